@@ -1,0 +1,287 @@
+"""Kernels of the index: sorting the entities of every world into cells, and blocks of queries with their candidates.
+
+A key packs (cell row, cell, rank) of an entity into 63 bits; the rank is its place in its world's list by id, so keys of a
+world are distinct and their order is unique, whatever the order before. Cells are floor(pos / cell) in absolute coordinates.
+Cells too far out for the bits left are clamped to the outermost one: still correct, only less selective.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from tussle.neighbors.lanes import LANES
+from tussle.neighbors.sort import sort_keys
+from tussle.numeric.kernel import device, kernel
+
+KEY_BITS = 62
+
+
+@device
+def rank_bits(n: int) -> int:
+    """Bits that hold the ranks of a world of n entities."""
+    bits = 1
+    while (1 << bits) < n:
+        bits += 1
+    return bits
+
+
+@device
+def cell_of(position: float, inverse_cell: float, limit: float) -> int:
+    """Cell number in [0, 2 limit]; NaN goes to cell 0. Never decreasing in position."""
+    cell = math.floor(position * inverse_cell)
+    cell = cell if cell > -limit else -limit
+    cell = cell if cell < limit else limit
+    return int(cell + limit)
+
+
+@kernel("I I I I Iw Iw Iw Iw Iw Iw Iw i8")
+def arrange(row_world, row_id, old_start, old_ids, keys, world_start, members, ids, fresh, scratch, sequence, n_worlds):
+    """New lists of the rows of each world by id, and the last sorted order carried over to them.
+
+    In: row_world, row_id (N,) of the new table; old_start (n_worlds + 1,), old_ids (old N,) by rank; keys (old N,) sorted.
+    Out: world_start (n_worlds + 1,), members (N,) rows by rank, ids (N,) by rank, fresh (N,) keys that hold only the rank, in
+    the old order, newcomers last. scratch (N,), sequence (max(N, old N),) are work space.
+    """
+    n = row_world.shape[0]
+    world_start[:] = 0
+    for row in range(n):
+        world_start[row_world[row] + 1] += 1
+    for w in range(n_worlds):
+        world_start[w + 1] += world_start[w]
+        sequence[w] = world_start[w]
+    for row in range(n):
+        w = row_world[row]
+        members[sequence[w]] = (row_id[row] << 32) | row
+        sequence[w] += 1
+    for w in range(n_worlds):
+        sort_keys(members, scratch, world_start[w], world_start[w + 1])
+    for k in range(n):
+        ids[k] = members[k] >> 32
+        members[k] &= 0xFFFFFFFF
+    for w in range(n_worlds):
+        start = world_start[w]
+        count = world_start[w + 1] - start
+        first = old_start[w]
+        n_old = old_start[w + 1] - first
+        new = 0
+        for k in range(n_old):
+            while new < count and ids[start + new] < old_ids[first + k]:
+                new += 1
+            stays = new < count and ids[start + new] == old_ids[first + k]
+            sequence[k] = new if stays else -1
+        mask = (1 << rank_bits(n_old)) - 1
+        for rank in range(count):
+            scratch[start + rank] = 0
+        done = start
+        for k in range(n_old):
+            rank = sequence[keys[first + k] & mask]
+            if rank >= 0:
+                fresh[done] = rank
+                scratch[start + rank] = 1
+                done += 1
+        for rank in range(count):
+            if scratch[start + rank] == 0:
+                fresh[done] = rank
+                done += 1
+
+
+@kernel("F F F F I I Iw Iw Iw Iw Fw Fw Fw Iw Iw Iw")
+def build(
+    x, y, z, inverse_cell, world_start, members, keys, scratch, order, place, sx, sy, sz, strip_start, strip_world, world_strip,
+):  # fmt: skip
+    """Sort the rows of every world by (cell row, cell, id) and note where each cell row (strip) begins.
+
+    x, y, z (N,) positions [m]; inverse_cell (n_worlds,) [1/m], 0 for one cell per world. keys (N,) hold ranks in their low bits on
+    entry, in any order, the last one for speed. strip_start (N + 1,), strip_world (N + 1,): first place and world of
+    each strip; world_strip (n_worlds + 1,): first strip of each world.
+    """
+    n_worlds = world_start.shape[0] - 1
+    n_strips = 0
+    for w in range(n_worlds):
+        start = world_start[w]
+        end = world_start[w + 1]
+        inverse = inverse_cell[w]
+        bits = rank_bits(end - start)
+        mask = (1 << bits) - 1
+        cell_bits = (KEY_BITS - bits) >> 1
+        limit = float((1 << (cell_bits - 1)) - 1)
+        world_strip[w] = n_strips
+        if inverse == 0.0:
+            for p in range(start, end):
+                keys[p] = p - start
+        else:
+            for p in range(start, end):
+                rank = keys[p] & mask
+                row = members[start + rank]
+                cell = (cell_of(y[row], inverse, limit) << cell_bits) | cell_of(x[row], inverse, limit)
+                keys[p] = (cell << bits) | rank
+            sort_keys(keys, scratch, start, end)
+        last = -1
+        for p in range(start, end):
+            key = keys[p]
+            row = members[start + (key & mask)]
+            order[p] = row
+            place[row] = p
+            sx[p] = x[row]
+            sy[p] = y[row]
+            sz[p] = z[row]
+            strip = key >> (bits + cell_bits)
+            if strip != last:
+                strip_start[n_strips] = p
+                strip_world[n_strips] = w
+            n_strips += strip != last
+            last = strip
+        strip_start[n_strips] = end
+    world_strip[n_worlds] = n_strips
+
+
+@kernel("I F F F I Fw Fw Fw")
+def update(rows, x, y, z, place, sx, sy, sz):
+    """Rows that moved and keep their places: x, y, z (n,) positions [m] of rows (n,)."""
+    for k in range(rows.shape[0]):
+        p = place[rows[k]]
+        sx[p] = x[k]
+        sy[p] = y[k]
+        sz[p] = z[k]
+
+
+@kernel("I I F F F i8 b1 Fw Fw Fw")
+def query_positions(queries, order, x, y, z, first, own, qx, qy, qz):
+    """Positions [m] by query from x, y, z: those of rows first ... (own), or by place."""
+    for k in range(queries.shape[0]):
+        p = queries[k]
+        i = order[p] - first if own else p
+        qx[k] = x[i]
+        qy[k] = y[i]
+        qz[k] = z[i]
+
+
+@kernel("I I I i8 i8 Iw Iw Iw -> i8")
+def group_queries(order, strip_start, world_strip, first, last, queries, block_first, block_strip):
+    """Places of rows [first, last) in sorted order, cut into blocks of up to LANES of one strip. Returns the number of blocks."""
+    n_strips = world_strip[world_strip.shape[0] - 1]
+    n_blocks = 0
+    done = 0
+    for strip in range(n_strips):
+        begin = done
+        for p in range(strip_start[strip], strip_start[strip + 1]):
+            row = order[p]
+            if done < last - first:
+                queries[done] = p
+            done += (row >= first) & (row < last)
+        while begin < done:
+            block_first[n_blocks] = begin
+            block_strip[n_blocks] = strip
+            n_blocks += 1
+            begin = min(begin + LANES, done)
+    block_first[n_blocks] = done
+    return n_blocks
+
+
+@device
+def lower_bound(keys: Any, start: int, end: int, bound: int) -> int:
+    """First place in [start, end) whose key is not below `bound`."""
+    while start < end:
+        middle = (start + end) >> 1
+        if keys[middle] < bound:
+            start = middle + 1
+        else:
+            end = middle
+    return start
+
+
+@device
+def step_to(keys: Any, start: int, end: int, bound: int, guess: int) -> int:
+    """As lower_bound, walking from a guess that is usually near."""
+    while guess > start and keys[guess - 1] >= bound:
+        guess -= 1
+    while guess < end and keys[guess] < bound:
+        guess += 1
+    return guess
+
+
+@kernel("F I I I I F F I I I i8 F Iw Iw Iw Iw Iw -> i8")
+def find_spans(
+    inverse_cell, world_start, keys, strip_start, world_strip, x, y, block_first, block_strip, strip_world, n_blocks,
+    reach, span_first, span_start, span_end, cursor, size,
+):  # fmt: skip
+    """Candidate runs of every block: all entities of its world within `reach` of a query, and more.
+
+    x, y (n,) positions [m] of the queries in query order; reach (n_worlds,) [m]; strip_world (n_strips,). cursor (3 n_strips,) work
+    space. Returns the number of spans, which may exceed the room in span_start (then call again with more). size[0] becomes the
+    largest number of candidates of one block.
+    """
+    room = span_start.shape[0]
+    n_strips = world_strip[world_strip.shape[0] - 1]
+    n_spans = 0
+    size[0] = 0
+    for k in range(2 * n_strips, 3 * n_strips):
+        cursor[k] = -1
+    for b in range(n_blocks):
+        span_first[b] = n_spans
+        own = block_strip[b]
+        w = strip_world[own]
+        start = world_start[w]
+        end = world_start[w + 1]
+        inverse = inverse_cell[w]
+        total = 0
+        if inverse == 0.0:
+            if n_spans < room:
+                span_start[n_spans] = start
+                span_end[n_spans] = end
+            n_spans += 1
+            size[0] = max(size[0], end - start)
+            continue
+        bits = rank_bits(end - start)
+        cell_bits = (KEY_BITS - bits) >> 1
+        limit = float((1 << (cell_bits - 1)) - 1)
+        west = x[block_first[b]]
+        east = west
+        south = y[block_first[b]]
+        north = south
+        for q in range(block_first[b] + 1, block_first[b + 1]):
+            west = min(west, x[q])
+            east = max(east, x[q])
+            south = min(south, y[q])
+            north = max(north, y[q])
+        low_row = cell_of(south - reach[w], inverse, limit)
+        high_row = cell_of(north + reach[w], inverse, limit)
+        low = cell_of(west - reach[w], inverse, limit)
+        high = cell_of(east + reach[w], inverse, limit) + 1
+        strip = own
+        while strip > world_strip[w] and keys[strip_start[strip - 1]] >> (bits + cell_bits) >= low_row:
+            strip -= 1
+        before = -1
+        while strip < world_strip[w + 1]:
+            row = keys[strip_start[strip]] >> (bits + cell_bits)
+            if row > high_row:
+                break
+            if row >= low_row:
+                begin = strip_start[strip]
+                stop = strip_start[strip + 1]
+                from_key = ((row << cell_bits) + low) << bits
+                to_key = ((row << cell_bits) + high) << bits
+                if cursor[2 * n_strips + strip] == own:
+                    i = step_to(keys, begin, stop, from_key, cursor[strip])
+                    j = step_to(keys, begin, stop, to_key, cursor[n_strips + strip])
+                else:
+                    i = lower_bound(keys, begin, stop, from_key)
+                    j = lower_bound(keys, i, stop, to_key)
+                    cursor[2 * n_strips + strip] = own
+                cursor[strip] = i
+                cursor[n_strips + strip] = j
+                if i < j:
+                    total += j - i
+                    if i == before:
+                        n_spans -= 1
+                    elif n_spans < room:
+                        span_start[n_spans] = i
+                    if n_spans < room:
+                        span_end[n_spans] = j
+                    before = j
+                    n_spans += 1
+            strip += 1
+        size[0] = max(size[0], total)
+    span_first[n_blocks] = n_spans
+    return n_spans

@@ -1,0 +1,228 @@
+"""Eight doubles in one SIMD register, as a value type inside kernels.
+
+A kernel that treats eight agents as lanes writes `dx = x - own_x` and `total += choose(inside, dx, 0.0)` for all
+eight at once. Every operation is the plain IEEE one per lane, in the order written, so a lane's bits do not depend on its
+neighbours or on the CPU: LLVM only picks the register width (one AVX-512 register, two AVX ones, four SSE ones).
+
+Relying on the loop vectoriser instead was slower by a factor of three: it keeps accumulators in memory between candidates.
+
+With the compiler off the same functions work on NumPy arrays of 8.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core.datamodel import models, register_default
+from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.extending import lower_builtin
+
+from tussle.numeric.kernel import device
+
+LANES = 8
+"""Agents per block. Eight doubles are one AVX-512 register; on narrower CPUs eight still amortise the candidate's loads."""
+
+_DOUBLES = ir.VectorType(ir.DoubleType(), LANES)
+_LONGS = ir.VectorType(ir.IntType(64), LANES)
+_BITS = ir.VectorType(ir.IntType(1), LANES)
+_RSQRT_MAGIC = 0x5FE6EB50C7B537A9
+
+
+class LanesType(types.Type):
+    """Numba type of eight doubles."""
+
+    def __init__(self) -> None:
+        super().__init__(name="Lanes8")
+
+
+class MaskType(types.Type):
+    """Numba type of eight truth values."""
+
+    def __init__(self) -> None:
+        super().__init__(name="Mask8")
+
+
+LANES_TYPE = LanesType()
+MASK_TYPE = MaskType()
+
+
+@register_default(LanesType)
+class _LanesModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, numba_type: Any) -> None:
+        super().__init__(manager, numba_type, _DOUBLES)
+
+
+@register_default(MaskType)
+class _MaskModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, numba_type: Any) -> None:
+        super().__init__(manager, numba_type, _BITS)
+
+
+def splat(value: Any) -> Any:
+    """Eight copies of one number."""
+    return np.full(LANES, value)
+
+
+def load(array: Any, start: int) -> Any:
+    """Elements start ... start + 7 of a contiguous float64 array; no bounds check, so the array has LANES spare elements."""
+    found = array[start : start + LANES]
+    return np.concatenate([found, np.zeros(LANES - len(found))])
+
+
+def store(array: Any, start: int, lanes: Any) -> None:
+    """Write eight lanes to elements start ... start + 7 of a contiguous float64 array; no bounds check."""
+    array[start : start + LANES] = lanes
+
+
+def choose(mask: Any, yes: Any, no: Any) -> Any:
+    """Per lane `yes` where the mask holds, else `no`; what is not chosen may be NaN."""
+    return np.where(mask, yes, no)
+
+
+def bits(mask: Any) -> int:
+    """The mask as an integer, lane 0 in the lowest bit."""
+    return int(np.packbits(mask, bitorder="little")[0])
+
+
+def lanes_sqrt(lanes: Any) -> Any:
+    """Correctly rounded square root per lane."""
+    return np.sqrt(lanes)
+
+
+def rsqrt_guess(lanes: Any) -> Any:
+    """1 / sqrt within 3.5 percent by integer arithmetic on the exponent: exact to reproduce on every machine."""
+    return (np.int64(_RSQRT_MAGIC) - (lanes.view(np.int64) >> 1)).view(np.float64)
+
+
+def _implement(function: Callable[..., Any], result: Any, *arguments: Any) -> Callable[[Any], Any]:
+    """Register the code generator that follows as `function(*arguments) -> result`."""
+
+    def register(generate: Any) -> Any:
+        class Template(AbstractTemplate):
+            key = function
+
+            def generic(self, args: Any, kws: Any) -> Any:
+                fits = len(args) == len(arguments) and all(
+                    given == wanted or (isinstance(wanted, type) and isinstance(given, wanted))
+                    for given, wanted in zip(args, arguments, strict=True)
+                )
+                return signature(result, *args) if fits and not kws else None
+
+        infer_global(function)(Template)
+        lower_builtin(function, *arguments)(generate)
+        return generate
+
+    return register
+
+
+def _splat(builder: Any, value: Any) -> Any:
+    zero = ir.Constant(ir.IntType(32), 0)
+    one = builder.insert_element(ir.Constant(_DOUBLES, ir.Undefined), value, zero)
+    places = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
+    return builder.shuffle_vector(one, ir.Constant(_DOUBLES, ir.Undefined), places)
+
+
+def _as_lanes(builder: Any, value: Any) -> Any:
+    return value if value.type == _DOUBLES else _splat(builder, value)
+
+
+def _pointer(context: Any, builder: Any, array_type: Any, array: Any, start: Any) -> Any:
+    data = context.make_array(array_type)(context, builder, value=array).data
+    return builder.bitcast(builder.gep(data, [start]), _DOUBLES.as_pointer())
+
+
+def _register_arithmetic() -> None:
+    for function, name in ((operator.add, "fadd"), (operator.sub, "fsub"), (operator.mul, "fmul"), (operator.truediv, "fdiv")):
+        inplace = getattr(operator, "i" + function.__name__)
+        for left, right in ((LANES_TYPE, LANES_TYPE), (LANES_TYPE, types.float64), (types.float64, LANES_TYPE)):
+
+            def generate(context: Any, builder: Any, sig: Any, args: Any, name: str = name) -> Any:
+                return getattr(builder, name)(_as_lanes(builder, args[0]), _as_lanes(builder, args[1]))
+
+            _implement(function, LANES_TYPE, left, right)(generate)
+            _implement(inplace, LANES_TYPE, left, right)(generate)
+
+
+def _register_comparisons() -> None:
+    for function, sign in ((operator.lt, "<"), (operator.le, "<="), (operator.gt, ">"), (operator.ge, ">="), (operator.ne, "!=")):
+        for right in (LANES_TYPE, types.float64):
+
+            def generate(context: Any, builder: Any, sig: Any, args: Any, sign: str = sign) -> Any:
+                return builder.fcmp_ordered(sign, args[0], _as_lanes(builder, args[1]))
+
+            _implement(function, MASK_TYPE, LANES_TYPE, right)(generate)
+
+
+_register_arithmetic()
+_register_comparisons()
+
+
+@_implement(operator.and_, MASK_TYPE, MASK_TYPE, MASK_TYPE)
+def _mask_and(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return builder.and_(*args)
+
+
+@_implement(operator.or_, MASK_TYPE, MASK_TYPE, MASK_TYPE)
+def _mask_or(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return builder.or_(*args)
+
+
+@_implement(splat, LANES_TYPE, types.float64)
+def _generate_splat(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return _splat(builder, args[0])
+
+
+@_implement(load, LANES_TYPE, types.Array, types.int64)
+def _generate_load(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return builder.load(_pointer(context, builder, sig.args[0], *args), align=8)
+
+
+@_implement(store, types.void, types.Array, types.int64, LANES_TYPE)
+def _generate_store(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    builder.store(args[2], _pointer(context, builder, sig.args[0], args[0], args[1]), align=8)
+    return context.get_dummy_value()
+
+
+def _generate_choose(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return builder.select(args[0], _as_lanes(builder, args[1]), _as_lanes(builder, args[2]))
+
+
+for _yes, _no in ((LANES_TYPE, LANES_TYPE), (LANES_TYPE, types.float64), (types.float64, LANES_TYPE), (types.float64, types.float64)):
+    _implement(choose, LANES_TYPE, MASK_TYPE, _yes, _no)(_generate_choose)
+
+
+@_implement(bits, types.int64, MASK_TYPE)
+def _generate_bits(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return builder.zext(builder.bitcast(args[0], ir.IntType(LANES)), ir.IntType(64))
+
+
+@_implement(lanes_sqrt, LANES_TYPE, LANES_TYPE)
+def _generate_sqrt(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return builder.call(builder.module.declare_intrinsic("llvm.sqrt", [_DOUBLES]), [args[0]])
+
+
+@_implement(rsqrt_guess, LANES_TYPE, LANES_TYPE)
+def _generate_guess(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    magic = ir.Constant(_LONGS, [_RSQRT_MAGIC] * LANES)
+    half = builder.lshr(builder.bitcast(args[0], _LONGS), ir.Constant(_LONGS, [1] * LANES))
+    return builder.bitcast(builder.sub(magic, half), _DOUBLES)
+
+
+@device
+def inverse_sqrt(square: Any) -> Any:
+    """1 / sqrt(square) per lane within 3 ulp; large and finite at 0.
+
+    Four Newton steps from an integer guess. Only multiplications and subtractions: a quarter of the time of a square root and
+    a division, and unlike the CPU's own estimate instruction the same bits everywhere.
+    """
+    half = 0.5 * square
+    root = rsqrt_guess(square)
+    root = root * (1.5 - half * (root * root))
+    root = root * (1.5 - half * (root * root))
+    root = root * (1.5 - half * (root * root))
+    return root * (1.5 - half * (root * root))
