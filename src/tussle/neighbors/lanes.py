@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 from numba import types
+from numba.core import cgutils
 from numba.core.datamodel import models, register_default
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import lower_builtin
@@ -77,6 +78,16 @@ def load(array: Any, start: int) -> Any:
 def store(array: Any, start: int, lanes: Any) -> None:
     """Write eight lanes to elements start ... start + 7 of a contiguous float64 array; no bounds check."""
     array[start : start + LANES] = lanes
+
+
+def load_some(array: Any, start: int, count: int) -> Any:
+    """As load, but lanes from `count` on are 0 and not read: for the end of an array."""
+    return load(array[: start + count], start)
+
+
+def store_some(array: Any, start: int, count: int, lanes: Any) -> None:
+    """As store, but lanes from `count` on are not written."""
+    array[start : start + count] = lanes[:count]
 
 
 def choose(mask: Any, yes: Any, no: Any) -> Any:
@@ -149,11 +160,12 @@ def _register_arithmetic() -> None:
 
 
 def _register_comparisons() -> None:
-    for function, sign in ((operator.lt, "<"), (operator.le, "<="), (operator.gt, ">"), (operator.ge, ">="), (operator.ne, "!=")):
+    for function, sign in ((operator.lt, "<"), (operator.le, "<="), (operator.gt, ">"), (operator.ge, ">="), (operator.eq, "=="), (operator.ne, "!=")):
         for right in (LANES_TYPE, types.float64):
 
             def generate(context: Any, builder: Any, sig: Any, args: Any, sign: str = sign) -> Any:
-                return builder.fcmp_ordered(sign, args[0], _as_lanes(builder, args[1]))
+                compare = builder.fcmp_unordered if sign == "!=" else builder.fcmp_ordered
+                return compare(sign, args[0], _as_lanes(builder, args[1]))
 
             _implement(function, MASK_TYPE, LANES_TYPE, right)(generate)
 
@@ -188,6 +200,38 @@ def _generate_store(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return context.get_dummy_value()
 
 
+def _first_lanes(builder: Any, count: Any) -> Any:
+    """Mask of the lanes below `count`."""
+    numbers = ir.Constant(_LONGS, list(range(LANES)))
+    zero = ir.Constant(ir.IntType(32), 0)
+    one = builder.insert_element(ir.Constant(_LONGS, ir.Undefined), count, zero)
+    places = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
+    return builder.icmp_signed("<", numbers, builder.shuffle_vector(one, ir.Constant(_LONGS, ir.Undefined), places))
+
+
+def _call_llvm(builder: Any, name: str, result: Any, arguments: list[Any]) -> Any:
+    function_type = ir.FunctionType(result, [a.type for a in arguments])
+    return builder.call(cgutils.get_or_insert_function(builder.module, function_type, name), arguments)
+
+
+@_implement(load_some, LANES_TYPE, types.Array, types.int64, types.int64)
+def _generate_load_some(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    pointer = _pointer(context, builder, sig.args[0], args[0], args[1])
+    align = ir.Constant(ir.IntType(32), 8)
+    rest = ir.Constant(_DOUBLES, [0.0] * LANES)
+    arguments = [pointer, align, _first_lanes(builder, args[2]), rest]
+    return _call_llvm(builder, f"llvm.masked.load.v{LANES}f64.p0", _DOUBLES, arguments)
+
+
+@_implement(store_some, types.void, types.Array, types.int64, types.int64, LANES_TYPE)
+def _generate_store_some(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    pointer = _pointer(context, builder, sig.args[0], args[0], args[1])
+    align = ir.Constant(ir.IntType(32), 8)
+    arguments = [args[3], pointer, align, _first_lanes(builder, args[2])]
+    _call_llvm(builder, f"llvm.masked.store.v{LANES}f64.p0", ir.VoidType(), arguments)
+    return context.get_dummy_value()
+
+
 def _generate_choose(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return builder.select(args[0], _as_lanes(builder, args[1]), _as_lanes(builder, args[2]))
 
@@ -203,7 +247,7 @@ def _generate_bits(context: Any, builder: Any, sig: Any, args: Any) -> Any:
 
 @_implement(lanes_sqrt, LANES_TYPE, LANES_TYPE)
 def _generate_sqrt(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    return builder.call(builder.module.declare_intrinsic("llvm.sqrt", [_DOUBLES]), [args[0]])
+    return _call_llvm(builder, f"llvm.sqrt.v{LANES}f64", _DOUBLES, [args[0]])
 
 
 @_implement(rsqrt_guess, LANES_TYPE, LANES_TYPE)
@@ -215,14 +259,14 @@ def _generate_guess(context: Any, builder: Any, sig: Any, args: Any) -> Any:
 
 @device
 def inverse_sqrt(square: Any) -> Any:
-    """1 / sqrt(square) per lane within 3 ulp; large and finite at 0.
+    """1 / sqrt(square) per lane within 3 ulp; finite at 0.
 
     Four Newton steps from an integer guess. Only multiplications and subtractions: a quarter of the time of a square root and
     a division, and unlike the CPU's own estimate instruction the same bits everywhere.
     """
     half = 0.5 * square
     root = rsqrt_guess(square)
-    root = root * (1.5 - half * (root * root))
-    root = root * (1.5 - half * (root * root))
-    root = root * (1.5 - half * (root * root))
-    return root * (1.5 - half * (root * root))
+    root = root * (1.5 - half * root * root)
+    root = root * (1.5 - half * root * root)
+    root = root * (1.5 - half * root * root)
+    return root * (1.5 - half * root * root)
