@@ -1,38 +1,116 @@
-"""Kernel decorators: one explicit signature, strict IEEE arithmetic, nothing compiled at import."""
+"""Kernel decorators: one explicit signature, strict IEEE arithmetic, nothing compiled at import, kept on disk by content.
+
+Codes of a signature: f8 i8 b1 u8 numbers; F I B U read-only 1-D contiguous arrays of float64, int64, bool, uint64; Fw Iw Bw Uw writable ones;
+F2 F2w ... 2-D C-contiguous. A result follows "->"; several results make a tuple.
+"""
 
 from __future__ import annotations
 
+import hashlib
+import platform
+import sys
+import threading
+import types
 from collections.abc import Callable
-from functools import update_wrapper
+from dataclasses import dataclass
+from functools import cache, update_wrapper
 from typing import Any
 
+import numpy as np
 
+from tussle.numeric import store
+from tussle.numeric.fingerprint import Fingerprint
+
+FORMAT = 1  # of the files; part of every key
+LETTERS = {"F": np.float64, "I": np.int64, "B": np.bool_, "U": np.uint64}
+NUMBERS: dict[str, tuple[type, ...]] = {
+    "f8": (float, int, np.floating, np.integer),
+    "i8": (int, np.integer),
+    "u8": (int, np.integer),
+    "b1": (bool, np.bool_),
+}
+
+
+@dataclass
+class Stats:
+    """How many kernels this process has compiled, and how many it has loaded from disk."""
+
+    compiled: int = 0
+    loaded: int = 0
+
+
+stats = Stats()
+_lock = threading.RLock()
+
+
+@cache
 def codes() -> dict[str, Any]:
     """Numba's type of each code of a kernel signature."""
-    from numba import boolean, float64, int64, types, uint64
+    from numba import boolean, float64, int64, uint64
+    from numba.core.types import Array
 
     table: dict[str, Any] = {"f8": float64, "i8": int64, "b1": boolean, "u8": uint64}
     for letter, dtype in {"F": float64, "I": int64, "B": boolean, "U": uint64}.items():
         for ndim, digit in ((1, ""), (2, "2")):
-            table[letter + digit] = types.Array(dtype, ndim, "C", readonly=True)
-            table[letter + digit + "w"] = types.Array(dtype, ndim, "C")
+            table[letter + digit] = Array(dtype, ndim, "C", readonly=True)
+            table[letter + digit + "w"] = Array(dtype, ndim, "C")
     return table
 
 
+@cache
+def environment() -> str:
+    """What every kernel's machine code depends on besides the code: versions, processor, settings of the compiler."""
+    import llvmlite
+    import numba
+    from numba.core import config
+    from numba.core.registry import cpu_target
+
+    settings = [config.OPT, config.LOOP_VECTORIZE, config.SLP_VECTORIZE, config.BOUNDSCHECK, config.DEBUGINFO_DEFAULT]
+    versions = [platform.python_implementation(), sys.version, numba.__version__, llvmlite.__version__, np.__version__]
+    return repr((FORMAT, versions, cpu_target.target_context.codegen().magic_tuple(), [str(setting) for setting in settings]))
+
+
+def renamed(function: Any, key: str) -> types.FunctionType:
+    """A copy whose name holds the key.
+
+    Symbols in the machine code are made of the qualified name and a number counted per process; functions of one name from files that
+    different processes wrote would otherwise meet under one symbol.
+    """
+    copy = types.FunctionType(function.__code__, function.__globals__, function.__name__, function.__defaults__, function.__closure__)
+    copy.__kwdefaults__ = function.__kwdefaults__
+    copy.__module__ = function.__module__
+    copy.__qualname__ = f"{function.__qualname__}_{key}"
+    return copy
+
+
 class Device:
-    """A small function that kernels call; compiled into its callers, without a cache of its own."""
+    """A small function that kernels call; compiled into its callers, with no file of its own.
+
+    Args:
+        function: The Python function, also found as `py_func`.
+    """
+
+    options: dict[str, Any] = {"error_model": "numpy", "forceinline": True}
 
     def __init__(self, function: Callable[..., Any]) -> None:
         self.py_func = function
         self._dispatcher: Any = None
+        self._digest = ""
         update_wrapper(self, function)
+
+    def refresh(self) -> None:
+        """Forget the compiled code if anything that it depends on has changed since, as a global redefined at the prompt."""
+        if self._dispatcher is not None and Fingerprint(self.py_func).digest != self._digest:
+            self._dispatcher = None
 
     @property
     def dispatcher(self) -> Any:
+        """Numba's dispatcher, made when first asked for."""
         if self._dispatcher is None:
             from numba import njit
 
-            self._dispatcher = njit(error_model="numpy", forceinline=True)(self.py_func)
+            self._digest = Fingerprint(self.py_func).digest
+            self._dispatcher = njit(**self.options)(renamed(self.py_func, self._digest))
         return self._dispatcher
 
     @property
@@ -49,31 +127,200 @@ def device(function: Callable[..., Any]) -> Any:
     return Device(function)
 
 
-class Kernel:
+class Kernel(Device):
+    """A function over arrays with one explicit signature, compiled or loaded from disk when first called.
+
+    Args:
+        function: The Python function, also found as `py_func`.
+        signature: Codes of the arguments, and of the results behind "->".
+
+    Raises:
+        ValueError: The signature has an unknown code, or not as many as the function has arguments.
+    """
+
+    options = {"error_model": "numpy"}
+
+    def __new__(cls, *args: Any) -> Kernel:
+        # A class of its own for each kernel: `__call__` is looked up on the class, and becomes Numba's dispatcher itself once that exists,
+        # so that a call costs hardly more than the dispatcher's.
+        return super().__new__(type("Kernel", (cls,), {"__slots__": ()}))
+
     def __init__(self, function: Callable[..., Any], signature: str) -> None:
-        self.py_func = function
+        super().__init__(function)
+        arguments, arrow, results = signature.partition("->")
         self.signature = signature
-        self._call: Any = None
-        update_wrapper(self, function)
+        self.arguments = tuple(arguments.split())
+        self.results = tuple(results.split())
+        known = set(NUMBERS) | {letter + rest for letter in LETTERS for rest in ("", "w", "2", "2w")}
+        wrong = [code for code in self.arguments + self.results if code not in known]
+        if wrong or (arrow and not self.results):
+            raise ValueError(f"kernel {self.name}: unknown code {wrong} in signature {signature!r}; there are: {', '.join(sorted(known))}")
+        n_arguments = self.py_func.__code__.co_argcount
+        if n_arguments != len(self.arguments):
+            raise ValueError(f"kernel {self.name} has {n_arguments} arguments, its signature {signature!r} has {len(self.arguments)}")
+        self._compiled: Any = None
+        self._main: Any = None
+
+    @property
+    def name(self) -> str:
+        """Module and qualified name."""
+        return f"{self.__module__}.{self.__qualname__}"
 
     @property
     def types(self) -> Any:
-        from numba import types
+        """The signature in Numba's types."""
+        from numba.core.types import Tuple, void
 
         table = codes()
-        arguments, _, result = self.signature.partition("->")
-        results = [table[code] for code in result.split()]
-        returned = types.void if not results else results[0] if len(results) == 1 else types.Tuple(results)
-        return returned(*[table[code] for code in arguments.split()])
+        results = [table[code] for code in self.results]
+        returned = void if not results else results[0] if len(results) == 1 else Tuple(results)
+        return returned(*[table[code] for code in self.arguments])
 
-    def __call__(self, *args: Any) -> Any:
-        if self._call is None:
-            from numba import njit
+    @property
+    def compiled(self) -> Any:
+        """Numba's compile result, loaded or compiled when first asked for."""
+        if self._compiled is None:
+            self._build()
+        return self._compiled
 
-            self._call = njit(self.types, error_model="numpy", nogil=True)(self.py_func)
-        return self._call(*args)
+    @property
+    def address(self) -> int:
+        """Address of the machine code under Numba's own calling convention."""
+        result = self.compiled
+        return int(result.library.get_pointer_to_function(result.fndesc.llvm_func_name))
+
+    def key(self) -> str:
+        """Hash of all that the machine code depends on."""
+        return self._key(Fingerprint(self.py_func))
+
+    def _key(self, reached: Fingerprint) -> str:
+        text = repr((reached.digest, self.arguments, self.results, sorted(self.options.items()), environment()))
+        return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
+
+    def assembly(self) -> str:
+        """Assembly text; compiled for the purpose where the kernel came from disk."""
+        with _lock:
+            dispatcher = self._new_dispatcher(self.key())
+            dispatcher.compile(self.types)
+        return "\n".join(dispatcher.inspect_asm().values())
+
+    def _new_dispatcher(self, key: str) -> Any:
+        from numba import njit
+
+        return njit(nogil=True, **self.options)(renamed(self.py_func, key))
+
+    def _build(self) -> None:
+        from numba.core.compiler_lock import global_compiler_lock
+
+        with _lock, global_compiler_lock:
+            if self._compiled is not None:  # another thread was faster
+                return
+            reached = Fingerprint(self.py_func)
+            key = self._key(reached)
+            main = self._new_dispatcher(key)
+            result = None if reached.opaque else load(self.name, key, main.targetctx)
+            if result is not None:
+                main.add_overload(result)
+                stats.loaded += 1
+            else:
+                for holder in reached.holders:
+                    if isinstance(holder, Device):
+                        holder.refresh()
+                main.compile(self.types)
+                result = next(iter(main.overloads.values()))
+                stats.compiled += 1
+                if not reached.opaque:
+                    save(self.name, key, result)
+            main._compile_for_args = self._accept
+            self._main = main
+            self._compiled = result
+            type(self).__call__ = staticmethod(main)  # type: ignore[method-assign]
+
+    def _accept(self, *args: Any) -> Any:
+        """Called by the dispatcher for types it has not met: register them if they fit the one signature, and never compile."""
+        from numba import typeof
+
+        names = self.py_func.__code__.co_varnames
+        for name, code, value in zip(names, self.arguments, args, strict=False):
+            wrong = mismatch(code, value)
+            if wrong:
+                raise TypeError(f"kernel {self.name}: argument {name!r} must be {expected(code)}, not {wrong}")
+        self._main._insert([typeof(value)._code for value in args], self._compiled.entry_point, False)
+        return self._compiled.entry_point
+
+    def __call__(self, *args: Any, **named: Any) -> Any:
+        self._build()
+        return self._main(*args, **named)
+
+    def __reduce__(self) -> str:
+        return self.__qualname__  # pickled by name, as a function is
 
 
 def kernel(signature: str) -> Callable[[Callable[..., Any]], Kernel]:
-    """Compile a function with one explicit signature, on its first call."""
+    """Compile a function with one explicit signature, on its first call, and keep it on disk."""
     return lambda function: Kernel(function, signature)
+
+
+def expected(code: str) -> str:
+    """A code in words."""
+    if code in NUMBERS:
+        return {"f8": "a number", "i8": "an integer", "u8": "an unsigned integer", "b1": "a bool"}[code]
+    ndim = "2-D C-contiguous" if "2" in code else "1-D contiguous"
+    return f"a {'writable ' if code.endswith('w') else ''}{ndim} {np.dtype(LETTERS[code[0]])} array"
+
+
+def mismatch(code: str, value: Any) -> str:
+    """What a value is instead of what the code asks for; "" where it fits."""
+    if code in NUMBERS:
+        return "" if isinstance(value, NUMBERS[code]) else f"{type(value).__name__} {value!r:.60}"
+    if not isinstance(value, np.ndarray):
+        return f"{type(value).__name__} {value!r:.60}"
+    flags = value.flags
+    good = value.dtype == LETTERS[code[0]] and value.ndim == (2 if "2" in code else 1) and flags.c_contiguous and flags.aligned
+    if good and (flags.writeable or not code.endswith("w")):
+        return ""
+    layout = "" if flags.c_contiguous else "non-contiguous "
+    return f"a {'' if flags.writeable else 'read-only '}{layout}{value.dtype} array of shape {value.shape}"
+
+
+def save(name: str, key: str, result: Any) -> None:
+    """Keep a compile result on disk, unless it holds addresses of this process."""
+    from numba.core.serialize import dumps
+
+    if result.library.has_dynamic_globals or result.lifted:
+        return
+    library, description, main, signature, _, _, _, reload_init, referenced = result._reduce()
+    if reload_init:
+        return
+    # Numba would keep the name of the module and import it when loading; a generated or user's module may not be importable, and its
+    # globals only serve Numba's object mode.
+    environments = [(each.consts, each.env_name) for each in (main, *referenced)]
+    store.save(name, key, dumps((library, description, signature, environments)))
+
+
+def load(name: str, key: str, target_context: Any) -> Any:
+    """A compile result from disk, None where there is none."""
+    from numba.core.compiler import CompileResult
+    from numba.core.runtime import nrt  # noqa: F401  (defines what the machine code links to)
+
+    target_context.refresh()
+    content = store.load(name, key)
+    if content is None:
+        return None
+    library, description, signature, environments = content
+    main, *referenced = [restored_environment(consts, env_name) for consts, env_name in environments]
+    parts = (library, description, main, signature, False, (), "", (), tuple(referenced))
+    return CompileResult._rebuild(target_context, *parts)
+
+
+def restored_environment(consts: list[Any], name: str) -> Any:
+    """The constants that machine code refers to by name."""
+    from numba.core.environment import Environment, lookup_environment
+
+    existing = lookup_environment(name)
+    if existing is not None:
+        return existing
+    restored = Environment({})
+    restored.consts[:] = consts
+    restored.env_name = name
+    return restored

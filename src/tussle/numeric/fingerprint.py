@@ -1,0 +1,250 @@
+"""What a kernel's machine code depends on: the code, constants and frozen globals of every function that it reaches.
+
+Numba's own disk cache looks at one source file only and runs old machine code after a callee or an imported constant was edited. Here a
+function is described by its bytecode and constants (neither line numbers nor comments nor its docstring), and by everything that its names
+stand for, followed through plain functions, jitted functions, closures, module attributes and overloads.
+"""
+
+from __future__ import annotations
+
+import builtins
+import dis
+import hashlib
+import sys
+import types
+from collections.abc import Callable, Iterator
+from enum import Enum
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+# Code of these changes only with a version that is part of every key.
+FIXED_PACKAGES = frozenset({"numba", "llvmlite", "numpy", "builtins"}) | sys.stdlib_module_names
+
+EXACT = frozenset(
+    "sqrt fabs floor ceil trunc copysign isnan isinf isfinite radians degrees gcd lcm fmod remainder modf frexp ldexp "
+    "absolute abs minimum maximum fmin fmax sign rint square negative positive add subtract multiply divide true_divide floor_divide "
+    "less less_equal greater greater_equal equal not_equal logical_and logical_or logical_not logical_xor bitwise_and bitwise_or "
+    "bitwise_xor invert left_shift right_shift signbit nextafter spacing".split()
+)
+
+
+class Fingerprint:
+    """A walk over all that a function reaches.
+
+    Attributes:
+        functions: The Python functions reached, the first one included.
+        holders: The objects with a `py_func` (devices, kernels, Numba's dispatchers) that stand for some of them.
+        libm: Names of functions reached that the machine's mathematical library computes, as "math.cos".
+        opaque: What was reached and cannot be described; code that depends on it must not be kept.
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self.functions: list[Any] = []
+        self.holders: list[Any] = []
+        self.libm: set[str] = set()
+        self.opaque: list[str] = []
+        self._hash = hashlib.blake2b(digest_size=16)
+        self._seen: dict[tuple[int, frozenset[str]], int] = {}
+        self._kept: list[Any] = []
+        self._visit(function, frozenset())
+        self.digest = self._hash.hexdigest()
+
+    def _write(self, *parts: str) -> None:
+        for part in parts:
+            data = part.encode("utf-8", "surrogatepass")
+            self._hash.update(b"%d:" % len(data) + data)
+
+    def _visit(self, value: Any, names: frozenset[str]) -> None:
+        text = constant(value)
+        if text is not None:
+            self._write("constant", text)
+            return
+        # A module is read once for every set of names that functions look up in it.
+        mark = (id(value), names) if isinstance(value, types.ModuleType) else (id(value), frozenset())
+        if mark in self._seen:
+            self._write("seen", str(self._seen[mark]))
+            return
+        self._seen[mark] = len(self._seen)
+        self._kept.append(value)  # an id stays with its object only while that lives
+        if isinstance(value, types.FunctionType):
+            self._visit_function(value)
+        elif isinstance(getattr(value, "py_func", None), types.FunctionType):
+            self.holders.append(value)
+            options = getattr(value, "targetoptions", None)
+            self._write("jitted", repr(sorted(options.items())) if isinstance(options, dict) else "")
+            self._visit(value.py_func, names)
+        elif isinstance(value, types.ModuleType):
+            self._visit_module(value, names)
+        elif isinstance(value, (tuple, list)):
+            self._write(type(value).__name__, str(len(value)))
+            for item in value:
+                self._visit(item, names)
+        elif isinstance(getattr(value, "_defn", None), types.FunctionType):  # an intrinsic of numba.extending
+            self._write("intrinsic")
+            self._visit(value._defn, names)
+        else:
+            self._visit_other(value)
+
+    def _visit_function(self, function: types.FunctionType) -> None:
+        if package(function) in FIXED_PACKAGES and function.__module__ != "__main__":
+            self._write("fixed", f"{function.__module__}.{function.__qualname__}")
+            self._note_libm(function)
+            return
+        self.functions.append(function)
+        code = function.__code__
+        self._write("function", code_text(code, function.__doc__))
+        self._visit(function.__defaults__, frozenset())
+        self._write(repr(sorted(function.__kwdefaults__ or ())))
+        self._visit(tuple((function.__kwdefaults__ or {}).values()), frozenset())
+        names = frozenset(names_of(code))
+        if has_power(code):
+            self.libm.add("**")
+        for name in sorted(names):
+            if name in function.__globals__:
+                self._write("global", name)
+                self._visit(function.__globals__[name], names)
+        for name, cell in zip(code.co_freevars, function.__closure__ or (), strict=True):
+            self._write("cell", name)
+            try:
+                contents = cell.cell_contents
+            except ValueError:  # not assigned yet
+                continue
+            self._visit(contents, names)
+        for implementation in overloads_of(function):
+            self._write("overload")
+            self._visit(implementation, frozenset())
+
+    def _visit_module(self, module: types.ModuleType, names: frozenset[str]) -> None:
+        # Every name of the function that is an attribute of the module, whether it is read from this module or not: following the
+        # bytecode would find fewer, and this finds never too few.
+        self._write("module", module.__name__)
+        for name in sorted(names):
+            if name in vars(module):
+                self._write("attribute", name)
+                self._visit(vars(module)[name], names)
+
+    def _visit_other(self, value: Any) -> None:
+        name = f"{getattr(value, '__module__', '')}.{getattr(value, '__qualname__', getattr(value, '__name__', ''))}"
+        if isinstance(value, np.ufunc):
+            self._write("ufunc", value.__name__)
+            self._note_libm(value)
+        elif isinstance(value, np.dtype):
+            self._write("dtype", repr(value))
+        elif isinstance(value, np.ndarray) and not value.dtype.hasobject:
+            self._write("array", repr(value.dtype), repr(value.shape), repr(value.flags.f_contiguous))
+            self._hash.update(value.tobytes())
+        elif isinstance(value, type) and issubclass(value, Enum):
+            self._write("enum", name, repr([(member.name, member.value) for member in value]))
+        elif isinstance(value, type) and issubclass(value, tuple) and hasattr(value, "_fields"):
+            self._write("fields", name, repr(value._fields))
+        elif package(value) in FIXED_PACKAGES or package(type(value)) in {"numba", "numpy"}:
+            self._write("fixed", name, repr(value) if package(type(value)) == "numba" else "")
+            self._note_libm(value)
+        else:
+            self._write("opaque", name)
+            self.opaque.append(f"{type(value).__qualname__} {name.strip('.')}".strip())
+
+    def _note_libm(self, function: Any) -> None:
+        name = getattr(function, "__name__", "")
+        if isinstance(function, np.ufunc):
+            if name not in EXACT:
+                self.libm.add(f"numpy.{name}")
+        elif getattr(function, "__module__", "") in ("math", "cmath") and name not in EXACT:
+            self.libm.add(f"{function.__module__}.{name}")
+
+
+def constant(value: Any) -> str | None:
+    """Text that tells an immutable constant from every other, None for anything else."""
+    if value is None or value is Ellipsis or isinstance(value, (bool, int, float, complex, str, bytes)):
+        if isinstance(value, Enum):
+            return f"{type(value).__qualname__}.{value.name}={value.value!r}"
+        return f"{type(value).__name__} {value!r}"
+    if isinstance(value, Enum):
+        return f"{type(value).__qualname__}.{value.name}={value.value!r}"
+    if isinstance(value, np.generic):
+        return f"{value.dtype!r} {value.tobytes().hex()}"
+    if isinstance(value, frozenset):
+        items = [constant(item) for item in value]
+        return None if None in items else f"frozenset {sorted(map(str, items))}"
+    if type(value) is tuple:
+        items = [constant(item) for item in value]
+        return None if None in items else f"tuple {items}"
+    return None
+
+
+def codes_of(code: types.CodeType) -> Iterator[types.CodeType]:
+    """The code object and all that are nested in it."""
+    yield code
+    for value in code.co_consts:
+        if isinstance(value, types.CodeType):
+            yield from codes_of(value)
+
+
+def names_of(code: types.CodeType) -> Iterator[str]:
+    """All global and attribute names that the code mentions."""
+    for each in codes_of(code):
+        yield from each.co_names
+
+
+@lru_cache(maxsize=None)
+def code_text(code: types.CodeType, doc: str | None) -> str:
+    """Everything of a code object that its compilation can depend on: no file, no line numbers, no docstring."""
+    constants = list(code.co_consts)
+    if doc is not None and constants and constants[0] == doc:
+        constants[0] = None
+    parts: list[Any] = [code.co_code.hex(), code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars]
+    parts += [code.co_argcount, code.co_kwonlyargcount, code.co_posonlyargcount, code.co_flags]
+    parts.append(getattr(code, "co_exceptiontable", b"").hex())
+    for value in constants:
+        parts.append(code_text(value, None) if isinstance(value, types.CodeType) else constant(value) or repr(value))
+    return repr(parts)
+
+
+@lru_cache(maxsize=None)
+def has_power(code: types.CodeType) -> bool:
+    """Whether the code raises to a power that is not a whole number written down (those become products)."""
+    for each in codes_of(code):
+        previous: Any = None
+        for instruction in dis.get_instructions(each):
+            if instruction.opname == "BINARY_OP" and instruction.argrepr.startswith("**"):
+                whole = previous.opname in ("LOAD_CONST", "LOAD_SMALL_INT") and isinstance(previous.argval, int)
+                if not whole:
+                    return True
+            if instruction.opname != "CACHE":
+                previous = instruction
+    return False
+
+
+def package(value: Any) -> str:
+    """Top-level package that defines a function, class or object."""
+    module = getattr(value, "__module__", None)
+    if module is None and isinstance(value, types.BuiltinFunctionType):
+        module = builtins.__name__
+    return str(module or "").partition(".")[0]
+
+
+_overloads: dict[int, list[Any]] = {}
+_overloads_read = 0
+
+
+def overloads_of(function: types.FunctionType) -> list[Any]:
+    """What numba.extending.overload has registered as the jitted meaning of a plain function."""
+    global _overloads_read
+    templates = sys.modules.get("numba.core.typing.templates")
+    if templates is None:
+        return []
+    entries = templates.builtin_registry.globals
+    for value, kind in entries[_overloads_read:]:
+        for template in getattr(kind, "templates", ()):
+            implementation = getattr(template, "_overload_func", None)
+            if implementation is not None:
+                _overloads.setdefault(id(value), []).append(implementation)
+    _overloads_read = len(entries)
+    return _overloads.get(id(function), [])
+
+
+def uses_libm(function: Callable[..., Any]) -> bool:
+    """Whether the function, or any that it reaches, calls the machine's mathematical library: its results are then not portable."""
+    return bool(Fingerprint(function).libm)

@@ -1,0 +1,144 @@
+"""The one Runge-Kutta integrator: fourth order, fixed steps, every row by itself, the derivative a compiled function."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Sequence
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tussle.errors import DeclarationError, listed, nearest_name
+from tussle.numeric.kernel import Device, Kernel, device, kernel
+
+Floats = NDArray[np.float64]
+DERIVATIVE = "Fw Fw Fw Fw"  # x (m,), u (k,), p (q,), dx (m,)
+
+
+def compile_derivative(
+    function: Callable[..., Any], x_names: Sequence[str], u_names: Sequence[str], p_names: Sequence[str]
+) -> Kernel:
+    """A state equation written with named numbers, as a kernel `void(x, u, p, dx)` over arrays.
+
+    Args:
+        function: Takes any of the names, in any order, and returns the time derivative of every state in the order of `x_names` (a
+            number where there is one state). What can be compiled is what Numba can; `math.cos` and its like make it depend on the machine.
+        x_names: States.
+        u_names: Inputs.
+        p_names: Parameters.
+
+    Raises:
+        DeclarationError: An argument is none of the names, or a name is used twice.
+    """
+    where: dict[str, str] = {}
+    for array, names in (("x", x_names), ("u", u_names), ("p", p_names)):
+        for place, name in enumerate(names):
+            if name in where:
+                raise DeclarationError(f"{label(function)}: {name!r} is declared twice among states, inputs and parameters")
+            where[name] = f"{array}[{place}]"
+    arguments = list(inspect.signature(function).parameters)
+    for name in arguments:
+        if name not in where:
+            raise DeclarationError(
+                f"{label(function)}: argument {name!r} is no state, input or parameter{nearest_name(name, where)}; {listed(where)}"
+            )
+    targets = ", ".join(f"dx[{place}]" for place in range(len(x_names)))
+    values = ", ".join(where[name] for name in arguments)
+    scope: dict[str, Any] = {"function": function if isinstance(function, (Device, Kernel)) else device(function)}
+    exec(f"def derivative(x, u, p, dx):\n    {targets} = function({values})\n", scope)
+    wrapper = scope["derivative"]
+    wrapper.__module__ = function.__module__
+    wrapper.__qualname__ = f"{function.__qualname__}.wrapper"
+    return kernel(DERIVATIVE)(wrapper)
+
+
+def label(function: Callable[..., Any]) -> str:
+    """The function's name with its file and line, for messages."""
+    plain = getattr(function, "py_func", function)
+    code = plain.__code__
+    return f"{code.co_filename}:{code.co_firstlineno}: {plain.__qualname__}"
+
+
+@cache
+def driver() -> Kernel:
+    """The integrating kernel; built when first used, because importing this module must not import the compiler."""
+    from numba import types
+    from numba.core import cgutils
+    from numba.extending import intrinsic
+
+    array = types.Array(types.float64, 1, "C")
+
+    @intrinsic
+    def call(typingctx, address, x, u, p, dx):  # type: ignore[no-untyped-def]
+        """Call the compiled derivative at an address. A first-class function object would cost microseconds per call to unbox."""
+
+        def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
+            arguments = signature.args[1:]
+            kind = context.call_conv.get_function_type(types.none, arguments)
+            pointer = builder.inttoptr(args[0], kind.as_pointer())
+            status, _ = context.call_conv.call_function(builder, pointer, types.none, arguments, args[1:])
+            with cgutils.if_unlikely(builder, status.is_error):
+                context.call_conv.return_status_propagate(builder, status)
+            return context.get_dummy_value()
+
+        return types.none(types.uint64, array, array, array, array), generate
+
+    @kernel("u8 F2w F2 F2 f8 i8")
+    def rk4_rows(address, states, inputs, params, dt, substeps):  # type: ignore[no-untyped-def]
+        m, n = states.shape
+        h = dt / substeps
+        x = np.empty(m)
+        y = np.empty(m)
+        u = np.empty(inputs.shape[0])
+        p = np.empty(params.shape[0])
+        k1 = np.empty(m)
+        k2 = np.empty(m)
+        k3 = np.empty(m)
+        k4 = np.empty(m)
+        for i in range(n):
+            for j in range(m):
+                x[j] = states[j, i]
+            for j in range(u.shape[0]):
+                u[j] = inputs[j, i]
+            for j in range(p.shape[0]):
+                p[j] = params[j, i]
+            for _ in range(substeps):
+                call(address, x, u, p, k1)
+                for j in range(m):
+                    y[j] = x[j] + 0.5 * h * k1[j]
+                call(address, y, u, p, k2)
+                for j in range(m):
+                    y[j] = x[j] + 0.5 * h * k2[j]
+                call(address, y, u, p, k3)
+                for j in range(m):
+                    y[j] = x[j] + h * k3[j]
+                call(address, y, u, p, k4)
+                for j in range(m):
+                    x[j] = x[j] + h / 6.0 * (k1[j] + 2.0 * k2[j] + 2.0 * k3[j] + k4[j])
+            for j in range(m):
+                states[j, i] = x[j]
+
+    return rk4_rows
+
+
+def rk4(derivative: Kernel, states: Floats, inputs: Floats, params: Floats, dt: float, substeps: int = 1) -> None:
+    """Advance all rows by dt in equal substeps, inputs and parameters held.
+
+    Args:
+        derivative: From `compile_derivative`.
+        states: (m, n), updated in place.
+        inputs: (k, n).
+        params: (q, n).
+        dt: Time to advance [s].
+        substeps: Number of Runge-Kutta steps in it.
+
+    Raises:
+        ValueError: The arrays differ in their number of rows, or there is no substep.
+    """
+    if not states.shape[1] == inputs.shape[1] == params.shape[1]:
+        raise ValueError(f"rk4: states {states.shape}, inputs {inputs.shape} and params {params.shape} must have equally many columns")
+    if substeps < 1:
+        raise ValueError(f"rk4: substeps must be at least 1, not {substeps}")
+    driver()(derivative.address, states, inputs, params, dt, substeps)
