@@ -2,5 +2,6 @@
 
 from tussle.neighbors.index import Blocks, Index
 from tussle.neighbors.lanes import LANES
+from tussle.neighbors.queries import Pairs, nearest, pairs
 
-__all__ = ["LANES", "Blocks", "Index"]
+__all__ = ["LANES", "Blocks", "Index", "Pairs", "nearest", "pairs"]

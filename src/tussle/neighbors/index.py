@@ -15,8 +15,10 @@ Floats = NDArray[np.float64]
 Longs = NDArray[np.int64]
 
 RINGS = 2
-"""Cells per reach. With 2, a block's box is about as high as it is long at the densities where time is spent (measured best
-of 1 to 4 from 500 entities up; 1 is a few microseconds better at 200)."""
+"""Cells per reach of a world: with 2 a block's box is about as high as it is long where time is spent (best of 1 to 3 at 2000)."""
+
+SPARSE_WORLD = 400
+"""Below this many entities one cell per reach is faster: fuller blocks (1.0 against 1.3 us per entity at 110, even at 500)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,20 +78,30 @@ class Index:
             self.world_start, self.members, new_ids, fresh, self._scratch, sequence, n_worlds,
         )  # fmt: skip
         self._keys, self._ids = fresh, new_ids
+        self.row_world = np.array(world, np.int64)
         self.order, self.place = np.zeros(n, np.int64), np.zeros(n, np.int64)
         self.sx, self.sy, self.sz = padded(n), padded(n), padded(n)
         self._strip_start, self._strip_world = np.zeros(n + 1, np.int64), np.zeros(n + 1, np.int64)
         self._world_strip = np.zeros(n_worlds + 1, np.int64)
         self._inverse_cell = np.zeros(n_worlds)
         self.reach = np.zeros(n_worlds)
+        self._rings = np.where(np.diff(self.world_start) < SPARSE_WORLD, 1.0, RINGS)
         self._cursor = np.zeros(3 * n, np.int64)
         self._size = np.zeros(1, np.int64)
         self._fixed = False
+        self._built = 0
         self._cache.clear()
 
     @property
     def n_worlds(self) -> int:
         return len(self.reach)
+
+    @property
+    def table(self) -> tuple[Longs, Longs, Longs, Longs, Floats, Floats, Floats, Floats]:
+        """world_start, keys, strip_start, world_strip, inverse_cell, sx, sy, sz: what the kernels of `search` take."""
+        return (
+            self.world_start, self._keys, self._strip_start, self._world_strip, self._inverse_cell, self.sx, self.sy, self.sz
+        )  # fmt: skip
 
     def build(self, x: Floats, y: Floats, z: Floats, reach: Floats) -> None:
         """Sort positions x, y, z (N,) [m] into cells. `reach` (n_worlds,) [m]: distance up to which blocks find everyone.
@@ -98,7 +110,7 @@ class Index:
         """
         if not np.array_equal(reach, self.reach) or not self._built:
             self.reach = np.array(reach, np.float64)
-            self._inverse_cell = RINGS / np.where(self.reach > 0.0, self.reach, 1.0)
+            self._inverse_cell = self._rings / np.where(self.reach > 0.0, self.reach, 1.0)
             self._cache.clear()
             self._fixed = bool(np.isinf(self.reach).all())
         self._built += 1
@@ -114,7 +126,7 @@ class Index:
     def gather(self, column: Floats) -> Floats:
         """A float column of the table by place, (N,), with LANES spare elements behind the end."""
         out = padded(len(column))
-        np.take(column, self.order, out=out)
+        kernels.gather(column, self.order, out)
         return out
 
     def blocks(self, first: int, last: int, pos: tuple[Floats, Floats, Floats] | None = None) -> Blocks:

@@ -146,6 +146,13 @@ def update(rows, x, y, z, place, sx, sy, sz):
         sz[p] = z[k]
 
 
+@kernel("F I Fw")
+def gather(column, order, out):
+    """out[p] = column[order[p]]."""
+    for p in range(order.shape[0]):
+        out[p] = column[order[p]]
+
+
 @kernel("I I F F F i8 b1 Fw Fw Fw")
 def query_positions(queries, order, x, y, z, first, own, qx, qy, qz):
     """Positions [m] by query from x, y, z: those of rows first ... (own), or by place."""

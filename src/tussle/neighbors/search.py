@@ -1,0 +1,296 @@
+"""Kernels of range and nearest-neighbour queries. The query's position is given: it may differ from the table's (a belief).
+
+A `table` is the tuple (world_start, keys, strip_start, world_strip, inverse_cell, sx, sy, sz, team) of an index, `team` by place
+as float64. A team filter is a mode, ANY, SAME or DIFFERENT, and the number it compares with.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from tussle.neighbors.kernels import KEY_BITS, cell_of, lower_bound, rank_bits
+from tussle.neighbors.lanes import LANES, bits, load
+from tussle.numeric.kernel import device, kernel
+
+ANY, SAME, DIFFERENT = 0, 1, 2
+
+SMALL_WORLD = 3000
+"""Up to this many entities the nearest is sought by looking at all: 8 at a time that costs 0.25 ns each."""
+
+ROUNDING_CELLS = 1e-6
+"""How far floor(pos / cell) may be off by rounding, in cells: positions reach 2^30 cells at 53 bits."""
+
+
+@device
+def squares(sx, sy, sz, p, x, y, z):
+    """Squared distances of places p ... p + 7 from a point."""
+    dx = load(sx, p) - x
+    dy = load(sy, p) - y
+    dz = load(sz, p) - z
+    return dx * dx + dy * dy + dz * dz
+
+
+@device
+def chosen(hit, team, p, mode, wanted):
+    """The bits of `hit` whose teams pass the filter."""
+    if mode == ANY:
+        return hit
+    same = bits(load(team, p) == wanted)
+    return hit & same if mode == SAME else hit & ~same
+
+
+@device
+def range_run(me, x, y, z, radius2, mode, wanted, table, start, end, found, done):
+    """Append the places in [start, end) nearer than the radius to `found`, as far as there is room; returns how many in all."""
+    sx, sy, sz, team = table[5], table[6], table[7], table[8]
+    for p in range(start, end, LANES):
+        hit = bits(squares(sx, sy, sz, p, x, y, z) < radius2) & ((1 << min(LANES, end - p)) - 1)
+        if hit != 0:
+            hit = chosen(hit, team, p, mode, wanted)
+            for k in range(LANES):
+                if ((hit >> k) & 1) != 0 and p + k != me:
+                    if done < found.shape[0]:
+                        found[done] = p + k
+                    done += 1
+    return done
+
+
+@device
+def first_strip(keys, strip_start, start, end, shift, row):
+    """First of the strips [start, end) whose row is not below `row`."""
+    while start < end:
+        middle = (start + end) >> 1
+        if keys[strip_start[middle]] >> shift < row:
+            start = middle + 1
+        else:
+            end = middle
+    return start
+
+
+@device
+def in_range(w, me, x, y, z, radius, mode, wanted, table, found, done):
+    """Append the places of world w nearer than `radius` to (x, y, z) to `found`, in order; `me` is the place left out."""
+    world_start, keys, strip_start, world_strip, inverse_cell = table[0], table[1], table[2], table[3], table[4]
+    start = world_start[w]
+    end = world_start[w + 1]
+    inverse = inverse_cell[w]
+    radius2 = radius * radius
+    if not radius > 0.0:
+        return done
+    if inverse == 0.0 or end - start <= 2 * LANES:
+        return range_run(me, x, y, z, radius2, mode, wanted, table, start, end, found, done)
+    n_bits = rank_bits(end - start)
+    cell_bits = (KEY_BITS - n_bits) >> 1
+    shift = n_bits + cell_bits
+    limit = float((1 << (cell_bits - 1)) - 1)
+    high_row = cell_of(y + radius, inverse, limit)
+    low = cell_of(x - radius, inverse, limit)
+    high = cell_of(x + radius, inverse, limit) + 1
+    last = world_strip[w + 1]
+    strip = first_strip(keys, strip_start, world_strip[w], last, shift, cell_of(y - radius, inverse, limit))
+    while strip < last:
+        row = keys[strip_start[strip]] >> shift
+        if row > high_row:
+            break
+        stop = strip_start[strip + 1]
+        i = lower_bound(keys, strip_start[strip], stop, ((row << cell_bits) + low) << n_bits)
+        j = lower_bound(keys, i, stop, ((row << cell_bits) + high) << n_bits)
+        done = range_run(me, x, y, z, radius2, mode, wanted, table, i, j, found, done)
+        strip += 1
+    return done
+
+
+@device
+def insert(square, rank, place, best, ranks, places, k):
+    """Put a candidate into the k best by (squared distance, rank); returns the distance that the next must not exceed."""
+    if square > best[k - 1] or (square == best[k - 1] and rank > ranks[k - 1]):
+        return best[k - 1]
+    j = k - 1
+    while j > 0 and (best[j - 1] > square or (best[j - 1] == square and ranks[j - 1] > rank)):
+        best[j] = best[j - 1]
+        ranks[j] = ranks[j - 1]
+        places[j] = places[j - 1]
+        j -= 1
+    best[j] = square
+    ranks[j] = rank
+    places[j] = place
+    return best[k - 1]
+
+
+@device
+def nearest_run(me, x, y, z, mode, wanted, table, mask, start, end, worst, best, ranks, places, k):
+    """Offer the places in [start, end) to the k best; returns the distance that the next must not exceed."""
+    keys, sx, sy, sz, team = table[1], table[5], table[6], table[7], table[8]
+    for p in range(start, end, LANES):
+        hit = bits(squares(sx, sy, sz, p, x, y, z) <= worst) & ((1 << min(LANES, end - p)) - 1)
+        if hit != 0:
+            hit = chosen(hit, team, p, mode, wanted)
+            for lane in range(LANES):
+                q = p + lane
+                if ((hit >> lane) & 1) != 0 and q != me:
+                    dx, dy, dz = sx[q] - x, sy[q] - y, sz[q] - z
+                    worst = insert(dx * dx + dy * dy + dz * dz, keys[q] & mask, q, best, ranks, places, k)
+    return worst
+
+
+@device
+def too_far(cells, cell, worst):
+    """Whether everything `cells` cells away is farther than `worst`, a squared distance, whatever the rounding."""
+    gap = (cells - 1.0 - ROUNDING_CELLS) * cell
+    return gap > 0.0 and gap * gap * (1.0 - 1e-12) > worst
+
+
+@device
+def nearest_in_strip(me, x, y, z, own, mode, wanted, table, shape, start, end, worst, best, ranks, places, k):
+    """Offer a strip to the k best, outward from cell `own`, LANES places at a time, as far as cells can matter."""
+    n_bits, cell_bits, cell = shape
+    keys = table[1]
+    mask = (1 << n_bits) - 1
+    cells = (1 << cell_bits) - 1
+    row = keys[start] >> (n_bits + cell_bits)
+    middle = lower_bound(keys, start, end, ((row << cell_bits) + own) << n_bits)
+    p = middle
+    while p < end and not too_far(float(((keys[p] >> n_bits) & cells) - own), cell, worst):
+        stop = min(p + LANES, end)
+        worst = nearest_run(me, x, y, z, mode, wanted, table, mask, p, stop, worst, best, ranks, places, k)
+        p = stop
+    p = middle
+    while p > start and not too_far(float(own - ((keys[p - 1] >> n_bits) & cells)), cell, worst):
+        begin = max(p - LANES, start)
+        worst = nearest_run(me, x, y, z, mode, wanted, table, mask, begin, p, worst, best, ranks, places, k)
+        p = begin
+    return worst
+
+
+@device
+def nearest_places(w, me, x, y, z, mode, wanted, table, best, ranks, places, k):
+    """The k nearest places of world w by (squared distance, rank) into `best`, `ranks`, `places`; -1 where there are fewer."""
+    world_start, keys, strip_start, world_strip, inverse_cell = table[0], table[1], table[2], table[3], table[4]
+    for j in range(k):
+        best[j] = np.inf
+        ranks[j] = 1 << KEY_BITS
+        places[j] = -1
+    start = world_start[w]
+    end = world_start[w + 1]
+    inverse = inverse_cell[w]
+    n_bits = rank_bits(end - start)
+    worst = np.inf
+    if inverse == 0.0 or end - start <= SMALL_WORLD:
+        nearest_run(me, x, y, z, mode, wanted, table, (1 << n_bits) - 1, start, end, worst, best, ranks, places, k)
+        return
+    cell_bits = (KEY_BITS - n_bits) >> 1
+    limit = float((1 << (cell_bits - 1)) - 1)
+    shape = (n_bits, cell_bits, 1.0 / inverse)
+    shift = n_bits + cell_bits
+    row = cell_of(y, inverse, limit)
+    own = cell_of(x, inverse, limit)
+    up = first_strip(keys, strip_start, world_strip[w], world_strip[w + 1], shift, row)
+    down = up - 1
+    while True:
+        above = float((keys[strip_start[up]] >> shift) - row) if up < world_strip[w + 1] else np.inf
+        below = float(row - (keys[strip_start[down]] >> shift)) if down >= world_strip[w] else np.inf
+        if min(above, below) == np.inf or too_far(min(above, below), shape[2], worst):
+            return
+        strip = up if above <= below else down
+        worst = nearest_in_strip(
+            me, x, y, z, own, mode, wanted, table, shape, strip_start[strip], strip_start[strip + 1], worst, best, ranks, places, k
+        )
+        if strip == up:
+            up += 1
+        else:
+            down -= 1
+
+
+@kernel("F F F F i8 F I I i8 I I I I F F F F F I Iw Iw i8 i8")
+def pair_places(
+    x, y, z, radius, mode, wanted, row_world, place, first, world_start, keys, strip_start, world_strip, inverse_cell, sx, sy, sz,
+    team, start, count, found, begin, stop,
+):  # fmt: skip
+    """Places near each of the rows begin ... stop - 1 of a group that begins at row `first` of the table.
+
+    x, y, z (n,) positions [m], radius (n,) [m], wanted (n,) teams. Writes count (n,); with room in `found` also the places, those of
+    row i from start[i] on.
+    """
+    table = (world_start, keys, strip_start, world_strip, inverse_cell, sx, sy, sz, team)
+    for i in range(begin, stop):
+        row = first + i
+        w = row_world[row]
+        into = found[start[i] :] if found.shape[0] > 0 else found
+        count[i] = in_range(w, place[row], x[i], y[i], z[i], radius[i], mode, wanted[i], table, into, 0)
+
+
+@kernel("F F F I I F F F I Iw Iw F2w Fw i8 i8")
+def pair_columns(x, y, z, start, found, sx, sy, sz, order, row, other, offset, distance, begin, stop):
+    """What pairs are asked for, by pair: row of the group, row of the table, offset (3, m) [m], distance [m]."""
+    for i in range(begin, stop):
+        for k in range(start[i], start[i + 1]):
+            p = found[k]
+            dx, dy, dz = sx[p] - x[i], sy[p] - y[i], sz[p] - z[i]
+            row[k] = i
+            other[k] = order[p]
+            offset[0, k] = dx
+            offset[1, k] = dy
+            offset[2, k] = dz
+            distance[k] = math.sqrt(dx * dx + dy * dy + dz * dz)
+
+
+@kernel("F F F i8 i8 F I I i8 I I I I F F F F F I I2w F2w i8 i8")
+def nearest_rows(
+    x, y, z, k, mode, wanted, row_world, place, first, world_start, keys, strip_start, world_strip, inverse_cell, sx, sy, sz, team,
+    order, other, square, begin, stop,
+):  # fmt: skip
+    """The k nearest rows of the table, other (k, n) or -1, and their squared distances [m^2], (k, n), for rows begin ... stop - 1."""
+    table = (world_start, keys, strip_start, world_strip, inverse_cell, sx, sy, sz, team)
+    best, ranks, places = np.empty(k), np.empty(k, np.int64), np.empty(k, np.int64)
+    for i in range(begin, stop):
+        row = first + i
+        nearest_places(row_world[row], place[row], x[i], y[i], z[i], mode, wanted[i], table, best, ranks, places, k)
+        for j in range(k):
+            other[j, i] = order[places[j]] if places[j] >= 0 else -1
+            square[j, i] = best[j]
+
+
+@kernel("I F Fw")
+def segment_sum(start, values, out):
+    """Sums of values[start[i] : start[i + 1]], one after another; 0 of none."""
+    for i in range(out.shape[0]):
+        total = 0.0
+        for k in range(start[i], start[i + 1]):
+            total += values[k]
+        out[i] = total
+
+
+@kernel("I F Fw f8")
+def segment_mean(start, values, out, empty):
+    """Means of values[start[i] : start[i + 1]], summed one after another; `empty` of none."""
+    for i in range(out.shape[0]):
+        total = 0.0
+        for k in range(start[i], start[i + 1]):
+            total += values[k]
+        n = start[i + 1] - start[i]
+        out[i] = total / n if n > 0 else empty
+
+
+@kernel("I F Fw f8")
+def segment_min(start, values, out, empty):
+    """Least of values[start[i] : start[i + 1]]; `empty` of none."""
+    for i in range(out.shape[0]):
+        least = empty
+        for k in range(start[i], start[i + 1]):
+            least = values[k] if k == start[i] or values[k] < least else least
+        out[i] = least
+
+
+@kernel("I F Iw")
+def segment_first_min(start, values, out):
+    """Where values[start[i] : start[i + 1]] is least, the first of equals; -1 of none."""
+    for i in range(out.shape[0]):
+        at = -1
+        for k in range(start[i], start[i + 1]):
+            if at < 0 or values[k] < values[at]:
+                at = k
+        out[i] = at
+
+
