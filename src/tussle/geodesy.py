@@ -1,0 +1,127 @@
+"""Where the local frame lies on Earth: East-North-Up on the tangent plane at an origin, to and from WGS84 coordinates.
+
+pymap3d would do the same with NumPy's sin and cos, whose last bits differ between machines; start positions given by latitude
+and longitude would then carry that difference into every later step.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from tussle.errors import ParameterError
+from tussle.numeric import atan2, cos, sin
+
+# NGA.STND.0036, Department of Defense World Geodetic System 1984 (2014), table 3.1: both defining, exact.
+SEMI_MAJOR = 6378137.0
+FLATTENING = 1.0 / 298.257223563
+
+SEMI_MINOR = SEMI_MAJOR * (1.0 - FLATTENING)
+ECCENTRICITY_SQUARED = FLATTENING * (2.0 - FLATTENING)
+SECOND_ECCENTRICITY_SQUARED = ECCENTRICITY_SQUARED / (1.0 - ECCENTRICITY_SQUARED)
+# Bowring's first step is good to 1e-9 rad from 100 km below the ground to far outside; each further one gains more digits than
+# that, so the second is at rounding and the third is margin for orbits.
+LATITUDE_STEPS = 3
+
+
+@dataclass(frozen=True)
+class Origin:
+    """The point of Earth where the world's frame touches it; z counts from its altitude along its vertical.
+
+    The default lies in Houston: what the mission format's documented default (latitude -95, longitude 29) says with its two
+    numbers the right way round.
+
+    Args:
+        latitude: Geodetic latitude on WGS84, north positive [rad].
+        longitude: East positive [rad].
+        altitude: Height above the ellipsoid [m].
+
+    Raises:
+        ParameterError: A value is not finite or the latitude is beyond a pole.
+    """
+
+    latitude: float = math.radians(29.0)
+    longitude: float = math.radians(-95.0)
+    altitude: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("latitude", "longitude", "altitude"):
+            value = float(getattr(self, name))
+            if not math.isfinite(value):
+                raise ParameterError(f"Origin.{name} = {value!r} is not allowed; it takes a finite number")
+            object.__setattr__(self, name, value)
+        limits = {"latitude": math.pi / 2.0, "longitude": 2.0 * math.pi}
+        for name, limit in limits.items():
+            value = getattr(self, name)
+            if abs(value) > limit:
+                raise ParameterError(
+                    f"Origin.{name} = {value!r} is not allowed; it takes radians within +-{limit:.6g} (for degrees: Origin.from_degrees)"
+                )
+
+    @classmethod
+    def from_degrees(cls, latitude: float, longitude: float, altitude: float = 0.0) -> Origin:
+        """An origin from latitude and longitude in degrees and altitude in metres."""
+        return cls(math.radians(latitude), math.radians(longitude), altitude)
+
+    def from_geodetic(self, geodetic: np.ndarray) -> np.ndarray:
+        """World positions of points of Earth.
+
+        Args:
+            geodetic: Latitude [rad], longitude [rad], altitude above the ellipsoid [m], (3, n) or (3,).
+
+        Returns:
+            East, north, up [m], same shape.
+        """
+        latitude, longitude, altitude = np.asarray(geodetic, np.float64)
+        x, y, z = _earth_centred(sin(latitude), cos(latitude), sin(longitude), cos(longitude), altitude)
+        (sin_lat, cos_lat, sin_lon, cos_lon), (x0, y0, z0) = self._frame
+        x, y, z = x - x0, y - y0, z - z0
+        outward = cos_lon * x + sin_lon * y
+        return np.stack([cos_lon * y - sin_lon * x, cos_lat * z - sin_lat * outward, sin_lat * z + cos_lat * outward])
+
+    def to_geodetic(self, pos: np.ndarray) -> np.ndarray:
+        """Points of Earth of world positions; the inverse of `from_geodetic` down to 1000 km below the ground.
+
+        B. R. Bowring, The accuracy of geodetic latitude and height equations, Survey Review 28 (1985), 202-206.
+
+        Args:
+            pos: East, north, up [m], (3, n) or (3,).
+
+        Returns:
+            Latitude [rad], longitude in (-pi, pi] [rad], altitude above the ellipsoid [m], same shape.
+        """
+        east, north, up = np.asarray(pos, np.float64)
+        (sin_lat, cos_lat, sin_lon, cos_lon), (x0, y0, z0) = self._frame
+        outward = cos_lat * up - sin_lat * north
+        x = x0 + (cos_lon * outward - sin_lon * east)
+        y = y0 + (sin_lon * outward + cos_lon * east)
+        z = z0 + (cos_lat * north + sin_lat * up)
+        axis = np.sqrt(x * x + y * y)
+        # (rise, run) of the latitude; of the parametric latitude they are (b rise, a run). Ratios, so that poles are no exception.
+        rise, run = z * (1.0 + SECOND_ECCENTRICITY_SQUARED * SEMI_MINOR / np.sqrt(axis * axis + z * z)), axis
+        for _ in range(LATITUDE_STEPS):
+            length = np.sqrt((SEMI_MINOR * rise) * (SEMI_MINOR * rise) + (SEMI_MAJOR * run) * (SEMI_MAJOR * run))
+            sine, cosine = SEMI_MINOR * rise / length, SEMI_MAJOR * run / length
+            rise = z + SECOND_ECCENTRICITY_SQUARED * SEMI_MINOR * (sine * sine * sine)
+            run = axis - ECCENTRICITY_SQUARED * SEMI_MAJOR * (cosine * cosine * cosine)
+        length = np.sqrt(rise * rise + run * run)
+        sine, cosine = rise / length, run / length
+        altitude = axis * cosine + z * sine - SEMI_MAJOR * np.sqrt(1.0 - ECCENTRICITY_SQUARED * sine * sine)
+        return np.stack([atan2(rise, run), atan2(y, x), altitude])
+
+    @cached_property
+    def _frame(self) -> tuple[tuple[float, float, float, float], tuple[float, float, float]]:
+        """Sine and cosine of latitude and longitude, and the Earth-centred position [m]."""
+        angles = sin(self.latitude), cos(self.latitude), sin(self.longitude), cos(self.longitude)
+        x, y, z = _earth_centred(*angles, self.altitude)
+        return angles, (float(x), float(y), float(z))
+
+
+def _earth_centred(sin_lat, cos_lat, sin_lon, cos_lon, altitude):  # type: ignore[no-untyped-def]
+    """Earth-centred, Earth-fixed position [m] of geodetic coordinates."""
+    curvature = SEMI_MAJOR / np.sqrt(1.0 - ECCENTRICITY_SQUARED * sin_lat * sin_lat)
+    axis = (curvature + altitude) * cos_lat
+    return axis * cos_lon, axis * sin_lon, (curvature * (1.0 - ECCENTRICITY_SQUARED) + altitude) * sin_lat

@@ -1,0 +1,104 @@
+"""What stands still in a mission: where on Earth it is, the ground, walls, named regions and the teams' bases."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from tussle.errors import ParameterError, listed, nearest_name
+from tussle.geodesy import Origin
+from tussle.shapes import Boundary, Convex, Cuboid, FlatGround, Plane, Polyhedron, Sphere, Vector, checked_number, checked_vector
+
+__all__ = ["Base", "Boundary", "Convex", "Cuboid", "FlatGround", "Origin", "Plane", "Polyhedron", "Scene", "Sphere"]
+
+
+@dataclass(frozen=True)
+class Base:
+    """A team's home.
+
+    Args:
+        team: The team's id.
+        position: Its centre [m], (3,), world frame.
+        radius: Its radius [m].
+        opacity: How it is drawn, 0 to 1.
+
+    Raises:
+        ParameterError: A value is not finite or out of bounds.
+    """
+
+    team: int
+    position: Vector
+    radius: float = 25.0
+    opacity: float = 1.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "position", checked_vector(self, "position"))
+        object.__setattr__(self, "radius", checked_number(self, "radius", above=0.0))
+        object.__setattr__(self, "opacity", checked_number(self, "opacity"))
+        if not 0.0 <= self.opacity <= 1.0:
+            raise ParameterError(f"Base.opacity = {self.opacity!r} is not allowed; it takes a number from 0 to 1")
+
+
+@dataclass(frozen=True)
+class Scene:
+    """All that stands still in a mission.
+
+    Args:
+        origin: Where the world's frame touches Earth.
+        ground: The ground; None for a world without.
+        walls: Solid shapes that stop rays.
+        boundaries: Named regions; they stop nothing by themselves.
+        bases: The teams' bases, in the mission's order.
+    """
+
+    origin: Origin = field(default_factory=Origin)
+    ground: FlatGround | None = None
+    walls: tuple[Boundary, ...] = ()
+    boundaries: Mapping[int | str, Boundary] = field(default_factory=dict)
+    bases: tuple[Base, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "walls", tuple(self.walls))
+        object.__setattr__(self, "boundaries", dict(self.boundaries))
+        object.__setattr__(self, "bases", tuple(self.bases))
+
+    def boundary(self, name: int | str) -> Boundary:
+        """The region of this id or name.
+
+        Raises:
+            ParameterError: There is none.
+        """
+        try:
+            return self.boundaries[name]
+        except KeyError:
+            names = [str(key) for key in self.boundaries]
+            raise ParameterError(f"the scene has no boundary {name!r}{nearest_name(str(name), names)}; {listed(names)}") from None
+
+    def bases_of(self, team: int) -> tuple[Base, ...]:
+        """The bases of one team, in the mission's order."""
+        return tuple(base for base in self.bases if base.team == team)
+
+    def contains(self, boundary: int | str, pos: np.ndarray) -> np.ndarray:
+        """Whether positions [m], (3, n), lie inside a region, (n,).
+
+        Raises:
+            ParameterError: There is no such region.
+        """
+        return self.boundary(boundary).contains(pos)
+
+    def ray(self, origin: np.ndarray, direction: np.ndarray) -> np.ndarray:
+        """Distance along rays to the ground or the first wall.
+
+        Args:
+            origin: Starts [m], (3, n).
+            direction: Directions of any length, (3, n).
+
+        Returns:
+            Distance [m], (n,); inf where a ray meets nothing.
+        """
+        distance = np.full(np.shape(origin)[1:], np.inf)
+        for solid in (*self.walls, *((self.ground,) if self.ground else ())):
+            distance = np.minimum(distance, solid.ray(origin, direction))
+        return distance
