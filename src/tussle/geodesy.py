@@ -58,7 +58,8 @@ class Origin:
             value = getattr(self, name)
             if abs(value) > limit:
                 raise ParameterError(
-                    f"Origin.{name} = {value!r} is not allowed; it takes radians within +-{limit:.6g} (for degrees: Origin.from_degrees)"
+                    f"Origin.{name} = {value!r} is not allowed; it takes radians within +-{limit:.6g} "
+                    f"(for degrees there is Origin.from_degrees)"
                 )
 
     @classmethod
@@ -80,7 +81,9 @@ class Origin:
         (sin_lat, cos_lat, sin_lon, cos_lon), (x0, y0, z0) = self._frame
         x, y, z = x - x0, y - y0, z - z0
         outward = cos_lon * x + sin_lon * y
-        return np.stack([cos_lon * y - sin_lon * x, cos_lat * z - sin_lat * outward, sin_lat * z + cos_lat * outward])
+        return np.stack(
+            [cos_lon * y - sin_lon * x, cos_lat * z - sin_lat * outward, sin_lat * z + cos_lat * outward]
+        )
 
     def to_geodetic(self, pos: np.ndarray) -> np.ndarray:
         """Points of Earth of world positions; the inverse of `from_geodetic` down to 1000 km below the ground.
@@ -100,10 +103,12 @@ class Origin:
         y = y0 + (sin_lon * outward + cos_lon * east)
         z = z0 + (cos_lat * north + sin_lat * up)
         axis = np.sqrt(x * x + y * y)
-        # (rise, run) of the latitude; of the parametric latitude they are (b rise, a run). Ratios, so that poles are no exception.
+        # Rise and run of the latitude; those of the parametric latitude are b rise and a run. Not their ratio, which fails at poles.
         rise, run = z * (1.0 + SECOND_ECCENTRICITY_SQUARED * SEMI_MINOR / np.sqrt(axis * axis + z * z)), axis
         for _ in range(LATITUDE_STEPS):
-            length = np.sqrt((SEMI_MINOR * rise) * (SEMI_MINOR * rise) + (SEMI_MAJOR * run) * (SEMI_MAJOR * run))
+            length = np.sqrt(
+                (SEMI_MINOR * rise) * (SEMI_MINOR * rise) + (SEMI_MAJOR * run) * (SEMI_MAJOR * run)
+            )
             sine, cosine = SEMI_MINOR * rise / length, SEMI_MAJOR * run / length
             rise = z + SECOND_ECCENTRICITY_SQUARED * SEMI_MINOR * (sine * sine * sine)
             run = axis - ECCENTRICITY_SQUARED * SEMI_MAJOR * (cosine * cosine * cosine)

@@ -9,9 +9,31 @@ import numpy as np
 
 from tussle.errors import ParameterError, listed, nearest_name
 from tussle.geodesy import Origin
-from tussle.shapes import Boundary, Convex, Cuboid, FlatGround, Plane, Polyhedron, Sphere, Vector, checked_number, checked_vector
+from tussle.shapes import (
+    Boundary,
+    Convex,
+    Cuboid,
+    FlatGround,
+    Plane,
+    Polyhedron,
+    Sphere,
+    Vector,
+    checked_number,
+    checked_vector,
+)
 
-__all__ = ["Base", "Boundary", "Convex", "Cuboid", "FlatGround", "Origin", "Plane", "Polyhedron", "Scene", "Sphere"]
+__all__ = [
+    "Base",
+    "Boundary",
+    "Convex",
+    "Cuboid",
+    "FlatGround",
+    "Origin",
+    "Plane",
+    "Polyhedron",
+    "Scene",
+    "Sphere",
+]
 
 
 @dataclass(frozen=True)
@@ -38,7 +60,9 @@ class Base:
         object.__setattr__(self, "radius", checked_number(self, "radius", above=0.0))
         object.__setattr__(self, "opacity", checked_number(self, "opacity"))
         if not 0.0 <= self.opacity <= 1.0:
-            raise ParameterError(f"Base.opacity = {self.opacity!r} is not allowed; it takes a number from 0 to 1")
+            raise ParameterError(
+                f"Base.opacity = {self.opacity!r} is not allowed; it takes a number from 0 to 1"
+            )
 
 
 @dataclass(frozen=True)
@@ -74,7 +98,9 @@ class Scene:
             return self.boundaries[name]
         except KeyError:
             names = [str(key) for key in self.boundaries]
-            raise ParameterError(f"the scene has no boundary {name!r}{nearest_name(str(name), names)}; {listed(names)}") from None
+            raise ParameterError(
+                f"the scene has no boundary {name!r}{nearest_name(str(name), names)}; {listed(names)}"
+            ) from None
 
     def bases_of(self, team: int) -> tuple[Base, ...]:
         """The bases of one team, in the mission's order."""

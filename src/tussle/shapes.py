@@ -118,7 +118,9 @@ class Plane(Convex):
         object.__setattr__(self, "point", checked_vector(self, "point"))
         object.__setattr__(self, "normal", checked_vector(self, "normal"))
         if not _length(self.normal) > 0.0:
-            raise ParameterError(f"Plane.normal = {self.normal!r} is not allowed; it takes a vector with a direction")
+            raise ParameterError(
+                f"Plane.normal = {self.normal!r} is not allowed; it takes a vector with a direction"
+            )
 
     def half_spaces(self) -> tuple[tuple[Vector, float], ...]:
         length = _length(self.normal)
@@ -147,7 +149,9 @@ class Cuboid(Convex):
         for name in ("center", "lengths", "rpy"):
             object.__setattr__(self, name, checked_vector(self, name))
         if not min(self.lengths) > 0.0:
-            raise ParameterError(f"Cuboid.lengths = {self.lengths!r} is not allowed; it takes three lengths in m > 0")
+            raise ParameterError(
+                f"Cuboid.lengths = {self.lengths!r} is not allowed; it takes three lengths in m > 0"
+            )
 
     def half_spaces(self) -> tuple[tuple[Vector, float], ...]:
         faces = []
@@ -177,7 +181,9 @@ class Polyhedron(Convex):
         if not 4 <= len(points) <= MOST_POINTS:
             raise ParameterError(f"Polyhedron.points has {len(points)} points; it takes 4 to {MOST_POINTS}")
         if len(self._faces) < 4:
-            raise ParameterError(f"Polyhedron.points = {points!r} is not allowed; all of them lie in one plane")
+            raise ParameterError(
+                f"Polyhedron.points = {points!r} is not allowed; all of them lie in one plane"
+            )
 
     def half_spaces(self) -> tuple[tuple[Vector, float], ...]:
         x, y, z = corners = np.array(self.points).T
@@ -240,7 +246,9 @@ class Sphere(Boundary):
         nearest = x * direction[0] + y * direction[1] + z * direction[2]
         # From the ray's closest point rather than by the quadratic formula, whose discriminant cancels for a far, small ball.
         dx, dy, dz = x - nearest * direction[0], y - nearest * direction[1], z - nearest * direction[2]
-        inward = (self.radius - np.sqrt(dx * dx + dy * dy + dz * dz)) * (self.radius + np.sqrt(dx * dx + dy * dy + dz * dz))
+        inward = (self.radius - np.sqrt(dx * dx + dy * dy + dz * dz)) * (
+            self.radius + np.sqrt(dx * dx + dy * dy + dz * dz)
+        )
         half = np.sqrt(np.maximum(inward, 0.0))
         first = np.where(nearest - half >= 0.0, nearest - half, nearest + half)
         moving = direction[0] * direction[0] + direction[1] * direction[1] + direction[2] * direction[2] > 0.0
@@ -252,7 +260,9 @@ def checked_number(owner: object, name: str, above: float = -math.inf) -> float:
     value = float(getattr(owner, name))
     if not (math.isfinite(value) and value > above):
         bound = f" > {above:g}" if math.isfinite(above) else ""
-        raise ParameterError(f"{type(owner).__name__}.{name} = {value!r} is not allowed; it takes a finite number{bound}")
+        raise ParameterError(
+            f"{type(owner).__name__}.{name} = {value!r} is not allowed; it takes a finite number{bound}"
+        )
     return value
 
 

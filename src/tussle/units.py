@@ -118,13 +118,30 @@ SPELLED_OUT = {
 }
 """Not understood, on purpose: one name a unit. They make the error message name the right one."""
 
-COMPOUND_EXAMPLES = ("m/s", "km/h", "m/s^2", "rad/s", "deg/s", "rad/s^2", "deg/s^2", "1/s", "kg m^2", "N m", "N s", "N/m", "m^2")
+COMPOUND_EXAMPLES = (
+    "m/s",
+    "km/h",
+    "m/s^2",
+    "rad/s",
+    "deg/s",
+    "rad/s^2",
+    "deg/s^2",
+    "1/s",
+    "kg m^2",
+    "N m",
+    "N s",
+    "N/m",
+    "m^2",
+)
 
-FACTOR = re.compile(r"(?P<solidus>/?)\s*(?P<name>1(?=\s*/)|%|[A-Za-z]+)(?:\^(?P<power>-?[1-9]))?\s*(?:\*\s*(?=[A-Za-z%]))?")
+FACTOR = re.compile(
+    r"(?P<solidus>/?)\s*(?P<name>1(?=\s*/)|%|[A-Za-z]+)(?:\^(?P<power>-?[1-9]))?\s*(?:\*\s*(?=[A-Za-z%]))?"
+)
 # The bound on the exponent keeps a hostile "1e999999999" from becoming an exact fraction of a gigabyte; the look ahead keeps
 # the rest of such a text, or of "1.2.3", from being taken for a unit.
 QUANTITY = re.compile(
-    r"(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,3})?|[-+]?inf)(?![A-Za-z0-9.]*\d)\s*(?P<unit>.*)", re.ASCII
+    r"(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,3})?|[-+]?inf)(?![A-Za-z0-9.]*\d)\s*(?P<unit>.*)",
+    re.ASCII,
 )
 LONGEST_TEXT = 200
 
@@ -144,7 +161,9 @@ def unit_of(text: str) -> Unit:
     while place < len(rest):
         match = FACTOR.match(rest, place)
         if match is None:
-            raise UnitError(f"{text!r} is not a unit; write factors with whole powers, as in 'm/s^2', 'kg m^2' or '1/s'")
+            raise UnitError(
+                f"{text!r} is not a unit; write factors with whole powers, as in 'm/s^2', 'kg m^2' or '1/s'"
+            )
         unit = _named(match["name"])
         power = int(match["power"] or 1) * (-1 if match["solidus"] else 1)
         factor = factor * unit.factor**power
@@ -198,7 +217,9 @@ def _split(text: str) -> tuple[Fraction | float, str]:
     match = QUANTITY.fullmatch(text.strip()) if len(text) <= LONGEST_TEXT else None
     if match is None:
         shown = text if len(text) <= LONGEST_TEXT else text[:40] + "..."
-        raise ParameterError(f"{shown!r} is not a number; write one, with or without a unit, as in '12' or '40 kt'")
+        raise ParameterError(
+            f"{shown!r} is not a number; write one, with or without a unit, as in '12' or '40 kt'"
+        )
     number = match["number"]
     return (float(number) if number.endswith("inf") else Fraction(number)), match["unit"].strip()
 

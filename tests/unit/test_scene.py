@@ -32,16 +32,30 @@ def columns(*points: tuple[float, float, float]) -> np.ndarray:
 
 def test_local_position_of_a_published_example() -> None:
     # The example of the manual of GeographicLib's CartConvert, to its two printed decimals.
-    pos = Origin.from_degrees(33.0, 44.0, 20.0).from_geodetic(columns((math.radians(33.3), math.radians(44.4), 6000.0)))
+    pos = Origin.from_degrees(33.0, 44.0, 20.0).from_geodetic(
+        columns((math.radians(33.3), math.radians(44.4), 6000.0))
+    )
     np.testing.assert_allclose(pos[:, 0], [37288.97, 33374.29, 5783.64], rtol=0.0, atol=0.01)
 
 
 @pytest.mark.parametrize(
     ("origin", "point", "pos"),
     [
-        ((33.0, 44.0, 20.0), (33.3, 44.4, 6000.0), (37288.9731966232283, 33374.2949469043575, 5783.6466155181825)),
-        ((48.8, 2.35, 35.0), (50.9, 1.8, 0.0), (-38691.0610441877678, 233662.3484833635055, -4437.5865705123863)),
-        ((-35.3, 149.1, 600.0), (-33.9, 151.2, 1200.0), (194228.1081604110950, 153263.4049672770024, -4202.9176876439307)),
+        (
+            (33.0, 44.0, 20.0),
+            (33.3, 44.4, 6000.0),
+            (37288.9731966232283, 33374.2949469043575, 5783.6466155181825),
+        ),
+        (
+            (48.8, 2.35, 35.0),
+            (50.9, 1.8, 0.0),
+            (-38691.0610441877678, 233662.3484833635055, -4437.5865705123863),
+        ),
+        (
+            (-35.3, 149.1, 600.0),
+            (-33.9, 151.2, 1200.0),
+            (194228.1081604110950, 153263.4049672770024, -4202.9176876439307),
+        ),
     ],
 )
 def test_local_position_against_sixty_digits(
@@ -53,7 +67,9 @@ def test_local_position_against_sixty_digits(
     np.testing.assert_allclose(frame.from_geodetic(geodetic)[:, 0], pos, rtol=0.0, atol=5e-9)
     # On the ground, 5e-9 m are this much of latitude and longitude, beside an ulp of the angle itself.
     metres = np.array([[6.3e6], [6.3e6 * math.cos(math.radians(point[0]))], [1.0]])
-    np.testing.assert_allclose(metres * frame.to_geodetic(columns(pos)), metres * geodetic, rtol=3e-16, atol=5e-9)
+    np.testing.assert_allclose(
+        metres * frame.to_geodetic(columns(pos)), metres * geodetic, rtol=3e-16, atol=5e-9
+    )
 
 
 def test_axes_of_earth() -> None:
@@ -87,7 +103,9 @@ def test_tangent_plane_leaves_earth() -> None:
     st.floats(-179.0, 180.0),
     st.floats(-20e3, 1e6),
 )
-def test_there_and_back_anywhere_on_earth(lat0: float, lon0: float, lat: float, lon: float, altitude: float) -> None:
+def test_there_and_back_anywhere_on_earth(
+    lat0: float, lon0: float, lat: float, lon: float, altitude: float
+) -> None:
     origin = Origin.from_degrees(lat0, lon0, 100.0)
     pos = origin.from_geodetic(columns((math.radians(lat), math.radians(lon), altitude)))
     again = origin.from_geodetic(origin.to_geodetic(pos))
@@ -104,7 +122,9 @@ def test_one_point_has_the_bits_of_a_row_of_many() -> None:
     assert many.tobytes() == np.ascontiguousarray(one).tobytes()
 
 
-@pytest.mark.parametrize("values", [(35.7, 0.0, 0.0), (0.0, -120.0, 0.0), (0.0, math.nan, 0.0), (0.0, 0.0, math.inf)])
+@pytest.mark.parametrize(
+    "values", [(35.7, 0.0, 0.0), (0.0, -120.0, 0.0), (0.0, math.nan, 0.0), (0.0, 0.0, math.inf)]
+)
 def test_origin_in_degrees_by_mistake_or_not_finite(values: tuple[float, float, float]) -> None:
     with pytest.raises(ParameterError, match=r"Origin\.\w+ = .* is not allowed"):
         Origin(*values)
@@ -114,7 +134,11 @@ def test_origin_in_degrees_by_mistake_or_not_finite(values: tuple[float, float, 
 
 
 def test_ground_contains_what_is_below_it() -> None:
-    assert FlatGround(2.0).contains(columns((0, 0, 1.9), (0, 0, 2.0), (9, 9, 2.1))).tolist() == [True, False, False]
+    assert FlatGround(2.0).contains(columns((0, 0, 1.9), (0, 0, 2.0), (9, 9, 2.1))).tolist() == [
+        True,
+        False,
+        False,
+    ]
 
 
 def test_ground_is_met_from_above_and_below_and_not_by_level_rays() -> None:
@@ -126,7 +150,10 @@ def test_ground_is_met_from_above_and_below_and_not_by_level_rays() -> None:
 def test_plane_contains_what_is_behind_its_normal() -> None:
     plane = Plane(point=(1.0, 0.0, 0.0), normal=(5.0, 0.0, 0.0))
     assert plane.contains(columns((0.9, 7, 7), (1.0, 7, 7), (1.1, 7, 7))).tolist() == [True, False, False]
-    assert plane.ray(columns((3, 0, 0), (3, 0, 0)), columns((-1, 0, 0), (1, 0, 0))).tolist() == [2.0, math.inf]
+    assert plane.ray(columns((3, 0, 0), (3, 0, 0)), columns((-1, 0, 0), (1, 0, 0))).tolist() == [
+        2.0,
+        math.inf,
+    ]
 
 
 def test_cuboid_turns() -> None:
@@ -149,8 +176,12 @@ def test_positive_roll_of_a_cuboid_turns_its_left_side_up() -> None:
 
 def test_surface_is_outside() -> None:
     box = Cuboid((0.0, 0.0, 0.0), (2.0, 2.0, 2.0))
-    assert box.contains(columns((1, 0, 0), (0, -1, 0), (0, 0, 1), (np.nextafter(1.0, 0.0), 0, 0))).tolist() == [False, False, False, True]
-    assert Sphere((0.0, 0.0, 0.0), 1.0).contains(columns((1, 0, 0), (0, np.nextafter(1.0, 0.0), 0))).tolist() == [False, True]
+    assert box.contains(
+        columns((1, 0, 0), (0, -1, 0), (0, 0, 1), (np.nextafter(1.0, 0.0), 0, 0))
+    ).tolist() == [False, False, False, True]
+    assert Sphere((0.0, 0.0, 0.0), 1.0).contains(
+        columns((1, 0, 0), (0, np.nextafter(1.0, 0.0), 0))
+    ).tolist() == [False, True]
 
 
 def test_rays_at_a_box() -> None:
@@ -158,7 +189,9 @@ def test_rays_at_a_box() -> None:
     start = columns((0, 0, 0), (0, 0, 0), (10, 0, 0), (0, 0, 0), (0, 3, 0), (0, 3, 0), (20, 0, 0))
     direction = columns((7, 0, 0), (-1, 0, 0), (0, 0.1, 0), (1, 1, 0), (1, 0, 0), (3, -1, 0), (-1, 0, 0))
     distance = box.ray(start, direction)
-    np.testing.assert_allclose(distance, [9.0, np.inf, 1.0, np.inf, np.inf, math.hypot(9, 3), 9.0], rtol=1e-15)
+    np.testing.assert_allclose(
+        distance, [9.0, np.inf, 1.0, np.inf, np.inf, math.hypot(9, 3), 9.0], rtol=1e-15
+    )
 
 
 def test_polyhedron_of_a_cube_is_the_cube() -> None:
@@ -270,5 +303,7 @@ def test_empty_scene_stops_no_ray() -> None:
 
 
 def test_unknown_boundary_names_the_nearest() -> None:
-    with pytest.raises(ParameterError, match=r"no boundary 'feild' \(did you mean 'field'\?\); there are: 1, field"):
+    with pytest.raises(
+        ParameterError, match=r"no boundary 'feild' \(did you mean 'field'\?\); there are: 1, field"
+    ):
         Scene(boundaries={1: Sphere(), "field": Sphere()}).boundary("feild")

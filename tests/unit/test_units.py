@@ -108,7 +108,15 @@ def test_wrong_dimension_says_what_is_allowed() -> None:
 
 @pytest.mark.parametrize(
     ("text", "unit"),
-    [("1 rad", ""), ("1 %", "rad"), ("1 rad/s", "1/s"), ("1 Hz", "rad/s"), ("1 rpm", "Hz"), ("1 kg", "N"), ("1 m", "m^2")],
+    [
+        ("1 rad", ""),
+        ("1 %", "rad"),
+        ("1 rad/s", "1/s"),
+        ("1 Hz", "rad/s"),
+        ("1 rpm", "Hz"),
+        ("1 kg", "N"),
+        ("1 m", "m^2"),
+    ],
 )
 def test_dimensions_that_are_not_the_same(text: str, unit: str) -> None:
     with pytest.raises(UnitError):
@@ -122,7 +130,14 @@ def test_plain_number_with_a_unit() -> None:
 
 @pytest.mark.parametrize(
     ("text", "guess"),
-    [("40 knots", "kt"), ("40 Kt", "kt"), ("3 metres", "m"), ("3 degrees", "deg"), ("3 RPM", "rpm"), ("9 kph", "km/h")],
+    [
+        ("40 knots", "kt"),
+        ("40 Kt", "kt"),
+        ("3 metres", "m"),
+        ("3 degrees", "deg"),
+        ("3 RPM", "rpm"),
+        ("9 kph", "km/h"),
+    ],
 )
 def test_unknown_unit_names_the_nearest(text: str, guess: str) -> None:
     with pytest.raises(UnitError, match=f"did you mean '{guess}'"):
