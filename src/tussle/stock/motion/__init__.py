@@ -1,0 +1,1 @@
+"""Motion models that ship with tussle, a folder each."""

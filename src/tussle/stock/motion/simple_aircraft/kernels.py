@@ -1,0 +1,184 @@
+"""SimpleAircraft kernels: RK4 with what repeats left out, and the state made public.
+
+Roll, pitch and speed have constant rates in a substep, so RK4's second and third stage see the same bank, elevation and speed, and the
+last stage of one substep is the first of the next. Eight sine-cosine pairs a substep remain of sixteen. Rows go through scratch arrays in
+blocks, with the substeps outside the loop over rows, because LLVM vectorises loops over few arrays only.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tussle.numeric import sincos, tan
+from tussle.numeric.kernel import device, kernel
+
+BLOCK = 64  # rows; the scratch of a block stays in the first-level cache
+THROTTLE_MAX = 100.0
+ACCELERATION = 0.2  # m/s^2 per unit of throttle
+
+
+@device
+def hold(value, low, high):  # type: ignore[no-untyped-def]
+    """Value held within [low, high]."""
+    return min(max(value, low), high)
+
+
+@device
+def turning(sine, cosine, speed, radius, slope, target):  # type: ignore[no-untyped-def]
+    """Turn rate [rad/s] at a bank given by its sine and cosine: V tan(roll) / (radius + slope (V - target))."""
+    return speed * sine / (cosine * (radius + slope * (speed - target)))
+
+
+@device
+def state_equation(roll, pitch, yaw, speed, throttle, roll_rate, pitch_rate, radius, slope, target):  # type: ignore[no-untyped-def]
+    """(x', y', z' [m/s], roll', pitch', yaw' [rad/s], speed' [m/s^2]) away from the limits; what `advance` integrates."""
+    sp, cp = sincos(pitch)
+    sy, cy = sincos(yaw)
+    turn = speed / (radius + slope * (speed - target)) * tan(roll)
+    pull = ACCELERATION * hold(throttle, -THROTTLE_MAX, THROTTLE_MAX)
+    return speed * cp * cy, speed * cp * sy, speed * sp, roll_rate, pitch_rate, turn, pull
+
+
+@kernel("F2w F2 F2 f8 i8")
+def advance(x, u, p, dt, substeps):  # type: ignore[no-untyped-def]
+    """Advance all rows, in place.
+
+    A rate that would end the substep beyond a limit of roll, pitch or speed is lowered so that it ends on the limit.
+
+    Args:
+        x: x, y, z [m], roll, pitch, yaw [rad], speed [m/s], (7, n), world frame; roll left wing up (turns left), pitch nose up.
+        u: throttle, roll_rate, pitch_rate [rad/s], (3, n).
+        p: turning_radius [m], min_velocity, max_velocity [m/s], max_roll, max_pitch [rad], max_roll_rate, max_pitch_rate [rad/s],
+            speed_target [m/s], radius_slope_per_speed [s], (9, n).
+        dt: Duration [s].
+        substeps: Number of equal RK4 steps in dt.
+    """
+    east, north, up, yaw = x[0], x[1], x[2], x[5]
+    roll, pitch, speed = x[3], x[4], x[6]
+    h = dt / substeps
+    half_h = 0.5 * h
+    sixth_h = h / 6.0
+    row = np.empty((8, BLOCK))  # sine and cosine of pitch, speed at the beginning; turn rate; speed in the middle and at the end; yaw step
+    angle = np.empty(4 * BLOCK)
+    sine = np.empty(4 * BLOCK)
+    cosine = np.empty(4 * BLOCK)
+    sp0, cp0, v0, turn0, vm, v1, turn_m, turn1 = row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7]
+    level = np.empty((2, BLOCK))
+    level_m, level_1 = level[0], level[1]
+    n = x.shape[1]
+    for first in range(0, n, BLOCK):
+        m = min(BLOCK, n - first)
+        last = first + m
+        throttle, roll_rate, pitch_rate = u[0, first:last], u[1, first:last], u[2, first:last]
+        radius, speed_min, speed_max = p[0, first:last], p[1, first:last], p[2, first:last]
+        roll_max, pitch_max, roll_rate_max = p[3, first:last], p[4, first:last], p[5, first:last]
+        pitch_rate_max, target, slope = p[6, first:last], p[7, first:last], p[8, first:last]
+        for l in range(m):
+            angle[l] = roll[first + l]
+            angle[m + l] = pitch[first + l]
+        for j in range(2 * m):
+            sine[j], cosine[j] = sincos(angle[j])
+        for l in range(m):
+            v0[l] = speed[first + l]
+            sp0[l] = sine[m + l]
+            cp0[l] = cosine[m + l]
+            turn0[l] = turning(sine[l], cosine[l], v0[l], radius[l], slope[l], target[l])
+        for _ in range(substeps):
+            for l in range(m):
+                i = first + l
+                now = roll[i]
+                end = hold(now + h * hold(roll_rate[l], -roll_rate_max[l], roll_rate_max[l]), -roll_max[l], roll_max[l])
+                roll[i] = end
+                angle[l] = 0.5 * (now + end)
+                angle[m + l] = end
+            for l in range(m):
+                i = first + l
+                now = pitch[i]
+                end = hold(now + h * hold(pitch_rate[l], -pitch_rate_max[l], pitch_rate_max[l]), -pitch_max[l], pitch_max[l])
+                pitch[i] = end
+                angle[2 * m + l] = 0.5 * (now + end)
+                angle[3 * m + l] = end
+            for l in range(m):
+                pull = ACCELERATION * hold(throttle[l], -THROTTLE_MAX, THROTTLE_MAX)
+                v1[l] = hold(v0[l] + h * pull, speed_min[l], speed_max[l])
+                vm[l] = 0.5 * (v0[l] + v1[l])
+            for j in range(4 * m):
+                sine[j], cosine[j] = sincos(angle[j])
+            for l in range(m):
+                turn_m[l] = turning(sine[l], cosine[l], vm[l], radius[l], slope[l], target[l])
+                turn1[l] = turning(sine[m + l], cosine[m + l], v1[l], radius[l], slope[l], target[l])
+            for l in range(m):
+                up[first + l] += sixth_h * (v0[l] * sp0[l] + 4.0 * (vm[l] * sine[2 * m + l]) + v1[l] * sine[3 * m + l])
+                level_m[l] = vm[l] * cosine[2 * m + l]
+                level_1[l] = v1[l] * cosine[3 * m + l]
+                v0[l] = v0[l] * cp0[l]
+                sp0[l] = sine[3 * m + l]
+                cp0[l] = cosine[3 * m + l]
+            for l in range(m):
+                now = yaw[first + l]
+                angle[l] = now
+                angle[m + l] = now + half_h * turn0[l]
+                angle[2 * m + l] = now + half_h * turn_m[l]
+                angle[3 * m + l] = now + h * turn_m[l]
+                yaw[first + l] = now + sixth_h * (turn0[l] + 4.0 * turn_m[l] + turn1[l])
+            for j in range(4 * m):
+                sine[j], cosine[j] = sincos(angle[j])
+            for l in range(m):
+                middle = 2.0 * level_m[l]
+                east[first + l] += sixth_h * (
+                    v0[l] * cosine[l] + middle * (cosine[m + l] + cosine[2 * m + l]) + level_1[l] * cosine[3 * m + l]
+                )
+                north[first + l] += sixth_h * (
+                    v0[l] * sine[l] + middle * (sine[m + l] + sine[2 * m + l]) + level_1[l] * sine[3 * m + l]
+                )
+            for l in range(m):
+                v0[l] = v1[l]
+                turn0[l] = turn1[l]
+        for l in range(m):
+            speed[first + l] = v0[l]
+
+
+@kernel("F2 Fw Fw Fw Fw Fw Fw Fw Fw Fw Fw")
+def to_body(x, east, north, up, qw, qx, qy, qz, vx, vy, vz):  # type: ignore[no-untyped-def]
+    """Publish position, attitude and velocity.
+
+    Args:
+        x: State as in `advance`, (7, n).
+        east, north, up: Position [m], (n,), written.
+        qw, qx, qy, qz: Quaternion body to world, (n,), written.
+        vx, vy, vz: Velocity [m/s], (n,), world frame, written.
+    """
+    east[:] = x[0]
+    north[:] = x[1]
+    up[:] = x[2]
+    roll, pitch, yaw, speed = x[3], x[4], x[5], x[6]
+    angle = np.empty(3 * BLOCK)
+    sine = np.empty(3 * BLOCK)
+    cosine = np.empty(3 * BLOCK)
+    n = x.shape[1]
+    for first in range(0, n, BLOCK):
+        m = min(BLOCK, n - first)
+        for l in range(m):
+            i = first + l
+            angle[l] = -0.5 * roll[i]
+            angle[m + l] = -0.5 * pitch[i]
+            angle[2 * m + l] = 0.5 * yaw[i]
+        for j in range(3 * m):
+            sine[j], cosine[j] = sincos(angle[j])
+        for l in range(m):
+            i = first + l
+            sr, cr = sine[l], cosine[l]
+            sp, cp = sine[m + l], cosine[m + l]
+            sy, cy = sine[2 * m + l], cosine[2 * m + l]
+            qw[i] = cr * (cp * cy) + sr * (sp * sy)
+            qx[i] = sr * (cp * cy) - cr * (sp * sy)
+            qy[i] = cr * (sp * cy) + sr * (cp * sy)
+            qz[i] = cr * (cp * sy) - sr * (sp * cy)
+        for l in range(m):
+            i = first + l
+            sp, cp = sine[m + l], cosine[m + l]
+            sy, cy = sine[2 * m + l], cosine[2 * m + l]
+            level = speed[i] * (cp * cp - sp * sp)
+            vx[i] = level * (cy * cy - sy * sy)
+            vy[i] = level * (2.0 * sy * cy)
+            vz[i] = speed[i] * (-2.0 * sp * cp)

@@ -1,0 +1,105 @@
+"""SingleIntegrator kernels. Rows go through scratch arrays in blocks, because LLVM vectorises loops over few arrays only."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from tussle.numeric import atan2, sincos
+from tussle.numeric.kernel import kernel
+
+BLOCK = 128  # rows
+
+
+@kernel("F2w F2 F2 f8 i8")
+def advance(x, u, p, dt, substeps):  # type: ignore[no-untyped-def]
+    """Advance all rows, in place: exact for a held velocity, so the number of substeps does not matter.
+
+    Args:
+        x: x, y, z [m], vx, vy, vz [m/s], yaw, climb [rad], (8, n), world frame.
+        u: velocity_x, velocity_y, velocity_z [m/s] and, where the heading is commanded, desired_heading [rad], (3 or 4, n).
+        p: max_speed [m/s], negative for the commanded speed, (1, n).
+        dt: Duration [s].
+        substeps: Number of steps in dt; unused.
+    """
+    east, north, up, vx, vy, vz, yaw, climb = x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7]
+    ux, uy, uz, max_speed = u[0], u[1], u[2], p[0]
+    is_headed = u.shape[0] > 3
+    heading = u[u.shape[0] - 1]
+    rise = np.empty(2 * BLOCK)
+    run = np.empty(2 * BLOCK)
+    angle = np.empty(2 * BLOCK)
+    scale = np.empty(BLOCK)
+    n = x.shape[1]
+    for first in range(0, n, BLOCK):
+        m = min(BLOCK, n - first)
+        for l in range(m):
+            i = first + l
+            speed = math.sqrt(ux[i] * ux[i] + uy[i] * uy[i] + uz[i] * uz[i])
+            divisor = 1.0 if speed == 0.0 else speed
+            scale[l] = 1.0 if max_speed[i] < 0.0 else max_speed[i] / divisor
+        for l in range(m):
+            i = first + l
+            vx[i] = ux[i] * scale[l]
+            east[i] += vx[i] * dt
+        for l in range(m):
+            i = first + l
+            vy[i] = uy[i] * scale[l]
+            north[i] += vy[i] * dt
+        for l in range(m):
+            i = first + l
+            vz[i] = uz[i] * scale[l]
+            up[i] += vz[i] * dt
+        for l in range(m):
+            i = first + l
+            rise[l] = vy[i]
+            run[l] = vx[i]
+            rise[m + l] = vz[i]
+            run[m + l] = math.sqrt(vx[i] * vx[i] + vy[i] * vy[i])
+        for j in range(2 * m):
+            angle[j] = atan2(rise[j], run[j])
+        for l in range(m):
+            i = first + l
+            level = run[m + l]
+            yaw[i] = yaw[i] if level == 0.0 else angle[l]
+            climb[i] = climb[i] if (level == 0.0) & (rise[m + l] == 0.0) else angle[m + l]
+        if is_headed:
+            for l in range(m):
+                yaw[first + l] = heading[first + l]
+
+
+@kernel("F2 Fw Fw Fw Fw Fw Fw Fw Fw Fw Fw")
+def to_body(x, east, north, up, qw, qx, qy, qz, vx, vy, vz):  # type: ignore[no-untyped-def]
+    """Publish position, attitude (no bank) and velocity.
+
+    Args:
+        x: State as in `advance`, (8, n).
+        east, north, up: Position [m], (n,), written.
+        qw, qx, qy, qz: Quaternion body to world, (n,), written.
+        vx, vy, vz: Velocity [m/s], (n,), world frame, written.
+    """
+    east[:] = x[0]
+    north[:] = x[1]
+    up[:] = x[2]
+    vx[:] = x[3]
+    vy[:] = x[4]
+    vz[:] = x[5]
+    yaw, climb = x[6], x[7]
+    angle = np.empty(2 * BLOCK)
+    sine = np.empty(2 * BLOCK)
+    cosine = np.empty(2 * BLOCK)
+    n = x.shape[1]
+    for first in range(0, n, BLOCK):
+        m = min(BLOCK, n - first)
+        for l in range(m):
+            angle[l] = 0.5 * yaw[first + l]
+            angle[m + l] = -0.5 * climb[first + l]
+        for j in range(2 * m):
+            sine[j], cosine[j] = sincos(angle[j])
+        for l in range(m):
+            i = first + l
+            qw[i] = cosine[m + l] * cosine[l]
+            qx[i] = -(sine[m + l] * sine[l])
+            qy[i] = sine[m + l] * cosine[l]
+            qz[i] = cosine[m + l] * sine[l]
