@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -103,7 +104,7 @@ class Origin:
         y = y0 + (sin_lon * outward + cos_lon * east)
         z = z0 + (cos_lat * north + sin_lat * up)
         axis = np.sqrt(x * x + y * y)
-        # Rise and run of the latitude; those of the parametric latitude are b rise and a run. Not their ratio, which fails at poles.
+        # Rise and run of the latitude; those of the parametric latitude are b rise and a run. Their ratio would fail at poles.
         rise, run = z * (1.0 + SECOND_ECCENTRICITY_SQUARED * SEMI_MINOR / np.sqrt(axis * axis + z * z)), axis
         for _ in range(LATITUDE_STEPS):
             length = np.sqrt(
@@ -125,7 +126,9 @@ class Origin:
         return angles, (float(x), float(y), float(z))
 
 
-def _earth_centred(sin_lat, cos_lat, sin_lon, cos_lon, altitude):  # type: ignore[no-untyped-def]
+def _earth_centred(
+    sin_lat: Any, cos_lat: Any, sin_lon: Any, cos_lon: Any, altitude: Any
+) -> tuple[Any, Any, Any]:
     """Earth-centred, Earth-fixed position [m] of geodetic coordinates."""
     curvature = SEMI_MAJOR / np.sqrt(1.0 - ECCENTRICITY_SQUARED * sin_lat * sin_lat)
     axis = (curvature + altitude) * cos_lat
