@@ -53,14 +53,14 @@ class Index:
     """Positions of all rows of all worlds at one instant; what a world's rows see is independent of the other worlds.
 
     After `layout` and `build`: `order` (N,) row of each place; `place` (N,) its inverse; `sx`, `sy`, `sz` (N,) positions by place.
-    World w holds places world_start[w] to world_start[w + 1] - 1, and members[world_start[w] + k] is its k-th row by id.
+    `inverse_cell` (n_worlds,) [1/m] is 0 where a world is one cell. World w holds places world_start[w] to world_start[w + 1] - 1, and members[world_start[w] + k] is its k-th row by id.
     """
 
     def __init__(self) -> None:
         self._keys = np.zeros(0, np.int64)
         self._ids = np.zeros(0, np.int64)
         self.world_start: Longs = np.zeros(1, np.int64)
-        self._built = 0
+        self.built = 0
         self._cache: dict[tuple[int, int], tuple[bool, int, Blocks]] = {}
         self.layout(np.zeros(0, np.int64), np.zeros(0, np.int64), 0)
 
@@ -83,13 +83,13 @@ class Index:
         self.sx, self.sy, self.sz = padded(n), padded(n), padded(n)
         self._strip_start, self._strip_world = np.zeros(n + 1, np.int64), np.zeros(n + 1, np.int64)
         self._world_strip = np.zeros(n_worlds + 1, np.int64)
-        self._inverse_cell = np.zeros(n_worlds)
+        self.inverse_cell = np.zeros(n_worlds)
         self.reach = np.zeros(n_worlds)
         self._rings = np.where(np.diff(self.world_start) < SPARSE_WORLD, 1.0, RINGS)
         self._cursor = np.zeros(3 * n, np.int64)
         self._size = np.zeros(1, np.int64)
         self._fixed = False
-        self._built = 0
+        self.built = 0
         self._cache.clear()
 
     @property
@@ -100,7 +100,7 @@ class Index:
     def table(self) -> tuple[Longs, Longs, Longs, Longs, Floats, Floats, Floats, Floats]:
         """world_start, keys, strip_start, world_strip, inverse_cell, sx, sy, sz: what the kernels of `search` take."""
         return (
-            self.world_start, self._keys, self._strip_start, self._world_strip, self._inverse_cell, self.sx, self.sy, self.sz
+            self.world_start, self._keys, self._strip_start, self._world_strip, self.inverse_cell, self.sx, self.sy, self.sz
         )  # fmt: skip
 
     def build(self, x: Floats, y: Floats, z: Floats, reach: Floats) -> None:
@@ -108,14 +108,14 @@ class Index:
 
         An infinite reach puts a world into one cell, in order of id; with every reach infinite the order depends on the layout alone.
         """
-        if not np.array_equal(reach, self.reach) or not self._built:
+        if not np.array_equal(reach, self.reach) or not self.built:
             self.reach = np.array(reach, np.float64)
-            self._inverse_cell = self._rings / np.where(self.reach > 0.0, self.reach, 1.0)
+            self.inverse_cell = self._rings / np.where(self.reach > 0.0, self.reach, 1.0)
             self._cache.clear()
             self._fixed = bool(np.isinf(self.reach).all())
-        self._built += 1
+        self.built += 1
         kernels.build(
-            x, y, z, self._inverse_cell, self.world_start, self.members, self._keys, self._scratch, self.order, self.place,
+            x, y, z, self.inverse_cell, self.world_start, self.members, self._keys, self._scratch, self.order, self.place,
             self.sx, self.sy, self.sz, self._strip_start, self._strip_world, self._world_strip,
         )  # fmt: skip
 
@@ -136,7 +136,7 @@ class Index:
             if blocks is not None and fixed:
                 self._query_positions(first, blocks.queries, None, blocks.x, blocks.y, blocks.z)
                 return blocks
-            if blocks is not None and built == self._built:
+            if blocks is not None and built == self.built:
                 return blocks
         n = last - first
         queries, block_first, block_strip = (np.empty(n + k, np.int64) for k in (0, 1, 0))
@@ -150,7 +150,7 @@ class Index:
         while True:
             spans = np.empty((2, room), np.int64)
             needed = kernels.find_spans(
-                self._inverse_cell, self.world_start, self._keys, self._strip_start, self._world_strip, x, y,
+                self.inverse_cell, self.world_start, self._keys, self._strip_start, self._world_strip, x, y,
                 block_first, block_strip, self._strip_world, n_blocks, self.reach, span_first, spans[0], spans[1],
                 self._cursor, self._size,
             )  # fmt: skip
@@ -159,7 +159,7 @@ class Index:
             room = needed
         blocks = Blocks(queries, x, y, z, n_blocks, block_first, span_first, spans[0], spans[1], int(self._size[0]))
         if pos is None:
-            self._cache[first, last] = (self._fixed, self._built, blocks)
+            self._cache[first, last] = (self._fixed, self.built, blocks)
         return blocks
 
     def _query_positions(

@@ -100,6 +100,26 @@ def bits(mask: Any) -> int:
     return int(np.packbits(mask, bitorder="little")[0])
 
 
+def lane_of(lanes: Any, lane: int) -> float:
+    """One lane's number."""
+    return float(lanes[lane])
+
+
+def below(count: int) -> Any:
+    """Mask of the first `count` lanes."""
+    return np.arange(LANES) < count
+
+
+def lowest(hits: int) -> int:
+    """Number of the lowest bit that is set; `hits` is not 0. `hits &= hits - 1` then clears it."""
+    return (hits & -hits).bit_length() - 1
+
+
+def ones(hits: int) -> int:
+    """How many bits are set."""
+    return hits.bit_count()
+
+
 def lanes_sqrt(lanes: Any) -> Any:
     """Correctly rounded square root per lane."""
     return np.sqrt(lanes)
@@ -243,6 +263,26 @@ for _yes, _no in ((LANES_TYPE, LANES_TYPE), (LANES_TYPE, types.float64), (types.
 @_implement(bits, types.int64, MASK_TYPE)
 def _generate_bits(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return builder.zext(builder.bitcast(args[0], ir.IntType(LANES)), ir.IntType(64))
+
+
+@_implement(lane_of, types.float64, LANES_TYPE, types.int64)
+def _generate_lane_of(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return builder.extract_element(*args)
+
+
+@_implement(below, MASK_TYPE, types.int64)
+def _generate_below(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return _first_lanes(builder, args[0])
+
+
+@_implement(lowest, types.int64, types.int64)
+def _generate_lowest(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return _call_llvm(builder, "llvm.cttz.i64", ir.IntType(64), [args[0], ir.Constant(ir.IntType(1), 1)])
+
+
+@_implement(ones, types.int64, types.int64)
+def _generate_ones(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return _call_llvm(builder, "llvm.ctpop.i64", ir.IntType(64), [args[0]])
 
 
 @_implement(lanes_sqrt, LANES_TYPE, LANES_TYPE)

@@ -1,0 +1,80 @@
+"""Predator: whom to hunt, whom to claim, and pure pursuit with unit gain."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from tussle.neighbors.search import DIFFERENT, SAME, in_range, nearest_places
+from tussle.numeric import atan2, wrap
+from tussle.numeric.kernel import device, kernel
+
+
+@device
+def row_of(target, w, id_start, id_row):
+    """Row of the table of entity `target` of world w; -1 of none (0) or of one that is gone."""
+    return id_row[id_start[w] + target] if target != 0 else -1
+
+
+@kernel("F F F I I F B Iw Iw Iw Iw I I I I I i8 I I I I F F F F F I -> i8")
+def hunt(
+    x, y, z, own_team, prey_team, capture_range, allow_switching, target, target_row, claim_row, claim_place,
+    row_id, row_world, id_start, id_row, place, first, world_start, keys, strip_start, world_strip, inverse_cell, sx, sy, sz,
+    team, order,
+):  # fmt: skip
+    """Choose targets and collect claims for the rows of a group that begins at row `first` of the table.
+
+    By row of the group (n,): x, y, z [m], own_team, prey_team, capture_range [m], allow_switching; target, the id hunted or 0, is kept
+    while it lives and switching is not allowed, else becomes the nearest of prey_team (of equals the smaller id); target_row is its
+    row of the table or -1. By row of the table: row_id, row_world, place. id_row[id_start[w] + i] is the row of id i of world w.
+    Claims, everyone of another team nearer than capture_range: claim_row (row of the group) and claim_place, which becomes the row
+    of the table, as far as there is room. Returns how many claims there are.
+    """
+    table = (world_start, keys, strip_start, world_strip, inverse_cell, sx, sy, sz, team)
+    best, ranks, places = np.empty(1), np.empty(1, np.int64), np.empty(1, np.int64)
+    n_claims = 0
+    room = claim_row.shape[0]
+    for i in range(x.shape[0]):
+        row = first + i
+        w = row_world[row]
+        me = place[row]
+        found = row_of(target[i], w, id_start, id_row)
+        if found < 0 or allow_switching[i]:
+            nearest_places(w, me, x[i], y[i], z[i], SAME, float(prey_team[i]), table, best, ranks, places, 1)
+            found = order[places[0]] if places[0] >= 0 else -1
+        target[i] = row_id[found] if found >= 0 else 0
+        target_row[i] = found
+        until = in_range(
+            w, me, x[i], y[i], z[i], capture_range[i], DIFFERENT, float(own_team[i]), table, claim_place, n_claims
+        )
+        for k in range(n_claims, min(until, room)):
+            claim_row[k] = i
+            claim_place[k] = order[claim_place[k]]
+        n_claims = until
+    return n_claims
+
+
+@kernel("F F F F F F I F F F Fw Fw Fw")
+def pursue(x, y, z, yaw, climb, max_speed, target_row, table_x, table_y, table_z, speed, turn_rate, pitch_rate):
+    """Speed [m/s] and rates [rad/s] towards the target's position; rows without a target keep their last commands.
+
+    x, y, z [m], yaw, climb (nose up positive) [rad], max_speed [m/s], target_row (n,) of the rows; table_x, table_y, table_z (N,) [m].
+    """
+    for i in range(x.shape[0]):
+        row = target_row[i]
+        if row >= 0:
+            dx, dy, dz = table_x[row] - x[i], table_y[row] - y[i], table_z[row] - z[i]
+            speed[i] = max_speed[i]
+            turn_rate[i] = wrap(atan2(dy, dx) - yaw[i])
+            pitch_rate[i] = wrap(atan2(dz, math.sqrt(dx * dx + dy * dy)) - climb[i])
+
+
+@kernel("F F F I F F Fw Fw")
+def point(x, y, max_speed, target_row, table_x, table_y, heading, speed):
+    """Desired heading [rad] and speed [m/s] towards the target; rows without a target keep their last commands."""
+    for i in range(x.shape[0]):
+        row = target_row[i]
+        if row >= 0:
+            heading[i] = atan2(table_y[row] - y[i], table_x[row] - x[i])
+            speed[i] = max_speed[i]
