@@ -1,0 +1,1 @@
+"""Controllers that ship with tussle, a folder each."""

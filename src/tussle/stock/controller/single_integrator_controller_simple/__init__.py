@@ -1,0 +1,5 @@
+"""SingleIntegratorControllerSimple: a wanted velocity handed through."""
+
+from tussle.stock.controller.single_integrator_controller_simple.plugin import SingleIntegratorControllerSimple
+
+__all__ = ["SingleIntegratorControllerSimple"]

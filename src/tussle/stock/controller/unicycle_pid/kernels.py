@@ -1,0 +1,74 @@
+"""The law of UnicyclePID. Rows go through scratch arrays in blocks so that the arc tangents and wraps run in SIMD lanes."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from tussle.numeric import atan2, wrap
+from tussle.numeric.kernel import kernel
+from tussle.numeric.pid import pid
+
+BLOCK = 128  # rows
+
+
+@kernel("F F F F F F F F F F F2 F2 F2 F2 F2w f8 Fw Fw Fw Fw Fw")
+def steer(  # type: ignore[no-untyped-def]
+    altitude, speed, heading, z, vx, vy, vz, yaw, climb, roll,
+    heading_gains, pitch_gains, roll_gains, speed_gains, memory, dt,
+    out_speed, acceleration, turn_rate, pitch_rate, roll_rate,
+):  # fmt: skip
+    """One call of the four loops.
+
+    Args:
+        altitude, speed, heading: Wanted altitude [m], speed [m/s], heading [rad], (n,).
+        z: Altitude [m], (n,).
+        vx, vy, vz: Velocity [m/s], (n,), world frame.
+        yaw, climb, roll: Heading, elevation (nose up), bank (right wing down) [rad], (n,).
+        heading_gains, pitch_gains, roll_gains, speed_gains: kp, ki, kd, band, (4, n).
+        memory: Integral and last error of heading, pitch, roll, speed; 1.0 once there is a last error, (9, n), updated in place.
+        dt: Time since the last call [s].
+        out_speed: The wanted speed, handed through [m/s], (n,), written.
+        acceleration: Command of the speed loop [m/s^2], (n,), written.
+        turn_rate, pitch_rate, roll_rate: Commands [rad/s], (n,), written.
+    """
+    rise = np.empty(BLOCK)
+    run = np.empty(BLOCK)
+    error = np.empty((4, BLOCK))
+    change = np.empty((4, BLOCK))
+    seen = memory[8]
+    n = speed.shape[0]
+    for first in range(0, n, BLOCK):
+        m = min(BLOCK, n - first)
+        for l in range(m):
+            i = first + l
+            rise[l] = (altitude[i] - z[i]) * speed[i]
+            run[l] = speed[i] * speed[i]
+        for l in range(m):
+            error[1, l] = atan2(rise[l], run[l]) - climb[first + l]
+        for l in range(m):
+            error[0, l] = wrap(heading[first + l] - yaw[first + l])
+            error[2, l] = -roll[first + l]
+        for l in range(m):
+            i = first + l
+            error[3, l] = speed[i] - math.sqrt(vx[i] * vx[i] + vy[i] * vy[i] + vz[i] * vz[i])
+        for k in range(4):
+            last = memory[2 * k + 1]
+            for l in range(m):
+                i = first + l
+                change[k, l] = seen[i] * (error[k, l] - last[i])
+                last[i] = error[k, l]
+        for l in range(m):
+            change[0, l] = wrap(change[0, l])
+            change[2, l] = wrap(change[2, l])
+            seen[first + l] = 1.0
+        for k in range(4):
+            gains = heading_gains if k == 0 else pitch_gains if k == 1 else roll_gains if k == 2 else speed_gains
+            out = turn_rate if k == 0 else pitch_rate if k == 1 else roll_rate if k == 2 else acceleration
+            integral = memory[2 * k]
+            kp, ki, kd, band = gains[0], gains[1], gains[2], gains[3]
+            for l in range(m):
+                i = first + l
+                out[i], integral[i] = pid(error[k, l], change[k, l], dt, kp[i], ki[i], kd[i], band[i], integral[i])
+    out_speed[:] = speed

@@ -1,0 +1,1 @@
+"""Sensors that ship with tussle, a folder each."""
