@@ -1,0 +1,75 @@
+"""What a plugin author imports."""
+
+from tussle.api.easy import EasyAutonomy, Me, Other
+from tussle.api.group import GroupView
+from tussle.api.kinds import Autonomy, Behavior, Controller, EntityPlugin, Interaction, Metric, Network, Sensor, WorldPlugin
+from tussle.api.motion import MotionBody, MotionModel
+from tussle.api.plugin import Plugin, service
+from tussle.api.world import WorldView
+from tussle.columns import (
+    Children,
+    EntityRef,
+    Field,
+    Handle,
+    Input,
+    Output,
+    Param,
+    Publish,
+    Ragged,
+    RaggedColumn,
+    State,
+    Subscribe,
+)
+from tussle.comms import EVERYONE, SAME_ENTITY
+from tussle.messages import Batch, Message
+from tussle.numeric import wrap
+from tussle.numeric.arrays import unit
+
+__all__ = [
+    "EVERYONE",
+    "SAME_ENTITY",
+    "Autonomy",
+    "Batch",
+    "Behavior",
+    "Children",
+    "Controller",
+    "EasyAutonomy",
+    "EntityPlugin",
+    "EntityRef",
+    "Field",
+    "GroupView",
+    "Handle",
+    "Input",
+    "Interaction",
+    "Me",
+    "Message",
+    "Metric",
+    "MotionBody",
+    "MotionModel",
+    "Network",
+    "Other",
+    "Output",
+    "Param",
+    "Plugin",
+    "Publish",
+    "Ragged",
+    "RaggedColumn",
+    "Sensor",
+    "State",
+    "Subscribe",
+    "WorldPlugin",
+    "WorldView",
+    "check_plugin",
+    "service",
+    "unit",
+    "wrap",
+]
+
+
+def __getattr__(name: str) -> object:
+    # The conformance kit stands above the engine that it drives; only its name lives here.
+    if name == "check_plugin":
+        import importlib
+
+        return importlib.import_module("tussle.engine.conformance").check_plugin
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,0 +1,86 @@
+"""What the views of one simulation share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from tussle.api.clock import Clock
+from tussle.api.draw import Draw
+from tussle.errors import TussleError, listed, nearest_name
+from tussle.rng import stream_key
+from tussle.scene import Scene
+
+
+@dataclass
+class Context:
+    """Shared by all views of a simulation.
+
+    Attributes:
+        clock: The worlds' clocks.
+        seeds: Seed of each world, (n_worlds,), uint64.
+        block_names: Names of the entity blocks; the body column `block` counts in them.
+        scene: Origin, ground, boundaries, bases.
+        teams: Team numbers of the mission, ascending.
+        services: Name -> function of the world plugins' services.
+        topic: Gives the topic of (network, name, type).
+        threads: Number of threads that a kernel over blocks may use.
+        draw: Where shapes go.
+    """
+
+    clock: Clock
+    seeds: np.ndarray
+    block_names: list[str]
+    scene: Scene
+    teams: np.ndarray
+    services: dict[str, Callable[..., Any]] = field(default_factory=dict)
+    topic: Callable[..., Any] | None = None
+    threads: int = 1
+    draw: Draw = field(default_factory=Draw)
+    _pool: ThreadPoolExecutor | None = None
+
+    def __post_init__(self) -> None:
+        self.block_keys = np.array([stream_key("block", name) for name in self.block_names], np.uint64)
+
+    def row_seeds(self, world: np.ndarray, block: np.ndarray) -> np.ndarray:
+        """Key of each row's draws, (n,), uint64: the world's seed mixed with the block's name."""
+        return self.seeds[world] ^ self.block_keys[block]
+
+    def split(self, n: int, run: Callable[[int, int], Any], least: int = 64) -> None:
+        """Call run(first, last) over [0, n), in several threads where that is allowed and there is enough of it."""
+        if self.threads == 1 or n < 2 * least:
+            run(0, n)
+            return
+        if self._pool is None:
+            self._pool = ThreadPoolExecutor(self.threads)
+        edges = [n * i // self.threads for i in range(self.threads + 1)]
+        for done in [self._pool.submit(run, a, b) for a, b in zip(edges[:-1], edges[1:], strict=True) if b > a]:
+            done.result()
+
+    def close(self) -> None:
+        if self._pool is not None:
+            self._pool.shutdown()
+            self._pool = None
+
+    def find_service(self, name: str, own: dict[str, Callable[..., Any]]) -> Callable[..., Any]:
+        """The service `name` of the entity's plugins, else of the world's.
+
+        Raises:
+            TussleError: Nobody offers it.
+        """
+        found = own.get(name) or self.services.get(name)
+        if found is None:
+            allowed = sorted({*own, *self.services})
+            raise TussleError(f"nobody offers a service {name!r}{nearest_name(name, allowed)}; {listed(allowed)}")
+        return found
+
+
+@lru_cache(maxsize=4096)
+def stream(plugin: str, label: str) -> int:
+    """Stream number of a plugin instance's draws under a label."""
+    return stream_key("plugin", plugin, label)

@@ -1,0 +1,195 @@
+"""What an entity's plugin sees: the rows of its group."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from tussle import rng
+from tussle.api import kernels
+from tussle.api.bodies import DERIVED, FLOATS, INTS, Bodies, BodyView, derive, read_only
+from tussle.api.context import Context, stream
+from tussle.api.draw import Draw
+from tussle.api.pairs import Nearest, Pairs, any_index, find_near_rows, find_nearest, find_nearest_row, find_pairs
+from tussle.errors import listed, nearest_name
+from tussle.neighbors.index import Index
+from tussle.scene import Scene
+
+GOLDEN = np.uint64(0x9E3779B97F4A7C15)
+
+
+class GroupView:
+    """Rows [first, last) of the body table: all entities, of all worlds, with the same plugins.
+
+    Row numbers hold within one call; ids hold for ever.
+
+    Attributes:
+        n: Number of rows.
+        first: Row of this view's row 0 in the body table.
+        dt: Time that this call covers [s].
+        pos: Position [m], (3, n), world frame. Likewise vel [m/s], quat (w, x, y, z), omega [rad/s], force, torque, health, radius,
+            mass, and the whole numbers id, team, world, block, place_in_block. For autonomies and controllers pos, vel and quat are the
+            entity's belief where a sensor writes one.
+        caller: The plugin that is being called.
+    """
+
+    is_subset = False
+
+    def __init__(self, bodies: Bodies, first: int, last: int, context: Context, dt: float) -> None:
+        self.context = context
+        self.dt = dt
+        self.substep = 0
+        self.caller: Any = None
+        self.failing_row: int | None = None
+        self.services: dict[str, Callable[..., Any]] = {}
+        self.belief: dict[str, np.ndarray] = {}
+        self.reset(bodies, first, last)
+
+    def reset(self, bodies: Bodies, first: int, last: int) -> None:
+        """Look at other rows, after the table has been repacked."""
+        own = self.__dict__
+        for name in (*FLOATS, *INTS, "_seeds"):
+            own.pop(name, None)
+        self._bodies = bodies
+        self.first, self.last = first, last
+        self.n = last - first
+        self._reaches: dict[int, tuple[np.ndarray, float | np.ndarray]] = {}
+
+    def __getattr__(self, name: str) -> Any:
+        if name in FLOATS or name in INTS:
+            own = self.belief.get(name)
+            array = read_only(getattr(self._bodies, name)[..., self.first : self.last] if own is None else own)
+            self.__dict__[name] = array
+            return array
+        if name in DERIVED:
+            if "quat" in self.belief:
+                k = DERIVED[name]
+                out = np.empty((k, self.n) if k > 1 else self.n)
+                derive(name, self.belief["quat"], out)
+                return out
+            return read_only(self._bodies.derived(name)[..., self.first : self.last])
+        if name == "_seeds":
+            self._seeds = self.context.row_seeds(self.world, self.block)
+            return self._seeds
+        allowed = [*FLOATS, *INTS, *DERIVED, "t", "dt", "n"]
+        raise AttributeError(f"g has no {name!r}{nearest_name(name, allowed)}; {listed(allowed)}")
+
+    # -- time and place ---------------------------------------------------------------------------------------------------
+
+    @property
+    def t(self) -> np.ndarray:
+        """Time at the beginning of this call [s], (n,)."""
+        return self.context.clock.t[self.world] + self.substep * self.dt
+
+    @property
+    def step_count(self) -> np.ndarray:
+        """Number of the step of each row's world, (n,)."""
+        return self.context.clock.step[self.world]
+
+    @property
+    def scene(self) -> Scene:
+        return self.context.scene
+
+    @property
+    def draw(self) -> Draw:
+        return self.context.draw
+
+    @property
+    def bodies(self) -> BodyView:
+        """All rows of all groups: what is true of everybody."""
+        return self._bodies.view
+
+    def who(self, row: int) -> str:
+        """Block, id and world of a row, for messages."""
+        name = self.context.block_names[int(self.block[row])]
+        return f"{name} {int(self.id[row])} of world {int(self.world[row])}"
+
+    # -- others -----------------------------------------------------------------------------------------------------------
+
+    def bodies_rows(self, world: np.ndarray, ids: np.ndarray) -> np.ndarray:
+        return self._bodies.rows_of(world, ids)
+
+    def rows_of(self, ids: np.ndarray) -> np.ndarray:
+        """Rows in `bodies` of the entities that this view's rows refer to, (n,); -1 for none and for those that are gone."""
+        return self._bodies.rows_of(self.world, ids)
+
+    def reach(self, radius: float | np.ndarray) -> float | np.ndarray:
+        """Longest radius of each world [m]: a float when the radius is one, else (n_worlds,)."""
+        if not isinstance(radius, np.ndarray):
+            return float(radius)
+        known = self._reaches.get(id(radius))
+        if known is not None:
+            return known[1]
+        longest = np.zeros(self._bodies.n_worlds)
+        kernels.longest_reach(radius, self.world, longest)
+        some = longest[longest > 0.0]
+        reach = float(some[0]) if len(some) and (some == some[0]).all() else longest
+        if not radius.flags.writeable:  # a parameter: it stays as it is until the next repack
+            self._reaches[id(radius)] = (radius, reach)
+        return reach
+
+    def index(self, radius: float | np.ndarray) -> Index:
+        """Neighbour index for queries within radius [m], one number or (n,); for kernels."""
+        return self._bodies.index(self.reach(radius))
+
+    def any_index(self) -> Index:
+        """Neighbour index for searches without a radius; for kernels."""
+        return any_index(self)
+
+    def by_place(self, index: Index, name: str) -> list[np.ndarray]:
+        """Components of a body column of everybody in the order of an index's places; for kernels."""
+        return self._bodies.by_place(index, name)
+
+    def near(self, radius: float | np.ndarray, teams: str | int | None = None) -> Pairs:
+        """Pairs of a row and another entity of its world at a distance < radius.
+
+        Args:
+            radius: One number or (n,) [m].
+            teams: "own", "other", a team number, or None for all.
+        """
+        return find_pairs(self, radius, teams)
+
+    def nearest(self, k: int = 1, teams: str | int | np.ndarray | None = None) -> Nearest:
+        """The k nearest other entities of each row, at any distance; `teams` as in `near`, or one team per row."""
+        return find_nearest(self, k, teams)
+
+    @property
+    def table_bodies(self) -> Bodies:
+        """The table behind `bodies`; for queries."""
+        return self._bodies
+
+    def nearest_row(self, row: int, team: int | None = None) -> int:
+        """Body row of the nearest other entity (of a team) of one row; -1 when there is none."""
+        return find_nearest_row(self, row, team)
+
+    def near_rows(self, row: int, radius: float, team: int | None = None) -> list[int]:
+        """Body rows of the other entities (of a team) nearer than radius [m] to one row, nearest first."""
+        return find_near_rows(self, row, radius, team)
+
+    # -- chance and services ------------------------------------------------------------------------------------------------
+
+    def _stream(self, label: str) -> int:
+        return stream(self.caller.instance_name if self.caller is not None else "", label)
+
+    def uniform(self, label: str, k: int | None = None) -> np.ndarray:
+        """Uniform draws in [0, 1), (n,) or (k, n): the same for an entity whatever else there is in the world."""
+        out = rng.uniform(self._seeds, self._stream(label), self.place_in_block, self.step_count, self.substep, k or 1)
+        return out if k is not None else out[0]
+
+    def normal(self, label: str, k: int | None = None) -> np.ndarray:
+        """Standard normal draws, (n,) or (k, n)."""
+        out = rng.normal(self._seeds, self._stream(label), self.place_in_block, self.step_count, self.substep, k or 1)
+        return out if k is not None else out[0]
+
+    def normal_pairs(self, label: str, row: np.ndarray, other_id: np.ndarray, k: int) -> np.ndarray:
+        """Standard normal draws of pairs, (k, m): keyed by the row's entity and the other's id."""
+        seeds = self._seeds[row] ^ (other_id.astype(np.uint64) * GOLDEN)
+        return rng.normal(seeds, self._stream(label), self.place_in_block[row], self.step_count[row], self.substep, k)
+
+    def call(self, service: str, *args: Any, **kwargs: Any) -> Any:
+        """Call a service of the entity's plugins (its first argument is this view), or of the world's."""
+        function = self.context.find_service(service, self.services)
+        return function(self, *args, **kwargs) if service in self.services else function(*args, **kwargs)
+

@@ -1,0 +1,195 @@
+"""Motion models: a state equation, the driver that integrates it, and the way in and out of the body table."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+
+from tussle.api.bodies import DERIVED, FLOATS, derive
+from tussle.api.group import GroupView
+from tussle.api.kinds import EntityPlugin
+from tussle.columns import Param, State
+from tussle.errors import DeclarationError, ParameterError, listed, nearest_name
+from tussle.numeric.quaternion import quat_from_euler
+from tussle.numeric.fingerprint import uses_libm
+from tussle.numeric.rk4 import compile_derivative, driver
+
+BODY_INPUTS = ("force_x", "force_y", "force_z", "torque_x", "torque_y", "torque_z", "mass")
+WRITABLE = ("pos", "vel", "quat", "omega")
+
+
+class MotionBody(GroupView):
+    """A motion model's rows in the body table; pos, vel, quat and omega are writable.
+
+    Attributes:
+        forward_speed: Speed along the body x axis [m/s], (n,).
+    """
+
+    def __getattr__(self, name: str) -> Any:
+        if name in WRITABLE:
+            array = getattr(self._bodies, name)[:, self.first : self.last]
+            self.__dict__[name] = array
+            return array
+        if name in DERIVED:
+            # Straight from the quaternions: while a model writes them, what the table keeps is out of date.
+            k = DERIVED[name]
+            out = np.empty((k, self.n) if k > 1 else self.n)
+            derive(name, np.ascontiguousarray(self.quat), out)
+            return out
+        if name == "forward_speed":
+            east, north, up = self.forward
+            vx, vy, vz = self.vel
+            return vx * east + vy * north + vz * up
+        return super().__getattr__(name)
+
+    def set_attitude(self, roll: Any = 0.0, climb: Any = 0.0, yaw: Any = 0.0) -> None:
+        """Write quat from bank (right wing down positive), elevation (nose up positive) and heading [rad], each (n,) or a number."""
+        flat = np.zeros(self.n)
+        self.quat[:] = quat_from_euler(flat + roll, flat - climb, flat + yaw)
+
+
+class MotionModel(EntityPlugin):
+    """The dynamics of an entity: x' = f(x, u); abstract.
+
+    A model declares one `State` with named fields, its inputs and parameters, and `derivative`: a static function whose arguments
+    are matched by name to fields, inputs, parameters, force_x ... torque_z (world frame) and mass, and which returns the fields'
+    derivatives in order. One shared Runge-Kutta driver of fourth order integrates it. A model may bring its own `advance` kernel
+    (x, u, p, dt, substeps) instead; x (m, n), u (k, n) inputs and p (q, n) parameters in order of declaration.
+
+    Raises:
+        DeclarationError: No state, several, or an argument of `derivative` that means nothing.
+    """
+
+    kind = "motion"
+    derivative: ClassVar[Any] = None
+    advance: ClassVar[Any] = None
+    abstract: ClassVar[bool] = True
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        if cls.derivative is None and cls.advance is None:
+            return
+        states = [c for c in cls.states().values() if c.fields]
+        if len(states) != 1:
+            raise DeclarationError(f"{cls.__name__} declares {len(states)} states with fields; a motion model has one, such as x = State('east north')")
+        if cls.derivative is not None:
+            allowed = [*states[0].fields, *cls._input_names(), *cls._param_names(), *BODY_INPUTS]
+            for name in inspect.signature(cls.derivative).parameters:
+                if name not in allowed:
+                    raise DeclarationError(
+                        f"{cls.__name__}.derivative has an argument {name!r}{nearest_name(name, allowed)} that is no state, input, "
+                        f"parameter or force; {listed(allowed)}"
+                    )
+        if "grade" not in cls.__dict__ and cls.derivative is not None and not uses_libm(cls.derivative):
+            cls.grade = "portable" if cls._has_plain_hooks() else "machine"
+
+    @classmethod
+    def _has_plain_hooks(cls) -> bool:
+        return False
+
+    @classmethod
+    def state(cls) -> State:
+        """Declaration of the state vector."""
+        return next(c for c in cls.states().values() if c.fields)
+
+    @classmethod
+    def _input_names(cls) -> list[str]:
+        return [channel for c in cls.inputs().values() for channel in c.channels]
+
+    @classmethod
+    def row_params(cls) -> dict[str, Param]:
+        """The parameters that are columns, in order: the rows of `p`."""
+        return {k: c for k, c in cls.params().items() if c.is_row_data}
+
+    @classmethod
+    def _param_names(cls) -> list[str]:
+        return [name for k, c in cls.row_params().items() for name in (c.fields or (k,))]
+
+    def active_inputs(self) -> list[str]:
+        """Names of the inputs that this instance uses, in order of declaration; structural parameters may switch some off."""
+        return list(type(self).inputs())
+
+    def input_channels(self) -> list[str]:
+        """Channel names of the rows of `u`."""
+        return [channel for k in self.active_inputs() for channel in type(self).inputs()[k].channels]
+
+    def body_inputs(self) -> list[str]:
+        """Which of force, torque and mass the derivative takes."""
+        if self.advance is not None or self.derivative is None:
+            return []
+        names = inspect.signature(self.derivative).parameters
+        return [name for name in BODY_INPUTS if name in names]
+
+    def integrator(self) -> Any:
+        """The compiled function (x, u, p, dt, substeps) that flies this model, and that `rollout` calls."""
+        if self.advance is not None:
+            return type(self).advance
+        f = compile_derivative(
+            type(self).derivative, list(self.state().fields), [*self.input_channels(), *self.body_inputs()], self._param_names()
+        )
+        return lambda x, u, p, dt, substeps: driver(f, x, u, p, dt, substeps)
+
+    # -- hooks --------------------------------------------------------------------------------------------------------------
+
+    def from_body(self, body: MotionBody, rows: np.ndarray) -> None:
+        """Set the state of `rows` from the body table: at spawn, and where someone else has moved them."""
+        raise TypeError(f"{type(self).__name__} has no from_body")
+
+    def to_body(self, body: MotionBody) -> None:
+        """Write pos, quat, vel (and omega) of all rows from the state."""
+        raise TypeError(f"{type(self).__name__} has no to_body")
+
+    # -- planning -----------------------------------------------------------------------------------------------------------
+
+    def rollout(self, x0: Any, inputs: Any, dt: float, substeps: int = 1, params: Mapping[str, Any] | None = None) -> np.ndarray:
+        """States along a path, by the very function that flies the model: bit for bit what the engine computes.
+
+        Call it on a plugin as data (`Unicycle(vel_max=20).rollout(...)`); nothing in any simulation changes.
+
+        Args:
+            x0: Initial states, (m,) or (m, n).
+            inputs: One row per step, (T, k) or (T, k, n), in order of declaration.
+            dt: Length of a step [s].
+            substeps: Runge-Kutta steps per step; the mission's motion_multiplier for the flown path.
+            params: Parameters that differ between the n, name -> (n,) or (k, n).
+
+        Returns:
+            (T + 1, m) or (T + 1, m, n), x0 first.
+
+        Raises:
+            ParameterError: A shape does not fit, or a parameter is unknown.
+        """
+        own = self.__dict__["_values"]
+        x = np.array(x0, float)
+        is_single = x.ndim == 1
+        x = np.ascontiguousarray(x[:, None] if is_single else x)
+        u = np.asarray(inputs, float)
+        u = u[..., None] if u.ndim == 2 else u
+        n, names = x.shape[1], [*self.input_channels(), *self.body_inputs()]
+        if x.shape[0] != len(self.state().fields) or u.ndim != 3 or u.shape[1] != len(names) or u.shape[2] not in (1, n):
+            raise ParameterError(
+                f"{type(self).__name__}.rollout: x0 is {np.shape(x0)} and inputs {np.shape(inputs)}; needed are "
+                f"({len(self.state().fields)}, n) for {', '.join(self.state().fields)} and (T, {len(names)}) for {', '.join(names)}"
+            )
+        for key in params or {}:
+            if key not in self.row_params():
+                raise ParameterError(f"{type(self).__name__} has no parameter {key!r}{nearest_name(key, self.row_params())}; {listed(self.row_params())}")
+        rows = []
+        for key, column in self.row_params().items():
+            value = np.asarray((params or {}).get(key, own[key]), float)
+            value = value[:, None] if column.fields and value.ndim == 1 else value
+            rows.append(np.broadcast_to(value, (len(column.fields) or 1, n)))
+        p = np.ascontiguousarray(np.concatenate(rows)) if rows else np.zeros((0, n))
+        integrate = self.integrator()
+        path = np.empty((len(u) + 1, *x.shape))
+        path[0] = x
+        for k in range(len(u)):
+            integrate(x, np.ascontiguousarray(np.broadcast_to(u[k], (len(names), n))), p, dt, substeps)
+            path[k + 1] = x
+        return path[..., 0] if is_single else path
+
+
+assert set(WRITABLE) <= set(FLOATS)

@@ -1,0 +1,148 @@
+"""Who is near whom, for NumPy code: pairs in range with reductions per row, and nearest others."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tussle.errors import ParameterError
+from tussle.neighbors import queries, search
+from tussle.neighbors.index import Index
+
+if TYPE_CHECKING:
+    from tussle.api.group import GroupView
+
+
+class Pairs:
+    """Pairs of a row and another entity of its world, ordered by row, each row's in a fixed order.
+
+    Any body column of the other is an attribute too: `near.vel` (3, m), `near.team` (m,), `near.yaw` ...
+
+    Attributes:
+        row: Row of the group, (m,).
+        other: Row of the other in the body table, (m,).
+        offset: From the row to the other [m], (3, m), world frame.
+        distance: Its length [m], (m,).
+        count: Number of pairs of each row, (n,).
+    """
+
+    def __init__(self, found: queries.Pairs, g: GroupView) -> None:
+        self.row, self.other = found.row, found.other
+        self.offset, self.distance = found.offset, found.distance
+        self.count = found.count
+        self._start = found.start
+        self._bodies = g.bodies
+
+    def __len__(self) -> int:
+        return len(self.row)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._bodies, name)[..., self.other]
+
+    def _each(self, reduce: Any, values: Any, *rest: Any) -> np.ndarray:
+        values = np.asarray(values, float)
+        if values.shape[-1:] != self.row.shape:
+            raise ParameterError(f"values of pairs have shape {values.shape}; the last axis needs the {len(self.row)} pairs")
+        out = np.zeros((*values.shape[:-1], len(self.count)))
+        flat = np.ascontiguousarray(values.reshape(-1, len(self.row)))
+        for source, target in zip(flat, out.reshape(-1, len(self.count)), strict=True):
+            reduce(self._start, source, target, *rest)
+        return out
+
+    def sum(self, values: Any) -> np.ndarray:
+        """Sum over each row's pairs of values (m,) or (k, m): (n,) or (k, n), 0 for rows without pairs."""
+        return self._each(search.segment_sum, values)
+
+    def mean(self, values: Any) -> np.ndarray:
+        """Mean over each row's pairs, 0 for rows without pairs."""
+        return self._each(search.segment_mean, values, 0.0)
+
+    def min(self, values: Any) -> np.ndarray:
+        """Minimum over each row's pairs, infinity for rows without pairs."""
+        return self._each(search.segment_min, values, np.inf)
+
+    def nearest(self) -> np.ndarray:
+        """Pair with the smallest distance of each row, (n,); -1 for rows without pairs."""
+        out = np.empty(len(self.count), np.int64)
+        search.segment_first_min(self._start, self.distance, out)
+        return out
+
+
+class Nearest:
+    """The k nearest others of each row.
+
+    Attributes:
+        other: Row in the body table, (k, n); -1 where there are fewer than k.
+        distance: [m], (k, n); infinity there.
+        offset: From the row to the other [m], (3, k, n); 0 there.
+    """
+
+    def __init__(self, other: np.ndarray, distance: np.ndarray, offset: np.ndarray) -> None:
+        self.other, self.distance, self.offset = other, distance, offset
+
+
+def find_pairs(g: GroupView, radius: float | np.ndarray, teams: str | int | None) -> Pairs:
+    """See `GroupView.near`."""
+    index = g.index(radius)
+    x, y, z = g.pos
+    reach = np.full(g.n, radius) if not isinstance(radius, np.ndarray) else np.ascontiguousarray(radius, float)
+    found = queries.pairs(index, g.first, g.last, x, y, z, reach, g.bodies.team, _checked(teams))
+    return Pairs(found, g)
+
+
+def _checked(teams: Any) -> Any:
+    if teams is None or (isinstance(teams, (int, np.integer)) and not isinstance(teams, bool)) or teams in ("own", "other"):
+        return int(teams) if isinstance(teams, np.integer) else teams
+    raise ParameterError(f"teams = {teams!r} is not allowed; it is 'own', 'other', a team number or None")
+
+
+def any_index(g: GroupView) -> Index:
+    """An index for searches without a radius, whose result does not depend on it: cells only where there are many rows."""
+    return g.table_bodies.index(g.table_bodies.usual_reach())
+
+
+def find_nearest(g: GroupView, k: int, teams: Any) -> Nearest:
+    """See `GroupView.nearest`."""
+    index = any_index(g)
+    x, y, z = g.pos
+    if isinstance(teams, np.ndarray):
+        other, square = np.empty((k, g.n), np.int64), np.empty((k, g.n))
+        search.nearest_rows(
+            x, y, z, k, search.SAME, teams.astype(float), index.row_world, index.place, g.first, *index.table,
+            g.by_place(index, "team")[0], index.order, other, square, 0, g.n,
+        )  # fmt: skip
+        distance = np.sqrt(square)
+    else:
+        other, distance = queries.nearest(index, g.first, g.last, x, y, z, k, g.bodies.team, _checked(teams))
+    there = other >= 0
+    offset = np.where(there, g.bodies.pos[:, np.where(there, other, 0)] - g.pos[:, None, :], 0.0)
+    return Nearest(other, distance, offset)
+
+
+def find_nearest_row(g: GroupView, row: int, team: int | None) -> int:
+    """Body row of the nearest other entity of one row, (of a team); -1 when there is none."""
+    index = any_index(g)
+    x, y, z = g.pos[:, row : row + 1]
+    other, square = np.empty((1, 1), np.int64), np.empty((1, 1))
+    mode, wanted = (search.ANY, 0.0) if team is None else (search.SAME, float(team))
+    search.nearest_rows(
+        x, y, z, 1, mode, np.array([wanted]), index.row_world, index.place, g.first + row, *index.table,
+        g.by_place(index, "team")[0], index.order, other, square, 0, 1,
+    )  # fmt: skip
+    return int(other[0, 0])
+
+
+def find_near_rows(g: GroupView, row: int, radius: float, team: int | None) -> list[int]:
+    """Body rows of the other entities (of a team) nearer than radius [m] to one row, nearest first, the smaller id when equal."""
+    bodies = g.bodies
+    members, world_start, _, _ = g.table_bodies.layout()
+    world = int(g.world[row])
+    rows = members[world_start[world] : world_start[world + 1]]
+    rows = rows[rows != g.first + row]
+    if team is not None:
+        rows = rows[bodies.team[rows] == team]
+    dx, dy, dz = bodies.pos[:, rows] - g.pos[:, row : row + 1]
+    distance = np.sqrt(dx * dx + dy * dy + dz * dz)
+    kept = np.flatnonzero(distance < radius)
+    return [int(r) for r in rows[kept[np.argsort(distance[kept], kind="stable")]]]

@@ -1,0 +1,223 @@
+"""The plugin as data and as part of a simulation: one class, the same attribute names."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from typing import Any, ClassVar, Self, TypeVar
+
+import numpy as np
+
+from tussle.columns import Channel, Children, Column, EntityRef, Handle, Input, Output, Param, Ragged, State, Topic
+from tussle.errors import DeclarationError, ParameterError, listed, nearest_name
+
+F = TypeVar("F", bound=Callable[..., Any])
+C = TypeVar("C", bound=Column)
+
+GRADES = ("portable", "machine", "external")
+RESERVED = ("name", "rate")
+
+
+def service(method: F) -> F:
+    """Mark a method that other plugins call by name with `g.call` or `w.call`."""
+    method.__dict__["is_service"] = True
+    return method
+
+
+class Plugin:
+    """A part of an entity or of the world; abstract.
+
+    Unbound, a plugin is data: it compares by value, pickles, and its repr says what differs from the defaults. A simulation binds
+    a copy of it, whose declared names are arrays.
+
+    Args:
+        name: Name of this instance; the class's name unless given. It tells two plugins of one class in one entity apart.
+        rate: Calls per second [Hz]; None calls it in every step.
+        **values: Parameters, by their declared names.
+
+    Raises:
+        ParameterError: A parameter is unknown or its value is not allowed.
+    """
+
+    grade: ClassVar[str] = "machine"
+    """What is promised of its bits: "portable", "machine" or "external"."""
+    atomic: ClassVar[bool] = False
+    """Promise that a call which raises has written nothing, which saves a copy of its columns per call."""
+    max_worlds: ClassVar[int | None] = None
+    """Largest stack of worlds it can take part in; None is any."""
+
+    columns: ClassVar[dict[str, Column]] = {}
+    services: ClassVar[tuple[str, ...]] = ()
+    wired: frozenset[str]
+    """Bound: names of its outputs that somebody reads."""
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        cls.columns = {k: c for base in reversed(cls.__mro__) for k, c in vars(base).items() if isinstance(c, Column)}
+        cls.services = tuple(sorted(k for k in dir(cls) if getattr(getattr(cls, k, None), "is_service", False)))
+        if cls.grade not in GRADES:
+            raise DeclarationError(f"{cls.__name__}.grade is {cls.grade!r}; it is one of {', '.join(GRADES)}")
+        for name, column in cls.columns.items():
+            if name in RESERVED or name.startswith("_"):
+                raise DeclarationError(f"{cls.__name__}.{name}: the name is reserved; choose another for this {type(column).__name__}")
+        params = [inspect.Parameter(k, inspect.Parameter.KEYWORD_ONLY, default=c.default) for k, c in cls.params().items()]
+        params += [inspect.Parameter(k, inspect.Parameter.KEYWORD_ONLY, default=()) for k, c in cls.children().items()]
+        params += [inspect.Parameter(k, inspect.Parameter.KEYWORD_ONLY, default=None) for k in RESERVED]
+        cls.__signature__ = inspect.Signature(params)  # type: ignore[attr-defined]
+
+    def __init__(self, *, name: str | None = None, rate: float | None = None, **values: Any) -> None:
+        cls = type(self)
+        if rate is not None and not rate > 0.0:
+            raise ParameterError(f"{cls.__name__}: rate = {rate!r} is not allowed; it takes a number of calls per second > 0, or None")
+        params, children = cls.params(), cls.children()
+        for key in values:
+            if key not in params and key not in children:
+                allowed = [*params, *children, *RESERVED]
+                raise ParameterError(f"{cls.__name__} has no parameter {key!r}{nearest_name(key, allowed)}; {listed(allowed)}")
+        resolved = {k: c.convert(values[k]) if k in values else c.default for k, c in params.items()}
+        for key, child in children.items():
+            resolved[key] = tuple(values.get(key, ()))
+            for plugin in resolved[key]:
+                if not isinstance(plugin, child.kind):
+                    raise ParameterError(f"{cls.__name__}.{key}: {plugin!r} is not a {child.kind.__name__}")
+        self.__dict__.update(_values=resolved, instance_name=name or cls.__name__, rate=rate)
+
+    # -- declarations ---------------------------------------------------------------------------------------------------
+
+    @classmethod
+    def declared(cls, kind: type[C]) -> dict[str, C]:
+        """Declarations of one kind, by name, in order of declaration, those of base classes first."""
+        return {k: c for k, c in cls.columns.items() if isinstance(c, kind)}
+
+    @classmethod
+    def params(cls) -> dict[str, Param]:
+        return cls.declared(Param)
+
+    @classmethod
+    def children(cls) -> dict[str, Children]:
+        return cls.declared(Children)
+
+    @classmethod
+    def states(cls) -> dict[str, State]:
+        return cls.declared(State)
+
+    @classmethod
+    def refs(cls) -> dict[str, EntityRef]:
+        return cls.declared(EntityRef)
+
+    @classmethod
+    def inputs(cls) -> dict[str, Input]:
+        return cls.declared(Input)
+
+    @classmethod
+    def outputs(cls) -> dict[str, Output]:
+        return cls.declared(Output)
+
+    @classmethod
+    def channels(cls) -> dict[str, Channel]:
+        return cls.declared(Channel)
+
+    @classmethod
+    def topics(cls) -> dict[str, Topic]:
+        return cls.declared(Topic)
+
+    @classmethod
+    def handles(cls) -> dict[str, Handle]:
+        return cls.declared(Handle)
+
+    @classmethod
+    def ragged(cls) -> dict[str, Ragged]:
+        return cls.declared(Ragged)
+
+    # -- as data --------------------------------------------------------------------------------------------------------
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """Parameters and children by name, SI."""
+        return dict(self.__dict__["_values"])
+
+    def replace(self, **values: Any) -> Self:
+        """A copy with other parameters."""
+        merged = {**self.values, "name": self.__dict__["instance_name"], "rate": self.__dict__["rate"], **values}
+        return type(self)(**merged)
+
+    def structure(self) -> tuple[Any, ...]:
+        """What entities must share to live in one group: class, name, rate, structural parameters, children's structure."""
+        own = self.__dict__["_values"]
+        fixed = tuple((k, own[k]) for k, c in self.params().items() if c.structural)
+        inner = tuple((k, tuple(c.structure() for c in own[k])) for k in self.children())
+        return (type(self), self.__dict__["instance_name"], self.__dict__["rate"], fixed, inner)
+
+    def __eq__(self, other: object) -> bool:
+        if type(self) is not type(other):
+            return NotImplemented
+        return self._identity() == other._identity()  # type: ignore[attr-defined]
+
+    def __hash__(self) -> int:
+        return hash(self._identity())
+
+    def _identity(self) -> tuple[Any, ...]:
+        own = self.__dict__
+        return (type(self), own["instance_name"], own["rate"], tuple(own["_values"].items()))
+
+    def __repr__(self) -> str:
+        own = self.__dict__
+        parts = [f"{k}={own['_values'][k]!r}" for k, c in self.params().items() if own["_values"][k] != c.default]
+        parts += [f"{k}={list(own['_values'][k])!r}" for k in self.children() if own["_values"][k]]
+        if own["instance_name"] != type(self).__name__:
+            parts.append(f"name={own['instance_name']!r}")
+        if own["rate"] is not None:
+            parts.append(f"rate={own['rate']!r}")
+        return f"{type(self).__name__}({', '.join(parts)})"
+
+    # -- bound ----------------------------------------------------------------------------------------------------------
+
+    def bound(self) -> Self:
+        """A copy whose arrays the engine fills in; the original stays data."""
+        copy = object.__new__(type(self))
+        copy.__dict__.update(self.__dict__, is_bound=True, wired=frozenset())
+        return copy
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        cls = type(self)
+        if name in cls.columns:
+            if not self.__dict__.get("is_bound"):
+                raise ParameterError(f"{cls.__name__}.{name} cannot be changed: a plugin is a value; make another with .replace({name}=...)")
+            array = self.__dict__.get(name)
+            if isinstance(array, np.ndarray) and isinstance(value, np.ndarray) and np.shares_memory(array, value):
+                return  # `self.x += 1` has already written into the column when Python assigns the result.
+            raise AttributeError(f"{cls.__name__}.{name} is a column: write into it with self.{name}[:] = value")
+        raise AttributeError(
+            f"{cls.__name__}.{name} is not declared{nearest_name(name, cls.columns)}: one plugin object serves all entities, so memory "
+            f"goes into a column: {name} = State(...) on the class, then self.{name}[:] = value (or me.{name} = value in easy mode)"
+        )
+
+    # -- hooks that do nothing unless filled in ---------------------------------------------------------------------------
+
+    def open_one(self, row: Any) -> Any:
+        """Make the object that a Handle column holds for a new row; `row` names it (world, id, seed, position)."""
+        return None
+
+    def close_one(self, handle: Any) -> None:
+        """Release one row's object; called exactly once for each that was opened."""
+
+    def save_one(self, handle: Any) -> Any:
+        """Picklable state of one row's object, for snapshots.
+
+        Raises:
+            SnapshotError: Unless the plugin fills it in.
+        """
+        from tussle.errors import SnapshotError
+
+        raise SnapshotError(f"{type(self).__name__} holds objects outside the arrays and cannot save them, so no snapshot can be taken")
+
+    def load_one(self, row: Any, state: Any) -> Any:
+        """An object like the one that was saved; the counterpart of `save_one`."""
+        return self.open_one(row)
+
+    def ready(self, g: Any) -> bool:
+        """Whether the outside is ready for the next step; asked in lockstep until true or until `ready_timeout`."""
+        return True
+
+    ready_timeout: ClassVar[float] = 10.0
+    """Longest wait for `ready` [s of wall time]."""

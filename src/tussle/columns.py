@@ -1,0 +1,431 @@
+"""The declarations: each array of a plugin is stated once, as a class attribute.
+
+On the class an attribute is the declaration (unit, shape, default, bounds, a line of doc); on a plugin that lives in a simulation
+the same name is the array. Allocation, constructors, sweeps, wiring checks, reset, snapshot, hashing and the plugin's page all
+read this one declaration.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from tussle import units
+from tussle.errors import DeclarationError, ParameterError
+
+PER = ("entity", "world", "team")
+
+
+class Column:
+    """A declared array of a plugin; abstract.
+
+    Attributes:
+        name: The attribute's name on the class, set by Python.
+        owner: Name of the class that declares it.
+        doc: One line that says what it is.
+    """
+
+    name: str = ""
+    owner: str = ""
+
+    def __init__(self, *, doc: str = "") -> None:
+        self.doc = doc
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+        self.owner = owner.__name__
+
+    def __get__(self, instance: object | None, owner: type) -> Any:
+        # Not a data descriptor on purpose: arrays of a bound plugin sit in its __dict__ and are found first, in 30 ns.
+        if instance is None:
+            return self
+        raise AttributeError(
+            f"{type(instance).__name__}.{self.name} is an array only inside a simulation; this {type(instance).__name__} is unbound data"
+        )
+
+    def __eq__(self, other: object) -> bool:
+        return type(self) is type(other) and self.__dict__ == other.__dict__
+
+    __hash__ = object.__hash__
+
+
+def _fields(text: str, what: str) -> tuple[str, ...]:
+    names = tuple(text.split())
+    for name in names:
+        if not name.isidentifier():
+            raise DeclarationError(f"{what}: {name!r} is not a name; write the names separated by blanks")
+    if len(set(names)) != len(names):
+        raise DeclarationError(f"{what}: a name stands twice in {text!r}")
+    return names
+
+
+class Numbers(Column):
+    """A column of numbers; abstract.
+
+    Attributes:
+        fields: Names of the components; empty for a column that is one number a row.
+        units: Unit of each component.
+        dtype: float, int or bool.
+    """
+
+    def __init__(self, fields: str, unit: str, dtype: type, doc: str) -> None:
+        super().__init__(doc=doc)
+        self.fields = _fields(fields, type(self).__name__)
+        self.unit = unit
+        self.units = units.split_units(unit, max(1, len(self.fields)))
+        if dtype not in (float, int, bool):
+            raise DeclarationError(f"{type(self).__name__}: dtype {dtype!r} is not one of float, int, bool")
+        self.dtype = dtype
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of one row's value: () or (k,)."""
+        return (len(self.fields),) if self.fields else ()
+
+
+class Param(Numbers):
+    """A parameter: a number per row, or with `structural` (and for text) one Python value for the plugin.
+
+    Args:
+        default: Value in SI units; its type (float, int, bool, str, tuple of floats) is the parameter's type.
+        unit: SI unit, or one per field.
+        ge: Smallest allowed value.
+        gt: Value that it must exceed.
+        le: Largest allowed value.
+        lt: Value that it must stay below.
+        choices: Allowed values, for text.
+        fields: Names of the components of a tuple.
+        text_unit: Unit of a bare number in a mission file where that is historically not SI.
+        structural: It changes code path or shape, so entities that differ in it live in different groups.
+        ragged: A list of rows of `fields` instead of one value.
+        doc: One line that says what it is.
+    """
+
+    def __init__(
+        self,
+        default: Any,
+        *,
+        unit: str = "",
+        ge: float | None = None,
+        gt: float | None = None,
+        le: float | None = None,
+        lt: float | None = None,
+        choices: Iterable[Any] = (),
+        fields: str = "",
+        text_unit: str = "",
+        structural: bool = False,
+        ragged: bool = False,
+        doc: str = "",
+    ) -> None:
+        self.is_text = isinstance(default, str)
+        dtype = bool if isinstance(default, bool) else int if isinstance(default, int) else float
+        super().__init__(fields, unit, dtype, doc)
+        self.text_units = units.split_units(text_unit or unit, max(1, len(self.fields)))
+        self.ge, self.gt, self.le, self.lt = ge, gt, le, lt
+        self.choices = tuple(choices)
+        self.ragged = ragged
+        self.structural = structural or self.is_text
+        self.default = self.convert(default, "default")
+
+    @property
+    def is_row_data(self) -> bool:
+        """One number (or tuple) per row, so a column of the group's table."""
+        return not self.structural and not self.ragged
+
+    def allowed(self) -> str:
+        """What values it takes, in words, for messages and pages."""
+        if self.choices:
+            return "one of " + ", ".join(repr(c) for c in self.choices)
+        bounds = [(self.ge, ">="), (self.gt, ">"), (self.le, "<="), (self.lt, "<")]
+        text = " and ".join(f"{sign} {bound:g}" for bound, sign in bounds if bound is not None)
+        kind = "text" if self.is_text else {float: "a finite number", int: "a whole number", bool: "true or false"}[self.dtype]
+        unit = f" in {self.unit}" if self.unit else ""
+        return f"{kind}{unit}{' ' + text if text else ''}"
+
+    def convert(self, value: Any, where: str = "") -> Any:
+        """Value in SI units as plain Python, checked.
+
+        Args:
+            value: A number (SI), a text with unit ("40 kt"), or for several fields a sequence of them.
+            where: Place for the message.
+
+        Raises:
+            ParameterError: It has another type or unit, is not finite, or is out of bounds.
+        """
+        if self.ragged:
+            return tuple(tuple(self._numbers(row, where)) if self.fields else self._number(row, 0, where) for row in value)
+        if self.fields:
+            return tuple(self._numbers(value, where))
+        return self._number(value, 0, where)
+
+    def _numbers(self, value: Any, where: str) -> list[Any]:
+        values = [part.strip() for part in value.split(",")] if isinstance(value, str) else value
+        try:
+            values = list(values)
+        except TypeError:
+            raise self._error(where, value, f"{len(self.fields)} values ({', '.join(self.fields)})") from None
+        if len(values) != len(self.fields):
+            raise self._error(where, value, f"{len(self.fields)} values ({', '.join(self.fields)})")
+        return [self._number(v, i, where) for i, v in enumerate(values)]
+
+    def _number(self, value: Any, component: int, where: str) -> Any:
+        if self.is_text:
+            if not isinstance(value, str) or (self.choices and value not in self.choices):
+                raise self._error(where, value, self.allowed())
+            return value
+        if self.dtype is bool:
+            return self._truth(value, where)
+        if isinstance(value, str):
+            value = self._parsed(value, component, where)
+        if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, np.integer, np.floating)):
+            raise self._error(where, value, self.allowed())
+        if self.dtype is int:
+            if int(value) != value:
+                raise self._error(where, value, self.allowed())
+            number: float = int(value)
+        else:
+            number = float(value)
+        if math.isnan(number):
+            raise self._error(where, value, self.allowed())
+        if not self._is_within(number):
+            raise self._error(where, value, self.allowed())
+        return number
+
+    def _parsed(self, text: str, component: int, where: str) -> float:
+        try:
+            return units.parse(text, self.units[component])
+        except units.UnitError as error:
+            raise ParameterError(f"{self._place(where)} = {text!r}: {error}") from None
+        except ValueError:
+            raise self._error(where, text, self.allowed()) from None
+
+    def _truth(self, value: Any, where: str) -> bool:
+        if isinstance(value, (bool, np.bool_)):
+            return bool(value)
+        if isinstance(value, str) and value.strip().lower() in ("true", "false", "1", "0"):
+            return value.strip().lower() in ("true", "1")
+        if isinstance(value, (int, float)) and value in (0, 1):
+            return bool(value)
+        raise self._error(where, value, self.allowed())
+
+    def _is_within(self, number: float) -> bool:
+        return (
+            (self.ge is None or number >= self.ge)
+            and (self.gt is None or number > self.gt)
+            and (self.le is None or number <= self.le)
+            and (self.lt is None or number < self.lt)
+            and (not self.choices or number in self.choices)
+        )
+
+    def _place(self, where: str) -> str:
+        name = f"{self.owner}.{self.name}" if self.owner else "Param"
+        return f"{where}: {name}" if where and where != "default" else name
+
+    def _error(self, where: str, value: Any, allowed: str) -> ParameterError:
+        return ParameterError(f"{self._place(where)} = {value!r} is not allowed; it takes {allowed}")
+
+    def __get__(self, instance: object | None, owner: type) -> Any:
+        if instance is None:
+            return self
+        return instance.__dict__["_values"][self.name]
+
+
+class State(Numbers):
+    """Memory of a plugin: all that it remembers from one call to the next.
+
+    Args:
+        fields: Names of the components; none for one number a row.
+        unit: SI unit, or one per field.
+        default: Value of a new row.
+        dtype: float, int or bool.
+        per: "entity"; for world plugins also "world" or "team".
+        doc: One line that says what it is.
+    """
+
+    def __init__(
+        self,
+        fields: str = "",
+        unit: str = "",
+        default: float = 0.0,
+        dtype: type = float,
+        per: str = "entity",
+        doc: str = "",
+    ) -> None:
+        super().__init__(fields, unit, dtype, doc)
+        if per not in PER:
+            raise DeclarationError(f"State: per={per!r} is not one of {', '.join(PER)}")
+        self.default = default
+        self.per = per
+
+
+class Channel(Numbers):
+    """A column that is wired to other plugins by the names of its channels; abstract."""
+
+    def __init__(self, channels: str, unit: str, doc: str) -> None:
+        super().__init__(channels, unit, float, doc)
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the channels: those given, else the attribute's own name."""
+        return self.fields or (self.name,)
+
+
+class Input(Channel):
+    """Values that another plugin of the entity writes: `Input(unit="m/s")`, or `Input("velocity_x velocity_y", unit="m/s")`.
+
+    Args:
+        channels: Names of the channels where they differ from the attribute or are several.
+        unit: SI unit, or one per channel.
+        optional: Nobody need write it; then it stays at `default`.
+        default: Value until somebody writes it.
+        doc: One line that says what it is.
+    """
+
+    def __init__(
+        self, channels: str = "", unit: str = "", optional: bool = False, default: float = 0.0, doc: str = ""
+    ) -> None:
+        super().__init__(channels, unit, doc)
+        self.optional = optional
+        self.default = default
+
+
+class Output(Channel):
+    """Values that this plugin writes for others of its entity; same arguments as `Input`."""
+
+    def __init__(self, channels: str = "", unit: str = "", doc: str = "") -> None:
+        super().__init__(channels, unit, doc)
+        self.default = 0.0
+
+
+class EntityRef(Numbers):
+    """Reference to another entity: its id, which survives any change of rows; 0 is none."""
+
+    def __init__(self, doc: str = "") -> None:
+        super().__init__("", "", int, doc)
+        self.default = 0
+        self.per = "entity"
+
+
+class Ragged(Numbers):
+    """A list per row, of any length: `start` (n + 1,) and `data` (k, total) or (total,)."""
+
+    def __init__(self, fields: str = "", unit: str = "", dtype: type = float, doc: str = "") -> None:
+        super().__init__(fields, unit, dtype, doc)
+
+
+class Handle(Column):
+    """An opaque object per row: a process, a socket, a flight model (see `Plugin.open_one`)."""
+
+
+class Children(Column):
+    """Plugins inside a plugin: its value is a list of plugins of one kind, bound with channels of their own."""
+
+    def __init__(self, kind: type, doc: str = "") -> None:
+        super().__init__(doc=doc)
+        self.kind = kind
+
+
+class Field(Numbers):
+    """A field of a message type."""
+
+    def __init__(self, fields: str = "", unit: str = "", dtype: type = float, doc: str = "") -> None:
+        super().__init__(fields, unit, dtype, doc)
+        self.default = 0
+
+
+class Topic(Column):
+    """One end of a topic; abstract. A topic is (network, name, message type).
+
+    Args:
+        message: The message type.
+        topic: Name; the type's name unless given.
+        network: Instance name of the network that carries it.
+        topic_param: Name of a text Param of the plugin that holds the topic's name.
+        network_param: Name of a text Param of the plugin that holds the network's name.
+        doc: One line that says what it is.
+    """
+
+    def __init__(
+        self,
+        message: type,
+        *,
+        topic: str = "",
+        network: str = "GlobalNetwork",
+        topic_param: str = "",
+        network_param: str = "",
+        doc: str = "",
+    ) -> None:
+        super().__init__(doc=doc)
+        self.message = message
+        self.topic = topic or message.__name__
+        self.network = network
+        self.topic_param = topic_param
+        self.network_param = network_param
+
+
+class Publish(Topic):
+    """The sending end of a topic."""
+
+
+class Subscribe(Topic):
+    """The receiving end of a topic."""
+
+
+class RaggedColumn:
+    """The array of a `Ragged` (or ragged `Param`): row i owns data[..., start[i]:start[i + 1]].
+
+    Attributes:
+        start: First item of each row and the end, (n + 1,), int64.
+        data: Items, (total,) or (k, total).
+    """
+
+    def __init__(self, start: np.ndarray, data: np.ndarray) -> None:
+        self.start = start
+        self.data = data
+
+    @classmethod
+    def empty(cls, n: int, declaration: Numbers) -> RaggedColumn:
+        """All rows without items."""
+        shape = (*declaration.shape, 0)
+        return cls(np.zeros(n + 1, np.int64), np.zeros(shape, np.dtype(declaration.dtype)))
+
+    @classmethod
+    def from_rows(cls, rows: list[Any], declaration: Numbers) -> RaggedColumn:
+        """From one sequence per row, each of shape (m, k) or (m,)."""
+        column = cls.empty(len(rows), declaration)
+        parts = [np.asarray(r, column.data.dtype).reshape(-1, *declaration.shape).T for r in rows]
+        column.set(np.cumsum([0, *[p.shape[-1] for p in parts]]), np.concatenate([column.data, *parts], axis=-1))
+        return column
+
+    def set(self, start: np.ndarray, data: np.ndarray) -> None:
+        """Replace all lists.
+
+        Raises:
+            ValueError: start does not fit the number of rows, or does not end at the number of items.
+        """
+        start = np.ascontiguousarray(start, np.int64)
+        data = np.ascontiguousarray(data, self.data.dtype)
+        if start.shape != self.start.shape or data.shape[:-1] != self.data.shape[:-1]:
+            raise ValueError(f"start is {start.shape} and data {data.shape}; needed {self.start.shape} and {self.data.shape[:-1]} + (total,)")
+        if start[0] != 0 or start[-1] != data.shape[-1] or (np.diff(start) < 0).any():
+            raise ValueError(f"start must rise from 0 to the number of items, {data.shape[-1]}")
+        self.start, self.data = start, data
+
+    def __getitem__(self, row: int) -> np.ndarray:
+        return self.data[..., self.start[row] : self.start[row + 1]]
+
+    def __len__(self) -> int:
+        return len(self.start) - 1
+
+    def take(self, index: np.ndarray) -> RaggedColumn:
+        """Lists of the rows `index`; -1 gives an empty list."""
+        kept = np.where(index >= 0, index, 0)
+        first = self.start[kept] if len(self) else np.zeros(len(index), np.int64)
+        length = np.where(index >= 0, (self.start[kept + 1] if len(self) else first) - first, 0)
+        start = np.zeros(len(index) + 1, np.int64)
+        np.cumsum(length, out=start[1:])
+        items = np.repeat(first - start[:-1], length) + np.arange(start[-1])
+        return RaggedColumn(start, np.ascontiguousarray(self.data[..., items]))

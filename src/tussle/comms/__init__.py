@@ -1,0 +1,5 @@
+"""Messages on their way: outboxes, queues and inboxes."""
+
+from tussle.comms.topic import EVERYONE, SAME_ENTITY, Inbox, Publisher, TopicBuffer
+
+__all__ = ["EVERYONE", "SAME_ENTITY", "Inbox", "Publisher", "TopicBuffer"]

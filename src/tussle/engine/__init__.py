@@ -1,0 +1,1 @@
+"""The engine: plugins, clocks and rows put together."""

@@ -1,0 +1,350 @@
+"""A simulation from outside: columns by path, snapshots, hashes, results."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tussle.api.bodies import DERIVED, FLOATS, INTS, Bodies, derive
+from tussle.columns import EntityRef, Handle, Output, Param, State
+from tussle.engine.group import Binding, Group
+from tussle.engine.result import WorldResult
+from tussle.errors import ParameterError, SnapshotError, listed, nearest_name
+from tussle.record import hash_columns
+
+if TYPE_CHECKING:
+    from tussle.engine.simulation import Simulation
+
+HASHED = ("id", "team", "block", "pos", "vel", "quat", "omega", "health", "radius", "mass")
+
+
+@dataclass
+class Parked:
+    """The last rows of a world that has ended: its part of the body table and of each group's table.
+
+    Attributes:
+        bodies: Its rows.
+        tables: Number of the group -> (rows in `bodies`, dtype -> columns).
+    """
+
+    bodies: Bodies
+    tables: dict[int, tuple[np.ndarray, dict[type, np.ndarray]]]
+
+
+def park(sim: Simulation, world: int) -> Parked:
+    """Keep a world's rows before they leave the table."""
+    bodies = sim.population.bodies
+    rows = np.flatnonzero(bodies.world == world)
+    tables = {}
+    for number, group in enumerate(sim.population.groups):
+        mine = np.flatnonzero((rows >= group.first) & (rows < group.last))
+        if len(mine):
+            tables[number] = (mine, {d: a[:, rows[mine] - group.first] for d, a in group.table.arrays.items()})
+    return Parked(Bodies(bodies.floats[:, rows].copy(), bodies.ints[:, rows].copy(), bodies.n_worlds), tables)
+
+
+# -- columns by path ------------------------------------------------------------------------------------------------------------
+
+
+def _sources(sim: Simulation) -> Iterator[tuple[Bodies, list[tuple[Group, np.ndarray, dict[type, np.ndarray]]]]]:
+    """Body tables with the rows of each group: the live one, then the worlds that have ended."""
+    groups = sim.population.groups
+    yield sim.population.bodies, [(g, np.arange(g.first, g.last), g.table.arrays) for g in groups]
+    for world, parked in sim.parked.items():
+        if not (sim.population.bodies.world == world).any():
+            yield parked.bodies, [(groups[n], rows, arrays) for n, (rows, arrays) in parked.tables.items()]
+
+
+def _binding(group: Group, path: tuple[str, ...]) -> Binding | None:
+    return next((b for b in group.walk() if b.path == path), None)
+
+
+def _parse(sim: Simulation, path: str) -> tuple[int, tuple[str, ...], str]:
+    """(block number, plugin path, column)."""
+    head, *names = path.split(".")
+    blocks = sim.context.block_names
+    if head not in blocks or not names:
+        allowed = [*blocks, *(r.spec.instance_name for r in sim.referees)]
+        raise ParameterError(f"{path!r}: there is no column by this path{nearest_name(head, allowed)}; paths begin with: {', '.join(allowed)}")
+    number = blocks.index(head)
+    *plugins, column = names
+    if not plugins:
+        allowed = [*FLOATS, *INTS, *DERIVED]
+        if column not in allowed:
+            raise ParameterError(f"{path!r}: bodies have no column {column!r}{nearest_name(column, allowed)}; {listed(allowed)}")
+        return number, (), column
+    key = tuple(plugins)
+    found = [b for g in sim.population.groups for b in g.walk() if g.block.name == head or b.path == key]
+    known = {".".join(b.path) for b in found}
+    matching = [b for b in found if b.path == key]
+    if not matching:
+        raise ParameterError(f"{path!r}: {head} has no plugin {'.'.join(key)!r}{nearest_name('.'.join(key), known)}; {listed(sorted(known))}")
+    if column not in matching[0].places:
+        raise ParameterError(f"{path!r}: {key[-1]} has no column {column!r}{nearest_name(column, matching[0].places)}; {listed(matching[0].places)}")
+    return number, key, column
+
+
+def _body_column(bodies: Bodies, name: str, rows: np.ndarray) -> np.ndarray:
+    if name in DERIVED:
+        k = DERIVED[name]
+        out = np.empty((k, len(rows)) if k > 1 else len(rows))
+        derive(name, np.ascontiguousarray(bodies.quat[:, rows]), out)
+        return out
+    return np.asarray(getattr(bodies, name)[..., rows])
+
+
+def read(sim: Simulation, path: str) -> tuple[np.ndarray, np.ndarray]:
+    """See `Simulation.read`."""
+    world_plugin = _world_column(sim, path)
+    if world_plugin is not None:
+        values = np.moveaxis(world_plugin, -1, 0).copy()
+        return values, np.ones(len(values), bool)
+    number, key, column = _parse(sim, path)
+    n_agents = int(sim.births.n_born[number].max(initial=0))
+    alive = np.zeros((sim.n_worlds, n_agents), bool)
+    out: np.ndarray | None = None
+    for bodies, groups in _sources(sim):
+        for group, rows, arrays in groups:
+            mine = np.flatnonzero(bodies.block[rows] == number)
+            binding = _binding(group, key) if key else None
+            if not len(mine) or (key and binding is None):
+                continue
+            if binding is None:
+                values = _body_column(bodies, column, rows[mine])
+            else:
+                place = binding.places[column]
+                data = arrays[place.dtype]
+                values = (data[place.first : place.first + place.k] if place.k else data[place.first])[..., mine]
+            if out is None:
+                out = np.zeros((sim.n_worlds, n_agents, *values.shape[:-1]), values.dtype)
+            at = bodies.world[rows[mine]], bodies.place_in_block[rows[mine]]
+            out[at] = np.moveaxis(values, -1, 0)
+            alive[at] = True
+    return (np.zeros((sim.n_worlds, n_agents)) if out is None else out), alive
+
+
+def _world_column(sim: Simulation, path: str) -> np.ndarray | None:
+    head, _, column = path.partition(".")
+    for referee in sim.referees:
+        if referee.spec.instance_name == head and head not in sim.context.block_names:
+            if column not in referee.places:
+                raise ParameterError(f"{path!r}: {head} has no column {column!r}{nearest_name(column, referee.places)}; {listed(referee.places)}")
+            per, place = referee.places[column]
+            if per == "entity":
+                raise ParameterError(f"{path!r}: a column per entity of a world plugin has no fixed shape and cannot be read")
+            return referee.tables[per].array(place)
+    return None
+
+
+def write(sim: Simulation, path: str, values: Any) -> None:
+    """See `Simulation.write`."""
+    world_plugin = _world_column(sim, path)
+    if world_plugin is not None:
+        world_plugin[:] = np.moveaxis(np.broadcast_to(values, np.moveaxis(world_plugin, -1, 0).shape), 0, -1)
+        return
+    number, key, column = _parse(sim, path)
+    if not key and (column in INTS or column in DERIVED):
+        raise ParameterError(f"{path!r} cannot be written; {listed(FLOATS)}")
+    bodies = sim.population.bodies
+    n_agents = int(sim.births.n_born[number].max(initial=0))
+    for group in sim.population.groups:
+        rows = np.arange(group.first, group.last)
+        mine = np.flatnonzero(bodies.block[rows] == number)
+        binding = _binding(group, key) if key else None
+        if not len(mine) or (key and binding is None):
+            continue
+        target = getattr(bodies, column) if binding is None else group.table.array(binding.places[column])
+        shape = (sim.n_worlds, n_agents, *target.shape[:-1])
+        try:
+            given = np.broadcast_to(np.asarray(values), shape)
+        except ValueError:
+            raise ParameterError(f"{path!r}: values have shape {np.shape(values)}; needed is {shape}") from None
+        part = np.moveaxis(given[bodies.world[rows[mine]], bodies.place_in_block[rows[mine]]], 0, -1)
+        _check_written(path, part, None if binding is None else type(binding.spec).columns[column])
+        target[..., rows[mine] if binding is None else mine] = part
+        if binding is None:
+            bodies.touch(group.first, group.last)
+            if column in ("pos", "vel", "quat"):
+                group.motion.plugin.from_body(group.moving, mine)
+        else:
+            for view in group.views:  # reaches of parameters are kept until the next repack
+                view.reset(bodies, group.first, group.last)
+
+
+def _check_written(path: str, values: np.ndarray, column: Any) -> None:
+    if np.issubdtype(values.dtype, np.floating) and np.isnan(values).any():
+        raise ParameterError(f"{path!r}: values hold NaN")
+    if isinstance(column, Param) and not column.fields:
+        for value in np.unique(values):
+            column.convert(value, path)
+
+
+# -- snapshots --------------------------------------------------------------------------------------------------------------------
+
+
+@dataclass
+class Snapshot:
+    """All columns of a simulation at one instant."""
+
+    mission: Any
+    seeds: np.ndarray
+    groups: list[tuple[Any, ...]]
+    world: dict[str, Any]
+
+
+def snapshot(sim: Simulation) -> Snapshot:
+    """See `Simulation.snapshot`."""
+    population, births = sim.population, sim.births
+    groups = []
+    for group in population.groups:
+        outside = [_save_handles(b) for b in group.walk()]
+        ragged = [{k: c.take(np.arange(group.n)) for k, c in _ragged(b).items()} for b in group.walk()]
+        groups.append((group.first, group.table.copy(), ragged, outside))
+    world = {
+        "floats": population.bodies.floats.copy(),
+        "ints": population.bodies.ints.copy(),
+        "step": sim.context.clock.step.copy(),
+        "common": sim.context.clock.common,
+        "running": sim.running.copy(),
+        "failed": sim.failed.copy(),
+        "results": list(sim.results),
+        "parked": dict(sim.parked),
+        "births": [births.next_id.copy(), births.n_born.copy(), births.n_left.copy(), [a.copy() for a in births.next_time]],
+        "referees": [r.copy() for r in sim.referees],
+        "mail": sim.mail.save(),
+        "wishes": list(sim.world_view.births),
+    }
+    return Snapshot(sim.mission, sim.context.seeds.copy(), groups, world)
+
+
+def _ragged(binding: Binding) -> dict[str, Any]:
+    return {k: binding.plugin.__dict__[k] for k in binding.ragged}
+
+
+def _save_handles(binding: Binding) -> dict[str, list[bytes]]:
+    return {k: [pickle.dumps(binding.plugin.save_one(h)) for h in held] for k, held in binding.handles.items()}
+
+
+def restore(sim: Simulation, saved: Snapshot) -> None:
+    """See `Simulation.restore`."""
+    if saved.mission != sim.mission or len(saved.seeds) != sim.n_worlds:
+        raise SnapshotError(f"the snapshot is of a stack of {len(saved.seeds)} worlds of {saved.mission.name or 'another mission'!r}, not of this simulation")
+    population, births, world = sim.population, sim.births, saved.world
+    if len(saved.groups) > len(population.groups):
+        raise SnapshotError("the snapshot has entities of blocks that this simulation has never had; restore it into the simulation it was taken from")
+    sim.context.seeds[:] = saved.seeds
+    population.bodies.replace(world["floats"].copy(), world["ints"].copy())
+    population.close_handles()
+    for number, group in enumerate(population.groups):
+        first, arrays, ragged, outside = saved.groups[number] if number < len(saved.groups) else _no_rows(group, population.bodies.n)
+        group.table.restore(arrays)
+        for binding, lists in zip(group.walk(), ragged, strict=True):
+            binding.ragged = {k: c.take(np.arange(len(c))) for k, c in lists.items()}
+        for binding, handles in zip(group.walk(), outside, strict=True):
+            binding.handles = {k: [None] * len(held) for k, held in handles.items()}
+        group.attach(population.bodies, first)
+        _load_handles(sim, group, outside)
+    births.next_id, births.n_born, births.n_left = (a.copy() for a in world["births"][:3])
+    births.next_time = [a.copy() for a in world["births"][3]]
+    clock = sim.context.clock
+    clock.step[:], clock.common = world["step"], world["common"]
+    sim.running[:], sim.failed[:] = world["running"], world["failed"]
+    sim.results, sim.parked = list(world["results"]), dict(world["parked"])
+    sim.world_view.births = list(world["wishes"])
+    sim.after_restore()
+    for referee, columns in zip(sim.referees, world["referees"], strict=True):
+        referee.restore(columns)
+    sim.mail.restore(world["mail"])
+
+
+def _no_rows(group: Group, first: int) -> tuple[Any, ...]:
+    empty = {d: a[:, :0] for d, a in group.table.arrays.items()}
+    none = np.zeros(0, np.int64)
+    return first, empty, [{k: c.take(none) for k, c in b.ragged.items()} for b in group.walk()], [dict.fromkeys(b.handles, []) for b in group.walk()]
+
+
+def _load_handles(sim: Simulation, group: Group, outside: list[dict[str, list[bytes]]]) -> None:
+    for binding, handles in zip(group.walk(), outside, strict=True):
+        for name, held in handles.items():
+            for row, data in enumerate(held):
+                about = sim.population.handle_row(group, binding, row)
+                binding.handles[name][row] = binding.plugin.load_one(about, pickle.loads(data))
+
+
+# -- hash and result ----------------------------------------------------------------------------------------------------------------
+
+
+def state_hash(sim: Simulation, world: int) -> str:
+    """Hash of one running world's columns."""
+    return hash_columns(_hashed(sim, world))
+
+
+def _hashed(sim: Simulation, world: int) -> Iterator[tuple[str, Any]]:
+    bodies = sim.population.bodies
+    members, world_start, _, _ = bodies.layout()
+    rows = members[world_start[world] : world_start[world + 1]]
+    yield "step", sim.context.clock.step[world : world + 1]
+    yield "births", np.concatenate([sim.births.next_id[world : world + 1], sim.births.n_born[:, world], sim.births.n_left[:, world]])
+    for name in HASHED:
+        yield name, getattr(bodies, name)[..., rows]
+    parts = []
+    for group in sim.population.groups:
+        first, last = np.searchsorted(bodies.world[group.first : group.last], [world, world + 1])
+        if last > first:
+            parts.append((int(bodies.id[group.first + first]), group, np.arange(first, last)))
+    for _, group, mine in sorted(parts, key=lambda part: part[0]):
+        for binding in group.walk():
+            yield from _hashed_columns(group, binding, mine)
+    for referee in sim.referees:
+        for name, column in type(referee.spec).states().items():
+            per, place = referee.places[name]
+            array = referee.tables[per].array(place)
+            yield f"{referee.spec.instance_name}.{name}", array[..., rows if per == "entity" else slice(world, world + 1)]
+    for part in sim.mail.columns(world):
+        yield "mail", part
+
+
+def _hashed_columns(group: Group, binding: Binding, rows: np.ndarray) -> Iterator[tuple[str, Any]]:
+    for name, column in type(binding.spec).columns.items():
+        is_memory = isinstance(column, (State, EntityRef)) or (isinstance(column, Output) and name in binding.plugin.wired)
+        label = ".".join((*binding.path, name))
+        if is_memory:
+            yield label, group.table.array(binding.places[name])[..., rows]
+        elif name in binding.ragged and not isinstance(column, Param):
+            lists = binding.plugin.__dict__[name].take(rows)
+            yield label, np.concatenate([lists.start.view(np.float64), lists.data.astype(np.float64).ravel()])
+        assert not isinstance(column, Handle) or name in binding.handles
+
+
+def world_result(sim: Simulation, world: int, reason: str) -> WorldResult:
+    """What a world's game has come to by now."""
+    bodies = sim.population.bodies
+    here = bodies.team[bodies.world == world]
+    alive = {int(team): int((here == team).sum()) for team in sim.context.teams}
+    clock = sim.context.clock
+    steps = int(clock.step[world])
+    result = WorldResult(world, int(sim.context.seeds[world]), reason, steps, float(clock.t[world]), alive)
+    scores: dict[int, float] = {}
+    for referee in [*sim.interactions, *sim.metrics]:
+        referee.view.caller = referee.plugin
+        found = _of_world(sim, referee.plugin.result(referee.view), world)
+        if found:
+            result.metrics[referee.spec.instance_name] = found
+        for team, score in (found.get("score") or {}).items() if referee in sim.metrics else ():
+            scores[team] = scores.get(team, 0.0) + score
+    result.scores = scores
+    result.state_hash = state_hash(sim, world)
+    return result
+
+
+def _of_world(sim: Simulation, values: Mapping[str, np.ndarray], world: int) -> dict[str, Any]:
+    out: dict[str, Any] = {}
+    for name, array in values.items():
+        array = np.asarray(array)
+        item = array[..., world]
+        out[name] = {int(t): v.item() for t, v in zip(sim.context.teams, item, strict=True)} if item.ndim else item.item()
+    return out

@@ -1,0 +1,203 @@
+"""Who is born when and where."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tussle import rng
+from tussle.engine.params import Overrides
+from tussle.errors import MissionError
+from tussle.mission import Block
+from tussle.numeric import cos, sin
+from tussle.numeric.quaternion import quat_from_euler
+from tussle.rng import stream_key
+
+MOST_TRIES = 10_000
+"""Attempts to find a free place for one entity before the mission is called too crowded."""
+
+
+@dataclass
+class Newborn:
+    """New entities as columns, ordered by (world, id).
+
+    Attributes:
+        world: (m,) likewise block (its number), place (in its block), id, team.
+        pos: [m], (3, m); vel [m/s], (3, m); quat (4, m).
+        values: health, radius, mass, each (m,).
+    """
+
+    world: np.ndarray
+    block: np.ndarray
+    place: np.ndarray
+    id: np.ndarray
+    team: np.ndarray
+    pos: np.ndarray
+    vel: np.ndarray
+    quat: np.ndarray
+    values: dict[str, np.ndarray]
+
+    def __len__(self) -> int:
+        return len(self.world)
+
+    @classmethod
+    def join(cls, parts: list[Newborn]) -> Newborn:
+        """All in one, ordered by (world, id)."""
+        world = np.concatenate([p.world for p in parts])
+        ids = np.concatenate([p.id for p in parts])
+        order = np.lexsort((ids, world))
+        take = lambda name: np.concatenate([getattr(p, name) for p in parts], axis=-1)[..., order]  # noqa: E731
+        values = {k: np.concatenate([p.values[k] for p in parts])[order] for k in parts[0].values}
+        return cls(world[order], take("block"), take("place"), ids[order], take("team"), take("pos"), take("vel"), take("quat"), values)
+
+
+class Births:
+    """Draws places and headings, counts ids, and keeps the times of the births to come.
+
+    Attributes:
+        next_id: Next id of each world, (n_worlds,).
+        n_born: Entities born so far, (n_blocks, n_worlds).
+        n_left: Births to come of blocks with a rate, (n_blocks, n_worlds).
+        next_time: Time of the next birth of each slot [s], per block (n_worlds, slots).
+    """
+
+    def __init__(self, overrides: Overrides, seeds: np.ndarray, start: float) -> None:
+        self.overrides = overrides
+        self.seeds = seeds
+        self.start = start
+        n_blocks, n_worlds = len(overrides.mission.blocks), overrides.n_worlds
+        self.keys = [stream_key("block", b.name) for b in overrides.mission.blocks]
+        self.next_id = np.ones(n_worlds, np.int64)
+        self.n_born = np.zeros((n_blocks, n_worlds), np.int64)
+        self.n_left = np.zeros((n_blocks, n_worlds), np.int64)
+        self.next_time = [np.full((n_worlds, b.slots if b.rate else 0), np.inf) for b in overrides.mission.blocks]
+        self.has_rates = any(b.rate for b in overrides.mission.blocks)
+
+    def begin(self, worlds: np.ndarray) -> dict[int, np.ndarray]:
+        """Set worlds to their beginning; block number -> world of each entity that is there from the start."""
+        self.next_id[worlds] = 1
+        self.n_born[:, worlds] = 0
+        due: dict[int, np.ndarray] = {}
+        for i, block in enumerate(self.overrides.mission.blocks):
+            if block.rate:
+                self.n_left[i, worlds] = block.count
+                self.next_time[i][worlds] = block.first_birth
+            else:
+                due[i] = np.repeat(worlds, block.count)
+        return due
+
+    def due(self, t: np.ndarray, running: np.ndarray) -> dict[int, np.ndarray]:
+        """Block number -> worlds of the births that are due at the worlds' times t [s], (n_worlds,)."""
+        found: dict[int, np.ndarray] = {}
+        for i, block in enumerate(self.overrides.mission.blocks):
+            if not block.rate or not self.n_left[i].any():
+                continue
+            parts = []
+            for slot in range(block.slots):
+                is_due = running & (self.next_time[i][:, slot] <= t + 1e-9) & (self.n_left[i] > 0)
+                worlds = np.flatnonzero(is_due)
+                if len(worlds):
+                    parts.append(worlds)
+                    self.n_left[i, worlds] -= 1
+                    wait = 1.0 / block.rate
+                    jitter = self._normal(i, "birth", worlds, np.full(len(worlds), slot), self.n_born[i, worlds], 0, 1)[0]
+                    later = t[worlds] + np.maximum(wait + block.interval_sd * jitter, 0.0)
+                    self.next_time[i][worlds, slot] = np.where(later > t[worlds], later, t[worlds] + wait)
+            if parts:
+                found[i] = np.sort(np.concatenate(parts), kind="stable")
+        return found
+
+    def is_over(self, world: int) -> bool:
+        """No birth is to come in this world."""
+        return not (self.n_left[:, world] > 0).any()
+
+    def _normal(
+        self, block: int, label: str, worlds: np.ndarray, index: np.ndarray, step: np.ndarray, substep: int, k: int
+    ) -> np.ndarray:
+        return rng.normal(self.seeds[worlds] ^ np.uint64(self.keys[block]), stream_key("birth", label), index, step, substep, k)
+
+    def _scatter(self, block: int, spec: Block, worlds: np.ndarray, places: np.ndarray, attempt: int) -> np.ndarray:
+        """Offsets from the block's position [m], (3, m)."""
+        seeds = self.seeds[worlds] ^ np.uint64(self.keys[block])
+        stream, step = stream_key("birth", "position"), np.zeros(len(worlds), np.int64)
+        if spec.placement == "uniform":
+            draws = 2.0 * rng.uniform(seeds, stream, places, step, attempt, 3) - 1.0
+            return draws * np.array(spec.half_width)[:, None]
+        return rng.normal(seeds, stream, places, step, attempt, 3) * np.sqrt(np.array(spec.variance))[:, None]
+
+    def create(
+        self, block: int, worlds: np.ndarray, where: dict[str, np.ndarray] | None = None, rejects: Callable[..., bool] | None = None,
+        taken: Callable[[int], np.ndarray] | None = None,
+    ) -> Newborn:  # fmt: skip
+        """Entities of one block, one per item of `worlds` (sorted).
+
+        Args:
+            block: Number of the block.
+            worlds: World of each, (m,).
+            where: pos, vel, quat, team that were asked for.
+            rejects: (world, pos, taken) -> whether a place is not free.
+            taken: Positions of a world's entities so far, (3, j).
+        """
+        m, where = len(worlds), where or {}
+        spec = self.overrides.mission.blocks[block]
+        run = _run_numbers(worlds)
+        places = self.n_born[block, worlds] + run
+        ids = self.next_id[worlds] + run
+        np.add.at(self.n_born[block], worlds, 1)
+        np.add.at(self.next_id, worlds, 1)
+        centre = np.array(spec.position)[:, None]
+        pos = centre + np.where((places > 0) | spec.scatter_first, self._scatter(block, spec, worlds, places, 0), 0.0)
+        if "pos" in where:
+            pos = np.array(where["pos"], float).reshape(3, -1) + np.zeros((3, m))
+        elif rejects is not None:
+            assert taken is not None
+            self._separate(block, spec, worlds, places, pos, rejects, taken)
+        value = lambda name: self.overrides.block_values(spec, name, worlds)  # noqa: E731
+        jitter = self._normal(block, "heading", worlds, places, np.zeros(m, np.int64), 0, 1)[0]
+        yaw = value("heading") + np.sqrt(spec.heading_variance) * jitter
+        climb = value("climb")
+        quat = quat_from_euler(value("roll"), -climb, yaw)
+        speed = value("speed")
+        vel = np.array([speed * (cos(climb) * cos(yaw)), speed * (cos(climb) * sin(yaw)), speed * sin(climb)])
+        if spec.velocity is not None:
+            vel = np.repeat(np.array(spec.velocity)[:, None], m, axis=1)
+        vel = np.array(where.get("vel", vel), float).reshape(3, -1) + np.zeros((3, m))
+        quat = np.array(where.get("quat", quat), float).reshape(4, -1) + np.zeros((4, m))
+        team = np.zeros(m, np.int64) + np.asarray(where.get("team", spec.team)).astype(np.int64)
+        values = {name: value(name) for name in ("health", "radius", "mass")}
+        return Newborn(worlds, np.full(m, block), places, ids, team, pos, vel, quat, values)
+
+    def _separate(
+        self, block: int, spec: Block, worlds: np.ndarray, places: np.ndarray, pos: np.ndarray, rejects: Any, taken: Any
+    ) -> None:
+        """Draw again where a referee finds a place not free; one entity after the other, as each takes up room."""
+        for world in np.unique(worlds):
+            mine = np.flatnonzero(worlds == world)
+            before = taken(int(world))
+            room = np.empty((3, before.shape[1] + len(mine)))
+            room[:, : before.shape[1]] = before
+            n = before.shape[1]
+            for i in mine:
+                attempt = 0
+                while rejects(int(world), pos[:, i], room[:, :n]):
+                    attempt += 1
+                    if attempt > MOST_TRIES:
+                        raise MissionError(
+                            f"block {spec.name!r}: no free place for entity {int(places[i]) + 1} of {spec.count} after {MOST_TRIES} tries; "
+                            f"give the block more room (placement {spec.placement!r}) or fewer entities"
+                        )
+                    one = slice(i, i + 1)
+                    pos[:, one] = np.array(spec.position)[:, None] + self._scatter(block, spec, worlds[one], places[one], attempt)
+                room[:, n] = pos[:, i]
+                n += 1
+
+
+def _run_numbers(worlds: np.ndarray) -> np.ndarray:
+    """0, 1, 2 ... within each run of equal (sorted) worlds."""
+    if not len(worlds):
+        return np.zeros(0, np.int64)
+    starts = np.flatnonzero(np.concatenate([[True], worlds[1:] != worlds[:-1]]))
+    return np.asarray(np.arange(len(worlds)) - np.repeat(starts, np.diff([*starts, len(worlds)])))

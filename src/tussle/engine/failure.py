@@ -1,0 +1,55 @@
+"""What went wrong, told in the author's terms: the plugin's file and line, the entity, the world, the step."""
+
+from __future__ import annotations
+
+import inspect
+import traceback
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tussle.api.bodies import Bodies
+from tussle.engine.group import Binding, Group
+from tussle.errors import PluginError
+
+_OWN = str(Path(__file__).resolve().parents[1])
+
+
+def _place_of(error: BaseException, plugin: Any) -> str:
+    """file:line of the deepest frame in the plugin's own file, else of the deepest frame outside this package."""
+    try:
+        own_file = inspect.getfile(type(plugin))
+    except (OSError, TypeError):
+        own_file = ""
+    frames = traceback.extract_tb(error.__traceback__)
+    mine = [f for f in frames if f.filename == own_file] or [f for f in frames if not f.filename.startswith(_OWN)] or list(frames)
+    return f"{Path(mine[-1].filename).name}:{mine[-1].lineno}" if mine else "?"
+
+
+def raised(error: BaseException, plugin: Any, *, where: str, step: int, world: int | None) -> PluginError:
+    """The error that a plugin has raised."""
+    text = f"{_place_of(error, plugin)}: {type(error).__name__}: {error}"
+    return PluginError(text, where=where, step=step, world=world, plugin=plugin.instance_name, cause=error)
+
+
+def not_finite(group: Group, bodies: Bodies, row: int, step: int) -> PluginError:
+    """Who made the position or attitude of a body row not finite: back along the wires to the first output that is not."""
+    i, world = row - group.first, int(bodies.world[row])
+    who = f"{group.name} {int(bodies.id[row])}"
+    for binding in [*group.autonomies, *group.controllers]:
+        found = _not_finite_output(binding, group, i)
+        if found:
+            return PluginError(f"{found} is not a finite number", where=who, step=step, world=world, plugin=binding.spec.instance_name)
+    values = ", ".join(f"{name} = {np.array2string(getattr(bodies, name)[:, row], precision=6)}" for name in ("pos", "quat"))
+    motion = group.motion.spec.instance_name
+    return PluginError(f"the entity's state is not finite: {values}; all of its inputs are", where=who, step=step, world=world, plugin=motion)
+
+
+def _not_finite_output(binding: Binding, group: Group, row: int) -> str:
+    for name, column in type(binding.spec).outputs().items():
+        values = np.atleast_1d(group.table.array(binding.places[name])[..., row])
+        for channel, value in zip(column.channels, values, strict=True):
+            if not np.isfinite(value):
+                return f"output {channel!r} = {value}"
+    return ""

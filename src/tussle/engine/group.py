@@ -1,0 +1,277 @@
+"""A group: all rows with the same list of plugins, their columns, and the plugins bound to them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from tussle.api.bodies import Bodies, read_only
+from tussle.api.context import Context
+from tussle.api.group import GroupView
+from tussle.api.kinds import Behavior
+from tussle.api.motion import MotionBody
+from tussle.columns import Channel, EntityRef, Handle, Input, Output, Param, Publish, Ragged, RaggedColumn, State, Subscribe
+from tussle.comms import Inbox, Publisher
+from tussle.engine.table import Place, Table
+from tussle.engine.wiring import BELIEF, Link, Wiring
+from tussle.errors import WiringError
+
+
+@dataclass
+class Binding:
+    """One plugin, bound to the columns of its group.
+
+    Attributes:
+        plugin: The bound copy.
+        spec: The plugin as data.
+        view: What its step is given.
+        path: Names from the entity down, such as ("MotorSchemas", "AvoidEntityMS").
+        places: Attribute -> where its column lies.
+        writable: Attributes that the plugin may write.
+        links: Channel attributes that are copied from and to the bus around each call.
+        ragged: Attribute -> list per row.
+        handles: Attribute -> object per row.
+        children: Bindings of the plugins inside this one.
+    """
+
+    plugin: Any
+    spec: Any
+    view: GroupView
+    path: tuple[str, ...]
+    places: dict[str, Place] = field(default_factory=dict)
+    writable: set[str] = field(default_factory=set)
+    links: dict[str, Link] = field(default_factory=dict)
+    ragged: dict[str, RaggedColumn] = field(default_factory=dict)
+    handles: dict[str, list[Any]] = field(default_factory=dict)
+    children: list[Binding] = field(default_factory=list)
+
+    def walk(self) -> Iterator[Binding]:
+        """This binding and all inside it."""
+        yield self
+        for child in self.children:
+            yield from child.walk()
+
+    def attach(self, table: Table) -> None:
+        """Give the plugin its arrays anew."""
+        own = self.plugin.__dict__
+        for name, place in self.places.items():
+            array = table.array(place)
+            own[name] = array if name in self.writable else read_only(array)
+        own.update(self.ragged)
+        own.update(self.handles)
+        for child in self.children:
+            child.attach(table)
+
+    def pull(self, table: Table) -> None:
+        """Copy the channels that do not lie side by side into the plugin's own arrays."""
+        data = table.arrays[float]
+        for name, link in self.links.items():
+            assert link.rows is not None
+            table.array(self.places[name])[:] = data[list(link.rows)]
+
+    def push(self, table: Table) -> None:
+        """Copy the plugin's own output arrays to the bus."""
+        data = table.arrays[float]
+        for name, link in self.links.items():
+            if name in self.writable:
+                data[list(link.rows or ())] = table.array(self.places[name])
+
+
+class Group:
+    """Rows [first, first + n) of the body table with one list of plugins.
+
+    Args:
+        name: Name of the first block in it, for messages.
+        block: The block whose plugins it has.
+        context: Shared by all views.
+        bodies: The body table.
+        dt: Step length [s].
+        substeps: Substeps of controllers and motion.
+        advise: See `Wiring`.
+    """
+
+    def __init__(
+        self, name: str, block: Any, context: Context, bodies: Bodies, dt: float, substeps: int, advise: Callable[..., list[str]]
+    ) -> None:
+        self.name = name
+        self.block = block
+        self.place = 0
+        self.context = context
+        self.table = Table()
+        self.first, self.n = bodies.n, 0
+        self.bodies = bodies
+        self.wiring = Wiring(f"block {name!r}", self.table, advise)
+        self.wiring.connect(block.sensor, block.autonomy, block.controller, block.motion)
+        self.thinking = GroupView(bodies, bodies.n, bodies.n, context, dt)
+        self.steering = GroupView(bodies, bodies.n, bodies.n, context, dt / substeps)
+        self.sensing = GroupView(bodies, bodies.n, bodies.n, context, dt)
+        self.moving = MotionBody(bodies, bodies.n, bodies.n, context, dt / substeps)
+        working = [c for c in block.controller if not c.passthrough]
+        self.motion = self._bind(block.motion, self.moving, (), is_motion=True)
+        self.autonomies = [self._bind(p, self.thinking, ()) for p in block.autonomy]
+        self.controllers = [self._bind(p, self.steering, ()) for p in working]
+        self.sensors = [self._bind(p, self.sensing, ()) for p in block.sensor]
+        self._believe()
+        self.integrate = self.motion.plugin.integrator()
+        self.table.allocate(0)
+        self.attach(bodies, bodies.n)
+
+    @property
+    def bindings(self) -> list[Binding]:
+        """All plugins in the order of a step."""
+        return [*self.autonomies, *self.controllers, self.motion, *self.sensors]
+
+    def walk(self) -> Iterator[Binding]:
+        for binding in self.bindings:
+            yield from binding.walk()
+
+    @property
+    def last(self) -> int:
+        return self.first + self.n
+
+    @property
+    def views(self) -> list[GroupView]:
+        return [self.thinking, self.steering, self.sensing, self.moving]
+
+    # -- binding ------------------------------------------------------------------------------------------------------------
+
+    def _bind(self, spec: Any, view: GroupView, path: tuple[str, ...], is_motion: bool = False) -> Binding:
+        binding = Binding(spec.bound(), spec, view, (*path, spec.instance_name))
+        plugin, key = binding.plugin, binding.path
+        wired = set(self.wiring.wired.get(id(spec), ()))
+        params = {k: c for k, c in type(spec).params().items() if c.is_row_data}
+        for name, param in params.items():  # one after the other, so that a motion model's are one matrix
+            dtype = float if is_motion else param.dtype
+            binding.places[name] = self.table.add((key, name), dtype, len(param.fields), param.default)
+        for name, column in type(spec).columns.items():
+            if isinstance(column, Param):
+                if column.ragged:
+                    binding.ragged[name] = RaggedColumn.empty(0, column)
+            elif isinstance(column, (State, EntityRef)):
+                default = column.default
+                binding.places[name] = self.table.add((key, name), column.dtype, len(column.fields), default)
+                binding.writable.add(name)
+            elif isinstance(column, Channel):
+                self._bind_channel(binding, name, column, bool(path))
+                if path:
+                    wired.add(name)
+            elif isinstance(column, Ragged):
+                binding.ragged[name] = RaggedColumn.empty(0, column)
+            elif isinstance(column, Handle):
+                binding.handles[name] = []
+            elif isinstance(column, (Publish, Subscribe)):
+                topic = self._topic(spec, column)
+                plugin.__dict__[name] = Publisher(topic, view) if isinstance(column, Publish) else Inbox(topic, view)
+        for name in type(spec).children():
+            inner = [self._bind(child, view, binding.path) for child in spec.values[name]]
+            plugin.__dict__[name] = [b.plugin for b in inner]
+            binding.children += inner
+        plugin.__dict__["wired"] = frozenset(wired)
+        for service in type(spec).services:
+            for one in self.views if hasattr(self, "moving") else [view]:
+                one.services[service] = getattr(plugin, service)
+        return binding
+
+    def _bind_channel(self, binding: Binding, name: str, column: Channel, is_child: bool) -> None:
+        link = self.wiring.links.get((id(binding.spec), name))
+        if is_child:
+            if isinstance(column, Input) and not column.optional:
+                raise WiringError(f"{self.wiring.where}: {'.'.join(binding.path)}.{name} is an input, and a plugin inside another has none")
+            link = Link(self.table.add((binding.path, name), float, len(column.fields), column.default))  # type: ignore[attr-defined]
+        if link is None:  # an input or output that a structural parameter has switched off
+            link = Link(self.table.add((binding.path, name), float, len(column.fields), column.default))  # type: ignore[attr-defined]
+        binding.places[name] = link.place
+        if link.rows is not None:
+            binding.links[name] = link
+        if isinstance(column, Output):
+            binding.writable.add(name)
+
+    def _topic(self, spec: Any, column: Any) -> Any:
+        values = spec.values
+        network = values[column.network_param] if column.network_param else column.network
+        name = values[column.topic_param] if column.topic_param else column.topic
+        assert self.context.topic is not None
+        return self.context.topic(network, name or column.message.__name__, column.message, f"{self.wiring.where}: {spec.instance_name}")
+
+    def _believe(self) -> None:
+        """Find the sensor outputs that are the entity's belief."""
+        self.belief: dict[str, Place] = {}
+        for sensor in self.sensors:
+            for name, (body, k, _) in BELIEF.items():
+                place = sensor.places.get(name)
+                if place is not None and isinstance(type(sensor.spec).columns[name], Output):
+                    if place.k != k:
+                        raise WiringError(f"{self.wiring.where}: {sensor.spec.instance_name}.{name} has {place.k} channels, it needs {k}")
+                    self.belief[body] = place
+
+    # -- rows ---------------------------------------------------------------------------------------------------------------
+
+    def rearrange(self, index: np.ndarray) -> None:
+        """New row i is old row index[i] of this group; -1 is a new one at the declared defaults."""
+        self.table.rearrange(index)
+        for binding in self.walk():
+            for name, column in binding.ragged.items():
+                binding.ragged[name] = column.take(index)
+            for name, objects in binding.handles.items():
+                binding.handles[name] = [objects[i] if i >= 0 else None for i in index]
+
+    def attach(self, bodies: Bodies, first: int) -> None:
+        """Take the place [first, first + n) in the body table, and give all plugins and views their arrays."""
+        belief = {name: self.table.array(place) for name, place in self.belief.items()}
+        self.thinking.belief = self.steering.belief = belief
+        self.shift(bodies, first)
+        for binding in self.bindings:
+            binding.attach(self.table)
+        self._attach_motion()
+
+    def shift(self, bodies: Bodies, first: int) -> None:
+        """Take another place in the body table with the rows unchanged."""
+        self.bodies, self.first, self.n = bodies, first, self.table.n
+        for view in self.views:
+            view.reset(bodies, first, self.last)
+
+    def _attach_motion(self) -> None:
+        motion, data = self.motion, self.table.arrays[float]
+        plugin = motion.plugin
+        state = next(k for k, c in type(plugin).states().items() if c.fields)
+        self.x = self.table.array(motion.places[state])
+        params = [motion.places[k] for k in type(plugin).row_params()]
+        first = params[0].first if params else 0
+        self.p = data[first : first + sum(max(1, p.k) for p in params)]
+        rows = [r for k in plugin.active_inputs() for r in self._rows_of(motion, k)]
+        self.body_inputs = plugin.body_inputs()
+        side_by_side = rows == list(range(rows[0], rows[0] + len(rows))) if rows else True
+        self.u_rows = rows
+        self.u = data[rows[0] : rows[0] + len(rows)] if rows and side_by_side else data[:0]
+        self.stacks_inputs = bool(self.body_inputs) or not side_by_side
+
+    def _rows_of(self, binding: Binding, name: str) -> tuple[int, ...]:
+        link = binding.links.get(name)
+        if link is not None and link.rows is not None:
+            return link.rows
+        place = binding.places[name]
+        return tuple(range(place.first, place.first + max(1, place.k)))
+
+    def advance(self, dt: float, substeps: int) -> None:
+        """Integrate all rows over dt [s], and publish the new states to the body table."""
+        u = self.u
+        if self.stacks_inputs:
+            u = self._stacked_inputs()
+        self.integrate(self.x, u, self.p, dt, substeps)
+        self.motion.plugin.to_body(self.moving)
+        self.bodies.touch(self.first, self.last)
+
+    def _stacked_inputs(self) -> np.ndarray:
+        rows = [self.table.arrays[float][self.u_rows]]
+        axes = {"x": 0, "y": 1, "z": 2}
+        for name in self.body_inputs:
+            column, _, axis = name.partition("_")
+            values = getattr(self.moving, column)
+            rows.append((values[axes[axis]] if axis else values)[None, :])
+        return np.ascontiguousarray(np.concatenate(rows))
+
+
+__all__ = ["Behavior", "Binding", "Group"]

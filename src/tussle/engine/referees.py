@@ -1,0 +1,106 @@
+"""World plugins bound to a stack: their parameters per world, their memory per world, team or entity."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from tussle.api.bodies import read_only
+from tussle.api.world import WorldView
+from tussle.columns import Handle, Input, Output, Param, Publish, Ragged, State, Subscribe
+from tussle.comms import Publisher
+from tussle.engine.params import Overrides
+from tussle.engine.table import Place, Table
+from tussle.errors import DeclarationError, WiringError
+
+
+@dataclass
+class Referee:
+    """One world plugin.
+
+    Attributes:
+        plugin: The bound copy.
+        spec: The plugin as data.
+        view: What its step is given.
+        tables: "world", "team" and "entity" -> its columns.
+        places: Attribute -> (which table, where in it).
+    """
+
+    plugin: Any
+    spec: Any
+    view: WorldView
+    tables: dict[str, Table] = field(default_factory=lambda: {"world": Table(), "team": Table(), "entity": Table()})
+    places: dict[str, tuple[str, Place]] = field(default_factory=dict)
+
+    @classmethod
+    def bind(cls, spec: Any, view: WorldView, overrides: Overrides) -> Referee:
+        """Bind a plugin of the mission to all worlds.
+
+        Raises:
+            DeclarationError: It declares a column that only entities' plugins have.
+            WiringError: A topic belongs to a network that is not there.
+        """
+        referee = cls(spec.bound(), spec, view)
+        n_worlds, n_teams = view.n_worlds, len(view.teams)
+        for name, column in type(spec).columns.items():
+            if isinstance(column, (Input, Output, Ragged, Handle)):
+                raise DeclarationError(f"{type(spec).__name__}.{name}: a world plugin has no {type(column).__name__} columns")
+            if isinstance(column, Param) and column.is_row_data:
+                referee._add("world", name, column.dtype, len(column.fields), column.default)
+            elif isinstance(column, State):
+                k = n_teams if column.per == "team" else len(column.fields)
+                referee._add("world" if column.per == "team" else column.per, name, column.dtype, k, column.default)
+            elif isinstance(column, Publish):
+                assert view.context.topic is not None
+                topic = view.context.topic(column.network, column.topic, column.message, spec.instance_name)
+                referee.plugin.__dict__[name] = Publisher(topic, view)
+            elif isinstance(column, Subscribe):
+                raise WiringError(f"{spec.instance_name}.{name}: a world plugin reads w.inbox({column.message.__name__}) instead of a Subscribe")
+        referee.tables["world"].allocate(n_worlds)
+        referee.tables["entity"].allocate(view.n)
+        referee.fill_params(overrides, np.arange(n_worlds))
+        for service in type(spec).services:
+            view.context.services[service] = getattr(referee.plugin, service)
+        referee.attach()
+        return referee
+
+    def _add(self, per: str, name: str, dtype: type, k: int, default: Any) -> None:
+        self.places[name] = (per, self.tables[per].add(name, dtype, k, default))
+
+    def fill_params(self, overrides: Overrides, worlds: np.ndarray) -> None:
+        """Set the parameters of some worlds."""
+        name = self.spec.instance_name
+        for key, column in type(self.spec).params().items():
+            if column.is_row_data:
+                array = self.tables["world"].array(self.places[key][1])
+                array[..., worlds] = overrides.fill(name, (name,), key, self.spec.values[key], worlds)
+
+    def reset(self, worlds: np.ndarray) -> None:
+        """Memory of some worlds back to the declared defaults."""
+        for name, column in type(self.spec).states().items():
+            per, place = self.places[name]
+            if per == "world":
+                self.tables[per].array(place)[..., worlds] = column.default
+
+    def rearrange(self, index: np.ndarray) -> None:
+        """The body table has been repacked."""
+        if self.tables["entity"].places:
+            self.tables["entity"].rearrange(index)
+            self.attach()
+
+    def attach(self) -> None:
+        """Give the plugin its arrays anew."""
+        declared = type(self.spec).columns
+        for name, (per, place) in self.places.items():
+            array = self.tables[per].array(place)
+            self.plugin.__dict__[name] = array if isinstance(declared[name], State) else read_only(array)
+
+    def copy(self) -> dict[str, Any]:
+        return {per: table.copy() for per, table in self.tables.items()}
+
+    def restore(self, saved: dict[str, Any]) -> None:
+        for per, table in self.tables.items():
+            table.restore(saved[per])
+        self.attach()

@@ -1,0 +1,509 @@
+"""A stack of worlds that plays one mission."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, Self
+
+import numpy as np
+
+from tussle.api import kernels
+from tussle.api.clock import Clock
+from tussle.api.context import Context
+from tussle.api.kinds import Interaction
+from tussle.api.plugin import GRADES
+from tussle.api.world import WorldView
+from tussle.engine import access, failure
+from tussle.engine.births import Births, Newborn
+from tussle.engine.group import Binding, Group
+from tussle.engine.mail import Mail
+from tussle.engine.params import Overrides
+from tussle.engine.population import Population
+from tussle.engine.referees import Referee
+from tussle.engine.result import WorldResult
+from tussle.engine.schedule import Call, Schedule
+from tussle.engine.subset import call_referee
+from tussle.errors import MissionError, ParameterError, PluginError
+from tussle.mission import Mission
+from tussle.stock import advise_controllers
+
+
+class Simulation:
+    """Plays a mission in one world per seed, all in step.
+
+    World k is bit for bit what it would be alone, whatever the stack.
+
+    Args:
+        mission: What is played.
+        seeds: Seed of each world; a single number is a stack of one.
+        params: Parameters by path ("prey.Boids.gain", "prey.speed", "SimpleCapture.capture_range"); one value, or one per world.
+        threads: Threads that a step may use; the result is the same with any number.
+        on_error: "raise" stops at the first plugin that fails; "record" ends the world with the error in its result, and the others
+            go on. By default "raise" for one world and "record" for several.
+
+    Raises:
+        MissionError: The mission cannot be played.
+        WiringError: Plugins do not fit together.
+        ParameterError: A parameter is unknown or not allowed.
+    """
+
+    def __init__(
+        self,
+        mission: Mission,
+        seeds: int | Iterable[int] = 1,
+        params: Mapping[str, Any] | None = None,
+        *,
+        threads: int = 1,
+        on_error: str | None = None,
+    ) -> None:
+        self.mission = mission
+        numbers = [seeds] if isinstance(seeds, (int, np.integer)) else list(seeds)
+        self._check(mission, numbers, on_error)
+        n = self.n_worlds = len(numbers)
+        self.on_error = on_error or ("raise" if n == 1 else "record")
+        self.running = np.ones(n, bool)
+        self.failed = np.zeros(n, bool)
+        self.results: list[WorldResult | None] = [None] * n
+        self.observers: list[Callable[[Simulation], None]] = []
+        self.parked: dict[int, access.Parked] = {}
+        self.is_closed = False
+        self._resumed = threading.Event()
+        self._resumed.set()
+        clock = Clock(n, mission.start, mission.dt)
+        seeds_ = np.array([s % 2**64 for s in numbers], np.uint64)
+        self.context = Context(clock, seeds_, [b.name for b in mission.blocks], mission.scene, mission.teams, threads=threads)
+        self.overrides = Overrides(mission, n)
+        self.overrides.set(params or {}, np.arange(n))
+        self._build(seeds_)
+        self.reset(range(n))
+
+    def _check(self, mission: Mission, seeds: Sequence[Any], on_error: str | None) -> None:
+        if not isinstance(mission, Mission):
+            raise MissionError(f"Simulation needs a Mission, not {mission!r}")
+        if not seeds:
+            raise MissionError("seeds is empty; give one number or several")
+        for seed in seeds:
+            if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)):
+                raise ParameterError(f"seed {seed!r} is not allowed; it takes a whole number")
+        if on_error not in (None, "raise", "record"):
+            raise ParameterError(f"on_error = {on_error!r} is not allowed; it is 'raise' or 'record'")
+        for plugin in [*mission.world_plugins, *(p for b in mission.blocks for p in b.plugins)]:
+            most = type(plugin).max_worlds
+            if most is not None and len(seeds) > most:
+                raise MissionError(f"{plugin.instance_name} takes part in at most {most} worlds of one stack, not {len(seeds)}")
+
+    def _build(self, seeds: np.ndarray) -> None:
+        mission = self.mission
+        self.births = Births(self.overrides, seeds, mission.start)
+        self.mail = Mail(self)
+        self.topics = self.mail.topics
+        self.context.topic = self.mail.topic
+        is_sequential = mission.update == "sequential"
+        self.population = Population(
+            self.context, self.overrides, self.n_worlds, mission.motion_multiplier, is_sequential, advise_controllers
+        )
+        view = self.world_view = WorldView(self.population.bodies, self.context)
+        view.templates = [b.name for b in mission.blocks]
+        view.publish_to = self.mail.publish_to
+        self.mail.names = [p.instance_name for p in mission.networks]
+        bind = lambda specs: [Referee.bind(p, view, self.overrides) for p in specs]  # noqa: E731
+        self.networks = bind(mission.networks)
+        self.mail.networks = {r.spec.instance_name: r for r in self.networks}
+        self.interactions, self.metrics = bind(mission.interactions), bind(mission.metrics)
+        self._schedule: list[Call] | None = None
+        self.population.on_new_group = self._forget_schedule
+        self.population.prepare()
+
+    def _forget_schedule(self) -> None:
+        self._schedule = None
+
+    @property
+    def referees(self) -> list[Referee]:
+        return [*self.interactions, *self.metrics, *self.networks]
+
+    # -- running ------------------------------------------------------------------------------------------------------------
+
+    @property
+    def t(self) -> np.ndarray:
+        """Time of each world [s], (n_worlds,)."""
+        return self.context.clock.t
+
+    @property
+    def steps(self) -> np.ndarray:
+        """Steps made by each world, (n_worlds,)."""
+        return self.context.clock.step.copy()
+
+    @property
+    def is_over(self) -> bool:
+        """No world is running."""
+        return not self.running.any()
+
+    @property
+    def schedule(self) -> list[Call]:
+        """The calls of a step, in order."""
+        if self._schedule is None:
+            self._schedule = Schedule(self).compose()
+        return self._schedule
+
+    def step(self, n: int = 1) -> None:
+        """Make n steps in all running worlds; none where all have ended.
+
+        Raises:
+            PluginError: With on_error="raise", a plugin failed.
+        """
+        for _ in range(n):
+            if not self.running.any():
+                return
+            self._step()
+
+    def _step(self) -> None:
+        births = self.births
+        if births.has_rates or self.world_view.births:
+            self._give_birth()
+        for observer in self.observers:
+            observer(self)
+        for call in self.schedule:
+            call.run()
+
+    def run(self, until: float | None = None) -> list[WorldResult]:
+        """Step until all worlds have ended, or have reached the time `until` [s]; waits while paused.
+
+        Returns:
+            The result of each world so far.
+        """
+        while self.running.any():
+            if until is not None and float(self.t[self.running].min()) > until - 0.5 * self.mission.dt:
+                break
+            self._resumed.wait()
+            self._step()
+        return self.result()
+
+    def run_until(self, condition: Callable[[Simulation], bool]) -> None:
+        """Step until condition(self) holds or all worlds have ended."""
+        while self.running.any() and not condition(self):
+            self._resumed.wait()
+            self._step()
+
+    def pause(self) -> None:
+        """Make `run` wait before its next step; `step` still steps."""
+        self._resumed.clear()
+
+    def resume(self) -> None:
+        """Let `run` go on."""
+        self._resumed.set()
+
+    @property
+    def is_paused(self) -> bool:
+        return not self._resumed.is_set()
+
+    # -- beginning and end of worlds ------------------------------------------------------------------------------------------
+
+    def reset(
+        self, worlds: Iterable[int], seeds: Sequence[int] | None = None, params: Mapping[str, Any] | None = None
+    ) -> None:
+        """Begin some worlds anew, with other seeds and parameters where given; the others are untouched.
+
+        Args:
+            worlds: Numbers of the worlds.
+            seeds: New seed of each; by default its last one.
+            params: As for the constructor, one value or one per world of `worlds`.
+        """
+        chosen = np.array(sorted(worlds), np.int64)
+        if len(chosen) and (chosen[0] < 0 or chosen[-1] >= self.n_worlds):
+            raise ParameterError(f"reset: there are worlds 0 to {self.n_worlds - 1}, not {chosen.tolist()}")
+        mask = np.zeros(self.n_worlds, bool)
+        mask[chosen] = True
+        if seeds is not None:
+            self.context.seeds[list(worlds)] = [s % 2**64 for s in seeds]
+        if params:
+            self.overrides.set(params, np.array(list(worlds), np.int64))
+        self.context.clock.step[chosen] = 0
+        self.running[chosen], self.failed[chosen] = True, False
+        for world in chosen:
+            self.results[world] = None
+            self.parked.pop(int(world), None)
+        self.mail.drop_worlds(mask)
+        view = self.world_view
+        view.births = [b for b in view.births if not mask[b["world"]].any()]
+        for referee in self.referees:
+            referee.reset(chosen)
+            referee.fill_params(self.overrides, chosen)
+        due = self.births.begin(chosen)
+        self._repack(mask[self.population.bodies.world], self._create(due))
+        self._set_common_step()
+        self._start_referees(mask)
+        self._take_out_dead()
+
+    def _start_referees(self, mask: np.ndarray) -> None:
+        for referee in self.referees:
+            if mask.all():
+                referee.view.caller = referee.plugin
+                referee.plugin.start(referee.view)
+            else:
+                call_referee(self.population, referee, mask, lambda r, w: r.plugin.start(w))
+        self.take_over_moves()
+
+    def _create(self, due: Mapping[int, np.ndarray]) -> Newborn | None:
+        rejecting = [r for r in self.interactions if type(r.plugin).rejects is not Interaction.rejects]
+        placed: dict[int, list[np.ndarray]] = {}
+
+        def taken(world: int) -> np.ndarray:
+            bodies = self.population.bodies
+            here = [] if world in placed and self.context.clock.step[world] == 0 else [bodies.pos[:, bodies.world == world]]
+            return np.concatenate([np.zeros((3, 0)), *here, *placed.get(world, [])], axis=1)
+
+        def rejects(world: int, pos: np.ndarray, others: np.ndarray) -> bool:
+            return any(r.plugin.rejects(r.view, world, pos, others) for r in rejecting)
+
+        parts = []
+        for block, worlds in due.items():
+            part = self.births.create(block, worlds, rejects=rejects if rejecting else None, taken=taken)
+            parts.append(part)
+            if rejecting:
+                for world in np.unique(worlds):
+                    placed.setdefault(int(world), []).append(part.pos[:, part.world == world])
+        return Newborn.join(parts) if parts else None
+
+    def _give_birth(self) -> None:
+        parts = []
+        asked, self.world_view.births = self.world_view.births, []
+        names = self.context.block_names
+        for wish in asked:
+            where = {k: v for k, v in wish.items() if k not in ("block", "world")}
+            worlds = wish["world"]
+            order = np.argsort(worlds, kind="stable")
+            kept = order[self.running[worlds[order]]]
+            if len(kept):
+                where = {k: v[..., kept] if np.ndim(v) and v.shape[-1] == len(worlds) else v for k, v in where.items()}
+                parts.append(self.births.create(names.index(wish["block"]), worlds[kept], where))
+        due = self.births.due(self.context.clock.t, self.running) if self.births.has_rates else {}
+        born = self._create(due) if due else None
+        parts += [born] if born is not None else []
+        if parts:
+            self._repack(None, Newborn.join(parts))
+
+    def _repack(self, gone: np.ndarray | None, new: Newborn | None) -> None:
+        index = self.population.repack(gone, new)
+        bodies = self.population.bodies
+        self.world_view.reset(bodies, 0, bodies.n)
+        for referee in self.referees:
+            referee.rearrange(index)
+        self._checked: tuple[Any, ...] | None = None
+
+    def after_restore(self) -> None:
+        """The table has been put back: views and checks look at it."""
+        bodies = self.population.bodies
+        self.world_view.reset(bodies, 0, bodies.n)
+        self._checked = None
+
+    # -- the end of a step ----------------------------------------------------------------------------------------------------
+
+    def take_over_moves(self) -> None:
+        """Motion models and beliefs take over the rows that world plugins have moved."""
+        view = self.world_view
+        if not view.moved:
+            return
+        rows = np.unique(np.concatenate(view.moved))
+        view.moved = []
+        for group in self.population.groups:
+            mine = rows[(rows >= group.first) & (rows < group.last)] - group.first
+            if len(mine):
+                group.motion.plugin.from_body(group.moving, mine)
+
+    def finish_step(self) -> None:
+        """Check all states, remove who is gone, advance the clocks, end worlds."""
+        self._check_states()
+        clock = self.context.clock
+        clock.step += self.running
+        died = self._take_out_dead()
+        if clock.common >= 0:
+            clock.common += 1
+        self._end_worlds(died)
+
+    def _check_states(self) -> None:
+        if self._checked is None:
+            b = self.population.bodies
+            self._checked = (*b.pos, *b.quat, b.health, np.empty(b.n, bool))
+        if kernels.check(*self._checked):
+            bodies, faulty = self.population.bodies, self._checked[-1]
+            for row in np.flatnonzero(faulty):
+                world = int(bodies.world[row])
+                if not self.failed[world]:
+                    group = next(g for g in self.population.groups if g.first <= row < g.last)
+                    self._record_failure(world, failure.not_finite(group, bodies, int(row), int(self.context.clock.step[world])))
+            self.world_view.kill(~faulty & ~(bodies.health > 0.0), "health")
+
+    def _take_out_dead(self) -> bool:
+        view, bodies = self.world_view, self.population.bodies
+        ended = self.failed & self.running
+        if not view.deaths and not ended.any():
+            return False
+        gone = np.zeros(bodies.n, bool)
+        for rows, _ in view.deaths:
+            gone[rows] = True
+        view.deaths = []
+        for world in np.flatnonzero(ended):
+            self._end(int(world), "error")
+            gone |= bodies.world == world
+        self._repack(gone, None)
+        return True
+
+    def _end_worlds(self, died: bool) -> None:
+        mission, clock = self.mission, self.context.clock
+        conditions = mission.end_conditions
+        over: dict[int, str] = {}
+        if "time" in conditions:
+            for world in np.flatnonzero(self.running & (clock.step >= mission.steps)) if self._may_be_time() else ():
+                over[int(world)] = "time"
+        if died or clock.common == 1:
+            for world, reason in self._lost_teams():
+                over.setdefault(world, reason)
+        if over:
+            self._end_and_park(over)
+
+    def _may_be_time(self) -> bool:
+        common = self.context.clock.common
+        return common < 0 or common >= self.mission.steps
+
+    def _lost_teams(self) -> Iterable[tuple[int, str]]:
+        conditions = self.mission.end_conditions
+        if "none" in conditions or not {"one_team", "all_dead"} & set(conditions):
+            return
+        bodies = self.population.bodies
+        number = np.searchsorted(self.context.teams, bodies.team)
+        n_teams = len(self.context.teams) + 1
+        counts = np.bincount(bodies.world * n_teams + number, minlength=self.n_worlds * n_teams).reshape(self.n_worlds, n_teams)
+        left = (counts > 0).sum(axis=1)
+        for world in np.flatnonzero(self.running & (left <= 1)):
+            if not self.births.is_over(int(world)):
+                continue
+            if left[world] == 0:
+                yield int(world), "all_dead"
+            elif "one_team" in conditions and len(self.context.teams) > 1:
+                yield int(world), "one_team"
+
+    def _end_and_park(self, over: Mapping[int, str]) -> None:
+        bodies = self.population.bodies
+        for world, reason in over.items():
+            self._end(world, reason)
+        if self.running.any():
+            self._repack(np.isin(bodies.world, list(over)), None)
+            mask = np.zeros(self.n_worlds, bool)
+            mask[list(over)] = True
+            self.mail.drop_worlds(mask)
+
+    def _end(self, world: int, reason: str) -> None:
+        result = access.world_result(self, world, reason)
+        previous = self.results[world]
+        if previous is not None:
+            result.error = previous.error
+        self.results[world] = result
+        self.parked[world] = access.park(self, world)
+        self.running[world] = False
+
+    def _set_common_step(self) -> None:
+        steps = np.unique(self.context.clock.step[self.running])
+        self.context.clock.common = int(steps[0]) if len(steps) == 1 else -1
+
+    # -- failures -------------------------------------------------------------------------------------------------------------
+
+    def as_plugin_error(self, error: Exception, plugin: Any, text: str = "") -> PluginError:
+        """The error with place and cause; `text` says more."""
+        found = failure.raised(error, plugin, where=text, step=int(self.context.clock.step.max()), world=None)
+        return found
+
+    def fail(self, world: int, plugin: Any, error: Exception, where: str) -> None:
+        """A plugin has failed in a world: it will end with this step."""
+        step = int(self.context.clock.step[world])
+        self._record_failure(world, failure.raised(error, plugin, where=where, step=step, world=world))
+
+    def _record_failure(self, world: int, error: PluginError) -> None:
+        if self.on_error == "raise":
+            raise error
+        self.failed[world] = True
+        self.results[world] = WorldResult(world, int(self.context.seeds[world]), "error", 0, 0.0, {}, error=error)
+        if (self.failed | ~self.running).all() and self.failed.sum() == self.n_worlds and self.n_worlds > 1:
+            raise error
+
+    def await_ready(self, group: Group, binding: Binding) -> None:
+        """Wait until what is outside the arrays is ready for a step.
+
+        Raises:
+            PluginError: It is not within the plugin's `ready_timeout`.
+        """
+        limit = time.monotonic() + binding.plugin.ready_timeout
+        while not binding.plugin.ready(binding.view):
+            if time.monotonic() > limit:
+                raise PluginError(
+                    f"was not ready within {binding.plugin.ready_timeout:g} s",
+                    where=group.name, step=int(self.context.clock.step.max()), plugin=binding.spec.instance_name,
+                )  # fmt: skip
+            time.sleep(0.001)
+
+    # -- from outside -----------------------------------------------------------------------------------------------------------
+
+    def read(self, path: str) -> tuple[np.ndarray, np.ndarray]:
+        """A column by path: ("predator.pos") -> values (n_worlds, n_agents, 3) and who lives (n_worlds, n_agents), by place in block.
+
+        Paths: "block.pos", "block.Plugin.column", and for world plugins "SimpleCaptureMetrics.captures" -> (n_worlds, ...), all true.
+        """
+        return access.read(self, path)
+
+    def write(self, path: str, values: Any) -> None:
+        """Set a column by path, shaped as `read` gives it; rows of the dead are ignored. A parameter is set for now, not for resets."""
+        access.write(self, path, values)
+
+    def snapshot(self) -> access.Snapshot:
+        """All columns, and nothing else. `restore` goes back to it: the same future, bit for bit."""
+        return access.snapshot(self)
+
+    def restore(self, snapshot: access.Snapshot) -> None:
+        """Go back to a snapshot of this simulation or of one like it.
+
+        Raises:
+            SnapshotError: It belongs to another mission or number of worlds.
+        """
+        access.restore(self, snapshot)
+
+    def result(self) -> list[WorldResult]:
+        """Result of each world, as it stands now for those that go on."""
+        return [r if r is not None and not self.running[w] else access.world_result(self, w, "") for w, r in enumerate(self.results)]
+
+    def state_hash(self, world: int = 0) -> str:
+        """Hash of all columns of one world: equal states, and only these, have equal hashes."""
+        done = self.results[world]
+        return done.state_hash if done is not None and not self.running[world] else access.state_hash(self, world)
+
+    @property
+    def grade(self) -> str:
+        """What is promised of the result's bits: that of its weakest plugin."""
+        plugins = [b.plugin for g in self.population.groups for b in g.walk()] + [r.plugin for r in self.referees]
+        return max((type(p).grade for p in plugins), key=GRADES.index, default="portable")
+
+    def describe(self) -> str:
+        """The step as a printed list, with the channels that have several writers, and the grade."""
+        lines = [f"{self.mission.name or 'mission'}: {self.n_worlds} world(s), dt {self.mission.dt:g} s, update {self.mission.update}"]
+        lines += [f"{i + 1:4d}  {call.label}" for i, call in enumerate(self.schedule)]
+        writers = {(where, c): names for g in self.population.groups for where, c, names in g.wiring.writers}
+        lines += [f"{where}: channel {c!r} is written by {', then '.join(names)}; the last wins" for (where, c), names in writers.items()]
+        return "\n".join([*lines, f"grade: {self.grade}"])
+
+    def close(self) -> None:
+        """Release all that plugins hold outside the arrays; called by `with`. A second call does nothing."""
+        if not self.is_closed:
+            self.is_closed = True
+            self.population.close_handles()
+            self.context.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def __del__(self) -> None:
+        if getattr(self, "is_closed", True) is False and hasattr(self, "population"):
+            self.close()
+

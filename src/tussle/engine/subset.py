@@ -1,0 +1,134 @@
+"""Some worlds of a stack on their own: for plugins that are due in a part of them, and to find the one in which a plugin fails."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from tussle.api.bodies import Bodies
+from tussle.api.world import WorldView
+from tussle.columns import RaggedColumn
+from tussle.comms import Inbox, Publisher
+from tussle.engine.group import Binding, Group
+from tussle.engine.population import Population
+from tussle.engine.referees import Referee
+from tussle.engine.table import Table
+
+
+def _sub_bodies(bodies: Bodies, rows: np.ndarray) -> Bodies:
+    sub = Bodies(bodies.floats[:, rows].copy(), bodies.ints[:, rows].copy(), bodies.n_worlds)
+    sub.scans = bodies.scans
+    return sub
+
+
+def _sub_table(table: Table, rows: np.ndarray) -> Table:
+    sub = copy.copy(table)
+    sub.arrays = {dtype: np.ascontiguousarray(array[:, rows]) for dtype, array in table.arrays.items()}
+    sub.n = len(rows)
+    return sub
+
+
+def _sub_binding(binding: Binding, view: Any, rows: np.ndarray) -> Binding:
+    plugin = object.__new__(type(binding.plugin))
+    plugin.__dict__.update(binding.plugin.__dict__)
+    sub = copy.copy(binding)
+    sub.plugin, sub.view = plugin, view
+    sub.ragged = {k: c.take(rows) for k, c in binding.ragged.items()}
+    sub.handles = {k: [objects[i] for i in rows] for k, objects in binding.handles.items()}
+    sub.children = [_sub_binding(child, view, rows) for child in binding.children]
+    for name, value in list(plugin.__dict__.items()):
+        if isinstance(value, Publisher):
+            plugin.__dict__[name] = Publisher(value.topic, view)
+        elif isinstance(value, Inbox):
+            inbox = Inbox(value.topic, view)
+            inbox.parcels = list(value.parcels)
+            plugin.__dict__[name] = inbox
+    children = iter(sub.children)
+    for name in type(plugin).children():
+        plugin.__dict__[name] = [next(children).plugin for _ in plugin.__dict__[name]]
+    return sub
+
+
+def _sub_group(group: Group, bodies: Bodies, first: int, rows: np.ndarray) -> Group:
+    sub = copy.copy(group)
+    sub.table = _sub_table(group.table, rows)
+    views: dict[int, Any] = {}
+    for name in ("thinking", "steering", "sensing", "moving"):
+        view = copy.copy(getattr(group, name))
+        view.is_subset = True
+        view.services = {}
+        views[id(getattr(group, name))] = view
+        setattr(sub, name, view)
+    clone = lambda b: _sub_binding(b, views[id(b.view)], rows)  # noqa: E731
+    sub.motion = clone(group.motion)
+    sub.autonomies = [clone(b) for b in group.autonomies]
+    sub.controllers = [clone(b) for b in group.controllers]
+    sub.sensors = [clone(b) for b in group.sensors]
+    for binding in sub.walk():
+        for service in type(binding.plugin).services:
+            for view in views.values():
+                view.services[service] = getattr(binding.plugin, service)
+    sub.attach(bodies, first)
+    return sub
+
+
+def _merge_ragged(whole: RaggedColumn, part: RaggedColumn, rows: np.ndarray) -> None:
+    lists = [whole[i] for i in range(len(whole))]
+    for k, row in enumerate(rows):
+        lists[row] = part[k]
+    start = np.cumsum([0, *[part_.shape[-1] for part_ in lists]])
+    whole.set(start, np.concatenate(lists, axis=-1) if lists else whole.data)
+
+
+def call_group(population: Population, group: Group, worlds: np.ndarray, action: Callable[[Group], None]) -> None:
+    """Do something to one group in some worlds only; worlds, (n_worlds,), says which. Nothing is written when it raises."""
+    bodies = population.bodies
+    rows = np.flatnonzero(worlds[bodies.world])
+    mine = rows[(rows >= group.first) & (rows < group.last)]
+    first = int(np.searchsorted(rows, group.first))
+    sub = _sub_group(group, _sub_bodies(bodies, rows), first, mine - group.first)
+    action(sub)
+    for dtype, array in sub.table.arrays.items():
+        group.table.arrays[dtype][:, mine - group.first] = array
+    bodies.floats[:, mine] = sub.bodies.floats[:, first : first + len(mine)]
+    bodies.touch(group.first, group.last)
+    for binding, part in zip(group.walk(), sub.walk(), strict=True):
+        for name in part.ragged:
+            _merge_ragged(binding.ragged[name], part.plugin.__dict__[name], mine - group.first)
+        for name in part.handles:
+            for k, row in enumerate(mine - group.first):
+                binding.handles[name][row] = part.plugin.__dict__[name][k]
+
+
+def call_referee(population: Population, referee: Referee, worlds: np.ndarray, action: Callable[[Referee, WorldView], None]) -> None:
+    """Do something with a world plugin in some worlds only. Nothing is written when it raises, messages excepted."""
+    bodies, view = population.bodies, referee.view
+    rows = np.flatnonzero(worlds[bodies.world])
+    sub_bodies = _sub_bodies(bodies, rows)
+    sub_view = copy.copy(view)
+    sub_view.deaths, sub_view.moved, sub_view.births = [], [], []
+    sub_view.reset(sub_bodies, 0, len(rows))
+    sub_view.caller = referee.plugin
+    sub = copy.copy(referee)
+    sub.plugin = object.__new__(type(referee.plugin))
+    sub.plugin.__dict__.update(referee.plugin.__dict__)
+    sub.tables = {
+        per: _sub_table(table, rows if per == "entity" else np.arange(table.n)) for per, table in referee.tables.items()
+    }
+    for name, value in list(sub.plugin.__dict__.items()):
+        if isinstance(value, Publisher):
+            sub.plugin.__dict__[name] = Publisher(value.topic, sub_view)
+    sub.attach()
+    action(sub, sub_view)
+    for per, table in referee.tables.items():
+        index = rows if per == "entity" else np.flatnonzero(worlds)
+        for dtype, array in sub.tables[per].arrays.items():
+            table.arrays[dtype][:, index] = array if per == "entity" else array[:, index]
+    bodies.floats[:, rows] = sub_bodies.floats
+    bodies.touch(0, bodies.n)
+    view.deaths += [(rows[r], why) for r, why in sub_view.deaths]
+    view.moved += [rows[r] for r in sub_view.moved]
+    view.births += [b for b in sub_view.births if worlds[b["world"]].all()]

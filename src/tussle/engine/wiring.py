@@ -1,0 +1,189 @@
+"""Who writes what whom reads: channels of one entity's plugins, by name, checked for names and units."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from tussle import units
+from tussle.columns import Channel, Output
+from tussle.engine.table import Place, Table
+from tussle.errors import WiringError, listed, nearest_name
+
+BELIEF = {"belief_pos": ("pos", 3, "m"), "belief_vel": ("vel", 3, "m/s"), "belief_quat": ("quat", 4, "")}
+
+
+@dataclass(slots=True)
+class Link:
+    """Where a channel column lies. With `rows`, it is the plugin's own array and is copied from (and, outputs, to) these rows."""
+
+    place: Place
+    rows: tuple[int, ...] | None = None
+
+
+@dataclass
+class Bus:
+    """Channels between one stage and the next.
+
+    Attributes:
+        row: Channel -> row in the table's float array.
+        unit: Channel -> unit.
+        writers: Channel -> names of the plugins that write it, in order.
+        read: Channels that somebody reads.
+    """
+
+    row: dict[str, int] = field(default_factory=dict)
+    unit: dict[str, str] = field(default_factory=dict)
+    writers: dict[str, list[str]] = field(default_factory=dict)
+    read: set[str] = field(default_factory=set)
+
+
+def read_channels(plugin: Any) -> list[tuple[str, Channel]]:
+    """Input columns that a plugin uses, in order of declaration."""
+    inputs = type(plugin).inputs()
+    names = plugin.active_inputs() if hasattr(plugin, "active_inputs") else list(inputs)
+    return [(k, inputs[k]) for k in names]
+
+
+def written_channels(plugin: Any) -> list[tuple[str, Channel]]:
+    """Output columns that a plugin uses, in order of declaration."""
+    outputs = type(plugin).outputs()
+    names = plugin.active_outputs() if hasattr(plugin, "active_outputs") else list(outputs)
+    return [(k, outputs[k]) for k in names]
+
+
+class Wiring:
+    """The wires of one group.
+
+    Args:
+        where: Name of the entity block, for messages.
+        table: Table that receives the channel columns.
+        advise: Gives controllers that would join the writers' channels to the reader, for messages.
+    """
+
+    def __init__(self, where: str, table: Table, advise: Callable[[Iterable[str], Iterable[str]], list[str]]) -> None:
+        self.where = where
+        self.table = table
+        self.advise = advise
+        self.links: dict[tuple[int, str], Link] = {}
+        self.wired: dict[int, set[str]] = {}
+        self.writers: list[tuple[str, str, list[str]]] = []
+
+    def connect(self, sensors: Sequence[Any], autonomies: Sequence[Any], controllers: Sequence[Any], motion: Any) -> None:
+        """Lay all wires.
+
+        Raises:
+            WiringError: An input that nobody writes, or whose writer has another unit.
+        """
+        working = [c for c in controllers if not c.passthrough]
+        self._check_passthrough(controllers, [*working, motion])
+        sense = self._bus(sensors, [])
+        self._join(sense, sensors, [])
+        stages: list[list[Any]] = [list(autonomies), *[[c] for c in working]]
+        for producers, consumer in zip(stages, [*working, motion], strict=True):
+            bus = self._bus(producers, [consumer])
+            self._join(bus, producers, [consumer], sense)
+        for autonomy in autonomies:
+            self._read(autonomy, {}, sense, required=True)
+
+    def _check_passthrough(self, controllers: Sequence[Any], consumers: Sequence[Any]) -> None:
+        following = list(consumers)
+        for controller in controllers:
+            if not controller.passthrough:
+                following.pop(0)
+                continue
+            offered = {c for _, column in written_channels(controller) for c in column.channels}
+            needed = [c for _, column in read_channels(following[0]) for c in column.channels if not column.optional]  # type: ignore[attr-defined]
+            for channel in needed if offered else []:
+                if channel not in offered:
+                    raise self._missing(following[0], channel, offered, controller.instance_name)
+
+    def _bus(self, producers: Sequence[Any], consumers: Sequence[Any]) -> Bus:
+        """Rows for all channels, the consumers' first and in their order, so that they see them side by side."""
+        bus = Bus()
+        for plugin in consumers:
+            for _, column in read_channels(plugin):
+                self._add(bus, column)
+        for plugin in producers:
+            for _, column in written_channels(plugin):
+                self._add(bus, column)
+        return bus
+
+    def _add(self, bus: Bus, column: Channel) -> None:
+        for channel, unit in zip(column.channels, column.units, strict=True):
+            if channel not in bus.row:
+                place = self.table.add(("channel", len(self.table.places)), float, 0, column.default)  # type: ignore[attr-defined]
+                bus.row[channel] = place.first
+                bus.unit[channel] = unit
+
+    def _join(self, bus: Bus, producers: Sequence[Any], consumers: Sequence[Any], also: Bus | None = None) -> None:
+        for plugin in producers:
+            for _, column in written_channels(plugin):
+                for channel in column.channels:
+                    bus.writers.setdefault(channel, []).append(plugin.instance_name)
+        for plugin in producers:
+            for name, column in written_channels(plugin):
+                self._check_units(plugin, column, bus)
+                self.links[id(plugin), name] = self._link(column, bus)
+        for plugin in consumers:
+            self._read(plugin, bus, also, required=True)
+        for channel, names in bus.writers.items():
+            if len(names) > 1:
+                self.writers.append((self.where, channel, names))
+        for plugin in producers:
+            for name, column in written_channels(plugin):
+                if name in BELIEF or any(c in bus.read for c in column.channels):
+                    self.wired.setdefault(id(plugin), set()).add(name)
+                if bus.read.isdisjoint(column.channels) and not consumers:
+                    self.wired.setdefault(id(plugin), set()).add(name)  # sensors: read by name from outside and by autonomies
+
+    def _read(self, plugin: Any, bus: Any, also: Bus | None, required: bool) -> None:
+        for name, column in read_channels(plugin):
+            source = None
+            for candidate in (bus, also):
+                if candidate and all(c in candidate.writers for c in column.channels):
+                    source = candidate
+                    break
+            if source is None:
+                if not column.optional and required:  # type: ignore[attr-defined]
+                    written = {c for b in (bus, also) if b for c in b.writers}
+                    absent = next((c for c in column.channels if c not in written), column.channels[0])
+                    raise self._missing(plugin, absent, written, "")
+                if isinstance(bus, Bus) and all(c in bus.row for c in column.channels):
+                    self.links[id(plugin), name] = self._link(column, bus)
+                else:
+                    place = self.table.add((id(plugin), name), float, len(column.fields), column.default)  # type: ignore[attr-defined]
+                    self.links[id(plugin), name] = Link(place)
+                continue
+            self._check_units(plugin, column, source)
+            source.read.update(column.channels)
+            self.links[id(plugin), name] = self._link(column, source)
+
+    def _link(self, column: Channel, bus: Bus) -> Link:
+        rows = tuple(bus.row[c] for c in column.channels)
+        if not column.fields or rows == tuple(range(rows[0], rows[0] + len(rows))):
+            return Link(Place(float, rows[0], len(column.fields)))
+        return Link(self.table.add(("own", len(self.table.places)), float, len(column.fields)), rows)
+
+    def _check_units(self, plugin: Any, column: Channel, bus: Bus) -> None:
+        for channel, unit in zip(column.channels, column.units, strict=True):
+            if not units.compatible(unit, bus.unit[channel]):
+                kind = "writes" if isinstance(column, Output) else "reads"
+                raise WiringError(
+                    f"{self.where}: {plugin.instance_name}.{column.name} {kind} channel {channel!r} in {unit or 'no unit'!r}, but it is "
+                    f"in {bus.unit[channel] or 'no unit'!r} for the plugin at its other end"
+                )
+
+    def _missing(self, reader: Any, channel: str, offered: Iterable[str], through: str) -> WiringError:
+        offered = sorted(offered)
+        fitting = self.advise(offered, [c for _, column in read_channels(reader) for c in column.channels])
+        advice = f"; controllers that would fit between them: {', '.join(fitting)}" if fitting else ""
+        by = f" through {through}" if through else ""
+        return WiringError(
+            f"{self.where}: nobody writes channel {channel!r} for {reader.instance_name}{by}{nearest_name(channel, offered)}; "
+            f"written are: {', '.join(offered) or 'none'}{advice}"
+        )
+
+
+__all__ = ["BELIEF", "Bus", "Link", "Wiring", "listed", "read_channels", "written_channels"]

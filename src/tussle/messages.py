@@ -1,0 +1,200 @@
+"""Message types that plugins share, and the columns that hold many messages at once."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import numpy as np
+
+from tussle.columns import Column, EntityRef, Field, Handle, Numbers, Ragged, RaggedColumn
+from tussle.errors import DeclarationError, ParameterError, listed, nearest_name
+
+
+class Message:
+    """A message type; abstract. Fields are declared as class attributes: `Field`, `EntityRef`, at most one `Ragged`, or a `Handle`
+    for any picklable object."""
+
+    fields: ClassVar[dict[str, Column]] = {}
+
+    def __init_subclass__(cls) -> None:
+        cls.fields = {k: c for base in reversed(cls.__mro__) for k, c in vars(base).items() if isinstance(c, Column)}
+        for name, column in cls.fields.items():
+            if not isinstance(column, (Field, EntityRef, Ragged, Handle)):
+                raise DeclarationError(f"{cls.__name__}.{name}: a message holds Field, EntityRef, Ragged or Handle, not {type(column).__name__}")
+            if name in ("world", "sender", "n"):
+                raise DeclarationError(f"{cls.__name__}.{name}: the name is reserved in messages")
+        if sum(isinstance(c, Ragged) for c in cls.fields.values()) > 1:
+            raise DeclarationError(f"{cls.__name__} has more than one ragged field; make two message types of it")
+
+
+class Batch:
+    """Messages of one type as columns, ordered by (world, sender, order of sending).
+
+    Attributes:
+        type: The message type.
+        world: World of each message, (n,).
+        sender: Id of the entity that sent it, 0 for the world, (n,).
+        data: Field name -> array (n,) or (k, n), `RaggedColumn`, or list.
+    """
+
+    def __init__(self, type_: type[Message], world: np.ndarray, sender: np.ndarray, data: dict[str, Any]) -> None:
+        self.type = type_
+        self.world = world
+        self.sender = sender
+        self.data = data
+
+    @property
+    def n(self) -> int:
+        return len(self.world)
+
+    def __len__(self) -> int:
+        return len(self.world)
+
+    def __getattr__(self, name: str) -> Any:
+        try:
+            return self.__dict__["data"][name]
+        except KeyError:
+            fields = self.__dict__["type"].fields if "type" in self.__dict__ else {}
+            raise AttributeError(f"messages of this type have no field {name!r}{nearest_name(name, fields)}; {listed(fields)}") from None
+
+    def take(self, index: np.ndarray) -> Batch:
+        """The messages `index`, in that order."""
+        data: dict[str, Any] = {}
+        for name, column in self.type.fields.items():
+            values = self.data[name]
+            if isinstance(column, Ragged):
+                data[name] = values.take(index)
+            elif isinstance(column, Handle):
+                data[name] = [values[i] for i in index]
+            else:
+                data[name] = np.ascontiguousarray(values[..., index])
+        return Batch(self.type, self.world[index], self.sender[index], data)
+
+    @classmethod
+    def empty(cls, type_: type[Message]) -> Batch:
+        return cls.make(type_, np.zeros(0, np.int64), np.zeros(0, np.int64), {})
+
+    @classmethod
+    def make(cls, type_: type[Message], world: np.ndarray, sender: np.ndarray, values: dict[str, Any]) -> Batch:
+        """Columns from values by field name; scalars are repeated, missing numbers are 0.
+
+        Raises:
+            ParameterError: A value belongs to no field, or has another shape.
+        """
+        n = len(world)
+        for name in values:
+            if name not in type_.fields:
+                raise ParameterError(f"{type_.__name__} has no field {name!r}{nearest_name(name, type_.fields)}; {listed(type_.fields)}")
+        data = {name: _field_values(type_, name, column, values.get(name), n) for name, column in type_.fields.items()}
+        return cls(type_, np.ascontiguousarray(world, np.int64), np.ascontiguousarray(sender, np.int64), data)
+
+    @classmethod
+    def join(cls, batches: list[Batch]) -> Batch:
+        """All messages in one, in the order given."""
+        first = batches[0]
+        if len(batches) == 1:
+            return first
+        data: dict[str, Any] = {}
+        for name, column in first.type.fields.items():
+            parts = [b.data[name] for b in batches]
+            if isinstance(column, Ragged):
+                lengths = np.concatenate([np.diff(p.start) for p in parts])
+                joined = RaggedColumn.empty(len(lengths), column)
+                joined.set(np.concatenate([[0], np.cumsum(lengths)]), np.concatenate([p.data for p in parts], axis=-1))
+                data[name] = joined
+            elif isinstance(column, Handle):
+                data[name] = [v for p in parts for v in p]
+            else:
+                data[name] = np.concatenate(parts, axis=-1)
+        return cls(first.type, np.concatenate([b.world for b in batches]), np.concatenate([b.sender for b in batches]), data)
+
+    @classmethod
+    def concatenate(cls, batches: list[Batch]) -> Batch:
+        """All messages in one, stably ordered by (world, sender)."""
+        joined = cls.join(batches)
+        order = np.lexsort((joined.sender, joined.world))
+        return joined if (order[1:] > order[:-1]).all() else joined.take(order)
+
+
+def _field_values(type_: type[Message], name: str, column: Column, value: Any, n: int) -> Any:
+    where = f"{type_.__name__}.{name}"
+    if isinstance(column, Handle):
+        return list(value) if isinstance(value, list) else [value] * n
+    if isinstance(column, Ragged):
+        if value is None:
+            return RaggedColumn.empty(n, column)
+        if not isinstance(value, RaggedColumn) or len(value) != n:
+            raise ParameterError(f"{where}: needed is a RaggedColumn of {n} rows")
+        return value
+    assert isinstance(column, Numbers)
+    shape = (*column.shape, n)
+    dtype = np.dtype(column.dtype)
+    try:
+        source = np.asarray(0 if value is None else value, dtype)
+        if column.shape and source.ndim == 1:
+            source = source[:, None]
+        return np.ascontiguousarray(np.broadcast_to(source, shape))
+    except ValueError:
+        raise ParameterError(f"{where}: shape {np.shape(value)} does not fit {shape}") from None
+
+
+class CaptureEntity(Message):
+    """A claim by the sender to have captured another entity; a referee judges it in the same step."""
+
+    target = EntityRef(doc="Entity claimed.")
+
+
+class EntityCaptured(Message):
+    """A capture that held."""
+
+    source = EntityRef(doc="Entity that captured.")
+    target = EntityRef(doc="Entity that was captured.")
+    source_team = Field(dtype=int)
+    target_team = Field(dtype=int)
+
+
+class EntityCollided(Message):
+    """Two entities met; sent once per pair, the smaller id first."""
+
+    first = EntityRef()
+    second = EntityRef()
+    first_team = Field(dtype=int)
+    second_team = Field(dtype=int)
+
+
+class BoundaryCrossed(Message):
+    """An entity left the boundary that contains it, or entered one that it had left."""
+
+    entity = EntityRef()
+    boundary = Field(dtype=int, doc="Id of the boundary.")
+    inside = Field(dtype=bool, doc="Whether it is inside now.")
+
+
+class StateEstimate(Message):
+    """What an entity believes of its own state."""
+
+    pos = Field("x y z", unit="m m m")
+    vel = Field("vx vy vz", unit="m/s m/s m/s")
+
+
+class Waypoint(Message):
+    """A point to go to."""
+
+    pos = Field("x y z", unit="m m m")
+
+
+class BoundaryShape(Message):
+    """The shape of a boundary, told once at the start."""
+
+    boundary = Field(dtype=int, doc="Id of the boundary.")
+    team = Field(dtype=int, doc="Team that it belongs to.")
+    shape = Handle(doc="A shape of `tussle.scene`.")
+
+
+class SpawnEntity(Message):
+    """Ask for a new entity of a block; it appears at the beginning of the next step."""
+
+    block = Handle(doc="Name of the block that serves as template.")
+    pos = Field("x y z", unit="m m m")
+    vel = Field("vx vy vz", unit="m/s m/s m/s")
+    quat = Field("w qx qy qz")

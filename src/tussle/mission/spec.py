@@ -1,0 +1,248 @@
+"""A mission as frozen data: who is there, with which plugins, in which world, for how long."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from tussle import units
+from tussle.api import Autonomy, Controller, Interaction, Metric, MotionModel, Network, Sensor
+from tussle.errors import MissionError, listed
+from tussle.scene import Scene
+from tussle import stock
+
+END_CONDITIONS = ("time", "one_team", "all_dead", "none")
+UPDATES = ("synchronous", "sequential")
+PLACEMENTS = ("normal", "uniform")
+
+
+def _numbers(where: str, value: Any, unit: str, n: int) -> tuple[float, ...]:
+    values = list(value) if not isinstance(value, (str, int, float)) else [value] * n
+    if len(values) != n:
+        raise MissionError(f"{where} = {value!r}: needed are {n} numbers")
+    return tuple(_number(where, v, unit) for v in values)
+
+
+def _number(where: str, value: Any, unit: str) -> float:
+    try:
+        number = units.parse(value, unit) if isinstance(value, str) else float(value)
+    except (TypeError, ValueError) as error:
+        raise MissionError(f"{where} = {value!r} is not allowed: {error}") from None
+    if not math.isfinite(number):
+        raise MissionError(f"{where} = {value!r} is not allowed; it takes a finite number{' in ' + unit if unit else ''}")
+    return number
+
+
+def _plugins(where: str, value: Any, kind: type) -> tuple[Any, ...]:
+    plugins = tuple(value) if isinstance(value, (list, tuple)) else () if value is None else (value,)
+    for plugin in plugins:
+        if not isinstance(plugin, kind):
+            hint = " (an instance is needed: write it with parentheses)" if isinstance(plugin, type) else ""
+            raise MissionError(f"{where}: {plugin!r} is not a {kind.__name__}{hint}")
+    names = [p.instance_name for p in plugins]
+    for name in names:
+        if names.count(name) > 1:
+            raise MissionError(f"{where}: two plugins are called {name!r}; give one of them another name with name=...")
+    return plugins
+
+
+@dataclass(frozen=True, kw_only=True)
+class Block:
+    """Entities of one make: how many, where, with which plugins.
+
+    Attributes:
+        name: Name of the block, unique in its mission.
+        team: Team number.
+        count: How many there will be in all.
+        position: Start position of the first [m], world frame.
+        variance: Placement "normal": variance of the others' positions around it [m^2].
+        half_width: Placement "uniform": the others lie within this of it [m].
+        placement: "normal" or "uniform".
+        scatter_first: The first is scattered like the others.
+        heading: Counter-clockwise from East [rad]; "180 deg" is understood here as in all numbers with units.
+        heading_variance: Variance of the heading [rad^2].
+        climb: Elevation of the nose, up positive [rad].
+        roll: Bank, right wing down positive [rad].
+        velocity: Initial velocity [m/s], world frame; None is `speed` along the body x axis.
+        speed: Initial speed [m/s].
+        health: What is left before it is removed at 0.
+        radius: Of its body [m].
+        mass: [kg].
+        rate: Births per second [1/s]; None places all at the start.
+        slots: With a rate: births that run side by side.
+        first_birth: With a rate: time of the first birth [s].
+        interval_sd: With a rate: standard deviation of the time between births [s].
+        autonomy: One or several autonomies.
+        controller: One or several controllers, from the autonomy towards the motion model.
+        motion: The motion model.
+        sensor: One or several sensors.
+    """
+
+    name: str
+    team: int = 0
+    count: int = 1
+    position: tuple[float, ...] = (0.0, 0.0, 0.0)
+    variance: tuple[float, ...] = (100.0, 100.0, 0.0)
+    half_width: tuple[float, ...] = (0.0, 0.0, 0.0)
+    placement: str = "normal"
+    scatter_first: bool = False
+    heading: float = 0.0
+    heading_variance: float = 0.0
+    climb: float = 0.0
+    roll: float = 0.0
+    velocity: tuple[float, ...] | None = None
+    speed: float = 0.0
+    health: float = 1.0
+    radius: float = 1.0
+    mass: float = 1.0
+    rate: float | None = None
+    slots: int = 1
+    first_birth: float = 0.0
+    interval_sd: float = 0.0
+    autonomy: Any = ()
+    controller: Any = ()
+    motion: Any = None
+    sensor: Any = ()
+
+    def __post_init__(self) -> None:
+        where = f"block {self.name!r}"
+        put = lambda name, value: object.__setattr__(self, name, value)  # noqa: E731 - frozen dataclasses are set up this way
+        if not self.name or "." in self.name:
+            raise MissionError(f"{where}: a block's name is not empty and has no dot, since paths such as prey.Boids.gain use dots")
+        for name, unit in (("position", "m"), ("variance", "m^2"), ("half_width", "m")):
+            put(name, _numbers(f"{where}: {name}", getattr(self, name), unit, 3))
+        if self.velocity is not None:
+            put("velocity", _numbers(f"{where}: velocity", self.velocity, "m/s", 3))
+        for name, unit in _BLOCK_NUMBERS.items():
+            if getattr(self, name) is not None:
+                put(name, _number(f"{where}: {name}", getattr(self, name), unit))
+        self._check_bounds(where)
+        put("autonomy", _plugins(f"{where}: autonomy", self.autonomy, Autonomy))
+        put("controller", _plugins(f"{where}: controller", self.controller, Controller))
+        put("sensor", _plugins(f"{where}: sensor", self.sensor, Sensor))
+        if isinstance(self.motion, type) or not isinstance(self.motion, MotionModel):
+            raise MissionError(f"{where}: motion = {self.motion!r} is not a motion model; each block has exactly one, such as motion=Unicycle()")
+        _plugins(where, self.plugins, object)
+
+    def _check_bounds(self, where: str) -> None:
+        for name in ("count", "slots", "team"):
+            if isinstance(getattr(self, name), bool) or int(getattr(self, name)) != getattr(self, name):
+                raise MissionError(f"{where}: {name} = {getattr(self, name)!r} is not allowed; it takes a whole number")
+        if self.placement not in PLACEMENTS:
+            raise MissionError(f"{where}: placement = {self.placement!r} is not allowed; {listed(PLACEMENTS)}")
+        for name in ("variance", "half_width"):
+            if min(getattr(self, name)) < 0.0:
+                raise MissionError(f"{where}: {name} = {getattr(self, name)!r} is not allowed; it takes numbers >= 0")
+        for name in ("count", "heading_variance", "speed", "interval_sd"):
+            if getattr(self, name) < 0:
+                raise MissionError(f"{where}: {name} = {getattr(self, name)!r} is not allowed; it takes a number >= 0")
+        for name in ("health", "radius", "mass", "rate", "slots"):
+            value = getattr(self, name)
+            if value is not None and not value > 0:
+                raise MissionError(f"{where}: {name} = {value!r} is not allowed; it takes a number > 0")
+
+    @property
+    def plugins(self) -> tuple[Any, ...]:
+        """All plugins in the order of a step."""
+        return (*self.autonomy, *self.controller, self.motion, *self.sensor)
+
+
+_BLOCK_NUMBERS = {
+    "heading": "rad",
+    "heading_variance": "",
+    "climb": "rad",
+    "roll": "rad",
+    "speed": "m/s",
+    "health": "",
+    "radius": "m",
+    "mass": "kg",
+    "rate": "1/s",
+    "first_birth": "s",
+    "interval_sd": "s",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mission:
+    """A game: its entities, its world, its referees, its end.
+
+    Attributes:
+        blocks: The entities.
+        dt: Length of a step [s].
+        end: Time at which it ends, with the condition "time" [s].
+        start: Time of step 0 [s].
+        motion_multiplier: Substeps of controllers and motion per step.
+        update: "synchronous": all decide on the states of the step's start. "sequential": one entity after another in order of id
+            decides and moves.
+        end_conditions: Which of time, one_team, all_dead, none end a world.
+        interactions: Referees and fields, in order.
+        metrics: What is counted, in order.
+        networks: What carries messages; GlobalNetwork is always there.
+        scene: Origin, ground, boundaries, bases.
+        name: Title.
+    """
+
+    blocks: Sequence[Block]
+    dt: float = 0.1
+    end: float = 50.0
+    start: float = 0.0
+    motion_multiplier: int = 1
+    update: str = "synchronous"
+    end_conditions: Any = ("time",)
+    interactions: Any = ()
+    metrics: Any = ()
+    networks: Any = ()
+    scene: Scene = field(default_factory=Scene)
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        put = lambda name, value: object.__setattr__(self, name, value)  # noqa: E731
+        put("blocks", tuple(self.blocks))
+        for block in self.blocks:
+            if not isinstance(block, Block):
+                raise MissionError(f"mission: {block!r} is not a Block")
+        names = [b.name for b in self.blocks]
+        for name in names:
+            if names.count(name) > 1:
+                raise MissionError(f"mission: two blocks are called {name!r}; paths and random numbers need their names to differ")
+        for name in ("dt", "end", "start"):
+            put(name, _number(f"mission: {name}", getattr(self, name), "s"))
+        if not self.dt > 0.0:
+            raise MissionError(f"mission: dt = {self.dt!r} is not allowed; it takes a number of seconds > 0")
+        if isinstance(self.motion_multiplier, bool) or self.motion_multiplier != int(self.motion_multiplier) or self.motion_multiplier < 1:
+            raise MissionError(f"mission: motion_multiplier = {self.motion_multiplier!r} is not allowed; it takes a whole number >= 1")
+        if self.update not in UPDATES:
+            raise MissionError(f"mission: update = {self.update!r} is not allowed; {listed(UPDATES)}")
+        conditions = self.end_conditions
+        conditions = tuple(c.strip() for c in conditions.split(",")) if isinstance(conditions, str) else tuple(conditions)
+        for condition in conditions:
+            if condition not in END_CONDITIONS:
+                raise MissionError(f"mission: end condition {condition!r} is not allowed; {listed(END_CONDITIONS)}")
+        put("end_conditions", conditions)
+        for name, kind in (("interactions", Interaction), ("metrics", Metric), ("networks", Network)):
+            put(name, _plugins(f"mission: {name}", getattr(self, name), kind))
+        if "GlobalNetwork" not in [p.instance_name for p in self.networks]:
+            put("networks", (stock.load("GlobalNetwork")(), *self.networks))
+
+    @property
+    def steps(self) -> int:
+        """Number of steps until the end time."""
+        return max(0, math.ceil((self.end - self.start) / self.dt - 0.5))
+
+    @property
+    def teams(self) -> np.ndarray:
+        """Team numbers, ascending, (n_teams,)."""
+        return np.unique(np.array([b.team for b in self.blocks], np.int64))
+
+    @property
+    def world_plugins(self) -> tuple[Any, ...]:
+        return (*self.interactions, *self.metrics, *self.networks)
+
+    def replace(self, **changes: Any) -> Mission:
+        """A copy with other values."""
+        return dataclasses.replace(self, **changes)

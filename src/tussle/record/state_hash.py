@@ -1,0 +1,22 @@
+"""The state hash: BLAKE2b over ordered columns."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable
+
+import numpy as np
+
+
+def hash_columns(columns: Iterable[tuple[str, np.ndarray | bytes]]) -> str:
+    """32 hexadecimal digits for named columns in the order given; the sign of zero and every last bit count.
+
+    Args:
+        columns: (name, array or bytes).
+    """
+    digest = hashlib.blake2b(digest_size=16)
+    for name, values in columns:
+        data = values if isinstance(values, bytes) else np.ascontiguousarray(values).tobytes()
+        digest.update(f"{name}:{len(data)};".encode())
+        digest.update(data)
+    return digest.hexdigest()

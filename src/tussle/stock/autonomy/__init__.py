@@ -1,0 +1,1 @@
+"""The autonomy plugins that ship, a folder each."""

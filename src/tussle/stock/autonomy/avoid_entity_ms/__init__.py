@@ -1,0 +1,5 @@
+"""Keep away from others."""
+
+from tussle.stock.autonomy.avoid_entity_ms.plugin import AvoidEntityMS
+
+__all__ = ["AvoidEntityMS"]

@@ -1,0 +1,5 @@
+"""The weighted mean of behaviours."""
+
+from tussle.stock.autonomy.motor_schemas.plugin import MotorSchemas
+
+__all__ = ["MotorSchemas"]

@@ -1,0 +1,5 @@
+"""Go to a point."""
+
+from tussle.stock.autonomy.move_to_goal_ms.plugin import MoveToGoalMS
+
+__all__ = ["MoveToGoalMS"]

@@ -1,0 +1,42 @@
+"""Go to a point."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tussle.api import Behavior, GroupView, Param, State, Subscribe, unit
+from tussle.messages import Waypoint
+
+AHEAD = 1e6  # [m]
+
+
+class MoveToGoalMS(Behavior):
+    """Wish towards the goal, at a speed that a PID on the distance gives; a `Waypoint` message replaces the goal."""
+
+    grade = "portable"
+
+    goal = Param((0.0, 0.0, 0.0), fields="x y z", unit="m", doc="Where to.")
+    use_initial_heading = Param(False, doc="The goal lies 1000 km ahead of where the entity begins.")
+    distance_pid = Param((0.5, 0.0, 0.0, 0.0), fields="kp ki kd band", doc="Gains of the speed on the distance.")
+    target = State("x y z", unit="m", doc="Where it is going to.")
+    integral = State(unit="m s", doc="Of the distance.")
+    previous = State(unit="m", doc="Distance at the last call.")
+    waypoints = Subscribe(Waypoint, network_param="network_name")
+    network_name = Param("GlobalNetwork", doc="Network that carries the waypoints.")
+
+    def spawn(self, g: GroupView, rows: np.ndarray) -> None:
+        ahead = g.pos + AHEAD * g.forward
+        self.target[:, rows] = np.where(self.use_initial_heading, ahead, self.goal)[:, rows]
+
+    def step(self, g: GroupView) -> None:
+        if self.waypoints:
+            rows, heard = self.waypoints.latest()
+            self.target[:, rows] = heard.pos
+        offset = self.target - g.pos
+        distance = np.sqrt(offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2])
+        kp, ki, kd, band = self.distance_pid
+        self.integral[:] = np.where(distance > band, 0.0, self.integral + distance * g.dt)
+        change = np.where(g.step_count > 0, distance - self.previous, 0.0)
+        speed = kp * distance + ki * self.integral + kd * change / g.dt
+        self.previous[:] = distance
+        self.wish[:] = unit(offset) * speed

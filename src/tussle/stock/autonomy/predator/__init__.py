@@ -1,0 +1,5 @@
+"""Hunting."""
+
+from tussle.stock.autonomy.predator.plugin import Predator
+
+__all__ = ["Predator"]

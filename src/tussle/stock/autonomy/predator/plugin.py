@@ -1,0 +1,62 @@
+"""Hunting."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tussle.api import Autonomy, EntityRef, GroupView, Output, Param, Publish
+from tussle.messages import CaptureEntity
+from tussle.stock.autonomy.predator import kernels
+
+
+class Predator(Autonomy):
+    """Pure pursuit of the nearest prey, and a claim on everyone of another team within `capture_range`.
+
+    Without `allow_prey_switching` a target is kept until it is gone; with it the nearest is chosen anew in every step. Claims go to
+    every entity of another team, rival predators too, as in the paper's code. Without any prey left the last commands persist.
+    """
+
+    grade = "portable"
+    atomic = True
+
+    max_speed = Param(30.0, unit="m/s", ge=0.0, doc="Wanted speed.")
+    capture_range = Param(5.0, unit="m", ge=0.0, doc="Distance below which others are claimed.")
+    allow_prey_switching = Param(True, doc="Choose the nearest prey in every step.")
+    prey_team_id = Param(1, doc="Team that is hunted.")
+    target = EntityRef(doc="Prey being hunted.")
+    speed = Output(unit="m/s")
+    turn_rate = Output(unit="rad/s")
+    pitch_rate = Output(unit="rad/s")
+    desired_heading = Output(unit="rad")
+    desired_speed = Output(unit="m/s")
+    capture = Publish(CaptureEntity)
+
+    def step(self, g: GroupView) -> None:
+        index = g.any_index()
+        bodies = g.bodies
+        _, _, id_row, id_start = g.table_bodies.layout()
+        x, y, z = g.pos
+        target_row = np.empty(g.n, np.int64)
+        room = 16 * g.n + 64
+        target = self.target.copy()
+        while True:
+            claim_row, claimed = np.empty(room, np.int64), np.empty(room, np.int64)
+            n_claims = kernels.hunt(
+                x, y, z, g.team, self.prey_team_id, self.capture_range, self.allow_prey_switching, target, target_row,
+                claim_row, claimed, bodies.id, index.row_world, id_start, id_row, index.place, g.first, *index.table,
+                g.by_place(index, "team")[0], index.order,
+            )  # fmt: skip
+            if n_claims <= room:
+                break
+            room = n_claims
+        self.target[:] = target
+        table_x, table_y, table_z = bodies.pos
+        if not self.wired.isdisjoint(("speed", "turn_rate", "pitch_rate")):
+            kernels.pursue(
+                x, y, z, g.yaw, g.climb, self.max_speed, target_row, table_x, table_y, table_z, self.speed, self.turn_rate,
+                self.pitch_rate,
+            )  # fmt: skip
+        if not self.wired.isdisjoint(("desired_heading", "desired_speed")):
+            kernels.point(x, y, self.max_speed, target_row, table_x, table_y, self.desired_heading, self.desired_speed)
+        if n_claims:
+            self.capture.publish(claim_row[:n_claims], target=bodies.id[claimed[:n_claims]])

@@ -1,0 +1,5 @@
+"""Fly straight on."""
+
+from tussle.stock.autonomy.straight.plugin import Straight
+
+__all__ = ["Straight"]

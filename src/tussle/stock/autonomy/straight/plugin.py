@@ -1,0 +1,83 @@
+"""Fly straight on."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from tussle.api import Autonomy, GroupView, Handle, Output, Param, Publish, State, Subscribe, unit
+from tussle.messages import BoundaryShape, SpawnEntity
+from tussle.numeric import atan2
+from tussle.numeric.quaternion import quat_from_euler
+
+AHEAD = 1e6  # [m]: so far that the direction does not change in a run
+SPAWN_PERIOD = 2.0  # [s]
+
+
+class Straight(Autonomy):
+    """Hold the initial heading, altitude and speed, on the state that the entity believes itself in.
+
+    With `enable_boundary_control` an entity outside the boundary it has last heard of turns back to its centre.
+    """
+
+    grade = "portable"
+
+    speed = Param(21.0, unit="m/s", ge=0.0, doc="Wanted speed.")
+    enable_boundary_control = Param(False, structural=True, doc="Turn back at a boundary.")
+    generate_entities = Param(False, structural=True, doc="Every 2 s ask for a new entity 10 m to the left, turned left by 90 degrees.")
+    template = Param("gen_straight", doc="Block of the new entities.")
+    goal = State("x y z", unit="m", doc="Point far ahead.")
+    is_fenced = State(dtype=bool, doc="Whether it has heard of a boundary.")
+    fence = Handle(doc="The boundary last heard of.")
+    fences = Subscribe(BoundaryShape)
+    births = Publish(SpawnEntity)
+    desired_altitude = Output(unit="m")
+    desired_speed = Output(unit="m/s")
+    desired_heading = Output(unit="rad")
+
+    def spawn(self, g: GroupView, rows: np.ndarray) -> None:
+        self.goal[:, rows] = g.pos[:, rows] + AHEAD * g.forward[:, rows]
+        self.goal[2, rows] = g.pos[2, rows]
+
+    def step(self, g: GroupView) -> None:
+        if self.enable_boundary_control:
+            self._turn_back(g)
+        direction = unit(self.goal - g.pos)
+        self.desired_altitude[:] = self.goal[2]
+        self.desired_speed[:] = self.speed
+        self.desired_heading[:] = atan2(direction[1], direction[0])
+        if self.generate_entities:
+            self._ask_for_another(g)
+
+    def _turn_back(self, g: GroupView) -> None:
+        if self.fences:
+            rows, heard = self.fences.latest()
+            for row, shape in zip(rows, heard.shape, strict=True):
+                self.fence[row] = shape
+                self.is_fenced[row] = True
+        for row in np.flatnonzero(self.is_fenced):
+            shape: Any = self.fence[row]
+            pos = g.pos[:, row : row + 1]
+            if not shape.contains(pos)[0]:
+                centre = np.array([[shape.center[0]], [shape.center[1]], [pos[2, 0]]])
+                self.goal[:2, row : row + 1] = (pos + AHEAD * unit(centre - pos))[:2]
+
+    def _ask_for_another(self, g: GroupView) -> None:
+        every = max(1, round(SPAWN_PERIOD / g.dt))
+        rows = np.flatnonzero((g.step_count > 0) & (g.step_count % every == 0))
+        if len(rows):
+            east, north, _ = g.forward[:, rows]
+            left = np.array([-north, east, np.zeros(len(rows))])
+            yaw = atan2(left[1], left[0])
+            level = np.zeros(len(rows))
+            self.births.publish(
+                rows, block=[self.template] * len(rows), pos=g.pos[:, rows] + 10.0 * left,
+                vel=self.speed[rows] * left, quat=quat_from_euler(level, level, yaw),
+            )  # fmt: skip
+
+    def save_one(self, handle: Any) -> Any:
+        return handle
+
+    def load_one(self, row: Any, state: Any) -> Any:
+        return state

@@ -1,0 +1,1 @@
+"""The interaction plugins that ship, a folder each."""

@@ -1,0 +1,55 @@
+"""A region and who crosses its edge."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tussle.api import Interaction, Param, State, WorldView, service
+from tussle.messages import BoundaryCrossed, BoundaryShape
+from tussle.scene import Cuboid, Plane, Sphere
+
+
+class Boundary(Interaction):
+    """A cuboid, sphere or half-space that tells its shape once (`BoundaryShape`), and who enters or leaves it (`BoundaryCrossed`).
+
+    Rotation is honoured; the historic one ignored it.
+    """
+
+    grade = "portable"
+
+    boundary_id = Param(0, structural=True, doc="Number that others know it by.")
+    team = Param(0, structural=True, doc="Team that it belongs to.")
+    shape = Param("cuboid", choices=("cuboid", "sphere", "plane"), doc="Kind of region.")
+    center = Param((0.0, 0.0, 0.0), fields="x y z", unit="m", structural=True, doc="Centre; of a plane, a point on it.")
+    lengths = Param((10.0, 10.0, 10.0), fields="x y z", unit="m", gt=0.0, structural=True, doc="Edges of a cuboid.")
+    rpy = Param((0.0, 0.0, 0.0), fields="roll pitch yaw", unit="rad", structural=True, doc="Its attitude.")
+    radius = Param(500.0, unit="m", gt=0.0, structural=True, doc="Of a sphere.")
+    normal = Param((0.0, 0.0, 1.0), fields="x y z", structural=True, doc="Of a plane; points to the outside.")
+    was_inside = State(dtype=bool, per="entity", doc="Whether an entity was inside at the end of the last step.")
+    is_known = State(dtype=bool, per="entity", doc="Whether it has been looked at before.")
+    is_told = State(dtype=bool, per="world", doc="Whether the shape has been published.")
+
+    def region(self) -> Cuboid | Sphere | Plane:
+        """The region as a shape of the scene."""
+        if self.shape == "sphere":
+            return Sphere(center=self.center, radius=self.radius)
+        if self.shape == "plane":
+            return Plane(point=self.center, normal=self.normal)
+        return Cuboid(center=self.center, lengths=self.lengths, rpy=self.rpy)
+
+    def step(self, w: WorldView) -> None:
+        fresh = np.flatnonzero(~self.is_told & (np.bincount(w.world, minlength=w.n_worlds) > 0))
+        if len(fresh):
+            w.publish(BoundaryShape, fresh, boundary=self.boundary_id, team=self.team, shape=self.region())
+            self.is_told[fresh] = True
+        inside = self.region().contains(w.pos)
+        rows = np.flatnonzero(self.is_known & (inside != self.was_inside))
+        if len(rows):
+            w.publish(BoundaryCrossed, w.world[rows], entity=w.id[rows], boundary=self.boundary_id, inside=inside[rows])
+        self.was_inside[:] = inside
+        self.is_known[:] = True
+
+    @service
+    def is_inside(self, pos: np.ndarray) -> np.ndarray:
+        """Whether points [m], (3, n), lie inside, (n,)."""
+        return np.asarray(self.region().contains(pos))

@@ -1,0 +1,1 @@
+"""The metric plugins that ship, a folder each."""

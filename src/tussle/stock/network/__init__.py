@@ -1,0 +1,1 @@
+"""The network plugins that ship, a folder each."""

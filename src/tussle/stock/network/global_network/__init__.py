@@ -1,0 +1,5 @@
+"""Everybody hears everything."""
+
+from tussle.stock.network.global_network.plugin import GlobalNetwork
+
+__all__ = ["GlobalNetwork"]

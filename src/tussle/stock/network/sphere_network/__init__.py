@@ -1,0 +1,5 @@
+"""Radio with a range."""
+
+from tussle.stock.network.sphere_network.plugin import SphereNetwork
+
+__all__ = ["SphereNetwork"]
