@@ -43,12 +43,12 @@ def requirements(project: dict, *extras: str) -> set[str]:
 
 def third_party(tree: str) -> dict[str, str]:
     """Outside packages that a folder imports, each with one place."""
-    found = {}
+    found: dict[str, str] = {}
+    own = {path.stem for path in python_files(tree)} | {"tussle"}
     for path in python_files(tree):
-        siblings = {other.stem for other in path.parent.glob("*.py")} | {"tussle"}
         for line, name in imported_modules(parsed(path)):
             package = name.split(".")[0]
-            if package not in siblings and package not in sys.stdlib_module_names and package != "None":
+            if package not in own and package not in sys.stdlib_module_names and package != "None":
                 found[package] = f"{relative(path)}:{line}"
     return found
 
