@@ -14,8 +14,7 @@ from tussle.api.kinds import EntityPlugin
 from tussle.columns import Param, State
 from tussle.errors import DeclarationError, ParameterError, listed, nearest_name
 from tussle.numeric.quaternion import quat_from_euler
-from tussle.numeric.fingerprint import uses_libm
-from tussle.numeric.rk4 import compile_derivative, driver
+from tussle.numeric.rk4 import compile_derivative, rk4
 
 BODY_INPUTS = ("force_x", "force_y", "force_z", "torque_x", "torque_y", "torque_z", "mass")
 WRITABLE = ("pos", "vel", "quat", "omega")
@@ -83,13 +82,6 @@ class MotionModel(EntityPlugin):
                         f"{cls.__name__}.derivative has an argument {name!r}{nearest_name(name, allowed)} that is no state, input, "
                         f"parameter or force; {listed(allowed)}"
                     )
-        if "grade" not in cls.__dict__ and cls.derivative is not None and not uses_libm(cls.derivative):
-            cls.grade = "portable" if cls._has_plain_hooks() else "machine"
-
-    @classmethod
-    def _has_plain_hooks(cls) -> bool:
-        return False
-
     @classmethod
     def state(cls) -> State:
         """Declaration of the state vector."""
@@ -130,7 +122,7 @@ class MotionModel(EntityPlugin):
         f = compile_derivative(
             type(self).derivative, list(self.state().fields), [*self.input_channels(), *self.body_inputs()], self._param_names()
         )
-        return lambda x, u, p, dt, substeps: driver(f, x, u, p, dt, substeps)
+        return lambda x, u, p, dt, substeps: rk4(f, x, u, p, dt, substeps)
 
     # -- hooks --------------------------------------------------------------------------------------------------------------
 
