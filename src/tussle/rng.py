@@ -178,9 +178,9 @@ def columns(
     seeds: ArrayLike, index: ArrayLike, step: ArrayLike, substep: int, k: int
 ) -> tuple[NDArray[np.uint64], NDArray[np.int64], NDArray[np.int64]]:
     """Seeds, index and step as arrays of one length, checked: a number beyond its bits would silently be another entity's draw."""
-    words, indices, steps = np.broadcast_arrays(
-        np.atleast_1d(np.asarray(seeds, dtype=np.uint64)), np.asarray(index, dtype=np.int64), np.asarray(step, dtype=np.int64)
-    )
+    words = np.asarray(seeds, dtype=np.uint64)
+    indices, steps = np.asarray(index, dtype=np.int64), np.asarray(step, dtype=np.int64)
+    shape = np.broadcast_shapes((1,), words.shape, indices.shape, steps.shape)
     for name, values in (("index", indices), ("step", steps)):
         if values.size and (values.min() < 0 or values.max() >= MAX_INDEX):
             raise ValueError(f"random numbers: {name} must be in 0 ... {MAX_INDEX - 1}, not {values.min()} ... {values.max()}")
@@ -188,4 +188,8 @@ def columns(
         raise ValueError(f"random numbers: substep must be in 0 ... {MAX_SUBSTEP - 1}, not {substep}")
     if k < 0:
         raise ValueError(f"random numbers: k must not be negative, but is {k}")
-    return np.ascontiguousarray(words), np.ascontiguousarray(indices), np.ascontiguousarray(steps)
+    return (
+        np.ascontiguousarray(np.broadcast_to(words, shape)),
+        np.ascontiguousarray(np.broadcast_to(indices, shape)),
+        np.ascontiguousarray(np.broadcast_to(steps, shape)),
+    )

@@ -10,7 +10,9 @@ from __future__ import annotations
 import builtins
 import dis
 import hashlib
+import os
 import sys
+import sysconfig
 import types
 from collections.abc import Callable, Iterator
 from enum import Enum
@@ -21,6 +23,7 @@ import numpy as np
 
 # Code of these changes only with a version that is part of every key.
 FIXED_PACKAGES = frozenset({"numba", "llvmlite", "numpy", "builtins"}) | sys.stdlib_module_names
+STANDARD_LIBRARY = sysconfig.get_paths()["stdlib"] + os.sep
 
 EXACT = frozenset(
     "sqrt fabs floor ceil trunc copysign isnan isinf isfinite radians degrees gcd lcm fmod remainder modf frexp ldexp "
@@ -88,7 +91,7 @@ class Fingerprint:
             self._visit_other(value)
 
     def _visit_function(self, function: types.FunctionType) -> None:
-        if package(function) in FIXED_PACKAGES and function.__module__ != "__main__":
+        if is_fixed(function):
             self._write("fixed", f"{function.__module__}.{function.__qualname__}")
             self._note_libm(function)
             return
@@ -215,6 +218,15 @@ def has_power(code: types.CodeType) -> bool:
             if instruction.opname != "CACHE":
                 previous = instruction
     return False
+
+
+def is_fixed(function: types.FunctionType) -> bool:
+    """Whether a Python function belongs to a package whose version is in every key."""
+    if package(function) in {"numba", "llvmlite", "numpy"}:
+        return True
+    # By its file and not by its module's name, which a file of the user's may share with one of the standard library.
+    file = function.__code__.co_filename
+    return file.startswith("<frozen ") or (file.startswith(STANDARD_LIBRARY) and "-packages" not in file)
 
 
 def package(value: Any) -> str:

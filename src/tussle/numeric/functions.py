@@ -118,7 +118,10 @@ class Binary(Device):
     def __call__(self, y: Any, x: Any) -> Any:
         if isinstance(y, (float, int)) and isinstance(x, (float, int)):
             return self._one(float(y), float(x))
-        ys, xs = np.broadcast_arrays(np.asarray(y, dtype=np.float64), np.asarray(x, dtype=np.float64))
+        ys, xs = np.asarray(y, dtype=np.float64), np.asarray(x, dtype=np.float64)
+        if ys.shape != xs.shape:
+            shape = np.broadcast_shapes(ys.shape, xs.shape)
+            ys, xs = np.broadcast_to(ys, shape), np.broadcast_to(xs, shape)
         if ys.ndim == 0:
             return self._one(float(ys), float(xs))
         out = np.empty(ys.size)

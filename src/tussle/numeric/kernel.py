@@ -78,7 +78,7 @@ def renamed(function: Any, key: str) -> types.FunctionType:
     """
     copy = types.FunctionType(function.__code__, function.__globals__, function.__name__, function.__defaults__, function.__closure__)
     copy.__kwdefaults__ = function.__kwdefaults__
-    copy.__module__ = function.__module__
+    copy.__module__ = function.__module__ or "generated"  # without a module Numba would drag the globals into the file
     copy.__qualname__ = f"{function.__qualname__}_{key}"
     return copy
 
@@ -164,7 +164,7 @@ class Kernel(Device):
     @property
     def name(self) -> str:
         """Module and qualified name."""
-        return f"{self.__module__}.{self.__qualname__}"
+        return f"{self.__module__ or 'generated'}.{self.__qualname__}"
 
     @property
     def types(self) -> Any:

@@ -1,0 +1,373 @@
+"""Kernels: signatures and messages, what a key sees, what is kept on disk and when it is used."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tussle.numeric import store
+from tussle.numeric.fingerprint import Fingerprint, uses_libm
+from tussle.numeric.kernel import device, kernel, stats
+
+GAIN = 2.0
+
+
+@device
+def scaled(x):
+    return GAIN * x
+
+
+@kernel("F f8 Fw")
+def scale_rows(x, offset, out):
+    for i in range(x.shape[0]):
+        out[i] = scaled(x[i]) + offset
+
+
+@kernel("F2 I B U i8 b1 u8 -> f8 i8")
+def all_codes(table, integers, flags, words, n, flag, word):
+    total = table[1, 0] + integers[0] + n
+    return total + (1.0 if flags[0] and flag else 0.0), np.int64(words[0] + word)
+
+
+@pytest.fixture
+def own_cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("TUSSLE_CACHE_DIR", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+def test_kernel_computes_in_place():
+    out = np.empty(3)
+    scale_rows(np.array([1.0, 2.0, 3.0]), 10, out)
+    np.testing.assert_array_equal(out, [12.0, 14.0, 16.0])
+
+
+def test_results_follow_the_arrow():
+    arguments = (np.array([[0.0], [2.0]]), np.array([3]), np.array([True]), np.array([5], np.uint64), 4, True, 6)
+    assert all_codes(*arguments) == (10.0, 11)
+
+
+def test_read_only_array_is_taken_where_the_code_reads():
+    x = np.ones(2)
+    x.flags.writeable = False
+    out = np.empty(2)
+    scale_rows(x, 0.0, out)
+    assert (out == 2.0).all()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((np.ones(2), 0.0, 3), "argument 'out' must be a writable 1-D contiguous float64 array, not int 3"),
+        ((np.ones(2, int), 0.0, np.ones(2)), "'x' must be a 1-D contiguous float64 array, not a int64 array of shape"),
+        ((np.ones(4)[::2], 0.0, np.ones(2)), "'x' must be a 1-D contiguous float64 array, not a non-contiguous float64 array"),
+        ((np.ones((1, 2)), 0.0, np.ones(2)), r"'x' must be .*, not a float64 array of shape \(1, 2\)"),
+        ((np.ones(2), "a", np.ones(2)), "'offset' must be a number, not str 'a'"),
+        ((np.ones(2), 0.0, np.broadcast_to(1.0, 2)), "'out' must be a writable .*, not a read-only"),
+    ],
+)
+def test_wrong_argument_is_named_with_what_is_expected(arguments, message):
+    with pytest.raises(TypeError, match=f"kernel .*test_kernel.scale_rows: .*{message}"):
+        scale_rows(*arguments)
+
+
+def test_fraction_is_not_cut_to_an_integer():
+    arguments = (np.ones((2, 1)), np.ones(1, int), np.array([True]), np.ones(1, np.uint64), 2.5, True, 6)
+    with pytest.raises(TypeError, match="'n' must be an integer, not float 2.5"):
+        all_codes(*arguments)
+
+
+def test_wrong_number_of_arguments():
+    with pytest.raises(TypeError, match="expected 3, got 1"):
+        scale_rows(np.ones(2))
+
+
+@pytest.mark.parametrize(("signature", "message"), [("F Q Fw", "unknown code"), ("F Fw", "has 3 arguments"), ("F f8 Fw ->", "code")])
+def test_unsound_signature_is_refused_where_it_stands(signature, message):
+    with pytest.raises(ValueError, match=f"scale_rows.*{message}"):
+        kernel(signature)(scale_rows.py_func)
+
+
+def test_kernel_calls_kernel():
+    @kernel("F Fw")
+    def twice(x, out):
+        scale_rows(x, 1.0, out)
+        scale_rows(out, 1.0, out)
+
+    out = np.empty(2)
+    twice(np.ones(2), out)
+    assert (out == 7.0).all()
+
+
+def test_kernel_is_pickled_by_name():
+    assert pickle.loads(pickle.dumps(scale_rows)) is scale_rows
+
+
+def test_second_call_neither_compiles_nor_loads():
+    scale_rows(np.ones(2), 0.0, np.empty(2))
+    before = (stats.compiled, stats.loaded)
+    scale_rows(np.ones(5), 1, np.empty(5))
+    assert (stats.compiled, stats.loaded) == before
+
+
+def test_threads_that_call_first_compile_once(own_cache):
+    @kernel("F Fw")
+    def fresh(x, out):
+        out[0] = x[0] + 41.0
+
+    def call(_):
+        out = np.empty(1)
+        fresh(np.ones(1), out)
+        return out[0]
+
+    before = stats.compiled
+    with ThreadPoolExecutor(4) as pool:
+        assert set(pool.map(call, range(8))) == {42.0}
+    assert stats.compiled == before + 1
+
+
+# What the key sees ------------------------------------------------------------------------------------------------------------------------
+
+
+def key_of(source: str, name: str = "f", **scope: object) -> str:
+    exec(compile(source, "<test>", "exec"), scope)
+    return Fingerprint(scope[name]).digest
+
+
+BASE = "K = 3.0\ndef g(x):\n    return x * K\ndef f(x):\n    return g(x) + 1.0\n"
+
+
+def test_lines_comments_and_wording_of_docstrings_change_no_key():
+    assert key_of("# a comment\n\n" + BASE) == key_of(BASE)
+    assert key_of(BASE.replace("def f(x):", "def f(x):\n    # why\n")) == key_of(BASE)
+    documented = [BASE.replace("def g(x):", f'def g(x):\n    "{text}"') for text in ("Doc.", "Another.")]
+    assert key_of(documented[0]) == key_of(documented[1])
+
+
+def test_every_change_that_counts_changes_the_key():
+    sources = [
+        BASE,
+        BASE.replace("3.0", "3.5"),
+        BASE.replace("K = 3.0", "K = 3"),
+        BASE.replace("x * K", "x / K"),
+        BASE.replace("+ 1.0", "+ 2.0"),
+        BASE.replace("return g(x)", "return [g(y) for y in (x, 2.0)][1]"),
+        BASE.replace("return g(x)", "return [g(y) for y in (x, 3.0)][1]"),
+        BASE.replace("def g(x)", "def g(x, y=1.0)"),
+        BASE.replace("def g(x)", "def g(x, y=2.0)"),
+        BASE.replace("def g(x)", "def g(x, *, y=2.0)"),
+    ]
+    assert len({key_of(source) for source in sources}) == len(sources)
+
+
+def test_frozen_arrays_tuples_and_closures_count():
+    source = "def f(i):\n    return K[i]\n"
+    arrays = [np.arange(3.0), np.arange(3), np.array([0.0, 1.0, 2.5]), (0.0, 1.0), (0.0, 1), (0.0, (1.0,)), np.float64(1.0)]
+    keys = [key_of(source, K=value) for value in arrays]
+    assert len(set(keys)) == len(keys)
+    closing = "def make(k):\n    def f(x):\n        return x + k\n    return f\nf = make(%s)\n"
+    assert key_of(closing % 1.0) != key_of(closing % 2.0)
+
+
+def test_module_attributes_count_for_each_function_that_reads_them():
+    import types
+
+    library = types.ModuleType("library")
+    library.a, library.b = 1.0, 1.0
+    source = "def g(x):\n    return x * m.a\ndef f(x):\n    return g(x) + m.b\n"
+    first = key_of(source, m=library)
+    library.b = 2.0
+    second = key_of(source, m=library)
+    library.a = 2.0
+    assert len({first, second, key_of(source, m=library)}) == 3
+
+
+def test_recursion_and_cycles_end():
+    assert key_of("def g(x):\n    return f(x)\ndef f(x):\n    return g(x)\n")
+
+
+def test_jitted_meaning_of_an_overloaded_function_counts():
+    from numba.extending import overload
+
+    def plain(x):
+        return x
+
+    def user(x):
+        return plain(x)
+
+    before = Fingerprint(user).digest
+
+    @overload(plain)
+    def meaning(x):
+        return lambda x: x + 1.0
+
+    assert Fingerprint(user).digest != before
+
+
+def test_object_that_cannot_be_described_is_reported():
+    class Strange:
+        pass
+
+    strange = Strange()
+
+    def f(x):
+        return x if strange else 0.0
+
+    assert Fingerprint(f).opaque and not Fingerprint(scaled.py_func).opaque
+
+
+def test_libm_is_found_through_callees():
+    import math
+
+    def sine(x):
+        return math.sin(x)
+
+    def caller(x):
+        return sine(x) + math.sqrt(x)
+
+    assert uses_libm(caller) and uses_libm(device(caller)) and uses_libm(lambda x: np.exp(x)) and uses_libm(lambda x, y: x**y)
+    assert not uses_libm(scaled) and not uses_libm(lambda x: x**2 + math.sqrt(x) + np.floor(x) + math.pi)
+
+
+def test_global_redefined_at_the_prompt_is_seen_by_new_kernels(own_cache):
+    scope: dict = {"device": device, "kernel": kernel, "K": 1.0}
+    exec("@device\ndef g(x):\n    return x + K\n", scope)
+    define = "@kernel('f8 -> f8')\ndef f(x):\n    return g(x)\n"
+    exec(define, scope)
+    assert scope["f"](1.0) == 2.0
+    scope["K"] = 10.0
+    exec(define, scope)
+    assert scope["f"](1.0) == 11.0
+
+
+# Files --------------------------------------------------------------------------------------------------------------------------------
+
+
+def test_damaged_file_is_compiled_anew(own_cache):
+    kernel("F f8 Fw")(scale_rows.py_func)(np.ones(1), 0.0, np.empty(1))
+    (path,) = own_cache.glob("*.kernel")
+    content = path.read_bytes()
+    path.write_bytes(content[:-9])
+    before = stats.compiled
+    kernel("F f8 Fw")(scale_rows.py_func)(np.ones(1), 0.0, np.empty(1))
+    assert stats.compiled == before + 1
+    assert len(path.read_bytes()) == len(content)
+
+
+def test_directory_that_cannot_be_written_warns_once_and_works(tmp_path, monkeypatch):
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("TUSSLE_CACHE_DIR", str(tmp_path / "file" / "cache"))
+    with pytest.warns(RuntimeWarning, match="cannot be kept in .*TUSSLE_CACHE_DIR") as caught:
+        for _ in range(2):
+            out = np.empty(1)
+            kernel("F f8 Fw")(scale_rows.py_func)(np.ones(1), 1.0, out)
+            assert out[0] == 3.0
+    assert len(caught) == 1
+
+
+def test_old_files_of_one_name_are_removed_and_others_stay(own_cache):
+    for i in range(store.KEEP + 3):
+        store.save("module.law", f"{i:032x}", b"data")
+        os.utime(own_cache / f"module.law-{i:032x}.kernel", (i, i))
+    store.save("module.law_of_another", f"{0:032x}", b"data")
+    names = sorted(path.name for path in own_cache.iterdir())
+    assert len(names) == store.KEEP + 1
+    assert f"module.law-{store.KEEP + 2:032x}.kernel" in names and f"module.law-{0:032x}.kernel" not in names
+
+
+def test_folder_is_chosen_by_the_environment(monkeypatch, tmp_path):
+    monkeypatch.setenv("TUSSLE_CACHE_DIR", str(tmp_path / "a"))
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "b"))
+    assert store.directory() == tmp_path / "a"
+    monkeypatch.delenv("TUSSLE_CACHE_DIR")
+    assert store.directory() == tmp_path / "b" / "tussle"
+    monkeypatch.delenv("NUMBA_CACHE_DIR")
+    assert "tussle" in str(store.directory()) and store.directory().is_absolute()
+
+
+# Across processes -------------------------------------------------------------------------------------------------------------------------
+
+FILES = {
+    "constants.py": "GRAVITY = 9.0\n",
+    "deep.py": "from tussle.numeric.kernel import device\nimport constants\n@device\ndef deep(x):\n    return x + constants.GRAVITY\n",
+    "shallow.py": "from tussle.numeric.kernel import device\nfrom deep import deep\n@device\ndef shallow(x):\n    return deep(x) * 2.0\n",
+    "law.py": (
+        "from tussle.numeric.kernel import kernel\nimport shallow\nfrom tussle.numeric import sin\n"
+        "@kernel('f8 -> f8')\ndef law(x):\n    return shallow.shallow(x) + 0.0 * sin(x)\n"
+        "@kernel('f8 -> f8')\ndef other(x):\n    return x + 0.5\n"
+        "def make(k):\n    @kernel('f8 -> f8')\n    def made(x):\n        return x * k\n    return made\n"
+        "scope = {'sin': sin}\nexec('def wrapper(x):\\n    return sin(x) * 0.0 + 7.0', scope)\ngenerated = kernel('f8 -> f8')(scope['wrapper'])\n"
+    ),
+}
+PROGRAM = (
+    "import law, sys\nfrom tussle.numeric.kernel import stats\n"
+    "print(law.law(1.0), law.other(1.0), law.make(2.0)(1.0), law.make(3.0)(1.0), law.generated(1.0), stats.compiled, stats.loaded)"
+)
+
+
+@pytest.fixture
+def project(tmp_path):
+    """A user's own folder of modules, and a function that runs them in a fresh process."""
+    for name, text in FILES.items():
+        (tmp_path / name).write_text(text)
+
+    def run(program: str = PROGRAM) -> list[float]:
+        source = str(Path(store.__file__).parents[2])
+        env = dict(os.environ, PYTHONPATH=f"{tmp_path}:{source}", PYTHONDONTWRITEBYTECODE="1", TUSSLE_CACHE_DIR=str(tmp_path / "cache"))
+        done = subprocess.run([sys.executable, "-W", "error", "-c", program], env=env, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        return [float(word) for word in done.stdout.split()]
+
+    run.start = lambda: subprocess.Popen(  # type: ignore[attr-defined]
+        [sys.executable, "-W", "error", "-c", PROGRAM],
+        env=dict(
+            os.environ,
+            PYTHONPATH=f"{tmp_path}:{Path(store.__file__).parents[2]}",
+            PYTHONDONTWRITEBYTECODE="1",
+            TUSSLE_CACHE_DIR=str(tmp_path / "cache"),
+        ),
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    run.edit = lambda name, old, new: (tmp_path / name).write_text((tmp_path / name).read_text().replace(old, new))  # type: ignore[attr-defined]
+    return run
+
+
+def test_edits_are_seen_and_only_what_changed_compiles(project):
+    assert project() == [20.0, 1.5, 2.0, 3.0, 7.0, 5, 0]
+    assert project() == [20.0, 1.5, 2.0, 3.0, 7.0, 0, 5]
+    project.edit("constants.py", "9.0", "99.0")  # an imported constant
+    assert project() == [200.0, 1.5, 2.0, 3.0, 7.0, 1, 4]
+    project.edit("shallow.py", "2.0", "3.0")  # a callee
+    assert project() == [300.0, 1.5, 2.0, 3.0, 7.0, 1, 4]
+    project.edit("deep.py", "x +", "x -")  # a callee's callee
+    assert project() == [-294.0, 1.5, 2.0, 3.0, 7.0, 1, 4]
+    project.edit("law.py", "x + 0.5", "x + 0.25")  # the other kernel itself
+    assert project() == [-294.0, 1.25, 2.0, 3.0, 7.0, 1, 4]
+    project.edit("deep.py", "@device", "# A comment moves the lines.\n@device")
+    assert project() == [-294.0, 1.25, 2.0, 3.0, 7.0, 0, 5]
+    project.edit("constants.py", "99.0", "9.0")
+    project.edit("shallow.py", "3.0", "2.0")
+    project.edit("deep.py", "x -", "x +")  # all as at first: that file is still there
+    assert project() == [20.0, 1.25, 2.0, 3.0, 7.0, 0, 5]
+
+
+def test_processes_may_fill_the_cache_at_once(project):
+    running = [project.start() for _ in range(3)]
+    outputs = [process.communicate()[0].split() for process in running]
+    assert [process.returncode for process in running] == [0, 0, 0]
+    assert {tuple(words[:5]) for words in outputs} == {("20.0", "1.5", "2.0", "3.0", "7.0")}
+    assert project() == [20.0, 1.5, 2.0, 3.0, 7.0, 0, 5]
+
+
+def test_same_names_from_files_of_different_processes_do_not_meet(project):
+    # Each process counts its functions from 1, so both files hold symbols made of the same name and number.
+    assert project("import law\nprint(law.make(2.0)(1.0))") == [2.0]
+    assert project("import law\nprint(law.make(3.0)(1.0))") == [3.0]
+    assert project("import law\nprint(law.make(3.0)(1.0), law.make(2.0)(1.0))") == [3.0, 2.0]

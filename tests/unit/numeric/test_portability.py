@@ -1,0 +1,101 @@
+"""The same bits under every instruction set that this machine can play, and no call into the machine's mathematical library."""
+
+from __future__ import annotations
+
+import gc
+import importlib
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
+
+import tussle
+from tussle.numeric.kernel import Kernel, kernel
+from tussle.numeric.rk4 import driver
+
+PROGRAM = Path(__file__).with_name("portable_values.py")
+PACKAGE = Path(tussle.__file__).parent
+DISABLED = " ".join(name for name in __cpu_dispatch__ if __cpu_features__.get(name))
+SETTINGS = {
+    "numpy": {"NPY_DISABLE_CPU_FEATURES": DISABLED},
+    "x86-64-v2": {"NUMBA_CPU_NAME": "x86-64-v2", "NUMBA_CPU_FEATURES": ""},
+    "x86-64-v3": {"NUMBA_CPU_NAME": "x86-64-v3", "NUMBA_CPU_FEATURES": ""},
+    "glibc": {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA"},
+    "unoptimised": {"NUMBA_OPT": "0"},
+}
+
+
+def hash_under(settings: dict[str, str], folder: Path) -> str:
+    env = dict(os.environ, PYTHONPATH=str(PACKAGE.parent), TUSSLE_CACHE_DIR=str(folder), **settings)
+    done = subprocess.run([sys.executable, "-W", "error", PROGRAM], env=env, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip()
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory):
+    return hash_under({}, tmp_path_factory.mktemp("plain"))
+
+
+@pytest.mark.skipif(os.uname().machine != "x86_64", reason="the settings name x86-64 processors")
+@pytest.mark.parametrize("name", SETTINGS)
+def test_all_instruction_sets_give_the_same_bits(name, plain, tmp_path):
+    assert len(plain) == 32
+    assert hash_under(SETTINGS[name], tmp_path) == plain
+
+
+# Assembly ---------------------------------------------------------------------------------------------------------------------------------
+
+LIBM = (
+    "sin cos tan sincos asin acos atan atan2 sinh cosh tanh asinh acosh atanh exp exp2 exp10 expm1 log log2 log10 log1p pow hypot cbrt "
+    "erf erfc tgamma lgamma fma powi __powidf2 ldexp"
+).split()
+CALL = re.compile(r"(?<![\w.])(_?(?:__svml_|_ZGV\w+_|numba_|npy_)?(?:%s)f?\d?)(?:@PLT|@GOTPCREL)?(?![\w.])" % "|".join(LIBM))
+FUSED = re.compile(r"\bv?fn?m(?:add|sub)\w*", re.IGNORECASE)
+
+
+def suspicious(assembly: str) -> set[str]:
+    """Calls of the mathematical library and fused multiply-adds in assembly text."""
+    code = [line for line in assembly.splitlines() if line.startswith("\t") and not line.startswith(("\t.ascii", "\t.asciz", "\t.section", "\t.file"))]
+    return {match.group(0) for line in code for match in (CALL.search(line), FUSED.search(line)) if match}
+
+
+def kernel_modules() -> list[str]:
+    """Modules of the package whose text declares kernels."""
+    found = []
+    for path in sorted(PACKAGE.rglob("*.py")):
+        if "@kernel(" in path.read_text() and path.name not in ("kernel.py", "rk4.py"):
+            found.append(".".join(("tussle", *path.relative_to(PACKAGE).with_suffix("").parts)).removesuffix(".__init__"))
+    return found
+
+
+def kernels_of(module: str) -> list[Kernel]:
+    """All kernels that exist after the module is imported and that are its own; generated ones too."""
+    loaded = importlib.import_module(module)
+    own = [value for value in gc.get_objects() if isinstance(value, Kernel) and value.py_func.__globals__ is vars(loaded)]
+    assert own
+    return own
+
+
+@pytest.mark.parametrize("module", kernel_modules())
+def test_no_kernel_of_the_package_calls_the_mathematical_library(module):
+    for each in kernels_of(module):
+        assert not suspicious(each.assembly()), each.name
+
+
+def test_nor_does_the_integrator():
+    assert not suspicious(driver().assembly())
+
+
+@pytest.mark.parametrize("expression", ["math.sin(x)", "math.exp(x)", "x**1.7", "math.atan2(x, 2.0)", "np.log(x)", "math.hypot(x, 1.0)"])
+def test_the_reading_of_assembly_finds_such_calls(expression):
+    import math
+
+    scope = {"math": math, "np": np}
+    exec(f"def f(x):\n    return {expression}\n", scope)
+    assert suspicious(kernel("f8 -> f8")(scope["f"]).assembly())
