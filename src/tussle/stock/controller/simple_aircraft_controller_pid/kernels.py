@@ -14,7 +14,7 @@ BLOCK = 128  # rows
 
 
 @kernel("F F F F F F F F b1 b1 F2 F2 F2 F2w f8 Fw Fw Fw")
-def steer(  # type: ignore[no-untyped-def]
+def steer(
     lateral, vertical, speed, z, vx, vy, vz, angle, use_roll, use_glide_slope,
     heading_gains, altitude_gains, speed_gains, memory, dt,
     throttle, roll_rate, pitch_rate,
@@ -31,7 +31,8 @@ def steer(  # type: ignore[no-untyped-def]
         use_roll: Whether the lateral loop holds a bank.
         use_glide_slope: Whether the vertical loop holds a slope.
         heading_gains, altitude_gains, speed_gains: kp, ki, kd, band, (4, n).
-        memory: Integral and last error of the lateral, vertical and speed loop; 1.0 once there is a last error, (7, n), updated in place.
+        memory: Integral and last error of the lateral, vertical and speed loop; 1.0 once there is a last error, (7,
+            n), updated in place.
         dt: Time since the last call [s].
         throttle: Command [-], (n,), written.
         roll_rate: Command [rad/s], positive banks into a left turn, (n,), written.
@@ -74,5 +75,7 @@ def steer(  # type: ignore[no-untyped-def]
             kp, ki, kd, band = gains[0], gains[1], gains[2], gains[3]
             for l in range(m):
                 i = first + l
-                command, integral[i] = pid(error[k, l], change[k, l], dt, kp[i], ki[i], kd[i], band[i], integral[i])
+                command, integral[i] = pid(
+                    error[k, l], change[k, l], dt, kp[i], ki[i], kd[i], band[i], integral[i]
+                )
                 out[i] = sign * command

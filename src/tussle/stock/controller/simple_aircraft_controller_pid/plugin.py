@@ -13,13 +13,15 @@ GAINS = "kp ki kd band"
 class SimpleAircraftControllerPID(Controller):
     """Flies a SimpleAircraft to a heading (or bank), an altitude (or slope of descent) and a speed, with one PID loop each.
 
-    The heading error drives the rate of the bank, so that loop is of third order and lives by its derivative gain. A PID's integral is
-    emptied while its error exceeds `band`. desired_roll is right wing down, desired_glide_slope positive downwards.
+    The heading error drives the rate of the bank, so that loop is of third order and lives by its derivative gain. A
+    PID's integral is emptied while its error exceeds `band`. desired_roll is right wing down, desired_glide_slope
+    positive downwards.
 
-    Other than in the existing system, a positive pitch_rate raises the nose, the measured slope is that of the true velocity (whose z
-    had the wrong sign there, so the loops act as before); each loop's time step is that of the call (there, the full step even when called
-    once per substep); the first call has no derivative kick, which there banked every aircraft at its largest rate at the start; and
-    the derivative of the heading error does not jump where the error passes from +pi to -pi.
+    Other than in the existing system, a positive pitch_rate raises the nose, the measured slope is that of the true
+    velocity (whose z had the wrong sign there, so the loops act as before); each loop's time step is that of the call
+    (there, the full step even when called once per substep); the first call has no derivative kick, which there
+    banked every aircraft at its largest rate at the start; and the derivative of the heading error does not jump
+    where the error passes from +pi to -pi.
     """
 
     grade = "portable"
@@ -32,10 +34,14 @@ class SimpleAircraftControllerPID(Controller):
         text_unit="1/s 1/s^2 1 deg",
         doc="Heading (or bank) to roll rate.",
     )
-    alt_pid = Param((1.0, 0.0, 0.8, 1.0), fields=GAINS, doc="Altitude [m] (or slope [rad]) to pitch rate [rad/s].")
+    alt_pid = Param(
+        (1.0, 0.0, 0.8, 1.0), fields=GAINS, doc="Altitude [m] (or slope [rad]) to pitch rate [rad/s]."
+    )
     vel_pid = Param((1.0, 0.1, 0.0, 1.0), fields=GAINS, unit="s/m 1/m s^2/m m/s", doc="Speed to throttle.")
     use_roll = Param(False, structural=True, doc="Hold desired_roll instead of desired_heading.")
-    use_glide_slope = Param(False, structural=True, doc="Hold desired_glide_slope instead of desired_altitude.")
+    use_glide_slope = Param(
+        False, structural=True, doc="Hold desired_glide_slope instead of desired_altitude."
+    )
     desired_heading = Input(unit="rad", doc="Wanted heading, counter-clockwise from East.")
     desired_roll = Input(unit="rad", doc="Wanted bank, right wing down, with use_roll.")
     desired_altitude = Input(unit="m", doc="Wanted height above the origin's tangent plane.")

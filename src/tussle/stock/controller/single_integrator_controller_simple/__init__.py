@@ -1,5 +1,7 @@
 """SingleIntegratorControllerSimple: a wanted velocity handed through."""
 
-from tussle.stock.controller.single_integrator_controller_simple.plugin import SingleIntegratorControllerSimple
+from tussle.stock.controller.single_integrator_controller_simple.plugin import (
+    SingleIntegratorControllerSimple,
+)
 
 __all__ = ["SingleIntegratorControllerSimple"]

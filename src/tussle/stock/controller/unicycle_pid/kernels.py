@@ -14,7 +14,7 @@ BLOCK = 128  # rows
 
 
 @kernel("F F F F F F F F F F F2 F2 F2 F2 F2w f8 Fw Fw Fw Fw Fw")
-def steer(  # type: ignore[no-untyped-def]
+def steer(
     altitude, speed, heading, z, vx, vy, vz, yaw, climb, roll,
     heading_gains, pitch_gains, roll_gains, speed_gains, memory, dt,
     out_speed, acceleration, turn_rate, pitch_rate, roll_rate,
@@ -27,7 +27,8 @@ def steer(  # type: ignore[no-untyped-def]
         vx, vy, vz: Velocity [m/s], (n,), world frame.
         yaw, climb, roll: Heading, elevation (nose up), bank (right wing down) [rad], (n,).
         heading_gains, pitch_gains, roll_gains, speed_gains: kp, ki, kd, band, (4, n).
-        memory: Integral and last error of heading, pitch, roll, speed; 1.0 once there is a last error, (9, n), updated in place.
+        memory: Integral and last error of heading, pitch, roll, speed; 1.0 once there is a last error, (9, n),
+            updated in place.
         dt: Time since the last call [s].
         out_speed: The wanted speed, handed through [m/s], (n,), written.
         acceleration: Command of the speed loop [m/s^2], (n,), written.
@@ -64,11 +65,15 @@ def steer(  # type: ignore[no-untyped-def]
             change[2, l] = wrap(change[2, l])
             seen[first + l] = 1.0
         for k in range(4):
-            gains = heading_gains if k == 0 else pitch_gains if k == 1 else roll_gains if k == 2 else speed_gains
+            gains = (
+                heading_gains if k == 0 else pitch_gains if k == 1 else roll_gains if k == 2 else speed_gains
+            )
             out = turn_rate if k == 0 else pitch_rate if k == 1 else roll_rate if k == 2 else acceleration
             integral = memory[2 * k]
             kp, ki, kd, band = gains[0], gains[1], gains[2], gains[3]
             for l in range(m):
                 i = first + l
-                out[i], integral[i] = pid(error[k, l], change[k, l], dt, kp[i], ki[i], kd[i], band[i], integral[i])
+                out[i], integral[i] = pid(
+                    error[k, l], change[k, l], dt, kp[i], ki[i], kd[i], band[i], integral[i]
+                )
     out_speed[:] = speed

@@ -13,24 +13,37 @@ GAINS = "kp ki kd band"
 class UnicyclePID(Controller):
     """Flies a unicycle to a heading, an altitude and a speed, with one PID loop each for heading, elevation, bank and speed.
 
-    The wanted elevation is that of the direction (speed forwards, altitude error upwards); for a vehicle that flies backwards it is the
-    other way up. Speed is handed through, and as `acceleration_x` for models that take one comes from the speed loop. A PID's integral is
-    emptied while its error exceeds `band`.
+    The wanted elevation is that of the direction (speed forwards, altitude error upwards); for a vehicle that flies
+    backwards it is the other way up. Speed is handed through, and as `acceleration_x` for models that take one comes
+    from the speed loop. A PID's integral is emptied while its error exceeds `band`.
 
-    Other than in the existing system, elevation is nose up and a positive pitch_rate raises the nose; each loop's time step is that of
-    the call (there, the full step even when called once per substep); the first call has no derivative kick; and the derivative of an
-    angle's error does not jump where the error passes from +pi to -pi.
+    Other than in the existing system, elevation is nose up and a positive pitch_rate raises the nose; each loop's
+    time step is that of the call (there, the full step even when called once per substep); the first call has no
+    derivative kick; and the derivative of an angle's error does not jump where the error passes from +pi to -pi.
     """
 
     grade = "portable"
     atomic = True
 
     heading_pid = Param(
-        (1.0, 0.1, 0.1, math.radians(45.0)), fields=GAINS, unit="1/s 1/s^2 1 rad", text_unit="1/s 1/s^2 1 deg", doc="Heading to turn rate."
+        (1.0, 0.1, 0.1, math.radians(45.0)),
+        fields=GAINS,
+        unit="1/s 1/s^2 1 rad",
+        text_unit="1/s 1/s^2 1 deg",
+        doc="Heading to turn rate.",
     )
-    pitch_pid = Param((1.0, 0.0, 0.0, 10.0), fields=GAINS, unit="1/s 1/s^2 1 rad", doc="Elevation to pitch rate.")
-    roll_pid = Param((1.0, 0.0, 0.0, 10.0), fields=GAINS, unit="1/s 1/s^2 1 rad", doc="Bank to roll rate; levels the wings.")
-    speed_pid = Param((1.0, 0.1, 0.03, 10.0), fields=GAINS, unit="1/s 1/s^2 1 m/s", doc="Speed to acceleration_x.")
+    pitch_pid = Param(
+        (1.0, 0.0, 0.0, 10.0), fields=GAINS, unit="1/s 1/s^2 1 rad", doc="Elevation to pitch rate."
+    )
+    roll_pid = Param(
+        (1.0, 0.0, 0.0, 10.0),
+        fields=GAINS,
+        unit="1/s 1/s^2 1 rad",
+        doc="Bank to roll rate; levels the wings.",
+    )
+    speed_pid = Param(
+        (1.0, 0.1, 0.03, 10.0), fields=GAINS, unit="1/s 1/s^2 1 m/s", doc="Speed to acceleration_x."
+    )
     desired_altitude = Input(unit="m", doc="Wanted height above the origin's tangent plane.")
     desired_speed = Input(unit="m/s", doc="Wanted speed.")
     desired_heading = Input(unit="rad", doc="Wanted heading, counter-clockwise from East.")

@@ -1,8 +1,9 @@
 """SimpleAircraft kernels: RK4 with what repeats left out, and the state made public.
 
-Roll, pitch and speed have constant rates in a substep, so RK4's second and third stage see the same bank, elevation and speed, and the
-last stage of one substep is the first of the next. Eight sine-cosine pairs a substep remain of sixteen. Rows go through scratch arrays in
-blocks, with the substeps outside the loop over rows, because LLVM vectorises loops over few arrays only.
+Roll, pitch and speed have constant rates in a substep, so RK4's second and third stage see the same bank, elevation
+and speed, and the last stage of one substep is the first of the next. Eight sine-cosine pairs a substep remain of
+sixteen. Rows go through scratch arrays in blocks, with the substeps outside the loop over rows, because LLVM
+vectorises loops over few arrays only.
 """
 
 from __future__ import annotations
@@ -18,19 +19,19 @@ ACCELERATION = 0.2  # m/s^2 per unit of throttle
 
 
 @device
-def hold(value, low, high):  # type: ignore[no-untyped-def]
+def hold(value, low, high):
     """Value held within [low, high]."""
     return min(max(value, low), high)
 
 
 @device
-def turning(sine, cosine, speed, radius, slope, target):  # type: ignore[no-untyped-def]
+def turning(sine, cosine, speed, radius, slope, target):
     """Turn rate [rad/s] at a bank given by its sine and cosine: V tan(roll) / (radius + slope (V - target))."""
     return speed * sine / (cosine * (radius + slope * (speed - target)))
 
 
 @device
-def state_equation(roll, pitch, yaw, speed, throttle, roll_rate, pitch_rate, radius, slope, target):  # type: ignore[no-untyped-def]
+def state_equation(roll, pitch, yaw, speed, throttle, roll_rate, pitch_rate, radius, slope, target):
     """(x', y', z' [m/s], roll', pitch', yaw' [rad/s], speed' [m/s^2]) away from the limits; what `advance` integrates."""
     sp, cp = sincos(pitch)
     sy, cy = sincos(yaw)
@@ -39,35 +40,44 @@ def state_equation(roll, pitch, yaw, speed, throttle, roll_rate, pitch_rate, rad
     return speed * cp * cy, speed * cp * sy, speed * sp, roll_rate, pitch_rate, turn, pull
 
 
+@device
+def stepped(value, rate, rate_max, h, limit):
+    """Value after h at a rate held within its limit, itself held within [-limit, limit]."""
+    return hold(value + h * hold(rate, -rate_max, rate_max), -limit, limit)
+
+
+@device
+def sincos_rows(angle, sine, cosine, n):
+    """Sine and cosine of the first n angles."""
+    for j in range(n):
+        sine[j], cosine[j] = sincos(angle[j])
+
+
 @kernel("F2w F2 F2 f8 i8")
-def advance(x, u, p, dt, substeps):  # type: ignore[no-untyped-def]
+def advance(x, u, p, dt, substeps):
     """Advance all rows, in place.
 
     A rate that would end the substep beyond a limit of roll, pitch or speed is lowered so that it ends on the limit.
 
     Args:
-        x: x, y, z [m], roll, pitch, yaw [rad], speed [m/s], (7, n), world frame; roll left wing up (turns left), pitch nose up.
+        x: x, y, z [m], roll, pitch, yaw [rad], speed [m/s], (7, n), world frame; positive roll turns left,
+            pitch nose up.
         u: throttle, roll_rate, pitch_rate [rad/s], (3, n).
-        p: turning_radius [m], min_velocity, max_velocity [m/s], max_roll, max_pitch [rad], max_roll_rate, max_pitch_rate [rad/s],
-            speed_target [m/s], radius_slope_per_speed [s], (9, n).
+        p: turning_radius [m], min_velocity, max_velocity [m/s], max_roll, max_pitch [rad], max_roll_rate,
+            max_pitch_rate [rad/s], speed_target [m/s], radius_slope_per_speed [s], (9, n).
         dt: Duration [s].
         substeps: Number of equal RK4 steps in dt.
     """
-    east, north, up, yaw = x[0], x[1], x[2], x[5]
-    roll, pitch, speed = x[3], x[4], x[6]
+    east, north, up, roll, pitch, yaw, speed = x[0], x[1], x[2], x[3], x[4], x[5], x[6]
     h = dt / substeps
-    half_h = 0.5 * h
-    sixth_h = h / 6.0
-    row = np.empty((8, BLOCK))  # sine and cosine of pitch, speed at the beginning; turn rate; speed in the middle and at the end; yaw step
-    angle = np.empty(4 * BLOCK)
-    sine = np.empty(4 * BLOCK)
-    cosine = np.empty(4 * BLOCK)
-    sp0, cp0, v0, turn0, vm, v1, turn_m, turn1 = row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7]
-    level = np.empty((2, BLOCK))
-    level_m, level_1 = level[0], level[1]
-    n = x.shape[1]
-    for first in range(0, n, BLOCK):
-        m = min(BLOCK, n - first)
+    half_h, sixth_h = 0.5 * h, dt / substeps / 6.0
+    # 0, m, 1: at the beginning, in the middle and at the end of the substep; "level" is the horizontal speed.
+    rows = np.empty((9, BLOCK))
+    v0, vm, v1, turn0, turn_m, turn1 = rows[0], rows[1], rows[2], rows[3], rows[4], rows[5]
+    rise0, level0, level_m = rows[6], rows[7], rows[8]
+    angle, sine, cosine = np.empty(4 * BLOCK), np.empty(4 * BLOCK), np.empty(4 * BLOCK)
+    for first in range(0, x.shape[1], BLOCK):
+        m = min(BLOCK, x.shape[1] - first)
         last = first + m
         throttle, roll_rate, pitch_rate = u[0, first:last], u[1, first:last], u[2, first:last]
         radius, speed_min, speed_max = p[0, first:last], p[1, first:last], p[2, first:last]
@@ -76,44 +86,37 @@ def advance(x, u, p, dt, substeps):  # type: ignore[no-untyped-def]
         for l in range(m):
             angle[l] = roll[first + l]
             angle[m + l] = pitch[first + l]
-        for j in range(2 * m):
-            sine[j], cosine[j] = sincos(angle[j])
+        sincos_rows(angle, sine, cosine, 2 * m)
         for l in range(m):
             v0[l] = speed[first + l]
-            sp0[l] = sine[m + l]
-            cp0[l] = cosine[m + l]
+            rise0[l] = v0[l] * sine[m + l]
+            level0[l] = v0[l] * cosine[m + l]
             turn0[l] = turning(sine[l], cosine[l], v0[l], radius[l], slope[l], target[l])
         for _ in range(substeps):
             for l in range(m):
-                i = first + l
-                now = roll[i]
-                end = hold(now + h * hold(roll_rate[l], -roll_rate_max[l], roll_rate_max[l]), -roll_max[l], roll_max[l])
-                roll[i] = end
-                angle[l] = 0.5 * (now + end)
-                angle[m + l] = end
+                angle[m + l] = stepped(roll[first + l], roll_rate[l], roll_rate_max[l], h, roll_max[l])
+                angle[l] = 0.5 * (roll[first + l] + angle[m + l])
+                roll[first + l] = angle[m + l]
             for l in range(m):
-                i = first + l
-                now = pitch[i]
-                end = hold(now + h * hold(pitch_rate[l], -pitch_rate_max[l], pitch_rate_max[l]), -pitch_max[l], pitch_max[l])
-                pitch[i] = end
-                angle[2 * m + l] = 0.5 * (now + end)
-                angle[3 * m + l] = end
+                angle[3 * m + l] = stepped(
+                    pitch[first + l], pitch_rate[l], pitch_rate_max[l], h, pitch_max[l]
+                )
+                angle[2 * m + l] = 0.5 * (pitch[first + l] + angle[3 * m + l])
+                pitch[first + l] = angle[3 * m + l]
             for l in range(m):
                 pull = ACCELERATION * hold(throttle[l], -THROTTLE_MAX, THROTTLE_MAX)
                 v1[l] = hold(v0[l] + h * pull, speed_min[l], speed_max[l])
                 vm[l] = 0.5 * (v0[l] + v1[l])
-            for j in range(4 * m):
-                sine[j], cosine[j] = sincos(angle[j])
+            sincos_rows(angle, sine, cosine, 4 * m)
             for l in range(m):
                 turn_m[l] = turning(sine[l], cosine[l], vm[l], radius[l], slope[l], target[l])
                 turn1[l] = turning(sine[m + l], cosine[m + l], v1[l], radius[l], slope[l], target[l])
             for l in range(m):
-                up[first + l] += sixth_h * (v0[l] * sp0[l] + 4.0 * (vm[l] * sine[2 * m + l]) + v1[l] * sine[3 * m + l])
-                level_m[l] = vm[l] * cosine[2 * m + l]
-                level_1[l] = v1[l] * cosine[3 * m + l]
-                v0[l] = v0[l] * cp0[l]
-                sp0[l] = sine[3 * m + l]
-                cp0[l] = cosine[3 * m + l]
+                rise1 = v1[l] * sine[3 * m + l]
+                up[first + l] += sixth_h * (rise0[l] + 4.0 * (vm[l] * sine[2 * m + l]) + rise1)
+                rise0[l] = rise1
+                level_m[l] = 2.0 * (vm[l] * cosine[2 * m + l])
+                vm[l] = v1[l] * cosine[3 * m + l]  # from here on the horizontal speed at the end
             for l in range(m):
                 now = yaw[first + l]
                 angle[l] = now
@@ -121,25 +124,19 @@ def advance(x, u, p, dt, substeps):  # type: ignore[no-untyped-def]
                 angle[2 * m + l] = now + half_h * turn_m[l]
                 angle[3 * m + l] = now + h * turn_m[l]
                 yaw[first + l] = now + sixth_h * (turn0[l] + 4.0 * turn_m[l] + turn1[l])
-            for j in range(4 * m):
-                sine[j], cosine[j] = sincos(angle[j])
+            sincos_rows(angle, sine, cosine, 4 * m)
             for l in range(m):
-                middle = 2.0 * level_m[l]
-                east[first + l] += sixth_h * (
-                    v0[l] * cosine[l] + middle * (cosine[m + l] + cosine[2 * m + l]) + level_1[l] * cosine[3 * m + l]
-                )
-                north[first + l] += sixth_h * (
-                    v0[l] * sine[l] + middle * (sine[m + l] + sine[2 * m + l]) + level_1[l] * sine[3 * m + l]
-                )
+                middle = level_m[l] * (cosine[m + l] + cosine[2 * m + l])
+                east[first + l] += sixth_h * (level0[l] * cosine[l] + middle + vm[l] * cosine[3 * m + l])
             for l in range(m):
-                v0[l] = v1[l]
-                turn0[l] = turn1[l]
-        for l in range(m):
-            speed[first + l] = v0[l]
+                middle = level_m[l] * (sine[m + l] + sine[2 * m + l])
+                north[first + l] += sixth_h * (level0[l] * sine[l] + middle + vm[l] * sine[3 * m + l])
+                v0[l], turn0[l], level0[l] = v1[l], turn1[l], vm[l]
+        speed[first:last] = v0[:m]
 
 
 @kernel("F2 Fw Fw Fw Fw Fw Fw Fw Fw Fw Fw")
-def to_body(x, east, north, up, qw, qx, qy, qz, vx, vy, vz):  # type: ignore[no-untyped-def]
+def to_body(x, east, north, up, qw, qx, qy, qz, vx, vy, vz):
     """Publish position, attitude and velocity.
 
     Args:

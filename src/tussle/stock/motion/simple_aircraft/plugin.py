@@ -14,28 +14,43 @@ class SimpleAircraft(MotionModel):
     """An aircraft without aerodynamics: it turns at the rate of its bank and flies where its nose points.
 
     x' = V cos(pitch) cos(yaw), y' = V cos(pitch) sin(yaw), z' = V sin(pitch), yaw' = V tan(roll) / L with the radius
-    L = turning_radius + radius_slope_per_speed (V - speed_target), roll' = roll_rate, pitch' = pitch_rate, V' = throttle / 5; pitch
-    is nose up. As in the existing system a positive roll (and roll_rate) turns to the left, so the published attitude, in which a
-    positive bank is right wing down, has its negative.
+    L = turning_radius + radius_slope_per_speed (V - speed_target), roll' = roll_rate, pitch' = pitch_rate, V' =
+    throttle / 5; pitch is nose up. As in the existing system a positive roll (and roll_rate) turns to the left, so
+    the published attitude, in which a positive bank is right wing down, has its negative.
 
-    Limits hold at the end of every substep: a rate that would go beyond is lowered so that it ends there. The existing system clamped
-    before each step, and what it published and flew could exceed a limit by one step's worth. Its z velocity had the wrong sign and
-    its positive pitch_rate put the nose down; its initial public velocity was level whatever the pitch.
+    Limits hold at the end of every substep: a rate that would go beyond is lowered so that it ends there. The
+    existing system clamped before each step, and what it published and flew could exceed a limit by one step's worth.
+    Its z velocity had the wrong sign and its positive pitch_rate put the nose down; its initial public velocity was
+    level whatever the pitch.
     """
 
     grade = "portable"
     atomic = True
 
-    turning_radius = Param(13.0, unit="m", gt=0.0, doc="Radius of a turn at 45 degrees of bank and speed_target.")
+    turning_radius = Param(
+        13.0, unit="m", gt=0.0, doc="Radius of a turn at 45 degrees of bank and speed_target."
+    )
     min_velocity = Param(15.0, unit="m/s", ge=0.0, doc="Lowest speed.")
     max_velocity = Param(40.0, unit="m/s", ge=0.0, doc="Highest speed.")
-    max_roll = Param(math.radians(30.0), unit="rad", text_unit="deg", ge=0.0, lt=math.pi / 2, doc="Largest bank.")
-    max_pitch = Param(math.radians(30.0), unit="rad", text_unit="deg", ge=0.0, le=math.pi / 2, doc="Largest elevation.")
-    max_roll_rate = Param(math.radians(57.3), unit="rad/s", text_unit="deg/s", ge=0.0, doc="Limit of roll_rate.")
-    max_pitch_rate = Param(math.radians(57.3), unit="rad/s", text_unit="deg/s", ge=0.0, doc="Limit of pitch_rate.")
+    max_roll = Param(
+        math.radians(30.0), unit="rad", text_unit="deg", ge=0.0, lt=math.pi / 2, doc="Largest bank."
+    )
+    max_pitch = Param(
+        math.radians(30.0), unit="rad", text_unit="deg", ge=0.0, le=math.pi / 2, doc="Largest elevation."
+    )
+    max_roll_rate = Param(
+        math.radians(57.3), unit="rad/s", text_unit="deg/s", ge=0.0, doc="Limit of roll_rate."
+    )
+    max_pitch_rate = Param(
+        math.radians(57.3), unit="rad/s", text_unit="deg/s", ge=0.0, doc="Limit of pitch_rate."
+    )
     speed_target = Param(50.0, unit="m/s", doc="Speed at which the radius is turning_radius.")
     radius_slope_per_speed = Param(0.0, unit="s", doc="Growth of the radius with speed.")
-    x = State("x y z roll pitch yaw speed", unit="m m m rad rad rad m/s", doc="Position, bank (turns left), elevation (nose up), heading, speed.")
+    x = State(
+        "x y z roll pitch yaw speed",
+        unit="m m m rad rad rad m/s",
+        doc="Position, bank (turns left), elevation (nose up), heading, speed.",
+    )
     throttle = Input(doc="Five times the acceleration [m/s^2], within 100 either way.")
     roll_rate = Input(unit="rad/s", doc="Rate of the bank; positive banks into a left turn.")
     pitch_rate = Input(unit="rad/s", doc="Rate of the elevation, nose up positive.")

@@ -13,12 +13,13 @@ BLOCK = 128  # rows
 
 
 @kernel("F2w F2 F2 f8 i8")
-def advance(x, u, p, dt, substeps):  # type: ignore[no-untyped-def]
+def advance(x, u, p, dt, substeps):
     """Advance all rows, in place: exact for a held velocity, so the number of substeps does not matter.
 
     Args:
         x: x, y, z [m], vx, vy, vz [m/s], yaw, climb [rad], (8, n), world frame.
-        u: velocity_x, velocity_y, velocity_z [m/s] and, where the heading is commanded, desired_heading [rad], (3 or 4, n).
+        u: velocity_x, velocity_y, velocity_z [m/s] and, where the heading is commanded, desired_heading [rad], (3 or
+            4, n).
         p: max_speed [m/s], negative for the commanded speed, (1, n).
         dt: Duration [s].
         substeps: Number of steps in dt; unused.
@@ -70,7 +71,7 @@ def advance(x, u, p, dt, substeps):  # type: ignore[no-untyped-def]
 
 
 @kernel("F2 Fw Fw Fw Fw Fw Fw Fw Fw Fw Fw")
-def to_body(x, east, north, up, qw, qx, qy, qz, vx, vy, vz):  # type: ignore[no-untyped-def]
+def to_body(x, east, north, up, qw, qx, qy, qz, vx, vy, vz):
     """Publish position, attitude (no bank) and velocity.
 
     Args:

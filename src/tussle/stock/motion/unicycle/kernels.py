@@ -1,17 +1,17 @@
 """Unicycle kernels: RK4 over any number of substeps in closed form, and the state made public.
 
-With speed and rates held over a step the derivative depends on time only, so RK4 is Simpson's rule, and its sum over N substeps
-of h is geometric. For an angle a with rate w and delta = h w / 2:
+With speed and rates held over a step the derivative depends on time only, so RK4 is Simpson's rule, and its sum over
+N substeps of h is geometric. For an angle a with rate w and delta = h w / 2:
 
     h/6 sum_s [cos a_s + 4 cos(a_s + delta) + cos(a_s + 2 delta)] = N h g(delta) cos(a + N delta),
     g(delta) = (2 + cos delta)/3 * sin(N delta) / (N sin delta),
 
-and the same for sin. With pitch, cos(pitch) cos(yaw) is split into the angles yaw + pitch and yaw - pitch. The result is RK4's up to
-rounding (and with less of it), and 12 substeps cost as much as one. Advancing cosine and sine by a rotation per substep was
-the alternative: as exact, but its cost grows with the substeps.
+and the same for sin. With pitch, cos(pitch) cos(yaw) is split into the angles yaw + pitch and yaw - pitch. The result
+is RK4's up to rounding (and with less of it), and 12 substeps cost as much as one. Advancing cosine and sine by a
+rotation per substep was the alternative: as exact, but its cost grows with the substeps.
 
-Rows are worked in blocks through scratch arrays, all angles of a block in one flat loop, because LLVM vectorises loops over few
-arrays only. Each row sees the same operations wherever it stands.
+Rows are worked in blocks through scratch arrays, all angles of a block in one flat loop, because LLVM vectorises
+loops over few arrays only. Each row sees the same operations wherever it stands.
 """
 
 from __future__ import annotations
@@ -25,26 +25,28 @@ from tussle.numeric.kernel import device, kernel
 
 BLOCK = 128  # rows; the scratch of a block (some 40 kB) stays in the first-level cache
 INVERSE_PI = 1.0 / math.pi
-PI_HIGH = 2.0 * 1.57079632673412561417  # the upper 33 bits of pi, so that k * PI_HIGH is exact for |k| < 2**20
+PI_HIGH = (
+    2.0 * 1.57079632673412561417
+)  # the upper 33 bits of pi, so that k * PI_HIGH is exact for |k| < 2**20
 PI_LOW = math.pi - PI_HIGH  # exact; together they miss pi by 1e-16
 GRAVITY = 9.81
 
 
 @device
-def clamp(value, limit):  # type: ignore[no-untyped-def]
+def clamp(value, limit):
     """Value held within [-limit, limit]."""
     return min(max(value, -limit), limit)
 
 
 @device
-def fold(delta):  # type: ignore[no-untyped-def]
+def fold(delta):
     """(delta - k pi in [-pi/2, pi/2], 1.0 if k is odd else 0.0): keeps sin(N d)/sin(d) away from 0/0 beside multiples of pi."""
     k = math.floor(delta * INVERSE_PI + 0.5)
     return (delta - k * PI_HIGH) - k * PI_LOW, k - 2.0 * math.floor(0.5 * k)
 
 
 @device
-def simpson_gain(sin_delta, cos_delta, sin_n_delta, odd, n, n_is_even):  # type: ignore[no-untyped-def]
+def simpson_gain(sin_delta, cos_delta, sin_n_delta, odd, n, n_is_even):
     """g(delta) of the module's docstring from sines of the folded delta; `odd` is the parity of the folding, n the substeps."""
     cosine = cos_delta - 2.0 * odd * cos_delta
     ratio = sin_n_delta / (n * sin_delta)
@@ -54,7 +56,7 @@ def simpson_gain(sin_delta, cos_delta, sin_n_delta, odd, n, n_is_even):  # type:
 
 
 @kernel("F2w F2 F2 f8 i8")
-def advance_pitch(x, u, p, dt, substeps):  # type: ignore[no-untyped-def]
+def advance_pitch(x, u, p, dt, substeps):
     """Advance the unicycle that pitches, in place.
 
     Args:
@@ -100,7 +102,9 @@ def advance_pitch(x, u, p, dt, substeps):  # type: ignore[no-untyped-def]
         for j in range(8 * m):
             sine[j], cosine[j] = sincos(angle[j])
         for j in range(3 * m):
-            gain[j] = simpson_gain(sine[2 * m + j], cosine[2 * m + j], sine[5 * m + j], gain[j], count, n_is_even)
+            gain[j] = simpson_gain(
+                sine[2 * m + j], cosine[2 * m + j], sine[5 * m + j], gain[j], count, n_is_even
+            )
         for l in range(m):
             i = first + l
             cc = cosine[l] * cosine[m + l]
@@ -115,7 +119,7 @@ def advance_pitch(x, u, p, dt, substeps):  # type: ignore[no-untyped-def]
 
 
 @kernel("F2w F2 F2 f8 i8")
-def advance_level(x, u, p, dt, substeps):  # type: ignore[no-untyped-def]
+def advance_level(x, u, p, dt, substeps):
     """Advance the unicycle whose pitch is held and whose climb speed is an input, in place.
 
     Args:
@@ -156,20 +160,49 @@ def advance_level(x, u, p, dt, substeps):  # type: ignore[no-untyped-def]
             sine[j], cosine[j] = sincos(angle[j])
         for l in range(m):
             i = first + l
-            gain = simpson_gain(sine[2 * m + l], cosine[2 * m + l], sine[3 * m + l], parity[l], count, n_is_even)
+            gain = simpson_gain(
+                sine[2 * m + l], cosine[2 * m + l], sine[3 * m + l], parity[l], count, n_is_even
+            )
             travelled = length[l] * cosine[m + l] * gain
             east[i] += travelled * cosine[l]
             north[i] += travelled * sine[l]
 
 
+@device
+def from_half_angles(sr, cr, sp, cp, sy, cy):
+    """Quaternion (w, x, y, z) from sine and cosine of half the roll, quaternion pitch (nose down) and yaw."""
+    return (
+        cr * (cp * cy) + sr * (sp * sy),
+        sr * (cp * cy) - cr * (sp * sy),
+        cr * (sp * cy) + sr * (cp * sy),
+        cr * (cp * sy) - sr * (sp * cy),
+    )
+
+
+@device
+def mean_direction(sy, cy, sp, cp, sd, cd, se, ce):
+    """Simpson's mean direction (three numbers) over the substep that ends at a yaw and pitch.
+
+    From sine and cosine of yaw, of pitch (nose up), and of half of what yaw and pitch turned in the substep.
+    """
+    sa, ca = sy * cd - cy * sd, cy * cd + sy * sd
+    sb, cb = sp * ce - cp * se, cp * ce + sp * se
+    plus = (2.0 + (cd * ce - sd * se)) * (1.0 / 6.0)
+    minus = (2.0 + (cd * ce + sd * se)) * (1.0 / 6.0)
+    east = plus * (ca * cb - sa * sb) + minus * (ca * cb + sa * sb)
+    north = plus * (sa * cb + ca * sb) + minus * (sa * cb - ca * sb)
+    return east, north, (2.0 + ce) * sb * (1.0 / 3.0)
+
+
 @kernel("F2 F F F F F F b1 b1 f8 Fw Fw Fw Fw Fw Fw Fw Fw Fw Fw Fw Fw Fw")
-def to_body(  # type: ignore[no-untyped-def]
-    x, speed, turn_rate, third, vel_max, turn_max, third_max, pitches, banks, h, east, north, up, qw, qx, qy, qz, vx, vy, vz, wx, wy, wz
-):
+def to_body(
+    x, speed, turn_rate, third, vel_max, turn_max, third_max, pitches, banks, h,
+    east, north, up, qw, qx, qy, qz, vx, vy, vz, wx, wy, wz,
+):  # fmt: skip
     """Publish position, attitude, velocity and turn rate.
 
-    The velocity is the displacement of the last substep over its length: Simpson's mean over the arc that ends at x, which needs no
-    memory of where the row stood before.
+    The velocity is the displacement of the last substep over its length: Simpson's mean over the arc that ends at x,
+    which needs no memory of where the row stood before.
 
     Args:
         x: x, y, z [m], yaw, pitch [rad], (5, n), world frame, pitch nose up.
@@ -192,12 +225,9 @@ def to_body(  # type: ignore[no-untyped-def]
     up[:] = x[2]
     yaw, pitch = x[3], x[4]
     half_h = 0.5 * h
-    angle = np.empty(5 * BLOCK)
-    sine = np.empty(5 * BLOCK)
-    cosine = np.empty(5 * BLOCK)
-    n = x.shape[1]
-    for first in range(0, n, BLOCK):
-        m = min(BLOCK, n - first)
+    angle, sine, cosine = np.empty(5 * BLOCK), np.empty(5 * BLOCK), np.empty(5 * BLOCK)
+    for first in range(0, x.shape[1], BLOCK):
+        m = min(BLOCK, x.shape[1] - first)
         for l in range(m):
             i = first + l
             raised = half_h * clamp(third[i], third_max[i])
@@ -205,49 +235,39 @@ def to_body(  # type: ignore[no-untyped-def]
             angle[m + l] = -0.5 * pitch[i]
             angle[2 * m + l] = half_h * clamp(turn_rate[i], turn_max[i])
             angle[3 * m + l] = raised if pitches else 0.0
-        angles = 4 * m
         if banks:
-            angles = 5 * m
             for l in range(m):
                 i = first + l
                 sideways = clamp(speed[i], vel_max[i]) * clamp(turn_rate[i], turn_max[i])
                 angle[4 * m + l] = -0.5 * atan2(sideways, GRAVITY)
-        for j in range(angles):
+        for j in range(5 * m if banks else 4 * m):
             sine[j], cosine[j] = sincos(angle[j])
         if not banks:
             sine[4 * m : 5 * m] = 0.0
             cosine[4 * m : 5 * m] = 1.0
         for l in range(m):
-            i = first + l
-            sy, cy = sine[l], cosine[l]
-            sp, cp = sine[m + l], cosine[m + l]
-            sr, cr = sine[4 * m + l], cosine[4 * m + l]
-            qw[i] = cr * (cp * cy) + sr * (sp * sy)
-            qx[i] = sr * (cp * cy) - cr * (sp * sy)
-            qy[i] = cr * (sp * cy) + sr * (cp * sy)
-            qz[i] = cr * (cp * sy) - sr * (sp * cy)
-        for l in range(m):  # from here on sine and cosine of [0, m) are those of yaw, of [m, 2m) those of pitch (nose up)
-            sy, cy = sine[l], cosine[l]
-            sp, cp = sine[m + l], cosine[m + l]
+            i, b, r = first + l, m + l, 4 * m + l
+            qw[i], qx[i], qy[i], qz[i] = from_half_angles(
+                sine[r], cosine[r], sine[b], cosine[b], sine[l], cosine[l]
+            )
+        for l in range(
+            m
+        ):  # from half the yaw to the yaw, from half the quaternion pitch to the pitch (nose up)
+            sy, cy, sp, cp = sine[l], cosine[l], sine[m + l], cosine[m + l]
             sine[l], cosine[l] = 2.0 * sy * cy, cy * cy - sy * sy
             sine[m + l], cosine[m + l] = -2.0 * sp * cp, cp * cp - sp * sp
         for l in range(m):
-            i = first + l
-            sd, cd = sine[2 * m + l], cosine[2 * m + l]
-            se, ce = sine[3 * m + l], cosine[3 * m + l]
-            sa, ca = sine[l] * cd - cosine[l] * sd, cosine[l] * cd + sine[l] * sd
-            sb, cb = sine[m + l] * ce - cosine[m + l] * se, cosine[m + l] * ce + sine[m + l] * se
-            forward = clamp(speed[i], vel_max[i]) * (1.0 / 3.0)
-            plus = 0.5 * (2.0 + (cd * ce - sd * se))
-            minus = 0.5 * (2.0 + (cd * ce + sd * se))
-            vx[i] = forward * (plus * (ca * cb - sa * sb) + minus * (ca * cb + sa * sb))
-            vy[i] = forward * (plus * (sa * cb + ca * sb) + minus * (sa * cb - ca * sb))
-            rising = forward * ((2.0 + ce) * sb)
-            vz[i] = rising if pitches else clamp(third[i], third_max[i])
+            i, b, d, e = first + l, m + l, 2 * m + l, 3 * m + l
+            mean_x, mean_y, mean_z = mean_direction(
+                sine[l], cosine[l], sine[b], cosine[b], sine[d], cosine[d], sine[e], cosine[e]
+            )
+            ahead = clamp(speed[i], vel_max[i])
+            vx[i] = ahead * mean_x
+            vy[i] = ahead * mean_y
+            vz[i] = ahead * mean_z if pitches else clamp(third[i], third_max[i])
         for l in range(m):
             i = first + l
-            commanded = clamp(third[i], third_max[i])
-            raised = commanded if pitches else 0.0
+            raised = clamp(third[i], third_max[i]) if pitches else 0.0
             wx[i] = raised * sine[l]
             wy[i] = -raised * cosine[l]
             wz[i] = clamp(turn_rate[i], turn_max[i])

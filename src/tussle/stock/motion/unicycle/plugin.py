@@ -14,15 +14,16 @@ from tussle.stock.motion.unicycle import kernels
 class Unicycle(MotionModel):
     """A vehicle that moves where its nose points; speed, turn rate and pitch rate are commanded and followed at once.
 
-    DeMarco, Squires, Day, Pippin 2018, equation (1): x' = v cos(pitch) cos(yaw), y' = v cos(pitch) sin(yaw), z' = v sin(pitch),
-    yaw' = turn_rate, pitch' = pitch_rate, with pitch nose up and every command held within its limit. Without `use_pitch` the pitch
-    stays as it was placed and z' = velocity_z.
+    DeMarco, Squires, Day, Pippin 2018, equation (1): x' = v cos(pitch) cos(yaw), y' = v cos(pitch) sin(yaw), z' = v
+    sin(pitch), yaw' = turn_rate, pitch' = pitch_rate, with pitch nose up and every command held within its limit.
+    Without `use_pitch` the pitch stays as it was placed and z' = velocity_z.
 
-    The existing system turned the sign of z' (since May 2020) but not that of the behaviours that fly it, so pursuers dived, looped and
-    flew on upside down; here climbing is nose up throughout. Its mission files mean use_pitch = false where they say nothing; here the
-    paper's model is the default. Like there, `vel` is the displacement of the last substep over its length (exactly what a camera would
-    see between two substeps), which lags the heading by half a substep of turn. Unlike there, a row that someone else moves (teleport,
-    wall) goes on from where it was put, and `omega` is filled.
+    The existing system turned the sign of z' (since May 2020) but not that of the behaviours that fly it, so pursuers
+    dived, looped and flew on upside down; here climbing is nose up throughout. Its mission files mean use_pitch =
+    false where they say nothing; here the paper's model is the default. Like there, `vel` is the displacement of the
+    last substep over its length (exactly what a camera would see between two substeps), which lags the heading by
+    half a substep of turn. Unlike there, a row that someone else moves (teleport, wall) goes on from where it was
+    put, and `omega` is filled.
     """
 
     grade = "portable"
@@ -33,8 +34,12 @@ class Unicycle(MotionModel):
     pitch_rate_max = Param(1.0, unit="rad/s", ge=0.0, doc="Limit of the pitch rate.")
     velocity_z_max = Param(0.0, unit="m/s", ge=0.0, doc="Limit of the climb speed without use_pitch.")
     use_pitch = Param(True, structural=True, doc="Steered by pitch_rate; else level with a climb speed.")
-    enable_roll = Param(False, structural=True, doc="Show the bank of a coordinated turn; the path is the same.")
-    x = State("x y z yaw pitch", unit="m m m rad rad", doc="Position, heading and elevation (nose up), world frame.")
+    enable_roll = Param(
+        False, structural=True, doc="Show the bank of a coordinated turn; the path is the same."
+    )
+    x = State(
+        "x y z yaw pitch", unit="m m m rad rad", doc="Position, heading and elevation (nose up), world frame."
+    )
     speed = Input(unit="m/s", doc="Speed along the body x axis.")
     turn_rate = Input(unit="rad/s", doc="Turn rate about the vertical, counter-clockwise positive.")
     pitch_rate = Input(unit="rad/s", doc="Rate of the elevation, nose up positive.")
@@ -42,7 +47,14 @@ class Unicycle(MotionModel):
 
     @staticmethod
     def derivative(
-        yaw: float, pitch: float, speed: float, turn_rate: float, pitch_rate: float, vel_max: float, turn_rate_max: float, pitch_rate_max: float
+        yaw: float,
+        pitch: float,
+        speed: float,
+        turn_rate: float,
+        pitch_rate: float,
+        vel_max: float,
+        turn_rate_max: float,
+        pitch_rate_max: float,
     ) -> tuple[float, float, float, float, float]:
         """State equation with use_pitch: (x', y', z' [m/s], yaw', pitch' [rad/s])."""
         v = min(max(speed, -vel_max), vel_max)
@@ -74,8 +86,9 @@ class Unicycle(MotionModel):
     def to_body(self, body: MotionBody) -> None:
         """Publish position, attitude, velocity and turn rate."""
         pitches = self.use_pitch
-        third, third_max = (self.pitch_rate, self.pitch_rate_max) if pitches else (self.velocity_z, self.velocity_z_max)
+        third = self.pitch_rate if pitches else self.velocity_z
+        third_max = self.pitch_rate_max if pitches else self.velocity_z_max
         kernels.to_body(
-            self.x, self.speed, self.turn_rate, third, self.vel_max, self.turn_rate_max, third_max, pitches, self.enable_roll, body.dt,
-            *body.pos, *body.quat, *body.vel, *body.omega,
+            self.x, self.speed, self.turn_rate, third, self.vel_max, self.turn_rate_max, third_max,
+            pitches, self.enable_roll, body.dt, *body.pos, *body.quat, *body.vel, *body.omega,
         )  # fmt: skip

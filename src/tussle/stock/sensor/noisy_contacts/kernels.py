@@ -7,7 +7,7 @@ from tussle.numeric.quaternion import quat_conjugate, quat_from_euler, quat_mult
 
 
 @kernel("I I F2 F2 F2 I I F2 F2 F2 F2 F2 F2 F2 F2 F2 F2 F2 F2 F2w")
-def blur(  # type: ignore[no-untyped-def]
+def blur(
     row, other, true_pos, true_vel, true_quat, ids, teams,
     pos_0, pos_1, pos_2, vel_0, vel_1, vel_2, orient_0, orient_1, orient_2,
     pos_draw, vel_draw, orient_draw, contacts,
@@ -24,7 +24,8 @@ def blur(  # type: ignore[no-untyped-def]
         teams: Teams of the body table, (N,).
         pos_0, pos_1, pos_2: Mean and standard deviation of x, y, z [m], (2, n) each, n rows of the group.
         vel_0, vel_1, vel_2: Those of the velocity [m/s], (2, n) each.
-        orient_0, orient_1, orient_2: Those of the turns about the body x, y and z axes, in this order [rad], (2, n) each.
+        orient_0, orient_1, orient_2: Those of the turns about the body x, y and z axes, in this order [rad], (2, n)
+            each.
         pos_draw, vel_draw, orient_draw: Standard normal draws, (3, m) each.
         contacts: id, team, x y z [m], vx vy vz [m/s], qw qx qy qz, (12, m), written.
     """

@@ -14,12 +14,13 @@ FIELDS = "id team x y z vx vy vz qw qx qy qz"
 
 
 class NoisyContacts(Sensor):
-    """Measures every other entity of the world within range: a list of states with normal noise, drawn anew for each pair and call.
+    """Measures every other entity of the world within range: a list of states with normal noise.
 
-    Draws are keyed by the one who measures and the id of the one who is measured, so that adding entities changes no other
-    measurement; the existing system drew them in the order of a hash table. Its covariance, a constant 5 on the diagonal whatever the
-    noise, is left out: the standard deviations are parameters. `max_range` is new; the default is everybody, whose lists grow with
-    the square of the number of entities.
+    The noise is drawn anew for each pair and call. Draws are keyed by the one who measures and the id of the one who
+    is measured, so that adding entities changes no other measurement; the existing system drew them in the order of a
+    hash table. Its covariance, a constant 5 on the diagonal whatever the noise, is left out: the standard deviations
+    are parameters. `max_range` is new; the default is everybody, whose lists grow with the square of the number of
+    entities.
     """
 
     grade = "portable"
@@ -34,7 +35,9 @@ class NoisyContacts(Sensor):
     orient_noise_0 = Param((0.0, 0.0), fields=PAIR, unit="rad", doc="Turn about the contact's x axis.")
     orient_noise_1 = Param((0.0, 0.0), fields=PAIR, unit="rad", doc="Turn about the contact's y axis.")
     orient_noise_2 = Param((0.0, 0.0), fields=PAIR, unit="rad", doc="Turn about the contact's z axis.")
-    contacts = Ragged(fields=FIELDS, unit="1 1 m m m m/s m/s m/s 1 1 1 1", doc="Measured entities of each row, world frame.")
+    contacts = Ragged(
+        fields=FIELDS, unit="1 1 m m m m/s m/s m/s 1 1 1 1", doc="Measured entities of each row, world frame."
+    )
     n_contacts = Output(doc="Number of entities measured.")
 
     def step(self, g: GroupView) -> None:

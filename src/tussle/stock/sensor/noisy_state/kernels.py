@@ -7,7 +7,7 @@ from tussle.numeric.quaternion import quat_conjugate, quat_from_euler, quat_mult
 
 
 @kernel("F F F F F F F F F F F2 F2 F2 F2 F2 F2 F2 F2 F2 F2 F2 F2 F2w F2w F2w")
-def blur(  # type: ignore[no-untyped-def]
+def blur(
     x, y, z, vx, vy, vz, qw, qx, qy, qz,
     pos_0, pos_1, pos_2, vel_0, vel_1, vel_2, orient_0, orient_1, orient_2,
     pos_draw, vel_draw, orient_draw, pos, vel, quat,
@@ -20,7 +20,8 @@ def blur(  # type: ignore[no-untyped-def]
         qw, qx, qy, qz: True quaternion body to world, (n,).
         pos_0, pos_1, pos_2: Mean and standard deviation of x, y, z [m], (2, n) each.
         vel_0, vel_1, vel_2: Those of the velocity [m/s], (2, n) each.
-        orient_0, orient_1, orient_2: Those of the turns about the body x, y and z axes, in this order [rad], (2, n) each.
+        orient_0, orient_1, orient_2: Those of the turns about the body x, y and z axes, in this order [rad], (2, n)
+            each.
         pos_draw, vel_draw, orient_draw: Standard normal draws, (3, n) each.
         pos: Noisy position [m], (3, n), written.
         vel: Noisy velocity [m/s], (3, n), written.
@@ -39,4 +40,6 @@ def blur(  # type: ignore[no-untyped-def]
         # Rx Ry Rz is the inverse of Rz(-) Ry(-) Rx(-), which quat_from_euler makes.
         bw, bx, by, bz = quat_from_euler(-about_x, -about_y, -about_z)
         tw, tx, ty, tz = quat_conjugate(bw, bx, by, bz)
-        quat[0, i], quat[1, i], quat[2, i], quat[3, i] = quat_multiply(qw[i], qx[i], qy[i], qz[i], tw, tx, ty, tz)
+        quat[0, i], quat[1, i], quat[2, i], quat[3, i] = quat_multiply(
+            qw[i], qx[i], qy[i], qz[i], tw, tx, ty, tz
+        )

@@ -11,10 +11,11 @@ PAIR = "mean sd"
 class NoisyState(Sensor):
     """Gives the entity a belief of its own position, velocity and attitude: the truth plus normal noise, drawn anew at each call.
 
-    The noise of the attitude is a turn about the body's x, then y, then z axis. Between calls, and before the first one, the belief stays
-    as it is (at the beginning, the truth at which the entity was placed). Autonomies and controllers of the entity see the belief;
-    motion, other entities and referees the truth. As in the existing system, except that draws are counter-based, so no other entity or
-    plugin changes them, and that the first step believes the placed state with the heading and speed that the motion model starts from.
+    The noise of the attitude is a turn about the body's x, then y, then z axis. Between calls, and before the first
+    one, the belief stays as it is (at the beginning, the truth at which the entity was placed). Autonomies and
+    controllers of the entity see the belief; motion, other entities and referees the truth. As in the existing
+    system, except that draws are counter-based, so no other entity or plugin changes them, and that the first step
+    believes the placed state with the heading and speed that the motion model starts from.
     """
 
     grade = "portable"
@@ -29,9 +30,15 @@ class NoisyState(Sensor):
     orient_noise_0 = Param((0.0, 0.0), fields=PAIR, unit="rad", doc="Turn about the body x axis.")
     orient_noise_1 = Param((0.0, 0.0), fields=PAIR, unit="rad", doc="Turn about the body y axis.")
     orient_noise_2 = Param((0.0, 0.0), fields=PAIR, unit="rad", doc="Turn about the body z axis.")
-    belief_pos = Output("belief_pos_x belief_pos_y belief_pos_z", unit="m", doc="Believed position, world frame.")
-    belief_vel = Output("belief_vel_x belief_vel_y belief_vel_z", unit="m/s", doc="Believed velocity, world frame.")
-    belief_quat = Output("belief_quat_w belief_quat_x belief_quat_y belief_quat_z", doc="Believed attitude, body to world.")
+    belief_pos = Output(
+        "belief_pos_x belief_pos_y belief_pos_z", unit="m", doc="Believed position, world frame."
+    )
+    belief_vel = Output(
+        "belief_vel_x belief_vel_y belief_vel_z", unit="m/s", doc="Believed velocity, world frame."
+    )
+    belief_quat = Output(
+        "belief_quat_w belief_quat_x belief_quat_y belief_quat_z", doc="Believed attitude, body to world."
+    )
 
     def step(self, g: GroupView) -> None:
         """A new belief for all rows."""
