@@ -1,8 +1,9 @@
 """Counter-based random numbers: a draw is a function of who draws, what for and when, so nothing else can change it.
 
-Threefry2x64-20 (Salmon, Moraes, Dror, Shaw 2011, "Parallel Random Numbers: As Easy as 1, 2, 3", section 4.2). The key is the world's seed and
-the stream (a hash of block, plugin instance and label), the counter is the index within the block, the step, the substep and the draw. Adding a
-plugin, a block, more entities or more worlds changes no other draw. Uses integer arithmetic and `tussle.numeric` only: portable.
+Threefry2x64-20 (Salmon, Moraes, Dror, Shaw 2011, "Parallel Random Numbers: As Easy as 1, 2, 3", section 4.2). The key
+is the world's seed and the stream (a hash of block, plugin instance and label), the counter is the index within the
+block, the step, the substep and the draw. Adding a plugin, a block, more entities or more worlds changes no other
+draw. Uses integer arithmetic and `tussle.numeric` only: portable.
 
 In jitted code all six numbers that say which draw are uint64; from Python use `uniform` and `normal`.
 """
@@ -146,7 +147,9 @@ def fill_normal(seeds, stream, index, step, substep, k, out):
             last[i] = normal2(seeds[i], stream, index[i], step[i], substep, k // 2)[0]
 
 
-def uniform(seeds: ArrayLike, stream: int, index: ArrayLike, step: ArrayLike, substep: int = 0, k: int = 1) -> Floats:
+def uniform(
+    seeds: ArrayLike, stream: int, index: ArrayLike, step: ArrayLike, substep: int = 0, k: int = 1
+) -> Floats:
     """Random numbers in [0, 1), (k, n); a line's numbers do not depend on k, nor a column's on the other columns.
 
     Args:
@@ -166,7 +169,9 @@ def uniform(seeds: ArrayLike, stream: int, index: ArrayLike, step: ArrayLike, su
     return out
 
 
-def normal(seeds: ArrayLike, stream: int, index: ArrayLike, step: ArrayLike, substep: int = 0, k: int = 1) -> Floats:
+def normal(
+    seeds: ArrayLike, stream: int, index: ArrayLike, step: ArrayLike, substep: int = 0, k: int = 1
+) -> Floats:
     """Standard normal random numbers, (k, n); arguments and errors as `uniform`."""
     words, indices, steps = columns(seeds, index, step, substep, k)
     out = np.empty((k, words.size))
@@ -177,13 +182,15 @@ def normal(seeds: ArrayLike, stream: int, index: ArrayLike, step: ArrayLike, sub
 def columns(
     seeds: ArrayLike, index: ArrayLike, step: ArrayLike, substep: int, k: int
 ) -> tuple[NDArray[np.uint64], NDArray[np.int64], NDArray[np.int64]]:
-    """Seeds, index and step as arrays of one length, checked: a number beyond its bits would silently be another entity's draw."""
+    """Seeds, index and step as arrays of one length, checked: beyond its bits a number would be another entity's draw."""
     words = np.asarray(seeds, dtype=np.uint64)
     indices, steps = np.asarray(index, dtype=np.int64), np.asarray(step, dtype=np.int64)
     shape = np.broadcast_shapes((1,), words.shape, indices.shape, steps.shape)
     for name, values in (("index", indices), ("step", steps)):
         if values.size and (values.min() < 0 or values.max() >= MAX_INDEX):
-            raise ValueError(f"random numbers: {name} must be in 0 ... {MAX_INDEX - 1}, not {values.min()} ... {values.max()}")
+            raise ValueError(
+                f"random numbers: {name} must be in 0 ... {MAX_INDEX - 1}, not {values.min()} ... {values.max()}"
+            )
     if not 0 <= substep < MAX_SUBSTEP:
         raise ValueError(f"random numbers: substep must be in 0 ... {MAX_SUBSTEP - 1}, not {substep}")
     if k < 0:

@@ -26,7 +26,7 @@ def unit(v: ArrayLike) -> Floats:
 
 @kernel("F2 F2 F2w")
 def matmul_columns(w, x, out):
-    """out = w @ x, the sum over the inner index taken in order for each column: (m, k), (k, n), (m, n)."""
+    """Out = w @ x, the sum over the inner index taken in order for each column: (m, k), (k, n), (m, n)."""
     for i in range(out.shape[0]):
         row = out[i]
         row[:] = 0.0

@@ -1,11 +1,13 @@
 """Portable elementary functions of one number: + - * / sqrt, comparisons and selects only, so every machine gives the same bits.
 
-Reductions and polynomials are those of fdlibm (Sun Microsystems 1993, "Freely Distributable LIBM", files s_sin.c, k_sin.c, k_cos.c,
-s_atan.c, e_asin.c, e_acos.c, e_exp.c, e_log.c), rearranged so that every argument takes the same path: both polynomials of a pair are
-computed and one is selected, which lets a loop over rows run in SIMD lanes. No branch, no table, no fused multiply-add.
+Reductions and polynomials are those of fdlibm (Sun Microsystems 1993, "Freely Distributable LIBM", files s_sin.c,
+k_sin.c, k_cos.c, s_atan.c, e_asin.c, e_acos.c, e_exp.c, e_log.c), rearranged so that every argument takes the same
+path: both polynomials of a pair are computed and one is selected, which lets a loop over rows run in SIMD lanes. No
+branch, no table, no fused multiply-add.
 
-Rounding to an integer adds and takes away 1.5 * 2**52: the low bits of the sum are that integer, in every rounding-to-nearest FPU, so
-neither a rounding instruction nor a conversion between float and int is needed (older CPUs have none for lanes of 64 bits).
+Rounding to an integer adds and takes away 1.5 * 2**52: the low bits of the sum are that integer, in every rounding-
+to-nearest FPU, so neither a rounding instruction nor a conversion between float and int is needed (older CPUs have
+none for lanes of 64 bits).
 """
 
 from __future__ import annotations
@@ -66,7 +68,8 @@ def sine_near_zero(x, tail):
     v = z * x
     r = 8.33333333332248946124e-03 + z * (
         -1.98412698298579493134e-04
-        + z * (2.75573137070700676789e-06 + z * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10))
+        + z
+        * (2.75573137070700676789e-06 + z * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10))
     )
     return x - ((z * (0.5 * tail - v * r) - tail) - v * -1.66666666666666324348e-01)
 
@@ -83,7 +86,11 @@ def cosine_near_zero(x, tail):
             + z
             * (
                 2.48015872894767294178e-05
-                + z * (-2.75573143513906633035e-07 + z * (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11))
+                + z
+                * (
+                    -2.75573143513906633035e-07
+                    + z * (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11)
+                )
             )
         )
     )
@@ -151,7 +158,11 @@ def arctangent_near_zero(x):
             + w
             * (
                 9.09088713343650656196e-02
-                + w * (6.66107313738753120669e-02 + w * (4.97687799461593236017e-02 + w * 1.62858201153657823623e-02))
+                + w
+                * (
+                    6.66107313738753120669e-02
+                    + w * (4.97687799461593236017e-02 + w * 1.62858201153657823623e-02)
+                )
             )
         )
     )
@@ -160,7 +171,11 @@ def arctangent_near_zero(x):
         + w
         * (
             -1.11111104054623557880e-01
-            + w * (-7.69187620504482999495e-02 + w * (-5.83357013379057348645e-02 + w * -3.65315727442169155270e-02))
+            + w
+            * (
+                -7.69187620504482999495e-02
+                + w * (-5.83357013379057348645e-02 + w * -3.65315727442169155270e-02)
+            )
         )
     )
     return x - x * (even + odd)
@@ -212,19 +227,24 @@ def arcsine_ratio(z):
             + z
             * (
                 2.01212532134862925881e-01
-                + z * (-4.00555345006794114027e-02 + z * (7.91534994289814532176e-04 + z * 3.47933107596021167570e-05))
+                + z
+                * (
+                    -4.00555345006794114027e-02
+                    + z * (7.91534994289814532176e-04 + z * 3.47933107596021167570e-05)
+                )
             )
         )
     )
     q = 1.0 + z * (
-        -2.40339491173441421878e00 + z * (2.02094576023350569471e00 + z * (-6.88283971605453293030e-01 + z * 7.70381505559019352791e-02))
+        -2.40339491173441421878e00
+        + z * (2.02094576023350569471e00 + z * (-6.88283971605453293030e-01 + z * 7.70381505559019352791e-02))
     )
     return p / q
 
 
 @device
 def arcsine_parts(x):
-    """What asin and acos share: (is |x| below 1/2, its ratio, sqrt((1 - |x|) / 2), that cut to 32 bits, what the cut took away)."""
+    """What asin and acos share: (is |x| below 1/2, ratio, root = sqrt((1 - |x|) / 2), root cut to 32 bits, the rest)."""
     ax = -x if x < 0.0 else x
     small = ax < 0.5
     z = x * x if small else (1.0 - ax) * 0.5
@@ -268,7 +288,7 @@ def power_of_two(k):
 
 @device
 def exp(x):
-    """e ** x; 1 ulp; infinite above 709.78, rounded into the subnormals below -708.4, 0 below -745.13 (e_exp.c)."""
+    """E ** x; 1 ulp; infinite above 709.78, rounded into the subnormals below -708.4, 0 below -745.13 (e_exp.c)."""
     x = float(x)
     bounded = 710.0 if x > 710.0 else x
     bounded = -746.0 if bounded < -746.0 else bounded
@@ -284,7 +304,11 @@ def exp(x):
         + t
         * (
             -2.77777777770155933842e-03
-            + t * (6.61375632143793436117e-05 + t * (-1.65339022054652515390e-06 + t * 4.13813679705723846039e-08))
+            + t
+            * (
+                6.61375632143793436117e-05
+                + t * (-1.65339022054652515390e-06 + t * 4.13813679705723846039e-08)
+            )
         )
     )
     y = 1.0 - ((low - (r * c) / (2.0 - c)) - high)

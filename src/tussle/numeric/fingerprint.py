@@ -1,8 +1,9 @@
 """What a kernel's machine code depends on: the code, constants and frozen globals of every function that it reaches.
 
-Numba's own disk cache looks at one source file only and runs old machine code after a callee or an imported constant was edited. Here a
-function is described by its bytecode and constants (neither line numbers nor comments nor its docstring), and by everything that its names
-stand for, followed through plain functions, jitted functions, closures, module attributes and overloads.
+Numba's own disk cache looks at one source file only and runs old machine code after a callee or an imported constant
+was edited. Here a function is described by its bytecode and constants (neither line numbers nor comments nor its
+docstring), and by everything that its names stand for, followed through plain functions, jitted functions, closures,
+module attributes and overloads.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import sysconfig
 import types
 from collections.abc import Callable, Iterator
 from enum import Enum
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
@@ -27,9 +28,10 @@ STANDARD_LIBRARY = sysconfig.get_paths()["stdlib"] + os.sep
 
 EXACT = frozenset(
     "sqrt fabs floor ceil trunc copysign isnan isinf isfinite radians degrees gcd lcm fmod remainder modf frexp ldexp "
-    "absolute abs minimum maximum fmin fmax sign rint square negative positive add subtract multiply divide true_divide floor_divide "
-    "less less_equal greater greater_equal equal not_equal logical_and logical_or logical_not logical_xor bitwise_and bitwise_or "
-    "bitwise_xor invert left_shift right_shift signbit nextafter spacing".split()
+    "absolute abs minimum maximum fmin fmax sign rint square negative positive add subtract multiply divide "
+    "true_divide floor_divide less less_equal greater greater_equal equal not_equal "
+    "logical_and logical_or logical_not logical_xor "
+    "bitwise_and bitwise_or bitwise_xor invert left_shift right_shift signbit nextafter spacing".split()
 )
 
 
@@ -160,12 +162,10 @@ class Fingerprint:
 
 def constant(value: Any) -> str | None:
     """Text that tells an immutable constant from every other, None for anything else."""
-    if value is None or value is Ellipsis or isinstance(value, (bool, int, float, complex, str, bytes)):
-        if isinstance(value, Enum):
-            return f"{type(value).__qualname__}.{value.name}={value.value!r}"
-        return f"{type(value).__name__} {value!r}"
     if isinstance(value, Enum):
         return f"{type(value).__qualname__}.{value.name}={value.value!r}"
+    if value is None or value is Ellipsis or isinstance(value, (bool, int, float, complex, str, bytes)):
+        return f"{type(value).__name__} {value!r}"
     if isinstance(value, np.generic):
         return f"{value.dtype!r} {value.tobytes().hex()}"
     if isinstance(value, frozenset):
@@ -191,28 +191,38 @@ def names_of(code: types.CodeType) -> Iterator[str]:
         yield from each.co_names
 
 
-@lru_cache(maxsize=None)
+@cache
 def code_text(code: types.CodeType, doc: str | None) -> str:
     """Everything of a code object that its compilation can depend on: no file, no line numbers, no docstring."""
     constants = list(code.co_consts)
     if doc is not None and constants and constants[0] == doc:
         constants[0] = None
-    parts: list[Any] = [code.co_code.hex(), code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars]
+    parts: list[Any] = [
+        code.co_code.hex(),
+        code.co_names,
+        code.co_varnames,
+        code.co_freevars,
+        code.co_cellvars,
+    ]
     parts += [code.co_argcount, code.co_kwonlyargcount, code.co_posonlyargcount, code.co_flags]
     parts.append(getattr(code, "co_exceptiontable", b"").hex())
     for value in constants:
-        parts.append(code_text(value, None) if isinstance(value, types.CodeType) else constant(value) or repr(value))
+        parts.append(
+            code_text(value, None) if isinstance(value, types.CodeType) else constant(value) or repr(value)
+        )
     return repr(parts)
 
 
-@lru_cache(maxsize=None)
+@cache
 def has_power(code: types.CodeType) -> bool:
     """Whether the code raises to a power that is not a whole number written down (those become products)."""
     for each in codes_of(code):
         previous: Any = None
         for instruction in dis.get_instructions(each):
             if instruction.opname == "BINARY_OP" and instruction.argrepr.startswith("**"):
-                whole = previous.opname in ("LOAD_CONST", "LOAD_SMALL_INT") and isinstance(previous.argval, int)
+                whole = previous.opname in ("LOAD_CONST", "LOAD_SMALL_INT") and isinstance(
+                    previous.argval, int
+                )
                 if not whole:
                     return True
             if instruction.opname != "CACHE":
@@ -237,26 +247,27 @@ def package(value: Any) -> str:
     return str(module or "").partition(".")[0]
 
 
-_overloads: dict[int, list[Any]] = {}
-_overloads_read = 0
-
-
 def overloads_of(function: types.FunctionType) -> list[Any]:
     """What numba.extending.overload has registered as the jitted meaning of a plain function."""
-    global _overloads_read
     templates = sys.modules.get("numba.core.typing.templates")
     if templates is None:
         return []
-    entries = templates.builtin_registry.globals
-    for value, kind in entries[_overloads_read:]:
+    return overload_table(len(templates.builtin_registry.globals)).get(id(function), [])
+
+
+@lru_cache(maxsize=1)
+def overload_table(n_entries: int) -> dict[int, list[Any]]:
+    """Registered implementations by the id of the function; read anew when Numba's registry has grown."""
+    table: dict[int, list[Any]] = {}
+    registry = sys.modules["numba.core.typing.templates"].builtin_registry
+    for value, kind in registry.globals[:n_entries]:
         for template in getattr(kind, "templates", ()):
             implementation = getattr(template, "_overload_func", None)
             if implementation is not None:
-                _overloads.setdefault(id(value), []).append(implementation)
-    _overloads_read = len(entries)
-    return _overloads.get(id(function), [])
+                table.setdefault(id(value), []).append(implementation)
+    return table
 
 
 def uses_libm(function: Callable[..., Any]) -> bool:
-    """Whether the function, or any that it reaches, calls the machine's mathematical library: its results are then not portable."""
+    """Whether the function, or any that it reaches, calls the machine's mathematical library: it is then not portable."""
     return bool(Fingerprint(function).libm)

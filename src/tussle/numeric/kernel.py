@@ -1,7 +1,7 @@
 """Kernel decorators: one explicit signature, strict IEEE arithmetic, nothing compiled at import, kept on disk by content.
 
-Codes of a signature: f8 i8 b1 u8 numbers; F I B U read-only 1-D contiguous arrays of float64, int64, bool, uint64; Fw Iw Bw Uw writable ones;
-F2 F2w ... 2-D C-contiguous. A result follows "->"; several results make a tuple.
+Codes of a signature: f8 i8 b1 u8 numbers; F I B U read-only 1-D contiguous arrays of float64, int64, bool, uint64; Fw
+Iw Bw Uw writable ones; F2 F2w ... 2-D C-contiguous. A result follows "->"; several results make a tuple.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import types
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, update_wrapper
-from typing import Any
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -62,23 +62,38 @@ def environment() -> str:
     """What every kernel's machine code depends on besides the code: versions, processor, settings of the compiler."""
     import llvmlite
     import numba
-    from numba.core import config
+    import numba.core.config
     from numba.core.registry import cpu_target
 
-    settings = [config.OPT, config.LOOP_VECTORIZE, config.SLP_VECTORIZE, config.BOUNDSCHECK, config.DEBUGINFO_DEFAULT]
-    versions = [platform.python_implementation(), sys.version, numba.__version__, llvmlite.__version__, np.__version__]
-    return repr((FORMAT, versions, cpu_target.target_context.codegen().magic_tuple(), [str(setting) for setting in settings]))
+    names = ("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "BOUNDSCHECK", "DEBUGINFO_DEFAULT")
+    settings = [str(getattr(numba.core.config, name)) for name in names]
+    versions = [
+        platform.python_implementation(),
+        sys.version,
+        numba.__version__,
+        llvmlite.__version__,
+        np.__version__,
+    ]
+    return repr((FORMAT, versions, cpu_target.target_context.codegen().magic_tuple(), settings))
 
 
 def renamed(function: Any, key: str) -> types.FunctionType:
     """A copy whose name holds the key.
 
-    Symbols in the machine code are made of the qualified name and a number counted per process; functions of one name from files that
-    different processes wrote would otherwise meet under one symbol.
+    Symbols in the machine code are made of the qualified name and a number counted per process; functions of one
+    name from files that different processes wrote would otherwise meet under one symbol.
     """
-    copy = types.FunctionType(function.__code__, function.__globals__, function.__name__, function.__defaults__, function.__closure__)
+    copy = types.FunctionType(
+        function.__code__,
+        function.__globals__,
+        function.__name__,
+        function.__defaults__,
+        function.__closure__,
+    )
     copy.__kwdefaults__ = function.__kwdefaults__
-    copy.__module__ = function.__module__ or "generated"  # without a module Numba would drag the globals into the file
+    copy.__module__ = (
+        function.__module__ or "generated"
+    )  # without a module Numba would drag the globals into the file
     copy.__qualname__ = f"{function.__qualname__}_{key}"
     return copy
 
@@ -90,7 +105,9 @@ class Device:
         function: The Python function, also found as `py_func`.
     """
 
-    options: dict[str, Any] = {"error_model": "numpy", "forceinline": True}
+    options: ClassVar[dict[str, Any]] = {"error_model": "numpy", "forceinline": True}
+    __name__: str
+    __qualname__: str
 
     def __init__(self, function: Callable[..., Any]) -> None:
         self.py_func = function
@@ -138,11 +155,11 @@ class Kernel(Device):
         ValueError: The signature has an unknown code, or not as many as the function has arguments.
     """
 
-    options = {"error_model": "numpy"}
+    options: ClassVar[dict[str, Any]] = {"error_model": "numpy"}
 
-    def __new__(cls, *args: Any) -> Kernel:
-        # A class of its own for each kernel: `__call__` is looked up on the class, and becomes Numba's dispatcher itself once that exists,
-        # so that a call costs hardly more than the dispatcher's.
+    def __new__(cls, *args: Any) -> Self:
+        # A class of its own for each kernel: `__call__` is looked up on the class, and becomes Numba's dispatcher itself
+        # once that exists, so that a call costs hardly more than the dispatcher's.
         return super().__new__(type("Kernel", (cls,), {"__slots__": ()}))
 
     def __init__(self, function: Callable[..., Any], signature: str) -> None:
@@ -154,10 +171,14 @@ class Kernel(Device):
         known = set(NUMBERS) | {letter + rest for letter in LETTERS for rest in ("", "w", "2", "2w")}
         wrong = [code for code in self.arguments + self.results if code not in known]
         if wrong or (arrow and not self.results):
-            raise ValueError(f"kernel {self.name}: unknown code {wrong} in signature {signature!r}; there are: {', '.join(sorted(known))}")
+            raise ValueError(
+                f"kernel {self.name}: unknown code {wrong} in signature {signature!r}; there are: {', '.join(sorted(known))}"
+            )
         n_arguments = self.py_func.__code__.co_argcount
         if n_arguments != len(self.arguments):
-            raise ValueError(f"kernel {self.name} has {n_arguments} arguments, its signature {signature!r} has {len(self.arguments)}")
+            raise ValueError(
+                f"kernel {self.name} has {n_arguments} arguments, its signature {signature!r} has {len(self.arguments)}"
+            )
         self._compiled: Any = None
         self._main: Any = None
 
@@ -194,7 +215,9 @@ class Kernel(Device):
         return self._key(Fingerprint(self.py_func))
 
     def _key(self, reached: Fingerprint) -> str:
-        text = repr((reached.digest, self.arguments, self.results, sorted(self.options.items()), environment()))
+        text = repr(
+            (reached.digest, self.arguments, self.results, sorted(self.options.items()), environment())
+        )
         return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
 
     def assembly(self) -> str:
@@ -244,7 +267,9 @@ class Kernel(Device):
         for name, code, value in zip(names, self.arguments, args, strict=False):
             wrong = mismatch(code, value)
             if wrong:
-                raise TypeError(f"kernel {self.name}: argument {name!r} must be {expected(code)}, not {wrong}")
+                raise TypeError(
+                    f"kernel {self.name}: argument {name!r} must be {expected(code)}, not {wrong}"
+                )
         self._main._insert([typeof(value)._code for value in args], self._compiled.entry_point, False)
         return self._compiled.entry_point
 
@@ -276,7 +301,12 @@ def mismatch(code: str, value: Any) -> str:
     if not isinstance(value, np.ndarray):
         return f"{type(value).__name__} {value!r:.60}"
     flags = value.flags
-    good = value.dtype == LETTERS[code[0]] and value.ndim == (2 if "2" in code else 1) and flags.c_contiguous and flags.aligned
+    good = (
+        value.dtype == LETTERS[code[0]]
+        and value.ndim == (2 if "2" in code else 1)
+        and flags.c_contiguous
+        and flags.aligned
+    )
     if good and (flags.writeable or not code.endswith("w")):
         return ""
     layout = "" if flags.c_contiguous else "non-contiguous "
@@ -292,8 +322,8 @@ def save(name: str, key: str, result: Any) -> None:
     library, description, main, signature, _, _, _, reload_init, referenced = result._reduce()
     if reload_init:
         return
-    # Numba would keep the name of the module and import it when loading; a generated or user's module may not be importable, and its
-    # globals only serve Numba's object mode.
+    # Numba would keep the name of the module and import it when loading; a generated or user's module may not be
+    # importable, and its globals only serve Numba's object mode.
     environments = [(each.consts, each.env_name) for each in (main, *referenced)]
     store.save(name, key, dumps((library, description, signature, environments)))
 

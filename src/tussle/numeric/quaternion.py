@@ -1,8 +1,9 @@
 """Unit quaternions (w, x, y, z) from the body frame (forward, left, up) to the world frame (east, north, up).
 
-In jitted code every function takes and gives components: `quat_rotate(qw, qx, qy, qz, vx, vy, vz)` gives three numbers. From Python the same
-names take arrays, quaternions (4, n) or (4,), vectors (3, n) or (3,). Angles are those of yaw, then pitch, then roll about the turned axes;
-pitch turns about the left axis, so it is positive with the nose down.
+In jitted code every function takes and gives components: `quat_rotate(qw, qx, qy, qz, vx, vy, vz)` gives three
+numbers. From Python the same names take arrays, quaternions (4, n) or (4,), vectors (3, n) or (3,). Angles are those
+of yaw, then pitch, then roll about the turned axes; pitch turns about the left axis, so it is positive with the nose
+down.
 """
 
 from __future__ import annotations
@@ -41,8 +42,12 @@ class Columnar(Device):
             raise TypeError(f"{self.__name__} takes {len(self._n_in)} arrays, not {len(arrays)}")
         for place, (array, size) in enumerate(zip(arrays, self._n_in, strict=True)):
             if size and (array.ndim == 0 or array.shape[0] != size):
-                raise TypeError(f"{self.__name__}: argument {place} has shape {array.shape}; expected ({size},) or ({size}, n)")
-        tails = [array.shape[1:] if size else array.shape for array, size in zip(arrays, self._n_in, strict=True)]
+                raise TypeError(
+                    f"{self.__name__}: argument {place} has shape {array.shape}; expected ({size},) or ({size}, n)"
+                )
+        tails = [
+            array.shape[1:] if size else array.shape for array, size in zip(arrays, self._n_in, strict=True)
+        ]
         tail = np.broadcast_shapes(*tails)
         columns = [column_major(array, size, tail) for array, size in zip(arrays, self._n_in, strict=True)]
         out = np.empty((max(self._n_out, 1), columns[0].shape[1]))
@@ -54,7 +59,9 @@ class Columnar(Device):
 def column_major(array: Floats, size: int, tail: tuple[int, ...]) -> Floats:
     """The array broadcast to its number of components and the common shape, as (components, n)."""
     if size:
-        shaped = np.broadcast_to(array.reshape(size, *(1,) * (len(tail) - array.ndim + 1), *array.shape[1:]), (size, *tail))
+        shaped = np.broadcast_to(
+            array.reshape(size, *(1,) * (len(tail) - array.ndim + 1), *array.shape[1:]), (size, *tail)
+        )
     else:
         shaped = np.broadcast_to(array, tail)
     return np.ascontiguousarray(shaped).reshape(max(size, 1), -1)
@@ -142,12 +149,14 @@ def _to_roll(w, x, y, z):
 
 @kernel("F2 F2 F2 F2w")
 def from_euler_rows(roll, pitch, yaw, out):
+    """Roll, pitch, yaw (1, n) [rad] to quaternions (4, n)."""
     for i in range(out.shape[1]):
         out[0, i], out[1, i], out[2, i], out[3, i] = _from_euler(roll[0, i], pitch[0, i], yaw[0, i])
 
 
 @kernel("F2 F2 F2w")
 def multiply_rows(a, b, out):
+    """Products of quaternions (4, n)."""
     for i in range(out.shape[1]):
         out[0, i], out[1, i], out[2, i], out[3, i] = _multiply(
             a[0, i], a[1, i], a[2, i], a[3, i], b[0, i], b[1, i], b[2, i], b[3, i]
@@ -156,42 +165,53 @@ def multiply_rows(a, b, out):
 
 @kernel("F2 F2w")
 def conjugate_rows(q, out):
+    """Inverses of unit quaternions (4, n)."""
     for i in range(out.shape[1]):
         out[0, i], out[1, i], out[2, i], out[3, i] = _conjugate(q[0, i], q[1, i], q[2, i], q[3, i])
 
 
 @kernel("F2 F2w")
 def normalize_rows(q, out):
+    """Quaternions (4, n) scaled to length 1."""
     for i in range(out.shape[1]):
         out[0, i], out[1, i], out[2, i], out[3, i] = _normalize(q[0, i], q[1, i], q[2, i], q[3, i])
 
 
 @kernel("F2 F2 F2w")
 def rotate_rows(q, v, out):
+    """Body vectors (3, n) in the world frame."""
     for i in range(out.shape[1]):
-        out[0, i], out[1, i], out[2, i] = _rotate(q[0, i], q[1, i], q[2, i], q[3, i], v[0, i], v[1, i], v[2, i])
+        out[0, i], out[1, i], out[2, i] = _rotate(
+            q[0, i], q[1, i], q[2, i], q[3, i], v[0, i], v[1, i], v[2, i]
+        )
 
 
 @kernel("F2 F2 F2w")
 def rotate_inverse_rows(q, v, out):
+    """World vectors (3, n) in the body frame."""
     for i in range(out.shape[1]):
-        out[0, i], out[1, i], out[2, i] = _rotate_inverse(q[0, i], q[1, i], q[2, i], q[3, i], v[0, i], v[1, i], v[2, i])
+        out[0, i], out[1, i], out[2, i] = _rotate_inverse(
+            q[0, i], q[1, i], q[2, i], q[3, i], v[0, i], v[1, i], v[2, i]
+        )
 
 
 @kernel("F2 F2w")
 def to_yaw_rows(q, out):
+    """Headings (1, n) [rad] of quaternions (4, n)."""
     for i in range(out.shape[1]):
         out[0, i] = _to_yaw(q[0, i], q[1, i], q[2, i], q[3, i])
 
 
 @kernel("F2 F2w")
 def to_pitch_rows(q, out):
+    """Pitch angles (1, n) [rad] of quaternions (4, n), positive nose down."""
     for i in range(out.shape[1]):
         out[0, i] = _to_pitch(q[0, i], q[1, i], q[2, i], q[3, i])
 
 
 @kernel("F2 F2w")
 def to_roll_rows(q, out):
+    """Roll angles (1, n) [rad] of quaternions (4, n)."""
     for i in range(out.shape[1]):
         out[0, i] = _to_roll(q[0, i], q[1, i], q[2, i], q[3, i])
 

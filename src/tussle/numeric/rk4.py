@@ -23,8 +23,9 @@ def compile_derivative(
     """A state equation written with named numbers, as a kernel `void(x, u, p, dx)` over arrays.
 
     Args:
-        function: Takes any of the names, in any order, and returns the time derivative of every state in the order of `x_names` (a
-            number where there is one state). What can be compiled is what Numba can; `math.cos` and its like make it depend on the machine.
+        function: Takes any of the names, in any order, and returns the time derivative of every state in the order of
+            `x_names` (a number where there is one state). It may use what Numba can compile; `math.cos` and its like
+            make it depend on the machine.
         x_names: States.
         u_names: Inputs.
         p_names: Parameters.
@@ -36,18 +37,23 @@ def compile_derivative(
     for array, names in (("x", x_names), ("u", u_names), ("p", p_names)):
         for place, name in enumerate(names):
             if name in where:
-                raise DeclarationError(f"{label(function)}: {name!r} is declared twice among states, inputs and parameters")
+                raise DeclarationError(
+                    f"{label(function)}: {name!r} is declared twice among states, inputs and parameters"
+                )
             where[name] = f"{array}[{place}]"
     arguments = list(inspect.signature(function).parameters)
     for name in arguments:
         if name not in where:
             raise DeclarationError(
-                f"{label(function)}: argument {name!r} is no state, input or parameter{nearest_name(name, where)}; {listed(where)}"
+                f"{label(function)}: argument {name!r} is no state, input or parameter"
+                f"{nearest_name(name, where)}; {listed(where)}"
             )
     targets = ", ".join(f"dx[{place}]" for place in range(len(x_names)))
     values = ", ".join(where[name] for name in arguments)
-    scope: dict[str, Any] = {"function": function if isinstance(function, (Device, Kernel)) else device(function)}
-    exec(f"def derivative(x, u, p, dx):\n    {targets} = function({values})\n", scope)
+    scope: dict[str, Any] = {
+        "function": function if isinstance(function, (Device, Kernel)) else device(function)
+    }
+    exec(f"def derivative(x, u, p, dx):\n    {targets} = function({values})\n", scope)  # noqa: S102 - the text holds only checked names
     wrapper = scope["derivative"]
     wrapper.__module__ = function.__module__
     wrapper.__qualname__ = f"{function.__qualname__}.wrapper"
@@ -123,7 +129,9 @@ def driver() -> Kernel:
     return rk4_rows
 
 
-def rk4(derivative: Kernel, states: Floats, inputs: Floats, params: Floats, dt: float, substeps: int = 1) -> None:
+def rk4(
+    derivative: Kernel, states: Floats, inputs: Floats, params: Floats, dt: float, substeps: int = 1
+) -> None:
     """Advance all rows by dt in equal substeps, inputs and parameters held.
 
     Args:
@@ -138,7 +146,9 @@ def rk4(derivative: Kernel, states: Floats, inputs: Floats, params: Floats, dt: 
         ValueError: The arrays differ in their number of rows, or there is no substep.
     """
     if not states.shape[1] == inputs.shape[1] == params.shape[1]:
-        raise ValueError(f"rk4: states {states.shape}, inputs {inputs.shape} and params {params.shape} must have equally many columns")
+        raise ValueError(
+            f"rk4: states {states.shape}, inputs {inputs.shape} and params {params.shape} must have equally many columns"
+        )
     if substeps < 1:
         raise ValueError(f"rk4: substeps must be at least 1, not {substeps}")
     driver()(derivative.address, states, inputs, params, dt, substeps)

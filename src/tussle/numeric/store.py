@@ -14,7 +14,9 @@ from pathlib import Path
 from typing import Any
 
 KEEP = 8  # files per name: a few variants of the code, and of the processor settings that tests use
-TOUCH_AFTER = 86400.0  # [s] a file in use is marked as such once a day, so that the removal takes the unused ones
+TOUCH_AFTER = (
+    86400.0  # [s] a file in use is marked as such once a day, so that the removal takes the unused ones
+)
 
 
 def directory() -> Path:
@@ -31,7 +33,11 @@ def directory() -> Path:
 def file_stem(name: str) -> str:
     """The name as the beginning of a file name; long ones are cut and told apart by a hash."""
     plain = re.sub(r"[^A-Za-z0-9_.]", "_", name)
-    return plain if len(plain) <= 120 else f"{plain[:100]}_{hashlib.blake2b(name.encode(), digest_size=6).hexdigest()}"
+    return (
+        plain
+        if len(plain) <= 120
+        else f"{plain[:100]}_{hashlib.blake2b(name.encode(), digest_size=6).hexdigest()}"
+    )
 
 
 def load(name: str, key: str) -> Any:
@@ -46,7 +52,7 @@ def load(name: str, key: str) -> Any:
     digest, data = content[:32], content[32:]
     if hashlib.sha256(data).digest() != digest:  # a damaged file: running its machine code could do anything
         return None
-    return pickle.loads(data)
+    return pickle.loads(data)  # noqa: S301 - the folder is the user's own, and holds machine code anyway
 
 
 def save(name: str, key: str, data: bytes) -> None:
@@ -59,9 +65,9 @@ def save(name: str, key: str, data: bytes) -> None:
         try:
             with os.fdopen(handle, "wb") as file:
                 file.write(hashlib.sha256(data).digest() + data)
-            os.replace(temporary, folder / f"{stem}-{key}.kernel")
+            Path(temporary).replace(folder / f"{stem}-{key}.kernel")
         except BaseException:
-            os.unlink(temporary)
+            Path(temporary).unlink()
             raise
     except OSError as error:
         warn_unwritable(str(folder), str(error))
@@ -87,7 +93,8 @@ def remove_old(folder: Path, stem: str) -> None:
 def warn_unwritable(folder: str, why: str) -> None:
     """Say once per folder that nothing is kept."""
     warnings.warn(
-        f"compiled kernels cannot be kept in {folder} ({why}): they compile anew in every process; set TUSSLE_CACHE_DIR to a writable folder",
+        f"compiled kernels cannot be kept in {folder} ({why}): they compile anew in every process; "
+        "set TUSSLE_CACHE_DIR to a writable folder",
         RuntimeWarning,
         stacklevel=2,
     )

@@ -29,7 +29,9 @@ def test_array_equals_its_elements_and_its_parts(function, x):
     whole = function(x)
     for i, value in enumerate(x):
         # The sign of a NaN is no number's bit: it differs between lanes and scalars in the processor itself.
-        assert same_bits(whole[i], function(float(value))) or (math.isnan(whole[i]) and math.isnan(function(float(value))))
+        assert same_bits(whole[i], function(float(value))) or (
+            math.isnan(whole[i]) and math.isnan(function(float(value)))
+        )
     for first in range(min(len(x), 9)):
         np.testing.assert_array_equal(function(x[first:]), whole[first:])
 
@@ -54,7 +56,9 @@ def test_sincos_is_sin_and_cos(x):
 @relaxed
 @given(x=MODERATE)
 def test_sine_is_odd_and_cosine_even_bit_for_bit(x):
-    assert sin(-x) == -sin(x) and cos(-x) == cos(x) and tan(-x) == -tan(x)
+    assert sin(-x) == -sin(x)
+    assert cos(-x) == cos(x)
+    assert tan(-x) == -tan(x)
 
 
 @relaxed
@@ -71,7 +75,8 @@ def test_atan2_inverts_sincos(x, y):
     assert -math.pi <= angle <= math.pi
     s, c = sincos(angle)
     length = math.hypot(x, y)
-    assert abs(length * s - y) <= 1e-15 * length and abs(length * c - x) <= 1e-15 * length
+    assert abs(length * s - y) <= 1e-15 * length
+    assert abs(length * c - x) <= 1e-15 * length
 
 
 @relaxed

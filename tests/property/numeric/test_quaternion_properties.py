@@ -81,10 +81,20 @@ def test_batched_equals_single(n, seed):
     draw = np.random.default_rng(seed)
     angles, v = draw.uniform(-1.5, 1.5, size=(3, n)), draw.normal(size=(3, n))
     q = quat_from_euler(*angles)
-    results = [quat_rotate(q, v), quat_rotate_inverse(q, v), quat_multiply(q, q[:, ::-1]), quat_to_yaw(q), quat_normalize(2.0 * q)]
+    results = [
+        quat_rotate(q, v),
+        quat_rotate_inverse(q, v),
+        quat_multiply(q, q[:, ::-1]),
+        quat_to_yaw(q),
+        quat_normalize(2.0 * q),
+    ]
     for i in range(n):
         one = quat_from_euler(*(float(a) for a in angles[:, i]))
-        single = [quat_rotate(one, v[:, i]), quat_rotate_inverse(one, v[:, i]), quat_multiply(one, q[:, n - 1 - i])]
+        single = [
+            quat_rotate(one, v[:, i]),
+            quat_rotate_inverse(one, v[:, i]),
+            quat_multiply(one, q[:, n - 1 - i]),
+        ]
         single += [quat_to_yaw(one), quat_normalize(2.0 * one)]
         for whole, alone in zip(results, single, strict=True):
             np.testing.assert_array_equal(whole[..., i], alone)

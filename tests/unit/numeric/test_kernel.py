@@ -49,7 +49,15 @@ def test_kernel_computes_in_place():
 
 
 def test_results_follow_the_arrow():
-    arguments = (np.array([[0.0], [2.0]]), np.array([3]), np.array([True]), np.array([5], np.uint64), 4, True, 6)
+    arguments = (
+        np.array([[0.0], [2.0]]),
+        np.array([3]),
+        np.array([True]),
+        np.array([5], np.uint64),
+        4,
+        True,
+        6,
+    )
     assert all_codes(*arguments) == (10.0, 11)
 
 
@@ -65,8 +73,14 @@ def test_read_only_array_is_taken_where_the_code_reads():
     ("arguments", "message"),
     [
         ((np.ones(2), 0.0, 3), "argument 'out' must be a writable 1-D contiguous float64 array, not int 3"),
-        ((np.ones(2, int), 0.0, np.ones(2)), "'x' must be a 1-D contiguous float64 array, not a int64 array of shape"),
-        ((np.ones(4)[::2], 0.0, np.ones(2)), "'x' must be a 1-D contiguous float64 array, not a non-contiguous float64 array"),
+        (
+            (np.ones(2, int), 0.0, np.ones(2)),
+            "'x' must be a 1-D contiguous float64 array, not a int64 array of shape",
+        ),
+        (
+            (np.ones(4)[::2], 0.0, np.ones(2)),
+            "'x' must be a 1-D contiguous float64 array, not a non-contiguous float64 array",
+        ),
         ((np.ones((1, 2)), 0.0, np.ones(2)), r"'x' must be .*, not a float64 array of shape \(1, 2\)"),
         ((np.ones(2), "a", np.ones(2)), "'offset' must be a number, not str 'a'"),
         ((np.ones(2), 0.0, np.broadcast_to(1.0, 2)), "'out' must be a writable .*, not a read-only"),
@@ -79,7 +93,7 @@ def test_wrong_argument_is_named_with_what_is_expected(arguments, message):
 
 def test_fraction_is_not_cut_to_an_integer():
     arguments = (np.ones((2, 1)), np.ones(1, int), np.array([True]), np.ones(1, np.uint64), 2.5, True, 6)
-    with pytest.raises(TypeError, match="'n' must be an integer, not float 2.5"):
+    with pytest.raises(TypeError, match=r"'n' must be an integer, not float 2\.5"):
         all_codes(*arguments)
 
 
@@ -88,7 +102,10 @@ def test_wrong_number_of_arguments():
         scale_rows(np.ones(2))
 
 
-@pytest.mark.parametrize(("signature", "message"), [("F Q Fw", "unknown code"), ("F Fw", "has 3 arguments"), ("F f8 Fw ->", "code")])
+@pytest.mark.parametrize(
+    ("signature", "message"),
+    [("F Q Fw", "unknown code"), ("F Fw", "has 3 arguments"), ("F f8 Fw ->", "code")],
+)
 def test_unsound_signature_is_refused_where_it_stands(signature, message):
     with pytest.raises(ValueError, match=f"scale_rows.*{message}"):
         kernel(signature)(scale_rows.py_func)
@@ -132,7 +149,7 @@ def test_threads_that_call_first_compile_once(own_cache):
     assert stats.compiled == before + 1
 
 
-# What the key sees ------------------------------------------------------------------------------------------------------------------------
+# What the key sees -----------------------------------------------------------------------------------------
 
 
 def key_of(source: str, name: str = "f", **scope: object) -> str:
@@ -168,7 +185,15 @@ def test_every_change_that_counts_changes_the_key():
 
 def test_frozen_arrays_tuples_and_closures_count():
     source = "def f(i):\n    return K[i]\n"
-    arrays = [np.arange(3.0), np.arange(3), np.array([0.0, 1.0, 2.5]), (0.0, 1.0), (0.0, 1), (0.0, (1.0,)), np.float64(1.0)]
+    arrays = [
+        np.arange(3.0),
+        np.arange(3),
+        np.array([0.0, 1.0, 2.5]),
+        (0.0, 1.0),
+        (0.0, 1),
+        (0.0, (1.0,)),
+        np.float64(1.0),
+    ]
     keys = [key_of(source, K=value) for value in arrays]
     assert len(set(keys)) == len(keys)
     closing = "def make(k):\n    def f(x):\n        return x + k\n    return f\nf = make(%s)\n"
@@ -219,7 +244,8 @@ def test_object_that_cannot_be_described_is_reported():
     def f(x):
         return x if strange else 0.0
 
-    assert Fingerprint(f).opaque and not Fingerprint(scaled.py_func).opaque
+    assert Fingerprint(f).opaque
+    assert not Fingerprint(scaled.py_func).opaque
 
 
 def test_libm_is_found_through_callees():
@@ -231,8 +257,12 @@ def test_libm_is_found_through_callees():
     def caller(x):
         return sine(x) + math.sqrt(x)
 
-    assert uses_libm(caller) and uses_libm(device(caller)) and uses_libm(lambda x: np.exp(x)) and uses_libm(lambda x, y: x**y)
-    assert not uses_libm(scaled) and not uses_libm(lambda x: x**2 + math.sqrt(x) + np.floor(x) + math.pi)
+    assert uses_libm(caller)
+    assert uses_libm(device(caller))
+    assert uses_libm(np.exp)
+    assert uses_libm(lambda x, y: x**y)
+    assert not uses_libm(scaled)
+    assert not uses_libm(lambda x: x**2 + math.sqrt(x) + np.floor(x) + math.pi)
 
 
 def test_global_redefined_at_the_prompt_is_seen_by_new_kernels(own_cache):
@@ -246,7 +276,7 @@ def test_global_redefined_at_the_prompt_is_seen_by_new_kernels(own_cache):
     assert scope["f"](1.0) == 11.0
 
 
-# Files --------------------------------------------------------------------------------------------------------------------------------
+# Files -----------------------------------------------------------------------------------------------------
 
 
 def test_damaged_file_is_compiled_anew(own_cache):
@@ -263,12 +293,12 @@ def test_damaged_file_is_compiled_anew(own_cache):
 def test_directory_that_cannot_be_written_warns_once_and_works(tmp_path, monkeypatch):
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("TUSSLE_CACHE_DIR", str(tmp_path / "file" / "cache"))
-    with pytest.warns(RuntimeWarning, match="cannot be kept in .*TUSSLE_CACHE_DIR") as caught:
-        for _ in range(2):
-            out = np.empty(1)
-            kernel("F f8 Fw")(scale_rows.py_func)(np.ones(1), 1.0, out)
-            assert out[0] == 3.0
-    assert len(caught) == 1
+    out = np.empty(1)
+    with pytest.warns(RuntimeWarning, match=r"cannot be kept in .*TUSSLE_CACHE_DIR"):
+        kernel("F f8 Fw")(scale_rows.py_func)(np.ones(1), 1.0, out)
+    assert out[0] == 3.0
+    kernel("F f8 Fw")(scale_rows.py_func)(np.ones(1), 2.0, out)  # a second warning would be an error
+    assert out[0] == 4.0
 
 
 def test_old_files_of_one_name_are_removed_and_others_stay(own_cache):
@@ -278,7 +308,8 @@ def test_old_files_of_one_name_are_removed_and_others_stay(own_cache):
     store.save("module.law_of_another", f"{0:032x}", b"data")
     names = sorted(path.name for path in own_cache.iterdir())
     assert len(names) == store.KEEP + 1
-    assert f"module.law-{store.KEEP + 2:032x}.kernel" in names and f"module.law-{0:032x}.kernel" not in names
+    assert f"module.law-{store.KEEP + 2:032x}.kernel" in names
+    assert f"module.law-{0:032x}.kernel" not in names
 
 
 def test_folder_is_chosen_by_the_environment(monkeypatch, tmp_path):
@@ -288,26 +319,31 @@ def test_folder_is_chosen_by_the_environment(monkeypatch, tmp_path):
     monkeypatch.delenv("TUSSLE_CACHE_DIR")
     assert store.directory() == tmp_path / "b" / "tussle"
     monkeypatch.delenv("NUMBA_CACHE_DIR")
-    assert "tussle" in str(store.directory()) and store.directory().is_absolute()
+    assert "tussle" in str(store.directory())
+    assert store.directory().is_absolute()
 
 
-# Across processes -------------------------------------------------------------------------------------------------------------------------
+# Across processes ------------------------------------------------------------------------------------------
 
 FILES = {
     "constants.py": "GRAVITY = 9.0\n",
-    "deep.py": "from tussle.numeric.kernel import device\nimport constants\n@device\ndef deep(x):\n    return x + constants.GRAVITY\n",
-    "shallow.py": "from tussle.numeric.kernel import device\nfrom deep import deep\n@device\ndef shallow(x):\n    return deep(x) * 2.0\n",
+    "deep.py": "from tussle.numeric.kernel import device\nimport constants\n"
+    "@device\ndef deep(x):\n    return x + constants.GRAVITY\n",
+    "shallow.py": "from tussle.numeric.kernel import device\nfrom deep import deep\n"
+    "@device\ndef shallow(x):\n    return deep(x) * 2.0\n",
     "law.py": (
         "from tussle.numeric.kernel import kernel\nimport shallow\nfrom tussle.numeric import sin\n"
         "@kernel('f8 -> f8')\ndef law(x):\n    return shallow.shallow(x) + 0.0 * sin(x)\n"
         "@kernel('f8 -> f8')\ndef other(x):\n    return x + 0.5\n"
         "def make(k):\n    @kernel('f8 -> f8')\n    def made(x):\n        return x * k\n    return made\n"
-        "scope = {'sin': sin}\nexec('def wrapper(x):\\n    return sin(x) * 0.0 + 7.0', scope)\ngenerated = kernel('f8 -> f8')(scope['wrapper'])\n"
+        "scope = {'sin': sin}\nexec('def wrapper(x):\\n    return sin(x) * 0.0 + 7.0', scope)\n"
+        "generated = kernel('f8 -> f8')(scope['wrapper'])\n"
     ),
 }
 PROGRAM = (
     "import law, sys\nfrom tussle.numeric.kernel import stats\n"
-    "print(law.law(1.0), law.other(1.0), law.make(2.0)(1.0), law.make(3.0)(1.0), law.generated(1.0), stats.compiled, stats.loaded)"
+    "print(law.law(1.0), law.other(1.0), law.make(2.0)(1.0), law.make(3.0)(1.0), "
+    "law.generated(1.0), stats.compiled, stats.loaded)"
 )
 
 
@@ -319,8 +355,19 @@ def project(tmp_path):
 
     def run(program: str = PROGRAM) -> list[float]:
         source = str(Path(store.__file__).parents[2])
-        env = dict(os.environ, PYTHONPATH=f"{tmp_path}:{source}", PYTHONDONTWRITEBYTECODE="1", TUSSLE_CACHE_DIR=str(tmp_path / "cache"))
-        done = subprocess.run([sys.executable, "-W", "error", "-c", program], env=env, capture_output=True, text=True, check=False)
+        env = dict(
+            os.environ,
+            PYTHONPATH=f"{tmp_path}:{source}",
+            PYTHONDONTWRITEBYTECODE="1",
+            TUSSLE_CACHE_DIR=str(tmp_path / "cache"),
+        )
+        done = subprocess.run(
+            [sys.executable, "-W", "error", "-c", program],
+            env=env,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
         assert done.returncode == 0, done.stderr
         return [float(word) for word in done.stdout.split()]
 
@@ -335,7 +382,9 @@ def project(tmp_path):
         stdout=subprocess.PIPE,
         text=True,
     )
-    run.edit = lambda name, old, new: (tmp_path / name).write_text((tmp_path / name).read_text().replace(old, new))  # type: ignore[attr-defined]
+    run.edit = lambda name, old, new: (tmp_path / name).write_text(
+        (tmp_path / name).read_text().replace(old, new)
+    )  # type: ignore[attr-defined]
     return run
 
 

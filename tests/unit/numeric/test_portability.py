@@ -32,7 +32,9 @@ SETTINGS = {
 
 def hash_under(settings: dict[str, str], folder: Path) -> str:
     env = dict(os.environ, PYTHONPATH=str(PACKAGE.parent), TUSSLE_CACHE_DIR=str(folder), **settings)
-    done = subprocess.run([sys.executable, "-W", "error", PROGRAM], env=env, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-W", "error", PROGRAM], env=env, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr
     return done.stdout.strip()
 
@@ -49,35 +51,48 @@ def test_all_instruction_sets_give_the_same_bits(name, plain, tmp_path):
     assert hash_under(SETTINGS[name], tmp_path) == plain
 
 
-# Assembly ---------------------------------------------------------------------------------------------------------------------------------
+# Assembly --------------------------------------------------------------------------------------------------
 
 LIBM = (
-    "sin cos tan sincos asin acos atan atan2 sinh cosh tanh asinh acosh atanh exp exp2 exp10 expm1 log log2 log10 log1p pow hypot cbrt "
-    "erf erfc tgamma lgamma fma powi __powidf2 ldexp"
-).split()
-CALL = re.compile(r"(?<![\w.])(_?(?:__svml_|_ZGV\w+_|numba_|npy_)?(?:%s)f?\d?)(?:@PLT|@GOTPCREL)?(?![\w.])" % "|".join(LIBM))
+    "sin|cos|tan|sincos|asin|acos|atan|atan2|sinh|cosh|tanh|asinh|acosh|atanh|exp|exp2|exp10|expm1|"
+    "log|log2|log10|log1p|pow|hypot|cbrt|erf|erfc|tgamma|lgamma|fma|powi|__powidf2|ldexp"
+)
+CALL = re.compile(
+    rf"(?<![\w.])(_?(?:__svml_|_ZGV\w+_|numba_|npy_)?(?:{LIBM})f?\d?)(?:@PLT|@GOTPCREL)?(?![\w.])"
+)
+
 FUSED = re.compile(r"\bv?fn?m(?:add|sub)\w*", re.IGNORECASE)
 
 
 def suspicious(assembly: str) -> set[str]:
     """Calls of the mathematical library and fused multiply-adds in assembly text."""
-    code = [line for line in assembly.splitlines() if line.startswith("\t") and not line.startswith(("\t.ascii", "\t.asciz", "\t.section", "\t.file"))]
+    code = [
+        line
+        for line in assembly.splitlines()
+        if line.startswith("\t") and not line.startswith(("\t.ascii", "\t.asciz", "\t.section", "\t.file"))
+    ]
     return {match.group(0) for line in code for match in (CALL.search(line), FUSED.search(line)) if match}
 
 
 def kernel_modules() -> list[str]:
     """Modules of the package whose text declares kernels."""
-    found = []
-    for path in sorted(PACKAGE.rglob("*.py")):
-        if "@kernel(" in path.read_text() and path.name not in ("kernel.py", "rk4.py"):
-            found.append(".".join(("tussle", *path.relative_to(PACKAGE).with_suffix("").parts)).removesuffix(".__init__"))
-    return found
+    paths = [path for path in sorted(PACKAGE.rglob("*.py")) if "@kernel(" in path.read_text()]
+    parts = [
+        path.relative_to(PACKAGE).with_suffix("").parts
+        for path in paths
+        if path.name not in ("kernel.py", "rk4.py")
+    ]
+    return [".".join(("tussle", *names)).removesuffix(".__init__") for names in parts]
 
 
 def kernels_of(module: str) -> list[Kernel]:
     """All kernels that exist after the module is imported and that are its own; generated ones too."""
     loaded = importlib.import_module(module)
-    own = [value for value in gc.get_objects() if isinstance(value, Kernel) and value.py_func.__globals__ is vars(loaded)]
+    own = [
+        value
+        for value in gc.get_objects()
+        if isinstance(value, Kernel) and value.py_func.__globals__ is vars(loaded)
+    ]
     assert own
     return own
 
@@ -92,7 +107,10 @@ def test_nor_does_the_integrator():
     assert not suspicious(driver().assembly())
 
 
-@pytest.mark.parametrize("expression", ["math.sin(x)", "math.exp(x)", "x**1.7", "math.atan2(x, 2.0)", "np.log(x)", "math.hypot(x, 1.0)"])
+@pytest.mark.parametrize(
+    "expression",
+    ["math.sin(x)", "math.exp(x)", "x**1.7", "math.atan2(x, 2.0)", "np.log(x)", "math.hypot(x, 1.0)"],
+)
 def test_the_reading_of_assembly_finds_such_calls(expression):
     import math
 

@@ -25,7 +25,14 @@ def decay(x):
 
 def error_after_one_second(substeps):
     states = np.array([[1.0], [0.0]])
-    rk4(compile_derivative(oscillator, ["place", "speed"], [], ["stiffness"]), states, NONE, np.ones((1, 1)), 1.0, substeps)
+    rk4(
+        compile_derivative(oscillator, ["place", "speed"], [], ["stiffness"]),
+        states,
+        NONE,
+        np.ones((1, 1)),
+        1.0,
+        substeps,
+    )
     return max(abs(states[0, 0] - math.cos(1.0)), abs(states[1, 0] + math.sin(1.0)))
 
 
@@ -55,7 +62,11 @@ def test_a_row_does_not_depend_on_the_others():
 
     derivative = compile_derivative(car, ["east", "north", "yaw", "v"], ["command", "turn"], ["lag"])
     draw = np.random.default_rng(0)
-    states, inputs, params = draw.normal(size=(4, 33)), draw.normal(size=(2, 33)), draw.uniform(0.5, 2.0, size=(1, 33))
+    states, inputs, params = (
+        draw.normal(size=(4, 33)),
+        draw.normal(size=(2, 33)),
+        draw.uniform(0.5, 2.0, size=(1, 33)),
+    )
     whole = states.copy()
     rk4(derivative, whole, inputs, params, 0.1, 5)
     for first, n in ((0, 1), (7, 1), (5, 3), (20, 13)):
@@ -71,14 +82,19 @@ def test_the_machine_library_may_be_used_and_is_found():
     states = np.array([[0.1], [0.0]])
     rk4(compile_derivative(swing, ["angle", "speed"], [], []), states, NONE, NONE, 0.01)
     assert states[1, 0] == pytest.approx(-9.81 * math.sin(0.1) * 0.01, rel=1e-3)
-    assert uses_libm(swing) and uses_libm(compile_derivative(swing, ["angle", "speed"], [], [])) and not uses_libm(oscillator)
+    assert uses_libm(swing)
+    assert uses_libm(compile_derivative(swing, ["angle", "speed"], [], []))
+    assert not uses_libm(oscillator)
 
 
 def test_unknown_argument_is_named_with_its_place_and_the_nearest_name():
     def wrong(speed, stifness):
         return -stifness * speed
 
-    with pytest.raises(DeclarationError, match=r"test_rk4.py:\d+: .*wrong: argument 'stifness' .*did you mean 'stiffness'.*speed, stiffness"):
+    with pytest.raises(
+        DeclarationError,
+        match=r"test_rk4.py:\d+: .*wrong: argument 'stifness' .*did you mean 'stiffness'.*speed, stiffness",
+    ):
         compile_derivative(wrong, ["speed"], [], ["stiffness"])
 
 
