@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +14,8 @@ Floats = NDArray[np.float64]
 Longs = NDArray[np.int64]
 
 RINGS = 2
-"""Cells per reach of a world: with 2 a block's box is about as high as it is long where time is spent (best of 1 to 3 at 2000)."""
+"""Cells per reach of a world: with 2 a block's box is about as high as it is long where time is spent (best of 1 to 3 at
+2000)."""
 
 SPARSE_WORLD = 400
 """Below this many entities one cell per reach is faster: fuller blocks (1.0 against 1.3 us per entity at 110, even at 500)."""
@@ -25,7 +25,8 @@ SPARSE_WORLD = 400
 class Blocks:
     """Query rows in groups of up to LANES that stand close together, each with the runs of places where its neighbours are.
 
-    Block b holds queries[block_first[b] : block_first[b + 1]]; its candidates are the places span_start[s] to span_end[s] - 1 for s
+    Block b holds queries[block_first[b] : block_first[b + 1]]; its candidates are the places span_start[s] to span_end[s] - 1
+    for s
     from span_first[b] to span_first[b + 1] - 1. Walking them in this order is the order of (cell row, cell, id), in any stack.
     """
 
@@ -45,15 +46,16 @@ class Blocks:
 
 
 def padded(n: int) -> Floats:
-    """n zeros that may be read in groups of LANES up to the last."""
+    """N zeros that may be read in groups of LANES up to the last."""
     return np.zeros(n + LANES)[:n]
 
 
 class Index:
     """Positions of all rows of all worlds at one instant; what a world's rows see is independent of the other worlds.
 
-    After `layout` and `build`: `order` (N,) row of each place; `place` (N,) its inverse; `sx`, `sy`, `sz` (N,) positions by place.
-    `inverse_cell` (n_worlds,) [1/m] is 0 where a world is one cell. World w holds places world_start[w] to world_start[w + 1] - 1, and members[world_start[w] + k] is its k-th row by id.
+    After `layout` and `build`: `order` (N,) row of each place; `place` (N,) its inverse; `sx`, `sy`, `sz` (N,) positions by
+    place. `built` counts the builds. `inverse_cell` (n_worlds,) [1/m] is 0 where a world is one cell. World w holds places
+    world_start[w] to world_start[w + 1] - 1, and members[world_start[w] + k] is its k-th row by id.
     """
 
     def __init__(self) -> None:
@@ -106,7 +108,8 @@ class Index:
     def build(self, x: Floats, y: Floats, z: Floats, reach: Floats) -> None:
         """Sort positions x, y, z (N,) [m] into cells. `reach` (n_worlds,) [m]: distance up to which blocks find everyone.
 
-        An infinite reach puts a world into one cell, in order of id; with every reach infinite the order depends on the layout alone.
+        An infinite reach puts a world into one cell, in order of id; with every reach infinite the order depends on the layout
+        alone.
         """
         if not np.array_equal(reach, self.reach) or not self.built:
             self.reach = np.array(reach, np.float64)
@@ -157,13 +160,21 @@ class Index:
             if needed <= room:
                 break
             room = needed
-        blocks = Blocks(queries, x, y, z, n_blocks, block_first, span_first, spans[0], spans[1], int(self._size[0]))
+        blocks = Blocks(
+            queries, x, y, z, n_blocks, block_first, span_first, spans[0], spans[1], int(self._size[0])
+        )
         if pos is None:
             self._cache[first, last] = (self._fixed, self.built, blocks)
         return blocks
 
     def _query_positions(
-        self, first: int, queries: Longs, pos: tuple[Floats, Floats, Floats] | None, x: Floats, y: Floats, z: Floats
+        self,
+        first: int,
+        queries: Longs,
+        pos: tuple[Floats, Floats, Floats] | None,
+        x: Floats,
+        y: Floats,
+        z: Floats,
     ) -> None:
         own = pos is not None
         east, north, up = pos if pos is not None else (self.sx, self.sy, self.sz)

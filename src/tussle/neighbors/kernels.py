@@ -36,7 +36,9 @@ def cell_of(position: float, inverse_cell: float, limit: float) -> int:
 
 
 @kernel("I I I I Iw Iw Iw Iw Iw Iw Iw i8")
-def arrange(row_world, row_id, old_start, old_ids, keys, world_start, members, ids, fresh, scratch, sequence, n_worlds):
+def arrange(
+    row_world, row_id, old_start, old_ids, keys, world_start, members, ids, fresh, scratch, sequence, n_worlds
+):
     """New lists of the rows of each world by id, and the last sorted order carried over to them.
 
     In: row_world, row_id (N,) of the new table; old_start (n_worlds + 1,), old_ids (old N,) by rank; keys (old N,) sorted.
@@ -92,8 +94,8 @@ def build(
 ):  # fmt: skip
     """Sort the rows of every world by (cell row, cell, id) and note where each cell row (strip) begins.
 
-    x, y, z (N,) positions [m]; inverse_cell (n_worlds,) [1/m], 0 for one cell per world. keys (N,) hold ranks in their low bits on
-    entry, in any order, the last one for speed. strip_start (N + 1,), strip_world (N + 1,): first place and world of
+    x, y, z (N,) positions [m]; inverse_cell (n_worlds,) [1/m], 0 for one cell per world. keys (N,) hold ranks in their low bits
+    on entry, in any order, the last one for speed. strip_start (N + 1,), strip_world (N + 1,): first place and world of
     each strip; world_strip (n_worlds + 1,): first strip of each world.
     """
     n_worlds = world_start.shape[0] - 1
@@ -208,6 +210,18 @@ def step_to(keys: Any, start: int, end: int, bound: int, guess: int) -> int:
     return guess
 
 
+@device
+def rectangle(x, y, start, end):
+    """Least and largest x and y of the points [start, end)."""
+    west, east, south, north = x[start], x[start], y[start], y[start]
+    for q in range(start + 1, end):
+        west = min(west, x[q])
+        east = max(east, x[q])
+        south = min(south, y[q])
+        north = max(north, y[q])
+    return west, east, south, north
+
+
 @kernel("F I I I I F F I I I i8 F Iw Iw Iw Iw Iw -> i8")
 def find_spans(
     inverse_cell, world_start, keys, strip_start, world_strip, x, y, block_first, block_strip, strip_world, n_blocks,
@@ -215,7 +229,8 @@ def find_spans(
 ):  # fmt: skip
     """Candidate runs of every block: all entities of its world within `reach` of a query, and more.
 
-    x, y (n,) positions [m] of the queries in query order; reach (n_worlds,) [m]; strip_world (n_strips,). cursor (3 n_strips,) work
+    x, y (n,) positions [m] of the queries in query order; reach (n_worlds,) [m]; strip_world (n_strips,). cursor (3 n_strips,)
+    work
     space. Returns the number of spans, which may exceed the room in span_start (then call again with more). size[0] becomes the
     largest number of candidates of one block.
     """
@@ -243,15 +258,7 @@ def find_spans(
         bits = rank_bits(end - start)
         cell_bits = (KEY_BITS - bits) >> 1
         limit = float((1 << (cell_bits - 1)) - 1)
-        west = x[block_first[b]]
-        east = west
-        south = y[block_first[b]]
-        north = south
-        for q in range(block_first[b] + 1, block_first[b + 1]):
-            west = min(west, x[q])
-            east = max(east, x[q])
-            south = min(south, y[q])
-            north = max(north, y[q])
+        west, east, south, north = rectangle(x, y, block_first[b], block_first[b + 1])
         low_row = cell_of(south - reach[w], inverse, limit)
         high_row = cell_of(north + reach[w], inverse, limit)
         low = cell_of(west - reach[w], inverse, limit)

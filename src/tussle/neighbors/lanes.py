@@ -11,290 +11,132 @@ With the compiler off the same functions work on NumPy arrays of 8.
 
 from __future__ import annotations
 
-import operator
+import hashlib
 from collections.abc import Callable
+from functools import cache, update_wrapper
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-from llvmlite import ir
-from numba import types
-from numba.core import cgutils
-from numba.core.datamodel import models, register_default
-from numba.core.typing.templates import AbstractTemplate, infer_global, signature
-from numba.extending import lower_builtin
 
 from tussle.numeric.kernel import device
 
 LANES = 8
 """Agents per block. Eight doubles are one AVX-512 register; on narrower CPUs eight still amortise the candidate's loads."""
 
-_DOUBLES = ir.VectorType(ir.DoubleType(), LANES)
-_LONGS = ir.VectorType(ir.IntType(64), LANES)
-_BITS = ir.VectorType(ir.IntType(1), LANES)
-_RSQRT_MAGIC = 0x5FE6EB50C7B537A9
+RSQRT_MAGIC = 0x5FE6EB50C7B537A9
 
 
-class LanesType(types.Type):
-    """Numba type of eight doubles."""
-
-    def __init__(self) -> None:
-        super().__init__(name="Lanes8")
-
-
-class MaskType(types.Type):
-    """Numba type of eight truth values."""
-
-    def __init__(self) -> None:
-        super().__init__(name="Mask8")
+@cache
+def generators() -> str:
+    """Digest of the code generators: machine code made by others must not be taken from the cache."""
+    return hashlib.blake2b(
+        Path(__file__).with_name("lanes_codegen.py").read_bytes(), digest_size=16
+    ).hexdigest()
 
 
-LANES_TYPE = LanesType()
-MASK_TYPE = MaskType()
+class LaneFunction:
+    """A function on lanes: NumPy when called from Python, a few instructions inside a kernel.
+
+    The code generators, and Numba with them, are imported when a kernel is first compiled that names such a function.
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self.py_func = function
+        update_wrapper(self, function)
+
+    @property
+    def targetoptions(self) -> dict[str, str]:
+        """What the machine code depends on besides the Python code: part of the key of every kernel that uses the function."""
+        return {"generators": generators()}
+
+    @property
+    def _numba_type_(self) -> Any:
+        from tussle.neighbors.lanes_codegen import type_of
+
+        return type_of(self.py_func)
+
+    def __call__(self, *args: Any) -> Any:
+        return self.py_func(*args)
 
 
-@register_default(LanesType)
-class _LanesModel(models.PrimitiveModel):
-    def __init__(self, manager: Any, numba_type: Any) -> None:
-        super().__init__(manager, numba_type, _DOUBLES)
-
-
-@register_default(MaskType)
-class _MaskModel(models.PrimitiveModel):
-    def __init__(self, manager: Any, numba_type: Any) -> None:
-        super().__init__(manager, numba_type, _BITS)
-
-
+@LaneFunction
 def splat(value: Any) -> Any:
     """Eight copies of one number."""
     return np.full(LANES, value)
 
 
+@LaneFunction
 def load(array: Any, start: int) -> Any:
     """Elements start ... start + 7 of a contiguous float64 array; no bounds check, so the array has LANES spare elements."""
     found = array[start : start + LANES]
     return np.concatenate([found, np.zeros(LANES - len(found))])
 
 
+@LaneFunction
 def store(array: Any, start: int, lanes: Any) -> None:
     """Write eight lanes to elements start ... start + 7 of a contiguous float64 array; no bounds check."""
     array[start : start + LANES] = lanes
 
 
+@LaneFunction
 def load_some(array: Any, start: int, count: int) -> Any:
     """As load, but lanes from `count` on are 0 and not read: for the end of an array."""
     return load(array[: start + count], start)
 
 
+@LaneFunction
 def store_some(array: Any, start: int, count: int, lanes: Any) -> None:
     """As store, but lanes from `count` on are not written."""
     array[start : start + count] = lanes[:count]
 
 
+@LaneFunction
 def choose(mask: Any, yes: Any, no: Any) -> Any:
     """Per lane `yes` where the mask holds, else `no`; what is not chosen may be NaN."""
     return np.where(mask, yes, no)
 
 
+@LaneFunction
 def bits(mask: Any) -> int:
     """The mask as an integer, lane 0 in the lowest bit."""
     return int(np.packbits(mask, bitorder="little")[0])
 
 
+@LaneFunction
 def lane_of(lanes: Any, lane: int) -> float:
     """One lane's number."""
     return float(lanes[lane])
 
 
+@LaneFunction
 def below(count: int) -> Any:
     """Mask of the first `count` lanes."""
     return np.arange(LANES) < count
 
 
+@LaneFunction
 def lowest(hits: int) -> int:
     """Number of the lowest bit that is set; `hits` is not 0. `hits &= hits - 1` then clears it."""
     return (hits & -hits).bit_length() - 1
 
 
+@LaneFunction
 def ones(hits: int) -> int:
     """How many bits are set."""
     return hits.bit_count()
 
 
+@LaneFunction
 def lanes_sqrt(lanes: Any) -> Any:
     """Correctly rounded square root per lane."""
     return np.sqrt(lanes)
 
 
+@LaneFunction
 def rsqrt_guess(lanes: Any) -> Any:
     """1 / sqrt within 3.5 percent by integer arithmetic on the exponent: exact to reproduce on every machine."""
-    return (np.int64(_RSQRT_MAGIC) - (lanes.view(np.int64) >> 1)).view(np.float64)
-
-
-def _implement(function: Callable[..., Any], result: Any, *arguments: Any) -> Callable[[Any], Any]:
-    """Register the code generator that follows as `function(*arguments) -> result`."""
-
-    def register(generate: Any) -> Any:
-        class Template(AbstractTemplate):
-            key = function
-
-            def generic(self, args: Any, kws: Any) -> Any:
-                fits = len(args) == len(arguments) and all(
-                    given == wanted or (isinstance(wanted, type) and isinstance(given, wanted))
-                    for given, wanted in zip(args, arguments, strict=True)
-                )
-                return signature(result, *args) if fits and not kws else None
-
-        infer_global(function)(Template)
-        lower_builtin(function, *arguments)(generate)
-        return generate
-
-    return register
-
-
-def _splat(builder: Any, value: Any) -> Any:
-    zero = ir.Constant(ir.IntType(32), 0)
-    one = builder.insert_element(ir.Constant(_DOUBLES, ir.Undefined), value, zero)
-    places = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
-    return builder.shuffle_vector(one, ir.Constant(_DOUBLES, ir.Undefined), places)
-
-
-def _as_lanes(builder: Any, value: Any) -> Any:
-    return value if value.type == _DOUBLES else _splat(builder, value)
-
-
-def _pointer(context: Any, builder: Any, array_type: Any, array: Any, start: Any) -> Any:
-    data = context.make_array(array_type)(context, builder, value=array).data
-    return builder.bitcast(builder.gep(data, [start]), _DOUBLES.as_pointer())
-
-
-def _register_arithmetic() -> None:
-    for function, name in ((operator.add, "fadd"), (operator.sub, "fsub"), (operator.mul, "fmul"), (operator.truediv, "fdiv")):
-        inplace = getattr(operator, "i" + function.__name__)
-        for left, right in ((LANES_TYPE, LANES_TYPE), (LANES_TYPE, types.float64), (types.float64, LANES_TYPE)):
-
-            def generate(context: Any, builder: Any, sig: Any, args: Any, name: str = name) -> Any:
-                return getattr(builder, name)(_as_lanes(builder, args[0]), _as_lanes(builder, args[1]))
-
-            _implement(function, LANES_TYPE, left, right)(generate)
-            _implement(inplace, LANES_TYPE, left, right)(generate)
-
-
-def _register_comparisons() -> None:
-    for function, sign in ((operator.lt, "<"), (operator.le, "<="), (operator.gt, ">"), (operator.ge, ">="), (operator.eq, "=="), (operator.ne, "!=")):
-        for right in (LANES_TYPE, types.float64):
-
-            def generate(context: Any, builder: Any, sig: Any, args: Any, sign: str = sign) -> Any:
-                compare = builder.fcmp_unordered if sign == "!=" else builder.fcmp_ordered
-                return compare(sign, args[0], _as_lanes(builder, args[1]))
-
-            _implement(function, MASK_TYPE, LANES_TYPE, right)(generate)
-
-
-_register_arithmetic()
-_register_comparisons()
-
-
-@_implement(operator.and_, MASK_TYPE, MASK_TYPE, MASK_TYPE)
-def _mask_and(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    return builder.and_(*args)
-
-
-@_implement(operator.or_, MASK_TYPE, MASK_TYPE, MASK_TYPE)
-def _mask_or(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    return builder.or_(*args)
-
-
-@_implement(splat, LANES_TYPE, types.float64)
-def _generate_splat(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    return _splat(builder, args[0])
-
-
-@_implement(load, LANES_TYPE, types.Array, types.int64)
-def _generate_load(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    return builder.load(_pointer(context, builder, sig.args[0], *args), align=8)
-
-
-@_implement(store, types.void, types.Array, types.int64, LANES_TYPE)
-def _generate_store(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    builder.store(args[2], _pointer(context, builder, sig.args[0], args[0], args[1]), align=8)
-    return context.get_dummy_value()
-
-
-def _first_lanes(builder: Any, count: Any) -> Any:
-    """Mask of the lanes below `count`."""
-    numbers = ir.Constant(_LONGS, list(range(LANES)))
-    zero = ir.Constant(ir.IntType(32), 0)
-    one = builder.insert_element(ir.Constant(_LONGS, ir.Undefined), count, zero)
-    places = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
-    return builder.icmp_signed("<", numbers, builder.shuffle_vector(one, ir.Constant(_LONGS, ir.Undefined), places))
-
-
-def _call_llvm(builder: Any, name: str, result: Any, arguments: list[Any]) -> Any:
-    function_type = ir.FunctionType(result, [a.type for a in arguments])
-    return builder.call(cgutils.get_or_insert_function(builder.module, function_type, name), arguments)
-
-
-@_implement(load_some, LANES_TYPE, types.Array, types.int64, types.int64)
-def _generate_load_some(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    pointer = _pointer(context, builder, sig.args[0], args[0], args[1])
-    align = ir.Constant(ir.IntType(32), 8)
-    rest = ir.Constant(_DOUBLES, [0.0] * LANES)
-    arguments = [pointer, align, _first_lanes(builder, args[2]), rest]
-    return _call_llvm(builder, f"llvm.masked.load.v{LANES}f64.p0", _DOUBLES, arguments)
-
-
-@_implement(store_some, types.void, types.Array, types.int64, types.int64, LANES_TYPE)
-def _generate_store_some(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    pointer = _pointer(context, builder, sig.args[0], args[0], args[1])
-    align = ir.Constant(ir.IntType(32), 8)
-    arguments = [args[3], pointer, align, _first_lanes(builder, args[2])]
-    _call_llvm(builder, f"llvm.masked.store.v{LANES}f64.p0", ir.VoidType(), arguments)
-    return context.get_dummy_value()
-
-
-def _generate_choose(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    return builder.select(args[0], _as_lanes(builder, args[1]), _as_lanes(builder, args[2]))
-
-
-for _yes, _no in ((LANES_TYPE, LANES_TYPE), (LANES_TYPE, types.float64), (types.float64, LANES_TYPE), (types.float64, types.float64)):
-    _implement(choose, LANES_TYPE, MASK_TYPE, _yes, _no)(_generate_choose)
-
-
-@_implement(bits, types.int64, MASK_TYPE)
-def _generate_bits(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    return builder.zext(builder.bitcast(args[0], ir.IntType(LANES)), ir.IntType(64))
-
-
-@_implement(lane_of, types.float64, LANES_TYPE, types.int64)
-def _generate_lane_of(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    return builder.extract_element(*args)
-
-
-@_implement(below, MASK_TYPE, types.int64)
-def _generate_below(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    return _first_lanes(builder, args[0])
-
-
-@_implement(lowest, types.int64, types.int64)
-def _generate_lowest(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    return _call_llvm(builder, "llvm.cttz.i64", ir.IntType(64), [args[0], ir.Constant(ir.IntType(1), 1)])
-
-
-@_implement(ones, types.int64, types.int64)
-def _generate_ones(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    return _call_llvm(builder, "llvm.ctpop.i64", ir.IntType(64), [args[0]])
-
-
-@_implement(lanes_sqrt, LANES_TYPE, LANES_TYPE)
-def _generate_sqrt(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    return _call_llvm(builder, f"llvm.sqrt.v{LANES}f64", _DOUBLES, [args[0]])
-
-
-@_implement(rsqrt_guess, LANES_TYPE, LANES_TYPE)
-def _generate_guess(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    magic = ir.Constant(_LONGS, [_RSQRT_MAGIC] * LANES)
-    half = builder.lshr(builder.bitcast(args[0], _LONGS), ir.Constant(_LONGS, [1] * LANES))
-    return builder.bitcast(builder.sub(magic, half), _DOUBLES)
+    return (np.int64(RSQRT_MAGIC) - (lanes.view(np.int64) >> 1)).view(np.float64)
 
 
 @device

@@ -50,12 +50,20 @@ def team_filter(
 
 
 def pairs(
-    index: Index, first: int, last: int, x: Floats, y: Floats, z: Floats, radius: Floats, team: Longs | None = None, teams: Teams = None
+    index: Index,
+    first: int,
+    last: int,
+    x: Floats,
+    y: Floats,
+    z: Floats,
+    radius: Floats,
+    team: Longs | None = None,
+    teams: Teams = None,
 ) -> Pairs:
     """Everyone nearer than `radius` (n,) [m] to the rows [first, last) of the table, taken to be at x, y, z (n,) [m].
 
-    `team` (N,) is the table's column, needed for a filter. A row is never near itself. Any radius is correct; the index's reach only
-    decides what is fast.
+    `team` (N,) is the table's column, needed for a filter. A row is never near itself. Any radius is correct; the index's reach
+    only decides what is fast.
     """
     n = last - first
     mode, by_place, wanted = team_filter(index, team, teams, first, last)
@@ -69,7 +77,23 @@ def pairs(
     offset, distance = np.empty((3, m)), np.empty(m)
     if m:
         search.pair_places(*query, start, count, found, 0, n)
-        search.pair_columns(x, y, z, start, found, index.sx, index.sy, index.sz, index.order, row, other, offset, distance, 0, n)
+        search.pair_columns(
+            x,
+            y,
+            z,
+            start,
+            found,
+            index.sx,
+            index.sy,
+            index.sz,
+            index.order,
+            row,
+            other,
+            offset,
+            distance,
+            0,
+            n,
+        )
     return Pairs(row, other, offset, distance, count, start)
 
 
@@ -92,6 +116,21 @@ def nearest(
     mode, by_place, wanted = team_filter(index, team, teams, first, last)
     other, square = np.empty((k, n), np.int64), np.empty((k, n))
     search.nearest_rows(
-        x, y, z, k, mode, wanted, index.row_world, index.place, first, *index.table, by_place, index.order, other, square, 0, n
+        x,
+        y,
+        z,
+        k,
+        mode,
+        wanted,
+        index.row_world,
+        index.place,
+        first,
+        *index.table,
+        by_place,
+        index.order,
+        other,
+        square,
+        0,
+        n,
     )
     return other, np.sqrt(square)

@@ -81,7 +81,13 @@ def first_strip(keys, strip_start, start, end, shift, row):
 @device
 def in_range(w, me, x, y, z, radius, mode, wanted, table, found, done):
     """Append the places of world w nearer than `radius` to (x, y, z) to `found`, in order; `me` is the place left out."""
-    world_start, keys, strip_start, world_strip, inverse_cell = table[0], table[1], table[2], table[3], table[4]
+    world_start, keys, strip_start, world_strip, inverse_cell = (
+        table[0],
+        table[1],
+        table[2],
+        table[3],
+        table[4],
+    )
     start = world_start[w]
     end = world_start[w + 1]
     inverse = inverse_cell[w]
@@ -147,7 +153,7 @@ def nearest_run(me, x, y, z, mode, wanted, table, mask, start, end, worst, best,
 
 @device
 def least_square(x, y, z, mode, wanted, table, start, end, least):
-    """Smallest squared distance per lane, of the places in [start, end) that pass the filter and of `least`; no branch on a place."""
+    """Smallest squared distance per lane, of the places in [start, end) that pass the filter and of `least`."""
     sx, sy, sz, team = table[5], table[6], table[7], table[8]
     for p in range(start, end, LANES):
         square = squares(sx, sy, sz, p, x, y, z)
@@ -192,7 +198,13 @@ def nearest_in_strip(me, x, y, z, own, mode, wanted, table, shape, start, end, w
 @device
 def nearest_places(w, me, x, y, z, mode, wanted, table, best, ranks, places, k):
     """The k nearest places of world w by (squared distance, rank) into `best`, `ranks`, `places`; -1 where there are fewer."""
-    world_start, keys, strip_start, world_strip, inverse_cell = table[0], table[1], table[2], table[3], table[4]
+    world_start, keys, strip_start, world_strip, inverse_cell = (
+        table[0],
+        table[1],
+        table[2],
+        table[3],
+        table[4],
+    )
     for j in range(k):
         best[j] = np.inf
         ranks[j] = 1 << KEY_BITS
@@ -229,7 +241,22 @@ def nearest_places(w, me, x, y, z, mode, wanted, table, best, ranks, places, k):
             return
         strip = up if above <= below else down
         worst = nearest_in_strip(
-            me, x, y, z, own, mode, wanted, table, shape, strip_start[strip], strip_start[strip + 1], worst, best, ranks, places, k
+            me,
+            x,
+            y,
+            z,
+            own,
+            mode,
+            wanted,
+            table,
+            shape,
+            strip_start[strip],
+            strip_start[strip + 1],
+            worst,
+            best,
+            ranks,
+            places,
+            k,
         )
         if strip == up:
             up += 1
@@ -244,8 +271,8 @@ def pair_places(
 ):  # fmt: skip
     """Places near each of the rows begin ... stop - 1 of a group that begins at row `first` of the table.
 
-    x, y, z (n,) positions [m], radius (n,) [m], wanted (n,) teams. Writes count (n,); with room in `found` also the places, those of
-    row i from start[i] on.
+    x, y, z (n,) positions [m], radius (n,) [m], wanted (n,) teams. Writes count (n,); with room in `found` also the places,
+    those of row i from start[i] on.
     """
     table = (world_start, keys, strip_start, world_strip, inverse_cell, sx, sy, sz, team)
     for i in range(begin, stop):
@@ -272,15 +299,20 @@ def pair_columns(x, y, z, start, found, sx, sy, sz, order, row, other, offset, d
 
 @kernel("F F F i8 i8 F I I i8 I I I I F F F F F I I2w F2w i8 i8")
 def nearest_rows(
-    x, y, z, k, mode, wanted, row_world, place, first, world_start, keys, strip_start, world_strip, inverse_cell, sx, sy, sz, team,
-    order, other, square, begin, stop,
+    x, y, z, k, mode, wanted, row_world, place, first, world_start, keys, strip_start, world_strip, inverse_cell, sx, sy, sz,
+    team, order, other, square, begin, stop,
 ):  # fmt: skip
-    """The k nearest rows of the table, other (k, n) or -1, and their squared distances [m^2], (k, n), for rows begin ... stop - 1."""
+    """The k nearest rows of the table, other (k, n) or -1, and their squared distances [m^2], (k, n).
+
+    For rows begin ... stop - 1 of the group.
+    """
     table = (world_start, keys, strip_start, world_strip, inverse_cell, sx, sy, sz, team)
     best, ranks, places = np.empty(k), np.empty(k, np.int64), np.empty(k, np.int64)
     for i in range(begin, stop):
         row = first + i
-        nearest_places(row_world[row], place[row], x[i], y[i], z[i], mode, wanted[i], table, best, ranks, places, k)
+        nearest_places(
+            row_world[row], place[row], x[i], y[i], z[i], mode, wanted[i], table, best, ranks, places, k
+        )
         for j in range(k):
             other[j, i] = order[places[j]] if places[j] >= 0 else -1
             square[j, i] = best[j]
@@ -326,5 +358,3 @@ def segment_first_min(start, values, out):
             if at < 0 or values[k] < values[at]:
                 at = k
         out[i] = at
-
-

@@ -27,7 +27,7 @@ class Stack:
     def near(self, row, radius):
         """Rows nearer than `radius` to a row, by brute force, and all squared distances."""
         with np.errstate(all="ignore"):
-            square = ((self.pos - self.pos[:, row : row + 1]) ** 2)
+            square = (self.pos - self.pos[:, row : row + 1]) ** 2
             square = square[0] + square[1] + square[2]
             hit = (square < radius * radius) & (self.world == self.world[row])
         hit[row] = False
@@ -45,7 +45,12 @@ def stack(worlds, groups=1, reverse_groups=False):
     table = np.array(rows, np.int64).reshape(-1, 4)
     pos = np.array([worlds[w][:, k] for _, w, _, k in rows]).reshape(-1, 3).T
     return Stack(
-        table[:, 1].copy(), table[:, 2].copy(), table[:, 0].copy(), table[:, 3].copy(), np.ascontiguousarray(pos), len(worlds)
+        table[:, 1].copy(),
+        table[:, 2].copy(),
+        table[:, 0].copy(),
+        table[:, 3].copy(),
+        np.ascontiguousarray(pos),
+        len(worlds),
     )
 
 

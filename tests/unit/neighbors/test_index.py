@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from stacks import block_candidates, stack
+from neighbor_stacks import block_candidates, stack
 
 from tussle.neighbors import Index, nearest, pairs
 

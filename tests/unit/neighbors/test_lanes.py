@@ -1,9 +1,24 @@
 """Lanes compiled are lanes in Python, bit for bit, and the inverse square root is exact enough."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
-from tussle.neighbors.lanes import LANES, bits, choose, inverse_sqrt, load_some, lowest, ones, splat, store_some
+from tussle.neighbors import lanes
+from tussle.neighbors.lanes import (
+    LANES,
+    bits,
+    choose,
+    inverse_sqrt,
+    load_some,
+    lowest,
+    ones,
+    splat,
+    store_some,
+)
+from tussle.numeric.fingerprint import Fingerprint
 from tussle.numeric.kernel import kernel
 
 
@@ -14,7 +29,9 @@ def compiled(a, b, out, hits):
         x = load_some(a, i, count)
         y = load_some(b, i, count)
         near = (x < y) & (x != 0.5)
-        store_some(out, i, count, choose(near, x * y - 1.5, splat(2.0) / (y + 3.0)) * inverse_sqrt(y * y + 1.0))
+        store_some(
+            out, i, count, choose(near, x * y - 1.5, splat(2.0) / (y + 3.0)) * inverse_sqrt(y * y + 1.0)
+        )
         hits[i // LANES] = bits(near)
 
 
@@ -34,7 +51,9 @@ def test_lanes_equal_numpy_bitwise_and_stop_at_the_end(n):
     compiled(a, b, out[:n], hits)
     np.testing.assert_array_equal(out[:n], plain(a, b))
     np.testing.assert_array_equal(out[n:], 7.0)
-    assert hits[0] & 255 == sum(1 << k for k in range(min(n, 8)) if a[k] < b[k]) | (hits[0] & ~((1 << min(n, 8)) - 1))
+    assert hits[0] & 255 == sum(1 << k for k in range(min(n, 8)) if a[k] < b[k]) | (
+        hits[0] & ~((1 << min(n, 8)) - 1)
+    )
 
 
 @kernel("F Fw")
@@ -64,3 +83,15 @@ def test_bits_are_counted(hits):
     out = np.zeros(2, np.int64)
     bit_counts(hits, out)
     assert tuple(out) == (lowest(hits), ones(hits))
+
+
+def test_kernels_are_keyed_by_the_code_generators(monkeypatch):
+    before = Fingerprint(compiled.py_func)
+    assert not before.opaque
+    monkeypatch.setattr(lanes, "generators", lambda: "others")
+    assert Fingerprint(compiled.py_func).digest != before.digest
+
+
+def test_importing_the_package_does_not_import_numba():
+    code = "import sys, tussle.neighbors; sys.exit('numba' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -1,17 +1,24 @@
 """Boids: neighbour sums with agents as lanes, the law, and what the controllers are told.
 
-One step: `neighbor_sums` (or `neighbor_sums_in_view`), with the historic means `historic_means`, then `law`, then what is wired of
-`velocity`, `rates` and `desired`. Kernels over blocks take a range of blocks, so that threads can share them.
+One step: `neighbor_sums` (or `neighbor_sums_in_view`), with the historic means `historic_means`, then `law`, then what is wired
+of `velocity`, `rates` and `desired`. Kernels over blocks take a range of blocks, so that threads can share them.
 """
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from tussle.neighbors.lanes import (
-    LANES, bits, choose, inverse_sqrt, lanes_sqrt, load, load_some, splat, store, store_some,
+    LANES,
+    bits,
+    choose,
+    inverse_sqrt,
+    lanes_sqrt,
+    load,
+    load_some,
+    splat,
+    store,
+    store_some,
 )  # fmt: skip
 from tussle.numeric import atan2, cos, sin, wrap
 from tussle.numeric.kernel import device, kernel
@@ -24,7 +31,17 @@ TOUCHING = 1e10
 OFFSET, HEADING, N_TEAM, N_ALL, TEAM_PUSH, OTHER_PUSH, N_SUMS = 0, 3, 5, 6, 7, 10, 13
 
 # Where the parameters of a block's lanes lie in its scratch, in groups of LANES.
-REACH2, SPHERE2, SPHERE, TEAM_SCALE, TEAM_TOUCH2, OTHER_SCALE, OTHER_TOUCH2, PLACE, FRAME = 0, 1, 2, 3, 4, 5, 6, 7, 8
+REACH2, SPHERE2, SPHERE, TEAM_SCALE, TEAM_TOUCH2, OTHER_SCALE, OTHER_TOUCH2, PLACE, FRAME = (
+    0,
+    1,
+    2,
+    3,
+    4,
+    5,
+    6,
+    7,
+    8,
+)
 VIEW = FRAME + 9  # cos(fov_az / 2), unlimited azimuth, cos(fov_el / 2), unlimited elevation
 N_SCRATCH = VIEW + 4
 
@@ -172,11 +189,25 @@ def find_near(b, k, blocks, points, by_place, own, first, lane, mates, others):
     sx, sy, sz, team = by_place
     q0 = block_first[b]
     wanted = own[0][order[queries[q0 + k]] - first]
-    taken, box, reach2 = take_lanes(q0, block_first[b + 1] - q0, wanted, queries, order, first, points, own, lane)
+    taken, box, reach2 = take_lanes(
+        q0, block_first[b + 1] - q0, wanted, queries, order, first, points, own, lane
+    )
     n_mates, n_others = 0, 0
     for s in range(span_first[b], span_first[b + 1]):
         n_mates, n_others = cull(
-            sx, sy, sz, team, float(wanted), span_start[s], span_end[s], box, reach2, mates, n_mates, others, n_others
+            sx,
+            sy,
+            sz,
+            team,
+            float(wanted),
+            span_start[s],
+            span_end[s],
+            box,
+            reach2,
+            mates,
+            n_mates,
+            others,
+            n_others,
         )
     return taken, n_mates, n_others
 
@@ -206,10 +237,11 @@ def neighbor_sums(
 ):  # fmt: skip
     """The sums over everyone in reach, for the queries of blocks begin ... stop - 1.
 
-    queries to order: of the index, its blocks and their queries' positions qx, qy, qz [m]. By place (N,): sx, sy, sz positions [m];
+    queries to order: of the index, its blocks and their queries' positions qx, qy, qz [m]. By place (N,): sx, sy, sz positions
+    [m];
     heading_x, heading_y what is averaged over team mates; team as a number. By row of the group (n,): own_team, comms_range [m],
-    sphere of influence [m], minimum ranges [m]. sums (N_SUMS, n). first: row of the table that is row 0 of the group. most: largest
-    number of candidates of a block. A block of several teams is walked once for each.
+    sphere of influence [m], minimum ranges [m]. sums (N_SUMS, n). first: row of the table that is row 0 of the group. most:
+    largest number of candidates of a block. A block of several teams is walked once for each.
     """
     mates = np.empty(most + LANES, np.int64)
     near = np.empty(most + LANES, np.int64)
@@ -228,11 +260,15 @@ def neighbor_sums(
                 b, k, blocks, (qx, qy, qz), (sx, sy, sz, team), own, first, lane, mates, others
             )
             done |= taken
-            n_near, offset, heading, n = sum_mates(mates, n_mates, sx, sy, sz, heading_x, heading_y, x, y, z, lane, near)
+            n_near, offset, heading, n = sum_mates(
+                mates, n_mates, sx, sy, sz, heading_x, heading_y, x, y, z, lane, near
+            )
             team_push = sum_pushes(near, n_near, sx, sy, sz, x, y, z, lane, TEAM_SCALE, TEAM_TOUCH2)
             n_all = n + count_inside(others, n_others, sx, sy, sz, x, y, z, lane)
             other_push = sum_pushes(others, n_others, sx, sy, sz, x, y, z, lane, OTHER_SCALE, OTHER_TOUCH2)
-            put(lane, taken, q0, queries, order, first, sums, offset, heading, n, n_all, team_push, other_push)
+            put(
+                lane, taken, q0, queries, order, first, sums, offset, heading, n, n_all, team_push, other_push
+            )
 
 
 @device
@@ -335,7 +371,21 @@ def neighbor_sums_in_view(
             _, _, more, other_push = sum_in_view(
                 others, n_others, sx, sy, sz, heading_x, heading_y, x, y, z, lane, OTHER_SCALE, OTHER_TOUCH2
             )
-            put(lane, taken, q0, queries, order, first, sums, offset, heading, n, n + more, team_push, other_push)
+            put(
+                lane,
+                taken,
+                q0,
+                queries,
+                order,
+                first,
+                sums,
+                offset,
+                heading,
+                n,
+                n + more,
+                team_push,
+                other_push,
+            )
 
 
 @kernel("F F F F2w")
@@ -371,7 +421,20 @@ def length(x, y, z):
 
 
 @kernel("F F F F2 F2 F F F F F F F2w")
-def law(x, y, z, goal, sums, max_speed, goal_weight, team_weight, nonteam_weight, centroid_weight, align_weight, wanted):
+def law(
+    x,
+    y,
+    z,
+    goal,
+    sums,
+    max_speed,
+    goal_weight,
+    team_weight,
+    nonteam_weight,
+    centroid_weight,
+    align_weight,
+    wanted,
+):
     """Velocity wanted [m/s], (3, n), from the sums and the goal (3, n) [m].
 
     The weighted sum of the five unit or repulsion vectors over the sum of their lengths, times max_speed. The heading's length
@@ -385,7 +448,9 @@ def law(x, y, z, goal, sums, max_speed, goal_weight, team_weight, nonteam_weight
             load_some(goal[2], i, m) - load_some(z, i, m),
         )
         cx, cy, cz = shortened(
-            load_some(sums[OFFSET], i, m), load_some(sums[OFFSET + 1], i, m), load_some(sums[OFFSET + 2], i, m)
+            load_some(sums[OFFSET], i, m),
+            load_some(sums[OFFSET + 1], i, m),
+            load_some(sums[OFFSET + 2], i, m),
         )
         hx, hy, hz = shortened(load_some(sums[HEADING], i, m), load_some(sums[HEADING + 1], i, m), splat(0.0))
         tx, ty, tz = (
@@ -394,7 +459,11 @@ def law(x, y, z, goal, sums, max_speed, goal_weight, team_weight, nonteam_weight
         ox, oy, oz = (
             load_some(sums[OTHER_PUSH], i, m), load_some(sums[OTHER_PUSH + 1], i, m), load_some(sums[OTHER_PUSH + 2], i, m)
         )  # fmt: skip
-        wg, wt, wo = load_some(goal_weight, i, m), load_some(team_weight, i, m), load_some(nonteam_weight, i, m)
+        wg, wt, wo = (
+            load_some(goal_weight, i, m),
+            load_some(team_weight, i, m),
+            load_some(nonteam_weight, i, m),
+        )
         wc, wa = load_some(centroid_weight, i, m), load_some(align_weight, i, m)
         total = (
             magnitude(wg) * length(gx, gy, gz) + magnitude(wt) * length(tx, ty, tz) + magnitude(wo) * length(ox, oy, oz)
@@ -402,9 +471,15 @@ def law(x, y, z, goal, sums, max_speed, goal_weight, team_weight, nonteam_weight
         )  # fmt: skip
         gain = load_some(max_speed, i, m) / choose(total > 0.0, total, 1.0)
         alone = load_some(sums[N_ALL], i, m) == 0.0
-        store_some(wanted[0], i, m, choose(alone, gx, gain * (wg * gx + wt * tx + wo * ox + wc * cx + wa * hx)))
-        store_some(wanted[1], i, m, choose(alone, gy, gain * (wg * gy + wt * ty + wo * oy + wc * cy + wa * hy)))
-        store_some(wanted[2], i, m, choose(alone, gz, gain * (wg * gz + wt * tz + wo * oz + wc * cz + wa * hz)))
+        store_some(
+            wanted[0], i, m, choose(alone, gx, gain * (wg * gx + wt * tx + wo * ox + wc * cx + wa * hx))
+        )
+        store_some(
+            wanted[1], i, m, choose(alone, gy, gain * (wg * gy + wt * ty + wo * oy + wc * cy + wa * hy))
+        )
+        store_some(
+            wanted[2], i, m, choose(alone, gz, gain * (wg * gz + wt * tz + wo * oz + wc * cz + wa * hz))
+        )
 
 
 @device

@@ -25,11 +25,13 @@ def hunt(
 ):  # fmt: skip
     """Choose targets and collect claims for the rows of a group that begins at row `first` of the table.
 
-    By row of the group (n,): x, y, z [m], own_team, prey_team, capture_range [m], allow_switching; target, the id hunted or 0, is kept
-    while it lives and switching is not allowed, else becomes the nearest of prey_team (of equals the smaller id); target_row is its
+    By row of the group (n,): x, y, z [m], own_team, prey_team, capture_range [m], allow_switching; target, the id hunted or 0,
+    is kept
+    while it lives and switching is not allowed, else becomes the nearest of prey_team (of equals the smaller id); target_row is
+    its
     row of the table or -1. By row of the table: row_id, row_world, place. id_row[id_start[w] + i] is the row of id i of world w.
-    Claims, everyone of another team nearer than capture_range: claim_row (row of the group) and claim_place, which becomes the row
-    of the table, as far as there is room. Returns how many claims there are.
+    Claims, everyone of another team nearer than capture_range: claim_row (row of the group) and claim_place, which becomes the
+    row of the table, as far as there is room. Returns how many claims there are.
     """
     table = (world_start, keys, strip_start, world_strip, inverse_cell, sx, sy, sz, team)
     best, ranks, places = np.empty(1), np.empty(1, np.int64), np.empty(1, np.int64)
@@ -46,7 +48,17 @@ def hunt(
         target[i] = row_id[found] if found >= 0 else 0
         target_row[i] = found
         until = in_range(
-            w, me, x[i], y[i], z[i], capture_range[i], DIFFERENT, float(own_team[i]), table, claim_place, n_claims
+            w,
+            me,
+            x[i],
+            y[i],
+            z[i],
+            capture_range[i],
+            DIFFERENT,
+            float(own_team[i]),
+            table,
+            claim_place,
+            n_claims,
         )
         for k in range(n_claims, min(until, room)):
             claim_row[k] = i
@@ -56,10 +68,13 @@ def hunt(
 
 
 @kernel("F F F F F F I F F F Fw Fw Fw")
-def pursue(x, y, z, yaw, climb, max_speed, target_row, table_x, table_y, table_z, speed, turn_rate, pitch_rate):
+def pursue(
+    x, y, z, yaw, climb, max_speed, target_row, table_x, table_y, table_z, speed, turn_rate, pitch_rate
+):
     """Speed [m/s] and rates [rad/s] towards the target's position; rows without a target keep their last commands.
 
-    x, y, z [m], yaw, climb (nose up positive) [rad], max_speed [m/s], target_row (n,) of the rows; table_x, table_y, table_z (N,) [m].
+    x, y, z [m], yaw, climb (nose up positive) [rad], max_speed [m/s], target_row (n,) of the rows; table_x, table_y, table_z
+    (N,) [m].
     """
     for i in range(x.shape[0]):
         row = target_row[i]

@@ -1,0 +1,117 @@
+"""Predator's choice, claims and pursuit against brute force."""
+
+import numpy as np
+import pytest
+from neighbor_stacks import stack
+
+from tussle.stock.autonomy.predator import kernels
+
+N_WORLDS = 3
+
+
+def game(n=60, seed=0, tied=False):
+    rng = np.random.default_rng(seed)
+    draw = (
+        (lambda: rng.integers(-3, 4, (3, n)).astype(float))
+        if tied
+        else (lambda: rng.normal(size=(3, n)) * 10.0)
+    )
+    s = stack([draw() for _ in range(N_WORLDS)], groups=6)
+    team = np.where(s.group == 5, 2 + s.source % 2, 1)
+    return s, team, int(np.flatnonzero(s.group == 5)[0])
+
+
+def run(s, team, first, target, switching, capture_range=4.0, room=5000):
+    index = s.index(20.0)
+    n = len(s.ids) - first
+    span = int(s.ids.max()) + 1
+    id_start = np.arange(N_WORLDS) * span
+    id_row = np.full(N_WORLDS * span, -1)
+    id_row[id_start[s.world] + s.ids] = np.arange(len(s.ids))
+    target_row, claim_row, claim_other = (
+        np.zeros(n, np.int64),
+        np.zeros(room, np.int64),
+        np.zeros(room, np.int64),
+    )
+    own = [axis[first:].copy() for axis in s.pos]
+    n_claims = kernels.hunt(
+        *own, team[first:], np.ones(n, np.int64), np.full(n, capture_range), np.full(n, switching), target, target_row,
+        claim_row, claim_other, s.ids, s.world, id_start, id_row, index.place, first, *index.table,
+        index.gather(team.astype(float)), index.order,
+    )  # fmt: skip
+    return target_row, n_claims, claim_row, claim_other, index
+
+
+@pytest.mark.parametrize("tied", [False, True])
+@pytest.mark.parametrize("n", [60, 900])
+def test_the_nearest_prey_is_hunted_and_ties_go_to_the_smaller_id(tied, n):
+    s, team, first = game(n, tied=tied)
+    target = np.zeros(len(s.ids) - first, np.int64)
+    rows, *_ = run(s, team, first, target, True)
+    for i, row in enumerate(rows):
+        _, square = s.near(first + i, 1.0)
+        prey = np.flatnonzero((s.world == s.world[first + i]) & (team == 1))
+        assert row == prey[np.lexsort((s.ids[prey], square[prey]))[0]]
+        assert target[i] == s.ids[row]
+
+
+def test_a_living_target_is_kept_and_a_gone_one_replaced():
+    s, team, first = game()
+    n = len(s.ids) - first
+    target = np.full(n, s.ids[0])
+    target[1] = s.ids.max() - 1
+    rows, *_ = run(s, team, first, target, False)
+    kept = np.arange(n) != 1
+    assert (target[kept] == s.ids[0]).all()
+    assert (s.world[rows] == s.world[first:]).all()
+    assert team[rows[1]] == 1
+
+
+def test_without_prey_there_is_no_target_and_commands_persist():
+    s, team, first = game()
+    team[team == 1] = 7
+    target = np.zeros(len(s.ids) - first, np.int64)
+    rows, *_ = run(s, team, first, target, True)
+    assert (rows == -1).all()
+    assert (target == 0).all()
+    n = len(rows)
+    own = [axis[first:].copy() for axis in s.pos]
+    outputs = [np.full(n, 5.0) for _ in range(3)]
+    kernels.pursue(*own, np.zeros(n), np.zeros(n), np.full(n, 35.0), rows, *s.pos, *outputs)
+    kernels.point(*own[:2], np.full(n, 35.0), rows, *s.pos[:2], *outputs[:2])
+    assert all((o == 5.0).all() for o in outputs)
+
+
+@pytest.mark.parametrize("room", [5000, 3, 0])
+def test_claims_are_everyone_of_another_team_in_range(room):
+    s, team, first = game(200)
+    target = np.zeros(len(s.ids) - first, np.int64)
+    _, n_claims, claim_row, claim_other, index = run(s, team, first, target, True, room=room)
+    expected = []
+    for i in range(len(target)):
+        near, _ = s.near(first + i, 4.0)
+        near = near[team[near] != team[first + i]]
+        expected += [(i, j) for j in near[np.argsort(index.place[near])]]
+    assert n_claims == len(expected) > 10
+    got = list(zip(claim_row, claim_other, strict=True))[: min(room, n_claims)]
+    assert got == expected[:room]
+
+
+def test_pursuit_points_at_the_target():
+    s, team, first = game()
+    n = len(s.ids) - first
+    target = np.zeros(n, np.int64)
+    rows, *_ = run(s, team, first, target, True)
+    own = [axis[first:].copy() for axis in s.pos]
+    yaw, climb = np.linspace(-3, 3, n), np.linspace(-1, 1, n)
+    speed, turn, pitch, heading, fast = (np.zeros(n) for _ in range(5))
+    kernels.pursue(*own, yaw, climb, np.full(n, 35.0), rows, *s.pos, speed, turn, pitch)
+    kernels.point(*own[:2], np.full(n, 35.0), rows, *s.pos[:2], heading, fast)
+    d = s.pos[:, rows] - np.array(own)
+    np.testing.assert_allclose(heading, np.arctan2(d[1], d[0]), atol=1e-14)
+    np.testing.assert_allclose(np.exp(1j * turn), np.exp(1j * (heading - yaw)), atol=1e-13)
+    np.testing.assert_allclose(
+        np.exp(1j * pitch), np.exp(1j * (np.arctan2(d[2], np.hypot(*d[:2])) - climb)), atol=1e-13
+    )
+    assert (speed == 35.0).all()
+    assert (fast == 35.0).all()
