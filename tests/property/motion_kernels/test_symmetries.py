@@ -1,0 +1,104 @@
+"""What must hold of any motion: turn the mission and the path turns; a step may be cut; speed is kept; time runs backwards."""
+
+import math
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tussle.numeric.quaternion import quat_rotate
+from tussle.stock.motion.simple_aircraft import kernels as aircraft
+from tussle.stock.motion.single_integrator import kernels as single
+from tussle.stock.motion.unicycle import kernels as unicycle
+
+angle = st.floats(-math.pi, math.pi)
+rate = st.floats(-2.0, 2.0)
+speed = st.floats(-40.0, 40.0)
+substeps = st.integers(1, 20)
+UNLIMITED = np.array([[1e3], [1e3], [1e3], [1e3]])
+AIRFRAME = np.array([[13.0], [1.0], [80.0], [1.4], [1.4], [3.0], [3.0], [50.0], [0.0]])
+
+
+def turned(points, by):
+    c, s = math.cos(by), math.sin(by)
+    x, y, z = points
+    return np.array([c * x - s * y, s * x + c * y, z])
+
+
+def column(*values):
+    return np.array(values, float)[:, None]
+
+
+@given(yaw=angle, pitch=angle, by=angle, v=speed, w=rate, q=rate, n=substeps)
+def test_unicycle_path_turns_with_its_start(yaw, pitch, by, v, w, q, n):
+    u = column(v, w, q)
+    straight, rotated = column(0, 0, 0, yaw, pitch), column(0, 0, 0, yaw + by, pitch)
+    for _ in range(10):
+        unicycle.advance_pitch(straight, u, UNLIMITED, 0.1, n)
+        unicycle.advance_pitch(rotated, u, UNLIMITED, 0.1, n)
+    assert np.abs(rotated[:3, 0] - turned(straight[:3, 0], by)).max() < 1e-11
+    assert abs(rotated[3, 0] - straight[3, 0] - by) < 1e-13
+
+
+@given(yaw=angle, pitch=angle, v=speed, w=rate, q=rate, n=substeps)
+def test_unicycle_step_may_be_cut_at_a_substep(yaw, pitch, v, w, q, n):
+    u = column(v, w, q)
+    whole, cut = column(1, 2, 3, yaw, pitch), column(1, 2, 3, yaw, pitch)
+    unicycle.advance_pitch(whole, u, UNLIMITED, 0.1 * n, n)
+    for _ in range(n):
+        unicycle.advance_pitch(cut, u, UNLIMITED, 0.1, 1)
+    assert np.abs(whole - cut).max() < 1e-11
+
+
+@given(yaw=angle, pitch=angle, v=speed, w=rate, q=rate, n=substeps)
+def test_unicycle_comes_back_when_time_runs_backwards(yaw, pitch, v, w, q, n):
+    start = column(1, 2, 3, yaw, pitch)
+    x = start.copy()
+    unicycle.advance_pitch(x, column(v, w, q), UNLIMITED, 0.7, n)
+    unicycle.advance_pitch(x, column(v, w, q), UNLIMITED, -0.7, n)
+    assert np.abs(x - start).max() < 1e-12
+
+
+@given(yaw=angle, pitch=angle, v=speed, w=rate, q=rate)
+def test_unicycle_publishes_its_speed_along_its_nose(yaw, pitch, v, w, q):
+    out = np.empty((13, 1))
+    unicycle.to_body(column(0, 0, 0, yaw, pitch), *column(v, w, q), *UNLIMITED[:3], True, False, 1e-9, *out)
+    assert abs(np.linalg.norm(out[7:10]) - abs(v)) < 1e-12
+    assert np.abs(quat_rotate(out[3:7], column(v, 0, 0)) - out[7:10]).max() < 1e-6
+
+
+@given(command=st.tuples(speed, speed, speed), by=angle, n=substeps)
+@settings(max_examples=50)
+def test_single_integrator_path_turns_with_its_command(command, by, n):
+    straight, rotated = np.zeros((8, 1)), np.zeros((8, 1))
+    single.advance(straight, column(*command), column(-1.0), 0.3, n)
+    single.advance(rotated, column(*turned(command, by)), column(-1.0), 0.3, n)
+    assert np.abs(rotated[:3, 0] - turned(straight[:3, 0], by)).max() < 1e-12
+
+
+@given(
+    yaw=angle,
+    by=angle,
+    roll=st.floats(-1.0, 1.0),
+    pitch=st.floats(-1.0, 1.0),
+    v=st.floats(5.0, 50.0),
+    p=rate,
+    q=rate,
+    n=substeps,
+)
+def test_aircraft_path_turns_with_its_start(yaw, by, roll, pitch, v, p, q, n):
+    u = column(1.0, p, q)
+    straight, rotated = column(0, 0, 0, roll, pitch, yaw, v), column(0, 0, 0, roll, pitch, yaw + by, v)
+    for _ in range(5):
+        aircraft.advance(straight, u, AIRFRAME, 0.1, n)
+        aircraft.advance(rotated, u, AIRFRAME, 0.1, n)
+    assert np.abs(rotated[:3, 0] - turned(straight[:3, 0], by)).max() < 1e-10
+    assert np.array_equal(rotated[[2, 3, 4, 6]], straight[[2, 3, 4, 6]])
+
+
+@given(yaw=angle, roll=st.floats(-1.3, 1.3), pitch=st.floats(-1.3, 1.3), v=st.floats(1.0, 80.0))
+def test_aircraft_flies_at_its_speed_along_its_nose(yaw, roll, pitch, v):
+    out = np.empty((10, 1))
+    aircraft.to_body(column(0, 0, 0, roll, pitch, yaw, v), *out)
+    assert abs(np.linalg.norm(out[7:]) - v) < 1e-12
+    assert np.abs(quat_rotate(out[3:7], column(v, 0, 0)) - out[7:]).max() < 1e-12

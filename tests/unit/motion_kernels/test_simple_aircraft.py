@@ -1,0 +1,148 @@
+import math
+
+import numpy as np
+import pytest
+
+from tussle.numeric.quaternion import quat_from_euler, quat_rotate
+from tussle.stock.motion.simple_aircraft import kernels
+
+RADIUS, V_MIN, V_MAX, ROLL_MAX, PITCH_MAX, ROLL_RATE_MAX, PITCH_RATE_MAX, TARGET, SLOPE = range(9)
+
+
+def limits(n, **changed):
+    p = np.empty((9, n))
+    p[:] = np.array([13.0, 5.0, 60.0, 1.2, 1.2, 3.0, 3.0, 50.0, 0.1])[:, None]
+    for name, value in changed.items():
+        p[globals()[name]] = value
+    return p
+
+
+def rk4(x, u, p, dt, substeps):
+    """The textbook method, in NumPy; limits are not looked at."""
+
+    def f(x):
+        roll, pitch, yaw, v = x[3:]
+        level = v * np.cos(pitch)
+        turn = v * np.tan(roll) / (p[RADIUS] + p[SLOPE] * (v - p[TARGET]))
+        return np.stack(
+            [level * np.cos(yaw), level * np.sin(yaw), v * np.sin(pitch), u[1], u[2], turn, u[0] / 5.0]
+        )
+
+    h = dt / substeps
+    for _ in range(substeps):
+        a = f(x)
+        b = f(x + h / 2 * a)
+        c = f(x + h / 2 * b)
+        x = x + h / 6 * (a + 2 * b + 2 * c + f(x + h * c))
+    return x
+
+
+def many(n, seed=3):
+    draw = np.random.default_rng(seed)
+    x = draw.normal(size=(7, n))
+    x[3:5] = draw.uniform(-0.4, 0.4, (2, n))
+    x[6] = draw.uniform(20.0, 40.0, n)
+    u = draw.uniform(-0.4, 0.4, (3, n))
+    return x, u, limits(n)
+
+
+@pytest.mark.parametrize("substeps", [1, 3, 12])
+def test_equals_rk4_away_from_the_limits(substeps):
+    x, u, p = many(70)
+    ours, reference = x.copy(), x.copy()
+    for k in range(20):
+        sign = 1.0 if k % 2 else -1.0
+        kernels.advance(ours, sign * u, p, 0.1, substeps)
+        reference = rk4(reference, sign * u, p, 0.1, substeps)
+    assert np.abs(ours - reference).max() < 1e-10
+
+
+def test_fourth_order():
+    x, u, p = many(30)
+    exact = x.copy()
+    kernels.advance(exact, u, p, 0.5, 2048)
+    errors = []
+    for substeps in (4, 8, 16, 32):
+        y = x.copy()
+        kernels.advance(y, u, p, 0.5, substeps)
+        errors.append(np.abs(y - exact).max())
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert np.all(np.abs(orders - 4.0) < 0.35), orders
+
+
+def test_state_equation_is_what_flies():
+    x, u, p = many(20)
+    y = x.copy()
+    h = 1e-7
+    kernels.advance(y, u, p, h, 1)
+    for i in range(20):
+        rates = kernels.state_equation(*x[3:, i], *u[:, i], p[RADIUS, i], p[SLOPE, i], p[TARGET, i])
+        assert np.allclose((y[:, i] - x[:, i]) / h, rates, atol=2e-5)
+
+
+@pytest.mark.parametrize("substeps", [1, 7])
+def test_limits_hold_and_are_reached_exactly(substeps):
+    n = 4
+    x = np.zeros((7, n))
+    x[6] = 20.0
+    u = np.array([[500.0, -500.0, 1e9, 0.0], [9.0, -9.0, 0.5, 0.0], [9.0, -9.0, 0.5, 0.0]])
+    p = limits(n, ROLL_MAX=0.5, PITCH_MAX=0.3, ROLL_RATE_MAX=1.0, PITCH_RATE_MAX=1.0, V_MIN=15.0, V_MAX=40.0)
+    for _ in range(20):
+        kernels.advance(x, u, p, 0.1, substeps)
+        assert np.all(np.abs(x[3]) <= 0.5)
+        assert np.all(np.abs(x[4]) <= 0.3)
+        assert np.all((x[6] >= 15.0) & (x[6] <= 40.0))
+    assert x[3].tolist() == [0.5, -0.5, 0.5, 0.0]
+    assert x[4].tolist() == [0.3, -0.3, 0.3, 0.0]
+    assert x[6].tolist() == [40.0, 15.0, 40.0, 20.0]
+
+
+def test_rates_are_held_within_their_limits():
+    x = np.zeros((7, 1))
+    x[6] = 20.0
+    u = np.array([[1e6], [9.0], [-9.0]])
+    kernels.advance(x, u, limits(1, ROLL_RATE_MAX=0.5, PITCH_RATE_MAX=0.25), 0.1, 1)
+    assert x[3, 0] == pytest.approx(0.05)
+    assert x[4, 0] == pytest.approx(-0.025)
+    assert x[6, 0] == pytest.approx(20.0 + 0.1 * 100.0 / 5.0)
+
+
+def test_steady_bank_flies_a_circle_of_the_turning_radius():
+    x = np.zeros((7, 1))
+    x[3], x[6] = math.pi / 4, 20.0
+    p = limits(1, RADIUS=50.0, TARGET=20.0)
+    period = 2.0 * math.pi * 50.0 / 20.0
+    kernels.advance(x, np.zeros((3, 1)), p, period / 2, 400)
+    assert x[1, 0] == pytest.approx(100.0, abs=1e-6)  # a positive bank turns left: half the circle ends at +y
+    kernels.advance(x, np.zeros((3, 1)), p, period / 2, 400)
+    assert np.abs(x[:2]).max() < 1e-6
+
+
+def test_published_velocity_is_that_of_the_path_and_bank_is_right_wing_down():
+    x, u, p = many(25)
+    out = np.full((10, 25), np.nan)
+    kernels.to_body(x, *out)
+    y = x.copy()
+    kernels.advance(y, 0.0 * u, p, 1e-7, 1)
+    assert np.abs((y - x)[:3] / 1e-7 - out[7:]).max() < 1e-5
+    assert np.abs(out[3:7] - quat_from_euler(-x[3], -x[4], x[5])).max() < 1e-15
+    nose = quat_rotate(out[3:7], np.array([[1.0], [0.0], [0.0]]) + 0.0 * x[:3])
+    assert np.abs(nose * x[6] - out[7:]).max() < 1e-12
+
+
+def test_bits_do_not_depend_on_place():
+    x, u, p = many(150)
+    p[ROLL_MAX, ::5] = 0.3
+    whole = x.copy()
+    kernels.advance(whole, u, p, 0.1, 3)
+    out = np.empty((10, 150))
+    kernels.to_body(whole, *out)
+    for width in range(1, 38):
+        for first in range(0, 150 - width, width):
+            rows = slice(first, first + width)
+            part = np.ascontiguousarray(x[:, rows])
+            kernels.advance(part, np.ascontiguousarray(u[:, rows]), np.ascontiguousarray(p[:, rows]), 0.1, 3)
+            shown = np.empty((10, width))
+            kernels.to_body(part, *shown)
+            assert np.array_equal(part, whole[:, rows])
+            assert np.array_equal(shown, out[:, rows])

@@ -1,0 +1,117 @@
+import math
+
+import numpy as np
+import pytest
+
+from tussle.stock.controller.simple_aircraft_controller_pid import SimpleAircraftControllerPID, kernels
+from tussle.stock.motion.simple_aircraft import kernels as aircraft
+
+HEADING = (1.0, 0.01, 2.0, math.radians(9.0))
+ALTITUDE = (1.0, 0.0, 0.8, 1.0)
+SPEED = (1.0, 0.1, 0.0, 1.0)
+
+
+def columns(*values):
+    return [np.array([float(v)]) for v in values]
+
+
+class Steering:
+    def __init__(self, n=1, use_roll=False, use_slope=False, gains=(HEADING, ALTITUDE, SPEED)):
+        self.gains = [np.repeat(np.array(g)[:, None], n, axis=1) for g in gains]
+        self.flags = use_roll, use_slope
+        self.memory = np.zeros((7, n))
+        self.out = np.full((3, n), np.nan)
+
+    def step(self, lateral, vertical, speed, z, vx, vy, vz, angle, dt=0.1):
+        kernels.steer(
+            lateral,
+            vertical,
+            speed,
+            z,
+            vx,
+            vy,
+            vz,
+            angle,
+            *self.flags,
+            *self.gains,
+            self.memory,
+            dt,
+            *self.out,
+        )
+        return self.out
+
+
+def proportional(use_roll=False, use_slope=False):
+    return Steering(1, use_roll, use_slope, [(1.0, 0.0, 0.0, 0.0)] * 3)
+
+
+def test_heading_altitude_and_speed_errors():
+    throttle, roll_rate, pitch_rate = proportional().step(
+        *columns(1.0, 120.0, 25.0, 100.0, 20.0, 0.0, 0.0, 0.5)
+    )[:, 0]
+    assert throttle == pytest.approx(5.0)
+    assert roll_rate == pytest.approx(0.5), "a goal to the left banks the model positively, which turns left"
+    assert pitch_rate == pytest.approx(20.0), "a goal above raises the nose"
+
+
+def test_heading_error_takes_the_short_way():
+    assert proportional().step(*columns(3.0, 0, 20, 0, 20, 0, 0, -3.0))[1, 0] == pytest.approx(6.0 - math.tau)
+
+
+def test_a_bank_to_the_right_needs_a_negative_roll_rate():
+    assert proportional(use_roll=True).step(*columns(0.3, 0, 20, 0, 20, 0, 0, 0.1))[1, 0] == pytest.approx(
+        -0.2
+    )
+
+
+def test_a_steeper_descent_lowers_the_nose():
+    level = proportional(use_slope=True).step(*columns(0.0, 0.1, 20, 0, 12, 16, 0, 0.0))[2, 0]
+    assert level == pytest.approx(-0.1)
+    descending = proportional(use_slope=True).step(*columns(0.0, 0.1, 20, 0, 12, 16, -20.0, 0.0))[2, 0]
+    assert descending == pytest.approx(math.pi / 4 - 0.1)
+
+
+def test_first_call_has_no_derivative_kick():
+    first = Steering().step(*columns(1.0, 120.0, 20.0, 100.0, 20.0, 0.0, 0.0, 0.0))
+    assert first[1, 0] == pytest.approx(1.0)
+    assert first[2, 0] == pytest.approx(20.0)
+
+
+def test_flies_an_aircraft_to_heading_altitude_and_speed():
+    steering = Steering()
+    x = np.zeros((7, 1))
+    x[6], x[2] = 20.0, 100.0
+    p = np.array([13.0, 15.0, 40.0, *np.radians([30.0, 30.0, 57.3, 57.3]), 50.0, 0.0])[:, None]
+    for _ in range(600):
+        body = np.empty((10, 1))
+        aircraft.to_body(x, *body)
+        out = steering.step(*columns(1.0, 130.0, 25.0), x[2], *body[7:], x[5])
+        aircraft.advance(x, np.ascontiguousarray(out), p, 0.1, 1)
+    assert x[5, 0] == pytest.approx(1.0, abs=0.02)
+    assert x[2, 0] == pytest.approx(130.0, abs=1.0)
+    assert x[6, 0] == pytest.approx(25.0, abs=0.1)
+
+
+def test_inputs_follow_the_structure():
+    assert SimpleAircraftControllerPID().active_inputs() == [
+        "desired_heading",
+        "desired_altitude",
+        "desired_speed",
+    ]
+    other = SimpleAircraftControllerPID(use_roll=True, use_glide_slope=True)
+    assert other.active_inputs() == ["desired_roll", "desired_glide_slope", "desired_speed"]
+
+
+@pytest.mark.parametrize("flag", [False, True])
+def test_bits_do_not_depend_on_place(flag):
+    rows = np.random.default_rng(6).normal(size=(8, 150)) * 3.0
+    whole = Steering(150, flag, flag)
+    for _ in range(2):
+        whole.step(*rows)
+    for width in range(1, 38):
+        for first in range(0, 150 - width, width):
+            some = slice(first, first + width)
+            part = Steering(width, flag, flag)
+            for _ in range(2):
+                part.step(*rows[:, some])
+            assert np.array_equal(part.out, whole.out[:, some])
