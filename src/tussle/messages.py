@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any, ClassVar
 
 import numpy as np
@@ -71,7 +72,9 @@ class Batch:
         return Batch(self.type, self.world[index], self.sender[index], data)
 
     @classmethod
+    @cache
     def empty(cls, type_: type[Message]) -> Batch:
+        """No messages; the one such batch of a type."""
         return cls.make(type_, np.zeros(0, np.int64), np.zeros(0, np.int64), {})
 
     @classmethod

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from tussle.api import kernels
 from tussle.errors import listed, nearest_name
-from tussle.neighbors.index import Index
+from tussle.neighbors.index import Index, padded
 
 FLOATS = {"pos": 3, "vel": 3, "quat": 4, "omega": 3, "force": 3, "torque": 3, "health": 1, "radius": 1, "mass": 1}
 INTS = ("id", "team", "world", "block", "place_in_block")
 DERIVED = {"yaw": 1, "climb": 1, "roll": 1, "forward": 3, "level_forward": 2}
 N_FLOATS = sum(FLOATS.values())
 EVERYWHERE = np.inf
+MOST_RANGES = 1000
+"""Ranges of touched rows that are remembered one by one."""
 BRUTE = 600
 """Rows per world up to which a search for the nearest needs no cells."""
 
@@ -23,13 +25,13 @@ _OFFSETS = {name: sum(list(FLOATS.values())[:i]) for i, name in enumerate(FLOATS
 _UNITS = {"pos": "m", "vel": "m/s", "quat": "", "omega": "rad/s", "force": "N", "torque": "N m", "radius": "m", "mass": "kg"}
 
 
-@dataclass
-class ByPlace:
-    """A column in the order of an index, and which rows have changed since."""
+@dataclass(slots=True)
+class Kept:
+    """Arrays that follow from the table, and the version of the table that they follow from."""
 
-    built: int
-    columns: list[np.ndarray]
-    stale: list[tuple[int, int]] = field(default_factory=list)
+    version: int
+    columns: Any
+    built: int = -1
 
 
 class Bodies:
@@ -68,12 +70,12 @@ class Bodies:
             own[name] = floats[first : first + k] if k > 1 else floats[first]
         for i, name in enumerate(INTS):
             own[name] = ints[i]
-        self._derived: dict[str, np.ndarray] = {}
-        self._pending: dict[str, list[tuple[int, int]]] = {}
+        self.version = self._oldest = 0
+        self._touched: list[tuple[int, int]] = []
+        self._derived: dict[str, Kept] = {}
         self._indexes: dict[Any, Index] = getattr(self, "_indexes", {})
-        self._stale: dict[Any, list[tuple[int, int]]] = {}
-        self._laid_out: set[Any] = set()
-        self._by_place: dict[tuple[int, str], ByPlace] = {}
+        self._laid_out: dict[Any, Kept] = {}
+        self._by_place: dict[tuple[int, str], Kept] = {}
         self._layout: tuple[np.ndarray, ...] | None = None
         self._read_only: BodyView | None = None
 
@@ -86,27 +88,30 @@ class Bodies:
 
     def touch(self, first: int, last: int) -> None:
         """Rows [first, last) have moved or turned."""
-        for pending in self._pending.values():
-            pending.append((first, last))
-        for stale in self._stale.values():
-            stale.append((first, last))
-        for sorted_ in self._by_place.values():
-            sorted_.stale.append((first, last))
+        self.version += 1
+        if self.scans:  # only then do the ranges matter: entities move one after the other
+            self._touched.append((first, last))
+            if len(self._touched) > MOST_RANGES:
+                self._oldest = self.version
+                self._touched.clear()
+
+    def _since(self, version: int) -> list[tuple[int, int]]:
+        """Ranges of rows that have changed since a version of the table."""
+        if not self.scans or version < self._oldest:
+            return [(0, self.n)]
+        return self._touched[version - self._oldest :]
 
     def derived(self, name: str) -> np.ndarray:
-        """yaw, climb, roll [rad], (n,), or forward, (3, n), up to date."""
-        pending = self._pending.get(name)
-        if pending is None:
+        """yaw, climb, roll [rad], (n,), or forward, (3, n), or level_forward, (2, n), up to date."""
+        kept = self._derived.get(name)
+        if kept is None:
             k = DERIVED[name]
-            self._derived[name] = np.empty((k, self.n) if k > 1 else self.n)
-            self._pending[name] = pending = [(0, self.n)]
-        if pending:
-            out, q = self._derived[name], self.quat
-            whole = sum(last - first for first, last in pending) >= self.n
-            for a, b in [(0, self.n)] if whole else pending:
-                derive(name, q[:, a:b], out[..., a:b])
-            pending.clear()
-        return self._derived[name]
+            kept = self._derived[name] = Kept(-1, np.empty((k, self.n) if k > 1 else self.n))
+        if kept.version != self.version:
+            for first, last in self._since(kept.version):
+                derive(name, self.quat, first, last, kept.columns)
+            kept.version = self.version
+        return np.asarray(kept.columns)
 
     # -- who is where -----------------------------------------------------------------------------------------------------
 
@@ -134,47 +139,52 @@ class Bodies:
         if self.scans:
             reach = EVERYWHERE
         key = reach if isinstance(reach, float) else reach.tobytes()
-        index = self._indexes.get(key)
-        if index is None:
-            index = self._indexes[key] = Index()
-        if key not in self._laid_out:
+        kept = self._laid_out.get(key)
+        if kept is None:
+            index = self._indexes.setdefault(key, Index())
             index.layout(self.world, self.id, self.n_worlds)
-            self._laid_out.add(key)
-            self._stale[key] = [(0, self.n)]
-        stale = self._stale[key]
-        if stale:
-            x, y, z = self.pos
-            moved = sum(last - first for first, last in stale)
-            if self.scans and moved < self.n:
-                for first, last in stale:
+            reaches = np.full(self.n_worlds, reach) if isinstance(reach, float) else reach
+            kept = self._laid_out[key] = Kept(-1, (index, reaches, *self.pos))
+        index, reaches, x, y, z = kept.columns
+        if kept.version != self.version:
+            ranges = self._since(kept.version)
+            if self.scans and kept.version >= 0 and ranges != [(0, self.n)]:
+                for first, last in ranges:
                     index.update(np.arange(first, last), x[first:last], y[first:last], z[first:last])
             else:
-                index.build(x, y, z, np.full(self.n_worlds, reach) if isinstance(reach, float) else reach)
-            stale.clear()
-        return index
+                index.build(x, y, z, reaches)
+            kept.version = self.version
+        return index  # type: ignore[no-any-return]
 
-
-    def by_place(self, index: Index, name: str) -> list[np.ndarray]:
+    def by_place(self, index: Index, name: str) -> tuple[np.ndarray, ...]:
         """Components of a column in the order of an index's places, as floats, each (n,) and padded for lanes; for kernels."""
         key = (id(index), name)
         kept = self._by_place.get(key)
-        if kept is not None and kept.built == index.built and (not kept.stale or name == "team"):
-            return kept.columns
-        source = np.atleast_2d(self.derived(name) if name in DERIVED else getattr(self, name))
-        if kept is not None and kept.built == index.built and self.scans and sum(b - a for a, b in kept.stale) < self.n:
-            for first, last in kept.stale:
+        if kept is None:
+            k = DERIVED.get(name) or FLOATS.get(name, 1)
+            kept = self._by_place[key] = Kept(-1, tuple(padded(self.n) for _ in range(k)))
+        if kept.built == index.built and (kept.version == self.version or name in INTS):
+            return kept.columns  # type: ignore[no-any-return]
+        if kept.built == index.built and self.scans:
+            source = np.atleast_2d(self.derived(name) if name in DERIVED else getattr(self, name))
+            for first, last in self._since(kept.version):
                 places = index.place[first:last]
                 for column, values in zip(kept.columns, source, strict=True):
                     column[places] = values[first:last]
-            kept.stale.clear()
-            return kept.columns
-        columns = [index.gather(values.astype(np.float64, copy=False)) for values in source]
-        self._by_place[key] = ByPlace(index.built, columns)
-        return columns
+        elif name == "level_forward":
+            kernels.level_forward_by_place(self.quat, index.order, *kept.columns)
+        elif name in INTS:
+            kernels.ints_by_place(getattr(self, name), index.order, kept.columns[0])
+        else:
+            source = np.atleast_2d(self.derived(name) if name in DERIVED else getattr(self, name))
+            for column, values in zip(kept.columns, source, strict=True):
+                kernels.floats_by_place(values, index.order, column)
+        kept.version, kept.built = self.version, index.built
+        return kept.columns  # type: ignore[no-any-return]
 
     def usual_reach(self) -> float:
         """A reach for searches that need none: of an index that is up to date, else all, else one that suits the density [m]."""
-        known = [k for k in self._laid_out if isinstance(k, float) and not self._stale[k]]
+        known = [k for k, kept in self._laid_out.items() if isinstance(k, float) and kept.version == self.version]
         if known:
             return max(known)
         if self.n <= BRUTE * self.n_worlds:
@@ -184,12 +194,9 @@ class Bodies:
         return float(2.0 ** np.ceil(np.log2(np.sqrt(64.0 * area / len(x)) + 1.0)))
 
 
-def derive(name: str, quat: np.ndarray, out: np.ndarray) -> None:
-    """Fill out with yaw, climb, roll (n,) or forward (3, n) of the quaternions (4, n)."""
-    if name in ("forward", "level_forward"):
-        getattr(kernels, name)(*quat, *out)
-    else:
-        getattr(kernels, name)(*quat, out)
+def derive(name: str, quat: np.ndarray, first: int, last: int, out: np.ndarray) -> None:
+    """Fill rows [first, last) of out, (n,) or (k, n), with yaw, climb, roll, forward or level_forward of the quaternions (4, n)."""
+    getattr(kernels, name)(quat, first, last, out)
 
 
 def read_only(array: np.ndarray) -> np.ndarray:

@@ -53,6 +53,7 @@ class GroupView:
         for name in (*FLOATS, *INTS, "_seeds"):
             own.pop(name, None)
         self._bodies = bodies
+        self._derived: dict[str, np.ndarray] = {}
         self.first, self.last = first, last
         self.n = last - first
         self._reaches: dict[int, tuple[np.ndarray, float | np.ndarray]] = {}
@@ -63,18 +64,43 @@ class GroupView:
             array = read_only(getattr(self._bodies, name)[..., self.first : self.last] if own is None else own)
             self.__dict__[name] = array
             return array
-        if name in DERIVED:
-            if "quat" in self.belief:
-                k = DERIVED[name]
-                out = np.empty((k, self.n) if k > 1 else self.n)
-                derive(name, self.belief["quat"], out)
-                return out
-            return read_only(self._bodies.derived(name)[..., self.first : self.last])
         if name == "_seeds":
             self._seeds = self.context.row_seeds(self.world, self.block)
             return self._seeds
         allowed = [*FLOATS, *INTS, *DERIVED, "t", "dt", "n"]
         raise AttributeError(f"g has no {name!r}{nearest_name(name, allowed)}; {listed(allowed)}")
+
+    def _derive(self, name: str) -> np.ndarray:
+        if "quat" in self.belief:
+            k = DERIVED[name]
+            out = np.empty((k, self.n) if k > 1 else self.n)
+            derive(name, self.belief["quat"], 0, self.n, out)
+            return out
+        everybody = self._bodies.derived(name)
+        view = self._derived.get(name)
+        if view is None:
+            view = self._derived[name] = read_only(everybody[..., self.first : self.last])
+        return view
+
+    @property
+    def yaw(self) -> np.ndarray:
+        """Heading, counter-clockwise from East [rad], (n,)."""
+        return self._derive("yaw")
+
+    @property
+    def climb(self) -> np.ndarray:
+        """Elevation of the nose, up positive [rad], (n,)."""
+        return self._derive("climb")
+
+    @property
+    def roll(self) -> np.ndarray:
+        """Bank, right wing down positive [rad], (n,)."""
+        return self._derive("roll")
+
+    @property
+    def forward(self) -> np.ndarray:
+        """Unit vector along the body x axis, (3, n), world frame."""
+        return self._derive("forward")
 
     # -- time and place ---------------------------------------------------------------------------------------------------
 

@@ -5,57 +5,83 @@ from __future__ import annotations
 import math
 
 from tussle.numeric import atan2
-from tussle.numeric.kernel import kernel
+from tussle.numeric.kernel import device, kernel
 
 
-@kernel("F F F F Fw")
-def yaw(qw, qx, qy, qz, out):
-    """Heading of the body x axis, counter-clockwise from East [rad], (n,), of unit or other quaternions."""
-    for i in range(out.shape[0]):
-        w, x, y, z = qw[i], qx[i], qy[i], qz[i]
+@kernel("F2 i8 i8 Fw")
+def yaw(quat, first, last, out):
+    """Heading of the body x axis, counter-clockwise from East [rad], (n,), of unit or other quaternions (4, n)."""
+    for i in range(first, last):
+        w, x, y, z = quat[0, i], quat[1, i], quat[2, i], quat[3, i]
         out[i] = atan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z)
 
 
-@kernel("F F F F Fw")
-def climb(qw, qx, qy, qz, out):
+@kernel("F2 i8 i8 Fw")
+def climb(quat, first, last, out):
     """Elevation of the body x axis, nose up positive [rad], (n,)."""
-    for i in range(out.shape[0]):
-        w, x, y, z = qw[i], qx[i], qy[i], qz[i]
+    for i in range(first, last):
+        w, x, y, z = quat[0, i], quat[1, i], quat[2, i], quat[3, i]
         east = w * w + x * x - y * y - z * z
         north = 2.0 * (w * z + x * y)
         out[i] = atan2(2.0 * (x * z - w * y), math.sqrt(east * east + north * north))
 
 
-@kernel("F F F F Fw")
-def roll(qw, qx, qy, qz, out):
+@kernel("F2 i8 i8 Fw")
+def roll(quat, first, last, out):
     """Bank about the body x axis, right wing down positive [rad], (n,)."""
-    for i in range(out.shape[0]):
-        w, x, y, z = qw[i], qx[i], qy[i], qz[i]
+    for i in range(first, last):
+        w, x, y, z = quat[0, i], quat[1, i], quat[2, i], quat[3, i]
         out[i] = atan2(2.0 * (w * x + y * z), w * w - x * x - y * y + z * z)
 
 
-@kernel("F F F F Fw Fw Fw")
-def forward(qw, qx, qy, qz, east, north, up):
-    """Unit vector along the body x axis, world frame, (n,) each."""
-    for i in range(east.shape[0]):
-        w, x, y, z = qw[i], qx[i], qy[i], qz[i]
+@kernel("F2 i8 i8 F2w")
+def forward(quat, first, last, out):
+    """Unit vector along the body x axis, world frame, (3, n)."""
+    for i in range(first, last):
+        w, x, y, z = quat[0, i], quat[1, i], quat[2, i], quat[3, i]
         scale = 1.0 / (w * w + x * x + y * y + z * z)
-        east[i] = (w * w + x * x - y * y - z * z) * scale
-        north[i] = 2.0 * (w * z + x * y) * scale
-        up[i] = 2.0 * (x * z - w * y) * scale
+        out[0, i] = (w * w + x * x - y * y - z * z) * scale
+        out[1, i] = 2.0 * (w * z + x * y) * scale
+        out[2, i] = 2.0 * (x * z - w * y) * scale
 
 
-@kernel("F F F F Fw Fw")
-def level_forward(qw, qx, qy, qz, east, north):
-    """Horizontal unit vector of the heading, (n,) each; zero for a nose that points straight up or down."""
-    for i in range(east.shape[0]):
-        w, x, y, z = qw[i], qx[i], qy[i], qz[i]
-        dx = w * w + x * x - y * y - z * z
-        dy = 2.0 * (w * z + x * y)
-        length = math.sqrt(dx * dx + dy * dy)
-        scale = 1.0 / length if length > 0.0 else 0.0
-        east[i] = dx * scale
-        north[i] = dy * scale
+@device
+def level(w, x, y, z):
+    """Horizontal unit vector (east, north) of the heading; zero for a nose that points straight up or down."""
+    dx = w * w + x * x - y * y - z * z
+    dy = 2.0 * (w * z + x * y)
+    length = math.sqrt(dx * dx + dy * dy)
+    scale = 1.0 / length if length > 0.0 else 0.0
+    return dx * scale, dy * scale
+
+
+@kernel("F2 i8 i8 F2w")
+def level_forward(quat, first, last, out):
+    """Horizontal unit vector of the heading, (2, n)."""
+    for i in range(first, last):
+        out[0, i], out[1, i] = level(quat[0, i], quat[1, i], quat[2, i], quat[3, i])
+
+
+@kernel("F2 I Fw Fw")
+def level_forward_by_place(quat, order, east, north):
+    """Horizontal unit vectors of the headings of the rows `order`, (n,) each."""
+    for p in range(order.shape[0]):
+        i = order[p]
+        east[p], north[p] = level(quat[0, i], quat[1, i], quat[2, i], quat[3, i])
+
+
+@kernel("F I Fw")
+def floats_by_place(values, order, out):
+    """out[p] = values[order[p]]."""
+    for p in range(order.shape[0]):
+        out[p] = values[order[p]]
+
+
+@kernel("I I Fw")
+def ints_by_place(values, order, out):
+    """out[p] = values[order[p]] as a float."""
+    for p in range(order.shape[0]):
+        out[p] = values[order[p]]
 
 
 @kernel("I I Iw")
@@ -101,15 +127,15 @@ def longest_reach(radius, world, reach):
         reach[w] = max(reach[w], radius[i])
 
 
-@kernel("F F F F F F F F Bw -> i8")
-def check(x, y, z, qw, qx, qy, qz, health, faulty):
+@kernel("F2 F2 F Bw -> i8")
+def check(pos, quat, health, faulty):
     """Number of rows that are not sound; faulty marks rows whose position or attitude is not finite. Rows without health count too.
 
     A sum of the seven numbers minus itself is 0 only where all are finite, so one test a row does, and it vectorises.
     """
     count = 0
-    for i in range(x.shape[0]):
-        total = x[i] + y[i] + z[i] + qw[i] + qx[i] + qy[i] + qz[i]
+    for i in range(health.shape[0]):
+        total = pos[0, i] + pos[1, i] + pos[2, i] + quat[0, i] + quat[1, i] + quat[2, i] + quat[3, i]
         bad = not (total - total == 0.0)
         faulty[i] = bad
         count += 1 if bad or not (health[i] > 0.0) else 0

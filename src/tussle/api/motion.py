@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from tussle.api.bodies import DERIVED, FLOATS, derive
+from tussle.api.bodies import DERIVED, FLOATS, Bodies, derive
 from tussle.api.group import GroupView
 from tussle.api.kinds import EntityPlugin
 from tussle.columns import Param, State
@@ -25,6 +25,7 @@ class MotionBody(GroupView):
 
     Attributes:
         forward_speed: Speed along the body x axis [m/s], (n,).
+        rows: The rows of pos, vel, quat and omega one by one, thirteen (n,); for kernels.
     """
 
     def __getattr__(self, name: str) -> Any:
@@ -32,17 +33,26 @@ class MotionBody(GroupView):
             array = getattr(self._bodies, name)[:, self.first : self.last]
             self.__dict__[name] = array
             return array
-        if name in DERIVED:
-            # Straight from the quaternions: while a model writes them, what the table keeps is out of date.
-            k = DERIVED[name]
-            out = np.empty((k, self.n) if k > 1 else self.n)
-            derive(name, np.ascontiguousarray(self.quat), out)
-            return out
+        if name == "rows":
+            rows = tuple(row for column in WRITABLE for row in getattr(self, column))
+            self.__dict__[name] = rows
+            return rows
         if name == "forward_speed":
             east, north, up = self.forward
             vx, vy, vz = self.vel
             return vx * east + vy * north + vz * up
         return super().__getattr__(name)
+
+    def _derive(self, name: str) -> np.ndarray:
+        # Straight from the quaternions: while a model writes them, what the table keeps is out of date.
+        k = DERIVED[name]
+        out = np.empty((k, self.n) if k > 1 else self.n)
+        derive(name, np.ascontiguousarray(self.quat), 0, self.n, out)
+        return out
+
+    def reset(self, bodies: Bodies, first: int, last: int) -> None:
+        self.__dict__.pop("rows", None)
+        super().reset(bodies, first, last)
 
     def set_attitude(self, roll: Any = 0.0, climb: Any = 0.0, yaw: Any = 0.0) -> None:
         """Write quat from bank (right wing down positive), elevation (nose up positive) and heading [rad], each (n,) or a number."""

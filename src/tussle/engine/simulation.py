@@ -69,6 +69,7 @@ class Simulation:
         self.observers: list[Callable[[Simulation], None]] = []
         self.parked: dict[int, access.Parked] = {}
         self.is_closed = False
+        self._has_failures = False
         self._resumed = threading.Event()
         self._resumed.set()
         clock = Clock(n, mission.start, mission.dt)
@@ -325,7 +326,7 @@ class Simulation:
     def _check_states(self) -> None:
         if self._checked is None:
             b = self.population.bodies
-            self._checked = (*b.pos, *b.quat, b.health, np.empty(b.n, bool))
+            self._checked = (b.pos, b.quat, b.health, np.empty(b.n, bool))
         if kernels.check(*self._checked):
             bodies, faulty = self.population.bodies, self._checked[-1]
             for row in np.flatnonzero(faulty):
@@ -337,9 +338,10 @@ class Simulation:
 
     def _take_out_dead(self) -> bool:
         view, bodies = self.world_view, self.population.bodies
-        ended = self.failed & self.running
-        if not view.deaths and not ended.any():
+        if not view.deaths and not self._has_failures:
             return False
+        ended = self.failed & self.running
+        self._has_failures = False
         gone = np.zeros(bodies.n, bool)
         for rows, _ in view.deaths:
             gone[rows] = True
@@ -422,7 +424,7 @@ class Simulation:
     def _record_failure(self, world: int, error: PluginError) -> None:
         if self.on_error == "raise":
             raise error
-        self.failed[world] = True
+        self.failed[world] = self._has_failures = True
         self.results[world] = WorldResult(world, int(self.context.seeds[world]), "error", 0, 0.0, {}, error=error)
         if (self.failed | ~self.running).all() and self.failed.sum() == self.n_worlds and self.n_worlds > 1:
             raise error

@@ -1,0 +1,73 @@
+"""Cost per agent and step from 100 to 100,000 entities at one density, and memory.
+
+    python benchmarks/scale.py [--sizes 1000 20000] [--repeats 3] [--json FILE]
+
+Unicycle boids, spread as densely as the 2,000 of Table 1 (which are normal with 632 m; here uniform over the square that has the same
+mean number of neighbours), dt 0.1 s, one motion step. `real_time` is simulated seconds per CPU second.
+"""
+
+from __future__ import annotations
+
+import math
+import resource
+import time
+from typing import Any
+
+import measuring
+
+from tussle import Block, Mission, Simulation
+from tussle.stock import Boids, Unicycle
+
+SIZES = (100, 300, 1000, 3000, 10_000, 20_000, 30_000, 100_000)
+SIGMA = math.sqrt(400_000.0)
+AREA_PER_AGENT = 4.0 * math.pi * SIGMA**2 / 2000.0
+"""Area per agent at which uniform agents have as many neighbours on average as 2,000 normal ones [m^2]."""
+STEPS = 50
+
+
+def mission(n: int) -> Mission:
+    """n boids at the density of Table 1 with N = 2000."""
+    half = 0.5 * math.sqrt(n * AREA_PER_AGENT)
+    block = Block(
+        name="prey",
+        team=1,
+        count=n,
+        position=(0, 0, 200),
+        placement="uniform",
+        scatter_first=True,
+        half_width=(half, half, 50.0),
+        autonomy=Boids(),
+        motion=Unicycle(vel_max=30.0),
+    )
+    return Mission(blocks=[block], dt=0.1, end=STEPS * 0.1, name=f"{n} boids")
+
+
+def measure(n: int) -> dict[str, Any]:
+    cpu, steps = 0.0, 0
+    while cpu < measuring.LEAST_CPU:
+        sim = Simulation(mission(n))
+        sim.step()
+        begin = time.process_time()
+        while not sim.is_over:
+            sim.step()
+            steps += 1
+            if n >= 30_000 and time.process_time() - begin > 2.0 * measuring.LEAST_CPU:
+                break
+        cpu += time.process_time() - begin
+    row = {"model": "Unicycle", "n": n, "ns_per_agent_step": 1e9 * cpu / steps / n, "real_time": steps * 0.1 / cpu, "cpu_s": cpu}
+    pairs = len(sim.world_view.near(200.0)) / n
+    return row | {"pairs": pairs, "alive": sim.population.bodies.n, "captures": 0, "peak_mb": _peak_mb()}
+
+
+def _peak_mb() -> float:
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+
+
+def main() -> None:
+    args = measuring.arguments(__doc__.splitlines()[0], SIZES)
+    rows = [measuring.median_of(args.repeats, lambda n=n: measure(n), "ns_per_agent_step") for n in args.sizes]
+    measuring.report("Unicycle boids at constant density, one thread", rows, args.json)
+
+
+if __name__ == "__main__":
+    main()

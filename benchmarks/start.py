@@ -1,0 +1,66 @@
+"""Time to import tussle and to the first step: kernels cached, not cached, and one of them edited.
+
+    python benchmarks/start.py [--repeats 3] [--json FILE]
+
+Each figure is a fresh process, wall time. The edited kernel is one in a copy of the package.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import measuring
+
+import tussle
+
+FIRST_STEP = "import sys; sys.path.insert(0, {here!r}); import game; game.Simulation(game.mission()).step()"
+EDITED = "stock/motion/unicycle/kernels.py"
+
+
+def run(code: str, package: Path, cache: Path) -> float:
+    """Wall seconds of a fresh Python that runs code with the package's copy."""
+    environment = {**os.environ, "PYTHONPATH": str(package), "TUSSLE_CACHE_DIR": str(cache)}
+    begin = time.perf_counter()
+    subprocess.run([sys.executable, "-c", code], check=True, env=environment)
+    return time.perf_counter() - begin
+
+
+def edit(path: Path) -> None:
+    """Change what one kernel computes, by a constant that nothing depends on."""
+    text = path.read_text(encoding="utf-8")
+    marker = "\ndef to_body("
+    at = text.index('"""', text.index('"""', text.index(marker)) + 3) + 3
+    path.write_text(text[:at] + "\n    unused = 1.0 + dt" + text[at:], encoding="utf-8")
+
+
+def measure() -> dict[str, Any]:
+    here = str(Path(__file__).parent)
+    first_step = FIRST_STEP.format(here=here)
+    with tempfile.TemporaryDirectory() as folder:
+        package, cache = Path(folder) / "src", Path(folder) / "cache"
+        shutil.copytree(Path(tussle.__file__).parent, package / "tussle")
+        bare = run("pass", package, cache)
+        run("import tussle", package, cache)
+        row = {"model": "start", "n": 110, "import_s": run("import tussle", package, cache) - bare}
+        row["first_step_cold_s"] = run(first_step, package, cache)
+        row["first_step_warm_s"] = run(first_step, package, cache)
+        edit(package / "tussle" / EDITED)
+        row["first_step_edited_s"] = run(first_step, package, cache)
+    return row
+
+
+def main() -> None:
+    args = measuring.arguments(__doc__.splitlines()[0], (110,))
+    row = measuring.median_of(args.repeats, measure, "first_step_warm_s")
+    measuring.report("Seconds of wall time, fresh processes", [row], args.json)
+
+
+if __name__ == "__main__":
+    main()
