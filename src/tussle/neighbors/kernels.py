@@ -27,7 +27,7 @@ def rank_bits(n: int) -> int:
 
 
 @device
-def cell_of(position: float, inverse_cell: float, limit: float) -> int:
+def cell_of(position, inverse_cell, limit):
     """Cell number in [0, 2 limit]; NaN goes to cell 0. Never decreasing in position."""
     cell = math.floor(position * inverse_cell)
     cell = cell if cell > -limit else -limit

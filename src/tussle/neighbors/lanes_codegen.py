@@ -1,5 +1,8 @@
 """The instructions of each function on lanes: types, typing rules and LLVM code, registered with Numba on import."""
 
+# Numba has no type annotations.
+# mypy: disable-error-code="no-untyped-call,attr-defined"
+
 from __future__ import annotations
 
 import operator
@@ -22,14 +25,14 @@ _LONGS = ir.VectorType(ir.IntType(64), LANES)
 _BITS = ir.VectorType(ir.IntType(1), LANES)
 
 
-class LanesType(types.Type):  # type: ignore[misc]
+class LanesType(types.Type):
     """Numba type of eight doubles."""
 
     def __init__(self) -> None:
         super().__init__(name="Lanes8")
 
 
-class MaskType(types.Type):  # type: ignore[misc]
+class MaskType(types.Type):
     """Numba type of eight truth values."""
 
     def __init__(self) -> None:
@@ -41,13 +44,13 @@ MASK_TYPE = MaskType()
 
 
 @register_default(LanesType)
-class _LanesModel(models.PrimitiveModel):  # type: ignore[misc]
+class _LanesModel(models.PrimitiveModel):
     def __init__(self, manager: Any, numba_type: Any) -> None:
         super().__init__(manager, numba_type, _DOUBLES)
 
 
 @register_default(MaskType)
-class _MaskModel(models.PrimitiveModel):  # type: ignore[misc]
+class _MaskModel(models.PrimitiveModel):
     def __init__(self, manager: Any, numba_type: Any) -> None:
         super().__init__(manager, numba_type, _BITS)
 
