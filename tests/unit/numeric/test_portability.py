@@ -64,14 +64,20 @@ CALL = re.compile(
 FUSED = re.compile(r"\bv?fn?m(?:add|sub)\w*", re.IGNORECASE)
 
 
+# Numba's text of the error "cannot assign slice of shape ..." counts decimal digits with log10; no result comes from there.
+ERROR_TEXT = "raise_with_shape_context"
+
+
 def suspicious(assembly: str) -> set[str]:
     """Calls of the mathematical library and fused multiply-adds in assembly text."""
-    code = [
-        line
-        for line in assembly.splitlines()
-        if line.startswith("\t") and not line.startswith(("\t.ascii", "\t.asciz", "\t.section", "\t.file"))
-    ]
-    return {match.group(0) for line in code for match in (CALL.search(line), FUSED.search(line)) if match}
+    found, symbol = set(), ""
+    for line in assembly.splitlines():
+        if line.endswith(":") and not line.startswith((".L", "\t")):
+            symbol = line
+        code = line.startswith("\t") and not line.startswith(("\t.asci", "\t.section", "\t.file"))
+        if code and ERROR_TEXT not in symbol:
+            found.update(match.group(0) for match in (CALL.search(line), FUSED.search(line)) if match)
+    return found
 
 
 def kernel_modules() -> list[str]:
