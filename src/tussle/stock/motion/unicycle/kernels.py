@@ -23,11 +23,10 @@ import numpy as np
 from tussle.numeric import atan2, sincos
 from tussle.numeric.kernel import device, kernel
 
-BLOCK = 128  # rows; the scratch of a block (some 40 kB) stays in the first-level cache
+BLOCK = 128  # rows; the scratch of a block (some 32 kB) stays in the first-level cache
 INVERSE_PI = 1.0 / math.pi
-PI_HIGH = (
-    2.0 * 1.57079632673412561417
-)  # the upper 33 bits of pi, so that k * PI_HIGH is exact for |k| < 2**20
+ROUNDER = 6755399441055744.0  # 1.5 * 2**52: added and taken away again, it rounds to a whole number
+PI_HIGH = 2.0 * 1.57079632673412561417  # 33 bits of pi: k * PI_HIGH is exact for |k| < 2**20
 PI_LOW = math.pi - PI_HIGH  # exact; together they miss pi by 1e-16
 GRAVITY = 9.81
 
@@ -40,9 +39,10 @@ def clamp(value, limit):
 
 @device
 def fold(delta):
-    """(delta - k pi in [-pi/2, pi/2], 1.0 if k is odd else 0.0): keeps sin(N d)/sin(d) away from 0/0 beside multiples of pi."""
-    k = math.floor(delta * INVERSE_PI + 0.5)
-    return (delta - k * PI_HIGH) - k * PI_LOW, k - 2.0 * math.floor(0.5 * k)
+    """(delta - k pi in [-pi/2, pi/2], 1.0 if k is odd else 0.0), so that sin(N d)/sin(d) stays away from 0/0 beside k pi."""
+    k = (delta * INVERSE_PI + ROUNDER) - ROUNDER
+    odd = abs(k - 2.0 * ((0.5 * k + ROUNDER) - ROUNDER))
+    return (delta - k * PI_HIGH) - k * PI_LOW, odd
 
 
 @device
@@ -70,7 +70,7 @@ def advance_pitch(x, u, p, dt, substeps):
     speed, turn_rate, pitch_rate = u[0], u[1], u[2]
     vel_max, turn_max, pitch_max = p[0], p[1], p[2]
     count = float(substeps)
-    n_is_even = (count - 1.0) - 2.0 * math.floor(0.5 * (count - 1.0))
+    n_is_even = 1.0 if substeps % 2 == 0 else 0.0
     half_dt = 0.5 * dt
     half_h = half_dt / count
     angle = np.empty(8 * BLOCK)
@@ -133,7 +133,7 @@ def advance_level(x, u, p, dt, substeps):
     speed, turn_rate, velocity_z = u[0], u[1], u[2]
     vel_max, turn_max, velocity_z_max = p[0], p[1], p[3]
     count = float(substeps)
-    n_is_even = (count - 1.0) - 2.0 * math.floor(0.5 * (count - 1.0))
+    n_is_even = 1.0 if substeps % 2 == 0 else 0.0
     half_dt = 0.5 * dt
     half_h = half_dt / count
     angle = np.empty(4 * BLOCK)
