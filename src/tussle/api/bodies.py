@@ -21,6 +21,7 @@ MOST_RANGES = 1000
 BRUTE = 600
 """Rows per world up to which a search for the nearest needs no cells."""
 
+_DERIVING = {name: getattr(kernels, name) for name in DERIVED}
 _OFFSETS = {name: sum(list(FLOATS.values())[:i]) for i, name in enumerate(FLOATS)}
 _UNITS = {"pos": "m", "vel": "m/s", "quat": "", "omega": "rad/s", "force": "N", "torque": "N m", "radius": "m", "mass": "kg"}
 
@@ -109,9 +110,9 @@ class Bodies:
             kept = self._derived[name] = Kept(-1, np.empty((k, self.n) if k > 1 else self.n))
         if kept.version != self.version:
             for first, last in self._since(kept.version):
-                derive(name, self.quat, first, last, kept.columns)
+                derive(name, self.quat, first, last, 0, kept.columns)
             kept.version = self.version
-        return np.asarray(kept.columns)
+        return kept.columns  # type: ignore[no-any-return]
 
     # -- who is where -----------------------------------------------------------------------------------------------------
 
@@ -194,9 +195,9 @@ class Bodies:
         return float(2.0 ** np.ceil(np.log2(np.sqrt(64.0 * area / len(x)) + 1.0)))
 
 
-def derive(name: str, quat: np.ndarray, first: int, last: int, out: np.ndarray) -> None:
-    """Fill rows [first, last) of out, (n,) or (k, n), with yaw, climb, roll, forward or level_forward of the quaternions (4, n)."""
-    getattr(kernels, name)(quat, first, last, out)
+def derive(name: str, quat: np.ndarray, first: int, last: int, base: int, out: np.ndarray) -> None:
+    """Put yaw, climb, roll, forward or level_forward of the quaternions [first, last) into out, (n,) or (k, n), from first - base on."""
+    _DERIVING[name](quat, first, last, base, out)
 
 
 def read_only(array: np.ndarray) -> np.ndarray:

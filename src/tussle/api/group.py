@@ -9,7 +9,7 @@ import numpy as np
 
 from tussle import rng
 from tussle.api import kernels
-from tussle.api.bodies import DERIVED, FLOATS, INTS, Bodies, BodyView, derive, read_only
+from tussle.api.bodies import DERIVED, FLOATS, INTS, Bodies, BodyView, Kept, derive, read_only
 from tussle.api.context import Context, stream
 from tussle.api.draw import Draw
 from tussle.api.pairs import Nearest, Pairs, any_index, find_near_rows, find_nearest, find_nearest_row, find_pairs
@@ -53,7 +53,7 @@ class GroupView:
         for name in (*FLOATS, *INTS, "_seeds"):
             own.pop(name, None)
         self._bodies = bodies
-        self._derived: dict[str, np.ndarray] = {}
+        self._derived: dict[str, Kept] = {}
         self.first, self.last = first, last
         self.n = last - first
         self._reaches: dict[int, tuple[np.ndarray, float | np.ndarray]] = {}
@@ -71,16 +71,18 @@ class GroupView:
         raise AttributeError(f"g has no {name!r}{nearest_name(name, allowed)}; {listed(allowed)}")
 
     def _derive(self, name: str) -> np.ndarray:
-        if "quat" in self.belief:
+        kept = self._derived.get(name)
+        if kept is None:
             k = DERIVED[name]
             out = np.empty((k, self.n) if k > 1 else self.n)
-            derive(name, self.belief["quat"], 0, self.n, out)
-            return out
-        everybody = self._bodies.derived(name)
-        view = self._derived.get(name)
-        if view is None:
-            view = self._derived[name] = read_only(everybody[..., self.first : self.last])
-        return view
+            kept = self._derived[name] = Kept(-1, (out, read_only(out)))
+        bodies = self._bodies
+        if "quat" in self.belief:
+            derive(name, self.belief["quat"], 0, self.n, 0, kept.columns[0])
+        elif kept.version != bodies.version:
+            derive(name, bodies.quat, self.first, self.last, self.first, kept.columns[0])
+            kept.version = bodies.version
+        return kept.columns[1]  # type: ignore[no-any-return]
 
     @property
     def yaw(self) -> np.ndarray:

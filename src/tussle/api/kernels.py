@@ -8,41 +8,44 @@ from tussle.numeric import atan2
 from tussle.numeric.kernel import device, kernel
 
 
-@kernel("F2 i8 i8 Fw")
-def yaw(quat, first, last, out):
-    """Heading of the body x axis, counter-clockwise from East [rad], (n,), of unit or other quaternions (4, n)."""
+@kernel("F2 i8 i8 i8 Fw")
+def yaw(quat, first, last, base, out):
+    """Heading of the body x axis, counter-clockwise from East [rad], of the columns [first, last) of quaternions (4, n).
+
+    Here and below column i goes to out[i - base]; the quaternions need not have unit length.
+    """
     for i in range(first, last):
         w, x, y, z = quat[0, i], quat[1, i], quat[2, i], quat[3, i]
-        out[i] = atan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z)
+        out[i - base] = atan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z)
 
 
-@kernel("F2 i8 i8 Fw")
-def climb(quat, first, last, out):
+@kernel("F2 i8 i8 i8 Fw")
+def climb(quat, first, last, base, out):
     """Elevation of the body x axis, nose up positive [rad], (n,)."""
     for i in range(first, last):
         w, x, y, z = quat[0, i], quat[1, i], quat[2, i], quat[3, i]
         east = w * w + x * x - y * y - z * z
         north = 2.0 * (w * z + x * y)
-        out[i] = atan2(2.0 * (x * z - w * y), math.sqrt(east * east + north * north))
+        out[i - base] = atan2(2.0 * (x * z - w * y), math.sqrt(east * east + north * north))
 
 
-@kernel("F2 i8 i8 Fw")
-def roll(quat, first, last, out):
+@kernel("F2 i8 i8 i8 Fw")
+def roll(quat, first, last, base, out):
     """Bank about the body x axis, right wing down positive [rad], (n,)."""
     for i in range(first, last):
         w, x, y, z = quat[0, i], quat[1, i], quat[2, i], quat[3, i]
-        out[i] = atan2(2.0 * (w * x + y * z), w * w - x * x - y * y + z * z)
+        out[i - base] = atan2(2.0 * (w * x + y * z), w * w - x * x - y * y + z * z)
 
 
-@kernel("F2 i8 i8 F2w")
-def forward(quat, first, last, out):
+@kernel("F2 i8 i8 i8 F2w")
+def forward(quat, first, last, base, out):
     """Unit vector along the body x axis, world frame, (3, n)."""
     for i in range(first, last):
         w, x, y, z = quat[0, i], quat[1, i], quat[2, i], quat[3, i]
         scale = 1.0 / (w * w + x * x + y * y + z * z)
-        out[0, i] = (w * w + x * x - y * y - z * z) * scale
-        out[1, i] = 2.0 * (w * z + x * y) * scale
-        out[2, i] = 2.0 * (x * z - w * y) * scale
+        out[0, i - base] = (w * w + x * x - y * y - z * z) * scale
+        out[1, i - base] = 2.0 * (w * z + x * y) * scale
+        out[2, i - base] = 2.0 * (x * z - w * y) * scale
 
 
 @device
@@ -55,11 +58,11 @@ def level(w, x, y, z):
     return dx * scale, dy * scale
 
 
-@kernel("F2 i8 i8 F2w")
-def level_forward(quat, first, last, out):
+@kernel("F2 i8 i8 i8 F2w")
+def level_forward(quat, first, last, base, out):
     """Horizontal unit vector of the heading, (2, n)."""
     for i in range(first, last):
-        out[0, i], out[1, i] = level(quat[0, i], quat[1, i], quat[2, i], quat[3, i])
+        out[0, i - base], out[1, i - base] = level(quat[0, i], quat[1, i], quat[2, i], quat[3, i])
 
 
 @kernel("F2 I Fw Fw")

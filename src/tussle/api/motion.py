@@ -47,7 +47,7 @@ class MotionBody(GroupView):
         # Straight from the quaternions: while a model writes them, what the table keeps is out of date.
         k = DERIVED[name]
         out = np.empty((k, self.n) if k > 1 else self.n)
-        derive(name, np.ascontiguousarray(self.quat), 0, self.n, out)
+        derive(name, self._bodies.quat, self.first, self.last, self.first, out)
         return out
 
     def reset(self, bodies: Bodies, first: int, last: int) -> None:

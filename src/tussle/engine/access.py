@@ -92,7 +92,7 @@ def _body_column(bodies: Bodies, name: str, rows: np.ndarray) -> np.ndarray:
     if name in DERIVED:
         k = DERIVED[name]
         out = np.empty((k, len(rows)) if k > 1 else len(rows))
-        derive(name, np.ascontiguousarray(bodies.quat[:, rows]), 0, len(rows), out)
+        derive(name, np.ascontiguousarray(bodies.quat[:, rows]), 0, len(rows), 0, out)
         return out
     return np.asarray(getattr(bodies, name)[..., rows])
 

@@ -148,6 +148,8 @@ class Group:
             binding.places[name] = self.table.add((key, name), dtype, len(param.fields), param.default)
         for name, column in type(spec).columns.items():
             if isinstance(column, Param):
+                if column.structural:
+                    plugin.__dict__[name] = spec.values[name]
                 if column.ragged:
                     binding.ragged[name] = RaggedColumn.empty(0, column)
             elif isinstance(column, (State, EntityRef)):

@@ -161,7 +161,16 @@ class Schedule:
             for inbox in inboxes:
                 inbox.clear(due)
 
-        return Call(self._label(kind, group, binding, substep), run)
+        def lean() -> None:
+            if group.n:
+                view.caller, view.substep = plugin, substep
+                try:
+                    plugin.step(view)
+                except Exception as error:
+                    self._isolate(group, binding, error, action)
+
+        is_plain = atomic and per_step is None and not (linked or inboxes or has_handles or topics)
+        return Call(self._label(kind, group, binding, substep), lean if is_plain else run)
 
     def _part(self, group: Group, binding: Binding, due: np.ndarray, action: Callable[[Group], None]) -> None:
         sim = self.sim

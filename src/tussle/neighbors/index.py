@@ -50,6 +50,27 @@ def padded(n: int) -> Floats:
     return np.zeros(n + LANES)[:n]
 
 
+@dataclass(slots=True)
+class Room:
+    """Arrays for the blocks of one range of rows, used again from step to step."""
+
+    queries: Longs
+    block_first: Longs
+    block_strip: Longs
+    x: Floats
+    y: Floats
+    z: Floats
+    span_first: Longs
+    span_start: Longs
+    span_end: Longs
+
+    @classmethod
+    def of(cls, n: int) -> Room:
+        """For n rows; the spans may turn out to need more."""
+        longs = lambda k: np.empty(k, np.int64)  # noqa: E731
+        return cls(longs(n), longs(n + 1), longs(n), padded(n), padded(n), padded(n), longs(n + 1), longs(2 * n + 64), longs(2 * n + 64))
+
+
 class Index:
     """Positions of all rows of all worlds at one instant; what a world's rows see is independent of the other worlds.
 
@@ -91,8 +112,10 @@ class Index:
         self._cursor = np.zeros(3 * n, np.int64)
         self._size = np.zeros(1, np.int64)
         self._fixed = False
+        self._given: Floats | None = None
         self.built = 0
         self._cache.clear()
+        self._rooms: dict[tuple[int, int], Room] = {}
 
     @property
     def n_worlds(self) -> int:
@@ -111,8 +134,8 @@ class Index:
         An infinite reach puts a world into one cell, in order of id; with every reach infinite the order depends on the layout
         alone.
         """
-        if not np.array_equal(reach, self.reach) or not self.built:
-            self.reach = np.array(reach, np.float64)
+        if reach is not self._given and (not np.array_equal(reach, self.reach) or not self.built):
+            self._given, self.reach = reach, np.array(reach, np.float64)
             self.inverse_cell = self._rings / np.where(self.reach > 0.0, self.reach, 1.0)
             self._cache.clear()
             self._fixed = bool(np.isinf(self.reach).all())
@@ -133,7 +156,7 @@ class Index:
         return out
 
     def blocks(self, first: int, last: int, pos: tuple[Floats, Floats, Floats] | None = None) -> Blocks:
-        """Blocks of rows [first, last) of the table. `pos`: where the rows stand [m], three (n,), if not where the table says."""
+        """Blocks of rows [first, last) of the table, good until the next call for these. `pos`: where the rows stand [m], three (n,), if not where the table says."""
         if pos is None:
             fixed, built, blocks = self._cache.get((first, last), (False, -1, None))
             if blocks is not None and fixed:
@@ -141,28 +164,28 @@ class Index:
                 return blocks
             if blocks is not None and built == self.built:
                 return blocks
-        n = last - first
-        queries, block_first, block_strip = (np.empty(n + k, np.int64) for k in (0, 1, 0))
+        room = self._rooms.get((first, last))
+        if room is None or pos is not None:
+            room = Room.of(last - first)
+            if pos is None:
+                self._rooms[first, last] = room
         n_blocks = kernels.group_queries(
-            self.order, self._strip_start, self._world_strip, first, last, queries, block_first, block_strip
+            self.order, self._strip_start, self._world_strip, first, last, room.queries, room.block_first, room.block_strip
         )
-        x, y, z = padded(n), padded(n), padded(n)
-        self._query_positions(first, queries, pos, x, y, z)
-        span_first = np.empty(n_blocks + 1, np.int64)
-        room = 8 * n_blocks + 8
+        self._query_positions(first, room.queries, pos, room.x, room.y, room.z)
         while True:
-            spans = np.empty((2, room), np.int64)
             needed = kernels.find_spans(
-                self.inverse_cell, self.world_start, self._keys, self._strip_start, self._world_strip, x, y,
-                block_first, block_strip, self._strip_world, n_blocks, self.reach, span_first, spans[0], spans[1],
-                self._cursor, self._size,
+                self.inverse_cell, self.world_start, self._keys, self._strip_start, self._world_strip, room.x, room.y,
+                room.block_first, room.block_strip, self._strip_world, n_blocks, self.reach, room.span_first,
+                room.span_start, room.span_end, self._cursor, self._size,
             )  # fmt: skip
-            if needed <= room:
+            if needed <= len(room.span_start):
                 break
-            room = needed
+            room.span_start, room.span_end = np.empty(2 * needed, np.int64), np.empty(2 * needed, np.int64)
         blocks = Blocks(
-            queries, x, y, z, n_blocks, block_first, span_first, spans[0], spans[1], int(self._size[0])
-        )
+            room.queries, room.x, room.y, room.z, n_blocks, room.block_first, room.span_first, room.span_start, room.span_end,
+            int(self._size[0]),
+        )  # fmt: skip
         if pos is None:
             self._cache[first, last] = (self._fixed, self.built, blocks)
         return blocks

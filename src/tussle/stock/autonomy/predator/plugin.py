@@ -38,18 +38,16 @@ class Predator(Autonomy):
         x, y, z = g.pos
         target_row = np.empty(g.n, np.int64)
         room = 16 * g.n + 64
-        target = self.target.copy()
-        while True:
+        while True:  # again with more room where there are more claims than expected; targets then stay as they are
             claim_row, claimed = np.empty(room, np.int64), np.empty(room, np.int64)
             n_claims = kernels.hunt(
-                x, y, z, g.team, self.prey_team_id, self.capture_range, self.allow_prey_switching, target, target_row,
+                x, y, z, g.team, self.prey_team_id, self.capture_range, self.allow_prey_switching, self.target, target_row,
                 claim_row, claimed, bodies.id, index.row_world, id_start, id_row, index.place, g.first, *index.table,
                 g.by_place(index, "team")[0], index.order,
             )  # fmt: skip
             if n_claims <= room:
                 break
             room = n_claims
-        self.target[:] = target
         table_x, table_y, table_z = bodies.pos
         if not self.wired.isdisjoint(("speed", "turn_rate", "pitch_rate")):
             kernels.pursue(
