@@ -38,6 +38,25 @@ class MissingExtraError(TussleError, ImportError):
     """A feature needs a package that only an extra installs; the message names both."""
 
 
+class ConformanceError(TussleError):
+    """A plugin breaks a rule of the contract.
+
+    Args:
+        plugin: Name of its class.
+        rule: What it breaks, such as "snapshot".
+        evidence: What was seen.
+    """
+
+    def __init__(self, plugin: str, rule: str, evidence: str) -> None:
+        super().__init__(plugin, rule, evidence)
+        self.plugin = plugin
+        self.rule = rule
+        self.evidence = evidence
+
+    def __str__(self) -> str:
+        return f"{self.plugin} breaks the rule {self.rule!r}: {self.evidence}"
+
+
 class PluginError(TussleError):
     """A plugin failed while the simulation ran.
 
