@@ -45,8 +45,9 @@ class Pairs:
         if values.shape[-1:] != self.row.shape:
             raise ParameterError(f"values of pairs have shape {values.shape}; the last axis needs the {len(self.row)} pairs")
         out = np.zeros((*values.shape[:-1], len(self.count)))
-        flat = np.ascontiguousarray(values.reshape(-1, len(self.row)))
-        for source, target in zip(flat, out.reshape(-1, len(self.count)), strict=True):
+        k = int(np.prod(values.shape[:-1]))  # in so many words: without pairs, -1 would mean nothing
+        flat = np.ascontiguousarray(values.reshape(k, len(self.row)))
+        for source, target in zip(flat, out.reshape(k, len(self.count)), strict=True):
             reduce(self._start, source, target, *rest)
         return out
 

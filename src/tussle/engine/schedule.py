@@ -70,8 +70,7 @@ class Schedule:
         if sim.interactions:
             calls.append(Call("take over what was moved", sim.take_over_moves))
         calls += [self._world_call("metric", r) for r in sim.metrics]
-        if sim.topics:
-            calls.append(Call("deliver messages", sim.mail.deliver))
+        calls.append(Call("deliver messages", sim.mail.deliver))  # always: the world may speak first on topics of its own
         calls.append(Call("check, remove, end", sim.finish_step))
         return calls
 
@@ -145,20 +144,15 @@ class Schedule:
                 self._isolate(group, binding, error, action)
 
         def run() -> None:
-            if not group.n:
-                return
-            if has_handles:
-                self._await(group, binding)
-            if per_step is None:
-                whole()
-                due = None
-            else:
-                due = is_due(clock.step, per_step) & ~dead
-                if due.all():
+            due = None if per_step is None else is_due(clock.step, per_step) & ~dead
+            if group.n:
+                if has_handles:
+                    self._await(group, binding)
+                if due is None or due.all():
                     whole()
                 elif due.any():
                     self._part(group, binding, due, action)
-            for inbox in inboxes:
+            for inbox in inboxes:  # of a group without rows too: who comes later has not heard what was said before
                 inbox.clear(due)
 
         def lean() -> None:

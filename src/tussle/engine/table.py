@@ -77,4 +77,4 @@ class Table:
 
     def restore(self, arrays: dict[type, np.ndarray]) -> None:
         self.arrays = {dtype: array.copy() for dtype, array in arrays.items()}
-        self.n = self.arrays[float].shape[1]
+        self.n = self.arrays[float].shape[1] if arrays else 0
