@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import importlib.metadata
 import tomllib
 from collections.abc import Iterable
 from functools import cache
@@ -19,15 +20,22 @@ def manifest() -> dict[str, str]:
     return dict(tomllib.loads(text)["plugins"])
 
 
+def others() -> dict[str, str]:
+    """Name -> "module:class" of the plugins that other installed packages offer under the entry point `tussle.plugins`."""
+    return {point.name: point.value for point in importlib.metadata.entry_points(group="tussle.plugins")}
+
+
 def load(name: str) -> Any:
-    """A plugin class by its name.
+    """A plugin class by its name: one that ships, else one of another installed package.
 
     Raises:
         ParameterError: There is none of this name.
     """
-    if name not in manifest():
-        raise ParameterError(f"there is no plugin {name!r}{nearest_name(name, manifest())}; {listed(sorted(manifest()))}")
-    module, _, attribute = manifest()[name].partition(":")
+    path = manifest().get(name) or others().get(name)
+    if path is None:
+        known = sorted({*manifest(), *others()})
+        raise ParameterError(f"there is no plugin {name!r}{nearest_name(name, known)}; {listed(known)}")
+    module, _, attribute = path.partition(":")
     return getattr(importlib.import_module(module), attribute)
 
 
