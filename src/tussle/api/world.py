@@ -49,6 +49,7 @@ class WorldView(GroupView):
 
     def __init__(self, bodies: Bodies, context: Context) -> None:
         super().__init__(bodies, 0, bodies.n, context, context.clock.dt)
+        self.only: np.ndarray | None = None  # worlds that this view speaks for, (n_worlds,); None is all
         self.deaths: list[tuple[np.ndarray, str]] = []
         self.moved: list[np.ndarray] = []
         self.births: list[dict[str, Any]] = []
@@ -125,13 +126,29 @@ class WorldView(GroupView):
         """
         if block not in self.templates:
             raise MissionError(f"w.spawn: there is no block {block!r}{nearest_name(block, self.templates)}; {listed(self.templates)}")
-        allowed = ("pos", "vel", "quat", "team")
-        for name in where:
-            if name not in allowed:
-                raise ParameterError(f"w.spawn: unknown {name!r}{nearest_name(name, allowed)}; {listed(allowed)}")
         world = np.atleast_1d(np.asarray(world, np.int64))
-        if len(world):
-            self.births.append({"block": block, "world": world, **{k: np.asarray(v, float) for k, v in where.items()}})
+        full = {name: self._per_birth(name, value, len(world)) for name, value in where.items()}
+        kept = self._spoken_for(world)
+        if len(kept):
+            self.births.append({"block": block, "world": world[kept], **{k: v[..., kept] for k, v in full.items()}})
+
+    def _per_birth(self, name: str, value: Any, m: int) -> np.ndarray:
+        allowed = {"pos": (3,), "vel": (3,), "quat": (4,), "team": ()}
+        if name not in allowed:
+            raise ParameterError(f"w.spawn: unknown {name!r}{nearest_name(name, allowed)}; {listed(allowed)}")
+        values, shape = np.asarray(value, float), (*allowed[name], m)
+        values = values[:, None] if allowed[name] and values.ndim == 1 else values
+        try:
+            values = np.broadcast_to(values, shape)
+        except ValueError:
+            raise ParameterError(f"w.spawn: {name} has shape {np.shape(value)}; needed is {shape}") from None
+        if name == "team" and not np.isin(values, self.teams).all():
+            raise ParameterError(f"w.spawn: team = {value!r} is not allowed; teams of the mission are {', '.join(map(str, self.teams))}")
+        return values
+
+    def _spoken_for(self, world: np.ndarray) -> np.ndarray:
+        """Which of these worlds this view speaks for: all, but for a call on behalf of some."""
+        return np.arange(len(world)) if self.only is None else np.flatnonzero(self.only[world])
 
     def _rows(self, rows: Any) -> np.ndarray:
         rows = np.atleast_1d(np.asarray(rows))
@@ -151,7 +168,8 @@ class WorldView(GroupView):
         world = np.atleast_1d(np.asarray(world, np.int64))
         if len(world):
             assert self.publish_to is not None
-            self.publish_to(type_, network).add(Batch.make(type_, world, np.zeros(len(world), np.int64), fields))
+            batch = Batch.make(type_, world, np.zeros(len(world), np.int64), fields)
+            self.publish_to(type_, network).add(batch if self.only is None else batch.take(self._spoken_for(world)))
 
     # -- chance and services ------------------------------------------------------------------------------------------------
 

@@ -79,9 +79,9 @@ class TopicBuffer:
             del self.sent[mark:]
             self._joined = None
 
-    def post(self, to: Any, due: np.ndarray) -> None:
-        """Queue this step's messages for delivery."""
-        self.queue.append(Parcel(self.outbox(), due, to))
+    def post(self, batch: Batch, to: Any, due: np.ndarray) -> None:
+        """Queue messages for delivery."""
+        self.queue.append(Parcel(batch, due, to))
 
     def deliver(self, step: np.ndarray) -> None:
         """Hand over all messages that are due at the end of the worlds' steps, (n_worlds,)."""

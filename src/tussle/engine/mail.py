@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from itertools import zip_longest
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tussle.columns import RaggedColumn
 from tussle.comms import EVERYONE, SAME_ENTITY, TopicBuffer
 from tussle.engine.referees import Referee
-from tussle.errors import WiringError, listed, nearest_name
-from tussle.messages import Message
+from tussle.errors import MissionError, PluginError, WiringError, listed, nearest_name
+from tussle.messages import Batch, Message, SpawnEntity
 
 if TYPE_CHECKING:
     from tussle.engine.simulation import Simulation
@@ -55,16 +57,48 @@ class Mail:
         step = self.sim.context.clock.step
         for topic in self.topics.values():
             if topic.sent:
+                if topic.type is SpawnEntity:
+                    self._ask_for_births(topic.outbox())
                 if topic.inboxes:
-                    self._route(topic)
+                    self._post(topic)
                 topic.clear_outbox()
             if topic.queue:
                 topic.deliver(step)
 
-    def _route(self, topic: TopicBuffer) -> None:
-        sim, network = self.sim, self.networks[topic.network]
-        batch, clock = topic.outbox(), sim.context.clock
-        view = network.view
+    def _ask_for_births(self, batch: Batch) -> None:
+        """Turn `SpawnEntity` messages into births at the beginning of the next step, block by block in the mission's order."""
+        view = self.sim.world_view
+        has_attitude = (batch.quat != 0.0).any(axis=0)
+        for block in view.templates:
+            for turned in (False, True):
+                index = np.array([i for i, b in enumerate(batch.block) if b == block and has_attitude[i] == turned], np.int64)
+                attitude = {"quat": batch.quat[:, index]} if turned else {}
+                view.spawn(block, batch.world[index], pos=batch.pos[:, index], vel=batch.vel[:, index], **attitude)
+        for i, block in enumerate(batch.block):
+            world = int(batch.world[i])
+            if block not in view.templates and not self.sim.failed[world]:
+                error = MissionError(f"SpawnEntity: there is no block {block!r}{nearest_name(str(block), view.templates)}; {listed(view.templates)}")
+                self.sim.record_failure(
+                    world, PluginError(str(error), where=f"sent by entity {int(batch.sender[i])}", step=int(self.sim.steps[world]), world=world)
+                )
+
+    def _post(self, topic: TopicBuffer) -> None:
+        network, batch = self.networks[topic.network], topic.outbox()
+        try:
+            self._route(topic, network, batch)
+        except Exception as error:
+            worlds = np.unique(batch.world)
+            for world in worlds:
+                mine = batch.take(np.flatnonzero(batch.world == world))
+                try:
+                    if len(worlds) == 1:
+                        raise error
+                    self._route(topic, network, mine)
+                except Exception as caught:
+                    self.sim.fail(int(world), network.plugin, caught, f"topic {topic.name!r}")
+
+    def _route(self, topic: TopicBuffer, network: Referee, batch: Batch) -> None:
+        sim, clock, view = self.sim, self.sim.context.clock, network.view
         view.caller = network.plugin
         to = network.plugin.route(view, batch)
         if not isinstance(to, str):
@@ -74,7 +108,7 @@ class Mail:
             raise WiringError(f"{topic.network}.route returned {to!r}; it is EVERYONE, SAME_ENTITY or (message numbers, rows)")
         delay = network.plugin.comm_delay[batch.world]
         steps = np.array([max(0, math.ceil(d / clock.dt - 1e-9)) for d in delay], np.int64)
-        topic.post(to, clock.step[batch.world] + steps)
+        topic.post(batch, to, clock.step[batch.world] + steps)
 
     def drop_worlds(self, gone: np.ndarray) -> None:
         for topic in self.topics.values():
@@ -82,13 +116,16 @@ class Mail:
 
     def save(self) -> Any:
         """Queues and inboxes; parcels are never written to, so the lists are enough."""
-        return [(list(t.queue), [list(i.parcels) for i in t.inboxes]) for t in self.topics.values()]
+        return {key: (t.type, list(t.queue), [list(i.parcels) for i in t.inboxes]) for key, t in self.topics.items()}
 
     def restore(self, saved: Any) -> None:
-        for topic, (queue, parcels) in zip(self.topics.values(), saved, strict=True):
+        for (network, name), (type_, _, _) in saved.items():
+            self.topic(network, name, type_, "snapshot")
+        for key, topic in self.topics.items():
+            _, queue, parcels = saved.get(key, (None, [], []))  # a topic or group that came later has had nothing then
             topic.queue = list(queue)
             topic.clear_outbox()
-            for inbox, mine in zip(topic.inboxes, parcels, strict=True):
+            for inbox, mine in zip_longest(topic.inboxes, parcels, fillvalue=()):
                 inbox.parcels = list(mine)
 
     def columns(self, world: int) -> list[bytes]:
@@ -96,12 +133,30 @@ class Mail:
         found: list[bytes] = []
         for key in sorted(self.topics):
             topic = self.topics[key]
-            parcels = [*topic.queue, *(p for i in topic.inboxes for p in i.parcels)]
-            for parcel in parcels:
+            name = "/".join(key).encode()
+            for parcel in topic.queue:
                 mine = parcel.batch.world == world
                 if mine.any():
                     part = parcel.select(mine)
                     to = part.to.encode() if isinstance(part.to, str) else b"".join(np.ascontiguousarray(a).tobytes() for a in part.to)
-                    numbers = [v for v in part.batch.data.values() if isinstance(v, np.ndarray)]
-                    found += ["/".join(key).encode(), to, part.due.tobytes(), part.batch.sender.tobytes(), *[np.ascontiguousarray(v).tobytes() for v in numbers]]
+                    found.append(b"|".join([name, to, part.due.tobytes(), *_numbers(part.batch)]))
+            # What waits in inboxes counts by who will read it: how many groups a stack has is nothing to a world. Sorted, since
+            # the order of groups is nothing to it either.
+            waiting = []
+            for inbox in topic.inboxes:
+                rows, batch = inbox.pairs()
+                mine = np.flatnonzero(batch.world == world)
+                if len(mine):
+                    waiting.append(b"|".join([name, inbox.view.id[rows[mine]].tobytes(), *_numbers(batch.take(mine))]))
+            found += sorted(waiting)
         return found
+
+
+def _numbers(batch: Batch) -> list[bytes]:
+    values: list[bytes] = [batch.sender.tobytes()]
+    for value in batch.data.values():
+        if isinstance(value, RaggedColumn):
+            values += [value.start.tobytes(), np.ascontiguousarray(value.data).tobytes()]
+        elif isinstance(value, np.ndarray):
+            values.append(np.ascontiguousarray(value).tobytes())
+    return values

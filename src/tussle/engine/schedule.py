@@ -185,23 +185,24 @@ class Schedule:
         """A call has failed: find the worlds in which it does, and make it in the others."""
         sim = self.sim
         bodies = sim.population.bodies
-        worlds = [int(w) for w in np.unique(bodies.world[group.first : group.last]) if not sim.failed[w]]
+        present = [int(w) for w in np.unique(bodies.world[group.first : group.last])]
         if due is not None:
-            worlds = [w for w in worlds if due[w]]
-        failed = 0
+            present = [w for w in present if due[w]]
+        worlds = [w for w in present if not sim.failed[w]]  # those that have failed in this step are still in the table
+        is_only, failed = len(present) == 1, 0
         for world in worlds:
             only = np.zeros(bodies.n_worlds, bool)
             only[world] = True
-            row = binding.view.failing_row if len(worlds) == 1 else None
-            caught: Exception | None = error if len(worlds) == 1 else None
+            row = binding.view.failing_row if is_only else None
+            caught: Exception | None = error if is_only else None
             found: list[int | None] = [row]
             if caught is None:
                 caught = self._try_alone(group, binding, only, action, found)
             if caught is not None:
                 failed += 1
-                sim.fail(world, binding.plugin, caught, self._who(group, binding, world, found[0], len(worlds) == 1))
+                sim.fail(world, binding.plugin, caught, self._who(group, binding, world, found[0], is_only))
         binding.view.failing_row = None
-        if worlds and not failed:
+        if not failed and len(worlds) == len(present):
             raise sim.as_plugin_error(error, binding.plugin, "fails in the stack but in none of its worlds alone")
 
     def _try_alone(
@@ -245,45 +246,54 @@ class Schedule:
             due = None if per_step is None else is_due(clock.step, per_step) & sim.running
             if due is not None and not due.any():
                 return
-            if due is not None and not due[sim.running].all():
-                call_referee(sim.population, referee, due, action)
-                return
             saved = None if plugin.atomic else referee.copy()
             floats = None if plugin.atomic else sim.population.bodies.floats.copy()
-            marks = [(t, len(t.sent)) for t in sim.topics.values()]
+            marks = self._marks()
             counts = len(view.deaths), len(view.moved), len(view.births)
             try:
-                view.caller = plugin
-                plugin.step(view)
+                if due is None or due[sim.running].all():
+                    view.caller = plugin
+                    plugin.step(view)
+                else:
+                    call_referee(sim.population, referee, due, action)
             except Exception as error:
                 if saved is not None and floats is not None:
                     referee.restore(saved)
                     sim.population.bodies.floats[:] = floats
-                for topic, mark in marks:
-                    topic.truncate(mark)
+                    sim.population.bodies.touch(0, sim.population.bodies.n)
+                self._forget_messages(marks)
                 del view.deaths[counts[0] :], view.moved[counts[1] :], view.births[counts[2] :]
-                self._isolate_referee(referee, error, action)
+                self._isolate_referee(referee, error, action, due)
 
         return Call(f"{kind:<12} {referee.spec.instance_name}{self._rate_text(referee.spec)}", run)
 
-    def _isolate_referee(self, referee: Referee, error: Exception, action: Callable[[Referee, Any], None]) -> None:
+    def _marks(self) -> dict[int, int]:
+        return {id(topic): len(topic.sent) for topic in self.sim.topics.values()}
+
+    def _forget_messages(self, marks: dict[int, int]) -> None:
+        for topic in self.sim.topics.values():
+            topic.truncate(marks.get(id(topic), 0))
+
+    def _isolate_referee(
+        self, referee: Referee, error: Exception, action: Callable[[Referee, Any], None], due: np.ndarray | None
+    ) -> None:
         sim = self.sim
-        worlds = [int(w) for w in np.flatnonzero(sim.running & ~sim.failed)]
+        present = np.flatnonzero(sim.running if due is None else due)
+        worlds = [int(w) for w in present if not sim.failed[w]]  # those that have failed in this step are still in the table
         failed = 0
         for world in worlds:
             only = np.zeros(len(sim.running), bool)
             only[world] = True
-            marks = [(t, len(t.sent)) for t in sim.topics.values()]
+            marks = self._marks()
             try:
-                if len(worlds) == 1:
+                if len(present) == 1:
                     raise error
                 call_referee(sim.population, referee, only, action)
             except Exception as caught:
-                for topic, mark in marks:
-                    topic.truncate(mark)
+                self._forget_messages(marks)
                 failed += 1
                 sim.fail(world, referee.plugin, caught, "")
-        if worlds and not failed:
+        if not failed and len(worlds) == len(present):
             raise sim.as_plugin_error(error, referee.plugin, "fails in the stack but in none of its worlds alone")
 
     # -- words ----------------------------------------------------------------------------------------------------------------
