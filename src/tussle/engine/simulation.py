@@ -232,7 +232,7 @@ class Simulation:
             referee.reset(chosen)
             referee.fill_params(self.overrides, chosen)
         due = self.births.begin(chosen)
-        self._repack(mask[self.population.bodies.world], self._create(due))
+        self._repack(mask[self.population.bodies.world], self._create(due, at_start=True))
         self._set_common_step()
         self._start_referees(mask)
         self._take_out_dead()
@@ -246,13 +246,13 @@ class Simulation:
                 call_referee(self.population, referee, mask, lambda r, w: r.plugin.start(w))
         self.take_over_moves()
 
-    def _create(self, due: Mapping[int, np.ndarray]) -> Newborn | None:
+    def _create(self, due: Mapping[int, np.ndarray], at_start: bool = False) -> Newborn | None:
         rejecting = [r for r in self.interactions if type(r.plugin).rejects is not Interaction.rejects]
         placed: dict[int, list[np.ndarray]] = {}
 
         def taken(world: int) -> np.ndarray:
             bodies = self.population.bodies
-            here = [] if world in placed and self.context.clock.step[world] == 0 else [bodies.pos[:, bodies.world == world]]
+            here = [] if at_start else [bodies.pos[:, bodies.world == world]]  # at a reset, the rows of the last game are still there
             return np.concatenate([np.zeros((3, 0)), *here, *placed.get(world, [])], axis=1)
 
         def rejects(world: int, pos: np.ndarray, others: np.ndarray) -> bool:
@@ -333,7 +333,7 @@ class Simulation:
                 world = int(bodies.world[row])
                 if not self.failed[world]:
                     group = next(g for g in self.population.groups if g.first <= row < g.last)
-                    self._record_failure(world, failure.not_finite(group, bodies, int(row), int(self.context.clock.step[world])))
+                    self.record_failure(world, failure.not_finite(group, bodies, int(row), int(self.context.clock.step[world])))
             self.world_view.kill(~faulty & ~(bodies.health > 0.0), "health")
 
     def _take_out_dead(self) -> bool:
@@ -419,9 +419,9 @@ class Simulation:
     def fail(self, world: int, plugin: Any, error: Exception, where: str) -> None:
         """A plugin has failed in a world: it will end with this step."""
         step = int(self.context.clock.step[world])
-        self._record_failure(world, failure.raised(error, plugin, where=where, step=step, world=world))
+        self.record_failure(world, failure.raised(error, plugin, where=where, step=step, world=world))
 
-    def _record_failure(self, world: int, error: PluginError) -> None:
+    def record_failure(self, world: int, error: PluginError) -> None:
         if self.on_error == "raise":
             raise error
         self.failed[world] = self._has_failures = True
