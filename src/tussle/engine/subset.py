@@ -110,25 +110,29 @@ def call_referee(population: Population, referee: Referee, worlds: np.ndarray, a
     sub_bodies = _sub_bodies(bodies, rows)
     sub_view = copy.copy(view)
     sub_view.deaths, sub_view.moved, sub_view.births = [], [], []
+    sub_view.only = worlds
     sub_view.reset(sub_bodies, 0, len(rows))
     sub_view.caller = referee.plugin
     sub = copy.copy(referee)
     sub.plugin = object.__new__(type(referee.plugin))
     sub.plugin.__dict__.update(referee.plugin.__dict__)
     sub.tables = {
-        per: _sub_table(table, rows if per == "entity" else np.arange(table.n)) for per, table in referee.tables.items()
+        per: _sub_table(table, rows if per == "entity" else np.arange(table.n))
+        for per, table in referee.tables.items()
+        if table.places  # a table without columns is not kept at the number of rows
     }
     for name, value in list(sub.plugin.__dict__.items()):
         if isinstance(value, Publisher):
             sub.plugin.__dict__[name] = Publisher(value.topic, sub_view)
     sub.attach()
     action(sub, sub_view)
-    for per, table in referee.tables.items():
+    for per, part in sub.tables.items():
+        table = referee.tables[per]
         index = rows if per == "entity" else np.flatnonzero(worlds)
-        for dtype, array in sub.tables[per].arrays.items():
+        for dtype, array in part.arrays.items():
             table.arrays[dtype][:, index] = array if per == "entity" else array[:, index]
     bodies.floats[:, rows] = sub_bodies.floats
     bodies.touch(0, bodies.n)
     view.deaths += [(rows[r], why) for r, why in sub_view.deaths]
     view.moved += [rows[r] for r in sub_view.moved]
-    view.births += [b for b in sub_view.births if worlds[b["world"]].all()]
+    view.births += sub_view.births
