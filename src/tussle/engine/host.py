@@ -167,7 +167,7 @@ class Host:
         ids = np.array(list(sender), np.int64)
         topic = self._topic(network, type_.__name__, type_, "host")
         topic.add(Batch.make(type_, np.zeros(len(ids), np.int64), ids, fields))
-        topic.post(EVERYONE, np.zeros(len(ids), np.int64))
+        topic.post(topic.outbox(), EVERYONE, np.zeros(len(ids), np.int64))
         topic.clear_outbox()
         topic.deliver(self.context.clock.step)
 
