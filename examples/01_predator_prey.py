@@ -1,0 +1,57 @@
+"""The game of DeMarco, Squires, Day and Pippin (2018): two teams of five predators hunt a flock of 100 prey for 500 s.
+
+Team 2 keeps to a prey until it is gone; team 3 turns to the nearest one in every step.
+"""
+
+import argparse
+import time
+
+from tussle import Block, Mission, Simulation
+from tussle.stock import Boids, Predator, SimpleCapture, SimpleCaptureMetrics, Unicycle
+
+parser = argparse.ArgumentParser(description=__doc__)
+parser.add_argument("--seeds", type=int, default=8, help="number of games, all played side by side")
+parser.add_argument("--end", type=float, default=500.0, help="length of a game [s]")
+args = parser.parse_args()
+
+prey = Block(
+    name="prey",
+    team=1,
+    count=100,
+    position=(0, 0, 200),
+    placement="uniform",
+    half_width=(200, 200, 100),
+    autonomy=Boids(),
+    motion=Unicycle(vel_max=30),
+)
+
+
+def hunters(name: str, team: int, north: float, switching: bool) -> Block:
+    """Five predators 2 km East of the prey, flying West."""
+    place = {"position": (2000, north, 200), "placement": "uniform", "half_width": (500, 500, 100)}
+    mind = Predator(max_speed=35, allow_prey_switching=switching)
+    body = Unicycle(vel_max=35, turn_rate_max=2, pitch_rate_max=1.5)
+    return Block(name=name, team=team, count=5, **place, heading="180 deg", autonomy=mind, motion=body)
+
+
+mission = Mission(
+    blocks=[prey, hunters("keepers", 2, -1000, False), hunters("switchers", 3, +1000, True)],
+    end=args.end,
+    end_conditions="time, one_team, all_dead",
+    interactions=[SimpleCapture()],
+    metrics=[SimpleCaptureMetrics()],
+)
+simulation = Simulation(mission, seeds=range(1, args.seeds + 1))
+simulation.step()  # the first one loads the kernels, and the first one ever compiles them
+began = time.process_time()
+results = simulation.run()
+cpu = time.process_time() - began
+
+print("seed  prey left  captured by 2  by 3  winner  end        s  state hash")
+for r in results:
+    winner = f"team {r.winner}" if r.winner else "tie"
+    print(f"{r.seed:4} {r.alive[1]:10} {r.scores[2]:14g} {r.scores[3]:5g}  {winner:7}", end=" ")
+    print(f"{r.end:8} {r.t:3g}  {r.state_hash[:20]}")
+won = {team: sum(r.winner == team for r in results) for team in (2, 3, None)}
+print(f"team 2 won {won[2]}, team 3 won {won[3]}, {won[None]} ties")
+print(f"{sum(r.t for r in results):g} s of game in {cpu:.2f} CPU s: {cpu / len(results):.2f} CPU s a game")

@@ -1,0 +1,58 @@
+"""A motion model of your own, as its state equation, and a planner that tries it out before it flies it."""
+
+import numpy as np
+
+from tussle import Block, Mission, Simulation
+from tussle.api import Autonomy, Input, MotionModel, Output, Param, State
+from tussle.numeric import cos, sin
+from tussle.stock import Boids, Predator, SimpleCapture, SimpleCaptureMetrics, Unicycle
+
+
+class SluggishPlane(MotionModel):
+    """A vehicle that flies where its nose points, and whose speed follows the wanted one with a lag."""
+
+    lag = Param(2.0, unit="s", gt=0.0, doc="Time in which the speed makes 63 % of a change.")
+    x = State("east north up yaw climb v", unit="m m m rad rad m/s")
+    commands = Input("speed turn_rate pitch_rate", unit="m/s rad/s rad/s")
+
+    @staticmethod
+    def derivative(yaw, climb, v, speed, turn_rate, pitch_rate, lag):
+        level = v * cos(climb)
+        return level * cos(yaw), level * sin(yaw), v * sin(climb), turn_rate, pitch_rate, (speed - v) / lag
+
+    def from_body(self, body, rows):
+        self.x[:, rows] = np.array([*body.pos, body.yaw, body.climb, body.forward_speed])[:, rows]
+
+    def to_body(self, body):
+        body.pos[:] = self.x[:3]
+        body.set_attitude(yaw=self.x[3], climb=self.x[4])
+        body.vel[:] = self.x[5] * body.forward
+
+
+PLANE = SluggishPlane(lag=1.0)
+STEERING = np.meshgrid(38.0, np.linspace(-1.5, 1.5, 7), np.linspace(-1.0, 1.0, 5))
+WAYS = np.array(STEERING).reshape(3, 35)  # (3 commands, 35 ways to set them)
+SECONDS = 0.3 * np.arange(11)[:, None, None]
+
+
+class Planner(Autonomy):
+    """Imagine 35 ways to steer for 3 s, with the very function that flies it, and take the one nearest to the prey."""
+
+    commands = Output("speed turn_rate pitch_rate", unit="m/s rad/s rad/s")
+
+    def step(self, g):
+        now = np.array([*g.pos, g.yaw, g.climb, np.sqrt(np.square(g.vel).sum(axis=0))])  # (6 states, n)
+        path = PLANE.rollout(now.repeat(35, axis=1), np.tile(WAYS, (10, 1, g.n)), dt=0.3)  # (11, 6, n * 35)
+        prey = g.nearest(teams=1).other[0]  # (n,) rows in the table of all bodies
+        goal = g.bodies.pos[:, prey] + SECONDS * g.bodies.vel[:, prey]  # (11, 3, n)
+        miss = path.reshape(11, 6, g.n, 35)[:, :3] - goal[..., None]
+        self.commands[:] = WAYS[:, np.square(miss).sum(axis=1).min(axis=0).argmin(axis=1)]
+
+
+# Of two that write a channel the last wins: the predator's part is to claim what is within its reach.
+pack = {"position": (1200, 0, 0), "heading": "180 deg", "autonomy": [Predator(), Planner()], "motion": PLANE}
+flock = {"variance": (2e4, 2e4, 0), "autonomy": Boids(), "motion": Unicycle(vel_max=30)}
+blocks = [Block(name="prey", team=1, count=60, **flock), Block(name="hunters", team=2, count=5, **pack)]
+game = {"interactions": [SimpleCapture()], "metrics": [SimpleCaptureMetrics()]}
+for r in Simulation(Mission(blocks=blocks, end=60, **game), seeds=range(1, 5)).run():
+    print(f"game {r.seed}: {r.scores[2]:g} captures, {r.alive[1]} prey left after {r.t:g} s")

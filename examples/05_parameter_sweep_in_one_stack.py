@@ -1,0 +1,31 @@
+"""A sweep over one parameter in one stack: each world has its own value, and all worlds run side by side."""
+
+import numpy as np
+
+from tussle import Block, Mission, Simulation
+from tussle.stock import Boids, Predator, SimpleCapture, SimpleCaptureMetrics, Unicycle
+
+flock = {"variance": (2e4, 2e4, 0), "autonomy": Boids(), "motion": Unicycle(vel_max=30)}
+pack = {"position": (1000, 0, 0), "variance": (1e5, 1e5, 0), "heading": "180 deg"}
+agile = {"autonomy": Predator(max_speed=35), "motion": Unicycle(vel_max=35, pitch_rate_max=1.5)}
+mission = Mission(
+    blocks=[
+        Block(name="prey", team=1, count=50, **flock),
+        Block(name="hunters", team=2, count=5, **pack, **agile),
+    ],
+    end=120,
+    interactions=[SimpleCapture()],
+    metrics=[SimpleCaptureMetrics()],
+)
+turn_rates = [0.2, 0.4, 0.8, 1.6, 3.2]  # [rad/s]
+seeds = range(1, 17)
+worlds = [(rate, seed) for rate in turn_rates for seed in seeds]
+results = Simulation(
+    mission,
+    seeds=[seed for _, seed in worlds],
+    params={"hunters.Unicycle.turn_rate_max": [rate for rate, _ in worlds]},
+).run()
+captures = np.array([r.scores[2] for r in results]).reshape(len(turn_rates), len(seeds))
+for rate, row in zip(turn_rates, captures, strict=True):
+    mean, error = row.mean(), row.std(ddof=1) / np.sqrt(len(row))
+    print(f"{rate} rad/s: {mean:4.1f} +- {error:.1f} captures  {'#' * round(mean)}")
