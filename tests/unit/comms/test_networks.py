@@ -1,0 +1,410 @@
+"""Who hears what, and when."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from small_worlds import EasyListener, Listener, Note, NoteMetric, Parcel, Reaper, Talker, alone, block, mission
+
+from tussle import Simulation
+from tussle.api import EVERYONE, Autonomy, Interaction, Metric, Network, Param, Publish, State, Subscribe, service
+from tussle.errors import MissionError, ParameterError, PluginError, TussleError, WiringError
+from tussle.stock import GlobalNetwork, LocalNetwork, SimpleCollision, SphereNetwork
+
+
+def still(name, *autonomies, **values):
+    from small_worlds import Drift
+
+    return block(name, autonomy=[Drift(to=(0, 0, 0)), *autonomies], **values)
+
+
+def heard(sim, path, column="n_heard"):
+    return sim.read(f"{path}.{column}")[0]
+
+
+def test_global_network_reaches_everybody_of_the_world_and_the_sender_itself():
+    game = mission(still("talker", Talker(last=1), Listener()), still("others", Listener(), count=3, position=(1e6, 0, 0)))
+    sim = Simulation(game, seeds=[1, 2])
+    sim.run()
+    assert heard(sim, "talker.Listener").tolist() == [[1], [1]]
+    assert heard(sim, "others.Listener").tolist() == [[1, 1, 1], [1, 1, 1]]
+    assert heard(sim, "others.Listener", "sender").tolist() == [[1, 1, 1], [1, 1, 1]]
+
+
+def test_a_message_is_read_at_the_receivers_next_call():
+    sim = Simulation(mission(still("a", Talker(first=3, last=4)), still("b", Listener())))
+    sim.run()
+    assert heard(sim, "b.Listener", "value")[0, 0] == 3
+    assert heard(sim, "b.Listener", "read_in")[0, 0] == 4
+
+
+def test_local_network_reaches_only_the_sender():
+    local = [Talker(network="LocalNetwork"), Listener(network="LocalNetwork")]
+    game = mission(still("pair", *local, count=2), still("deaf", Listener(network="LocalNetwork")), networks=[LocalNetwork()])
+    sim = alone(game, 1)
+    assert heard(sim, "pair.Listener").tolist() == [[9, 9]]
+    assert heard(sim, "pair.Listener", "sender").tolist() == [[1, 2]]
+    assert heard(sim, "deaf.Listener").tolist() == [[0]]
+
+
+@pytest.mark.parametrize(("place", "expected"), [(99.999999, 9), (100.0, 0), (100.000001, 0)])
+def test_sphere_network_ends_strictly_before_its_range(place, expected):
+    game = mission(
+        still("a", Talker(network="SphereNetwork"), Listener(network="SphereNetwork")),
+        still("b", Listener(network="SphereNetwork"), position=(0, place, 0)),
+        networks=[SphereNetwork(range=100.0)],
+    )
+    sim = alone(game, 1)
+    assert heard(sim, "b.Listener").tolist() == [[expected]]
+    assert heard(sim, "a.Listener").tolist() == [[9]]
+
+
+def test_range_is_a_parameter_per_world():
+    game = mission(
+        still("a", Talker(network="SphereNetwork")),
+        still("b", Listener(network="SphereNetwork"), position=(0, 50.0, 0)),
+        networks=[SphereNetwork()],
+    )
+    sim = Simulation(game, seeds=[1, 2], params={"SphereNetwork.range": [40.0, 60.0]})
+    sim.run()
+    assert heard(sim, "b.Listener").tolist() == [[0], [9]]
+
+
+def test_plane_filter_keeps_words_on_their_side_of_the_surface():
+    def run(z, **values):
+        network = SphereNetwork(filter_comms_plane=True, **values)
+        game = mission(
+            still("a", Talker(network="SphereNetwork"), position=(0, 0, 5)),
+            still("b", Listener(network="SphereNetwork"), position=(0, 0, z)),
+            networks=[network],
+        )
+        return int(heard(alone(game, 1), "b.Listener")[0, 0])
+
+    assert run(-5.0) == 0
+    assert run(3.0) == 9
+    assert run(-5.0, comms_boundary_epsilon=6.0) == 9
+    assert run(-5.0, comms_boundary_altitude=20.0) == 9
+
+
+def lossy(count=100, p=0.3, **values):
+    return mission(
+        still("talker", Talker(network="SphereNetwork"), position=(0, 0, 0)),
+        still("crowd", Listener(network="SphereNetwork"), count=count),
+        networks=[SphereNetwork(range=1e9, prob_transmit=p)], end=4.0, **values,
+    )  # fmt: skip
+
+
+def test_share_of_messages_that_arrive_is_prob_transmit():
+    n = heard(alone(lossy(), 5), "crowd.Listener")[0]
+    sent = 39 * 100
+    # Binomial: five standard deviations.
+    assert abs(n.sum() - 0.3 * sent) < 5.0 * np.sqrt(sent * 0.3 * 0.7)
+    assert n.std() > 1.0
+    assert heard(alone(lossy(p=0.0), 5), "crowd.Listener").sum() == 0
+    assert heard(alone(lossy(p=1.0), 5), "crowd.Listener").sum() == sent
+
+
+def test_losses_are_the_same_in_a_stack_and_whoever_else_talks():
+    first = heard(alone(lossy(), 5), "crowd.Listener")[0]
+    stack = Simulation(lossy(), seeds=[4, 5, 6])
+    stack.run()
+    assert np.array_equal(heard(stack, "crowd.Listener")[1], first)
+    assert not np.array_equal(heard(stack, "crowd.Listener")[0], first)
+    more = lossy()
+    more = more.replace(blocks=[*more.blocks, still("other", Talker(network="SphereNetwork", topic="Other"))])
+    assert np.array_equal(heard(alone(more, 5), "crowd.Listener")[0], first)
+
+
+@pytest.mark.parametrize(("delay", "read_in"), [(0.0, 3), (0.1, 4), (0.25, 6), (0.3, 6), (0.5, 8)])
+def test_a_delayed_message_arrives_on_time_though_nobody_talks_any_more(delay, read_in):
+    """Said in step 2; handed over at the end of the first step at or after t + delay, read in the next."""
+    game = mission(
+        still("a", Talker(first=2, last=3, network="slow")), still("b", Listener(network="slow")),
+        networks=[GlobalNetwork(name="slow", comm_delay=delay)],
+    )  # fmt: skip
+    sim = alone(game, 1)
+    assert heard(sim, "b.Listener", "read_in").tolist() == [[read_in]]
+    assert heard(sim, "b.Listener", "value").tolist() == [[2]]
+    assert heard(sim, "b.Listener").tolist() == [[1]]
+
+
+def test_a_message_on_its_way_when_the_sender_is_gone_still_arrives():
+    game = mission(
+        still("a", Talker(first=2, last=3, network="slow"), team=1), still("b", Listener(network="slow"), team=2),
+        networks=[GlobalNetwork(name="slow", comm_delay=0.4)], interactions=[Reaper(team=1, at=0.4)],
+    )  # fmt: skip
+    assert heard(alone(game, 1), "b.Listener", "read_in").tolist() == [[7]]
+
+
+def test_delay_is_a_parameter_per_world():
+    game = mission(
+        still("a", Talker(first=2, last=3, network="slow")), still("b", Listener(network="slow")),
+        networks=[GlobalNetwork(name="slow")],
+    )  # fmt: skip
+    sim = Simulation(game, seeds=[1, 2], params={"slow.comm_delay": [0.1, 0.4]})
+    sim.run()
+    assert heard(sim, "b.Listener", "read_in").tolist() == [[4], [7]]
+
+
+def test_world_plugins_read_in_the_same_step_the_last_one_included():
+    sim = alone(mission(still("a", Talker()), metrics=[NoteMetric()]), 1)
+    assert sim.result()[0].metrics["NoteMetric"] == {"n_notes": 10, "total": 45}
+
+
+def test_what_only_the_world_says_is_counted_once():
+    """No plugin of any entity has a topic here; the first one appears when the world speaks."""
+
+    class Meetings(Metric):
+        n = State(dtype=int, per="world")
+
+        def step(self, w):
+            from tussle.messages import EntityCollided
+
+            np.add.at(self.n, w.inbox(EntityCollided).world, 1)
+
+        def result(self, w):
+            return {"n": self.n}
+
+    game = mission(
+        block("a", count=2, health=1.0), interactions=[SimpleCollision(startup_collision_range=0.0)], metrics=[Meetings()]
+    )
+    assert alone(game, 1).result()[0].metrics["Meetings"]["n"] <= 1
+
+    class Herald(Interaction):
+        def step(self, w):
+            w.publish(Note, np.flatnonzero(w.step_count == 2), value=7)
+
+    sim = alone(mission(block(), interactions=[Herald()], metrics=[NoteMetric()]), 1)
+    assert sim.result()[0].metrics["NoteMetric"] == {"n_notes": 1, "total": 7}
+
+
+def test_what_the_world_says_reaches_subscribers_with_sender_0():
+    class Herald(Interaction):
+        def step(self, w):
+            w.publish(Note, np.flatnonzero(w.step_count == 2), value=7)
+
+    sim = alone(mission(still("b", Listener()), interactions=[Herald()]), 1)
+    assert heard(sim, "b.Listener", "value").tolist() == [[7]]
+    assert heard(sim, "b.Listener", "sender").tolist() == [[0]]
+    assert heard(sim, "b.Listener", "read_in").tolist() == [[3]]
+
+
+def test_easy_mode_hears_what_vector_mode_hears():
+    sim = alone(mission(still("a", Talker(), count=3), still("b", EasyListener(), Listener())), 1)
+    for column in ("n_heard", "value", "sender"):
+        assert heard(sim, "b.EasyListener", column).tolist() == heard(sim, "b.Listener", column).tolist()
+    assert heard(sim, "b.EasyListener")[0, 0] == 27
+    assert heard(sim, "b.EasyListener", "sender")[0, 0] == 3
+
+
+def test_a_receiver_with_a_rate_hears_all_since_its_last_call():
+    sim = Simulation(mission(still("a", Talker()), still("b", Listener(rate=2.5))))
+    counts = []
+    while not sim.is_over:
+        sim.step()
+        counts.append(int(heard(sim, "b.Listener")[0, 0]))
+    # Called in steps 0, 4 and 8, where the messages of the steps before have arrived.
+    assert counts == [0, 0, 0, 0, 4, 4, 4, 4, 8, 8]
+    assert heard(sim, "b.Listener", "total")[0, 0] == sum(range(8))
+
+
+def test_an_entity_hears_nothing_said_before_it_came_whatever_happens_in_other_worlds():
+    """In one world of the stack the group is empty until 0.5 s; alone, the whole group is."""
+    late = still("b", Listener(), rate=0.01, first_birth=0.5)
+    early = still("c", Listener(), rate=0.01, first_birth=0.0)
+    sim = alone(mission(still("a", Talker()), late), 1)
+    assert heard(sim, "b.Listener", "n_heard")[0, 0] == 5  # those of step 4, just delivered, to step 8
+    both = alone(mission(still("a", Talker()), late, early), 1)
+    assert heard(both, "b.Listener", "n_heard")[0, 0] == 5
+
+
+def test_topic_and_network_can_be_parameters():
+    quiet = Talker(topic="Quiet", name="Quiet")
+    game = mission(
+        still("a", Talker(topic="Loud"), quiet, Talker(network="other", topic="Loud", name="Far")),
+        still("b", Listener(topic="Loud"), Listener(topic="Quiet", network="other", name="Nothing")),
+        networks=[GlobalNetwork(name="other")],
+    )
+    sim = alone(game, 1)
+    assert heard(sim, "b.Listener").tolist() == [[9]]
+    assert heard(sim, "b.Nothing").tolist() == [[0]]
+
+
+def test_a_network_that_is_not_there_is_refused():
+    with pytest.raises(WiringError, match=r"block 'a'.*network 'LocalNetwrk' \(did you mean 'LocalNetwork'\?\); there are: GlobalNetwork, LocalNetwork"):
+        Simulation(mission(still("a", Talker(network="LocalNetwrk")), networks=[LocalNetwork()]))
+
+
+def test_one_topic_carries_one_type():
+    class Shout(Autonomy):
+        shouts = Publish(Parcel, topic="Note")
+
+        def step(self, g):
+            pass
+
+    with pytest.raises(WiringError, match="topic 'Note' on GlobalNetwork carries Note, not Parcel"):
+        Simulation(mission(still("a", Talker(), Shout())))
+
+
+def test_a_network_that_answers_nonsense_is_told_so_and_named():
+    class Odd(Network):
+        def route(self, w, messages):
+            return "everybody"
+
+    game = mission(still("a", Talker(network="Odd")), still("b", Listener(network="Odd")), networks=[Odd()])
+    with pytest.raises((WiringError, PluginError), match=r"Odd.*'everybody'.*EVERYONE, SAME_ENTITY"):
+        Simulation(game).step()
+
+
+def test_a_network_that_raises_ends_only_the_world_it_raises_in():
+    class Jammed(Network):
+        at = Param(1_000_000)
+
+        def route(self, w, messages):
+            if (w.step_count[messages.world] >= self.at[messages.world]).any():
+                raise OSError("jammed")
+            return EVERYONE
+
+    game = mission(still("a", Talker(network="Jammed")), still("b", Listener(network="Jammed")), networks=[Jammed()])
+    sim = Simulation(game, seeds=[1, 2, 3], params={"Jammed.at": [99, 4, 99]})
+    results = sim.run()
+    assert [r.end for r in results] == ["time", "error", "time"]
+    assert "Jammed" in str(results[1].error)
+    assert "jammed" in str(results[1].error)
+    assert "test_networks.py:" in str(results[1].error)
+    assert heard(sim, "b.Listener").tolist() == [[9], [4], [9]]
+    assert results[0].state_hash == alone(game, 1).state_hash()
+
+
+def test_a_network_without_a_route_is_told_so():
+    class Dumb(Network):
+        pass
+
+    game = mission(still("a", Talker(network="Dumb")), still("b", Listener(network="Dumb")), networks=[Dumb()])
+    with pytest.raises(PluginError, match="Dumb has no route"):
+        Simulation(game).step()
+
+
+class Sender(Autonomy):
+    parcels = Publish(Parcel)
+
+    def step(self, g):
+        from tussle.api import RaggedColumn
+
+        rows = np.flatnonzero(g.step_count == 1)
+        points = RaggedColumn.from_rows([[(1.0, 2.0)] * (i % 3) for i in g.id[rows]], Parcel.fields["points"])
+        self.parcels.publish(rows, value=g.id[rows] * 10, points=points, thing=[{"id": int(i)} for i in g.id[rows]])
+
+
+class Receiver(Autonomy):
+    parcels = Subscribe(Parcel)
+    n_points = State(dtype=int)
+    sum_y = State()
+    ids = State(dtype=int)
+
+    def step(self, g):
+        rows, heard_ = self.parcels.pairs()
+        for i, row in enumerate(rows):
+            self.n_points[row] += heard_.points[i].shape[1]
+            self.sum_y[row] += heard_.points[i][1].sum()
+            self.ids[row] += heard_.thing[i]["id"]
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.3])
+def test_messages_carry_lists_and_objects(delay):
+    game = mission(
+        still("a", Sender(), count=5), still("b", Receiver(), count=2), networks=[GlobalNetwork(comm_delay=delay)]
+    )
+    sim = alone(game, 1)
+    assert sim.read("b.Receiver.n_points")[0].tolist() == [[6, 6]]  # 1 + 2 + 0 + 1 + 2
+    assert sim.read("b.Receiver.sum_y")[0].tolist() == [[12.0, 12.0]]
+    assert sim.read("b.Receiver.ids")[0].tolist() == [[15, 15]]
+
+
+def test_services_are_called_by_name():
+    class Lamp(Autonomy):
+        level = State(default=2.0)
+
+        @service
+        def brightness(self, g):
+            return 3.0 * self.level
+
+        def step(self, g):
+            pass
+
+    class Weather(Interaction):
+        wind = Param(4.0)
+
+        @service
+        def wind_speed(self, world):
+            return self.wind[world]
+
+    class Asker(Autonomy):
+        seen = State()
+        wind = State()
+
+        def step(self, g):
+            self.seen[:] = g.call("brightness")
+            self.wind[:] = g.call("wind_speed", g.world)
+
+    sim = Simulation(mission(still("a", Lamp(), Asker(), count=2), interactions=[Weather()]), seeds=[1, 2],
+                     params={"Weather.wind": [5.0, 6.0]})  # fmt: skip
+    sim.run()
+    assert sim.read("a.Asker.seen")[0].tolist() == [[6.0, 6.0], [6.0, 6.0]]
+    assert sim.read("a.Asker.wind")[0].tolist() == [[5.0, 5.0], [6.0, 6.0]]
+
+    class Lost(Autonomy):
+        def step(self, g):
+            g.call("brightnes")
+
+    with pytest.raises(PluginError, match=r"nobody offers a service 'brightnes' \(did you mean 'brightness'\?\)"):
+        Simulation(mission(still("a", Lamp(), Lost()))).step()
+
+
+def test_a_world_plugin_does_not_subscribe():
+    class Spy(Interaction):
+        notes = Subscribe(Note)
+
+    with pytest.raises(WiringError, match=r"Spy.notes.*w.inbox\(Note\)"):
+        Simulation(mission(still("a"), interactions=[Spy()]))
+
+
+def test_a_service_that_is_nowhere_is_an_error_for_world_plugins_too():
+    class Caller(Interaction):
+        def step(self, w):
+            w.call("nothing")
+
+    with pytest.raises(TussleError, match="nobody offers a service 'nothing'; there are none"):
+        Simulation(mission(still("a"), interactions=[Caller()])).step()
+
+
+def test_capture_of_names_that_are_not_there():
+    class Misspelt(Autonomy):
+        notes = Publish(Note)
+
+        def step(self, g):
+            self.notes.publish([0], valu=3)
+
+    with pytest.raises(PluginError, match=r"Note has no field 'valu' \(did you mean 'value'\?\); there are: value"):
+        Simulation(mission(still("a", Misspelt()))).step()
+
+
+def test_publishing_to_a_network_that_is_not_there():
+    class Herald(Interaction):
+        def step(self, w):
+            w.publish(Note, [0], network="Nowhere", value=7)
+
+    with pytest.raises(TussleError, match="network 'Nowhere'.*there are: GlobalNetwork"):
+        Simulation(mission(still("a"), interactions=[Herald()])).step()
+
+
+def test_two_networks_of_one_name_are_refused():
+    with pytest.raises(MissionError, match="two plugins are called 'SphereNetwork'"):
+        mission(still("a"), networks=[SphereNetwork(), SphereNetwork(range=5.0)])
+
+
+def test_prob_transmit_is_a_probability():
+    with pytest.raises(ParameterError, match=r"SphereNetwork.prob_transmit = 1.5 is not allowed; it takes a finite number >= 0 and <= 1"):
+        SphereNetwork(prob_transmit=1.5)
+
+
