@@ -165,12 +165,15 @@ def write(sim: Simulation, path: str, values: Any) -> None:
             raise ParameterError(f"{path!r}: values have shape {np.shape(values)}; needed is {shape}") from None
         part = np.moveaxis(given[bodies.world[rows[mine]], bodies.place_in_block[rows[mine]]], 0, -1)
         _check_written(path, part, None if binding is None else type(binding.spec).columns[column])
-        target[..., rows[mine] if binding is None else mine] = part
         if binding is None:
+            # Rows that are written as they were keep their motion state: taking it over from the attitude would round it.
+            differs = np.atleast_2d(target[..., rows[mine]] != part).any(axis=0)
+            target[..., rows[mine]] = part
             bodies.touch(group.first, group.last)
-            if column in ("pos", "vel", "quat"):
-                group.motion.plugin.from_body(group.moving, mine)
+            if column in ("pos", "vel", "quat") and differs.any():
+                group.motion.plugin.from_body(group.moving, mine[differs])
         else:
+            target[..., mine] = part
             for view in group.views:  # reaches of parameters are kept until the next repack
                 view.reset(bodies, group.first, group.last)
 
