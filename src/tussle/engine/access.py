@@ -229,7 +229,8 @@ def _ragged(binding: Binding) -> dict[str, Any]:
 
 
 def _save_handles(binding: Binding) -> dict[str, list[bytes]]:
-    return {k: [pickle.dumps(binding.plugin.save_one(h)) for h in held] for k, held in binding.handles.items()}
+    save = lambda h: pickle.dumps((h is not None, None if h is None else binding.plugin.save_one(h)))  # noqa: E731
+    return {k: [save(h) for h in held] for k, held in binding.handles.items()}
 
 
 def restore(sim: Simulation, saved: Snapshot) -> None:
@@ -240,8 +241,8 @@ def restore(sim: Simulation, saved: Snapshot) -> None:
     if len(saved.groups) > len(population.groups):
         raise SnapshotError("the snapshot has entities of blocks that this simulation has never had; restore it into the simulation it was taken from")
     sim.context.seeds[:] = saved.seeds
-    population.bodies.replace(world["floats"].copy(), world["ints"].copy())
     population.close_handles()
+    population.bodies.replace(world["floats"].copy(), world["ints"].copy())
     for number, group in enumerate(population.groups):
         first, arrays, ragged, outside = saved.groups[number] if number < len(saved.groups) else _no_rows(group, population.bodies.n)
         group.table.restore(arrays)
@@ -275,7 +276,8 @@ def _load_handles(sim: Simulation, group: Group, outside: list[dict[str, list[by
         for name, held in handles.items():
             for row, data in enumerate(held):
                 about = sim.population.handle_row(group, binding, row)
-                binding.handles[name][row] = binding.plugin.load_one(about, pickle.loads(data))
+                is_open, state = pickle.loads(data)
+                binding.handles[name][row] = binding.plugin.load_one(about, state) if is_open else None
 
 
 # -- hash and result ----------------------------------------------------------------------------------------------------------------

@@ -104,8 +104,10 @@ class Births:
                     self.n_left[i, worlds] -= 1
                     wait = 1.0 / block.rate
                     jitter = self._normal(i, "birth", worlds, np.full(len(worlds), slot), self.n_born[i, worlds], 0, 1)[0]
-                    later = t[worlds] + np.maximum(wait + block.interval_sd * jitter, 0.0)
-                    self.next_time[i][worlds, slot] = np.where(later > t[worlds], later, t[worlds] + wait)
+                    # From the time it was due at, not that of the step, else a rate that does not divide the steps' would lag.
+                    base = np.maximum(self.next_time[i][worlds, slot], t[worlds] - self.overrides.mission.dt)
+                    later = base + wait + block.interval_sd * jitter
+                    self.next_time[i][worlds, slot] = np.where(later > base, later, base + wait)
             if parts:
                 found[i] = np.sort(np.concatenate(parts), kind="stable")
         return found

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tussle.columns import Handle, Publish, Subscribe
+from tussle.api.plugin import Plugin
+from tussle.columns import Publish, Subscribe
 from tussle.engine.group import Binding, Group
 from tussle.engine.referees import Referee
 from tussle.engine.subset import call_group, call_referee
@@ -39,6 +40,12 @@ def is_due(step: np.ndarray, per_step: Fraction) -> np.ndarray:
     """Whether floor(k p / q) changes from step k - 1 to k, for each world's step."""
     p, q = per_step.numerator, per_step.denominator
     return np.asarray((step * p) // q != ((step - 1) * p) // q)
+
+
+def _is_outside(binding: Binding) -> bool:
+    """Whether a plugin, or one inside it, holds objects that it opens itself, or waits for something."""
+    kinds = [type(b.spec) for b in binding.walk()]
+    return any(k.handles() and (k.open_one is not Plugin.open_one or k.ready is not Plugin.ready) for k in kinds)
 
 
 class Schedule:
@@ -103,8 +110,8 @@ class Schedule:
                         group.x[:], group.bodies.floats[:, group.first : group.last] = state
                     self._isolate(group, group.motion, error, action)
 
-        if any(isinstance(c, Handle) for c in type(group.motion.spec).columns.values()):
-            return Call(self._label("motion", group, group.motion), lambda: (self._await(group, group.motion), run())[-1])
+        if _is_outside(group.motion):
+            return Call(self._label("motion", group, group.motion), lambda: self._world_by_world(group, group.motion, action))
         return Call(self._label("motion", group, group.motion), run)
 
     def _entity_call(self, kind: str, group: Group, binding: Binding, substep: int = 0) -> Call:
@@ -113,7 +120,7 @@ class Schedule:
         per_step = _rate(binding.spec, clock.dt)
         topics = [b.plugin.__dict__[k].topic for b in binding.walk() for k, c in type(b.spec).columns.items() if isinstance(c, Publish)]
         inboxes = [b.plugin.__dict__[k] for b in binding.walk() for k, c in type(b.spec).columns.items() if isinstance(c, Subscribe)]
-        has_handles = any(isinstance(c, Handle) for c in type(binding.spec).columns.values())
+        is_outside = _is_outside(binding)
         atomic, linked = binding.plugin.atomic, any(b.links for b in binding.walk())
         view, plugin, table = binding.view, binding.plugin, group.table
         writable = [b.places[k] for b in binding.walk() for k in sorted(b.writable)]
@@ -146,9 +153,9 @@ class Schedule:
         def run() -> None:
             due = None if per_step is None else is_due(clock.step, per_step) & ~dead
             if group.n:
-                if has_handles:
-                    self._await(group, binding)
-                if due is None or due.all():
+                if is_outside:
+                    self._world_by_world(group, binding, action, due)
+                elif due is None or due.all():
                     whole()
                 elif due.any():
                     self._part(group, binding, due, action)
@@ -163,7 +170,7 @@ class Schedule:
                 except Exception as error:
                     self._isolate(group, binding, error, action)
 
-        is_plain = atomic and per_step is None and not (linked or inboxes or has_handles or topics)
+        is_plain = atomic and per_step is None and not (linked or inboxes or is_outside or topics)
         return Call(self._label(kind, group, binding, substep), lean if is_plain else run)
 
     def _part(self, group: Group, binding: Binding, due: np.ndarray, action: Callable[[Group], None]) -> None:
@@ -176,8 +183,19 @@ class Schedule:
         except Exception as error:
             self._isolate(group, binding, error, action, due)
 
-    def _await(self, group: Group, binding: Binding) -> None:
-        self.sim.await_ready(group, binding)
+    def _world_by_world(
+        self, group: Group, binding: Binding, action: Callable[[Group], None], due: np.ndarray | None = None
+    ) -> None:
+        """Call a plugin that holds something outside: what it did there in a call that failed could not be undone and done again."""
+        sim = self.sim
+
+        def when_ready(some: Group) -> None:
+            sim.await_ready(some, next(b for b in some.bindings if b.path == binding.path))
+            action(some)
+
+        for world in np.unique(sim.population.bodies.world[group.first : group.last]):
+            if not sim.failed[world] and (due is None or due[world]):
+                self._part(group, binding, np.arange(len(sim.running)) == world, when_ready)
 
     def _isolate(
         self, group: Group, binding: Binding, error: Exception, action: Callable[[Group], None], due: np.ndarray | None = None

@@ -41,7 +41,7 @@ class Simulation:
         params: Parameters by path ("prey.Boids.gain", "prey.speed", "SimpleCapture.capture_range"); one value, or one per world.
         threads: Threads that a step may use; the result is the same with any number.
         on_error: "raise" stops at the first plugin that fails; "record" ends the world with the error in its result, and the others
-            go on. By default "raise" for one world and "record" for several.
+            go on. By default "raise" for one world and "record" for several, but for the error that ends the last of them all.
 
     Raises:
         MissionError: The mission cannot be played.
@@ -63,6 +63,7 @@ class Simulation:
         self._check(mission, numbers, on_error)
         n = self.n_worlds = len(numbers)
         self.on_error = on_error or ("raise" if n == 1 else "record")
+        self._raises_when_all_fail = on_error is None
         self.running = np.ones(n, bool)
         self.failed = np.zeros(n, bool)
         self.results: list[WorldResult | None] = [None] * n
@@ -85,9 +86,7 @@ class Simulation:
             raise MissionError(f"Simulation needs a Mission, not {mission!r}")
         if not seeds:
             raise MissionError("seeds is empty; give one number or several")
-        for seed in seeds:
-            if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)):
-                raise ParameterError(f"seed {seed!r} is not allowed; it takes a whole number")
+        _check_seeds(seeds)
         if on_error not in (None, "raise", "record"):
             raise ParameterError(f"on_error = {on_error!r} is not allowed; it is 'raise' or 'record'")
         for plugin in [*mission.world_plugins, *(p for b in mission.blocks for p in b.plugins)]:
@@ -211,15 +210,20 @@ class Simulation:
             seeds: New seed of each; by default its last one.
             params: As for the constructor, one value or one per world of `worlds`.
         """
-        chosen = np.array(sorted(worlds), np.int64)
-        if len(chosen) and (chosen[0] < 0 or chosen[-1] >= self.n_worlds):
-            raise ParameterError(f"reset: there are worlds 0 to {self.n_worlds - 1}, not {chosen.tolist()}")
+        listed_ = [int(w) for w in worlds]
+        chosen = np.array(sorted(listed_), np.int64)
+        if len(chosen) and (chosen[0] < 0 or chosen[-1] >= self.n_worlds or len(set(listed_)) < len(listed_)):
+            raise ParameterError(f"reset: there are worlds 0 to {self.n_worlds - 1}, each once, not {listed_}")
         mask = np.zeros(self.n_worlds, bool)
         mask[chosen] = True
         if seeds is not None:
-            self.context.seeds[list(worlds)] = [s % 2**64 for s in seeds]
+            _check_seeds(seeds)
+            if len(seeds) != len(listed_):
+                raise ParameterError(f"reset: {len(seeds)} seeds for {len(listed_)} worlds")
         if params:
-            self.overrides.set(params, np.array(list(worlds), np.int64))
+            self.overrides.set(params, np.array(listed_, np.int64))
+        if seeds is not None:
+            self.context.seeds[listed_] = [s % 2**64 for s in seeds]
         self.context.clock.step[chosen] = 0
         self.running[chosen], self.failed[chosen] = True, False
         for world in chosen:
@@ -227,12 +231,13 @@ class Simulation:
             self.parked.pop(int(world), None)
         self.mail.drop_worlds(mask)
         view = self.world_view
-        view.births = [b for b in view.births if not mask[b["world"]].any()]
+        view.births = [{k: v if k == "block" else v[..., ~mask[b["world"]]] for k, v in b.items()} for b in view.births]
         for referee in self.referees:
             referee.reset(chosen)
             referee.fill_params(self.overrides, chosen)
         due = self.births.begin(chosen)
-        self._repack(mask[self.population.bodies.world], self._create(due, at_start=True))
+        gone = mask | ~self.running  # worlds that ended last keep their rows as long as nobody runs
+        self._repack(gone[self.population.bodies.world], self._create(due, at_start=True))
         self._set_common_step()
         self._start_referees(mask)
         self._take_out_dead()
@@ -292,12 +297,14 @@ class Simulation:
         for referee in self.referees:
             referee.rearrange(index)
         self._checked: tuple[Any, ...] | None = None
+        self._has_changed = True
 
     def after_restore(self) -> None:
         """The table has been put back: views and checks look at it."""
         bodies = self.population.bodies
         self.world_view.reset(bodies, 0, bodies.n)
         self._checked = None
+        self._has_changed = True
 
     # -- the end of a step ----------------------------------------------------------------------------------------------------
 
@@ -318,10 +325,10 @@ class Simulation:
         self._check_states()
         clock = self.context.clock
         clock.step += self.running
-        died = self._take_out_dead()
+        self._take_out_dead()
         if clock.common >= 0:
             clock.common += 1
-        self._end_worlds(died)
+        self._end_worlds()
 
     def _check_states(self) -> None:
         if self._checked is None:
@@ -352,14 +359,15 @@ class Simulation:
         self._repack(gone, None)
         return True
 
-    def _end_worlds(self, died: bool) -> None:
+    def _end_worlds(self) -> None:
         mission, clock = self.mission, self.context.clock
         conditions = mission.end_conditions
         over: dict[int, str] = {}
         if "time" in conditions:
             for world in np.flatnonzero(self.running & (clock.step >= mission.steps)) if self._may_be_time() else ():
                 over[int(world)] = "time"
-        if died or clock.common == 1:
+        if self._has_changed:  # who is there has changed since the last look: births count too, since the last one may decide
+            self._has_changed = False
             for world, reason in self._lost_teams():
                 over.setdefault(world, reason)
         if over:
@@ -395,6 +403,8 @@ class Simulation:
             mask = np.zeros(self.n_worlds, bool)
             mask[list(over)] = True
             self.mail.drop_worlds(mask)
+        else:
+            self.population.close_handles()
 
     def _end(self, world: int, reason: str) -> None:
         result = access.world_result(self, world, reason)
@@ -419,6 +429,10 @@ class Simulation:
     def fail(self, world: int, plugin: Any, error: Exception, where: str) -> None:
         """A plugin has failed in a world: it will end with this step."""
         step = int(self.context.clock.step[world])
+        if isinstance(error, PluginError):  # the engine's own words, such as those of `await_ready`
+            error.where, error.step, error.world = where or error.where, step, world
+            self.record_failure(world, error)
+            return
         self.record_failure(world, failure.raised(error, plugin, where=where, step=step, world=world))
 
     def record_failure(self, world: int, error: PluginError) -> None:
@@ -426,7 +440,7 @@ class Simulation:
             raise error
         self.failed[world] = self._has_failures = True
         self.results[world] = WorldResult(world, int(self.context.seeds[world]), "error", 0, 0.0, {}, error=error)
-        if (self.failed | ~self.running).all() and self.failed.sum() == self.n_worlds and self.n_worlds > 1:
+        if self.failed.all() and self._raises_when_all_fail:
             raise error
 
     def await_ready(self, group: Group, binding: Binding) -> None:
@@ -509,3 +523,8 @@ class Simulation:
         if getattr(self, "is_closed", True) is False and hasattr(self, "population"):
             self.close()
 
+
+def _check_seeds(seeds: Iterable[Any]) -> None:
+    for seed in seeds:
+        if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)):
+            raise ParameterError(f"seed {seed!r} is not allowed; it takes a whole number")

@@ -1,0 +1,347 @@
+"""Who is born when and where."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from small_worlds import Drift, Reaper, Wander, alone, block, mission
+
+from tussle import Simulation
+from tussle.api import Autonomy, Interaction, Metric, Param, Publish, State
+from tussle.errors import MissionError, ParameterError, PluginError
+from tussle.messages import SpawnEntity
+from tussle.stock import SimpleCollision
+
+
+def ids(sim, name="a"):
+    return [i for i in sim.read(f"{name}.id")[0][0].tolist() if i]
+
+
+def births_of(game, name="a", seed=1):
+    """Step in which each entity of a block is first there."""
+    sim = Simulation(game, seeds=seed)
+    born: list[int] = []
+    while not sim.is_over:
+        sim.step()
+        born += [int(sim.steps[0]) - 1] * (sim.read(f"{name}.pos")[1].sum() - len(born))
+    return born
+
+
+def test_count_without_rate_is_there_from_the_start():
+    sim = Simulation(mission(block("a", count=3), block("b", count=2)))
+    assert ids(sim, "a") == [1, 2, 3]
+    assert ids(sim, "b") == [4, 5]
+
+
+@pytest.mark.parametrize(
+    ("values", "steps"),
+    [
+        ({"rate": 5.0, "count": 4}, [0, 2, 4, 6]),
+        ({"rate": 5.0, "count": 4, "first_birth": 0.3}, [3, 5, 7, 9]),
+        ({"rate": 5.0, "count": 6, "slots": 3}, [0, 0, 0, 2, 2, 2]),
+        ({"rate": 5.0, "count": 4, "slots": 3}, [0, 0, 0, 2]),
+        ({"rate": "5 Hz", "count": 2}, [0, 2]),
+        ({"rate": 10.0, "count": 3}, [0, 1, 2]),
+        ({"rate": 1000.0, "count": 3}, [0, 1, 2]),
+        # 4 a second at 10 steps a second: on the average the rate that was asked for, each birth in the first step at or after its time
+        ({"rate": 4.0, "count": 4}, [0, 3, 5, 8]),
+        ({"rate": 0.1, "count": 4, "first_birth": 5.0}, []),
+    ],
+)
+def test_births_come_at_their_rate(values, steps):
+    assert births_of(mission(block(**values))) == steps
+
+
+def test_times_between_births_vary_with_interval_sd_and_by_seed_only():
+    game = mission(block(rate=2.0, interval_sd=0.2, count=10), end=5.0)
+    first = births_of(game, seed=1)
+    assert len(set(np.diff(first))) > 2
+    assert first == births_of(game, seed=1)
+    assert first != births_of(game, seed=2)
+    more = mission(block("z", count=3), *game.blocks, end=5.0)
+    assert first == births_of(more, seed=1)
+
+
+def test_first_is_exactly_there_and_scatter_first_scatters_it():
+    exact = Simulation(mission(block(count=3, position=(10, 20, 30), variance=(100, 100, 25)))).read("a.pos")[0][0]
+    assert exact[0].tolist() == [10.0, 20.0, 30.0]
+    assert (exact[1:] != exact[0]).all()
+    scattered = Simulation(mission(block(count=3, position=(10, 20, 30), variance=(100, 100, 25), scatter_first=True))).read("a.pos")[0][0]
+    assert (scattered[0] != exact[0]).all()
+    assert np.array_equal(scattered[1:], exact[1:])
+
+
+def test_variance_is_a_variance():
+    game = mission(block(count=4000, position=(10, 0, -5), variance=(100, 25, 0), scatter_first=True))
+    pos = Simulation(game).read("a.pos")[0][0]
+    assert pos.mean(axis=0) == pytest.approx([10.0, 0.0, -5.0], abs=5 * 10 / np.sqrt(4000))
+    assert pos.std(axis=0) == pytest.approx([10.0, 5.0, 0.0], rel=0.06)
+
+
+def test_uniform_placement_fills_the_box_and_no_more():
+    game = mission(block(count=2000, position=(10, 0, -5), placement="uniform", half_width=(4, 2, 0)))
+    pos = Simulation(game).read("a.pos")[0][0]
+    assert (np.abs(pos - [10, 0, -5]) <= [4, 2, 0]).all()
+    assert pos.min(axis=0) == pytest.approx([6.0, -2.0, -5.0], abs=0.05)
+    assert pos.std(axis=0) == pytest.approx(np.array([4, 2, 0]) / np.sqrt(3), rel=0.06)
+
+
+def test_heading_and_speed_of_the_newborn():
+    game = mission(block(count=2000, heading="90 deg", heading_variance=0.04, speed=5.0))
+    sim = Simulation(game)
+    yaw = sim.read("a.yaw")[0][0]
+    assert yaw.mean() == pytest.approx(np.pi / 2, abs=0.03)
+    assert yaw.std() == pytest.approx(0.2, rel=0.06)
+    vel = sim.read("a.vel")[0][0]
+    assert vel[:, 0] == pytest.approx(5.0 * np.cos(yaw))
+    assert vel[:, 1] == pytest.approx(5.0 * np.sin(yaw))
+
+
+def test_a_climbing_nose_points_the_velocity_up():
+    sim = Simulation(mission(block(climb="30 deg", speed=2.0)))
+    assert sim.read("a.vel")[0][0, 0] == pytest.approx([2.0 * np.cos(np.pi / 6), 0.0, 1.0])
+    assert sim.read("a.climb")[0][0, 0] == pytest.approx(np.pi / 6)
+
+
+def scattered(*extra, count=4, before=()):
+    return mission(*before, block("a", count=count, variance=(100, 100, 9), heading_variance=0.1, autonomy=Wander()), *extra)
+
+
+def test_another_block_or_more_entities_change_no_draw():
+    paths = {
+        "as it is": scattered(),
+        "more": scattered(count=9),
+        "block before": scattered(before=[block("z", count=3, variance=(1, 1, 1), autonomy=Wander())]),
+        "block behind": scattered(block("z", count=3, variance=(1, 1, 1), autonomy=Wander())),
+        "another plugin": scattered().replace(metrics=[Quiet()]),
+    }
+    found = {name: alone(game, 3).read("a.pos")[0][0, :4] for name, game in paths.items()}
+    for name, pos in found.items():
+        assert np.array_equal(pos, found["as it is"]), name
+    assert not np.array_equal(alone(scattered(), 4).read("a.pos")[0][0, :4], found["as it is"])
+
+
+class Quiet(Metric):
+    def step(self, w):
+        w.normal("something", 3)
+
+
+def test_referees_room_is_kept_at_placement_and_elsewhere_nothing_changes():
+    crowd = {"count": 12, "position": (0, 0, 0), "variance": (4, 4, 4)}
+    free = Simulation(mission(block(**crowd))).read("a.pos")[0][0]
+    game = mission(block(**crowd), block("b", **crowd), interactions=[SimpleCollision(collision_range=0.0, startup_collision_range=1.45)])
+    sim = Simulation(game, seeds=[1, 2])
+    for world in (0, 1):
+        pos = np.concatenate([sim.read("a.pos")[0][world], sim.read("b.pos")[0][world]])
+        gap = np.linalg.norm(pos[:, None] - pos[None], axis=-1) + 1e9 * np.eye(24)
+        assert gap.min() >= 1.45
+    assert np.linalg.norm(free[:, None] - free[None], axis=-1)[np.triu_indices(12, 1)].min() < 1.45
+    assert np.array_equal(sim.read("a.pos")[0][0, 0], free[0])
+
+
+def test_room_at_a_reset_is_that_of_a_fresh_start():
+    game = mission(block(count=12, variance=(9, 9, 9), autonomy=Wander()), interactions=[SimpleCollision(collision_range=0.0)])
+    sim = Simulation(game, seeds=[1, 2])
+    start = sim.read("a.pos")[0]
+    sim.step(3)
+    sim.reset([1])
+    assert np.array_equal(sim.read("a.pos")[0][1], start[1])
+
+
+def test_births_during_the_run_keep_room_to_those_that_are_there():
+    game = mission(
+        block("a", count=5, variance=(4, 4, 4), autonomy=Drift(to=(0, 0, 0))),
+        block("b", count=5, rate=10.0, slots=5, variance=(4, 4, 4), autonomy=Drift(to=(0, 0, 0))),
+        block("c", count=5, rate=10.0, slots=5, variance=(4, 4, 4), autonomy=Drift(to=(0, 0, 0))),
+        interactions=[SimpleCollision(collision_range=0.0, startup_collision_range=1.5)],
+    )
+    sim = Simulation(game)
+    sim.step()
+    pos = np.concatenate([sim.read(f"{name}.pos")[0][0] for name in "abc"])
+    assert len(pos) == 15
+    assert (np.linalg.norm(pos[:, None] - pos[None], axis=-1) + 1e9 * np.eye(15)).min() >= 1.5
+
+
+def test_a_mission_too_crowded_says_so():
+    with pytest.raises(MissionError, match=r"block 'a': no free place for entity 2 of 2 after 10000 tries.*placement 'normal'"):
+        Simulation(mission(block(count=2), interactions=[SimpleCollision()]))
+
+
+def test_ids_are_never_used_again():
+    game = mission(block("a", team=1, count=2), block("b", team=2, rate=5.0, count=3), interactions=[Reaper(team=1, at=0.0)])
+    sim = Simulation(game)
+    seen = []
+    while not sim.is_over:
+        sim.step()
+        seen.append(ids(sim, "b"))
+    assert seen[0] == [3]
+    assert seen[-1] == [3, 4, 5]
+
+
+class Mother(Interaction):
+    """Spawn one child in step 2 of some worlds."""
+
+    at = Param(2)
+    count = State(dtype=int, per="world")
+
+    def step(self, w):
+        worlds = np.flatnonzero((w.step_count == self.at) & (np.bincount(w.world, minlength=w.n_worlds) > 0))
+        w.spawn("child", worlds, pos=(5.0, 6.0, 7.0), team=2)
+        self.count[worlds] += 1
+
+
+def with_children(*world, **values):
+    return mission(block("a", team=1), block("child", count=0, team=1, position=(1, 1, 1)), block("b", team=2, position=(9, 9, 9)),
+                   interactions=list(world), **values)  # fmt: skip
+
+
+def test_w_spawn_is_born_at_the_beginning_of_the_next_step():
+    sim = Simulation(with_children(Mother()), seeds=[1, 2, 3], params={"Mother.at": [2, 4, 99]})
+    sim.step(3)
+    assert sim.read("child.pos")[1].sum() == 0
+    seen = []
+    sim.observers.append(lambda s: seen.append((int(s.steps[0]), s.read("child.pos")[0].tolist())))
+    sim.step()
+    assert seen == [(3, [[[5.0, 6.0, 7.0]], [[0.0, 0.0, 0.0]], [[0.0, 0.0, 0.0]]])]
+    sim.run()
+    assert sim.read("child.pos")[1].tolist() == [[True], [True], [False]]
+    assert sim.read("child.id")[0].tolist() == [[3], [3], [0]]
+    assert sim.read("child.team")[0].tolist() == [[2], [2], [0]]
+
+
+def test_w_spawn_without_a_place_takes_the_blocks():
+    class Plain(Interaction):
+        def step(self, w):
+            w.spawn("child", np.flatnonzero(w.step_count == 0))
+
+    sim = Simulation(with_children(Plain()))
+    sim.step(2)
+    assert sim.read("child.pos")[0][0, 0].tolist() == [1.1, 1.0, 1.0]
+
+
+def test_w_spawn_takes_one_place_for_all_or_one_each():
+    class Three(Interaction):
+        def step(self, w):
+            if w.step_count[0] == 0:
+                w.spawn("child", [0, 0, 0], pos=(1.0, 2.0, 3.0), vel=np.array([[1.0, 2.0, 3.0], [0, 0, 0], [0, 0, 0]]))
+
+    sim = Simulation(with_children(Three()))
+    sim.step(1)
+    starts = []
+    sim.observers.append(lambda s: starts.append((s.read("child.pos")[0][0].tolist(), s.read("child.vel")[0][0].tolist())))
+    sim.step(1)
+    assert starts[0] == ([[1.0, 2.0, 3.0]] * 3, [[1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [3.0, 0.0, 0.0]])
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda w: w.spawn("chld", [0]), r"there is no block 'chld' \(did you mean 'child'\?\); there are: a, child, b"),
+        (lambda w: w.spawn("child", [0], speed=3), r"w.spawn: unknown 'speed'; there are: pos, vel, quat, team"),
+        (lambda w: w.spawn("child", [0], team=7), r"w.spawn: team = 7 is not allowed; teams of the mission are 1, 2"),
+        (lambda w: w.spawn("child", [0], pos=(1, 2)), r"w.spawn: pos has shape \(2,\); needed is \(3, 1\)"),
+        (lambda w: w.move([0], pos=(1, 2)), r"w.move: pos has shape \(2, 1\); needed is \(3, 1\)"),
+    ],
+)
+def test_wrong_wishes_are_refused(call, message):
+    class Wrong(Interaction):
+        def step(self, w):
+            call(w)
+
+    with pytest.raises(PluginError, match=message):
+        Simulation(with_children(Wrong())).step()
+
+
+class Asker(Autonomy):
+    """Ask for one more of a block in one step."""
+
+    at = Param(2)
+    template = Param("child")
+    births = Publish(SpawnEntity)
+
+    def step(self, g):
+        rows = np.flatnonzero(g.step_count == self.at)
+        turned = np.array([[0.0], [0.0], [0.0], [1.0]])
+        self.births.publish(rows, block=[self.template] * len(rows), pos=g.pos[:, rows] + 10.0, vel=g.vel[:, rows], quat=turned)
+
+
+def asking(**values):
+    return mission(block("a", team=1, count=2, autonomy=[Drift(), Asker(**values)], position=(100, 0, 0)), block("child", count=0, team=2))
+
+
+def test_an_autonomy_asks_for_an_entity_by_message():
+    sim = Simulation(asking(), seeds=[1, 2], params={"a.Asker.at": [2, 5]})
+    born = []
+    sim.observers.append(lambda s: born.append(s.read("child.pos")[1].sum(axis=1).tolist()))
+    sim.run()
+    assert born == [[0, 0]] * 3 + [[2, 0]] * 3 + [[2, 2]] * 4
+    assert sim.read("child.id")[0].tolist() == [[3, 4], [3, 4]]
+    # Asked for at 100.2 + 10, and drifting at 1 m/s from step 3 on, seven steps.
+    assert sim.read("child.pos")[0][0, 0] == pytest.approx([110.2 + 0.7, 10.0, 10.0])
+    assert alone(asking(), 1).state_hash() == sim.state_hash(0)
+
+
+def test_attitude_of_the_asked_for():
+    sim = Simulation(asking())
+    sim.step(3)
+    sim.observers.append(lambda s: yaws.append(s.read("child.yaw")[0][0].tolist()))
+    yaws: list[list[float]] = []
+    sim.step()
+    assert yaws[0] == pytest.approx([np.pi, np.pi])
+
+
+def test_births_by_message_of_several_blocks_get_the_same_ids_in_any_stack():
+    game = mission(
+        block("a", autonomy=[Drift(), Asker(template="x"), Asker(template="y", name="Second")]),
+        block("x", count=0), block("y", count=0),
+    )  # fmt: skip
+    params = {"a.Asker.at": [2, 2, 3], "a.Second.at": [3, 2, 2]}
+    stack = Simulation(game, seeds=[1, 2, 3], params=params)
+    stack.run()
+    for world in range(3):
+        one = Simulation(game, seeds=world + 1, params={k: v[world] for k, v in params.items()})
+        one.run()
+        assert one.state_hash() == stack.state_hash(world)
+    assert stack.read("x.id")[0][:, 0].tolist() == [2, 2, 3]
+
+
+def test_asking_for_a_block_that_is_not_there_ends_that_world_only():
+    game = asking(template="chil")
+    sim = Simulation(game, seeds=[1, 2, 3], params={"a.Asker.at": [99, 4, 99]})
+    results = sim.run()
+    assert [r.end for r in results] == ["time", "error", "time"]
+    assert results[1].steps == 5
+    assert "there is no block 'chil' (did you mean 'child'?); there are: a, child" in str(results[1].error)
+    with pytest.raises(PluginError, match="world 0, step 2"):
+        Simulation(game, seeds=1).run()
+
+
+def test_resetting_one_world_leaves_the_wishes_of_others():
+    class Everywhere(Interaction):
+        def step(self, w):
+            w.spawn("child", np.flatnonzero(w.step_count == 0), pos=(5.0, 6.0, 7.0))
+
+    sim = Simulation(with_children(Everywhere()), seeds=[1, 2])
+    sim.step()
+    sim.reset([0])
+    sim.step()
+    assert sim.read("child.pos")[1].tolist() == [[False], [True]]
+
+
+def test_a_referee_due_in_some_worlds_asks_only_there():
+    class Keen(Interaction):
+        def step(self, w):
+            w.spawn("child", np.arange(w.n_worlds), pos=(5.0, 6.0, 7.0))
+
+    sim = Simulation(with_children(Keen(rate=5.0)), seeds=[1, 2])
+    sim.step()
+    sim.reset([0])  # clocks differ from now on: due in steps 0, 2, 4 ... of each world
+    sim.step(4)
+    assert sim.read("child.pos")[1].sum(axis=1).tolist() == [2, 2]
+
+
+def test_negative_count_is_refused():
+    with pytest.raises(MissionError, match=r"block 'a': count = -1 is not allowed; it takes a number >= 0"):
+        block(count=-1)
+    with pytest.raises(ParameterError, match="a seed|seed"):
+        Simulation(mission(), seeds=["1"])
