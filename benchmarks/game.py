@@ -68,7 +68,12 @@ def measure(n_worlds: int) -> dict[str, Any]:
     cpu, simulated, agent_steps, sim = measuring.play(make)
     alive = sum(sum(r.alive.values()) for r in sim.result()) / n_worlds
     row = {"model": "Unicycle", "n": n_worlds, "cpu_s_per_world": cpu / runs, "sim_per_cpu": simulated / cpu}
-    row |= {"ratio": ORIGINAL / (cpu / runs), "cpu_s": cpu, "alive": alive, "captures": measuring.captures(sim)}
+    row |= {
+        "ratio": ORIGINAL / (cpu / runs),
+        "cpu_s": cpu,
+        "alive": alive,
+        "captures": measuring.captures(sim),
+    }
     return row | {"pairs": float("nan") if not agent_steps else measuring.mean_pairs(game, 200.0, every=100)}
 
 

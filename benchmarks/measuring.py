@@ -22,7 +22,9 @@ def arguments(description: str, sizes: Sequence[int]) -> argparse.Namespace:
     """The options of all benchmarks: --sizes, --repeats, --json."""
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--sizes", type=int, nargs="+", default=list(sizes), help="which sizes to measure")
-    parser.add_argument("--repeats", type=int, default=3, help="measurements of each row, of which the median counts")
+    parser.add_argument(
+        "--repeats", type=int, default=3, help="measurements of each row, of which the median counts"
+    )
     parser.add_argument("--json", type=Path, help="write the rows to this file")
     return parser.parse_args()
 

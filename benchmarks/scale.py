@@ -54,7 +54,13 @@ def measure(n: int) -> dict[str, Any]:
             if n >= 30_000 and time.process_time() - begin > 2.0 * measuring.LEAST_CPU:
                 break
         cpu += time.process_time() - begin
-    row = {"model": "Unicycle", "n": n, "ns_per_agent_step": 1e9 * cpu / steps / n, "real_time": steps * 0.1 / cpu, "cpu_s": cpu}
+    row = {
+        "model": "Unicycle",
+        "n": n,
+        "ns_per_agent_step": 1e9 * cpu / steps / n,
+        "real_time": steps * 0.1 / cpu,
+        "cpu_s": cpu,
+    }
     pairs = len(sim.world_view.near(200.0)) / n
     return row | {"pairs": pairs, "alive": sim.population.bodies.n, "captures": 0, "peak_mb": _peak_mb()}
 
@@ -65,7 +71,9 @@ def _peak_mb() -> float:
 
 def main() -> None:
     args = measuring.arguments(__doc__.splitlines()[0], SIZES)
-    rows = [measuring.median_of(args.repeats, lambda n=n: measure(n), "ns_per_agent_step") for n in args.sizes]
+    rows = [
+        measuring.median_of(args.repeats, lambda n=n: measure(n), "ns_per_agent_step") for n in args.sizes
+    ]
     measuring.report("Unicycle boids at constant density, one thread", rows, args.json)
 
 

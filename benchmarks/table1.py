@@ -43,10 +43,24 @@ def mission(model: str, n: int) -> Mission:
     def predators(name: str, team: int, switching: bool) -> Block:
         hunter = Predator(max_speed=35.0, capture_range=5.0, allow_prey_switching=switching)
         legs = Unicycle(vel_max=35.0, turn_rate_max=2.0, pitch_rate_max=1.5)
-        return Block(name=name, team=team, count=5, position=(1000, 0, 200), heading="180 deg", autonomy=hunter, motion=legs)
+        return Block(
+            name=name,
+            team=team,
+            count=5,
+            position=(1000, 0, 200),
+            heading="180 deg",
+            autonomy=hunter,
+            motion=legs,
+        )
 
     prey = Block(
-        name="prey", team=1, count=n - 10, position=(0, 0, 200), variance=(400_000, 400_000, 1000), autonomy=Boids(), **MODELS[model]
+        name="prey",
+        team=1,
+        count=n - 10,
+        position=(0, 0, 200),
+        variance=(400_000, 400_000, 1000),
+        autonomy=Boids(),
+        **MODELS[model],
     )
     return Mission(
         blocks=[prey, predators("keepers", 2, False), predators("switchers", 3, True)],
@@ -63,7 +77,12 @@ def mission(model: str, n: int) -> Mission:
 def measure(model: str, n: int) -> dict[str, Any]:
     game = mission(model, n)
     cpu, simulated, agent_steps, sim = measuring.play(lambda: Simulation(game))
-    row = {"model": model, "n": n, "sim_per_cpu": simulated / cpu, "us_per_step": 1e6 * cpu / simulated * game.dt}
+    row = {
+        "model": model,
+        "n": n,
+        "sim_per_cpu": simulated / cpu,
+        "us_per_step": 1e6 * cpu / simulated * game.dt,
+    }
     row |= {"ns_per_agent_step": 1e9 * cpu / agent_steps, "cpu_s": cpu, "alive": sim.population.bodies.n}
     original = ORIGINAL.get(model, {}).get(n)
     if original:

@@ -60,7 +60,12 @@ def shares(scores: np.ndarray) -> np.ndarray:
 def ks_distance(a: np.ndarray, b: np.ndarray) -> float:
     """Largest distance between two empirical distribution functions."""
     grid = np.union1d(a, b)
-    return float(np.abs(np.searchsorted(np.sort(a), grid, "right") / len(a) - np.searchsorted(np.sort(b), grid, "right") / len(b)).max())
+    return float(
+        np.abs(
+            np.searchsorted(np.sort(a), grid, "right") / len(a)
+            - np.searchsorted(np.sort(b), grid, "right") / len(b)
+        ).max()
+    )
 
 
 def compare(ours: np.ndarray, theirs: np.ndarray) -> list[dict[str, Any]]:
@@ -70,15 +75,33 @@ def compare(ours: np.ndarray, theirs: np.ndarray) -> list[dict[str, Any]]:
     for name, a, b in zip(("team 2 wins", "team 3 wins", "ties"), shares(ours), shares(theirs), strict=True):
         pooled = (a * n + b * m) / (n + m)
         limit = Z_99 * math.sqrt(pooled * (1.0 - pooled) * (1.0 / n + 1.0 / m))
-        rows.append({"measure": f"share: {name}", "ours": a, "theirs": b, "difference": abs(a - b), "limit": limit})
+        rows.append(
+            {"measure": f"share: {name}", "ours": a, "theirs": b, "difference": abs(a - b), "limit": limit}
+        )
     columns = {"score of team 2": (ours[:, 1], theirs[:, 1]), "score of team 3": (ours[:, 2], theirs[:, 2])}
     columns["prey lost"] = (100 - ours[:, 3], 100 - theirs[:, 3])
     for name, (x, y) in columns.items():
         limit = Z_99 * math.sqrt(x.var(ddof=1) / n + y.var(ddof=1) / m)
-        rows.append({"measure": f"mean: {name}", "ours": x.mean(), "theirs": y.mean(), "difference": abs(x.mean() - y.mean()), "limit": limit})
+        rows.append(
+            {
+                "measure": f"mean: {name}",
+                "ours": x.mean(),
+                "theirs": y.mean(),
+                "difference": abs(x.mean() - y.mean()),
+                "limit": limit,
+            }
+        )
     for name, (x, y) in columns.items():
         limit = KS_99 * math.sqrt((n + m) / (n * m))
-        rows.append({"measure": f"KS distance: {name}", "ours": x.std(ddof=1), "theirs": y.std(ddof=1), "difference": ks_distance(x, y), "limit": limit})
+        rows.append(
+            {
+                "measure": f"KS distance: {name}",
+                "ours": x.std(ddof=1),
+                "theirs": y.std(ddof=1),
+                "difference": ks_distance(x, y),
+                "limit": limit,
+            }
+        )
     return rows
 
 
@@ -100,20 +123,41 @@ def main() -> None:
     ours = np.array(rows, float)
     won, lost, tied = (shares(ours) * len(ours)).round().astype(int)
     print(f"{args.update}, {args.law} law: {len(ours)} games in {wall:.0f} s on {args.processes} processes")
-    print(f"team 2 wins {won}, team 3 wins {lost}, ties {tied}   (published: {PUBLISHED[0]} / {PUBLISHED[1]} / {PUBLISHED[2]} of 1000)")
-    for name, column in (("score of team 2", ours[:, 1]), ("score of team 3", ours[:, 2]), ("prey lost", 100 - ours[:, 3])):
-        print(f"{name:<16} mean {column.mean():6.2f}  sd {column.std(ddof=1):6.2f}  median {np.median(column):4.0f}")
+    print(
+        f"team 2 wins {won}, team 3 wins {lost}, ties {tied}   (published: {PUBLISHED[0]} / {PUBLISHED[1]} / {PUBLISHED[2]} of 1000)"
+    )
+    for name, column in (
+        ("score of team 2", ours[:, 1]),
+        ("score of team 3", ours[:, 2]),
+        ("prey lost", 100 - ours[:, 3]),
+    ):
+        print(
+            f"{name:<16} mean {column.mean():6.2f}  sd {column.std(ddof=1):6.2f}  median {np.median(column):4.0f}"
+        )
     if args.csv:
-        np.savetxt(args.csv, ours, fmt=["%d", "%d", "%d", "%d", "%.1f"], delimiter=",", header="seed,score_2,score_3,prey_left,end_time", comments="")
+        np.savetxt(
+            args.csv,
+            ours,
+            fmt=["%d", "%d", "%d", "%d", "%.1f"],
+            delimiter=",",
+            header="seed,score_2,score_3,prey_left,end_time",
+            comments="",
+        )
     report: list[dict[str, Any]] = []
     if args.reference:
         report = compare(ours, np.genfromtxt(args.reference, delimiter=",", skip_header=1)[:, :4])
         print(f"{'measure':<30} {'ours':>9} {'theirs':>9} {'distance':>9} {'1 % limit':>9}")
         for row in report:
             mark = "" if row["difference"] <= row["limit"] else "   TOLD APART"
-            print(f"{row['measure']:<30} {row['ours']:9.4f} {row['theirs']:9.4f} {row['difference']:9.4f} {row['limit']:9.4f}{mark}")
+            print(
+                f"{row['measure']:<30} {row['ours']:9.4f} {row['theirs']:9.4f} {row['difference']:9.4f} {row['limit']:9.4f}{mark}"
+            )
     if args.json:
-        args.json.write_text(json.dumps({"wall_s": wall, "wins": [int(won), int(lost), int(tied)], "rows": report}, indent=1) + "\n", encoding="utf-8")
+        args.json.write_text(
+            json.dumps({"wall_s": wall, "wins": [int(won), int(lost), int(tied)], "rows": report}, indent=1)
+            + "\n",
+            encoding="utf-8",
+        )
 
 
 if __name__ == "__main__":

@@ -141,7 +141,11 @@ class Param(Numbers):
             return "one of " + ", ".join(repr(c) for c in self.choices)
         bounds = [(self.ge, ">="), (self.gt, ">"), (self.le, "<="), (self.lt, "<")]
         text = " and ".join(f"{sign} {bound:g}" for bound, sign in bounds if bound is not None)
-        kind = "text" if self.is_text else {float: "a finite number", int: "a whole number", bool: "true or false"}[self.dtype]
+        kind = (
+            "text"
+            if self.is_text
+            else {float: "a finite number", int: "a whole number", bool: "true or false"}[self.dtype]
+        )
         unit = f" in {self.unit}" if self.unit else ""
         return f"{kind}{unit}{' ' + text if text else ''}"
 
@@ -156,7 +160,10 @@ class Param(Numbers):
             ParameterError: It has another type or unit, is not finite, or is out of bounds.
         """
         if self.ragged:
-            return tuple(tuple(self._numbers(row, where)) if self.fields else self._number(row, 0, where) for row in value)
+            return tuple(
+                tuple(self._numbers(row, where)) if self.fields else self._number(row, 0, where)
+                for row in value
+            )
         if self.fields:
             return tuple(self._numbers(value, where))
         return self._number(value, 0, where)
@@ -180,7 +187,9 @@ class Param(Numbers):
             return self._truth(value, where)
         if isinstance(value, str):
             value = self._parsed(value, component, where)
-        if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, np.integer, np.floating)):
+        if isinstance(value, (bool, np.bool_)) or not isinstance(
+            value, (int, float, np.integer, np.floating)
+        ):
             raise self._error(where, value, self.allowed())
         if self.dtype is int:
             if int(value) != value:
@@ -397,7 +406,9 @@ class RaggedColumn:
         """From one sequence per row, each of shape (m, k) or (m,)."""
         column = cls.empty(len(rows), declaration)
         parts = [np.asarray(r, column.data.dtype).reshape(-1, *declaration.shape).T for r in rows]
-        column.set(np.cumsum([0, *[p.shape[-1] for p in parts]]), np.concatenate([column.data, *parts], axis=-1))
+        column.set(
+            np.cumsum([0, *[p.shape[-1] for p in parts]]), np.concatenate([column.data, *parts], axis=-1)
+        )
         return column
 
     def set(self, start: np.ndarray, data: np.ndarray) -> None:
@@ -409,7 +420,9 @@ class RaggedColumn:
         start = np.ascontiguousarray(start, np.int64)
         data = np.ascontiguousarray(data, self.data.dtype)
         if start.shape != self.start.shape or data.shape[:-1] != self.data.shape[:-1]:
-            raise ValueError(f"start is {start.shape} and data {data.shape}; needed {self.start.shape} and {self.data.shape[:-1]} + (total,)")
+            raise ValueError(
+                f"start is {start.shape} and data {data.shape}; needed {self.start.shape} and {self.data.shape[:-1]} + (total,)"
+            )
         if start[0] != 0 or start[-1] != data.shape[-1] or (np.diff(start) < 0).any():
             raise ValueError(f"start must rise from 0 to the number of items, {data.shape[-1]}")
         self.start, self.data = start, data

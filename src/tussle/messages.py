@@ -13,19 +13,26 @@ from tussle.errors import DeclarationError, ParameterError, listed, nearest_name
 
 class Message:
     """A message type; abstract. Fields are declared as class attributes: `Field`, `EntityRef`, at most one `Ragged`, or a `Handle`
-    for any picklable object."""
+    for any picklable object.
+    """
 
     fields: ClassVar[dict[str, Column]] = {}
 
     def __init_subclass__(cls) -> None:
-        cls.fields = {k: c for base in reversed(cls.__mro__) for k, c in vars(base).items() if isinstance(c, Column)}
+        cls.fields = {
+            k: c for base in reversed(cls.__mro__) for k, c in vars(base).items() if isinstance(c, Column)
+        }
         for name, column in cls.fields.items():
             if not isinstance(column, (Field, EntityRef, Ragged, Handle)):
-                raise DeclarationError(f"{cls.__name__}.{name}: a message holds Field, EntityRef, Ragged or Handle, not {type(column).__name__}")
+                raise DeclarationError(
+                    f"{cls.__name__}.{name}: a message holds Field, EntityRef, Ragged or Handle, not {type(column).__name__}"
+                )
             if name in ("world", "sender", "n"):
                 raise DeclarationError(f"{cls.__name__}.{name}: the name is reserved in messages")
         if sum(isinstance(c, Ragged) for c in cls.fields.values()) > 1:
-            raise DeclarationError(f"{cls.__name__} has more than one ragged field; make two message types of it")
+            raise DeclarationError(
+                f"{cls.__name__} has more than one ragged field; make two message types of it"
+            )
 
 
 class Batch:
@@ -38,7 +45,9 @@ class Batch:
         data: Field name -> array (n,) or (k, n), `RaggedColumn`, or list.
     """
 
-    def __init__(self, type_: type[Message], world: np.ndarray, sender: np.ndarray, data: dict[str, Any]) -> None:
+    def __init__(
+        self, type_: type[Message], world: np.ndarray, sender: np.ndarray, data: dict[str, Any]
+    ) -> None:
         self.type = type_
         self.world = world
         self.sender = sender
@@ -56,7 +65,9 @@ class Batch:
             return self.__dict__["data"][name]
         except KeyError:
             fields = self.__dict__["type"].fields if "type" in self.__dict__ else {}
-            raise AttributeError(f"messages of this type have no field {name!r}{nearest_name(name, fields)}; {listed(fields)}") from None
+            raise AttributeError(
+                f"messages of this type have no field {name!r}{nearest_name(name, fields)}; {listed(fields)}"
+            ) from None
 
     def take(self, index: np.ndarray) -> Batch:
         """The messages `index`, in that order."""
@@ -78,7 +89,9 @@ class Batch:
         return cls.make(type_, np.zeros(0, np.int64), np.zeros(0, np.int64), {})
 
     @classmethod
-    def make(cls, type_: type[Message], world: np.ndarray, sender: np.ndarray, values: dict[str, Any]) -> Batch:
+    def make(
+        cls, type_: type[Message], world: np.ndarray, sender: np.ndarray, values: dict[str, Any]
+    ) -> Batch:
         """Columns from values by field name; scalars are repeated, missing numbers are 0.
 
         Raises:
@@ -87,8 +100,13 @@ class Batch:
         n = len(world)
         for name in values:
             if name not in type_.fields:
-                raise ParameterError(f"{type_.__name__} has no field {name!r}{nearest_name(name, type_.fields)}; {listed(type_.fields)}")
-        data = {name: _field_values(type_, name, column, values.get(name), n) for name, column in type_.fields.items()}
+                raise ParameterError(
+                    f"{type_.__name__} has no field {name!r}{nearest_name(name, type_.fields)}; {listed(type_.fields)}"
+                )
+        data = {
+            name: _field_values(type_, name, column, values.get(name), n)
+            for name, column in type_.fields.items()
+        }
         return cls(type_, np.ascontiguousarray(world, np.int64), np.ascontiguousarray(sender, np.int64), data)
 
     @classmethod
@@ -103,13 +121,21 @@ class Batch:
             if isinstance(column, Ragged):
                 lengths = np.concatenate([np.diff(p.start) for p in parts])
                 joined = RaggedColumn.empty(len(lengths), column)
-                joined.set(np.concatenate([[0], np.cumsum(lengths)]), np.concatenate([p.data for p in parts], axis=-1))
+                joined.set(
+                    np.concatenate([[0], np.cumsum(lengths)]),
+                    np.concatenate([p.data for p in parts], axis=-1),
+                )
                 data[name] = joined
             elif isinstance(column, Handle):
                 data[name] = [v for p in parts for v in p]
             else:
                 data[name] = np.concatenate(parts, axis=-1)
-        return cls(first.type, np.concatenate([b.world for b in batches]), np.concatenate([b.sender for b in batches]), data)
+        return cls(
+            first.type,
+            np.concatenate([b.world for b in batches]),
+            np.concatenate([b.sender for b in batches]),
+            data,
+        )
 
     @classmethod
     def concatenate(cls, batches: list[Batch]) -> Batch:

@@ -2,7 +2,17 @@
 
 from tussle.api.easy import EasyAutonomy, Me, Other
 from tussle.api.group import GroupView
-from tussle.api.kinds import Autonomy, Behavior, Controller, EntityPlugin, Interaction, Metric, Network, Sensor, WorldPlugin
+from tussle.api.kinds import (
+    Autonomy,
+    Behavior,
+    Controller,
+    EntityPlugin,
+    Interaction,
+    Metric,
+    Network,
+    Sensor,
+    WorldPlugin,
+)
 from tussle.api.motion import MotionBody, MotionModel
 from tussle.api.plugin import Plugin, service
 from tussle.api.world import WorldView

@@ -11,7 +11,17 @@ from tussle.api import kernels
 from tussle.errors import listed, nearest_name
 from tussle.neighbors.index import Index, padded
 
-FLOATS = {"pos": 3, "vel": 3, "quat": 4, "omega": 3, "force": 3, "torque": 3, "health": 1, "radius": 1, "mass": 1}
+FLOATS = {
+    "pos": 3,
+    "vel": 3,
+    "quat": 4,
+    "omega": 3,
+    "force": 3,
+    "torque": 3,
+    "health": 1,
+    "radius": 1,
+    "mass": 1,
+}
 INTS = ("id", "team", "world", "block", "place_in_block")
 DERIVED = {"yaw": 1, "climb": 1, "roll": 1, "forward": 3, "level_forward": 2}
 N_FLOATS = sum(FLOATS.values())
@@ -23,7 +33,16 @@ BRUTE = 600
 
 _DERIVING = {name: getattr(kernels, name) for name in DERIVED}
 _OFFSETS = {name: sum(list(FLOATS.values())[:i]) for i, name in enumerate(FLOATS)}
-_UNITS = {"pos": "m", "vel": "m/s", "quat": "", "omega": "rad/s", "force": "N", "torque": "N m", "radius": "m", "mass": "kg"}
+_UNITS = {
+    "pos": "m",
+    "vel": "m/s",
+    "quat": "",
+    "omega": "rad/s",
+    "force": "N",
+    "torque": "N m",
+    "radius": "m",
+    "mass": "kg",
+}
 
 
 @dataclass(slots=True)
@@ -47,6 +66,21 @@ class Bodies:
             health, radius [m], mass [kg], and id, team, world, block, place_in_block.
     """
 
+    pos: np.ndarray
+    vel: np.ndarray
+    quat: np.ndarray
+    omega: np.ndarray
+    force: np.ndarray
+    torque: np.ndarray
+    health: np.ndarray
+    radius: np.ndarray
+    mass: np.ndarray
+    id: np.ndarray
+    team: np.ndarray
+    world: np.ndarray
+    block: np.ndarray
+    place_in_block: np.ndarray
+
     def __init__(self, floats: np.ndarray, ints: np.ndarray, n_worlds: int) -> None:
         self.n_worlds = n_worlds
         self.scans = False
@@ -54,7 +88,7 @@ class Bodies:
 
     @classmethod
     def empty(cls, n: int, n_worlds: int) -> Bodies:
-        """n rows at the origin, unit mass and health, level."""
+        """N rows at the origin, unit mass and health, level."""
         floats = np.zeros((N_FLOATS, n))
         for name in ("health", "radius", "mass"):
             floats[_OFFSETS[name]] = 1.0
@@ -132,7 +166,9 @@ class Bodies:
         """Row of each (world, id), (m,); -1 for id 0 and for those that are gone."""
         _, _, id_row, id_start = self.layout()
         rows = np.empty(len(ids), np.int64)
-        kernels.find_rows(np.ascontiguousarray(world, np.int64), np.ascontiguousarray(ids, np.int64), id_row, id_start, rows)
+        kernels.find_rows(
+            np.ascontiguousarray(world, np.int64), np.ascontiguousarray(ids, np.int64), id_row, id_start, rows
+        )
         return rows
 
     def index(self, reach: float | np.ndarray) -> Index:
@@ -185,7 +221,9 @@ class Bodies:
 
     def usual_reach(self) -> float:
         """A reach for searches that need none: of an index that is up to date, else all, else one that suits the density [m]."""
-        known = [k for k, kept in self._laid_out.items() if isinstance(k, float) and kept.version == self.version]
+        known = [
+            k for k, kept in self._laid_out.items() if isinstance(k, float) and kept.version == self.version
+        ]
         if known:
             return max(known)
         if self.n <= BRUTE * self.n_worlds:
@@ -221,4 +259,6 @@ class BodyView:
         if name in DERIVED:
             return read_only(self._bodies.derived(name))
         allowed = [*FLOATS, *INTS, *DERIVED]
-        raise AttributeError(f"bodies have no column {name!r}{nearest_name(name, allowed)}; {listed(allowed)}")
+        raise AttributeError(
+            f"bodies have no column {name!r}{nearest_name(name, allowed)}; {listed(allowed)}"
+        )

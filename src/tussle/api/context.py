@@ -59,7 +59,9 @@ class Context:
         if self._pool is None:
             self._pool = ThreadPoolExecutor(self.threads)
         edges = [n * i // self.threads for i in range(self.threads + 1)]
-        for done in [self._pool.submit(run, a, b) for a, b in zip(edges[:-1], edges[1:], strict=True) if b > a]:
+        for done in [
+            self._pool.submit(run, a, b) for a, b in zip(edges[:-1], edges[1:], strict=True) if b > a
+        ]:
             done.result()
 
     def close(self) -> None:
@@ -76,7 +78,9 @@ class Context:
         found = own.get(name) or self.services.get(name)
         if found is None:
             allowed = sorted({*own, *self.services})
-            raise TussleError(f"nobody offers a service {name!r}{nearest_name(name, allowed)}; {listed(allowed)}")
+            raise TussleError(
+                f"nobody offers a service {name!r}{nearest_name(name, allowed)}; {listed(allowed)}"
+            )
         return found
 
 

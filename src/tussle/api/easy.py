@@ -54,10 +54,16 @@ class Other:
         if name in NUMBERS:
             return getattr(self._bodies, name)[self._row].item()
         allowed = [*VECTORS, *NUMBERS]
-        raise AttributeError(f"another entity has no {name!r}{nearest_name(name, allowed)}; {listed(allowed)}")
+        raise AttributeError(
+            f"another entity has no {name!r}{nearest_name(name, allowed)}; {listed(allowed)}"
+        )
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Other) and other._row == self._row and other._bodies._bodies is self._bodies._bodies
+        return (
+            isinstance(other, Other)
+            and other._row == self._row
+            and other._bodies._bodies is self._bodies._bodies
+        )
 
     def __hash__(self) -> int:
         return hash(self._row)
@@ -74,7 +80,9 @@ class Me:
 
     __slots__ = ("_g", "_heard", "_plugin", "_row")
 
-    def __init__(self, plugin: EasyAutonomy, g: GroupView, row: int, heard: dict[str, tuple[np.ndarray, Any]]) -> None:
+    def __init__(
+        self, plugin: EasyAutonomy, g: GroupView, row: int, heard: dict[str, tuple[np.ndarray, Any]]
+    ) -> None:
         set_ = object.__setattr__
         set_(self, "_plugin", plugin)
         set_(self, "_g", g)
@@ -124,13 +132,19 @@ class Me:
         plugin, g, row = self._plugin, self._g, self._row
         column = plugin.columns.get(name)
         if isinstance(column, EntityRef):
-            plugin.__dict__[name][row] = 0 if value is None else value.id if isinstance(value, Other) else int(value)
+            plugin.__dict__[name][row] = (
+                0 if value is None else value.id if isinstance(value, Other) else int(value)
+            )
         elif isinstance(column, (State, Output)):
             plugin.__dict__[name][..., row] = value
         elif column is not None:
-            raise AttributeError(f"me.{name} is read-only: it is a {type(column).__name__} of {type(plugin).__name__}")
+            raise AttributeError(
+                f"me.{name} is read-only: it is a {type(column).__name__} of {type(plugin).__name__}"
+            )
         elif name in VECTORS or name in NUMBERS or name in ("t", "dt"):
-            raise AttributeError(f"me.{name} is read-only: an autonomy decides, its motion model moves {g.who(row)}")
+            raise AttributeError(
+                f"me.{name} is read-only: an autonomy decides, its motion model moves {g.who(row)}"
+            )
         else:
             setattr(plugin, name, value)  # refused there, with the sentence on columns
 
@@ -153,7 +167,9 @@ class Me:
         publisher = self._plugin.__dict__.get(topic)
         if not isinstance(self._plugin.columns.get(topic), Publish):
             topics = [k for k, c in self._plugin.columns.items() if isinstance(c, Publish)]
-            raise AttributeError(f"{type(self._plugin).__name__} publishes no {topic!r}{nearest_name(topic, topics)}; {listed(topics)}")
+            raise AttributeError(
+                f"{type(self._plugin).__name__} publishes no {topic!r}{nearest_name(topic, topics)}; {listed(topics)}"
+            )
         values = {k: v.id if isinstance(v, Other) else v for k, v in fields.items()}
         assert publisher is not None
         publisher.publish([self._row], **values)

@@ -12,7 +12,15 @@ from tussle.api import kernels
 from tussle.api.bodies import DERIVED, FLOATS, INTS, Bodies, BodyView, Kept, derive, read_only
 from tussle.api.context import Context, stream
 from tussle.api.draw import Draw
-from tussle.api.pairs import Nearest, Pairs, any_index, find_near_rows, find_nearest, find_nearest_row, find_pairs
+from tussle.api.pairs import (
+    Nearest,
+    Pairs,
+    any_index,
+    find_near_rows,
+    find_nearest,
+    find_nearest_row,
+    find_pairs,
+)
 from tussle.errors import listed, nearest_name
 from tussle.neighbors.index import Index
 from tussle.scene import Scene
@@ -61,7 +69,9 @@ class GroupView:
     def __getattr__(self, name: str) -> Any:
         if name in FLOATS or name in INTS:
             own = self.belief.get(name)
-            array = read_only(getattr(self._bodies, name)[..., self.first : self.last] if own is None else own)
+            array = read_only(
+                getattr(self._bodies, name)[..., self.first : self.last] if own is None else own
+            )
             self.__dict__[name] = array
             return array
         if name == "_seeds":
@@ -203,21 +213,26 @@ class GroupView:
 
     def uniform(self, label: str, k: int | None = None) -> np.ndarray:
         """Uniform draws in [0, 1), (n,) or (k, n): the same for an entity whatever else there is in the world."""
-        out = rng.uniform(self._seeds, self._stream(label), self.place_in_block, self.step_count, self.substep, k or 1)
+        out = rng.uniform(
+            self._seeds, self._stream(label), self.place_in_block, self.step_count, self.substep, k or 1
+        )
         return out if k is not None else out[0]
 
     def normal(self, label: str, k: int | None = None) -> np.ndarray:
         """Standard normal draws, (n,) or (k, n)."""
-        out = rng.normal(self._seeds, self._stream(label), self.place_in_block, self.step_count, self.substep, k or 1)
+        out = rng.normal(
+            self._seeds, self._stream(label), self.place_in_block, self.step_count, self.substep, k or 1
+        )
         return out if k is not None else out[0]
 
     def normal_pairs(self, label: str, row: np.ndarray, other_id: np.ndarray, k: int) -> np.ndarray:
         """Standard normal draws of pairs, (k, m): keyed by the row's entity and the other's id."""
         seeds = self._seeds[row] ^ (other_id.astype(np.uint64) * GOLDEN)
-        return rng.normal(seeds, self._stream(label), self.place_in_block[row], self.step_count[row], self.substep, k)
+        return rng.normal(
+            seeds, self._stream(label), self.place_in_block[row], self.step_count[row], self.substep, k
+        )
 
     def call(self, service: str, *args: Any, **kwargs: Any) -> Any:
         """Call a service of the entity's plugins (its first argument is this view), or of the world's."""
         function = self.context.find_service(service, self.services)
         return function(self, *args, **kwargs) if service in self.services else function(*args, **kwargs)
-

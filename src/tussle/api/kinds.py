@@ -51,7 +51,8 @@ class Controller(EntityPlugin):
 
 class Sensor(EntityPlugin):
     """Measures after motion; writes channels for autonomies, and with outputs `belief_pos`, `belief_vel`, `belief_quat` the
-    state that the entity believes itself in; abstract."""
+    state that the entity believes itself in; abstract.
+    """
 
     kind = "sensor"
 

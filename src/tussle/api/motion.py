@@ -83,7 +83,9 @@ class MotionModel(EntityPlugin):
             return
         states = [c for c in cls.states().values() if c.fields]
         if len(states) != 1:
-            raise DeclarationError(f"{cls.__name__} declares {len(states)} states with fields; a motion model has one, such as x = State('east north')")
+            raise DeclarationError(
+                f"{cls.__name__} declares {len(states)} states with fields; a motion model has one, such as x = State('east north')"
+            )
         if cls.derivative is not None:
             allowed = [*states[0].fields, *cls._input_names(), *cls._param_names(), *BODY_INPUTS]
             for name in inspect.signature(cls.derivative).parameters:
@@ -92,6 +94,7 @@ class MotionModel(EntityPlugin):
                         f"{cls.__name__}.derivative has an argument {name!r}{nearest_name(name, allowed)} that is no state, input, "
                         f"parameter or force; {listed(allowed)}"
                     )
+
     @classmethod
     def state(cls) -> State:
         """Declaration of the state vector."""
@@ -130,7 +133,10 @@ class MotionModel(EntityPlugin):
         if self.advance is not None:
             return type(self).advance
         f = compile_derivative(
-            type(self).derivative, list(self.state().fields), [*self.input_channels(), *self.body_inputs()], self._param_names()
+            type(self).derivative,
+            list(self.state().fields),
+            [*self.input_channels(), *self.body_inputs()],
+            self._param_names(),
         )
         return lambda x, u, p, dt, substeps: rk4(f, x, u, p, dt, substeps)
 
@@ -146,7 +152,9 @@ class MotionModel(EntityPlugin):
 
     # -- planning -----------------------------------------------------------------------------------------------------------
 
-    def rollout(self, x0: Any, inputs: Any, dt: float, substeps: int = 1, params: Mapping[str, Any] | None = None) -> np.ndarray:
+    def rollout(
+        self, x0: Any, inputs: Any, dt: float, substeps: int = 1, params: Mapping[str, Any] | None = None
+    ) -> np.ndarray:
         """States along a path, by the very function that flies the model: bit for bit what the engine computes.
 
         Call it on a plugin as data (`Unicycle(vel_max=20).rollout(...)`); nothing in any simulation changes.
@@ -171,14 +179,21 @@ class MotionModel(EntityPlugin):
         u = np.asarray(inputs, float)
         u = u[..., None] if u.ndim == 2 else u
         n, names = x.shape[1], [*self.input_channels(), *self.body_inputs()]
-        if x.shape[0] != len(self.state().fields) or u.ndim != 3 or u.shape[1] != len(names) or u.shape[2] not in (1, n):
+        if (
+            x.shape[0] != len(self.state().fields)
+            or u.ndim != 3
+            or u.shape[1] != len(names)
+            or u.shape[2] not in (1, n)
+        ):
             raise ParameterError(
                 f"{type(self).__name__}.rollout: x0 is {np.shape(x0)} and inputs {np.shape(inputs)}; needed are "
                 f"({len(self.state().fields)}, n) for {', '.join(self.state().fields)} and (T, {len(names)}) for {', '.join(names)}"
             )
         for key in params or {}:
             if key not in self.row_params():
-                raise ParameterError(f"{type(self).__name__} has no parameter {key!r}{nearest_name(key, self.row_params())}; {listed(self.row_params())}")
+                raise ParameterError(
+                    f"{type(self).__name__} has no parameter {key!r}{nearest_name(key, self.row_params())}; {listed(self.row_params())}"
+                )
         rows = []
         for key, column in self.row_params().items():
             value = np.asarray((params or {}).get(key, own[key]), float)

@@ -43,7 +43,9 @@ class Pairs:
     def _each(self, reduce: Any, values: Any, *rest: Any) -> np.ndarray:
         values = np.asarray(values, float)
         if values.shape[-1:] != self.row.shape:
-            raise ParameterError(f"values of pairs have shape {values.shape}; the last axis needs the {len(self.row)} pairs")
+            raise ParameterError(
+                f"values of pairs have shape {values.shape}; the last axis needs the {len(self.row)} pairs"
+            )
         out = np.zeros((*values.shape[:-1], len(self.count)))
         k = int(np.prod(values.shape[:-1]))  # in so many words: without pairs, -1 would mean nothing
         flat = np.ascontiguousarray(values.reshape(k, len(self.row)))
@@ -87,13 +89,19 @@ def find_pairs(g: GroupView, radius: float | np.ndarray, teams: str | int | None
     """See `GroupView.near`."""
     index = g.index(radius)
     x, y, z = g.pos
-    reach = np.full(g.n, radius) if not isinstance(radius, np.ndarray) else np.ascontiguousarray(radius, float)
+    reach = (
+        np.full(g.n, radius) if not isinstance(radius, np.ndarray) else np.ascontiguousarray(radius, float)
+    )
     found = queries.pairs(index, g.first, g.last, x, y, z, reach, g.bodies.team, _checked(teams))
     return Pairs(found, g)
 
 
 def _checked(teams: Any) -> Any:
-    if teams is None or (isinstance(teams, (int, np.integer)) and not isinstance(teams, bool)) or teams in ("own", "other"):
+    if (
+        teams is None
+        or (isinstance(teams, (int, np.integer)) and not isinstance(teams, bool))
+        or teams in ("own", "other")
+    ):
         return int(teams) if isinstance(teams, np.integer) else teams
     raise ParameterError(f"teams = {teams!r} is not allowed; it is 'own', 'other', a team number or None")
 

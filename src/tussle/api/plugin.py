@@ -8,7 +8,19 @@ from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 
-from tussle.columns import Channel, Children, Column, EntityRef, Handle, Input, Output, Param, Ragged, State, Topic
+from tussle.columns import (
+    Channel,
+    Children,
+    Column,
+    EntityRef,
+    Handle,
+    Input,
+    Output,
+    Param,
+    Ragged,
+    State,
+    Topic,
+)
 from tussle.errors import DeclarationError, ParameterError, listed, nearest_name
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -53,27 +65,43 @@ class Plugin:
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
-        cls.columns = {k: c for base in reversed(cls.__mro__) for k, c in vars(base).items() if isinstance(c, Column)}
-        cls.services = tuple(sorted(k for k in dir(cls) if getattr(getattr(cls, k, None), "is_service", False)))
+        cls.columns = {
+            k: c for base in reversed(cls.__mro__) for k, c in vars(base).items() if isinstance(c, Column)
+        }
+        cls.services = tuple(
+            sorted(k for k in dir(cls) if getattr(getattr(cls, k, None), "is_service", False))
+        )
         if cls.grade not in GRADES:
             raise DeclarationError(f"{cls.__name__}.grade is {cls.grade!r}; it is one of {', '.join(GRADES)}")
         for name, column in cls.columns.items():
             if name in RESERVED or name.startswith("_"):
-                raise DeclarationError(f"{cls.__name__}.{name}: the name is reserved; choose another for this {type(column).__name__}")
-        params = [inspect.Parameter(k, inspect.Parameter.KEYWORD_ONLY, default=c.default) for k, c in cls.params().items()]
-        params += [inspect.Parameter(k, inspect.Parameter.KEYWORD_ONLY, default=()) for k, c in cls.children().items()]
+                raise DeclarationError(
+                    f"{cls.__name__}.{name}: the name is reserved; choose another for this {type(column).__name__}"
+                )
+        params = [
+            inspect.Parameter(k, inspect.Parameter.KEYWORD_ONLY, default=c.default)
+            for k, c in cls.params().items()
+        ]
+        params += [
+            inspect.Parameter(k, inspect.Parameter.KEYWORD_ONLY, default=())
+            for k, c in cls.children().items()
+        ]
         params += [inspect.Parameter(k, inspect.Parameter.KEYWORD_ONLY, default=None) for k in RESERVED]
         cls.__signature__ = inspect.Signature(params)  # type: ignore[attr-defined]
 
     def __init__(self, *, name: str | None = None, rate: float | None = None, **values: Any) -> None:
         cls = type(self)
         if rate is not None and not rate > 0.0:
-            raise ParameterError(f"{cls.__name__}: rate = {rate!r} is not allowed; it takes a number of calls per second > 0, or None")
+            raise ParameterError(
+                f"{cls.__name__}: rate = {rate!r} is not allowed; it takes a number of calls per second > 0, or None"
+            )
         params, children = cls.params(), cls.children()
         for key in values:
             if key not in params and key not in children:
                 allowed = [*params, *children, *RESERVED]
-                raise ParameterError(f"{cls.__name__} has no parameter {key!r}{nearest_name(key, allowed)}; {listed(allowed)}")
+                raise ParameterError(
+                    f"{cls.__name__} has no parameter {key!r}{nearest_name(key, allowed)}; {listed(allowed)}"
+                )
         resolved = {k: c.convert(values[k]) if k in values else c.default for k, c in params.items()}
         for key, child in children.items():
             resolved[key] = tuple(values.get(key, ()))
@@ -138,7 +166,12 @@ class Plugin:
 
     def replace(self, **values: Any) -> Self:
         """A copy with other parameters."""
-        merged = {**self.values, "name": self.__dict__["instance_name"], "rate": self.__dict__["rate"], **values}
+        merged = {
+            **self.values,
+            "name": self.__dict__["instance_name"],
+            "rate": self.__dict__["rate"],
+            **values,
+        }
         return type(self)(**merged)
 
     def structure(self) -> tuple[Any, ...]:
@@ -162,7 +195,9 @@ class Plugin:
 
     def __repr__(self) -> str:
         own = self.__dict__
-        parts = [f"{k}={own['_values'][k]!r}" for k, c in self.params().items() if own["_values"][k] != c.default]
+        parts = [
+            f"{k}={own['_values'][k]!r}" for k, c in self.params().items() if own["_values"][k] != c.default
+        ]
         parts += [f"{k}={list(own['_values'][k])!r}" for k in self.children() if own["_values"][k]]
         if own["instance_name"] != type(self).__name__:
             parts.append(f"name={own['instance_name']!r}")
@@ -182,11 +217,19 @@ class Plugin:
         cls = type(self)
         if name in cls.columns:
             if not self.__dict__.get("is_bound"):
-                raise ParameterError(f"{cls.__name__}.{name} cannot be changed: a plugin is a value; make another with .replace({name}=...)")
+                raise ParameterError(
+                    f"{cls.__name__}.{name} cannot be changed: a plugin is a value; make another with .replace({name}=...)"
+                )
             array = self.__dict__.get(name)
-            if isinstance(array, np.ndarray) and isinstance(value, np.ndarray) and np.shares_memory(array, value):
+            if (
+                isinstance(array, np.ndarray)
+                and isinstance(value, np.ndarray)
+                and np.shares_memory(array, value)
+            ):
                 return  # `self.x += 1` has already written into the column when Python assigns the result.
-            raise AttributeError(f"{cls.__name__}.{name} is a column: write into it with self.{name}[:] = value")
+            raise AttributeError(
+                f"{cls.__name__}.{name} is a column: write into it with self.{name}[:] = value"
+            )
         raise AttributeError(
             f"{cls.__name__}.{name} is not declared{nearest_name(name, cls.columns)}: one plugin object serves all entities, so memory "
             f"goes into a column: {name} = State(...) on the class, then self.{name}[:] = value (or me.{name} = value in easy mode)"
@@ -209,7 +252,9 @@ class Plugin:
         """
         from tussle.errors import SnapshotError
 
-        raise SnapshotError(f"{type(self).__name__} holds objects outside the arrays and cannot save them, so no snapshot can be taken")
+        raise SnapshotError(
+            f"{type(self).__name__} holds objects outside the arrays and cannot save them, so no snapshot can be taken"
+        )
 
     def load_one(self, row: Any, state: Any) -> Any:
         """An object like the one that was saved; the counterpart of `save_one`."""

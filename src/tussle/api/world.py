@@ -99,7 +99,12 @@ class WorldView(GroupView):
             self.deaths.append((rows, why))
 
     def move(
-        self, rows: Any, *, pos: np.ndarray | None = None, vel: np.ndarray | None = None, quat: np.ndarray | None = None
+        self,
+        rows: Any,
+        *,
+        pos: np.ndarray | None = None,
+        vel: np.ndarray | None = None,
+        quat: np.ndarray | None = None,
     ) -> None:
         """Put entities elsewhere: pos [m], vel [m/s], (3, m), quat, (4, m); their motion models take it over."""
         rows = self._rows(rows)
@@ -110,7 +115,9 @@ class WorldView(GroupView):
                 value = np.asarray(value, float)
                 value = value[:, None] if value.ndim == 1 else value
                 if value.shape[0] != k or value.shape[1] not in (1, len(rows)):
-                    raise ParameterError(f"w.move: {name} has shape {value.shape}; needed is ({k}, {len(rows)})")
+                    raise ParameterError(
+                        f"w.move: {name} has shape {value.shape}; needed is ({k}, {len(rows)})"
+                    )
                 getattr(self._bodies, name)[:, rows] = value
         for row in rows:
             self._bodies.touch(int(row), int(row) + 1)
@@ -125,12 +132,16 @@ class WorldView(GroupView):
             **where: pos, vel (3, m), quat (4, m), team (m,); what is missing is the block's.
         """
         if block not in self.templates:
-            raise MissionError(f"w.spawn: there is no block {block!r}{nearest_name(block, self.templates)}; {listed(self.templates)}")
+            raise MissionError(
+                f"w.spawn: there is no block {block!r}{nearest_name(block, self.templates)}; {listed(self.templates)}"
+            )
         world = np.atleast_1d(np.asarray(world, np.int64))
         full = {name: self._per_birth(name, value, len(world)) for name, value in where.items()}
         kept = self._spoken_for(world)
         if len(kept):
-            self.births.append({"block": block, "world": world[kept], **{k: v[..., kept] for k, v in full.items()}})
+            self.births.append(
+                {"block": block, "world": world[kept], **{k: v[..., kept] for k, v in full.items()}}
+            )
 
     def _per_birth(self, name: str, value: Any, m: int) -> np.ndarray:
         allowed = {"pos": (3,), "vel": (3,), "quat": (4,), "team": ()}
@@ -143,7 +154,9 @@ class WorldView(GroupView):
         except ValueError:
             raise ParameterError(f"w.spawn: {name} has shape {np.shape(value)}; needed is {shape}") from None
         if name == "team" and not np.isin(values, self.teams).all():
-            raise ParameterError(f"w.spawn: team = {value!r} is not allowed; teams of the mission are {', '.join(map(str, self.teams))}")
+            raise ParameterError(
+                f"w.spawn: team = {value!r} is not allowed; teams of the mission are {', '.join(map(str, self.teams))}"
+            )
         return values
 
     def _spoken_for(self, world: np.ndarray) -> np.ndarray:
@@ -163,13 +176,17 @@ class WorldView(GroupView):
             return Batch.empty(type_)
         return topics[0].outbox() if len(topics) == 1 else Batch.concatenate([t.outbox() for t in topics])
 
-    def publish(self, type_: type[Message], world: Any, network: str = "GlobalNetwork", **fields: Any) -> None:
+    def publish(
+        self, type_: type[Message], world: Any, network: str = "GlobalNetwork", **fields: Any
+    ) -> None:
         """Send one message per item of `world` in the name of the world (sender 0)."""
         world = np.atleast_1d(np.asarray(world, np.int64))
         if len(world):
             assert self.publish_to is not None
             batch = Batch.make(type_, world, np.zeros(len(world), np.int64), fields)
-            self.publish_to(type_, network).add(batch if self.only is None else batch.take(self._spoken_for(world)))
+            self.publish_to(type_, network).add(
+                batch if self.only is None else batch.take(self._spoken_for(world))
+            )
 
     # -- chance and services ------------------------------------------------------------------------------------------------
 
@@ -183,10 +200,14 @@ class WorldView(GroupView):
 
     def _draws(self, law: Callable[..., np.ndarray], label: str, k: int | None) -> np.ndarray:
         clock = self.context.clock
-        out = law(self.context.seeds, self._stream(label), np.zeros(self.n_worlds, np.int64), clock.step, 0, k or 1)
+        out = law(
+            self.context.seeds, self._stream(label), np.zeros(self.n_worlds, np.int64), clock.step, 0, k or 1
+        )
         return out if k is not None else out[0]
 
-    def uniform_pairs(self, label: str, world: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    def uniform_pairs(
+        self, label: str, world: np.ndarray, first: np.ndarray, second: np.ndarray
+    ) -> np.ndarray:
         """Uniform draws in [0, 1), one per (world, first, second), (m,): keyed by these numbers, not by their place."""
         seeds = self.context.seeds[world] ^ (first.astype(np.uint64) * GOLDEN)
         draws = rng.uniform(seeds, self._stream(label), second, self.context.clock.step[world], 0, 1)

@@ -130,7 +130,11 @@ class Inbox:
     @property
     def messages(self) -> Batch:
         """All messages that arrived, without regard to who hears them."""
-        return Batch.concatenate([p.batch for p in self.parcels]) if self.parcels else Batch.empty(self.topic.type)
+        return (
+            Batch.concatenate([p.batch for p in self.parcels])
+            if self.parcels
+            else Batch.empty(self.topic.type)
+        )
 
     def pairs(self) -> tuple[np.ndarray, Batch]:
         """(row, messages): one item per receiving row and message, ordered by row, then arrival, then sender; row numbers are the group's own."""

@@ -43,14 +43,19 @@ def park(sim: Simulation, world: int) -> Parked:
     for number, group in enumerate(sim.population.groups):
         mine = np.flatnonzero((rows >= group.first) & (rows < group.last))
         if len(mine):
-            tables[number] = (mine, {d: a[:, rows[mine] - group.first] for d, a in group.table.arrays.items()})
+            tables[number] = (
+                mine,
+                {d: a[:, rows[mine] - group.first] for d, a in group.table.arrays.items()},
+            )
     return Parked(Bodies(bodies.floats[:, rows].copy(), bodies.ints[:, rows].copy(), bodies.n_worlds), tables)
 
 
 # -- columns by path ------------------------------------------------------------------------------------------------------------
 
 
-def _sources(sim: Simulation) -> Iterator[tuple[Bodies, list[tuple[Group, np.ndarray, dict[type, np.ndarray]]]]]:
+def _sources(
+    sim: Simulation,
+) -> Iterator[tuple[Bodies, list[tuple[Group, np.ndarray, dict[type, np.ndarray]]]]]:
     """Body tables with the rows of each group: the live one, then the worlds that have ended."""
     groups = sim.population.groups
     yield sim.population.bodies, [(g, np.arange(g.first, g.last), g.table.arrays) for g in groups]
@@ -69,22 +74,30 @@ def _parse(sim: Simulation, path: str) -> tuple[int, tuple[str, ...], str]:
     blocks = sim.context.block_names
     if head not in blocks or not names:
         allowed = [*blocks, *(r.spec.instance_name for r in sim.referees)]
-        raise ParameterError(f"{path!r}: there is no column by this path{nearest_name(head, allowed)}; paths begin with: {', '.join(allowed)}")
+        raise ParameterError(
+            f"{path!r}: there is no column by this path{nearest_name(head, allowed)}; paths begin with: {', '.join(allowed)}"
+        )
     number = blocks.index(head)
     *plugins, column = names
     if not plugins:
         allowed = [*FLOATS, *INTS, *DERIVED]
         if column not in allowed:
-            raise ParameterError(f"{path!r}: bodies have no column {column!r}{nearest_name(column, allowed)}; {listed(allowed)}")
+            raise ParameterError(
+                f"{path!r}: bodies have no column {column!r}{nearest_name(column, allowed)}; {listed(allowed)}"
+            )
         return number, (), column
     key = tuple(plugins)
     found = [b for g in sim.population.groups for b in g.walk() if g.block.name == head or b.path == key]
     known = {".".join(b.path) for b in found}
     matching = [b for b in found if b.path == key]
     if not matching:
-        raise ParameterError(f"{path!r}: {head} has no plugin {'.'.join(key)!r}{nearest_name('.'.join(key), known)}; {listed(sorted(known))}")
+        raise ParameterError(
+            f"{path!r}: {head} has no plugin {'.'.join(key)!r}{nearest_name('.'.join(key), known)}; {listed(sorted(known))}"
+        )
     if column not in matching[0].places:
-        raise ParameterError(f"{path!r}: {key[-1]} has no column {column!r}{nearest_name(column, matching[0].places)}; {listed(matching[0].places)}")
+        raise ParameterError(
+            f"{path!r}: {key[-1]} has no column {column!r}{nearest_name(column, matching[0].places)}; {listed(matching[0].places)}"
+        )
     return number, key, column
 
 
@@ -118,7 +131,9 @@ def read(sim: Simulation, path: str) -> tuple[np.ndarray, np.ndarray]:
             else:
                 place = binding.places[column]
                 data = arrays[place.dtype]
-                values = (data[place.first : place.first + place.k] if place.k else data[place.first])[..., mine]
+                values = (data[place.first : place.first + place.k] if place.k else data[place.first])[
+                    ..., mine
+                ]
             if out is None:
                 out = np.zeros((sim.n_worlds, n_agents, *values.shape[:-1]), values.dtype)
             at = bodies.world[rows[mine]], bodies.place_in_block[rows[mine]]
@@ -132,10 +147,14 @@ def _world_column(sim: Simulation, path: str) -> np.ndarray | None:
     for referee in sim.referees:
         if referee.spec.instance_name == head and head not in sim.context.block_names:
             if column not in referee.places:
-                raise ParameterError(f"{path!r}: {head} has no column {column!r}{nearest_name(column, referee.places)}; {listed(referee.places)}")
+                raise ParameterError(
+                    f"{path!r}: {head} has no column {column!r}{nearest_name(column, referee.places)}; {listed(referee.places)}"
+                )
             per, place = referee.places[column]
             if per == "entity":
-                raise ParameterError(f"{path!r}: a column per entity of a world plugin has no fixed shape and cannot be read")
+                raise ParameterError(
+                    f"{path!r}: a column per entity of a world plugin has no fixed shape and cannot be read"
+                )
             return referee.tables[per].array(place)
     return None
 
@@ -162,7 +181,9 @@ def write(sim: Simulation, path: str, values: Any) -> None:
         try:
             given = np.broadcast_to(np.asarray(values), shape)
         except ValueError:
-            raise ParameterError(f"{path!r}: values have shape {np.shape(values)}; needed is {shape}") from None
+            raise ParameterError(
+                f"{path!r}: values have shape {np.shape(values)}; needed is {shape}"
+            ) from None
         part = np.moveaxis(given[bodies.world[rows[mine]], bodies.place_in_block[rows[mine]]], 0, -1)
         _check_written(path, part, None if binding is None else type(binding.spec).columns[column])
         if binding is None:
@@ -216,7 +237,12 @@ def snapshot(sim: Simulation) -> Snapshot:
         "failed": sim.failed.copy(),
         "results": list(sim.results),
         "parked": dict(sim.parked),
-        "births": [births.next_id.copy(), births.n_born.copy(), births.n_left.copy(), [a.copy() for a in births.next_time]],
+        "births": [
+            births.next_id.copy(),
+            births.n_born.copy(),
+            births.n_left.copy(),
+            [a.copy() for a in births.next_time],
+        ],
         "referees": [r.copy() for r in sim.referees],
         "mail": sim.mail.save(),
         "wishes": list(sim.world_view.births),
@@ -236,15 +262,21 @@ def _save_handles(binding: Binding) -> dict[str, list[bytes]]:
 def restore(sim: Simulation, saved: Snapshot) -> None:
     """See `Simulation.restore`."""
     if saved.mission != sim.mission or len(saved.seeds) != sim.n_worlds:
-        raise SnapshotError(f"the snapshot is of a stack of {len(saved.seeds)} worlds of {saved.mission.name or 'another mission'!r}, not of this simulation")
+        raise SnapshotError(
+            f"the snapshot is of a stack of {len(saved.seeds)} worlds of {saved.mission.name or 'another mission'!r}, not of this simulation"
+        )
     population, births, world = sim.population, sim.births, saved.world
     if len(saved.groups) > len(population.groups):
-        raise SnapshotError("the snapshot has entities of blocks that this simulation has never had; restore it into the simulation it was taken from")
+        raise SnapshotError(
+            "the snapshot has entities of blocks that this simulation has never had; restore it into the simulation it was taken from"
+        )
     sim.context.seeds[:] = saved.seeds
     population.close_handles()
     population.bodies.replace(world["floats"].copy(), world["ints"].copy())
     for number, group in enumerate(population.groups):
-        first, arrays, ragged, outside = saved.groups[number] if number < len(saved.groups) else _no_rows(group, population.bodies.n)
+        first, arrays, ragged, outside = (
+            saved.groups[number] if number < len(saved.groups) else _no_rows(group, population.bodies.n)
+        )
         group.table.restore(arrays)
         for binding, lists in zip(group.walk(), ragged, strict=True):
             binding.ragged = {k: c.take(np.arange(len(c))) for k, c in lists.items()}
@@ -268,7 +300,12 @@ def restore(sim: Simulation, saved: Snapshot) -> None:
 def _no_rows(group: Group, first: int) -> tuple[Any, ...]:
     empty = {d: a[:, :0] for d, a in group.table.arrays.items()}
     none = np.zeros(0, np.int64)
-    return first, empty, [{k: c.take(none) for k, c in b.ragged.items()} for b in group.walk()], [dict.fromkeys(b.handles, []) for b in group.walk()]
+    return (
+        first,
+        empty,
+        [{k: c.take(none) for k, c in b.ragged.items()} for b in group.walk()],
+        [dict.fromkeys(b.handles, []) for b in group.walk()],
+    )
 
 
 def _load_handles(sim: Simulation, group: Group, outside: list[dict[str, list[bytes]]]) -> None:
@@ -293,7 +330,12 @@ def _hashed(sim: Simulation, world: int) -> Iterator[tuple[str, Any]]:
     members, world_start, _, _ = bodies.layout()
     rows = members[world_start[world] : world_start[world + 1]]
     yield "step", sim.context.clock.step[world : world + 1]
-    yield "births", np.concatenate([sim.births.next_id[world : world + 1], sim.births.n_born[:, world], sim.births.n_left[:, world]])
+    yield (
+        "births",
+        np.concatenate(
+            [sim.births.next_id[world : world + 1], sim.births.n_born[:, world], sim.births.n_left[:, world]]
+        ),
+    )
     for name in HASHED:
         yield name, getattr(bodies, name)[..., rows]
     parts = []
@@ -308,14 +350,19 @@ def _hashed(sim: Simulation, world: int) -> Iterator[tuple[str, Any]]:
         for name, column in type(referee.spec).states().items():
             per, place = referee.places[name]
             array = referee.tables[per].array(place)
-            yield f"{referee.spec.instance_name}.{name}", array[..., rows if per == "entity" else slice(world, world + 1)]
+            yield (
+                f"{referee.spec.instance_name}.{name}",
+                array[..., rows if per == "entity" else slice(world, world + 1)],
+            )
     for part in sim.mail.columns(world):
         yield "mail", part
 
 
 def _hashed_columns(group: Group, binding: Binding, rows: np.ndarray) -> Iterator[tuple[str, Any]]:
     for name, column in type(binding.spec).columns.items():
-        is_memory = isinstance(column, (State, EntityRef)) or (isinstance(column, Output) and name in binding.plugin.wired)
+        is_memory = isinstance(column, (State, EntityRef)) or (
+            isinstance(column, Output) and name in binding.plugin.wired
+        )
         label = ".".join((*binding.path, name))
         if is_memory:
             yield label, group.table.array(binding.places[name])[..., rows]
@@ -351,5 +398,9 @@ def _of_world(sim: Simulation, values: Mapping[str, np.ndarray], world: int) -> 
     for name, array in values.items():
         array = np.asarray(array)
         item = array[..., world]
-        out[name] = {int(t): v.item() for t, v in zip(sim.context.teams, item, strict=True)} if item.ndim else item.item()
+        out[name] = (
+            {int(t): v.item() for t, v in zip(sim.context.teams, item, strict=True)}
+            if item.ndim
+            else item.item()
+        )
     return out

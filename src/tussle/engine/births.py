@@ -51,7 +51,17 @@ class Newborn:
         order = np.lexsort((ids, world))
         take = lambda name: np.concatenate([getattr(p, name) for p in parts], axis=-1)[..., order]  # noqa: E731
         values = {k: np.concatenate([p.values[k] for p in parts])[order] for k in parts[0].values}
-        return cls(world[order], take("block"), take("place"), ids[order], take("team"), take("pos"), take("vel"), take("quat"), values)
+        return cls(
+            world[order],
+            take("block"),
+            take("place"),
+            ids[order],
+            take("team"),
+            take("pos"),
+            take("vel"),
+            take("quat"),
+            values,
+        )
 
 
 class Births:
@@ -73,7 +83,9 @@ class Births:
         self.next_id = np.ones(n_worlds, np.int64)
         self.n_born = np.zeros((n_blocks, n_worlds), np.int64)
         self.n_left = np.zeros((n_blocks, n_worlds), np.int64)
-        self.next_time = [np.full((n_worlds, b.slots if b.rate else 0), np.inf) for b in overrides.mission.blocks]
+        self.next_time = [
+            np.full((n_worlds, b.slots if b.rate else 0), np.inf) for b in overrides.mission.blocks
+        ]
         self.has_rates = any(b.rate for b in overrides.mission.blocks)
 
     def begin(self, worlds: np.ndarray) -> dict[int, np.ndarray]:
@@ -103,7 +115,9 @@ class Births:
                     parts.append(worlds)
                     self.n_left[i, worlds] -= 1
                     wait = 1.0 / block.rate
-                    jitter = self._normal(i, "birth", worlds, np.full(len(worlds), slot), self.n_born[i, worlds], 0, 1)[0]
+                    jitter = self._normal(
+                        i, "birth", worlds, np.full(len(worlds), slot), self.n_born[i, worlds], 0, 1
+                    )[0]
                     # From the time it was due at, not that of the step, else a rate that does not divide the steps' would lag.
                     base = np.maximum(self.next_time[i][worlds, slot], t[worlds] - self.overrides.mission.dt)
                     later = base + wait + block.interval_sd * jitter
@@ -117,11 +131,27 @@ class Births:
         return not (self.n_left[:, world] > 0).any()
 
     def _normal(
-        self, block: int, label: str, worlds: np.ndarray, index: np.ndarray, step: np.ndarray, substep: int, k: int
+        self,
+        block: int,
+        label: str,
+        worlds: np.ndarray,
+        index: np.ndarray,
+        step: np.ndarray,
+        substep: int,
+        k: int,
     ) -> np.ndarray:
-        return rng.normal(self.seeds[worlds] ^ np.uint64(self.keys[block]), stream_key("birth", label), index, step, substep, k)
+        return rng.normal(
+            self.seeds[worlds] ^ np.uint64(self.keys[block]),
+            stream_key("birth", label),
+            index,
+            step,
+            substep,
+            k,
+        )
 
-    def _scatter(self, block: int, spec: Block, worlds: np.ndarray, places: np.ndarray, attempt: int) -> np.ndarray:
+    def _scatter(
+        self, block: int, spec: Block, worlds: np.ndarray, places: np.ndarray, attempt: int
+    ) -> np.ndarray:
         """Offsets from the block's position [m], (3, m)."""
         seeds = self.seeds[worlds] ^ np.uint64(self.keys[block])
         stream, step = stream_key("birth", "position"), np.zeros(len(worlds), np.int64)
@@ -151,7 +181,9 @@ class Births:
         np.add.at(self.n_born[block], worlds, 1)
         np.add.at(self.next_id, worlds, 1)
         centre = np.array(spec.position)[:, None]
-        pos = centre + np.where((places > 0) | spec.scatter_first, self._scatter(block, spec, worlds, places, 0), 0.0)
+        pos = centre + np.where(
+            (places > 0) | spec.scatter_first, self._scatter(block, spec, worlds, places, 0), 0.0
+        )
         if "pos" in where:
             pos = np.array(where["pos"], float).reshape(3, -1) + np.zeros((3, m))
         elif rejects is not None:
@@ -173,7 +205,14 @@ class Births:
         return Newborn(worlds, np.full(m, block), places, ids, team, pos, vel, quat, values)
 
     def _separate(
-        self, block: int, spec: Block, worlds: np.ndarray, places: np.ndarray, pos: np.ndarray, rejects: Any, taken: Any
+        self,
+        block: int,
+        spec: Block,
+        worlds: np.ndarray,
+        places: np.ndarray,
+        pos: np.ndarray,
+        rejects: Any,
+        taken: Any,
     ) -> None:
         """Draw again where a referee finds a place not free; one entity after the other, as each takes up room."""
         for world in np.unique(worlds):
@@ -192,7 +231,9 @@ class Births:
                             f"give the block more room (placement {spec.placement!r}) or fewer entities"
                         )
                     one = slice(i, i + 1)
-                    pos[:, one] = np.array(spec.position)[:, None] + self._scatter(block, spec, worlds[one], places[one], attempt)
+                    pos[:, one] = np.array(spec.position)[:, None] + self._scatter(
+                        block, spec, worlds[one], places[one], attempt
+                    )
                 room[:, n] = pos[:, i]
                 n += 1
 

@@ -23,7 +23,11 @@ def _place_of(error: BaseException, plugin: Any) -> str:
     except (OSError, TypeError):
         own_file = ""
     frames = traceback.extract_tb(error.__traceback__)
-    mine = [f for f in frames if f.filename == own_file] or [f for f in frames if not f.filename.startswith(_OWN)] or list(frames)
+    mine = (
+        [f for f in frames if f.filename == own_file]
+        or [f for f in frames if not f.filename.startswith(_OWN)]
+        or list(frames)
+    )
     return f"{Path(mine[-1].filename).name}:{mine[-1].lineno}" if mine else "?"
 
 
@@ -40,10 +44,24 @@ def not_finite(group: Group, bodies: Bodies, row: int, step: int) -> PluginError
     for binding in [*group.autonomies, *group.controllers]:
         found = _not_finite_output(binding, group, i)
         if found:
-            return PluginError(f"{found} is not a finite number", where=who, step=step, world=world, plugin=binding.spec.instance_name)
-    values = ", ".join(f"{name} = {np.array2string(getattr(bodies, name)[:, row], precision=6)}" for name in ("pos", "quat"))
+            return PluginError(
+                f"{found} is not a finite number",
+                where=who,
+                step=step,
+                world=world,
+                plugin=binding.spec.instance_name,
+            )
+    values = ", ".join(
+        f"{name} = {np.array2string(getattr(bodies, name)[:, row], precision=6)}" for name in ("pos", "quat")
+    )
     motion = group.motion.spec.instance_name
-    return PluginError(f"the entity's state is not finite: {values}; all of its inputs are", where=who, step=step, world=world, plugin=motion)
+    return PluginError(
+        f"the entity's state is not finite: {values}; all of its inputs are",
+        where=who,
+        step=step,
+        world=world,
+        plugin=motion,
+    )
 
 
 def _not_finite_output(binding: Binding, group: Group, row: int) -> str:

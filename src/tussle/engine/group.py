@@ -13,7 +13,19 @@ from tussle.api.context import Context
 from tussle.api.group import GroupView
 from tussle.api.kinds import Behavior
 from tussle.api.motion import MotionBody
-from tussle.columns import Channel, EntityRef, Handle, Input, Output, Param, Publish, Ragged, RaggedColumn, State, Subscribe
+from tussle.columns import (
+    Channel,
+    EntityRef,
+    Handle,
+    Input,
+    Output,
+    Param,
+    Publish,
+    Ragged,
+    RaggedColumn,
+    State,
+    Subscribe,
+)
 from tussle.comms import Inbox, Publisher
 from tussle.engine.table import Place, Table
 from tussle.engine.wiring import BELIEF, Link, Wiring
@@ -94,7 +106,14 @@ class Group:
     """
 
     def __init__(
-        self, name: str, block: Any, context: Context, bodies: Bodies, dt: float, substeps: int, advise: Callable[..., list[str]]
+        self,
+        name: str,
+        block: Any,
+        context: Context,
+        bodies: Bodies,
+        dt: float,
+        substeps: int,
+        advise: Callable[..., list[str]],
     ) -> None:
         self.name = name
         self.block = block
@@ -166,7 +185,9 @@ class Group:
                 binding.handles[name] = []
             elif isinstance(column, (Publish, Subscribe)):
                 topic = self._topic(spec, column)
-                plugin.__dict__[name] = Publisher(topic, view) if isinstance(column, Publish) else Inbox(topic, view)
+                plugin.__dict__[name] = (
+                    Publisher(topic, view) if isinstance(column, Publish) else Inbox(topic, view)
+                )
         for name in type(spec).children():
             inner = [self._bind(child, view, binding.path) for child in spec.values[name]]
             plugin.__dict__[name] = [b.plugin for b in inner]
@@ -181,7 +202,9 @@ class Group:
         link = self.wiring.links.get((id(binding.spec), name))
         if is_child:
             if isinstance(column, Input) and not column.optional:
-                raise WiringError(f"{self.wiring.where}: {'.'.join(binding.path)}.{name} is an input, and a plugin inside another has none")
+                raise WiringError(
+                    f"{self.wiring.where}: {'.'.join(binding.path)}.{name} is an input, and a plugin inside another has none"
+                )
             link = Link(self.table.add((binding.path, name), float, len(column.fields), column.default))  # type: ignore[attr-defined]
         if link is None:  # an input or output that a structural parameter has switched off
             link = Link(self.table.add((binding.path, name), float, len(column.fields), column.default))  # type: ignore[attr-defined]
@@ -196,7 +219,12 @@ class Group:
         network = values[column.network_param] if column.network_param else column.network
         name = values[column.topic_param] if column.topic_param else column.topic
         assert self.context.topic is not None
-        return self.context.topic(network, name or column.message.__name__, column.message, f"{self.wiring.where}: {spec.instance_name}")
+        return self.context.topic(
+            network,
+            name or column.message.__name__,
+            column.message,
+            f"{self.wiring.where}: {spec.instance_name}",
+        )
 
     def _believe(self) -> None:
         """Find the sensor outputs that are the entity's belief."""
@@ -206,7 +234,9 @@ class Group:
                 place = sensor.places.get(name)
                 if place is not None and isinstance(type(sensor.spec).columns[name], Output):
                     if place.k != k:
-                        raise WiringError(f"{self.wiring.where}: {sensor.spec.instance_name}.{name} has {place.k} channels, it needs {k}")
+                        raise WiringError(
+                            f"{self.wiring.where}: {sensor.spec.instance_name}.{name} has {place.k} channels, it needs {k}"
+                        )
                     self.belief[body] = place
 
     # -- rows ---------------------------------------------------------------------------------------------------------------

@@ -60,7 +60,9 @@ class Host:
         scene: Scene | None = None,
     ) -> None:
         if n < 1 or n_others < 0 or not dt > 0.0:
-            raise ParameterError(f"Host: n = {n}, n_others = {n_others}, dt = {dt} is not allowed; n >= 1, n_others >= 0, dt > 0")
+            raise ParameterError(
+                f"Host: n = {n}, n_others = {n_others}, dt = {dt} is not allowed; n >= 1, n_others >= 0, dt > 0"
+            )
         self.has_motion = motion is not None
         block = Block(
             name="host", team=team, autonomy=autonomy, controller=controller, sensor=sensor,
@@ -68,7 +70,9 @@ class Host:
         )  # fmt: skip
         self.topics: dict[tuple[str, str], TopicBuffer] = {}
         clock = Clock(1, 0.0, dt)
-        context = Context(clock, np.array([seed], np.uint64), ["host", "others"], scene or Scene(), np.array([team]))
+        context = Context(
+            clock, np.array([seed], np.uint64), ["host", "others"], scene or Scene(), np.array([team])
+        )
         context.topic = self._topic
         self.context = context
         self.bodies = Bodies.empty(n + n_others, 1)
@@ -86,19 +90,19 @@ class Host:
     @property
     def pos(self) -> np.ndarray:
         """Positions of all rows [m], (3, n + n_others); writable, as vel, quat and team are."""
-        return self.bodies.pos  # type: ignore[no-any-return]
+        return self.bodies.pos
 
     @property
     def vel(self) -> np.ndarray:
-        return self.bodies.vel  # type: ignore[no-any-return]
+        return self.bodies.vel
 
     @property
     def quat(self) -> np.ndarray:
-        return self.bodies.quat  # type: ignore[no-any-return]
+        return self.bodies.quat
 
     @property
     def team(self) -> np.ndarray:
-        return self.bodies.team  # type: ignore[no-any-return]
+        return self.bodies.team
 
     @property
     def t(self) -> float:
@@ -155,14 +159,26 @@ class Host:
             ParameterError: Nobody writes it.
         """
         motion = self.group.motion
-        channels = {c: (k, i) for k, column in type(motion.spec).inputs().items() for i, c in enumerate(column.channels)}
+        channels = {
+            c: (k, i)
+            for k, column in type(motion.spec).inputs().items()
+            for i, c in enumerate(column.channels)
+        }
         if name not in channels:
-            raise ParameterError(f"nobody writes channel {name!r}{nearest_name(name, channels)}; {listed(channels)}")
+            raise ParameterError(
+                f"nobody writes channel {name!r}{nearest_name(name, channels)}; {listed(channels)}"
+            )
         attribute, i = channels[name]
         array = self.group.table.array(motion.places[attribute])
         return np.array(array[i] if array.ndim == 2 else array)
 
-    def deliver(self, type_: type[Message], sender: Iterable[int] = (0,), network: str = "GlobalNetwork", **fields: Any) -> None:
+    def deliver(
+        self,
+        type_: type[Message],
+        sender: Iterable[int] = (0,),
+        network: str = "GlobalNetwork",
+        **fields: Any,
+    ) -> None:
         """Hand messages to all rows that subscribe to the type, one per sender id; they read them in their next call."""
         ids = np.array(list(sender), np.int64)
         topic = self._topic(network, type_.__name__, type_, "host")

@@ -39,13 +39,17 @@ class Mail:
             WiringError: There is no such network, or the topic carries another type.
         """
         if network not in self.names:
-            raise WiringError(f"{where}: topic {name!r} is on network {network!r}{nearest_name(network, self.names)}; {listed(self.names)}")
+            raise WiringError(
+                f"{where}: topic {name!r} is on network {network!r}{nearest_name(network, self.names)}; {listed(self.names)}"
+            )
         key = (network, name)
         if key not in self.topics:
             buffer = self.topics[key] = TopicBuffer(network, name, type_)
             self.sim.world_view.by_type.setdefault(type_, []).append(buffer)
         if self.topics[key].type is not type_:
-            raise WiringError(f"{where}: topic {name!r} on {network} carries {self.topics[key].type.__name__}, not {type_.__name__}")
+            raise WiringError(
+                f"{where}: topic {name!r} on {network} carries {self.topics[key].type.__name__}, not {type_.__name__}"
+            )
         return self.topics[key]
 
     def publish_to(self, type_: type[Message], network: str) -> TopicBuffer:
@@ -71,15 +75,28 @@ class Mail:
         has_attitude = (batch.quat != 0.0).any(axis=0)
         for block in view.templates:
             for turned in (False, True):
-                index = np.array([i for i, b in enumerate(batch.block) if b == block and has_attitude[i] == turned], np.int64)
+                index = np.array(
+                    [i for i, b in enumerate(batch.block) if b == block and has_attitude[i] == turned],
+                    np.int64,
+                )
                 attitude = {"quat": batch.quat[:, index]} if turned else {}
-                view.spawn(block, batch.world[index], pos=batch.pos[:, index], vel=batch.vel[:, index], **attitude)
+                view.spawn(
+                    block, batch.world[index], pos=batch.pos[:, index], vel=batch.vel[:, index], **attitude
+                )
         for i, block in enumerate(batch.block):
             world = int(batch.world[i])
             if block not in view.templates and not self.sim.failed[world]:
-                error = MissionError(f"SpawnEntity: there is no block {block!r}{nearest_name(str(block), view.templates)}; {listed(view.templates)}")
+                error = MissionError(
+                    f"SpawnEntity: there is no block {block!r}{nearest_name(str(block), view.templates)}; {listed(view.templates)}"
+                )
                 self.sim.record_failure(
-                    world, PluginError(str(error), where=f"sent by entity {int(batch.sender[i])}", step=int(self.sim.steps[world]), world=world)
+                    world,
+                    PluginError(
+                        str(error),
+                        where=f"sent by entity {int(batch.sender[i])}",
+                        step=int(self.sim.steps[world]),
+                        world=world,
+                    ),
                 )
 
     def _post(self, topic: TopicBuffer) -> None:
@@ -105,7 +122,9 @@ class Mail:
             number, rows = to
             to = (np.asarray(number, np.int64), sim.population.bodies.id[np.asarray(rows, np.int64)])
         elif to not in (EVERYONE, SAME_ENTITY):
-            raise WiringError(f"{topic.network}.route returned {to!r}; it is EVERYONE, SAME_ENTITY or (message numbers, rows)")
+            raise WiringError(
+                f"{topic.network}.route returned {to!r}; it is EVERYONE, SAME_ENTITY or (message numbers, rows)"
+            )
         delay = network.plugin.comm_delay[batch.world]
         steps = np.array([max(0, math.ceil(d / clock.dt - 1e-9)) for d in delay], np.int64)
         topic.post(batch, to, clock.step[batch.world] + steps)
@@ -116,13 +135,18 @@ class Mail:
 
     def save(self) -> Any:
         """Queues and inboxes; parcels are never written to, so the lists are enough."""
-        return {key: (t.type, list(t.queue), [list(i.parcels) for i in t.inboxes]) for key, t in self.topics.items()}
+        return {
+            key: (t.type, list(t.queue), [list(i.parcels) for i in t.inboxes])
+            for key, t in self.topics.items()
+        }
 
     def restore(self, saved: Any) -> None:
         for (network, name), (type_, _, _) in saved.items():
             self.topic(network, name, type_, "snapshot")
         for key, topic in self.topics.items():
-            _, queue, parcels = saved.get(key, (None, [], []))  # a topic or group that came later has had nothing then
+            _, queue, parcels = saved.get(
+                key, (None, [], [])
+            )  # a topic or group that came later has had nothing then
             topic.queue = list(queue)
             topic.clear_outbox()
             for inbox, mine in zip_longest(topic.inboxes, parcels, fillvalue=()):
@@ -138,7 +162,11 @@ class Mail:
                 mine = parcel.batch.world == world
                 if mine.any():
                     part = parcel.select(mine)
-                    to = part.to.encode() if isinstance(part.to, str) else b"".join(np.ascontiguousarray(a).tobytes() for a in part.to)
+                    to = (
+                        part.to.encode()
+                        if isinstance(part.to, str)
+                        else b"".join(np.ascontiguousarray(a).tobytes() for a in part.to)
+                    )
                     found.append(b"|".join([name, to, part.due.tobytes(), *_numbers(part.batch)]))
             # What waits in inboxes counts by who will read it: how many groups a stack has is nothing to a world. Sorted, since
             # the order of groups is nothing to it either.
@@ -147,7 +175,9 @@ class Mail:
                 rows, batch = inbox.pairs()
                 mine = np.flatnonzero(batch.world == world)
                 if len(mine):
-                    waiting.append(b"|".join([name, inbox.view.id[rows[mine]].tobytes(), *_numbers(batch.take(mine))]))
+                    waiting.append(
+                        b"|".join([name, inbox.view.id[rows[mine]].tobytes(), *_numbers(batch.take(mine))])
+                    )
             found += sorted(waiting)
         return found
 

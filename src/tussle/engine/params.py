@@ -10,9 +10,16 @@ import numpy as np
 from tussle.columns import Param
 from tussle.errors import MissionError, ParameterError, listed, nearest_name
 from tussle.mission import Block, Mission
-from tussle.units import parse
 
-BLOCK_VALUES = {"heading": "rad", "climb": "rad", "roll": "rad", "speed": "m/s", "health": "", "radius": "m", "mass": "kg"}
+BLOCK_VALUES = {
+    "heading": "rad",
+    "climb": "rad",
+    "roll": "rad",
+    "speed": "m/s",
+    "health": "",
+    "radius": "m",
+    "mass": "kg",
+}
 
 
 class Overrides:
@@ -39,7 +46,11 @@ class Overrides:
         """
         for path, value in values.items():
             key, column = self._find(path)
-            many = isinstance(value, (list, np.ndarray)) and len(value) == len(worlds) and np.ndim(value) > len(column.shape)
+            many = (
+                isinstance(value, (list, np.ndarray))
+                and len(value) == len(worlds)
+                and np.ndim(value) > len(column.shape)
+            )
             items = [column.convert(v, path) for v in (value if many else [value] * len(worlds))]
             if column.structural:
                 row = self.structural.setdefault(key, [None] * self.n_worlds)
@@ -66,22 +77,30 @@ class Overrides:
             plugins, rest = {head: world[head]}, [head, *rest]
         else:
             allowed = [*self.blocks, *world]
-            raise ParameterError(f"{path!r}: there is no block or world plugin {head!r}{nearest_name(head, allowed)}; {listed(allowed)}")
+            raise ParameterError(
+                f"{path!r}: there is no block or world plugin {head!r}{nearest_name(head, allowed)}; {listed(allowed)}"
+            )
         names: list[str] = []
         while len(rest) > 1:
             name = rest.pop(0)
             if name not in plugins:
-                raise ParameterError(f"{path!r}: {head} has no plugin {name!r}{nearest_name(name, plugins)}; {listed(plugins)}")
+                raise ParameterError(
+                    f"{path!r}: {head} has no plugin {name!r}{nearest_name(name, plugins)}; {listed(plugins)}"
+                )
             names.append(name)
             plugin = plugins[name]
             plugins = {c.instance_name: c for k in type(plugin).children() for c in plugin.values[k]}
         if not names or not rest:
             allowed = [*plugins, *(BLOCK_VALUES if head in self.blocks else ())]
             missing = rest[0] if rest else ""
-            raise ParameterError(f"{path!r} names no parameter{nearest_name(missing, allowed)}; {head} has: {', '.join(allowed)}")
+            raise ParameterError(
+                f"{path!r} names no parameter{nearest_name(missing, allowed)}; {head} has: {', '.join(allowed)}"
+            )
         params = type(plugin).params()
         if rest[0] not in params:
-            raise ParameterError(f"{path!r}: {names[-1]} has no parameter {rest[0]!r}{nearest_name(rest[0], params)}; {listed(params)}")
+            raise ParameterError(
+                f"{path!r}: {names[-1]} has no parameter {rest[0]!r}{nearest_name(rest[0], params)}; {listed(params)}"
+            )
         return (head, tuple(names), rest[0]), params[rest[0]]
 
     def block_values(self, block: Block, name: str, world: np.ndarray) -> np.ndarray:
@@ -108,7 +127,9 @@ class Overrides:
             blocks = list(self.mission.blocks)
             for (owner, path, name), value in key:
                 if owner not in self.blocks:
-                    raise MissionError(f"{'.'.join(path)}.{name} is structural, so a stack of worlds shares it; set it in the mission")
+                    raise MissionError(
+                        f"{'.'.join(path)}.{name} is structural, so a stack of worlds shares it; set it in the mission"
+                    )
                 i = self.blocks[owner]
                 blocks[i] = _with_param(blocks[i], path, name, value)
             self._variants[key] = tuple(blocks)

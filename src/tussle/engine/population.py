@@ -49,7 +49,13 @@ class Population:
     """
 
     def __init__(
-        self, context: Context, overrides: Overrides, n_worlds: int, substeps: int, is_sequential: bool, advise: Callable[..., list[str]]
+        self,
+        context: Context,
+        overrides: Overrides,
+        n_worlds: int,
+        substeps: int,
+        is_sequential: bool,
+        advise: Callable[..., list[str]],
     ) -> None:
         self.context = context
         self.overrides = overrides
@@ -69,9 +75,22 @@ class Population:
         """The group of an entity: made when it is the first of its kind."""
         block = blocks[number]
         shape = (tuple(p.structure() for p in block.autonomy), tuple(p.structure() for p in block.controller))
-        key = (*shape, block.motion.structure(), tuple(p.structure() for p in block.sensor), place if self.is_sequential else 0)
+        key = (
+            *shape,
+            block.motion.structure(),
+            tuple(p.structure() for p in block.sensor),
+            place if self.is_sequential else 0,
+        )
         if key not in self._by_key:
-            group = Group(block.name, block, self.context, self.bodies, self.context.clock.dt, self.substeps, self.advise)
+            group = Group(
+                block.name,
+                block,
+                self.context,
+                self.bodies,
+                self.context.clock.dt,
+                self.substeps,
+                self.advise,
+            )
             self._by_key[key] = group
             self.groups.append(group)
             if self.is_sequential:
@@ -150,7 +169,11 @@ class Population:
             who = -1 - source[rows]
             floats[:, rows] = 0.0
             b = self.bodies
-            b.pos[:, rows], b.vel[:, rows], b.quat[:, rows] = new.pos[:, who], new.vel[:, who], new.quat[:, who]
+            b.pos[:, rows], b.vel[:, rows], b.quat[:, rows] = (
+                new.pos[:, who],
+                new.vel[:, who],
+                new.quat[:, who],
+            )
             for name, values in new.values.items():
                 getattr(b, name)[rows] = values[who]
             b.id[rows], b.team[rows], b.world[rows] = new.id[who], new.team[who], new.world[who]
@@ -188,7 +211,9 @@ class Population:
                 block = self.overrides.mission.blocks[number]
                 mine = block_of == number
                 base = _find(block, binding.path).values[name]
-                array[..., rows[mine]] = self.overrides.fill(block.name, binding.path, name, base, world[mine])
+                array[..., rows[mine]] = self.overrides.fill(
+                    block.name, binding.path, name, base, world[mine]
+                )
 
     def _fill_ragged(self, group: Group, binding: Binding, rows: np.ndarray) -> None:
         for name, column in type(binding.spec).params().items():
@@ -196,7 +221,9 @@ class Population:
                 lists: list[Any] = [binding.ragged[name][i].T for i in range(group.n)]
                 for row in rows:
                     block = self.overrides.mission.blocks[self.bodies.block[group.first + row]]
-                    lists[row] = np.array(_find(block, binding.path).values[name], float).reshape(-1, *column.shape)
+                    lists[row] = np.array(_find(block, binding.path).values[name], float).reshape(
+                        -1, *column.shape
+                    )
                 binding.ragged[name] = RaggedColumn.from_rows(lists, column)
 
     # -- handles ------------------------------------------------------------------------------------------------------------
@@ -211,7 +238,9 @@ class Population:
         for name, column in type(binding.spec).columns.items():
             if isinstance(column, Handle):
                 for row in rows:
-                    binding.handles[name][row] = binding.plugin.open_one(self.handle_row(group, binding, int(row)))
+                    binding.handles[name][row] = binding.plugin.open_one(
+                        self.handle_row(group, binding, int(row))
+                    )
 
     def _close_handles(self, gone: np.ndarray) -> None:
         for group in self.groups:
@@ -234,4 +263,3 @@ def _find(block: Block, path: tuple[str, ...]) -> Any:
         plugin = next(p for p in plugins if p.instance_name == name)
         plugins = tuple(c for k in type(plugin).children() for c in plugin.values[k])
     return plugin
-

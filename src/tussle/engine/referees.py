@@ -31,7 +31,9 @@ class Referee:
     plugin: Any
     spec: Any
     view: WorldView
-    tables: dict[str, Table] = field(default_factory=lambda: {"world": Table(), "team": Table(), "entity": Table()})
+    tables: dict[str, Table] = field(
+        default_factory=lambda: {"world": Table(), "team": Table(), "entity": Table()}
+    )
     places: dict[str, tuple[str, Place]] = field(default_factory=dict)
 
     @classmethod
@@ -46,18 +48,24 @@ class Referee:
         n_worlds, n_teams = view.n_worlds, len(view.teams)
         for name, column in type(spec).columns.items():
             if isinstance(column, (Input, Output, Ragged, Handle)):
-                raise DeclarationError(f"{type(spec).__name__}.{name}: a world plugin has no {type(column).__name__} columns")
+                raise DeclarationError(
+                    f"{type(spec).__name__}.{name}: a world plugin has no {type(column).__name__} columns"
+                )
             if isinstance(column, Param) and column.is_row_data:
                 referee._add("world", name, column.dtype, len(column.fields), column.default)
             elif isinstance(column, State):
                 k = n_teams if column.per == "team" else len(column.fields)
-                referee._add("world" if column.per == "team" else column.per, name, column.dtype, k, column.default)
+                referee._add(
+                    "world" if column.per == "team" else column.per, name, column.dtype, k, column.default
+                )
             elif isinstance(column, Publish):
                 assert view.context.topic is not None
                 topic = view.context.topic(column.network, column.topic, column.message, spec.instance_name)
                 referee.plugin.__dict__[name] = Publisher(topic, view)
             elif isinstance(column, Subscribe):
-                raise WiringError(f"{spec.instance_name}.{name}: a world plugin reads w.inbox({column.message.__name__}) instead of a Subscribe")
+                raise WiringError(
+                    f"{spec.instance_name}.{name}: a world plugin reads w.inbox({column.message.__name__}) instead of a Subscribe"
+                )
         referee.tables["world"].allocate(n_worlds)
         referee.tables["entity"].allocate(view.n)
         referee.fill_params(overrides, np.arange(n_worlds))

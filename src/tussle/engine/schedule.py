@@ -45,7 +45,9 @@ def is_due(step: np.ndarray, per_step: Fraction) -> np.ndarray:
 def _is_outside(binding: Binding) -> bool:
     """Whether a plugin, or one inside it, holds objects that it opens itself, or waits for something."""
     kinds = [type(b.spec) for b in binding.walk()]
-    return any(k.handles() and (k.open_one is not Plugin.open_one or k.ready is not Plugin.ready) for k in kinds)
+    return any(
+        k.handles() and (k.open_one is not Plugin.open_one or k.ready is not Plugin.ready) for k in kinds
+    )
 
 
 class Schedule:
@@ -77,7 +79,9 @@ class Schedule:
         if sim.interactions:
             calls.append(Call("take over what was moved", sim.take_over_moves))
         calls += [self._world_call("metric", r) for r in sim.metrics]
-        calls.append(Call("deliver messages", sim.mail.deliver))  # always: the world may speak first on topics of its own
+        calls.append(
+            Call("deliver messages", sim.mail.deliver)
+        )  # always: the world may speak first on topics of its own
         calls.append(Call("check, remove, end", sim.finish_step))
         return calls
 
@@ -102,7 +106,11 @@ class Schedule:
 
         def run() -> None:
             if group.n:
-                state = None if group.motion.plugin.atomic else (group.x.copy(), group.bodies.floats[:, group.first : group.last].copy())
+                state = (
+                    None
+                    if group.motion.plugin.atomic
+                    else (group.x.copy(), group.bodies.floats[:, group.first : group.last].copy())
+                )
                 try:
                     action(group)
                 except Exception as error:
@@ -111,15 +119,28 @@ class Schedule:
                     self._isolate(group, group.motion, error, action)
 
         if _is_outside(group.motion):
-            return Call(self._label("motion", group, group.motion), lambda: self._world_by_world(group, group.motion, action))
+            return Call(
+                self._label("motion", group, group.motion),
+                lambda: self._world_by_world(group, group.motion, action),
+            )
         return Call(self._label("motion", group, group.motion), run)
 
     def _entity_call(self, kind: str, group: Group, binding: Binding, substep: int = 0) -> Call:
         sim, path = self.sim, binding.path
         clock, dead = sim.context.clock, sim.failed
         per_step = _rate(binding.spec, clock.dt)
-        topics = [b.plugin.__dict__[k].topic for b in binding.walk() for k, c in type(b.spec).columns.items() if isinstance(c, Publish)]
-        inboxes = [b.plugin.__dict__[k] for b in binding.walk() for k, c in type(b.spec).columns.items() if isinstance(c, Subscribe)]
+        topics = [
+            b.plugin.__dict__[k].topic
+            for b in binding.walk()
+            for k, c in type(b.spec).columns.items()
+            if isinstance(c, Publish)
+        ]
+        inboxes = [
+            b.plugin.__dict__[k]
+            for b in binding.walk()
+            for k, c in type(b.spec).columns.items()
+            if isinstance(c, Subscribe)
+        ]
         is_outside = _is_outside(binding)
         atomic, linked = binding.plugin.atomic, any(b.links for b in binding.walk())
         view, plugin, table = binding.view, binding.plugin, group.table
@@ -159,7 +180,9 @@ class Schedule:
                     whole()
                 elif due.any():
                     self._part(group, binding, due, action)
-            for inbox in inboxes:  # of a group without rows too: who comes later has not heard what was said before
+            for (
+                inbox
+            ) in inboxes:  # of a group without rows too: who comes later has not heard what was said before
                 inbox.clear(due)
 
         def lean() -> None:
@@ -198,7 +221,12 @@ class Schedule:
                 self._part(group, binding, np.arange(len(sim.running)) == world, when_ready)
 
     def _isolate(
-        self, group: Group, binding: Binding, error: Exception, action: Callable[[Group], None], due: np.ndarray | None = None
+        self,
+        group: Group,
+        binding: Binding,
+        error: Exception,
+        action: Callable[[Group], None],
+        due: np.ndarray | None = None,
     ) -> None:
         """A call has failed: find the worlds in which it does, and make it in the others."""
         sim = self.sim
@@ -206,7 +234,9 @@ class Schedule:
         present = [int(w) for w in np.unique(bodies.world[group.first : group.last])]
         if due is not None:
             present = [w for w in present if due[w]]
-        worlds = [w for w in present if not sim.failed[w]]  # those that have failed in this step are still in the table
+        worlds = [
+            w for w in present if not sim.failed[w]
+        ]  # those that have failed in this step are still in the table
         is_only, failed = len(present) == 1, 0
         for world in worlds:
             only = np.zeros(bodies.n_worlds, bool)
@@ -221,10 +251,17 @@ class Schedule:
                 sim.fail(world, binding.plugin, caught, self._who(group, binding, world, found[0], is_only))
         binding.view.failing_row = None
         if not failed and len(worlds) == len(present):
-            raise sim.as_plugin_error(error, binding.plugin, "fails in the stack but in none of its worlds alone")
+            raise sim.as_plugin_error(
+                error, binding.plugin, "fails in the stack but in none of its worlds alone"
+            )
 
     def _try_alone(
-        self, group: Group, binding: Binding, only: np.ndarray, action: Callable[[Group], None], found: list[int | None]
+        self,
+        group: Group,
+        binding: Binding,
+        only: np.ndarray,
+        action: Callable[[Group], None],
+        found: list[int | None],
     ) -> Exception | None:
         def watched(some: Group) -> None:
             own = next(b for b in some.bindings if b.path == binding.path)
@@ -293,11 +330,17 @@ class Schedule:
             topic.truncate(marks.get(id(topic), 0))
 
     def _isolate_referee(
-        self, referee: Referee, error: Exception, action: Callable[[Referee, Any], None], due: np.ndarray | None
+        self,
+        referee: Referee,
+        error: Exception,
+        action: Callable[[Referee, Any], None],
+        due: np.ndarray | None,
     ) -> None:
         sim = self.sim
         present = np.flatnonzero(sim.running if due is None else due)
-        worlds = [int(w) for w in present if not sim.failed[w]]  # those that have failed in this step are still in the table
+        worlds = [
+            int(w) for w in present if not sim.failed[w]
+        ]  # those that have failed in this step are still in the table
         failed = 0
         for world in worlds:
             only = np.zeros(len(sim.running), bool)
@@ -312,7 +355,9 @@ class Schedule:
                 failed += 1
                 sim.fail(world, referee.plugin, caught, "")
         if not failed and len(worlds) == len(present):
-            raise sim.as_plugin_error(error, referee.plugin, "fails in the stack but in none of its worlds alone")
+            raise sim.as_plugin_error(
+                error, referee.plugin, "fails in the stack but in none of its worlds alone"
+            )
 
     # -- words ----------------------------------------------------------------------------------------------------------------
 

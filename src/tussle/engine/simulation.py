@@ -75,7 +75,9 @@ class Simulation:
         self._resumed.set()
         clock = Clock(n, mission.start, mission.dt)
         seeds_ = np.array([s % 2**64 for s in numbers], np.uint64)
-        self.context = Context(clock, seeds_, [b.name for b in mission.blocks], mission.scene, mission.teams, threads=threads)
+        self.context = Context(
+            clock, seeds_, [b.name for b in mission.blocks], mission.scene, mission.teams, threads=threads
+        )
         self.overrides = Overrides(mission, n)
         self.overrides.set(params or {}, np.arange(n))
         self._build(seeds_)
@@ -92,7 +94,9 @@ class Simulation:
         for plugin in [*mission.world_plugins, *(p for b in mission.blocks for p in b.plugins)]:
             most = type(plugin).max_worlds
             if most is not None and len(seeds) > most:
-                raise MissionError(f"{plugin.instance_name} takes part in at most {most} worlds of one stack, not {len(seeds)}")
+                raise MissionError(
+                    f"{plugin.instance_name} takes part in at most {most} worlds of one stack, not {len(seeds)}"
+                )
 
     def _build(self, seeds: np.ndarray) -> None:
         mission = self.mission
@@ -102,7 +106,12 @@ class Simulation:
         self.context.topic = self.mail.topic
         is_sequential = mission.update == "sequential"
         self.population = Population(
-            self.context, self.overrides, self.n_worlds, mission.motion_multiplier, is_sequential, advise_controllers
+            self.context,
+            self.overrides,
+            self.n_worlds,
+            mission.motion_multiplier,
+            is_sequential,
+            advise_controllers,
         )
         view = self.world_view = WorldView(self.population.bodies, self.context)
         view.templates = [b.name for b in mission.blocks]
@@ -201,7 +210,10 @@ class Simulation:
     # -- beginning and end of worlds ------------------------------------------------------------------------------------------
 
     def reset(
-        self, worlds: Iterable[int], seeds: Sequence[int] | None = None, params: Mapping[str, Any] | None = None
+        self,
+        worlds: Iterable[int],
+        seeds: Sequence[int] | None = None,
+        params: Mapping[str, Any] | None = None,
     ) -> None:
         """Begin some worlds anew, with other seeds and parameters where given; the others are untouched.
 
@@ -213,7 +225,9 @@ class Simulation:
         listed_ = [int(w) for w in worlds]
         chosen = np.array(sorted(listed_), np.int64)
         if len(chosen) and (chosen[0] < 0 or chosen[-1] >= self.n_worlds or len(set(listed_)) < len(listed_)):
-            raise ParameterError(f"reset: there are worlds 0 to {self.n_worlds - 1}, each once, not {listed_}")
+            raise ParameterError(
+                f"reset: there are worlds 0 to {self.n_worlds - 1}, each once, not {listed_}"
+            )
         mask = np.zeros(self.n_worlds, bool)
         mask[chosen] = True
         if seeds is not None:
@@ -231,7 +245,9 @@ class Simulation:
             self.parked.pop(int(world), None)
         self.mail.drop_worlds(mask)
         view = self.world_view
-        view.births = [{k: v if k == "block" else v[..., ~mask[b["world"]]] for k, v in b.items()} for b in view.births]
+        view.births = [
+            {k: v if k == "block" else v[..., ~mask[b["world"]]] for k, v in b.items()} for b in view.births
+        ]
         for referee in self.referees:
             referee.reset(chosen)
             referee.fill_params(self.overrides, chosen)
@@ -257,7 +273,9 @@ class Simulation:
 
         def taken(world: int) -> np.ndarray:
             bodies = self.population.bodies
-            here = [] if at_start else [bodies.pos[:, bodies.world == world]]  # at a reset, the rows of the last game are still there
+            here = (
+                [] if at_start else [bodies.pos[:, bodies.world == world]]
+            )  # at a reset, the rows of the last game are still there
             return np.concatenate([np.zeros((3, 0)), *here, *placed.get(world, [])], axis=1)
 
         def rejects(world: int, pos: np.ndarray, others: np.ndarray) -> bool:
@@ -282,7 +300,10 @@ class Simulation:
             order = np.argsort(worlds, kind="stable")
             kept = order[self.running[worlds[order]]]
             if len(kept):
-                where = {k: v[..., kept] if np.ndim(v) and v.shape[-1] == len(worlds) else v for k, v in where.items()}
+                where = {
+                    k: v[..., kept] if np.ndim(v) and v.shape[-1] == len(worlds) else v
+                    for k, v in where.items()
+                }
                 parts.append(self.births.create(names.index(wish["block"]), worlds[kept], where))
         due = self.births.due(self.context.clock.t, self.running) if self.births.has_rates else {}
         born = self._create(due) if due else None
@@ -340,7 +361,10 @@ class Simulation:
                 world = int(bodies.world[row])
                 if not self.failed[world]:
                     group = next(g for g in self.population.groups if g.first <= row < g.last)
-                    self.record_failure(world, failure.not_finite(group, bodies, int(row), int(self.context.clock.step[world])))
+                    self.record_failure(
+                        world,
+                        failure.not_finite(group, bodies, int(row), int(self.context.clock.step[world])),
+                    )
             self.world_view.kill(~faulty & ~(bodies.health > 0.0), "health")
 
     def _take_out_dead(self) -> bool:
@@ -364,9 +388,13 @@ class Simulation:
         conditions = mission.end_conditions
         over: dict[int, str] = {}
         if "time" in conditions:
-            for world in np.flatnonzero(self.running & (clock.step >= mission.steps)) if self._may_be_time() else ():
+            for world in (
+                np.flatnonzero(self.running & (clock.step >= mission.steps)) if self._may_be_time() else ()
+            ):
                 over[int(world)] = "time"
-        if self._has_changed:  # who is there has changed since the last look: births count too, since the last one may decide
+        if (
+            self._has_changed
+        ):  # who is there has changed since the last look: births count too, since the last one may decide
             self._has_changed = False
             for world, reason in self._lost_teams():
                 over.setdefault(world, reason)
@@ -384,7 +412,9 @@ class Simulation:
         bodies = self.population.bodies
         number = np.searchsorted(self.context.teams, bodies.team)
         n_teams = len(self.context.teams) + 1
-        counts = np.bincount(bodies.world * n_teams + number, minlength=self.n_worlds * n_teams).reshape(self.n_worlds, n_teams)
+        counts = np.bincount(bodies.world * n_teams + number, minlength=self.n_worlds * n_teams).reshape(
+            self.n_worlds, n_teams
+        )
         left = (counts > 0).sum(axis=1)
         for world in np.flatnonzero(self.running & (left <= 1)):
             if not self.births.is_over(int(world)):
@@ -439,7 +469,9 @@ class Simulation:
         if self.on_error == "raise":
             raise error
         self.failed[world] = self._has_failures = True
-        self.results[world] = WorldResult(world, int(self.context.seeds[world]), "error", 0, 0.0, {}, error=error)
+        self.results[world] = WorldResult(
+            world, int(self.context.seeds[world]), "error", 0, 0.0, {}, error=error
+        )
         if self.failed.all() and self._raises_when_all_fail:
             raise error
 
@@ -485,25 +517,39 @@ class Simulation:
 
     def result(self) -> list[WorldResult]:
         """Result of each world, as it stands now for those that go on."""
-        return [r if r is not None and not self.running[w] else access.world_result(self, w, "") for w, r in enumerate(self.results)]
+        return [
+            r if r is not None and not self.running[w] else access.world_result(self, w, "")
+            for w, r in enumerate(self.results)
+        ]
 
     def state_hash(self, world: int = 0) -> str:
         """Hash of all columns of one world: equal states, and only these, have equal hashes."""
         done = self.results[world]
-        return done.state_hash if done is not None and not self.running[world] else access.state_hash(self, world)
+        return (
+            done.state_hash
+            if done is not None and not self.running[world]
+            else access.state_hash(self, world)
+        )
 
     @property
     def grade(self) -> str:
         """What is promised of the result's bits: that of its weakest plugin."""
-        plugins = [b.plugin for g in self.population.groups for b in g.walk()] + [r.plugin for r in self.referees]
+        plugins = [b.plugin for g in self.population.groups for b in g.walk()] + [
+            r.plugin for r in self.referees
+        ]
         return max((type(p).grade for p in plugins), key=GRADES.index, default="portable")
 
     def describe(self) -> str:
         """The step as a printed list, with the channels that have several writers, and the grade."""
-        lines = [f"{self.mission.name or 'mission'}: {self.n_worlds} world(s), dt {self.mission.dt:g} s, update {self.mission.update}"]
+        lines = [
+            f"{self.mission.name or 'mission'}: {self.n_worlds} world(s), dt {self.mission.dt:g} s, update {self.mission.update}"
+        ]
         lines += [f"{i + 1:4d}  {call.label}" for i, call in enumerate(self.schedule)]
         writers = {(where, c): names for g in self.population.groups for where, c, names in g.wiring.writers}
-        lines += [f"{where}: channel {c!r} is written by {', then '.join(names)}; the last wins" for (where, c), names in writers.items()]
+        lines += [
+            f"{where}: channel {c!r} is written by {', then '.join(names)}; the last wins"
+            for (where, c), names in writers.items()
+        ]
         return "\n".join([*lines, f"grade: {self.grade}"])
 
     def close(self) -> None:

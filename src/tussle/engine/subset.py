@@ -83,7 +83,9 @@ def _merge_ragged(whole: RaggedColumn, part: RaggedColumn, rows: np.ndarray) -> 
     whole.set(start, np.concatenate(lists, axis=-1) if lists else whole.data)
 
 
-def call_group(population: Population, group: Group, worlds: np.ndarray, action: Callable[[Group], None]) -> None:
+def call_group(
+    population: Population, group: Group, worlds: np.ndarray, action: Callable[[Group], None]
+) -> None:
     """Do something to one group in some worlds only; worlds, (n_worlds,), says which. Nothing is written when it raises."""
     bodies = population.bodies
     rows = np.flatnonzero(worlds[bodies.world])
@@ -103,7 +105,9 @@ def call_group(population: Population, group: Group, worlds: np.ndarray, action:
                 binding.handles[name][row] = part.plugin.__dict__[name][k]
 
 
-def call_referee(population: Population, referee: Referee, worlds: np.ndarray, action: Callable[[Referee, WorldView], None]) -> None:
+def call_referee(
+    population: Population, referee: Referee, worlds: np.ndarray, action: Callable[[Referee, WorldView], None]
+) -> None:
     """Do something with a world plugin in some worlds only. Nothing is written when it raises, messages excepted."""
     bodies, view = population.bodies, referee.view
     rows = np.flatnonzero(worlds[bodies.world])

@@ -62,7 +62,9 @@ class Wiring:
         advise: Gives controllers that would join the writers' channels to the reader, for messages.
     """
 
-    def __init__(self, where: str, table: Table, advise: Callable[[Iterable[str], Iterable[str]], list[str]]) -> None:
+    def __init__(
+        self, where: str, table: Table, advise: Callable[[Iterable[str], Iterable[str]], list[str]]
+    ) -> None:
         self.where = where
         self.table = table
         self.advise = advise
@@ -70,7 +72,9 @@ class Wiring:
         self.wired: dict[int, set[str]] = {}
         self.writers: list[tuple[str, str, list[str]]] = []
 
-    def connect(self, sensors: Sequence[Any], autonomies: Sequence[Any], controllers: Sequence[Any], motion: Any) -> None:
+    def connect(
+        self, sensors: Sequence[Any], autonomies: Sequence[Any], controllers: Sequence[Any], motion: Any
+    ) -> None:
         """Lay all wires.
 
         Raises:
@@ -94,7 +98,9 @@ class Wiring:
                 following.pop(0)
                 continue
             offered = {c for _, column in written_channels(controller) for c in column.channels}
-            needed = [c for _, column in read_channels(following[0]) for c in column.channels if not column.optional]  # type: ignore[attr-defined]
+            needed = [
+                c for _, column in read_channels(following[0]) for c in column.channels if not column.optional
+            ]  # type: ignore[attr-defined]
             for channel in needed if offered else []:
                 if channel not in offered:
                     raise self._missing(following[0], channel, offered, controller.instance_name)
@@ -117,7 +123,9 @@ class Wiring:
                 bus.row[channel] = place.first
                 bus.unit[channel] = unit
 
-    def _join(self, bus: Bus, producers: Sequence[Any], consumers: Sequence[Any], also: Bus | None = None) -> None:
+    def _join(
+        self, bus: Bus, producers: Sequence[Any], consumers: Sequence[Any], also: Bus | None = None
+    ) -> None:
         for plugin in producers:
             for _, column in written_channels(plugin):
                 for channel in column.channels:
@@ -136,7 +144,9 @@ class Wiring:
                 if name in BELIEF or any(c in bus.read for c in column.channels):
                     self.wired.setdefault(id(plugin), set()).add(name)
                 if bus.read.isdisjoint(column.channels) and not consumers:
-                    self.wired.setdefault(id(plugin), set()).add(name)  # sensors: read by name from outside and by autonomies
+                    self.wired.setdefault(id(plugin), set()).add(
+                        name
+                    )  # sensors: read by name from outside and by autonomies
 
     def _read(self, plugin: Any, bus: Any, also: Bus | None, required: bool) -> None:
         for name, column in read_channels(plugin):

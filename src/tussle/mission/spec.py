@@ -10,11 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from tussle import units
+from tussle import stock, units
 from tussle.api import Autonomy, Controller, Interaction, Metric, MotionModel, Network, Sensor
 from tussle.errors import MissionError, listed
 from tussle.scene import Scene
-from tussle import stock
 
 END_CONDITIONS = ("time", "one_team", "all_dead", "none")
 UPDATES = ("synchronous", "sequential")
@@ -34,7 +33,9 @@ def _number(where: str, value: Any, unit: str) -> float:
     except (TypeError, ValueError) as error:
         raise MissionError(f"{where} = {value!r} is not allowed: {error}") from None
     if not math.isfinite(number):
-        raise MissionError(f"{where} = {value!r} is not allowed; it takes a finite number{' in ' + unit if unit else ''}")
+        raise MissionError(
+            f"{where} = {value!r} is not allowed; it takes a finite number{' in ' + unit if unit else ''}"
+        )
     return number
 
 
@@ -47,7 +48,9 @@ def _plugins(where: str, value: Any, kind: type) -> tuple[Any, ...]:
     names = [p.instance_name for p in plugins]
     for name in names:
         if names.count(name) > 1:
-            raise MissionError(f"{where}: two plugins are called {name!r}; give one of them another name with name=...")
+            raise MissionError(
+                f"{where}: two plugins are called {name!r}; give one of them another name with name=..."
+            )
     return plugins
 
 
@@ -113,7 +116,9 @@ class Block:
         where = f"block {self.name!r}"
         put = lambda name, value: object.__setattr__(self, name, value)  # noqa: E731 - frozen dataclasses are set up this way
         if not self.name or "." in self.name:
-            raise MissionError(f"{where}: a block's name is not empty and has no dot, since paths such as prey.Boids.gain use dots")
+            raise MissionError(
+                f"{where}: a block's name is not empty and has no dot, since paths such as prey.Boids.gain use dots"
+            )
         for name, unit in (("position", "m"), ("variance", "m^2"), ("half_width", "m")):
             put(name, _numbers(f"{where}: {name}", getattr(self, name), unit, 3))
         if self.velocity is not None:
@@ -126,21 +131,31 @@ class Block:
         put("controller", _plugins(f"{where}: controller", self.controller, Controller))
         put("sensor", _plugins(f"{where}: sensor", self.sensor, Sensor))
         if isinstance(self.motion, type) or not isinstance(self.motion, MotionModel):
-            raise MissionError(f"{where}: motion = {self.motion!r} is not a motion model; each block has exactly one, such as motion=Unicycle()")
+            raise MissionError(
+                f"{where}: motion = {self.motion!r} is not a motion model; each block has exactly one, such as motion=Unicycle()"
+            )
         _plugins(where, self.plugins, object)
 
     def _check_bounds(self, where: str) -> None:
         for name in ("count", "slots", "team"):
             if isinstance(getattr(self, name), bool) or int(getattr(self, name)) != getattr(self, name):
-                raise MissionError(f"{where}: {name} = {getattr(self, name)!r} is not allowed; it takes a whole number")
+                raise MissionError(
+                    f"{where}: {name} = {getattr(self, name)!r} is not allowed; it takes a whole number"
+                )
         if self.placement not in PLACEMENTS:
-            raise MissionError(f"{where}: placement = {self.placement!r} is not allowed; {listed(PLACEMENTS)}")
+            raise MissionError(
+                f"{where}: placement = {self.placement!r} is not allowed; {listed(PLACEMENTS)}"
+            )
         for name in ("variance", "half_width"):
             if min(getattr(self, name)) < 0.0:
-                raise MissionError(f"{where}: {name} = {getattr(self, name)!r} is not allowed; it takes numbers >= 0")
+                raise MissionError(
+                    f"{where}: {name} = {getattr(self, name)!r} is not allowed; it takes numbers >= 0"
+                )
         for name in ("count", "heading_variance", "speed", "interval_sd"):
             if getattr(self, name) < 0:
-                raise MissionError(f"{where}: {name} = {getattr(self, name)!r} is not allowed; it takes a number >= 0")
+                raise MissionError(
+                    f"{where}: {name} = {getattr(self, name)!r} is not allowed; it takes a number >= 0"
+                )
         for name in ("health", "radius", "mass", "rate", "slots"):
             value = getattr(self, name)
             if value is not None and not value > 0:
@@ -209,20 +224,34 @@ class Mission:
         names = [b.name for b in self.blocks]
         for name in names:
             if names.count(name) > 1:
-                raise MissionError(f"mission: two blocks are called {name!r}; paths and random numbers need their names to differ")
+                raise MissionError(
+                    f"mission: two blocks are called {name!r}; paths and random numbers need their names to differ"
+                )
         for name in ("dt", "end", "start"):
             put(name, _number(f"mission: {name}", getattr(self, name), "s"))
         if not self.dt > 0.0:
             raise MissionError(f"mission: dt = {self.dt!r} is not allowed; it takes a number of seconds > 0")
-        if isinstance(self.motion_multiplier, bool) or self.motion_multiplier != int(self.motion_multiplier) or self.motion_multiplier < 1:
-            raise MissionError(f"mission: motion_multiplier = {self.motion_multiplier!r} is not allowed; it takes a whole number >= 1")
+        if (
+            isinstance(self.motion_multiplier, bool)
+            or self.motion_multiplier != int(self.motion_multiplier)
+            or self.motion_multiplier < 1
+        ):
+            raise MissionError(
+                f"mission: motion_multiplier = {self.motion_multiplier!r} is not allowed; it takes a whole number >= 1"
+            )
         if self.update not in UPDATES:
             raise MissionError(f"mission: update = {self.update!r} is not allowed; {listed(UPDATES)}")
         conditions = self.end_conditions
-        conditions = tuple(c.strip() for c in conditions.split(",")) if isinstance(conditions, str) else tuple(conditions)
+        conditions = (
+            tuple(c.strip() for c in conditions.split(","))
+            if isinstance(conditions, str)
+            else tuple(conditions)
+        )
         for condition in conditions:
             if condition not in END_CONDITIONS:
-                raise MissionError(f"mission: end condition {condition!r} is not allowed; {listed(END_CONDITIONS)}")
+                raise MissionError(
+                    f"mission: end condition {condition!r} is not allowed; {listed(END_CONDITIONS)}"
+                )
         put("end_conditions", conditions)
         for name, kind in (("interactions", Interaction), ("metrics", Metric), ("networks", Network)):
             put(name, _plugins(f"mission: {name}", getattr(self, name), kind))

@@ -46,7 +46,9 @@ def advise_controllers(offered: Iterable[str], needed: Iterable[str]) -> list[st
     for name, path in manifest().items():
         if ".controller." in path:
             controller = load(name)
-            takes = {c for column in controller.inputs().values() for c in column.channels if not column.optional}
+            takes = {
+                c for column in controller.inputs().values() for c in column.channels if not column.optional
+            }
             gives = {c for column in controller.outputs().values() for c in column.channels}
             if takes and takes <= offered and needed <= gives:
                 found.append(name)
@@ -56,7 +58,9 @@ def advise_controllers(offered: Iterable[str], needed: Iterable[str]) -> list[st
 def __getattr__(name: str) -> Any:
     if not name.startswith("_") and name in manifest():
         return load(name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}{nearest_name(name, manifest()) if not name.startswith('_') else ''}")
+    raise AttributeError(
+        f"module {__name__!r} has no attribute {name!r}{nearest_name(name, manifest()) if not name.startswith('_') else ''}"
+    )
 
 
 def __dir__() -> list[str]:

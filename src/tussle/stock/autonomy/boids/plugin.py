@@ -29,7 +29,13 @@ class Boids(Autonomy):
 
     max_speed = Param(30.0, unit="m/s", ge=0.0, doc="Wanted speed.")
     comms_range = Param(200.0, unit="m", ge=0.0, doc="Distance up to which others count.")
-    fov_el = Param(2.0 * math.pi, unit="rad", text_unit="deg", ge=0.0, doc="Field of view in elevation; a full circle has no edge.")
+    fov_el = Param(
+        2.0 * math.pi,
+        unit="rad",
+        text_unit="deg",
+        ge=0.0,
+        doc="Field of view in elevation; a full circle has no edge.",
+    )
     fov_az = Param(2.0 * math.pi, unit="rad", text_unit="deg", ge=0.0, doc="Field of view in azimuth.")
     goal_weight = Param(0.1, ge=0.0, doc="Weight of the direction to the goal.")
     avoid_team_weight = Param(1.0, ge=0.0, doc="Weight of the repulsion from team mates.")
@@ -37,8 +43,12 @@ class Boids(Autonomy):
     centroid_weight = Param(1.0, ge=0.0, doc="Weight of the direction to the team mates' centroid.")
     align_weight = Param(0.5, ge=0.0, doc="Weight of the team mates' mean heading.")
     sphere_of_influence = Param(100.0, unit="m", ge=0.0, doc="Distance from which others repel.")
-    minimum_team_range = Param(2.0, unit="m", ge=0.0, doc="Distance to team mates below which nothing else counts.")
-    minimum_nonteam_range = Param(20.0, unit="m", ge=0.0, doc="Distance to others below which nothing else counts.")
+    minimum_team_range = Param(
+        2.0, unit="m", ge=0.0, doc="Distance to team mates below which nothing else counts."
+    )
+    minimum_nonteam_range = Param(
+        20.0, unit="m", ge=0.0, doc="Distance to others below which nothing else counts."
+    )
     use_initial_heading = Param(True, doc="The goal lies `goal_distance` ahead of where the entity begins.")
     goal_distance = Param(AHEAD, unit="m", ge=0.0, doc="How far.")
     goal = Param((1e6, 1e6, 1e3), fields="x y z", unit="m", doc="The goal otherwise.")
@@ -73,7 +83,9 @@ class Boids(Autonomy):
         if "velocity" in wired:
             kernels.velocity(wanted, self.max_speed, self.velocity)
         if "desired_heading" in wired or "desired_altitude" in wired or "desired_speed" in wired:
-            kernels.desired(wanted, z, self.max_speed, self.desired_heading, self.desired_speed, self.desired_altitude)
+            kernels.desired(
+                wanted, z, self.max_speed, self.desired_heading, self.desired_speed, self.desired_altitude
+            )
 
     def _sums(self, g: GroupView) -> np.ndarray:
         index = g.index(self.comms_range)

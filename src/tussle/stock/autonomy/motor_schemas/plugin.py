@@ -18,7 +18,9 @@ class MotorSchemas(Autonomy):
     grade = "portable"
 
     max_speed = Param(21.0, unit="m/s", gt=0.0, doc="Longest wish, and speed when there is none.")
-    pub_vel_vec = Param(False, structural=True, doc="Write a wanted velocity instead of heading, altitude and speed.")
+    pub_vel_vec = Param(
+        False, structural=True, doc="Write a wanted velocity instead of heading, altitude and speed."
+    )
     add_lower_bound_to_vz = Param(False, doc="Bound the wanted vertical speed from below.")
     vz_lower_bound = Param(-1.0, unit="m/s", doc="That bound.")
     behaviors = Children(Behavior, doc="What it is made of.")
@@ -57,5 +59,3 @@ class MotorSchemas(Autonomy):
     def longest_wish(self, g: GroupView) -> np.ndarray:
         """Length that a behaviour's wish should not exceed [m/s], (n,)."""
         return self.max_speed
-
-

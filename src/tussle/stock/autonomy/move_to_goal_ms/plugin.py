@@ -17,7 +17,9 @@ class MoveToGoalMS(Behavior):
 
     goal = Param((0.0, 0.0, 0.0), fields="x y z", unit="m", doc="Where to.")
     use_initial_heading = Param(False, doc="The goal lies 1000 km ahead of where the entity begins.")
-    distance_pid = Param((0.5, 0.0, 0.0, 0.0), fields="kp ki kd band", doc="Gains of the speed on the distance.")
+    distance_pid = Param(
+        (0.5, 0.0, 0.0, 0.0), fields="kp ki kd band", doc="Gains of the speed on the distance."
+    )
     target = State("x y z", unit="m", doc="Where it is going to.")
     integral = State(unit="m s", doc="Of the distance.")
     previous = State(unit="m", doc="Distance at the last call.")

@@ -38,7 +38,9 @@ class Predator(Autonomy):
         x, y, z = g.pos
         target_row = np.empty(g.n, np.int64)
         room = 16 * g.n + 64
-        while True:  # again with more room where there are more claims than expected; targets then stay as they are
+        while (
+            True
+        ):  # again with more room where there are more claims than expected; targets then stay as they are
             claim_row, claimed = np.empty(room, np.int64), np.empty(room, np.int64)
             n_claims = kernels.hunt(
                 x, y, z, g.team, self.prey_team_id, self.capture_range, self.allow_prey_switching, self.target, target_row,
@@ -55,6 +57,8 @@ class Predator(Autonomy):
                 self.pitch_rate,
             )  # fmt: skip
         if not self.wired.isdisjoint(("desired_heading", "desired_speed")):
-            kernels.point(x, y, self.max_speed, target_row, table_x, table_y, self.desired_heading, self.desired_speed)
+            kernels.point(
+                x, y, self.max_speed, target_row, table_x, table_y, self.desired_heading, self.desired_speed
+            )
         if n_claims:
             self.capture.publish(claim_row[:n_claims], target=bodies.id[claimed[:n_claims]])

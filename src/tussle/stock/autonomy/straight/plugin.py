@@ -25,7 +25,11 @@ class Straight(Autonomy):
 
     speed = Param(21.0, unit="m/s", ge=0.0, doc="Wanted speed.")
     enable_boundary_control = Param(False, structural=True, doc="Turn back at a boundary.")
-    generate_entities = Param(False, structural=True, doc="Every 2 s ask for a new entity 10 m to the left, turned left by 90 degrees.")
+    generate_entities = Param(
+        False,
+        structural=True,
+        doc="Every 2 s ask for a new entity 10 m to the left, turned left by 90 degrees.",
+    )
     template = Param("gen_straight", doc="Block of the new entities.")
     goal = State("x y z", unit="m", doc="Point far ahead.")
     is_fenced = State(dtype=bool, doc="Whether it has heard of a boundary.")

@@ -20,12 +20,18 @@ class Boundary(Interaction):
     boundary_id = Param(0, structural=True, doc="Number that others know it by.")
     team = Param(0, structural=True, doc="Team that it belongs to.")
     shape = Param("cuboid", choices=("cuboid", "sphere", "plane"), doc="Kind of region.")
-    center = Param((0.0, 0.0, 0.0), fields="x y z", unit="m", structural=True, doc="Centre; of a plane, a point on it.")
-    lengths = Param((10.0, 10.0, 10.0), fields="x y z", unit="m", gt=0.0, structural=True, doc="Edges of a cuboid.")
+    center = Param(
+        (0.0, 0.0, 0.0), fields="x y z", unit="m", structural=True, doc="Centre; of a plane, a point on it."
+    )
+    lengths = Param(
+        (10.0, 10.0, 10.0), fields="x y z", unit="m", gt=0.0, structural=True, doc="Edges of a cuboid."
+    )
     rpy = Param((0.0, 0.0, 0.0), fields="roll pitch yaw", unit="rad", structural=True, doc="Its attitude.")
     radius = Param(500.0, unit="m", gt=0.0, structural=True, doc="Of a sphere.")
     normal = Param((0.0, 0.0, 1.0), fields="x y z", structural=True, doc="Of a plane; points to the outside.")
-    was_inside = State(dtype=bool, per="entity", doc="Whether an entity was inside at the end of the last step.")
+    was_inside = State(
+        dtype=bool, per="entity", doc="Whether an entity was inside at the end of the last step."
+    )
     is_known = State(dtype=bool, per="entity", doc="Whether it has been looked at before.")
     is_told = State(dtype=bool, per="world", doc="Whether the shape has been published.")
 
@@ -45,7 +51,13 @@ class Boundary(Interaction):
         inside = self.region().contains(w.pos)
         rows = np.flatnonzero(self.is_known & (inside != self.was_inside))
         if len(rows):
-            w.publish(BoundaryCrossed, w.world[rows], entity=w.id[rows], boundary=self.boundary_id, inside=inside[rows])
+            w.publish(
+                BoundaryCrossed,
+                w.world[rows],
+                entity=w.id[rows],
+                boundary=self.boundary_id,
+                inside=inside[rows],
+            )
         self.was_inside[:] = inside
         self.is_known[:] = True
 

@@ -22,7 +22,9 @@ class SimpleCapture(Interaction):
     capture_range = Param(5.0, unit="m", ge=0.0, doc="Largest distance at which a claim holds.")
     enable_team_captures = Param(True, doc="Team mates can be captured.")
     enable_non_team_captures = Param(True, doc="Others can be captured.")
-    credit = Param("once", choices=("once", "each"), doc="Whether a capture counts once, or once per claim that holds.")
+    credit = Param(
+        "once", choices=("once", "each"), doc="Whether a capture counts once, or once per claim that holds."
+    )
     effect = Param("remove", choices=("remove", "teleport", "heal"), doc="What becomes of the captured.")
     teleport_to = Param((0.0, 0.0, 0.0), fields="x y z", unit="m", doc="With teleport: where they are put.")
     healed_health = Param(1.0, gt=0.0, doc="With heal: their health afterwards.")

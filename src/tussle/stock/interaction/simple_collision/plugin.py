@@ -42,7 +42,12 @@ class SimpleCollision(Interaction):
         counts &= w.id[first] < w.id[second]
         first, second, world = first[counts], second[counts], world[counts]
         w.publish(
-            EntityCollided, world, first=w.id[first], second=w.id[second], first_team=w.team[first], second_team=w.team[second]
+            EntityCollided,
+            world,
+            first=w.id[first],
+            second=w.id[second],
+            first_team=w.team[first],
+            second_team=w.team[second],
         )
         w.kill(np.unique(np.concatenate([first, second])), "collision")
 

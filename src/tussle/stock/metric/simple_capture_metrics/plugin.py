@@ -28,5 +28,7 @@ class SimpleCaptureMetrics(Metric):
             np.add.at(self.non_team_captures, (team[~is_team], captured.world[~is_team]), 1)
 
     def result(self, w: WorldView) -> dict[str, np.ndarray]:
-        score = self.TeamCapture_weight * self.team_captures + self.NonTeamCapture_weight * self.non_team_captures
+        score = (
+            self.TeamCapture_weight * self.team_captures + self.NonTeamCapture_weight * self.non_team_captures
+        )
         return {"TeamCapture": self.team_captures, "NonTeamCapture": self.non_team_captures, "score": score}

@@ -19,7 +19,9 @@ class SphereNetwork(Network):
 
     range = Param(100.0, unit="m", ge=0.0, doc="Distance below which others hear.")
     prob_transmit = Param(1.0, ge=0.0, le=1.0, doc="Probability that one receiver gets one message.")
-    filter_comms_plane = Param(False, doc="Nothing passes between above and below a plane, such as the water's surface.")
+    filter_comms_plane = Param(
+        False, doc="Nothing passes between above and below a plane, such as the water's surface."
+    )
     comms_boundary_altitude = Param(0.0, unit="m", doc="Height of the plane.")
     comms_boundary_epsilon = Param(0.0, unit="m", ge=0.0, doc="Both sides reach this far over the plane.")
 
@@ -31,7 +33,9 @@ class SphereNetwork(Network):
         number = np.repeat(np.arange(messages.n), count)
         place = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
         receiver = pairs.other[np.repeat(first, count) + place]
-        heard = self._passes_plane(w, sender[number], receiver) & self._is_lucky(w, messages, number, receiver)
+        heard = self._passes_plane(w, sender[number], receiver) & self._is_lucky(
+            w, messages, number, receiver
+        )
         own = np.flatnonzero(sender >= 0)
         return np.concatenate([own, number[heard]]), np.concatenate([sender[own], receiver[heard]])
 
@@ -39,13 +43,19 @@ class SphereNetwork(Network):
         world = w.world[receiver]
         height, slack = self.comms_boundary_altitude[world], self.comms_boundary_epsilon[world]
         a, b = w.pos[2][sender], w.pos[2][receiver]
-        same_side = ((a > height - slack) & (b > height - slack)) | ((a < height + slack) & (b < height + slack))
+        same_side = ((a > height - slack) & (b > height - slack)) | (
+            (a < height + slack) & (b < height + slack)
+        )
         return np.asarray(same_side | ~self.filter_comms_plane[world])
 
-    def _is_lucky(self, w: WorldView, messages: Batch, number: np.ndarray, receiver: np.ndarray) -> np.ndarray:
+    def _is_lucky(
+        self, w: WorldView, messages: Batch, number: np.ndarray, receiver: np.ndarray
+    ) -> np.ndarray:
         # Keyed by sender, its how-many-eth message of the step, and receiver: who else talks or listens changes no draw.
         is_first = np.ones(messages.n, bool)
-        is_first[1:] = (messages.world[1:] != messages.world[:-1]) | (messages.sender[1:] != messages.sender[:-1])
+        is_first[1:] = (messages.world[1:] != messages.world[:-1]) | (
+            messages.sender[1:] != messages.sender[:-1]
+        )
         ordinal = np.arange(messages.n) - np.maximum.accumulate(np.where(is_first, np.arange(messages.n), 0))
         key = messages.sender[number] + (ordinal[number] << 32)
         world = messages.world[number]
