@@ -1,0 +1,190 @@
+"""The golden missions: small games that between them run every shipped plugin and every path of a step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+
+from golden_plugins import Beacon, Car, Nursery, Wanderer
+
+from tussle import Block, Mission
+from tussle.stock import (
+    AvoidEntityMS,
+    Boids,
+    Boundary,
+    DirectController,
+    LocalNetwork,
+    MotorSchemas,
+    MoveToGoalMS,
+    NoisyContacts,
+    NoisyState,
+    Predator,
+    SimpleAircraft,
+    SimpleAircraftControllerPID,
+    SimpleCapture,
+    SimpleCaptureMetrics,
+    SimpleCollision,
+    SingleIntegrator,
+    SingleIntegratorControllerSimple,
+    SphereNetwork,
+    Straight,
+    Unicycle,
+    UnicyclePID,
+)
+
+SEEDS = (1, 2, 3)
+"""Seeds whose hashes are kept."""
+
+
+def _hunters(name: str, team: int, count: int, north: float, *, switches: bool) -> Block:
+    return Block(
+        name=name, team=team, count=count, position=(40.0, north, 200.0), placement="uniform", half_width=(30.0, 30.0, 10.0),
+        heading="180 deg", autonomy=Predator(max_speed=35.0, capture_range=20.0, allow_prey_switching=switches),
+        motion=Unicycle(vel_max=35.0, turn_rate_max=2.0, pitch_rate_max=1.5),
+    )  # fmt: skip
+
+
+def _prey(count: int, **law: object) -> Block:
+    return Block(
+        name="prey", team=1, count=count, position=(0.0, 0.0, 200.0), placement="uniform", half_width=(60.0, 60.0, 10.0),
+        autonomy=Boids(**law), motion=Unicycle(vel_max=30.0, turn_rate_max=1.0, pitch_rate_max=1.0),
+    )  # fmt: skip
+
+
+def chase_synchronous() -> Mission:
+    """Predator/prey with twelve substeps: the block loop, claims, captures, deaths, scores."""
+    return Mission(
+        blocks=[_prey(24), _hunters("keepers", 2, 3, -40.0, switches=False), _hunters("switchers", 3, 2, 40.0, switches=True)],
+        motion_multiplier=12, end=5.0, end_conditions="time, one_team, all_dead",
+        interactions=[SimpleCapture(capture_range=20.0)], metrics=[SimpleCaptureMetrics()],
+    )  # fmt: skip
+
+
+def chase_sequential() -> Mission:
+    """The same one after another, with the paper's means and scoring."""
+    return Mission(
+        blocks=[
+            _prey(8, means="historic"), _hunters("keepers", 2, 2, -40.0, switches=False), _hunters("switchers", 3, 1, 40.0, switches=True),
+        ],
+        update="sequential", end=5.0, end_conditions="time, one_team, all_dead",
+        interactions=[SimpleCapture(capture_range=20.0, credit="each")], metrics=[SimpleCaptureMetrics()],
+    )  # fmt: skip
+
+
+def two_flocks() -> Mission:
+    """Points in two flocks that see differently far, collide, and are placed apart."""
+    flock = lambda name, team, east, sight: Block(  # noqa: E731
+        name=name, team=team, count=20, position=(east, 0.0, 100.0), variance=(400.0, 400.0, 100.0), scatter_first=True,
+        autonomy=Boids(comms_range=sight, avoid_nonteam_weight=0.0, goal=(-east, 0.0, 100.0), use_initial_heading=False),
+        controller=SingleIntegratorControllerSimple(), motion=SingleIntegrator(),
+    )  # fmt: skip
+    return Mission(
+        blocks=[flock("west", 1, -40.0, 35.0), flock("east", 2, 40.0, 120.0)], end=5.0,
+        interactions=[SimpleCollision(collision_range=4.0, startup_collision_range=6.0)],
+    )  # fmt: skip
+
+
+def aircraft() -> Mission:
+    """Aircraft under PID loops that believe a noisy state and turn back at a boundary."""
+    return Mission(
+        blocks=[
+            Block(
+                name="plane", team=1, count=6, position=(0.0, 0.0, 300.0), heading_variance=1.0, climb="5 deg", roll="10 deg", speed=22.0,
+                autonomy=Straight(enable_boundary_control=True), controller=SimpleAircraftControllerPID(),
+                motion=SimpleAircraft(), sensor=NoisyState(pos_noise_0=(0.0, 2.0), orient_noise_2=(0.01, 0.05)),
+            )
+        ],
+        motion_multiplier=2, end=6.0,
+        interactions=[Boundary(center=(0.0, 0.0, 300.0), lengths=(90.0, 90.0, 200.0), rpy=(0.0, 0.0, 0.3))],
+    )  # fmt: skip
+
+
+def schemas() -> Mission:
+    """Behaviours inside a behaviour, a PID between the substeps, noisy contacts."""
+    behaviors = [AvoidEntityMS(sphere_of_influence=40.0, gain=2.0), MoveToGoalMS(goal=(200.0, 50.0, 120.0))]
+    return Mission(
+        blocks=[
+            Block(
+                name="robot", team=1, count=12, position=(0.0, 0.0, 100.0), heading_variance=2.0,
+                autonomy=MotorSchemas(max_speed=12.0, behaviors=behaviors), controller=UnicyclePID(),
+                motion=Unicycle(vel_max=15.0, turn_rate_max=1.0, pitch_rate_max=1.0, enable_roll=True),
+                sensor=NoisyContacts(max_range=25.0, orient_noise_0=(0.0, 0.1)),
+            )
+        ],
+        motion_multiplier=4, end=6.0,
+    )  # fmt: skip
+
+
+def births_and_radio() -> Mission:
+    """Births by rate, by count and by a referee; messages by a radio that is late and lossy; goals heard."""
+    beacon = lambda name, count, **when: Block(  # noqa: E731
+        name=name, team=1, count=count, variance=(900.0, 900.0, 25.0), heading_variance=0.5, autonomy=Beacon(),
+        motion=SingleIntegrator(), **when,
+    )  # fmt: skip
+    listener = Block(
+        name="listener", team=2, count=4, position=(20.0, 0.0, 0.0),
+        autonomy=MotorSchemas(pub_vel_vec=True, behaviors=[MoveToGoalMS(use_initial_heading=True, network_name="SphereNetwork")]),
+        motion=SingleIntegrator(max_speed=8.0),
+    )  # fmt: skip
+    return Mission(
+        blocks=[beacon("first", 6), listener, beacon("late", 14, rate=4.0, slots=2, first_birth=0.3, interval_sd=0.2)], end=5.0,
+        networks=[SphereNetwork(range=60.0, prob_transmit=0.6, comm_delay=0.35), LocalNetwork()], interactions=[Nursery()],
+    )  # fmt: skip
+
+
+def narrow_view() -> Mission:
+    """Flocking with a limited field of view, next to a flock without."""
+    flock = lambda name, limits: Block(  # noqa: E731
+        name=name, team=1, count=12, position=(0.0, 0.0, 100.0), variance=(900.0, 900.0, 100.0), heading_variance=1.0,
+        autonomy=Boids(limits_view=limits, fov_az="150 deg", fov_el="60 deg", comms_range=70.0), controller=DirectController(),
+        motion=Unicycle(vel_max=25.0, turn_rate_max=1.0, pitch_rate_max=0.5),
+    )  # fmt: skip
+    return Mission(blocks=[flock("narrow", True), flock("wide", False)], motion_multiplier=3, end=5.0)
+
+
+def slow_clocks() -> Mission:
+    """Plugins at 3 Hz in steps of 0.1 s: who is due depends on each world's own clock."""
+    prey = Block(
+        name="prey", team=1, count=10, variance=(400.0, 400.0, 4.0), heading_variance=1.0, autonomy=Boids(rate=3.0),
+        controller=UnicyclePID(), motion=Unicycle(vel_max=20.0, turn_rate_max=1.0, pitch_rate_max=0.5), sensor=NoisyState(rate=3.0),
+    )  # fmt: skip
+    hunter = Block(
+        name="hunter", team=2, count=2, position=(40.0, 0.0, 0.0), autonomy=Predator(rate=3.0, capture_range=15.0),
+        controller=DirectController(), motion=Unicycle(vel_max=30.0, turn_rate_max=2.0, pitch_rate_max=1.0),
+    )  # fmt: skip
+    talker = Block(name="talker", team=3, count=3, autonomy=Beacon(rate=3.0), motion=SingleIntegrator())
+    return Mission(
+        blocks=[prey, hunter, talker], motion_multiplier=2, end=5.0, networks=[SphereNetwork(range=40.0, comm_delay=0.2)],
+        interactions=[SimpleCapture(capture_range=15.0, rate=3.0)], metrics=[SimpleCaptureMetrics()],
+    )  # fmt: skip
+
+
+def cars() -> Mission:
+    """A motion model that is only its state equation, driven by plain NumPy code."""
+    car = Block(
+        name="car", team=1, count=15, variance=(400.0, 400.0, 0.0), heading_variance=3.0, speed=3.0, autonomy=Wanderer(), motion=Car(),
+    )  # fmt: skip
+    return Mission(blocks=[car], motion_multiplier=5, end=5.0)
+
+
+STEPS: dict[str, int] = {
+    "chase_synchronous": 24,
+    "chase_sequential": 24,
+    "two_flocks": 24,
+    "aircraft": 40,
+    "schemas": 24,
+    "births_and_radio": 24,
+    "narrow_view": 24,
+    "slow_clocks": 24,
+    "cars": 24,
+}
+"""Steps after which a mission's hashes are taken."""
+
+NAMES = tuple(STEPS)
+
+
+@cache
+def mission(name: str) -> Mission:
+    """A golden mission by its name; missions are frozen, so all callers share it."""
+    make: Callable[[], Mission] = globals()[name]
+    return make()
