@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from tussle import units
-from tussle.errors import DeclarationError, ParameterError
+from tussle.errors import DeclarationError, ParameterError, UnitError
 
 PER = ("entity", "world", "team")
 
@@ -206,7 +206,7 @@ class Param(Numbers):
     def _parsed(self, text: str, component: int, where: str) -> float:
         try:
             return units.parse(text, self.units[component])
-        except units.UnitError as error:
+        except UnitError as error:
             raise ParameterError(f"{self._place(where)} = {text!r}: {error}") from None
         except ValueError:
             raise self._error(where, text, self.allowed()) from None

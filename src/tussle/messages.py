@@ -12,8 +12,9 @@ from tussle.errors import DeclarationError, ParameterError, listed, nearest_name
 
 
 class Message:
-    """A message type; abstract. Fields are declared as class attributes: `Field`, `EntityRef`, at most one `Ragged`, or a `Handle`
-    for any picklable object.
+    """A message type; abstract.
+
+    Fields are declared as class attributes: `Field`, `EntityRef`, at most one `Ragged`, or a `Handle` for any picklable object.
     """
 
     fields: ClassVar[dict[str, Column]] = {}
@@ -83,10 +84,9 @@ class Batch:
         return Batch(self.type, self.world[index], self.sender[index], data)
 
     @classmethod
-    @cache
     def empty(cls, type_: type[Message]) -> Batch:
         """No messages; the one such batch of a type."""
-        return cls.make(type_, np.zeros(0, np.int64), np.zeros(0, np.int64), {})
+        return _empty(type_)  # type: ignore[arg-type]
 
     @classmethod
     def make(
@@ -143,6 +143,11 @@ class Batch:
         joined = cls.join(batches)
         order = np.lexsort((joined.sender, joined.world))
         return joined if (order[1:] > order[:-1]).all() else joined.take(order)
+
+
+@cache
+def _empty(type_: Any) -> Batch:
+    return Batch.make(type_, np.zeros(0, np.int64), np.zeros(0, np.int64), {})
 
 
 def _field_values(type_: type[Message], name: str, column: Column, value: Any, n: int) -> Any:

@@ -239,6 +239,7 @@ def derive(name: str, quat: np.ndarray, first: int, last: int, base: int, out: n
 
 
 def read_only(array: np.ndarray) -> np.ndarray:
+    """A view that cannot be written."""
     view = array[...]
     view.flags.writeable = False
     return view

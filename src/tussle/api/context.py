@@ -6,6 +6,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import lru_cache
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -49,7 +50,7 @@ class Context:
 
     def row_seeds(self, world: np.ndarray, block: np.ndarray) -> np.ndarray:
         """Key of each row's draws, (n,), uint64: the world's seed mixed with the block's name."""
-        return self.seeds[world] ^ self.block_keys[block]
+        return np.asarray(self.seeds[world] ^ self.block_keys[block])
 
     def split(self, n: int, run: Callable[[int, int], Any], least: int = 64) -> None:
         """Call run(first, last) over [0, n), in several threads where that is allowed and there is enough of it."""
@@ -60,7 +61,7 @@ class Context:
             self._pool = ThreadPoolExecutor(self.threads)
         edges = [n * i // self.threads for i in range(self.threads + 1)]
         for done in [
-            self._pool.submit(run, a, b) for a, b in zip(edges[:-1], edges[1:], strict=True) if b > a
+            self._pool.submit(run, a, b) for a, b in pairwise(edges) if b > a
         ]:
             done.result()
 

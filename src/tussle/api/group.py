@@ -119,12 +119,12 @@ class GroupView:
     @property
     def t(self) -> np.ndarray:
         """Time at the beginning of this call [s], (n,)."""
-        return self.context.clock.t[self.world] + self.substep * self.dt
+        return np.asarray(self.context.clock.t[self.world] + self.substep * self.dt)
 
     @property
     def step_count(self) -> np.ndarray:
         """Number of the step of each row's world, (n,)."""
-        return self.context.clock.step[self.world]
+        return np.asarray(self.context.clock.step[self.world])
 
     @property
     def scene(self) -> Scene:
@@ -176,7 +176,7 @@ class GroupView:
         """Neighbour index for searches without a radius; for kernels."""
         return any_index(self)
 
-    def by_place(self, index: Index, name: str) -> list[np.ndarray]:
+    def by_place(self, index: Index, name: str) -> tuple[np.ndarray, ...]:
         """Components of a body column of everybody in the order of an index's places; for kernels."""
         return self._bodies.by_place(index, name)
 

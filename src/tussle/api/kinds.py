@@ -50,8 +50,9 @@ class Controller(EntityPlugin):
 
 
 class Sensor(EntityPlugin):
-    """Measures after motion; writes channels for autonomies, and with outputs `belief_pos`, `belief_vel`, `belief_quat` the
-    state that the entity believes itself in; abstract.
+    """Measures after motion, and writes channels for autonomies; abstract.
+
+    Its outputs `belief_pos`, `belief_vel` and `belief_quat` are the state that the entity believes itself in.
     """
 
     kind = "sensor"

@@ -63,7 +63,7 @@ class WorldView(GroupView):
         self._writable = WorldBodies(bodies)
 
     @property
-    def bodies(self) -> WorldBodies:  # type: ignore[override]
+    def bodies(self) -> WorldBodies:
         return self._writable
 
     @property
@@ -110,10 +110,9 @@ class WorldView(GroupView):
         rows = self._rows(rows)
         if not len(rows):
             return
-        for name, value, k in (("pos", pos, 3), ("vel", vel, 3), ("quat", quat, 4)):
-            if value is not None:
-                value = np.asarray(value, float)
-                value = value[:, None] if value.ndim == 1 else value
+        for name, given, k in (("pos", pos, 3), ("vel", vel, 3), ("quat", quat, 4)):
+            if given is not None:
+                value = np.asarray(given, float).reshape(k, -1) if np.ndim(given) == 1 else np.asarray(given, float)
                 if value.shape[0] != k or value.shape[1] not in (1, len(rows)):
                     raise ParameterError(
                         f"w.move: {name} has shape {value.shape}; needed is ({k}, {len(rows)})"

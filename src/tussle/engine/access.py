@@ -11,6 +11,7 @@ import numpy as np
 
 from tussle.api.bodies import DERIVED, FLOATS, INTS, Bodies, derive
 from tussle.columns import EntityRef, Handle, Output, Param, State
+from tussle.engine import failure
 from tussle.engine.group import Binding, Group
 from tussle.engine.result import WorldResult
 from tussle.errors import ParameterError, SnapshotError, listed, nearest_name
@@ -255,7 +256,9 @@ def _ragged(binding: Binding) -> dict[str, Any]:
 
 
 def _save_handles(binding: Binding) -> dict[str, list[bytes]]:
-    save = lambda h: pickle.dumps((h is not None, None if h is None else binding.plugin.save_one(h)))  # noqa: E731
+    def save(h: Any) -> bytes:
+        return pickle.dumps((h is not None, None if h is None else binding.plugin.save_one(h)))
+
     return {k: [save(h) for h in held] for k, held in binding.handles.items()}
 
 
@@ -304,7 +307,7 @@ def _no_rows(group: Group, first: int) -> tuple[Any, ...]:
         first,
         empty,
         [{k: c.take(none) for k, c in b.ragged.items()} for b in group.walk()],
-        [dict.fromkeys(b.handles, []) for b in group.walk()],
+        [{k: [] for k in b.handles} for b in group.walk()],
     )
 
 
@@ -347,7 +350,7 @@ def _hashed(sim: Simulation, world: int) -> Iterator[tuple[str, Any]]:
         for binding in group.walk():
             yield from _hashed_columns(group, binding, mine)
     for referee in sim.referees:
-        for name, column in type(referee.spec).states().items():
+        for name in type(referee.spec).states():
             per, place = referee.places[name]
             array = referee.tables[per].array(place)
             yield (
@@ -383,7 +386,10 @@ def world_result(sim: Simulation, world: int, reason: str) -> WorldResult:
     scores: dict[int, float] = {}
     for referee in [*sim.interactions, *sim.metrics]:
         referee.view.caller = referee.plugin
-        found = _of_world(sim, referee.plugin.result(referee.view), world)
+        try:
+            found = _of_world(sim, referee.plugin.result(referee.view), world)
+        except Exception as error:
+            raise failure.raised(error, referee.plugin, where="result", step=steps, world=world) from error
         if found:
             result.metrics[referee.spec.instance_name] = found
         for team, score in (found.get("score") or {}).items() if referee in sim.metrics else ():
@@ -396,8 +402,7 @@ def world_result(sim: Simulation, world: int, reason: str) -> WorldResult:
 def _of_world(sim: Simulation, values: Mapping[str, np.ndarray], world: int) -> dict[str, Any]:
     out: dict[str, Any] = {}
     for name, array in values.items():
-        array = np.asarray(array)
-        item = array[..., world]
+        item = np.asarray(array)[..., world]
         out[name] = (
             {int(t): v.item() for t, v in zip(sim.context.teams, item, strict=True)}
             if item.ndim

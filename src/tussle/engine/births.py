@@ -49,7 +49,9 @@ class Newborn:
         world = np.concatenate([p.world for p in parts])
         ids = np.concatenate([p.id for p in parts])
         order = np.lexsort((ids, world))
-        take = lambda name: np.concatenate([getattr(p, name) for p in parts], axis=-1)[..., order]  # noqa: E731
+        def take(name: str) -> np.ndarray:
+            return np.asarray(np.concatenate([getattr(p, name) for p in parts], axis=-1)[..., order])
+
         values = {k: np.concatenate([p.values[k] for p in parts])[order] for k in parts[0].values}
         return cls(
             world[order],
@@ -157,8 +159,9 @@ class Births:
         stream, step = stream_key("birth", "position"), np.zeros(len(worlds), np.int64)
         if spec.placement == "uniform":
             draws = 2.0 * rng.uniform(seeds, stream, places, step, attempt, 3) - 1.0
-            return draws * np.array(spec.half_width)[:, None]
-        return rng.normal(seeds, stream, places, step, attempt, 3) * np.sqrt(np.array(spec.variance))[:, None]
+            return np.asarray(draws * np.array(spec.half_width)[:, None])
+        draws = rng.normal(seeds, stream, places, step, attempt, 3)
+        return np.asarray(draws * np.sqrt(np.array(spec.variance))[:, None])
 
     def create(
         self, block: int, worlds: np.ndarray, where: dict[str, np.ndarray] | None = None, rejects: Callable[..., bool] | None = None,
@@ -189,7 +192,9 @@ class Births:
         elif rejects is not None:
             assert taken is not None
             self._separate(block, spec, worlds, places, pos, rejects, taken)
-        value = lambda name: self.overrides.block_values(spec, name, worlds)  # noqa: E731
+        def value(name: str) -> np.ndarray:
+            return self.overrides.block_values(spec, name, worlds)
+
         jitter = self._normal(block, "heading", worlds, places, np.zeros(m, np.int64), 0, 1)[0]
         yaw = value("heading") + np.sqrt(spec.heading_variance) * jitter
         climb = value("climb")

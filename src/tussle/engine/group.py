@@ -118,6 +118,8 @@ class Group:
         self.name = name
         self.block = block
         self.place = 0
+        self.first: int
+        self.n: int
         self.context = context
         self.table = Table()
         self.first, self.n = bodies.n, 0

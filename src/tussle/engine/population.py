@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,9 +14,11 @@ from tussle.api import kernels
 from tussle.api.bodies import Bodies
 from tussle.api.context import Context
 from tussle.columns import Handle, RaggedColumn
+from tussle.engine import failure
 from tussle.engine.births import Newborn
 from tussle.engine.group import Binding, Group
 from tussle.engine.params import Overrides
+from tussle.errors import PluginError
 from tussle.mission import Block
 
 
@@ -68,6 +72,7 @@ class Population:
         self._by_key: dict[Any, Group] = {}
         self.changed = 0
         self.on_new_group: Callable[[], None] = lambda: None
+        self.on_failure: Callable[[int, PluginError], None] = lambda world, error: None
 
     # -- groups -------------------------------------------------------------------------------------------------------------
 
@@ -193,11 +198,24 @@ class Population:
             for name, place in group.belief.items():
                 group.table.array(place)[..., rows] = getattr(self.bodies, name)[..., group.first + rows]
             group.moving.caller = group.motion.plugin
-            group.motion.plugin.from_body(group.moving, rows)
+            with self._blaming(group, group.motion, rows):
+                group.motion.plugin.from_body(group.moving, rows)
             for binding in group.walk():
                 self._open_handles(group, binding, rows)
                 binding.view.caller = binding.plugin
-                binding.plugin.spawn(binding.view, rows)
+                with self._blaming(group, binding, rows):
+                    binding.plugin.spawn(binding.view, rows)
+
+    @contextmanager
+    def _blaming(self, group: Group, binding: Binding, rows: np.ndarray) -> Iterator[None]:
+        """An error of a plugin's hook for newborn rows becomes one that names it."""
+        try:
+            yield
+        except Exception as error:
+            worlds = np.unique(self.bodies.world[group.first + rows])
+            step = int(self.context.clock.step[worlds[0]])
+            world = int(worlds[0]) if len(worlds) == 1 else None
+            raise failure.raised(error, binding.plugin, where=group.name, step=step, world=world) from error
 
     def fill_params(self, group: Group, binding: Binding, rows: np.ndarray) -> None:
         """Set the parameters of rows of a group from their blocks and what is set per world."""
@@ -238,9 +256,14 @@ class Population:
         for name, column in type(binding.spec).columns.items():
             if isinstance(column, Handle):
                 for row in rows:
-                    binding.handles[name][row] = binding.plugin.open_one(
-                        self.handle_row(group, binding, int(row))
-                    )
+                    about = self.handle_row(group, binding, int(row))
+                    try:
+                        binding.handles[name][row] = binding.plugin.open_one(about)
+                    except Exception as error:
+                        where, step = f"{group.name} {about.id}", int(self.context.clock.step[about.world])
+                        self.on_failure(
+                            about.world, failure.raised(error, binding.plugin, where=where, step=step, world=about.world)
+                        )
 
     def _close_handles(self, gone: np.ndarray) -> None:
         for group in self.groups:
@@ -249,7 +272,15 @@ class Population:
                     for i in np.flatnonzero(gone[group.first : group.last]):
                         held, objects[i] = objects[i], None
                         if held is not None:
-                            binding.plugin.close_one(held)
+                            self._close_one(group, binding, held)
+
+    def _close_one(self, group: Group, binding: Binding, held: Any) -> None:
+        try:
+            binding.plugin.close_one(held)
+        except Exception as error:  # the others are to be closed all the same, and no result depends on it
+            said = failure.raised(error, binding.plugin, where=group.name, step=0, world=None)
+            text = f"{binding.spec.instance_name}, {group.name}: could not be closed: {said.message}"
+            warnings.warn(text, RuntimeWarning, stacklevel=2)
 
     def close_handles(self) -> None:
         """Release all objects outside the arrays."""

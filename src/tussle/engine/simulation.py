@@ -81,7 +81,11 @@ class Simulation:
         self.overrides = Overrides(mission, n)
         self.overrides.set(params or {}, np.arange(n))
         self._build(seeds_)
-        self.reset(range(n))
+        try:
+            self.reset(range(n))
+        except Exception:
+            self.close()
+            raise
 
     def _check(self, mission: Mission, seeds: Sequence[Any], on_error: str | None) -> None:
         if not isinstance(mission, Mission):
@@ -117,12 +121,15 @@ class Simulation:
         view.templates = [b.name for b in mission.blocks]
         view.publish_to = self.mail.publish_to
         self.mail.names = [p.instance_name for p in mission.networks]
-        bind = lambda specs: [Referee.bind(p, view, self.overrides) for p in specs]  # noqa: E731
+        def bind(specs: Iterable[Any]) -> list[Referee]:
+            return [Referee.bind(p, view, self.overrides) for p in specs]
+
         self.networks = bind(mission.networks)
         self.mail.networks = {r.spec.instance_name: r for r in self.networks}
         self.interactions, self.metrics = bind(mission.interactions), bind(mission.metrics)
         self._schedule: list[Call] | None = None
         self.population.on_new_group = self._forget_schedule
+        self.population.on_failure = self.record_failure
         self.population.prepare()
 
     def _forget_schedule(self) -> None:
@@ -261,11 +268,17 @@ class Simulation:
     def _start_referees(self, mask: np.ndarray) -> None:
         for referee in self.referees:
             if mask.all():
-                referee.view.caller = referee.plugin
-                referee.plugin.start(referee.view)
+                self._start(referee, referee.view)
             else:
-                call_referee(self.population, referee, mask, lambda r, w: r.plugin.start(w))
+                call_referee(self.population, referee, mask, self._start)
         self.take_over_moves()
+
+    def _start(self, referee: Referee, view: WorldView) -> None:
+        view.caller = referee.plugin
+        try:
+            referee.plugin.start(view)
+        except Exception as error:
+            raise failure.raised(error, referee.plugin, where="", step=0, world=None) from error
 
     def _create(self, due: Mapping[int, np.ndarray], at_start: bool = False) -> Newborn | None:
         rejecting = [r for r in self.interactions if type(r.plugin).rejects is not Interaction.rejects]
@@ -396,8 +409,8 @@ class Simulation:
             self._has_changed
         ):  # who is there has changed since the last look: births count too, since the last one may decide
             self._has_changed = False
-            for world, reason in self._lost_teams():
-                over.setdefault(world, reason)
+            for number, reason in self._lost_teams():
+                over.setdefault(number, reason)
         if over:
             self._end_and_park(over)
 

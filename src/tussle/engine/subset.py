@@ -62,7 +62,9 @@ def _sub_group(group: Group, bodies: Bodies, first: int, rows: np.ndarray) -> Gr
         view.services = {}
         views[id(getattr(group, name))] = view
         setattr(sub, name, view)
-    clone = lambda b: _sub_binding(b, views[id(b.view)], rows)  # noqa: E731
+    def clone(b: Binding) -> Binding:
+        return _sub_binding(b, views[id(b.view)], rows)
+
     sub.motion = clone(group.motion)
     sub.autonomies = [clone(b) for b in group.autonomies]
     sub.controllers = [clone(b) for b in group.controllers]

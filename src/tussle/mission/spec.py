@@ -54,6 +54,10 @@ def _plugins(where: str, value: Any, kind: type) -> tuple[Any, ...]:
     return plugins
 
 
+def _set(frozen: Any, name: str, value: Any) -> None:
+    object.__setattr__(frozen, name, value)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Block:
     """Entities of one make: how many, where, with which plugins.
@@ -114,22 +118,21 @@ class Block:
 
     def __post_init__(self) -> None:
         where = f"block {self.name!r}"
-        put = lambda name, value: object.__setattr__(self, name, value)  # noqa: E731 - frozen dataclasses are set up this way
         if not self.name or "." in self.name:
             raise MissionError(
                 f"{where}: a block's name is not empty and has no dot, since paths such as prey.Boids.gain use dots"
             )
         for name, unit in (("position", "m"), ("variance", "m^2"), ("half_width", "m")):
-            put(name, _numbers(f"{where}: {name}", getattr(self, name), unit, 3))
+            _set(self, name, _numbers(f"{where}: {name}", getattr(self, name), unit, 3))
         if self.velocity is not None:
-            put("velocity", _numbers(f"{where}: velocity", self.velocity, "m/s", 3))
+            _set(self, "velocity", _numbers(f"{where}: velocity", self.velocity, "m/s", 3))
         for name, unit in _BLOCK_NUMBERS.items():
             if getattr(self, name) is not None:
-                put(name, _number(f"{where}: {name}", getattr(self, name), unit))
+                _set(self, name, _number(f"{where}: {name}", getattr(self, name), unit))
         self._check_bounds(where)
-        put("autonomy", _plugins(f"{where}: autonomy", self.autonomy, Autonomy))
-        put("controller", _plugins(f"{where}: controller", self.controller, Controller))
-        put("sensor", _plugins(f"{where}: sensor", self.sensor, Sensor))
+        _set(self, "autonomy", _plugins(f"{where}: autonomy", self.autonomy, Autonomy))
+        _set(self, "controller", _plugins(f"{where}: controller", self.controller, Controller))
+        _set(self, "sensor", _plugins(f"{where}: sensor", self.sensor, Sensor))
         if isinstance(self.motion, type) or not isinstance(self.motion, MotionModel):
             raise MissionError(
                 f"{where}: motion = {self.motion!r} is not a motion model; each block has exactly one, such as motion=Unicycle()"
@@ -216,8 +219,7 @@ class Mission:
     name: str = ""
 
     def __post_init__(self) -> None:
-        put = lambda name, value: object.__setattr__(self, name, value)  # noqa: E731
-        put("blocks", tuple(self.blocks))
+        _set(self, "blocks", tuple(self.blocks))
         for block in self.blocks:
             if not isinstance(block, Block):
                 raise MissionError(f"mission: {block!r} is not a Block")
@@ -228,7 +230,7 @@ class Mission:
                     f"mission: two blocks are called {name!r}; paths and random numbers need their names to differ"
                 )
         for name in ("dt", "end", "start"):
-            put(name, _number(f"mission: {name}", getattr(self, name), "s"))
+            _set(self, name, _number(f"mission: {name}", getattr(self, name), "s"))
         if not self.dt > 0.0:
             raise MissionError(f"mission: dt = {self.dt!r} is not allowed; it takes a number of seconds > 0")
         if (
@@ -252,11 +254,11 @@ class Mission:
                 raise MissionError(
                     f"mission: end condition {condition!r} is not allowed; {listed(END_CONDITIONS)}"
                 )
-        put("end_conditions", conditions)
+        _set(self, "end_conditions", conditions)
         for name, kind in (("interactions", Interaction), ("metrics", Metric), ("networks", Network)):
-            put(name, _plugins(f"mission: {name}", getattr(self, name), kind))
+            _set(self, name, _plugins(f"mission: {name}", getattr(self, name), kind))
         if "GlobalNetwork" not in [p.instance_name for p in self.networks]:
-            put("networks", (stock.load("GlobalNetwork")(), *self.networks))
+            _set(self, "networks", (stock.load("GlobalNetwork")(), *self.networks))
 
     @property
     def steps(self) -> int:

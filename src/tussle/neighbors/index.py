@@ -67,7 +67,9 @@ class Room:
     @classmethod
     def of(cls, n: int) -> Room:
         """For n rows; the spans may turn out to need more."""
-        longs = lambda k: np.empty(k, np.int64)  # noqa: E731
+        def longs(k: int) -> Longs:
+            return np.empty(k, np.int64)
+
         return cls(longs(n), longs(n + 1), longs(n), padded(n), padded(n), padded(n), longs(n + 1), longs(2 * n + 64), longs(2 * n + 64))
 
 

@@ -58,4 +58,4 @@ class MotorSchemas(Autonomy):
     @service
     def longest_wish(self, g: GroupView) -> np.ndarray:
         """Length that a behaviour's wish should not exceed [m/s], (n,)."""
-        return self.max_speed
+        return np.asarray(self.max_speed)

@@ -57,8 +57,8 @@ class Straight(Autonomy):
     def _turn_back(self, g: GroupView) -> None:
         if self.fences:
             rows, heard = self.fences.latest()
-            for row, shape in zip(rows, heard.shape, strict=True):
-                self.fence[row] = shape
+            for row, told in zip(rows, heard.shape, strict=True):
+                self.fence[row] = told
                 self.is_fenced[row] = True
         for row in np.flatnonzero(self.is_fenced):
             shape: Any = self.fence[row]
