@@ -1,0 +1,93 @@
+"""The conformance kit: `check_plugin(MyPlugin)` in a test holds a plugin to the contract."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from tussle.api import MotionModel, Plugin
+from tussle.engine.conformance_columns import check_class_values, check_columns, class_values
+from tussle.engine.conformance_declarations import check_declarations
+from tussle.engine.conformance_game import Traces, build
+from tussle.engine.conformance_grade import check_grade
+from tussle.engine.conformance_limits import check_limits
+from tussle.engine.conformance_motion import check_motion
+from tussle.engine.conformance_stack import check_reset, check_snapshot, check_stacks
+from tussle.errors import ConformanceError, TussleError
+
+
+def check_plugin(cls: type[Plugin], *, companions: Sequence[Any] | None = None, **params: Any) -> None:
+    """Hold a plugin class to the contract, in small games that are made up around it.
+
+    The rules, by the names that errors give them:
+
+    * declarations: a docstring, no lists or dicts on the class, hooks only, SI units, defaults that are allowed.
+    * grade: "portable" source calls nothing whose last bits depend on the machine or on the number of rows; no chance but g.uniform.
+    * own columns, memory in columns: calls change the plugin's own columns and nothing else, and leave nothing elsewhere.
+    * stack invariance: a world alone is the same, bit for bit, in stacks of 1, 2, 7 and 64, in another order, with threads, deaths,
+      births in mid-run, moves, and worlds that end apart.
+    * reset: some worlds begin as if new while the others do not notice. snapshot: after restore the same future follows.
+    * finite: at every finite bound, and at a tenth and ten times each default.
+    * rollout, rows, body round trip, from_body, order of convergence, advance: for motion models.
+    * runs: it fits the game and raises no error.
+
+    Each structural switch and each choice of a text parameter is tried as well. With grade "external" nothing is promised of the bits,
+    and only the rest is checked.
+
+    Args:
+        cls: The class.
+        companions: Plugins as data that it needs beside it, in place of the kit's own: a motion model, a referee, a network ...
+        **params: Parameters other than the defaults.
+
+    Raises:
+        ConformanceError: The plugin breaks a rule; the message names the plugin, the rule and what was seen.
+    """
+    if not (isinstance(cls, type) and issubclass(cls, Plugin)):
+        raise ConformanceError(
+            getattr(cls, "__name__", repr(cls)), "declarations", "check_plugin takes the class of a plugin"
+        )
+    before = class_values(cls)
+    check_declarations(cls)
+    check_grade(cls)
+    plugin = cls(**params)
+    for number, variant in enumerate([plugin, *_variants(plugin)]):
+        try:
+            _play(variant, companions or (), is_first=number == 0)
+        except ConformanceError as error:
+            if number and repr(variant) not in error.evidence:
+                raise ConformanceError(
+                    error.plugin, error.rule, f"as {variant!r}, {error.evidence}"
+                ) from error
+            raise
+        except TussleError as error:
+            if isinstance(error.__cause__, ConformanceError):  # found inside a call, and told as that call's failure
+                raise error.__cause__ from None
+            raise ConformanceError(
+                cls.__name__, "runs", f"as {variant!r} in the kit's game: {error}"
+            ) from error
+        check_class_values(cls, before)
+
+
+def _play(plugin: Plugin, companions: Sequence[Any], is_first: bool) -> None:
+    game = build(plugin, companions)
+    check_columns(game)
+    if isinstance(plugin, MotionModel):
+        check_motion(game, is_first)
+    if type(plugin).grade != "external":
+        traces = Traces(game)
+        check_stacks(game, traces)
+        check_reset(game, traces)
+        check_snapshot(game, traces)
+    check_limits(game)
+
+
+def _variants(plugin: Plugin) -> Iterator[Plugin]:
+    """The plugin with one structural switch or choice changed."""
+    for name, column in plugin.params().items():
+        value = plugin.values[name]
+        if column.structural and column.dtype is bool and not column.is_text:
+            yield plugin.replace(**{name: not value})
+        elif column.is_text:
+            for choice in column.choices:
+                if choice != value:
+                    yield plugin.replace(**{name: choice})

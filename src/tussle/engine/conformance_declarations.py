@@ -1,0 +1,155 @@
+"""Rules of the conformance kit that need no game: what a class declares, and what it overrides."""
+
+from __future__ import annotations
+
+import inspect
+import pickle
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+from tussle import units
+from tussle.api import Controller, EasyAutonomy, Interaction, Metric, MotionModel, Network, Plugin
+from tussle.columns import Column, Input, Numbers, Output, Param, State
+from tussle.engine.wiring import BELIEF
+from tussle.errors import ConformanceError, TussleError, listed
+
+RULE = "declarations"
+HOOKS = frozenset(
+    ["spawn", "step", "step_one", "start", "result", "route", "rejects", "from_body", "to_body", "derivative", "advance", "integrator", "active_inputs", "active_outputs", "open_one", "close_one", "save_one", "load_one", "ready", "ready_timeout", "grade", "atomic", "max_worlds", "passthrough", "abstract", "kind"]
+)
+MACHINERY = frozenset({"columns", "services", "__signature__"})
+MUTABLE = (list, dict, set, bytearray, np.ndarray)
+MAGIC = frozenset(
+    ["__init__", "__new__", "__setattr__", "__getattr__", "__getattribute__", "__delattr__", "__eq__", "__hash__", "__reduce__", "__getstate__"]
+)
+
+
+def own_classes(cls: type) -> Iterator[type]:
+    """The class and those of its bases that are not the package's kinds, the class first."""
+    return (
+        base for base in cls.__mro__ if base is not object and not base.__module__.startswith("tussle.api.")
+    )
+
+
+def check_declarations(cls: type[Plugin]) -> None:
+    """The class is documented, holds nothing that changes, overrides hooks only, and its columns make sense.
+
+    Raises:
+        ConformanceError: It is not, or they do not.
+    """
+    problem = next(_problems(cls), None)
+    if problem:
+        raise ConformanceError(cls.__name__, RULE, problem)
+
+
+def _problems(cls: type[Plugin]) -> Iterator[str]:
+    if not (vars(cls).get("__doc__") or "").strip():
+        yield "the class has no docstring; its page begins with it"
+    yield from _attributes(cls)
+    yield from _hooks(cls)
+    for name, column in cls.columns.items():
+        yield from _column(name, column)
+    yield from _beliefs(cls)
+    yield from _as_data(cls)
+
+
+def _attributes(cls: type[Plugin]) -> Iterator[str]:
+    for base in own_classes(cls):
+        for name, value in vars(base).items():
+            if name in MACHINERY or isinstance(value, Column):
+                continue
+            if isinstance(value, MUTABLE) and not name.startswith("__"):
+                yield f"{name} is a {type(value).__name__} on the class, which all simulations share; declare a column, or make it a tuple"
+            if name in MAGIC and not (name == "__hash__" and value is None):
+                yield f"it defines {name}; only hooks are filled in ({listed(sorted(HOOKS & set(dir(cls))))})"
+            kind = next(
+                (b for b in cls.__mro__ if b.__module__.startswith("tussle.api.") and name in vars(b)), None
+            )
+            if kind is not None and name not in HOOKS and not name.startswith("__"):
+                yield f"it overrides {kind.__name__}.{name}, which is not a hook ({listed(sorted(HOOKS & set(dir(cls))))})"
+
+
+def _hooks(cls: type[Plugin]) -> Iterator[str]:
+    for hook, arguments in _needed(cls).items():
+        function = getattr(cls, hook)
+        if (getattr(function, "__module__", None) or "").startswith("tussle.api."):
+            yield f"it has no {hook}({', '.join(('self', *arguments))})"
+        elif inspect.isfunction(function):
+            given = list(inspect.signature(function).parameters.values())
+            required = [
+                p
+                for p in given
+                if p.default is p.empty and p.kind in {p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD}
+            ]
+            if len(required) != len(arguments) + 1:
+                yield f"{hook} takes ({', '.join(p.name for p in given)}); it is called as {hook}({', '.join(('self', *arguments))})"
+    if (
+        issubclass(cls, MotionModel)
+        and cls.derivative is None
+        and cls.advance is None
+        and cls.integrator is MotionModel.integrator
+    ):
+        yield "it has neither derivative nor advance"
+    if issubclass(cls, (Interaction, Metric)) and all(
+        getattr(cls, k).__module__.startswith("tussle.api.") for k in ("start", "step", "result")
+    ):
+        yield "it has neither start nor step nor result"
+
+
+def _needed(cls: type[Plugin]) -> dict[str, tuple[str, ...]]:
+    if issubclass(cls, MotionModel):
+        return {"from_body": ("body", "rows"), "to_body": ("body",)}
+    if issubclass(cls, Network):
+        return {"route": ("w", "messages")}
+    if issubclass(cls, (Interaction, Metric)) or (issubclass(cls, Controller) and cls.passthrough):
+        return {}
+    return {"step_one": ("me",)} if issubclass(cls, EasyAutonomy) else {"step": ("g",)}
+
+
+def _column(name: str, column: Column) -> Iterator[str]:
+    if not isinstance(column, Numbers):
+        return
+    for unit in column.units:
+        if not units.is_si(unit):
+            yield f"{name} is in {unit!r}; inside a simulation all numbers are SI (Param takes text_unit for mission files)"
+    if isinstance(column, Param):
+        for unit, text_unit in zip(column.units, column.text_units, strict=True):
+            if units.unit_of(unit).dimension != units.unit_of(text_unit).dimension:
+                yield f"{name} is in {unit!r} but in mission files in {text_unit!r}, which measures something else"
+        yield from _refuses(name, lambda: column.convert(column.default))
+    elif isinstance(column, (State, Input, Output)):
+        parts = column.default if isinstance(column.default, tuple) else (column.default,)
+        if isinstance(column.default, tuple) and len(parts) != len(column.fields):
+            yield f"{name} has {len(column.fields)} fields and {len(parts)} defaults"
+        if any(isinstance(v, float) and v != v for v in parts):
+            yield f"{name} begins as NaN, which no rule can tell from a mistake"
+
+
+def _refuses(name: str, action: Callable[[], Any]) -> Iterator[str]:
+    try:
+        action()
+    except TussleError as error:
+        yield f"{name}: {error}"
+
+
+def _beliefs(cls: type[Plugin]) -> Iterator[str]:
+    for name, (body, k, unit) in BELIEF.items():
+        column = cls.outputs().get(name)
+        if column is not None and (
+            len(column.fields) != k or any(not units.compatible(u, unit) for u in column.units)
+        ):
+            yield f"{name} is what the entity believes its {body} is: {k} channels in {unit or 'no unit'}"
+
+
+def _as_data(cls: type[Plugin]) -> Iterator[str]:
+    try:
+        plugin = cls()
+    except TussleError as error:
+        yield f"{cls.__name__}() fails: {error}"
+        return
+    if plugin != cls() or plugin.replace() != plugin:
+        yield f"two {cls.__name__}() are not equal, so some parameter does not compare by value"
+    if "<locals>" not in cls.__qualname__ and pickle.loads(pickle.dumps(plugin)) != plugin:
+        yield "it is another one after pickling"

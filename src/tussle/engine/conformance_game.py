@@ -1,0 +1,343 @@
+"""The conformance kit's game: a small mission around one plugin, and what became of each of its worlds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tussle.api import (
+    Autonomy,
+    Behavior,
+    Controller,
+    Interaction,
+    Message,
+    Metric,
+    MotionModel,
+    Network,
+    Plugin,
+    Publish,
+    Sensor,
+    Subscribe,
+    WorldPlugin,
+)
+from tussle.columns import Channel, Topic
+from tussle.engine import access
+from tussle.engine.conformance_partners import (
+    Driver,
+    Parent,
+    Reaper,
+    Wire,
+    Wisher,
+    Word,
+    can_say,
+    driver,
+    feeler,
+    sink,
+)
+from tussle.engine.simulation import Simulation
+from tussle.engine.wiring import BELIEF, read_channels, written_channels
+from tussle.errors import ConformanceError
+from tussle.mission import Block, Mission
+
+SEEDS = (11, 12, 13, 14, 15)
+"""Worlds that are followed. 13 dies out early (see `Reaper`)."""
+STEPS = 20
+WORLD_KINDS = (Interaction, Metric, Network)
+
+Columns = list[tuple[str, Any]]
+
+
+@dataclass(frozen=True)
+class Game:
+    """A mission around a plugin.
+
+    Attributes:
+        plugin: The plugin as data.
+        mission: With deaths, births, a move, and worlds that end apart.
+        quiet: The same without these.
+        paths: Where the plugin's parameters are, such as "red.Boids".
+    """
+
+    plugin: Any
+    mission: Mission
+    quiet: Mission
+    paths: tuple[str, ...]
+
+    def params(self, seeds: Sequence[int]) -> dict[str, list[Any]]:
+        """Parameters that differ from world to world, by the worlds' seeds."""
+        out: dict[str, list[Any]] = {}
+        for name in self.plugin.params():
+            values = [scaled(self.plugin, name, 1.03 - 0.02 * (seed % 3)) for seed in seeds]
+            if self.plugin.params()[name].is_row_data:
+                out[f"{self.paths[0]}.{name}"] = values
+        return out
+
+    def play(self, seeds: Sequence[int], threads: int = 1) -> Simulation:
+        """The mission's worlds of these seeds."""
+        return Simulation(self.mission, seeds, self.params(seeds), threads=threads, on_error="raise")
+
+
+def scaled(plugin: Any, name: str, factor: float) -> Any:
+    """A parameter's value times a factor where it is a real number of its own row and allows that, else as it is."""
+    column, value = plugin.params()[name], plugin.values[name]
+    if not column.is_row_data or column.dtype is not float or column.choices:
+        return value
+    changed = tuple(v * factor for v in value) if column.fields else value * factor
+    parts = changed if column.fields else (changed,)
+    return changed if all(is_within(column, v) for v in parts) else value
+
+
+def is_within(column: Any, value: float) -> bool:
+    """Whether a number is within a parameter's bounds."""
+    bounds = (
+        (column.ge, value.__ge__),
+        (column.gt, value.__gt__),
+        (column.le, value.__le__),
+        (column.lt, value.__lt__),
+    )
+    return all(bound is None or bool(compare(float(bound))) for bound, compare in bounds)
+
+
+# -- the mission ------------------------------------------------------------------------------------------------------------------
+
+
+def build(plugin: Any, companions: Sequence[Any] = ()) -> Game:
+    """A game around a plugin, with partners that feed it, read it and speak with it.
+
+    Args:
+        plugin: The plugin as data.
+        companions: Plugins as data that take the place of the kit's own where the plugin needs particular ones.
+    """
+    plugin = _with_children(plugin)
+    says, hears = _topics(plugin)
+    if isinstance(plugin, WorldPlugin):
+        first = _missions(plugin, companions, says, hears)
+        for message in _asked(first.quiet):
+            says.add((message, message.__name__, "GlobalNetwork"))
+        for message in _told(first.quiet):
+            hears.add((message, message.__name__, "GlobalNetwork"))
+    return _missions(plugin, companions, says, hears)
+
+
+def _with_children(plugin: Any) -> Any:
+    inner = {}
+    for name, column in plugin.children().items():
+        if not plugin.values[name]:
+            inner[name] = [
+                Wisher()
+                if issubclass(Wisher, column.kind) and column.kind is not Autonomy
+                else driver((), (), (), ())
+            ]
+    return plugin.replace(**inner) if inner else plugin
+
+
+def _topics(plugin: Any) -> tuple[set[Any], set[Any]]:
+    """What the driver is to say, and to hear: (message, topic, network)."""
+    says: set[Any] = set()
+    hears: set[Any] = set()
+    for name, column in plugin.topics().items():
+        assert isinstance(column, Topic), name
+        topic = plugin.values[column.topic_param] if column.topic_param else column.topic
+        network = plugin.values[column.network_param] if column.network_param else column.network
+        (hears if isinstance(column, Publish) else says).add(
+            (column.message, topic or column.message.__name__, network)
+        )
+    for name in plugin.children():
+        for child in plugin.values[name]:
+            for mine, theirs in zip((says, hears), _topics(child), strict=True):
+                mine |= theirs
+    if isinstance(plugin, Network):
+        for ends in (says, hears):
+            ends.add((Word, Word.__name__, plugin.instance_name))
+    return says, hears
+
+
+def _asked(mission: Mission) -> list[type[Message]]:
+    """Message types that the world plugins read in the first steps: these are not declared."""
+    asked: dict[type[Message], None] = {}
+    with Simulation(mission, 1) as sim:
+        view, inbox = sim.world_view, sim.world_view.inbox
+        view.__dict__["inbox"] = lambda type_: (asked.setdefault(type_), inbox(type_))[1]
+        sim.step(3)
+    return [message for message in asked if can_say(message)]
+
+
+def _told(mission: Mission) -> list[type[Message]]:
+    """Message types that the world plugins send in the first steps."""
+    told: dict[type[Message], None] = {}
+    with Simulation(mission, 1) as sim:
+        publish_to = sim.world_view.publish_to
+        assert publish_to is not None
+        sim.world_view.publish_to = lambda type_, network: (
+            told.setdefault(type_),
+            publish_to(type_, network),
+        )[1]
+        sim.step(3)
+    return list(told)
+
+
+def _missions(plugin: Any, companions: Sequence[Any], says: Iterable[Any], hears: Iterable[Any]) -> Game:
+    said = sorted((t for t in says if can_say(t[0])), key=_topic_order)
+    heard = sorted(hears, key=_topic_order)
+    other = lambda kind: [c for c in companions if isinstance(c, kind)]  # noqa: E731
+    own = lambda kind: [plugin] if isinstance(plugin, kind) else []  # noqa: E731
+    networks = [*own(Network), *other(Network)]
+    there = {"GlobalNetwork", *(n.instance_name for n in networks)}
+    networks += [Wire(name=name) for name in sorted({t[2] for t in (*said, *heard)} - there)]
+    varied = plugin.replace(**{name: scaled(plugin, name, 0.9) for name in plugin.params()})
+    blocks, path = [], plugin.instance_name
+    for name, team, one in (("red", 1, plugin), ("blue", 2, varied), ("late", 1, plugin)):
+        slots = _slots(one, companions, said, heard)
+        blocks.append(_block(name, team, slots))
+    if isinstance(plugin, Behavior):
+        path = f"Parent.{path}"
+    paths = (path,) if isinstance(plugin, WorldPlugin) else tuple(f"{b.name}.{path}" for b in blocks)
+    mission = Mission(
+        blocks=blocks,
+        dt=0.1,
+        end=0.1 * STEPS,
+        motion_multiplier=2,
+        end_conditions="time, all_dead",
+        interactions=[*own(Interaction), *other(Interaction), Reaper()],
+        metrics=[*own(Metric), *other(Metric)],
+        networks=networks,
+        name=f"conformance of {plugin.instance_name}",
+    )
+    quiet = mission.replace(blocks=blocks[:2], interactions=mission.interactions[:-1])
+    return Game(plugin, mission, quiet, paths if len(paths) == 1 else paths[:2])
+
+
+def _topic_order(topic: Any) -> tuple[str, str, str]:
+    return topic[2], topic[1], topic[0].__name__
+
+
+def _block(name: str, team: int, slots: dict[str, Any]) -> Block:
+    late = {"rate": 10.0, "first_birth": 0.3} if name == "late" else {}
+    x, count = {"red": (0.0, 5), "blue": (10.0, 4), "late": (-10.0, 2)}[name]
+    return Block(
+        name=name, team=team, count=count, position=(x, 0.0, 30.0), variance=(60.0, 60.0, 20.0), scatter_first=True,
+        heading=x / 5.0, heading_variance=1.0, climb=0.1, speed=6.0, **late, **slots,
+    )  # fmt: skip
+
+
+def _slots(
+    plugin: Any, companions: Sequence[Any], says: Sequence[Any], hears: Sequence[Any]
+) -> dict[str, Any]:
+    """Plugins of a block, by their place in it."""
+    holder = Parent(behaviors=[plugin]) if isinstance(plugin, Behavior) else plugin
+    mine = lambda kind: [p for p in (holder, *companions) if isinstance(p, kind)]  # noqa: E731
+    autonomies, controllers, sensors, motions = (
+        mine(Autonomy),
+        mine(Controller),
+        mine(Sensor),
+        mine(MotionModel),
+    )
+    fed = [c for a in autonomies for _, c in read_channels(a)]
+    measured = [c for s in sensors for name, c in written_channels(s) if name not in BELIEF]
+    fed = _without(fed, measured)
+    consumer = (controllers or motions or [None])[0]
+    wanted = [c for _, c in read_channels(consumer)] if consumer is not None else []
+    written = [c for a in autonomies for _, c in written_channels(a)]
+    pilot = driver(_without(wanted, written), measured, says, hears)
+    if not motions:
+        last = [c for c in controllers if not c.passthrough] or controllers
+        end = [c for _, c in written_channels(last[-1])] if last else []
+        motions = [sink(end or [*Driver.outputs().values(), *_without(written, [])])]
+    sensors = [*sensors, *([feeler(fed)] if fed else [])]
+    return {
+        "autonomy": [pilot, *autonomies],
+        "controller": controllers,
+        "motion": motions[0],
+        "sensor": sensors,
+    }
+
+
+def _without(columns: Iterable[Channel], others: Iterable[Channel]) -> list[Channel]:
+    """The columns, each once, that have a channel which no other has."""
+    there = {channel for c in others for channel in c.channels}
+    kept = []
+    for column in columns:
+        if not there.issuperset(column.channels):
+            kept.append(column)
+            there |= set(column.channels)
+    return kept
+
+
+# -- what became of a world -------------------------------------------------------------------------------------------------------
+
+
+def columns_of(sim: Simulation, world: int) -> Columns:
+    """All that belongs to one world now: (name, values); of a world that has ended, its result."""
+    done = sim.results[world]
+    if done is not None and not sim.running[world]:
+        parts = (done.end, done.steps, done.t, done.alive, done.metrics, done.scores, done.state_hash)
+        return [("result", repr(parts).encode())]
+    return [
+        (name, values if isinstance(values, bytes) else np.array(values))
+        for name, values in access._hashed(sim, world)
+    ]
+
+
+def first_difference(expected: Columns, found: Columns) -> str:
+    """The first column that differs in a bit, in words; "" when all are equal."""
+    for (name, a), (_, b) in zip(expected, found, strict=False):
+        if name == "result" and a != b:
+            return f"{name}: {a.decode()} against {b.decode() if isinstance(b, bytes) else b}"
+        data = [v if isinstance(v, bytes) else v.tobytes() for v in (a, b)]
+        if data[0] != data[1]:
+            if isinstance(a, bytes) or isinstance(b, bytes) or a.shape != b.shape or a.dtype != b.dtype:
+                return f"{name}: {_shape(a)} against {_shape(b)}"
+            items = [np.frombuffer(d, np.uint8).reshape(a.size, -1) for d in data]
+            item = int(np.flatnonzero((items[0] != items[1]).any(axis=1))[0])
+            return f"{name}: {a.ravel()[item]!r} against {b.ravel()[item]!r}"
+    if len(expected) != len(found):
+        return f"{len(expected)} columns against {len(found)}"
+    return ""
+
+
+def _shape(values: Any) -> str:
+    return f"{len(values)} bytes" if isinstance(values, bytes) else f"shape {values.shape}"
+
+
+class Traces:
+    """What each followed world is alone, after every step: the standard that all stacks are held to."""
+
+    def __init__(self, game: Game) -> None:
+        self.game = game
+        self.steps: dict[int, list[Columns]] = {}
+        for seed in SEEDS:
+            with game.play([seed]) as sim:
+                states = [columns_of(sim, 0)]
+                for _ in range(STEPS):
+                    sim.step()
+                    states.append(columns_of(sim, 0))
+            self.steps[seed] = states
+
+    def hold(self, sim: Simulation, world: int, seed: int, step: int, rule: str, where: str) -> None:
+        """A world of a stack must be now what it is alone after `step` steps.
+
+        Raises:
+            ConformanceError: It is not.
+        """
+        difference = first_difference(self.steps[seed][step], columns_of(sim, world))
+        if difference:
+            name = type(self.game.plugin).__name__
+            raise ConformanceError(
+                name, rule, f"{where}: after step {step} of the world with seed {seed}, {difference}"
+            )
+
+
+__all__ = [
+    "SEEDS",
+    "STEPS",
+    "Game",
+    "Plugin",
+    "Subscribe",
+    "Traces",
+    "build",
+    "columns_of",
+    "first_difference",
+]

@@ -1,0 +1,233 @@
+"""Rules of the conformance kit for motion models: rollouts are flights, kernels solve their equation, bodies go in and out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from tussle.api import MotionModel
+from tussle.engine.conformance_game import Game
+from tussle.engine.group import Group
+from tussle.engine.simulation import Simulation
+from tussle.errors import ConformanceError
+from tussle.numeric.rk4 import compile_derivative, rk4
+
+EPS = float(np.finfo(float).eps)
+STEPS = 10
+ORDER = 4.0
+SLACK = 0.5
+"""How far below its order a method may seem to be at a step where higher terms are not yet small."""
+WORST_ANGLE = 64.0 * EPS
+"""Error of an attitude that went through three angles and back: each of a dozen functions and products errs by up to 2 ulp of pi."""
+
+Integrator = Callable[..., None]
+
+
+class Flight:
+    """A quiet game of a motion model, with what was integrated in each step.
+
+    Attributes:
+        sim: After the last step.
+        group: The group of the model.
+        x: States before each step and after the last, (steps + 1, m, n).
+        u: Inputs in each step, (steps, k, n).
+        p: Parameters, (q, n).
+    """
+
+    def __init__(self, game: Game) -> None:
+        self.sim = sim = Simulation(game.quiet, [11, 12], on_error="raise")
+        self.group: Group = next(g for g in sim.population.groups if type(g.motion.spec) is type(game.plugin))
+        states, inputs = [self.group.x.copy()], []
+        integrate = self.group.integrate
+
+        def recorded(x: np.ndarray, u: np.ndarray, p: np.ndarray, dt: float, substeps: int) -> None:
+            inputs.append(np.array(u))
+            integrate(x, u, p, dt, substeps)
+            states.append(np.array(x))
+
+        self.group.integrate = recorded
+        sim.step(STEPS)
+        self.group.integrate = integrate
+        self.x, self.u, self.p = np.array(states), np.array(inputs), np.array(self.group.p)
+        self.dt, self.substeps = sim.mission.dt, sim.mission.motion_multiplier
+
+
+def check_motion(game: Game, is_default: bool) -> None:
+    """All rules for motion models.
+
+    Args:
+        game: Around the model.
+        is_default: The model is as its class is by default; `derivative` describes that variant.
+
+    Raises:
+        ConformanceError: The model breaks one.
+    """
+    model: Any = game.plugin
+    flight = Flight(game)
+    with flight.sim:
+        _check_rollout(model, flight)
+        _check_rows(model, flight)
+        _check_bodies(model, flight)
+        if model.derivative is not None and (is_default or model.advance is None):
+            equation = _solver(model)
+            _check_order(model, flight, equation)
+            _check_kernel(model, flight, equation)
+        else:
+            _check_convergence(model, flight)
+
+
+def _check_rollout(model: Any, flight: Flight) -> None:
+    params, place = {}, 0
+    for name, column in type(model).row_params().items():
+        k = len(column.fields) or 1
+        params[name] = flight.p[place : place + k] if column.fields else flight.p[place]
+        place += k
+    path = model.rollout(flight.x[0], flight.u, flight.dt, flight.substeps, params)
+    if path.tobytes() != np.ascontiguousarray(flight.x).tobytes():
+        step, field, row = (int(i[0]) for i in np.nonzero(path != flight.x))
+        text = f"{model.state().fields[field]} after step {step} is {path[step, field, row]!r} in the rollout and {flight.x[step, field, row]!r} in flight"
+        raise ConformanceError(type(model).__name__, "rollout", text)
+
+
+def _check_rows(model: Any, flight: Flight) -> None:
+    """A row's path must not depend on where it stands, or on how many others there are."""
+    integrate = model.integrator()
+    whole = flight.x[0].copy()
+    integrate(whole, flight.u[0], flight.p, flight.dt, flight.substeps)
+    n = whole.shape[1]
+    for a, b in ((0, 1), (1, n), (2, 7), (n - 3, n), (5, 6)):
+        part = np.ascontiguousarray(flight.x[0][:, a:b])
+        u, p = np.ascontiguousarray(flight.u[0][:, a:b]), np.ascontiguousarray(flight.p[:, a:b])
+        integrate(part, u, p, flight.dt, flight.substeps)
+        if part.tobytes() != np.ascontiguousarray(whole[:, a:b]).tobytes():
+            raise ConformanceError(
+                type(model).__name__,
+                "rows",
+                f"rows {a} to {b} of {n} fly otherwise on their own than among the others",
+            )
+
+
+# -- the equation and who solves it -----------------------------------------------------------------------------------------------
+
+
+def _solver(model: Any) -> Integrator:
+    """The shared driver on the model's own equation."""
+    f = compile_derivative(
+        type(model).derivative,
+        list(model.state().fields),
+        [*model.input_channels(), *_body_inputs(model)],
+        model._param_names(),
+    )
+    return lambda x, u, p, dt, substeps: rk4(f, x, u, p, dt, substeps)
+
+
+def _body_inputs(model: Any) -> list[str]:
+    return list(model.body_inputs())
+
+
+def _solved(integrate: Integrator, flight: Flight, step: int, dt: float, substeps: int) -> np.ndarray:
+    x = flight.x[step].copy()
+    integrate(x, flight.u[step], flight.p, dt, substeps)
+    return x
+
+
+def _rounding(flight: Flight, step: int, end: np.ndarray, substeps: int) -> np.ndarray:
+    """What rounding alone may add up to: a few units in the last place of everything that is added, per substep."""
+    size = np.abs(flight.x[step]) + np.abs(end) + np.abs(end - flight.x[step])
+    return np.asarray(16.0 * EPS * substeps * np.maximum(size, 1e-3).max(axis=1, keepdims=True))
+
+
+def _check_order(model: Any, flight: Flight, equation: Integrator) -> None:
+    """Halving the step divides the driver's error by 2^4 on a smooth equation; what does not is not one."""
+    dt = 5.0 * flight.dt
+    best = _solved(equation, flight, 0, dt, 64)
+    errors = [np.abs(_solved(equation, flight, 0, dt, n) - best).max(axis=0) for n in (2, 4)]
+    noise = _rounding(flight, 0, best, 64).max()
+    tells = errors[1] > 64.0 * noise
+    if tells.any():
+        order = np.log2(errors[0][tells] / errors[1][tells])
+        # A clamp or a sign inside the equation costs the order of single rows; a wrong equation that of all.
+        if np.median(order) < ORDER - SLACK:
+            text = f"halving the step lowers the error of the derivative's path by 2^{np.median(order):.2f}, not 2^4: it is not smooth in x"
+            raise ConformanceError(type(model).__name__, "order of convergence", text)
+
+
+def _check_kernel(model: Any, flight: Flight, equation: Integrator) -> None:
+    """The model's own kernel stays as near to the driver's path as both are to the truth (Richardson's estimate of the driver's error)."""
+    angles = np.array([unit == "rad" for unit in model.state().units])
+    for step in (0, STEPS // 2):
+        path = _solved(model.integrator(), flight, step, flight.dt, flight.substeps)
+        coarse = _solved(equation, flight, step, flight.dt, flight.substeps)
+        fine = _solved(equation, flight, step, flight.dt, 2 * flight.substeps)
+        error = np.abs(coarse - fine) * 16.0 / 15.0
+        tolerance = 2.0 * error.max(axis=1, keepdims=True) + _rounding(
+            flight, step, coarse, 2 * flight.substeps
+        )
+        gap = np.abs(path - coarse)
+        turn = 2.0 * np.pi
+        gap[angles] = np.abs(gap[angles] - turn * np.round(gap[angles] / turn))
+        if (gap > tolerance).any():
+            field, row = (int(i[0]) for i in np.nonzero(gap > tolerance))
+            text = (
+                f"{model.state().fields[field]} after one step is {path[field, row]!r} by advance and {coarse[field, row]!r} by the derivative; "
+                f"they may differ by {np.broadcast_to(tolerance, gap.shape)[field, row]:.1e}"
+            )
+            raise ConformanceError(type(model).__name__, "advance", text)
+
+
+def _check_convergence(model: Any, flight: Flight) -> None:
+    """A kernel without an equation to hold it to: finer substeps must at least lead somewhere."""
+    integrate = model.integrator()
+    ends = [_solved(integrate, flight, 0, flight.dt, n) for n in (8, 16, 32, 64)]
+    gaps = [float(np.abs(b - a).max()) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+    noise = float(_rounding(flight, 0, ends[-1], 64).max())
+    if gaps[2] > 0.75 * gaps[0] + 4.0 * noise:
+        text = f"halving the substeps three times changes the end of a step by {gaps[0]:.1e}, {gaps[1]:.1e}, {gaps[2]:.1e}; it does not converge"
+        raise ConformanceError(type(model).__name__, "convergence", text)
+
+
+# -- in and out of the body table -------------------------------------------------------------------------------------------------
+
+
+def _check_bodies(model: MotionModel, flight: Flight) -> None:
+    """What a model has published it takes over unchanged, and it goes on from where it is put."""
+    name = type(model).__name__
+    group, body = flight.group, flight.group.moving
+    bound: Any = group.motion.plugin
+    rows = np.arange(group.n)
+    before = {k: np.array(getattr(body, k)) for k in ("pos", "quat")}
+    kept = group.x.copy()
+    bound.from_body(body, rows)
+    bound.to_body(body)
+    size = np.abs(before["pos"]).max()
+    if np.abs(body.pos - before["pos"]).max() > 4.0 * EPS * size:
+        raise ConformanceError(
+            name,
+            "body round trip",
+            f"from_body and to_body move entities by {np.abs(body.pos - before['pos']).max():.1e} m",
+        )
+    steep = np.abs(np.cos(body.climb)) < 0.05  # there yaw and roll are one angle
+    turned = np.minimum(np.abs(body.quat - before["quat"]), np.abs(body.quat + before["quat"])).max(axis=0)
+    if (turned[~steep] > 20.0 * WORST_ANGLE).any():
+        raise ConformanceError(
+            name,
+            "body round trip",
+            f"from_body and to_body turn entities: quat changes by {turned[~steep].max():.1e}",
+        )
+    group.x[:] = kept
+    bound.to_body(body)
+    body.pos[:, :3] += 7.0
+    wanted = body.pos.copy()
+    others = group.x[:, 3:].copy()
+    bound.from_body(body, rows[:3])
+    if group.x[:, 3:].tobytes() != others.tobytes():
+        raise ConformanceError(
+            name, "from_body", "it sets the state of rows that it was not asked for; index with `rows`"
+        )
+    bound.to_body(body)
+    if not np.allclose(body.pos[:, :3], wanted[:, :3], rtol=4.0 * EPS, atol=4.0 * EPS * size):
+        raise ConformanceError(
+            name, "from_body", f"an entity put at {wanted[:, 0]} goes on from {body.pos[:, 0]}"
+        )

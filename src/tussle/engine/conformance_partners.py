@@ -1,0 +1,286 @@
+"""The other plugins of the conformance kit's game: they feed, read and hear the plugin under test, and trouble its worlds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import numpy as np
+
+from tussle.api import (
+    EVERYONE,
+    Autonomy,
+    Batch,
+    Behavior,
+    Children,
+    EntityRef,
+    Field,
+    GroupView,
+    Handle,
+    Input,
+    Interaction,
+    Message,
+    MotionBody,
+    MotionModel,
+    Network,
+    Output,
+    Param,
+    Publish,
+    Ragged,
+    RaggedColumn,
+    Sensor,
+    State,
+    Subscribe,
+    WorldView,
+    service,
+)
+from tussle.columns import Channel, Numbers
+from tussle.numeric.quaternion import quat_from_euler
+
+AMPLITUDES = {"m": 40.0, "m/s": 8.0, "rad": 1.0, "rad/s": 0.8, "m/s^2": 3.0}
+"""What is usual for small robots, by unit; 1 for all others."""
+
+
+class Word(Message):
+    """A message of the kit."""
+
+    number = Field(doc="Any number.")
+    target = EntityRef(doc="The sender's nearest.")
+
+
+def signal(entity: Any, step: Any, number: float) -> np.ndarray:
+    """A number in [-1, 1) that differs from entity to entity, step to step and number to number; exact on every machine."""
+    phase = 0.6180339887498949 * entity + 0.1357913579 * step + 0.3819660112501051 * number
+    return np.asarray(2.0 * (phase - np.floor(phase)) - 1.0)
+
+
+def squash(x: np.ndarray) -> np.ndarray:
+    """Into (-1, 1), each last bit of x counting; NaN where x is not finite, so that nobody overlooks it."""
+    return x / (1.0 + np.abs(x))
+
+
+def write_signals(plugin: Any, g: GroupView, feel: np.ndarray) -> None:
+    """Fill all outputs with signals of their units' size, changed a little by `feel` (n,)."""
+    number = 0
+    for name, column in plugin.outputs().items():
+        for values, unit in zip(np.atleast_2d(plugin.__dict__[name]), column.units, strict=True):
+            number += 1
+            size = AMPLITUDES.get(unit, 1.0)
+            values[:] = size * (0.8 * signal(g.id, g.step_count, number) + 0.1 * squash(feel))
+
+
+def can_say(message: type[Message]) -> bool:
+    """Whether the kit can make up messages of this type: an opaque object it cannot."""
+    return not any(isinstance(column, Handle) for column in message.fields.values())
+
+
+def made_up(message: type[Message], g: GroupView, rows: np.ndarray, nearest: np.ndarray) -> dict[str, Any]:
+    """Fields of one message of each of `rows` about the entity with the id `nearest`, (m,)."""
+    refs = [name for name, column in message.fields.items() if isinstance(column, EntityRef)]
+    out: dict[str, Any] = {}
+    for number, (name, column) in enumerate(message.fields.items()):
+        value = signal(g.id[rows], g.step_count[rows], number + 0.5)
+        if isinstance(column, EntityRef):
+            out[name] = g.id[rows] if len(refs) > 1 and name == refs[0] else nearest
+        elif name in {"pos", "vel", "quat"}:
+            out[name] = getattr(g, name)[:, rows]
+        elif "team" in name:
+            out[name] = g.team[rows]
+        elif isinstance(column, Ragged):
+            shape = (2, *column.shape)
+            out[name] = RaggedColumn.from_rows([np.full(shape, 10.0 * v) for v in value], column)
+        elif isinstance(column, Numbers):
+            size = np.array([AMPLITUDES.get(unit, 1.0) for unit in column.units])
+            numbers = size[:, None] * value if column.shape else size[0] * value
+            out[name] = numbers > 0.0 if column.dtype is bool else numbers.astype(column.dtype)
+    return out
+
+
+def weigh(batch: Batch) -> np.ndarray:
+    """One number per message that depends on all of its numbers, (n,)."""
+    total = signal(batch.sender, 0.0, 1.0)
+    for name, column in batch.type.fields.items():
+        if isinstance(column, (Field, EntityRef)):
+            for values in np.atleast_2d(batch.data[name]):
+                total = total + squash(values.astype(float))
+    return total
+
+
+class Driver(Autonomy):
+    """Writes values that vary with time and entity into its outputs, says and hears messages; abstract: `driver` adds the columns."""
+
+    grade = "portable"
+    heard = State(doc="Sum over all that was heard.")
+    own = Output(
+        "kit_x kit_y kit_z", unit="m/s", doc="Moves the entity when it is moved by the kit's own model."
+    )
+
+    def step(self, g: GroupView) -> None:
+        for name in self.topics():
+            inbox = self.__dict__[name]
+            if isinstance(type(self).columns[name], Subscribe) and inbox:
+                rows, batch = inbox.pairs()
+                np.add.at(self.heard, rows, weigh(batch))
+        feel = squash(g.pos[0]) + squash(g.vel[1]) + squash(g.yaw) + squash(self.heard)
+        for name in self.inputs():
+            for values in np.atleast_2d(self.__dict__[name]):
+                feel = feel + squash(values)
+        write_signals(self, g, feel)
+        self._speak(g)
+
+    def _speak(self, g: GroupView) -> None:
+        mouths = [name for name, column in self.topics().items() if isinstance(column, Publish)]
+        if mouths:
+            nearest = g.nearest().other[0]
+            rows = np.flatnonzero(((g.id + g.step_count) % 3 == 0) & (nearest >= 0))
+            for name in mouths if len(rows) else ():
+                message = type(self).columns[name].message  # type: ignore[attr-defined]
+                self.__dict__[name].publish(rows, **made_up(message, g, rows, g.bodies.id[nearest[rows]]))
+
+
+class Feeler(Sensor):
+    """Writes values that vary with time and entity for autonomies that read them; abstract: `sensor` adds the columns."""
+
+    grade = "portable"
+
+    def step(self, g: GroupView) -> None:
+        write_signals(self, g, g.pos[0])
+
+
+def drift(x: np.ndarray, u: np.ndarray, p: np.ndarray, dt: float, substeps: int) -> None:
+    """The kit's motion: every input pushes, none can push far."""
+    turn = np.zeros(x.shape[1])
+    x[3:6] *= 0.8
+    for j in range(u.shape[0]):
+        push = squash(u[j])
+        x[3 + j % 3] += 2.0 * push
+        x[3 + (j + 1) % 3] += push
+        turn += 0.5 * push
+    x[:3] += dt * x[3:6]
+    x[6] += dt * turn
+    x[7] = 0.3 * squash(turn)
+
+
+class Sink(MotionModel):
+    """Reads everything that is written for a motion model and moves by it; abstract: `sink` adds the inputs."""
+
+    grade = "portable"
+    x = State("x y z vx vy vz yaw climb", unit="m m m m/s m/s m/s rad rad")
+
+    def integrator(self) -> Callable[..., None]:
+        return drift
+
+    def from_body(self, body: MotionBody, rows: np.ndarray) -> None:
+        self.x[:3, rows], self.x[3:6, rows] = body.pos[:, rows], body.vel[:, rows]
+        self.x[6, rows], self.x[7, rows] = body.yaw[rows], body.climb[rows]
+
+    def to_body(self, body: MotionBody) -> None:
+        body.pos[:], body.vel[:] = self.x[:3], self.x[3:6]
+        body.set_attitude(0.0, self.x[7], self.x[6])
+
+
+class Wisher(Behavior):
+    """A behaviour for plugins that are made of behaviours."""
+
+    grade = "portable"
+
+    def step(self, g: GroupView) -> None:
+        self.wish[:] = [6.0 * signal(g.id, g.step_count, k) for k in range(3)]
+
+
+class Parent(Autonomy):
+    """Holds a behaviour; offers the service `longest_wish`, as who holds behaviours does."""
+
+    grade = "portable"
+    behaviors = Children(Behavior)
+    velocity = Output("velocity_x velocity_y velocity_z", unit="m/s")
+
+    def step(self, g: GroupView) -> None:
+        total = np.zeros((3, g.n))
+        for behavior in self.behaviors:
+            g.caller = behavior
+            behavior.step(g)
+            total += behavior.gain * behavior.wish
+        g.caller = self
+        self.velocity[:] = total
+
+    @service
+    def longest_wish(self, g: GroupView) -> np.ndarray:
+        """Length that a wish should not exceed [m/s], (n,)."""
+        return np.full(g.n, 20.0)
+
+
+class Wire(Network):
+    """Carries topics of a network that the mission does not have."""
+
+    grade = "portable"
+
+    def route(self, w: WorldView, messages: Batch) -> str:
+        return EVERYONE
+
+
+class Reaper(Interaction):
+    """Deaths, births, a move, and worlds that end apart; all by the world's seed alone."""
+
+    grade = "portable"
+    chance = Param(0.03, ge=0.0, le=1.0, doc="That an entity dies in a step.")
+    last_step = Param(12, doc="When every third world dies out.")
+
+    def step(self, w: WorldView) -> None:
+        step = w.step_count[w.world]
+        dice = w.uniform_pairs("death", w.world, w.id, np.zeros(w.n, np.int64))
+        is_doomed = (w.seeds[w.world] % 3 == 1) & (step >= self.last_step[w.world])
+        w.kill((dice < self.chance[w.world]) | is_doomed, "reaped")
+        born = np.flatnonzero(w.step_count == 5 + (w.seeds % 2).astype(np.int64))
+        place = 20.0 * w.uniform("place", 3)[:, born]
+        w.spawn("red", born, pos=place, vel=0.1 * place)
+        rows = np.flatnonzero((w.id == 2) & (step == 8))
+        level = np.zeros(len(rows))
+        w.move(rows, pos=w.pos[:, rows] + 3.0, quat=quat_from_euler(level + 0.1, level - 0.2, level + 1.0))
+
+
+# -- classes made to fit ----------------------------------------------------------------------------------------------------------
+
+
+def _inputs(channels: Iterable[Channel], optional: bool) -> dict[str, Any]:
+    return {
+        f"in_{i}": Input(" ".join(c.channels), unit=_units(c), optional=optional)
+        for i, c in enumerate(channels)
+    }
+
+
+def _outputs(channels: Iterable[Channel]) -> dict[str, Any]:
+    return {f"out_{i}": Output(" ".join(c.channels), unit=_units(c)) for i, c in enumerate(channels)}
+
+
+def _units(column: Channel) -> str:
+    return " ".join(unit or "1" for unit in column.units)
+
+
+def _made(base: type, name: str, columns: dict[str, Any]) -> Any:
+    return type(name, (base,), {"__doc__": base.__doc__, "__module__": __name__, **columns})()
+
+
+def driver(
+    writes: Iterable[Channel], reads: Iterable[Channel], says: Iterable[Any], hears: Iterable[Any]
+) -> Driver:
+    """An autonomy that writes and reads these channels, and has the other end of these topics: (message, topic, network)."""
+    columns = {**_outputs(writes), **_inputs(reads, optional=True)}
+    for i, (message, topic, network) in enumerate(says):
+        columns[f"says_{i}"] = Publish(message, topic=topic, network=network)
+    for i, (message, topic, network) in enumerate(hears):
+        columns[f"hears_{i}"] = Subscribe(message, topic=topic, network=network)
+    made: Driver = _made(Driver, "Driver", columns)
+    return made
+
+
+def sink(reads: Iterable[Channel]) -> Sink:
+    """A motion model that reads these channels."""
+    made: Sink = _made(Sink, "Sink", _inputs(reads, optional=False))
+    return made
+
+
+def feeler(writes: Iterable[Channel]) -> Feeler:
+    """A sensor that writes these channels."""
+    made: Feeler = _made(Feeler, "Feeler", _outputs(writes))
+    return made

@@ -1,0 +1,624 @@
+"""The kit catches what it says it catches: one deliberately broken plugin per rule."""
+
+from __future__ import annotations
+
+import math
+import random
+
+import numpy as np
+import pytest
+from numba import njit
+
+from tussle.api import (
+    Autonomy,
+    Behavior,
+    Controller,
+    EasyAutonomy,
+    EntityRef,
+    GroupView,
+    Input,
+    Interaction,
+    Metric,
+    MotionModel,
+    Network,
+    Output,
+    Param,
+    Plugin,
+    Publish,
+    Sensor,
+    State,
+    Subscribe,
+    check_plugin,
+)
+from tussle.errors import ConformanceError, TussleError
+from tussle.messages import CaptureEntity
+from tussle.numeric import cos, sin
+from tussle.numeric.kernel import kernel
+
+# -- sound plugins of each kind: what every broken one below would be without its fault -------------------------------------------
+
+
+class SoundAutonomy(Autonomy):
+    """Circles, the faster the more are near."""
+
+    grade = "portable"
+    gain = Param(0.5, unit="1/s", ge=0.0)
+    sight = Param(20.0, unit="m", gt=0.0)
+    turns = State(unit="rad", doc="Turned so far.")
+    favourite = EntityRef()
+    speed = Output(unit="m/s")
+    turn_rate = Output(unit="rad/s")
+    capture = Publish(CaptureEntity)
+
+    def step(self, g: GroupView) -> None:
+        near = g.near(self.sight)
+        other = g.nearest().other[0]
+        self.favourite[:] = np.where(other >= 0, g.bodies.id[np.maximum(other, 0)], 0)
+        self.turn_rate[:] = self.gain * near.count
+        self.turns[:] = self.turns + self.turn_rate * g.dt
+        self.speed[:] = 3.0 + near.sum(near.distance) / (1.0 + near.count) + g.uniform("speed")
+        self.capture.publish(np.flatnonzero(near.count > 2), target=self.favourite[near.count > 2])
+
+
+class SoundEasy(EasyAutonomy):
+    """Goes to its nearest."""
+
+    speed = Output(unit="m/s")
+    turn_rate = Output(unit="rad/s")
+
+    def step_one(self, me) -> None:
+        other = me.nearest()
+        me.speed = 0.0 if other is None else math.sqrt(me.distance(other))
+        me.turn_rate = math.sin(me.yaw)
+
+
+class SoundController(Controller):
+    """A first-order lag."""
+
+    grade = "portable"
+    lag = Param(0.5, unit="s", gt=0.0)
+    desired_speed = Input(unit="m/s")
+    speed = Output(unit="m/s")
+    memory = State(unit="m/s")
+
+    def step(self, g: GroupView) -> None:
+        part = g.dt / (self.lag + g.dt)
+        self.memory[:] = self.memory + part * (self.desired_speed - self.memory)
+        self.speed[:] = self.memory
+
+
+class SoundMotion(MotionModel):
+    """A car whose speed follows the command with a lag."""
+
+    grade = "portable"
+    lag = Param(0.5, unit="s", gt=0.0, ge=0.05)
+    x = State("east north up yaw v", unit="m m m rad m/s")
+    speed = Input(unit="m/s")
+    turn_rate = Input(unit="rad/s")
+
+    @staticmethod
+    def derivative(yaw, v, speed, turn_rate, lag):
+        return v * cos(yaw), v * sin(yaw), 0.0, turn_rate, (speed - v) / lag
+
+    def from_body(self, body, rows) -> None:
+        self.x[:3, rows] = body.pos[:, rows]
+        self.x[3, rows] = body.yaw[rows]
+        self.x[4, rows] = body.forward_speed[rows]
+
+    def to_body(self, body) -> None:
+        body.pos[:] = self.x[:3]
+        body.set_attitude(yaw=self.x[3])
+        body.vel[0], body.vel[1] = self.x[4] * cos(self.x[3]), self.x[4] * sin(self.x[3])
+        body.vel[2] = 0.0
+
+
+class SoundSensor(Sensor):
+    """Measures its height with noise."""
+
+    grade = "portable"
+    noise = Param(0.5, unit="m", ge=0.0)
+    height = Output(unit="m")
+
+    def step(self, g: GroupView) -> None:
+        self.height[:] = g.pos[2] + self.noise * g.normal("height")
+
+
+class SoundReferee(Interaction):
+    """Hurts who claims too much."""
+
+    grade = "portable"
+    harm = Param(0.1, ge=0.0)
+    claims = State(dtype=int, per="world")
+
+    def step(self, w) -> None:
+        claims = w.inbox(CaptureEntity)
+        np.add.at(self.claims, claims.world, 1)
+        rows = w.rows_at(claims.world, claims.sender)
+        np.subtract.at(w.bodies.health, rows, self.harm[claims.world])
+
+
+class SoundMetric(Metric):
+    """Counts how many of each team there are."""
+
+    grade = "portable"
+    seen = State(dtype=int, per="team")
+
+    def step(self, w) -> None:
+        np.add.at(self.seen, (w.team_numbers(w.team), w.world), 1)
+
+    def result(self, w):
+        return {"seen": self.seen, "score": self.seen}
+
+
+class SoundNetwork(Network):
+    """Everyone hears, one step late at most."""
+
+    grade = "portable"
+
+    def route(self, w, messages):
+        return "everyone"
+
+
+class SoundBehavior(Behavior):
+    """Wishes to be elsewhere."""
+
+    grade = "portable"
+
+    def step(self, g: GroupView) -> None:
+        self.wish[:] = 0.1 * g.pos + g.call("longest_wish")
+
+
+SOUND = [v for k, v in list(globals().items()) if k.startswith("Sound")]
+
+
+@pytest.mark.parametrize("cls", SOUND, ids=lambda cls: cls.__name__)
+def test_a_sound_plugin_passes(cls) -> None:
+    check_plugin(cls)
+
+
+def test_a_plugin_can_come_with_companions_and_parameters() -> None:
+    check_plugin(SoundAutonomy, companions=[SoundController(lag=0.2), SoundMotionOfSpeed()], gain=0.1)
+
+
+class SoundMotionOfSpeed(SoundMotion):
+    """The same car, which needs a speed only."""
+
+    turn_rate = Input(unit="rad/s", optional=True)
+
+
+# -- broken ones ------------------------------------------------------------------------------------------------------------------
+
+CALLS: list[int] = []
+SEEN: dict[int, float] = {}
+
+
+class NoDoc(SoundAutonomy):
+    pass
+
+
+class ListOnClass(SoundAutonomy):
+    """Keeps a list on the class."""
+
+    log = []  # noqa: RUF012 - that is the fault
+
+
+class NotAHook(SoundAutonomy):
+    """Overrides what the package relies on."""
+
+    def replace(self, **values):
+        return self
+
+
+class OwnInit(SoundAutonomy):
+    """Has a constructor of its own."""
+
+    def __init__(self, **values) -> None:
+        super().__init__(**values)
+
+
+class NoStep(Autonomy):
+    """Does nothing."""
+
+    speed = Output(unit="m/s")
+
+
+class WrongStep(SoundAutonomy):
+    """Wants more arguments than it is given."""
+
+    def step(self, g, dt):
+        pass
+
+
+class NotSI(SoundAutonomy):
+    """Thinks in knots."""
+
+    fast = Param(10.0, unit="kt")
+
+
+class HalfBelief(SoundSensor):
+    """Believes in a place on the map only."""
+
+    belief_pos = Output("belief_x belief_y", unit="m")
+
+
+class NothingToDo(Interaction):
+    """Neither starts nor steps."""
+
+
+class UsesSine(SoundAutonomy):
+    """NumPy's sine differs from machine to machine."""
+
+    def step(self, g: GroupView) -> None:
+        self.speed[:] = np.sin(g.yaw)
+
+
+class UsesMathInAnotherFunction(SoundAutonomy):
+    """So does that of the C library, wherever it is called."""
+
+    def step(self, g: GroupView) -> None:
+        self.speed[:] = [wobble(x) for x in g.yaw]
+
+
+def wobble(x: float) -> float:
+    return math.sin(x)
+
+
+class UsesMatrixProduct(SoundAutonomy):
+    """Products of matrices add in an order of their own."""
+
+    def step(self, g: GroupView) -> None:
+        self.speed[:] = (np.eye(3) @ g.vel)[0]
+
+
+class UsesPower(SoundAutonomy):
+    """Powers are not correctly rounded."""
+
+    def step(self, g: GroupView) -> None:
+        self.speed[:] = np.abs(g.pos[0]) ** 0.3
+
+
+class UsesSum(SoundAutonomy):
+    """Sums over rows depend on their number."""
+
+    def step(self, g: GroupView) -> None:
+        self.speed[:] = g.vel.sum() * 0.0 + g.vel[0]
+
+
+class UsesMean(SoundAutonomy):
+    """So do means."""
+
+    def step(self, g: GroupView) -> None:
+        self.speed[:] = g.vel[0] + 0.0 * np.mean(g.vel[1])
+
+
+class UsesLibmInDerivative(SoundMotion):
+    """A compiled cosine of the C library."""
+
+    @staticmethod
+    def derivative(yaw, v, speed, turn_rate, lag):
+        return v * math.cos(yaw), v * math.sin(yaw), 0.0, turn_rate, (speed - v) / lag
+
+
+@njit("f8(f8)")
+def compiled_exp(x):  # pragma: no cover
+    return math.exp(x)
+
+
+class UsesLibmInKernel(SoundAutonomy):
+    """A compiled exponential of the C library."""
+
+    def step(self, g: GroupView) -> None:
+        self.speed[:] = [compiled_exp(-abs(x)) for x in g.vel[0]]
+
+
+class UsesChance(SoundAutonomy):
+    """Draws from one generator for all."""
+
+    grade = "machine"
+
+    def step(self, g: GroupView) -> None:
+        self.speed[:] = random.random()
+
+
+class CountsRows(SoundAutonomy):
+    """Everybody flies faster the more there are, in other worlds too."""
+
+    def step(self, g: GroupView) -> None:
+        self.speed[:] = float(g.n)
+
+
+class KnowsItsRow(SoundAutonomy):
+    """The first one is special, wherever it stands."""
+
+    def step(self, g: GroupView) -> None:
+        self.speed[:] = 1.0 + (np.arange(g.n) == 0)
+
+
+class CountsCalls(SoundAutonomy):
+    """Remembers outside of columns: in a list of its module."""
+
+    def step(self, g: GroupView) -> None:
+        CALLS.append(1)
+        self.speed[:] = 1.0 / len(CALLS)
+
+
+class RemembersById(SoundAutonomy):
+    """Remembers outside of columns by entity, so that stacks do not show it, but a second game does."""
+
+    def step(self, g: GroupView) -> None:
+        for row, key in enumerate(zip(g.id.tolist(), g._seeds.tolist(), strict=True)):
+            SEEN[hash(key)] = SEEN.get(hash(key), 0.0) + float(g.step_count[row] == 0)
+            self.speed[row] = SEEN[hash(key)]
+
+
+class MissesSnapshot(SoundAutonomy):
+    """A memory that begins anew with each entity, but that a restore does not bring back."""
+
+    def spawn(self, g: GroupView, rows) -> None:
+        for row in rows:
+            SEEN[hash((int(g.id[row]), int(g._seeds[row])))] = 0.0
+
+    def step(self, g: GroupView) -> None:
+        for row, key in enumerate(zip(g.id.tolist(), g._seeds.tolist(), strict=True)):
+            SEEN[hash(key)] += 1.0
+            self.speed[row] = SEEN[hash(key)]
+
+
+class ForgetsToReset(SoundMetric):
+    """Begins anew when all worlds do, but not when some of them do."""
+
+    def start(self, w) -> None:
+        if not w.step_count.any():
+            SEEN.clear()
+
+    def step(self, w) -> None:
+        for world, seed in enumerate(w.seeds.tolist()):
+            SEEN[seed] = SEEN.get(seed, 0.0) + 1.0
+            self.seen[:, world] = SEEN[seed]
+
+
+class SetsAttribute(SoundAutonomy):
+    """Tries an attribute that is not declared."""
+
+    def step(self, g: GroupView) -> None:
+        self.previous = g.yaw.copy()
+
+
+class HidesAttribute(SoundAutonomy):
+    """Gets one past the guard."""
+
+    def step(self, g: GroupView) -> None:
+        self.__dict__["previous"] = g.yaw.copy()
+
+
+class ChangesClass(SoundAutonomy):
+    """Counts on the class."""
+
+    count = 0
+
+    def step(self, g: GroupView) -> None:
+        type(self).count = 1
+
+
+class WritesView(SoundAutonomy):
+    """Pushes others, which a view refuses."""
+
+    def step(self, g: GroupView) -> None:
+        g.vel[0] += 1.0
+
+
+class WritesAroundView(SoundAutonomy):
+    """Pushes others past the view."""
+
+    def step(self, g: GroupView) -> None:
+        g.table_bodies.vel[0] += 1.0
+
+
+class WritesParameter(SoundAutonomy):
+    """Adapts its own gain past the view."""
+
+    def step(self, g: GroupView) -> None:
+        self.gain.base[:] *= 0.9
+
+
+class WritesWrongColumn(Metric):
+    """A metric that heals."""
+
+    def step(self, w) -> None:
+        w.bodies.health[:] = 2.0
+
+
+class NanAtBound(SoundAutonomy):
+    """Divides by what may be zero."""
+
+    def step(self, g: GroupView) -> None:
+        with np.errstate(all="ignore"):
+            self.speed[:] = 0.0 * g.pos[0] / self.gain
+
+
+class NanInReferee(Interaction):
+    """Keeps a number that is none when its parameter is large."""
+
+    limit = Param(1.0, gt=0.0)
+    ratio = State(per="world")
+
+    def step(self, w) -> None:
+        self.ratio[:] = np.where(self.limit > 5.0, np.inf, 1.0)
+
+
+class RaisesAtBound(SoundAutonomy):
+    """Refuses a value that it declares as allowed."""
+
+    def step(self, g: GroupView) -> None:
+        if (self.gain == 0.0).any():
+            raise ValueError("gain is 0")
+
+
+class Raises(SoundAutonomy):
+    """Raises."""
+
+    def step(self, g: GroupView) -> None:
+        raise RuntimeError("no")
+
+
+class BrokenVariant(SoundAutonomy):
+    """Sound as long as nobody touches its switch."""
+
+    fancy = Param(False, structural=True)
+
+    def step(self, g: GroupView) -> None:
+        self.speed[:] = float(g.n) if self.fancy else 1.0
+
+
+class RolloutOfItsOwn(SoundMotion):
+    """Flies otherwise than it plans: its path depends on more than its state."""
+
+    def to_body(self, body) -> None:
+        self.x[0] += 1e-9
+        SoundMotion.to_body(self, body)
+
+
+class JumpyDerivative(SoundMotion):
+    """A state equation with steps in it."""
+
+    @staticmethod
+    def derivative(yaw, v, speed, turn_rate, lag):
+        return (1.0 if yaw * 7.0 - math.floor(yaw * 7.0) > 0.5 else -1.0), v * 3.0, yaw * yaw, 3.0, (speed - v) / lag
+
+
+@kernel("F2w F2 F2 f8 i8")
+def euler(x, u, p, dt, substeps):
+    """One Euler step where the equation asks for better."""
+    for i in range(x.shape[1]):
+        x[0, i] += dt * x[4, i] * cos(x[3, i])
+        x[1, i] += dt * x[4, i] * sin(x[3, i])
+        x[3, i] += dt * u[1, i]
+        x[4, i] += dt * (u[0, i] - x[4, i]) / p[0, i]
+
+
+class EulerKernel(SoundMotion):
+    """A kernel that does not solve the equation."""
+
+    advance = euler
+
+
+@kernel("F2w F2 F2 f8 i8")
+def place_counts(x, u, p, dt, substeps):
+    """The last row flies elsewhere."""
+    for i in range(x.shape[1]):
+        x[0, i] += dt * u[0, i] * (1.0 + 1e-16 * i)
+    x[1, x.shape[1] - 1] += 1e-12
+
+
+class RowsDiffer(SoundMotion):
+    """A kernel whose result depends on where a row stands."""
+
+    derivative = None
+    advance = place_counts
+
+
+class Displaces(SoundMotion):
+    """Publishes another place than it took over."""
+
+    def to_body(self, body) -> None:
+        SoundMotion.to_body(self, body)
+        body.pos[2] += 0.5
+
+
+class SetsAllRows(SoundMotion):
+    """Takes over rows that it was not asked for."""
+
+    def from_body(self, body, rows) -> None:
+        SoundMotion.from_body(self, body, np.arange(body.n))
+        self.x[4] = 0.0
+
+
+class IgnoresBody(SoundMotion):
+    """Goes on from where it was, wherever it is put."""
+
+    def from_body(self, body, rows) -> None:
+        self.x[3, rows] = body.yaw[rows]
+
+
+BROKEN = {
+    "declarations": [NoDoc, ListOnClass, NotAHook, OwnInit, NoStep, WrongStep, NotSI, HalfBelief, NothingToDo],
+    "grade": [
+        *(UsesSine, UsesMathInAnotherFunction, UsesMatrixProduct, UsesPower, UsesSum, UsesMean),
+        *(UsesLibmInDerivative, UsesLibmInKernel, UsesChance),
+    ],
+    "stack invariance": [CountsRows, KnowsItsRow, CountsCalls, RemembersById],
+    "snapshot": [MissesSnapshot],
+    "reset": [ForgetsToReset],
+    "runs": [SetsAttribute, WritesView, Raises],
+    "memory in columns": [HidesAttribute, ChangesClass],
+    "own columns": [WritesAroundView, WritesParameter, WritesWrongColumn],
+    "finite": [NanAtBound, NanInReferee, RaisesAtBound],
+    "rollout": [RolloutOfItsOwn],
+    "order of convergence": [JumpyDerivative],
+    "advance": [EulerKernel],
+    "rows": [RowsDiffer],
+    "body round trip": [Displaces],
+    "from_body": [SetsAllRows, IgnoresBody],
+}
+
+
+@pytest.mark.parametrize(
+    ("rule", "cls"), [(rule, cls) for rule, classes in BROKEN.items() for cls in classes], ids=lambda v: getattr(v, "__name__", "")
+)
+def test_a_broken_plugin_is_caught(rule: str, cls: type[Plugin]) -> None:
+    CALLS.clear()
+    SEEN.clear()
+    with pytest.raises(ConformanceError) as caught:
+        check_plugin(cls)
+    assert (caught.value.rule, caught.value.plugin) == (rule, cls.__name__), str(caught.value)
+    assert cls.__name__ in str(caught.value)
+    assert caught.value.evidence
+
+
+def test_variants_are_named() -> None:
+    with pytest.raises(ConformanceError, match=r"stack invariance.*as BrokenVariant\(fancy=True\)"):
+        check_plugin(BrokenVariant)
+
+
+def test_evidence_says_seed_step_and_column() -> None:
+    with pytest.raises(ConformanceError, match=r"step \d+ of the world with seed \d+, .*: .* against "):
+        check_plugin(CountsRows)
+    with pytest.raises(ConformanceError, match=r"with gain = 0\.0, "):
+        check_plugin(NanAtBound)
+    with pytest.raises(ConformanceError, match=r"test_kit\.py:\d+ uses np\.sin"):
+        check_plugin(UsesSine)
+    with pytest.raises(ConformanceError, match=r"step has written into vel, which is not its own"):
+        check_plugin(WritesAroundView)
+
+
+def test_what_is_external_promises_no_bits() -> None:
+    class Joystick(CountsRows):
+        """Moves as somebody outside wants."""
+
+        grade = "external"
+
+    check_plugin(Joystick)
+
+
+def test_only_plugins_are_checked() -> None:
+    with pytest.raises(ConformanceError, match="the class of a plugin"):
+        check_plugin(SoundAutonomy())
+    assert issubclass(ConformanceError, TussleError)
+
+
+class Listener(Autonomy):
+    """Hears on a network that the mission would not have."""
+
+    grade = "portable"
+    words = Subscribe(CaptureEntity, network="Radio")
+    heard = State()
+    speed = Output(unit="m/s")
+
+    def step(self, g: GroupView) -> None:
+        rows, _ = self.words.pairs()
+        np.add.at(self.heard, rows, 1.0)
+        self.speed[:] = self.heard
+
+
+def test_networks_and_messages_are_made_up_where_a_plugin_needs_them() -> None:
+    check_plugin(Listener)
