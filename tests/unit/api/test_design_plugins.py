@@ -9,7 +9,7 @@ from small_worlds import block, mission
 
 from tussle import Block, Mission, Simulation
 from tussle.api import Autonomy, Output, Param
-from tussle.errors import DeclarationError, ParameterError
+from tussle.errors import DeclarationError, ParameterError, PluginError
 from tussle.stock import SimpleCapture, SimpleCaptureMetrics, SingleIntegrator, Straight, Unicycle, UnicyclePID
 
 
@@ -157,7 +157,7 @@ def test_a_model_without_from_body_says_so():
     class Half(MotionModelWithState):
         pass
 
-    with pytest.raises(TypeError, match="Half has no from_body"):
+    with pytest.raises(PluginError, match="Half, a, world 0, step 0: .*Half has no from_body"):
         Simulation(mission(block(motion=Half(), autonomy=Driver())))
 
 
