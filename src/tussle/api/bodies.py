@@ -110,6 +110,7 @@ class Bodies:
         self._derived: dict[str, Kept] = {}
         self._indexes: dict[Any, Index] = getattr(self, "_indexes", {})
         self._laid_out: dict[Any, Kept] = {}
+        self._newest: Kept | None = None
         self._by_place: dict[tuple[int, str], Kept] = {}
         self._layout: tuple[np.ndarray, ...] | None = None
         self._read_only: BodyView | None = None
@@ -191,6 +192,7 @@ class Bodies:
             else:
                 index.build(x, y, z, reaches)
             kept.version = self.version
+        self._newest = kept
         return index  # type: ignore[no-any-return]
 
     def by_place(self, index: Index, name: str) -> tuple[np.ndarray, ...]:
@@ -218,6 +220,13 @@ class Bodies:
                 kernels.floats_by_place(values, index.order, column)
         kept.version, kept.built = self.version, index.built
         return kept.columns  # type: ignore[no-any-return]
+
+    def any_index(self) -> Index:
+        """An index for searches without a radius, whose result does not depend on it: one that is up to date, if there is one."""
+        newest = self._newest
+        if newest is None or newest.version != self.version:
+            return self.index(self.usual_reach())
+        return newest.columns[0]  # type: ignore[no-any-return]
 
     def usual_reach(self) -> float:
         """A reach for searches that need none: of an index that is up to date, else all, else one that suits the density [m]."""

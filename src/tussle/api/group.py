@@ -15,7 +15,6 @@ from tussle.api.draw import Draw
 from tussle.api.pairs import (
     Nearest,
     Pairs,
-    any_index,
     find_near_rows,
     find_nearest,
     find_nearest_row,
@@ -51,15 +50,21 @@ class GroupView:
         self.substep = 0
         self.caller: Any = None
         self.failing_row: int | None = None
+        self._seen: list[str] = []
         self.services: dict[str, Callable[..., Any]] = {}
         self.belief: dict[str, np.ndarray] = {}
         self.reset(bodies, first, last)
 
+    def own_cache(self) -> None:
+        """After a copy: forget names without the original's forgetting them too."""
+        self._seen = list(self._seen)
+
     def reset(self, bodies: Bodies, first: int, last: int) -> None:
         """Look at other rows, after the table has been repacked."""
         own = self.__dict__
-        for name in (*FLOATS, *INTS, "_seeds"):
+        for name in self._seen:
             own.pop(name, None)
+        self._seen.clear()
         self._bodies = bodies
         self._derived: dict[str, Kept] = {}
         self.first, self.last = first, last
@@ -73,9 +78,11 @@ class GroupView:
                 getattr(self._bodies, name)[..., self.first : self.last] if own is None else own
             )
             self.__dict__[name] = array
+            self._seen.append(name)
             return array
         if name == "_seeds":
             self._seeds = self.context.row_seeds(self.world, self.block)
+            self._seen.append(name)
             return self._seeds
         allowed = [*FLOATS, *INTS, *DERIVED, "t", "dt", "n"]
         raise AttributeError(f"g has no {name!r}{nearest_name(name, allowed)}; {listed(allowed)}")
@@ -174,7 +181,7 @@ class GroupView:
 
     def any_index(self) -> Index:
         """Neighbour index for searches without a radius; for kernels."""
-        return any_index(self)
+        return self._bodies.any_index()
 
     def by_place(self, index: Index, name: str) -> tuple[np.ndarray, ...]:
         """Components of a body column of everybody in the order of an index's places; for kernels."""

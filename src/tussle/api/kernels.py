@@ -161,3 +161,12 @@ def gather_ints(source, index, out):
         for j in range(index.shape[0]):
             if index[j] >= 0:
                 out[r, j] = source[r, index[j]]
+
+
+@kernel("B2 I B2w")
+def gather_truths(source, index, out):
+    """Columns index of source (k, n) into out (k, m); index -1 leaves out as it is."""
+    for r in range(source.shape[0]):
+        for j in range(index.shape[0]):
+            if index[j] >= 0:
+                out[r, j] = source[r, index[j]]

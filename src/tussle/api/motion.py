@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from tussle.api.bodies import DERIVED, FLOATS, Bodies, derive
+from tussle.api.bodies import DERIVED, FLOATS, derive
 from tussle.api.group import GroupView
 from tussle.api.kinds import EntityPlugin
 from tussle.columns import Param, State
@@ -32,10 +32,12 @@ class MotionBody(GroupView):
         if name in WRITABLE:
             array = getattr(self._bodies, name)[:, self.first : self.last]
             self.__dict__[name] = array
+            self._seen.append(name)
             return array
         if name == "rows":
             rows = tuple(row for column in WRITABLE for row in getattr(self, column))
             self.__dict__[name] = rows
+            self._seen.append(name)
             return rows
         if name == "forward_speed":
             east, north, up = self.forward
@@ -49,10 +51,6 @@ class MotionBody(GroupView):
         out = np.empty((k, self.n) if k > 1 else self.n)
         derive(name, self._bodies.quat, self.first, self.last, self.first, out)
         return out
-
-    def reset(self, bodies: Bodies, first: int, last: int) -> None:
-        self.__dict__.pop("rows", None)
-        super().reset(bodies, first, last)
 
     def set_attitude(self, roll: Any = 0.0, climb: Any = 0.0, yaw: Any = 0.0) -> None:
         """Write quat from bank (right wing down positive), elevation (nose up positive) and heading [rad], each (n,) or a number."""

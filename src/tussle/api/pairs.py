@@ -106,14 +106,9 @@ def _checked(teams: Any) -> Any:
     raise ParameterError(f"teams = {teams!r} is not allowed; it is 'own', 'other', a team number or None")
 
 
-def any_index(g: GroupView) -> Index:
-    """An index for searches without a radius, whose result does not depend on it: cells only where there are many rows."""
-    return g.table_bodies.index(g.table_bodies.usual_reach())
-
-
 def find_nearest(g: GroupView, k: int, teams: Any) -> Nearest:
     """See `GroupView.nearest`."""
-    index = any_index(g)
+    index = g.table_bodies.any_index()
     x, y, z = g.pos
     if isinstance(teams, np.ndarray):
         other, square = np.empty((k, g.n), np.int64), np.empty((k, g.n))
@@ -131,7 +126,7 @@ def find_nearest(g: GroupView, k: int, teams: Any) -> Nearest:
 
 def find_nearest_row(g: GroupView, row: int, team: int | None) -> int:
     """Body row of the nearest other entity of one row, (of a team); -1 when there is none."""
-    index = any_index(g)
+    index = g.table_bodies.any_index()
     x, y, z = g.pos[:, row : row + 1]
     other, square = np.empty((1, 1), np.int64), np.empty((1, 1))
     mode, wanted = (search.ANY, 0.0) if team is None else (search.SAME, float(team))

@@ -112,7 +112,8 @@ class WorldView(GroupView):
             return
         for name, given, k in (("pos", pos, 3), ("vel", vel, 3), ("quat", quat, 4)):
             if given is not None:
-                value = np.asarray(given, float).reshape(k, -1) if np.ndim(given) == 1 else np.asarray(given, float)
+                value = np.asarray(given, float)
+                value = value[:, None] if value.ndim == 1 else value
                 if value.shape[0] != k or value.shape[1] not in (1, len(rows)):
                     raise ParameterError(
                         f"w.move: {name} has shape {value.shape}; needed is ({k}, {len(rows)})"

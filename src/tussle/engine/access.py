@@ -203,8 +203,10 @@ def write(sim: Simulation, path: str, values: Any) -> None:
 def _check_written(path: str, values: np.ndarray, column: Any) -> None:
     if np.issubdtype(values.dtype, np.floating) and np.isnan(values).any():
         raise ParameterError(f"{path!r}: values hold NaN")
-    if isinstance(column, Param) and not column.fields:
-        for value in np.unique(values):
+    if column is None and not path.endswith(".health") and not np.isfinite(values).all():
+        raise ParameterError(f"{path!r}: values must be finite")
+    if isinstance(column, Param):
+        for value in np.unique(values, axis=-1).T if column.fields else np.unique(values):
             column.convert(value, path)
 
 
@@ -247,6 +249,7 @@ def snapshot(sim: Simulation) -> Snapshot:
         "referees": [r.copy() for r in sim.referees],
         "mail": sim.mail.save(),
         "wishes": list(sim.world_view.births),
+        "params": sim.overrides.save(),
     }
     return Snapshot(sim.mission, sim.context.seeds.copy(), groups, world)
 
@@ -294,6 +297,7 @@ def restore(sim: Simulation, saved: Snapshot) -> None:
     sim.running[:], sim.failed[:] = world["running"], world["failed"]
     sim.results, sim.parked = list(world["results"]), dict(world["parked"])
     sim.world_view.births = list(world["wishes"])
+    sim.overrides.restore(world["params"])
     sim.after_restore()
     for referee, columns in zip(sim.referees, world["referees"], strict=True):
         referee.restore(columns)

@@ -8,11 +8,12 @@ from typing import Any
 from tussle.api import MotionModel, Plugin
 from tussle.engine.conformance_columns import check_class_values, check_columns, class_values
 from tussle.engine.conformance_declarations import check_declarations
-from tussle.engine.conformance_game import Traces, build
+from tussle.engine.conformance_game import build
 from tussle.engine.conformance_grade import check_grade
 from tussle.engine.conformance_limits import check_limits
 from tussle.engine.conformance_motion import check_motion
 from tussle.engine.conformance_stack import check_reset, check_snapshot, check_stacks
+from tussle.engine.conformance_traces import Traces
 from tussle.errors import ConformanceError, TussleError
 
 
@@ -60,7 +61,9 @@ def check_plugin(cls: type[Plugin], *, companions: Sequence[Any] | None = None, 
                 ) from error
             raise
         except TussleError as error:
-            if isinstance(error.__cause__, ConformanceError):  # found inside a call, and told as that call's failure
+            if isinstance(
+                error.__cause__, ConformanceError
+            ):  # found inside a call, and told as that call's failure
                 raise error.__cause__ from None
             raise ConformanceError(
                 cls.__name__, "runs", f"as {variant!r} in the kit's game: {error}"

@@ -51,7 +51,12 @@ def check_columns(game: Game) -> None:
 
 def class_values(cls: type[Plugin]) -> dict[str, Any]:
     """What stands on the class and its own bases now."""
-    return {f"{base.__name__}.{k}": v for base in own_classes(cls) for k, v in vars(base).items() if k not in MACHINERY and not k.startswith("__")}
+    return {
+        f"{base.__name__}.{k}": v
+        for base in own_classes(cls)
+        for k, v in vars(base).items()
+        if k not in MACHINERY and not k.startswith("__")
+    }
 
 
 def check_class_values(cls: type[Plugin], before: dict[str, Any]) -> None:

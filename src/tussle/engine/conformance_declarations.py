@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 import pickle
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -16,14 +17,19 @@ from tussle.engine.wiring import BELIEF
 from tussle.errors import ConformanceError, TussleError, listed
 
 RULE = "declarations"
-HOOKS = frozenset(
-    ["spawn", "step", "step_one", "start", "result", "route", "rejects", "from_body", "to_body", "derivative", "advance", "integrator", "active_inputs", "active_outputs", "open_one", "close_one", "save_one", "load_one", "ready", "ready_timeout", "grade", "atomic", "max_worlds", "passthrough", "abstract", "kind"]
-)
+HOOKS_NAMES = """
+    spawn step step_one start result route rejects from_body to_body derivative advance integrator active_inputs
+    active_outputs open_one close_one save_one load_one ready ready_timeout grade atomic max_worlds passthrough
+    abstract kind
+"""
+HOOKS = frozenset(HOOKS_NAMES.split())
 MACHINERY = frozenset({"columns", "services", "__signature__"})
 MUTABLE = (list, dict, set, bytearray, np.ndarray)
-MAGIC = frozenset(
-    ["__init__", "__new__", "__setattr__", "__getattr__", "__getattribute__", "__delattr__", "__eq__", "__hash__", "__reduce__", "__getstate__"]
-)
+MAGIC_NAMES = """
+    __init__ __new__ __setattr__ __getattr__ __getattribute__ __delattr__ __eq__ __hash__ __reduce__
+    __getstate__
+"""
+MAGIC = frozenset(MAGIC_NAMES.split())
 
 
 def own_classes(cls: type) -> Iterator[type]:
@@ -120,10 +126,11 @@ def _column(name: str, column: Column) -> Iterator[str]:
                 yield f"{name} is in {unit!r} but in mission files in {text_unit!r}, which measures something else"
         yield from _refuses(name, lambda: column.convert(column.default))
     elif isinstance(column, (State, Input, Output)):
-        parts = column.default if isinstance(column.default, tuple) else (column.default,)
-        if isinstance(column.default, tuple) and len(parts) != len(column.fields):
+        default: Any = column.default
+        parts = default if isinstance(default, tuple) else (default,)
+        if isinstance(default, tuple) and len(parts) != len(column.fields):
             yield f"{name} has {len(column.fields)} fields and {len(parts)} defaults"
-        if any(isinstance(v, float) and v != v for v in parts):
+        if any(isinstance(v, float) and math.isnan(v) for v in parts):
             yield f"{name} begins as NaN, which no rule can tell from a mistake"
 
 
@@ -151,5 +158,5 @@ def _as_data(cls: type[Plugin]) -> Iterator[str]:
         return
     if plugin != cls() or plugin.replace() != plugin:
         yield f"two {cls.__name__}() are not equal, so some parameter does not compare by value"
-    if "<locals>" not in cls.__qualname__ and pickle.loads(pickle.dumps(plugin)) != plugin:
+    if "<locals>" not in cls.__qualname__ and pickle.loads(pickle.dumps(plugin)) != plugin:  # noqa: S301 - our own bytes
         yield "it is another one after pickling"

@@ -1,12 +1,10 @@
-"""The conformance kit's game: a small mission around one plugin, and what became of each of its worlds."""
+"""The conformance kit's game: a small mission around one plugin."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
-
-import numpy as np
 
 from tussle.api import (
     Autonomy,
@@ -17,14 +15,11 @@ from tussle.api import (
     Metric,
     MotionModel,
     Network,
-    Plugin,
     Publish,
     Sensor,
-    Subscribe,
     WorldPlugin,
 )
 from tussle.columns import Channel, Topic
-from tussle.engine import access
 from tussle.engine.conformance_partners import (
     Driver,
     Parent,
@@ -39,15 +34,12 @@ from tussle.engine.conformance_partners import (
 )
 from tussle.engine.simulation import Simulation
 from tussle.engine.wiring import BELIEF, read_channels, written_channels
-from tussle.errors import ConformanceError
 from tussle.mission import Block, Mission
 
 SEEDS = (11, 12, 13, 14, 15)
 """Worlds that are followed. 13 dies out early (see `Reaper`)."""
 STEPS = 20
 WORLD_KINDS = (Interaction, Metric, Network)
-
-Columns = list[tuple[str, Any]]
 
 
 @dataclass(frozen=True)
@@ -147,8 +139,9 @@ def _topics(plugin: Any) -> tuple[set[Any], set[Any]]:
         )
     for name in plugin.children():
         for child in plugin.values[name]:
-            for mine, theirs in zip((says, hears), _topics(child), strict=True):
-                mine |= theirs
+            its_says, its_hears = _topics(child)
+            says |= its_says
+            hears |= its_hears
     if isinstance(plugin, Network):
         for ends in (says, hears):
             ends.add((Word, Word.__name__, plugin.instance_name))
@@ -182,9 +175,8 @@ def _told(mission: Mission) -> list[type[Message]]:
 def _missions(plugin: Any, companions: Sequence[Any], says: Iterable[Any], hears: Iterable[Any]) -> Game:
     said = sorted((t for t in says if can_say(t[0])), key=_topic_order)
     heard = sorted(hears, key=_topic_order)
-    other = lambda kind: [c for c in companions if isinstance(c, kind)]  # noqa: E731
-    own = lambda kind: [plugin] if isinstance(plugin, kind) else []  # noqa: E731
-    networks = [*own(Network), *other(Network)]
+    all_: list[Any] = [plugin, *companions]
+    networks: list[Any] = [p for p in all_ if isinstance(p, Network)]
     there = {"GlobalNetwork", *(n.instance_name for n in networks)}
     networks += [Wire(name=name) for name in sorted({t[2] for t in (*said, *heard)} - there)]
     varied = plugin.replace(**{name: scaled(plugin, name, 0.9) for name in plugin.params()})
@@ -201,8 +193,8 @@ def _missions(plugin: Any, companions: Sequence[Any], says: Iterable[Any], hears
         end=0.1 * STEPS,
         motion_multiplier=2,
         end_conditions="time, all_dead",
-        interactions=[*own(Interaction), *other(Interaction), Reaper()],
-        metrics=[*own(Metric), *other(Metric)],
+        interactions=[*(p for p in all_ if isinstance(p, Interaction)), Reaper()],
+        metrics=[p for p in all_ if isinstance(p, Metric)],
         networks=networks,
         name=f"conformance of {plugin.instance_name}",
     )
@@ -215,7 +207,7 @@ def _topic_order(topic: Any) -> tuple[str, str, str]:
 
 
 def _block(name: str, team: int, slots: dict[str, Any]) -> Block:
-    late = {"rate": 10.0, "first_birth": 0.3} if name == "late" else {}
+    late: dict[str, Any] = {"rate": 10.0, "first_birth": 0.3} if name == "late" else {}
     x, count = {"red": (0.0, 5), "blue": (10.0, 4), "late": (-10.0, 2)}[name]
     return Block(
         name=name, team=team, count=count, position=(x, 0.0, 30.0), variance=(60.0, 60.0, 20.0), scatter_first=True,
@@ -228,13 +220,9 @@ def _slots(
 ) -> dict[str, Any]:
     """Plugins of a block, by their place in it."""
     holder = Parent(behaviors=[plugin]) if isinstance(plugin, Behavior) else plugin
-    mine = lambda kind: [p for p in (holder, *companions) if isinstance(p, kind)]  # noqa: E731
-    autonomies, controllers, sensors, motions = (
-        mine(Autonomy),
-        mine(Controller),
-        mine(Sensor),
-        mine(MotionModel),
-    )
+    kinds = (Autonomy, Controller, Sensor, MotionModel)
+    given: list[Any] = [holder, *companions]
+    autonomies, controllers, sensors, motions = ([p for p in given if isinstance(p, kind)] for kind in kinds)
     fed = [c for a in autonomies for _, c in read_channels(a)]
     measured = [c for s in sensors for name, c in written_channels(s) if name not in BELIEF]
     fed = _without(fed, measured)
@@ -264,80 +252,3 @@ def _without(columns: Iterable[Channel], others: Iterable[Channel]) -> list[Chan
             kept.append(column)
             there |= set(column.channels)
     return kept
-
-
-# -- what became of a world -------------------------------------------------------------------------------------------------------
-
-
-def columns_of(sim: Simulation, world: int) -> Columns:
-    """All that belongs to one world now: (name, values); of a world that has ended, its result."""
-    done = sim.results[world]
-    if done is not None and not sim.running[world]:
-        parts = (done.end, done.steps, done.t, done.alive, done.metrics, done.scores, done.state_hash)
-        return [("result", repr(parts).encode())]
-    return [
-        (name, values if isinstance(values, bytes) else np.array(values))
-        for name, values in access._hashed(sim, world)
-    ]
-
-
-def first_difference(expected: Columns, found: Columns) -> str:
-    """The first column that differs in a bit, in words; "" when all are equal."""
-    for (name, a), (_, b) in zip(expected, found, strict=False):
-        if name == "result" and a != b:
-            return f"{name}: {a.decode()} against {b.decode() if isinstance(b, bytes) else b}"
-        data = [v if isinstance(v, bytes) else v.tobytes() for v in (a, b)]
-        if data[0] != data[1]:
-            if isinstance(a, bytes) or isinstance(b, bytes) or a.shape != b.shape or a.dtype != b.dtype:
-                return f"{name}: {_shape(a)} against {_shape(b)}"
-            items = [np.frombuffer(d, np.uint8).reshape(a.size, -1) for d in data]
-            item = int(np.flatnonzero((items[0] != items[1]).any(axis=1))[0])
-            return f"{name}: {a.ravel()[item]!r} against {b.ravel()[item]!r}"
-    if len(expected) != len(found):
-        return f"{len(expected)} columns against {len(found)}"
-    return ""
-
-
-def _shape(values: Any) -> str:
-    return f"{len(values)} bytes" if isinstance(values, bytes) else f"shape {values.shape}"
-
-
-class Traces:
-    """What each followed world is alone, after every step: the standard that all stacks are held to."""
-
-    def __init__(self, game: Game) -> None:
-        self.game = game
-        self.steps: dict[int, list[Columns]] = {}
-        for seed in SEEDS:
-            with game.play([seed]) as sim:
-                states = [columns_of(sim, 0)]
-                for _ in range(STEPS):
-                    sim.step()
-                    states.append(columns_of(sim, 0))
-            self.steps[seed] = states
-
-    def hold(self, sim: Simulation, world: int, seed: int, step: int, rule: str, where: str) -> None:
-        """A world of a stack must be now what it is alone after `step` steps.
-
-        Raises:
-            ConformanceError: It is not.
-        """
-        difference = first_difference(self.steps[seed][step], columns_of(sim, world))
-        if difference:
-            name = type(self.game.plugin).__name__
-            raise ConformanceError(
-                name, rule, f"{where}: after step {step} of the world with seed {seed}, {difference}"
-            )
-
-
-__all__ = [
-    "SEEDS",
-    "STEPS",
-    "Game",
-    "Plugin",
-    "Subscribe",
-    "Traces",
-    "build",
-    "columns_of",
-    "first_difference",
-]

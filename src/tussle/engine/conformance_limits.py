@@ -117,7 +117,7 @@ def _not_finite(sim: Simulation) -> tuple[int, str]:
                     found = _first(group.table.array(binding.places[name]))
                     if found is not None:
                         return int(world[found[0]]), f"{'.'.join(binding.path)}.{name} is {found[1]}"
-            for name, lists in binding.ragged.items():
+            for name in binding.ragged:
                 items = np.atleast_2d(binding.plugin.__dict__[name].data)
                 if not isinstance(type(binding.spec).columns[name], Param) and not np.isfinite(items).all():
                     item = int(np.flatnonzero(~np.isfinite(items).all(axis=0))[0])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -181,7 +182,7 @@ def _check_convergence(model: Any, flight: Flight) -> None:
     """A kernel without an equation to hold it to: finer substeps must at least lead somewhere."""
     integrate = model.integrator()
     ends = [_solved(integrate, flight, 0, flight.dt, n) for n in (8, 16, 32, 64)]
-    gaps = [float(np.abs(b - a).max()) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+    gaps = [float(np.abs(b - a).max()) for a, b in pairwise(ends)]
     noise = float(_rounding(flight, 0, ends[-1], 64).max())
     if gaps[2] > 0.75 * gaps[0] + 4.0 * noise:
         text = f"halving the substeps three times changes the end of a step by {gaps[0]:.1e}, {gaps[1]:.1e}, {gaps[2]:.1e}; it does not converge"

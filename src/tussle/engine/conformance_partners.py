@@ -56,7 +56,7 @@ def signal(entity: Any, step: Any, number: float) -> np.ndarray:
 
 def squash(x: np.ndarray) -> np.ndarray:
     """Into (-1, 1), each last bit of x counting; NaN where x is not finite, so that nobody overlooks it."""
-    return x / (1.0 + np.abs(x))
+    return np.asarray(x / (1.0 + np.abs(x)))
 
 
 def write_signals(plugin: Any, g: GroupView, feel: np.ndarray) -> None:

@@ -6,7 +6,8 @@ from typing import Any
 
 from tussle.api import Plugin
 from tussle.columns import Handle
-from tussle.engine.conformance_game import SEEDS, STEPS, Game, Traces
+from tussle.engine.conformance_game import SEEDS, STEPS, Game
+from tussle.engine.conformance_traces import Traces
 from tussle.engine.simulation import Simulation
 
 STACKS: tuple[tuple[int, int], ...] = ((1, 2), (2, 1), (7, 1), (64, 2))

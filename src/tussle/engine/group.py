@@ -137,6 +137,7 @@ class Group:
         self.sensors = [self._bind(p, self.sensing, ()) for p in block.sensor]
         self._believe()
         self.integrate = self.motion.plugin.integrator()
+        self._place_motion()
         self.table.allocate(0)
         self.attach(bodies, bodies.n)
 
@@ -267,20 +268,23 @@ class Group:
         for view in self.views:
             view.reset(bodies, first, self.last)
 
-    def _attach_motion(self) -> None:
-        motion, data = self.motion, self.table.arrays[float]
-        plugin = motion.plugin
-        state = next(k for k, c in type(plugin).states().items() if c.fields)
-        self.x = self.table.array(motion.places[state])
+    def _place_motion(self) -> None:
+        """Where the motion model's state, inputs and parameters lie in the table."""
+        motion, plugin = self.motion, self.motion.plugin
+        self.x_place = motion.places[next(k for k, c in type(plugin).states().items() if c.fields)]
         params = [motion.places[k] for k in type(plugin).row_params()]
         first = params[0].first if params else 0
-        self.p = data[first : first + sum(max(1, p.k) for p in params)]
+        self.p_rows = slice(first, first + sum(max(1, p.k) for p in params))
         rows = [r for k in plugin.active_inputs() for r in self._rows_of(motion, k)]
         self.body_inputs = plugin.body_inputs()
         side_by_side = rows == list(range(rows[0], rows[0] + len(rows))) if rows else True
         self.u_rows = rows
-        self.u = data[rows[0] : rows[0] + len(rows)] if rows and side_by_side else data[:0]
+        self.u_slice = slice(rows[0], rows[0] + len(rows)) if rows and side_by_side else slice(0, 0)
         self.stacks_inputs = bool(self.body_inputs) or not side_by_side
+
+    def _attach_motion(self) -> None:
+        data = self.table.arrays[float]
+        self.x, self.u, self.p = self.table.array(self.x_place), data[self.u_slice], data[self.p_rows]
 
     def _rows_of(self, binding: Binding, name: str) -> tuple[int, ...]:
         link = binding.links.get(name)

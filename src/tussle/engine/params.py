@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping
 from typing import Any
 
@@ -12,14 +13,15 @@ from tussle.errors import MissionError, ParameterError, listed, nearest_name
 from tussle.mission import Block, Mission
 
 BLOCK_VALUES = {
-    "heading": "rad",
-    "climb": "rad",
-    "roll": "rad",
-    "speed": "m/s",
-    "health": "",
-    "radius": "m",
-    "mass": "kg",
+    "heading": Param(0.0, unit="rad"),
+    "climb": Param(0.0, unit="rad"),
+    "roll": Param(0.0, unit="rad"),
+    "speed": Param(0.0, unit="m/s", ge=0.0),
+    "health": Param(1.0, gt=0.0),
+    "radius": Param(1.0, unit="m", gt=0.0),
+    "mass": Param(1.0, unit="kg", gt=0.0),
 }
+"""Numbers of a block that may differ from world to world, with the bounds that the block itself has."""
 
 
 class Overrides:
@@ -44,14 +46,19 @@ class Overrides:
         Raises:
             ParameterError: The path leads nowhere, or a value is not allowed.
         """
+        checked = []  # all of them before any is set
         for path, value in values.items():
             key, column = self._find(path)
+            if column.ragged:
+                raise ParameterError(f"{path!r} is a list, which is no column of a stack; set it in the mission")
             many = (
                 isinstance(value, (list, np.ndarray))
                 and len(value) == len(worlds)
                 and np.ndim(value) > len(column.shape)
             )
             items = [column.convert(v, path) for v in (value if many else [value] * len(worlds))]
+            checked.append((key, column, items))
+        for key, column, items in checked:
             if column.structural:
                 row = self.structural.setdefault(key, [None] * self.n_worlds)
                 for w, item in zip(worlds, items, strict=True):
@@ -63,14 +70,22 @@ class Overrides:
             self.columns[key][worlds] = np.asarray(items, float)
             self.given[key][worlds] = True
 
+    def save(self) -> list[dict[Any, Any]]:
+        """What has been set, for snapshots."""
+        return [{k: copy.copy(v) for k, v in part.items()} for part in (self.columns, self.given, self.structural)]
+
+    def restore(self, saved: list[dict[Any, Any]]) -> None:
+        """Go back to what `save` gave."""
+        self.columns, self.given, self.structural = ({k: copy.copy(v) for k, v in part.items()} for part in saved)
+
     def _find(self, path: str) -> tuple[tuple[str, tuple[str, ...], str], Param]:
         head, *rest = path.split(".")
         world = {p.instance_name: p for p in self.mission.world_plugins}
         if head in self.blocks and len(rest) == 1 and rest[0] in BLOCK_VALUES:
-            column = Param(0.0, unit=BLOCK_VALUES[rest[0]])
+            column = copy.copy(BLOCK_VALUES[rest[0]])
             column.name, column.owner = rest[0], head
             return (head, (), rest[0]), column
-        if head in self.blocks and rest:
+        if head in self.blocks:
             block = self.mission.blocks[self.blocks[head]]
             plugins = {p.instance_name: p for p in block.plugins}
         elif head in world:

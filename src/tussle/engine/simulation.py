@@ -83,6 +83,7 @@ class Simulation:
         self._build(seeds_)
         try:
             self.reset(range(n))
+            self._schedule = Schedule(self).compose()
         except Exception:
             self.close()
             raise
@@ -190,7 +191,7 @@ class Simulation:
             The result of each world so far.
         """
         while self.running.any():
-            if until is not None and float(self.t[self.running].min()) > until - 0.5 * self.mission.dt:
+            if until is not None and float(self.t[self.running].min()) >= until - 1e-6 * self.mission.dt:
                 break
             self._resumed.wait()
             self._step()

@@ -59,6 +59,7 @@ def _sub_group(group: Group, bodies: Bodies, first: int, rows: np.ndarray) -> Gr
     for name in ("thinking", "steering", "sensing", "moving"):
         view = copy.copy(getattr(group, name))
         view.is_subset = True
+        view.own_cache()
         view.services = {}
         views[id(getattr(group, name))] = view
         setattr(sub, name, view)
@@ -115,6 +116,7 @@ def call_referee(
     rows = np.flatnonzero(worlds[bodies.world])
     sub_bodies = _sub_bodies(bodies, rows)
     sub_view = copy.copy(view)
+    sub_view.own_cache()
     sub_view.deaths, sub_view.moved, sub_view.births = [], [], []
     sub_view.only = worlds
     sub_view.reset(sub_bodies, 0, len(rows))

@@ -12,6 +12,9 @@ from tussle.api import kernels
 DTYPES: dict[type, Any] = {float: np.float64, int: np.int64, bool: np.bool_}
 
 
+_GATHER = {float: kernels.gather_floats, int: kernels.gather_ints, bool: kernels.gather_truths}
+
+
 @dataclass(frozen=True, slots=True)
 class Place:
     """Where a column lies: `k` rows from `first` in the array of a dtype; k = 0 is one row seen as (n,)."""
@@ -63,9 +66,9 @@ class Table:
             if not len(old):
                 self.arrays[dtype] = np.empty((0, len(index)), old.dtype)
                 continue
-            if dtype is float and not fresh:
-                new = np.empty((len(old), len(index)))
-                kernels.gather_floats(old, index, new)
+            if not fresh:
+                new = np.empty((len(old), len(index)), old.dtype)
+                _GATHER[dtype](old, index, new)
             else:
                 new = np.repeat(np.array(self.defaults[dtype], old.dtype)[:, None], len(index), axis=1)
                 new[:, ~is_new] = old[:, index[~is_new]]
