@@ -483,7 +483,13 @@ class JumpyDerivative(SoundMotion):
 
     @staticmethod
     def derivative(yaw, v, speed, turn_rate, lag):
-        return (1.0 if yaw * 7.0 - math.floor(yaw * 7.0) > 0.5 else -1.0), v * 3.0, yaw * yaw, 3.0, (speed - v) / lag
+        return (
+            (1.0 if yaw * 7.0 - math.floor(yaw * 7.0) > 0.5 else -1.0),
+            v * 3.0,
+            yaw * yaw,
+            3.0,
+            (speed - v) / lag,
+        )
 
 
 @kernel("F2w F2 F2 f8 i8")
@@ -541,7 +547,17 @@ class IgnoresBody(SoundMotion):
 
 
 BROKEN = {
-    "declarations": [NoDoc, ListOnClass, NotAHook, OwnInit, NoStep, WrongStep, NotSI, HalfBelief, NothingToDo],
+    "declarations": [
+        NoDoc,
+        ListOnClass,
+        NotAHook,
+        OwnInit,
+        NoStep,
+        WrongStep,
+        NotSI,
+        HalfBelief,
+        NothingToDo,
+    ],
     "grade": [
         *(UsesSine, UsesMathInAnotherFunction, UsesMatrixProduct, UsesPower, UsesSum, UsesMean),
         *(UsesLibmInDerivative, UsesLibmInKernel, UsesChance),
@@ -563,7 +579,9 @@ BROKEN = {
 
 
 @pytest.mark.parametrize(
-    ("rule", "cls"), [(rule, cls) for rule, classes in BROKEN.items() for cls in classes], ids=lambda v: getattr(v, "__name__", "")
+    ("rule", "cls"),
+    [(rule, cls) for rule, classes in BROKEN.items() for cls in classes],
+    ids=lambda v: getattr(v, "__name__", ""),
 )
 def test_a_broken_plugin_is_caught(rule: str, cls: type[Plugin]) -> None:
     CALLS.clear()

@@ -43,7 +43,8 @@ def check_plugin(cls: type[Plugin], *, companions: Sequence[Any] | None = None, 
     Raises:
         ConformanceError: The plugin breaks a rule; the message names the plugin, the rule and what was seen.
     """
-    if not (isinstance(cls, type) and issubclass(cls, Plugin)):
+    given: Any = cls
+    if not (isinstance(given, type) and issubclass(given, Plugin)):
         raise ConformanceError(
             getattr(cls, "__name__", repr(cls)), "declarations", "check_plugin takes the class of a plugin"
         )

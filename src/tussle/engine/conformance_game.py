@@ -143,8 +143,9 @@ def _topics(plugin: Any) -> tuple[set[Any], set[Any]]:
             says |= its_says
             hears |= its_hears
     if isinstance(plugin, Network):
-        for ends in (says, hears):
-            ends.add((Word, Word.__name__, plugin.instance_name))
+        word = Word, Word.__name__, plugin.__dict__["instance_name"]
+        says.add(word)
+        hears.add(word)
     return says, hears
 
 
@@ -222,12 +223,13 @@ def _slots(
     holder = Parent(behaviors=[plugin]) if isinstance(plugin, Behavior) else plugin
     kinds = (Autonomy, Controller, Sensor, MotionModel)
     given: list[Any] = [holder, *companions]
-    autonomies, controllers, sensors, motions = ([p for p in given if isinstance(p, kind)] for kind in kinds)
+    places: list[list[Any]] = [[p for p in given if isinstance(p, kind)] for kind in kinds]
+    autonomies, controllers, sensors, motions = places
     fed = [c for a in autonomies for _, c in read_channels(a)]
     measured = [c for s in sensors for name, c in written_channels(s) if name not in BELIEF]
     fed = _without(fed, measured)
-    consumer = (controllers or motions or [None])[0]
-    wanted = [c for _, c in read_channels(consumer)] if consumer is not None else []
+    readers = [[c for _, c in read_channels(p)] for p in (*controllers, *motions)]
+    wanted = next((columns for columns in readers if columns), [])
     written = [c for a in autonomies for _, c in written_channels(a)]
     pilot = driver(_without(wanted, written), measured, says, hears)
     if not motions:

@@ -88,7 +88,8 @@ def _check_rollout(model: Any, flight: Flight) -> None:
     path = model.rollout(flight.x[0], flight.u, flight.dt, flight.substeps, params)
     if path.tobytes() != np.ascontiguousarray(flight.x).tobytes():
         step, field, row = (int(i[0]) for i in np.nonzero(path != flight.x))
-        text = f"{model.state().fields[field]} after step {step} is {path[step, field, row]!r} in the rollout and {flight.x[step, field, row]!r} in flight"
+        name, planned, flown = model.state().fields[field], path[step, field, row], flight.x[step, field, row]
+        text = f"{name} after step {step} is {planned!r} in the rollout and {flown!r} in flight"
         raise ConformanceError(type(model).__name__, "rollout", text)
 
 
@@ -129,7 +130,7 @@ def _body_inputs(model: Any) -> list[str]:
 
 
 def _solved(integrate: Integrator, flight: Flight, step: int, dt: float, substeps: int) -> np.ndarray:
-    x = flight.x[step].copy()
+    x: np.ndarray = flight.x[step].copy()
     integrate(x, flight.u[step], flight.p, dt, substeps)
     return x
 
@@ -172,8 +173,8 @@ def _check_kernel(model: Any, flight: Flight, equation: Integrator) -> None:
         if (gap > tolerance).any():
             field, row = (int(i[0]) for i in np.nonzero(gap > tolerance))
             text = (
-                f"{model.state().fields[field]} after one step is {path[field, row]!r} by advance and {coarse[field, row]!r} by the derivative; "
-                f"they may differ by {np.broadcast_to(tolerance, gap.shape)[field, row]:.1e}"
+                f"{model.state().fields[field]} after one step is {path[field, row]!r} by advance and {coarse[field, row]!r} by "
+                f"the derivative; they may differ by {np.broadcast_to(tolerance, gap.shape)[field, row]:.1e}"
             )
             raise ConformanceError(type(model).__name__, "advance", text)
 
@@ -185,7 +186,10 @@ def _check_convergence(model: Any, flight: Flight) -> None:
     gaps = [float(np.abs(b - a).max()) for a, b in pairwise(ends)]
     noise = float(_rounding(flight, 0, ends[-1], 64).max())
     if gaps[2] > 0.75 * gaps[0] + 4.0 * noise:
-        text = f"halving the substeps three times changes the end of a step by {gaps[0]:.1e}, {gaps[1]:.1e}, {gaps[2]:.1e}; it does not converge"
+        changes = ", ".join(f"{gap:.1e}" for gap in gaps)
+        text = (
+            f"halving the substeps three times changes the end of a step by {changes}; it does not converge"
+        )
         raise ConformanceError(type(model).__name__, "convergence", text)
 
 
