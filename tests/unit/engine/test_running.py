@@ -1,0 +1,626 @@
+"""Clocks, rates, ends, pauses, resets, and what is read and written from outside."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import numpy as np
+import pytest
+from small_worlds import (
+    Drift, Listener, Note, NoteMetric, Reaper, Talker, Wander, alone, block, hashes, mission,
+)  # fmt: skip
+
+from tussle import Simulation
+from tussle.api import Autonomy, Interaction, Metric, Output, Param, State
+from tussle.errors import MissionError, ParameterError, SnapshotError
+from tussle.stock import NoisyContacts, SimpleCollision, Unicycle
+
+
+class Counter(Autonomy):
+    """Counts its calls and remembers the steps."""
+
+    n = State(dtype=int)
+    last = State(dtype=int, default=-1)
+    when = State(unit="s", default=-1.0)
+
+    def step(self, g):
+        self.n[:] += 1
+        self.last[:] = g.step_count
+        self.when[:] = g.t
+
+
+class Tally(Metric):
+    n = State(dtype=int, per="world")
+
+    def step(self, w):
+        self.n[:] += 1
+
+    def result(self, w):
+        return {"n": self.n}
+
+
+# -- clocks and rates -----------------------------------------------------------------------------------------------------------
+
+
+def test_time_is_computed_not_accumulated():
+    sim = Simulation(mission(block(), dt=0.1, start=5.0, end=1e9))
+    sim.step(2000)
+    assert sim.t[0] == 5.0 + 2000 * 0.1
+    total = 5.0
+    for _ in range(2000):
+        total += 0.1
+    assert sim.t[0] != total
+
+
+def test_a_plugin_sees_the_time_of_the_steps_beginning():
+    sim = Simulation(mission(block(autonomy=[Drift(), Counter()]), start=2.0, end=9.0))
+    sim.step(4)
+    assert sim.read("a.Counter.when")[0].tolist() == [[2.0 + 3 * 0.1]]
+
+
+@pytest.mark.parametrize(
+    ("rate", "due"),
+    [
+        (None, list(range(12))),
+        (10.0, list(range(12))),
+        (50.0, list(range(12))),
+        (5.0, [0, 2, 4, 6, 8, 10]),
+        (2.5, [0, 4, 8]),
+        (3.0, [0, 4, 7, 10]),  # floor(3 k / 10) changes
+        (7.0, [0, 2, 3, 5, 6, 8, 9, 10]),
+        (0.1, [0]),
+    ],
+)
+def test_due_rule(rate, due):
+    sim = Simulation(mission(block(autonomy=[Drift(), Counter(rate=rate)]), metrics=[Tally(rate=rate)], end=1.2))
+    seen = []
+    while not sim.is_over:
+        step = int(sim.steps[0])
+        sim.step()
+        if sim.read("a.Counter.last")[0][0, 0] == step:
+            seen.append(step)
+    assert seen == due
+    assert sim.result()[0].metrics["Tally"]["n"] == len(due)
+
+
+def test_due_rule_with_fractions_that_floats_do_not_hold():
+    """3 Hz at 1/30 s written as 0.1 s / 3 would drift; the decimal numbers are taken as they are written."""
+    sim = Simulation(mission(block(autonomy=[Drift(), Counter(rate=0.7)]), dt=0.1, end=1000.0))
+    sim.step(10_000)
+    assert sim.read("a.Counter.n")[0][0, 0] == 700
+
+
+def test_rates_hold_on_each_worlds_own_clock():
+    game = mission(block(autonomy=[Drift(), Counter(rate=2.5)]), metrics=[Tally(rate=2.5)], end=50.0)
+    sim = Simulation(game, seeds=[1, 2, 3])
+    sim.step(3)
+    sim.reset([1])
+    sim.step(10)
+    lone = Simulation(game)
+    lone.step(10)
+    assert sim.steps.tolist() == [13, 10, 13]
+    assert sim.read("a.Counter.n")[0][:, 0].tolist() == [4, 3, 4]
+    assert sim.read("a.Counter.last")[0][:, 0].tolist() == [12, 8, 12]
+    assert sim.read("Tally.n")[0].tolist() == [4, 3, 4]
+    assert lone.read("a.Counter.n")[0][0, 0] == 3
+
+
+class Substeps(Autonomy):
+    speed = Output(unit="m/s")
+    turn_rate = Output(unit="rad/s")
+    pitch_rate = Output(unit="rad/s")
+
+    def step(self, g):
+        self.speed[:] = 1.0
+
+
+def test_the_last_call_has_the_engines_dt_and_controllers_the_substeps():
+    from tussle.api import Controller, Input
+
+    class Watch(Controller):
+        speed_in = Input("speed", unit="m/s")
+        speed = Output(unit="m/s")
+        turn_rate = Output(unit="rad/s")
+        pitch_rate = Output(unit="rad/s")
+        n = State(dtype=int)
+        dt = State(unit="s")
+        when = State(unit="s")
+
+        def step(self, g):
+            self.n[:] += 1
+            self.dt[:] = g.dt
+            self.when[:] = g.t
+            self.speed[:] = self.speed_in
+
+    sim = Simulation(mission(block(autonomy=Substeps(), controller=Watch(), motion=Unicycle(vel_max=9.0)), motion_multiplier=4))
+    sim.step(3)
+    assert sim.read("a.Watch.n")[0].tolist() == [[12]]
+    assert sim.read("a.Watch.dt")[0].tolist() == [[0.025]]
+    assert sim.read("a.Watch.when")[0][0, 0] == pytest.approx(0.2 + 3 * 0.025)
+    assert sim.read("a.pos")[0][0, 0, 0] == pytest.approx(0.3)
+
+
+# -- ends -----------------------------------------------------------------------------------------------------------------------
+
+
+def teams(**values):
+    return [block("one", team=1, count=2), block("two", team=2, count=3, **values)]
+
+
+@pytest.mark.parametrize(
+    ("conditions", "reapers", "end", "steps"),
+    [
+        ("time", {1: 0.3, 2: 0.5}, "time", 10),
+        ("time, one_team", {1: 0.3}, "one_team", 4),
+        ("one_team", {2: 0.5}, "one_team", 6),
+        ("time, all_dead", {1: 0.3}, "time", 10),
+        ("time, all_dead", {1: 0.3, 2: 0.5}, "all_dead", 6),
+        ("one_team", {1: 0.3, 2: 0.3}, "all_dead", 4),
+    ],
+)
+def test_end_conditions(conditions, reapers, end, steps):
+    judges = [Reaper(team=team, at=at, name=f"Reaper{team}") for team, at in reapers.items()]
+    result = Simulation(mission(*teams(), end_conditions=conditions, interactions=judges)).run()[0]
+    assert (result.end, result.steps) == (end, steps)
+    assert result.t == pytest.approx(0.1 * steps)
+
+
+def test_no_condition_ends_nothing():
+    sim = Simulation(mission(*teams(), end_conditions="none", interactions=[Reaper(team=1, at=0.1), Reaper(team=2, at=0.1, name="R")]))
+    sim.step(30)
+    assert not sim.is_over
+    assert sim.steps[0] == 30
+    assert sim.result()[0].end == ""
+
+
+def test_a_mission_of_one_team_is_no_last_team_standing():
+    assert Simulation(mission(block(), end_conditions="time, one_team")).run()[0].end == "time"
+
+
+def test_the_game_is_open_while_births_are_to_come():
+    """Team 1 is gone at 0.2 s, but another of it comes at 0.5 s; all of team 2 stay."""
+    late = block("late", team=1, count=1, rate=1.0, first_birth=0.5)
+    game = mission(block("one", team=1), block("two", team=2), late, end_conditions="time, one_team", interactions=[Reaper(team=1, at=0.2)])
+    result = Simulation(game).run()[0]
+    assert (result.end, result.steps) == ("one_team", 6)
+
+
+def test_the_game_ends_when_the_last_birth_changes_nothing():
+    """Team 1 is gone at 0.2 s; the last birth, of team 2, decides that it has lost: nobody dies in that step."""
+    late = block("late", team=2, count=1, rate=1.0, first_birth=0.5)
+    game = mission(block("one", team=1), block("two", team=2), late, end_conditions="time, one_team", interactions=[Reaper(team=1, at=0.2)])
+    result = Simulation(game).run()[0]
+    assert (result.end, result.steps) == ("one_team", 6)
+
+
+def test_a_game_that_is_decided_before_it_begins_ends_with_the_first_step_also_after_a_reset():
+    game = mission(block("one", team=1, count=0), block("two", team=2), end_conditions="time, one_team")
+    assert Simulation(game).run()[0].steps == 1
+    sim = Simulation(game.replace(blocks=[block("one", team=1), block("two", team=2)], interactions=[Reaper(team=1, at=0.5)]), seeds=[1, 2])
+    sim.step(3)
+    sim.reset([1], params={"Reaper.at": 0.0})
+    assert [r.steps for r in sim.run()] == [6, 1]
+
+
+def test_worlds_end_apart_and_each_as_it_would_alone():
+    game = mission(*teams(autonomy=Wander()), end_conditions="time, one_team", interactions=[Reaper(team=1)], end=2.0)
+    at = [0.5, 99.0, 0.2, 1.0]
+    sim = Simulation(game, seeds=[1, 2, 3, 4], params={"Reaper.at": at})
+    results = sim.run()
+    assert [r.steps for r in results] == [6, 20, 3, 11]
+    assert [r.end for r in results] == ["one_team", "time", "one_team", "one_team"]
+    for k, r in enumerate(results):
+        lone = Simulation(game, seeds=k + 1, params={"Reaper.at": at[k]})
+        lone.run()
+        assert lone.state_hash() == r.state_hash == sim.state_hash(k)
+
+
+def test_without_health_an_entity_is_removed():
+    class Doctor(Interaction):
+        def step(self, w):
+            w.bodies.health[w.id == 2] -= 0.3
+
+    sim = Simulation(mission(block(count=3), interactions=[Doctor()]))
+    sim.step(3)
+    assert sim.read("a.health")[0][0].tolist() == pytest.approx([1.0, 0.1, 1.0])
+    sim.step()
+    assert sim.read("a.id")[0][0].tolist() == [1, 0, 3]
+    assert sim.result()[0].alive == {0: 2}
+
+
+def test_the_killed_are_seen_until_the_end_of_the_step():
+    class Watch(Metric):
+        n = State(dtype=int, per="world")
+
+        def step(self, w):
+            self.n[:] = np.bincount(w.world, minlength=w.n_worlds)
+
+    sim = Simulation(mission(block(team=1, count=2), interactions=[Reaper(team=1, at=0.0)], metrics=[Watch()], end_conditions="none"))
+    sim.step()
+    assert sim.read("Watch.n")[0].tolist() == [2]
+    assert sim.read("a.pos")[1].sum() == 0
+
+
+# -- running --------------------------------------------------------------------------------------------------------------------
+
+
+def test_run_until_a_time_or_a_condition():
+    sim = Simulation(mission())
+    sim.run(until=0.35)
+    assert sim.steps[0] == 4
+    sim.run(until=0.4)
+    assert sim.steps[0] == 4
+    sim.run_until(lambda s: s.read("a.pos")[0][0, 0, 0] > 0.55)
+    assert sim.steps[0] == 6
+    assert sim.run()[0].steps == 10
+    sim.step(5)
+    assert sim.steps[0] == 10
+    assert sim.is_over
+
+
+def test_observers_see_each_step_before_it_is_made():
+    sim, seen = Simulation(mission()), []
+    sim.observers.append(lambda s: seen.append((int(s.steps[0]), float(s.read("a.pos")[0][0, 0, 0]))))
+    sim.run()
+    assert [k for k, _ in seen] == list(range(10))
+    assert [x for _, x in seen] == pytest.approx([0.1 * k for k in range(10)])
+
+
+def test_pause_holds_run_in_its_thread_and_changes_nothing():
+    game = mission(block(autonomy=Wander(), count=5), end=3.0)
+    sim = Simulation(game, seeds=7)
+    sim.observers.append(lambda s: s.pause() if s.steps[0] == 11 else None)
+    thread = threading.Thread(target=sim.run)
+    thread.start()
+    deadline = time.monotonic() + 10.0
+    while sim.steps[0] < 12 and time.monotonic() < deadline:
+        time.sleep(0.005)
+    time.sleep(0.05)
+    assert sim.is_paused
+    assert sim.steps[0] == 12
+    sim.step()
+    assert sim.steps[0] == 13
+    sim.observers.clear()
+    sim.resume()
+    thread.join(timeout=10.0)
+    assert not thread.is_alive()
+    assert sim.state_hash() == alone(game, 7).state_hash()
+
+
+def test_threads_change_no_bit():
+    game = mission(block(autonomy=Wander(), count=50, variance=(9, 9, 9)), sensor_block(), end=0.5)
+    assert hashes(game, [1, 2], threads=3) == hashes(game, [1, 2])
+
+
+def sensor_block():
+    return block("eyes", count=20, variance=(9, 9, 9), sensor=NoisyContacts())
+
+
+# -- reset ------------------------------------------------------------------------------------------------------------------------
+
+
+def rich(**values):
+    """A game with nearly everything in it that a reset has to put back."""
+    return mission(
+        block("a", team=1, count=4, variance=(50, 50, 50), autonomy=[Wander(), Talker(), Listener(rate=2.5)], sensor=NoisyContacts()),
+        block("late", team=2, count=5, rate=4.0, interval_sd=0.05, variance=(50, 50, 50), autonomy=[Wander(), Listener()]),
+        interactions=[SimpleCollision(collision_range=3.0)], metrics=[NoteMetric()], end=2.0, **values,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("after", [1, 7, 20])
+def test_reset_of_some_worlds_is_a_fresh_start_and_leaves_the_others_alone(after):
+    fresh = hashes(rich(), [1, 2, 3])
+    sim = Simulation(rich(), seeds=[1, 9, 3])
+    sim.step(after)
+    sim.reset([1], seeds=[2])
+    while not sim.is_over:
+        sim.step()
+    assert [r.state_hash for r in sim.result()] == fresh
+    assert [r.seed for r in sim.result()] == [1, 2, 3]
+
+
+def test_a_slot_takes_the_next_seed_while_its_neighbours_go_on():
+    game = rich(end_conditions="time")
+    fresh = hashes(game, [1, 2, 3, 4])
+    sim = Simulation(game, seeds=[1, 2])
+    sim.step(5)
+    sim.reset([1], seeds=[2])
+    sim.run(until=None)
+    done = {r.seed: r.state_hash for r in sim.result()}
+    sim.reset([0, 1], seeds=[3, 4])
+    sim.run()
+    done |= {r.seed: r.state_hash for r in sim.result()}
+    assert [done[s] for s in (1, 2, 3, 4)] == fresh
+
+
+def test_the_last_to_end_stay_as_they_are_when_another_begins_anew():
+    sim = Simulation(mission(block(autonomy=Wander())), seeds=[1, 2])
+    sim.run()
+    before, hash_ = sim.read("a.pos")[0][1].copy(), sim.state_hash(1)
+    sim.reset([0])
+    sim.run()
+    assert np.array_equal(sim.read("a.pos")[0][1], before)
+    assert sim.state_hash(1) == hash_
+
+
+def test_reset_gives_seeds_and_params_in_the_order_of_the_worlds():
+    sim = Simulation(mission(), seeds=[1, 2, 3])
+    sim.reset([2, 0], seeds=[30, 10], params={"a.Drift.to": [(3.0, 0, 0), (1.5, 0, 0)]})
+    assert sim.context.seeds.tolist() == [10, 2, 30]
+    sim.step()
+    assert sim.read("a.pos")[0][:, 0, 0].tolist() == pytest.approx([0.15, 0.1, 0.3])
+    sim.reset(w for w in (0, 1))
+    assert sim.steps.tolist() == [0, 0, 1]
+    assert sim.read("a.pos")[1].sum() == 3
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (([3],), r"reset: there are worlds 0 to 1, each once, not \[3\]"),
+        (([-1],), r"reset: there are worlds 0 to 1"),
+        (([0, 0],), r"reset: there are worlds 0 to 1, each once, not \[0, 0\]"),
+        (([0, 1], [5]), r"reset: 1 seeds for 2 worlds"),
+        (([0], ["x"]), r"seed 'x' is not allowed; it takes a whole number"),
+        (([0], None, {"a.Drift.two": 1}), r"Drift has no parameter 'two' \(did you mean 'to'\?\)"),
+    ],
+)
+def test_resets_that_cannot_be(arguments, message):
+    sim = Simulation(mission(), seeds=[1, 2])
+    sim.step()
+    with pytest.raises(ParameterError, match=message):
+        sim.reset(*arguments)
+    assert sim.context.seeds.tolist() == [1, 2]
+    assert sim.steps.tolist() == [1, 1]
+
+
+# -- snapshots --------------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("at", [0, 3, 11])
+def test_snapshot_and_restore_lead_to_the_same_future(at):
+    sim = Simulation(rich(), seeds=[1, 2, 3])
+    sim.step(at)
+    saved = sim.snapshot()
+    first = [r.state_hash for r in sim.run()]
+    assert first == hashes(rich(), [1, 2, 3])
+    sim.restore(saved)
+    assert sim.steps.tolist() == [at] * 3
+    assert [r.state_hash for r in sim.run()] == first
+
+
+def test_a_snapshot_fits_another_simulation_of_the_mission():
+    sim = Simulation(rich(), seeds=[1, 2])
+    sim.step(9)
+    saved = sim.snapshot()
+    other = Simulation(rich(), seeds=[7, 8])
+    other.restore(saved)
+    assert other.context.seeds.tolist() == [1, 2]
+    assert [r.state_hash for r in other.run()] == hashes(rich(), [1, 2])
+
+
+def test_a_snapshot_keeps_worlds_that_have_ended_and_clocks_that_differ():
+    game = mission(*teams(autonomy=Wander()), end_conditions="time, one_team", interactions=[Reaper(team=1)], end=2.0)
+    sim = Simulation(game, seeds=[1, 2, 3], params={"Reaper.at": [0.2, 99.0, 1.0]})
+    sim.step(5)
+    sim.reset([2])
+    sim.step(2)
+    saved = sim.snapshot()
+    first = [(r.end, r.steps, r.state_hash) for r in sim.run()]
+    sim.restore(saved)
+    assert sim.running.tolist() == [False, True, True]
+    assert [(r.end, r.steps, r.state_hash) for r in sim.run()] == first
+
+
+def test_restore_takes_parameters_back_for_those_yet_to_be_born():
+    game = mission(block(count=3, rate=5.0), end=1.0)
+    sim = Simulation(game, seeds=[1, 2])
+    sim.step(3)
+    saved = sim.snapshot()
+    sim.reset([0], params={"a.Drift.to": (5.0, 0.0, 0.0)})
+    sim.step(3)
+    sim.restore(saved)
+    assert [r.state_hash for r in sim.run()] == hashes(game, [1, 2])
+
+
+def test_restore_takes_messages_back():
+    class Herald(Interaction):
+        def step(self, w):
+            w.publish(Note, np.flatnonzero(w.step_count == 2), value=7)
+
+    game = mission(block(autonomy=[Drift(), Listener()]), block("b", autonomy=[Drift(), Talker(last=2)]), interactions=[Herald()])
+    sim = Simulation(game)
+    start = sim.snapshot()
+    first = sim.run()[0].state_hash
+    sim.restore(start)
+    assert sim.run()[0].state_hash == first
+    assert sim.read("a.Listener.n_heard")[0][0, 0] == 3
+
+
+def test_snapshots_of_something_else_are_refused():
+    saved = Simulation(mission()).snapshot()
+    with pytest.raises(SnapshotError, match=r"a stack of 1 worlds"):
+        Simulation(mission(), seeds=[1, 2]).restore(saved)
+    with pytest.raises(SnapshotError, match="another mission"):
+        Simulation(mission(block("b"))).restore(saved)
+
+
+def test_snapshot_of_groups_that_are_not_there():
+    game = mission(block(motion=Unicycle(), autonomy=Substeps()))
+    split = Simulation(game, seeds=[1, 2], params={"a.Unicycle.enable_roll": [False, True]})
+    saved = split.snapshot()
+    with pytest.raises(SnapshotError, match="never had"):
+        Simulation(game, seeds=[1, 2]).restore(saved)
+
+
+# -- from outside -----------------------------------------------------------------------------------------------------------------
+
+
+def test_read_is_in_stable_agent_order_with_who_lives():
+    sim = Simulation(mission(block("a", count=3, autonomy=Wander(), variance=(9, 9, 9)), block("b", team=1)), seeds=[1, 2])
+    pos, alive = sim.read("a.pos")
+    assert pos.shape == (2, 3, 3)
+    sim.write("a.health", [[1.0, 0.0, 1.0], [1.0, 1.0, 1.0]])
+    sim.step()
+    after, alive = sim.read("a.pos")
+    assert alive.tolist() == [[True, False, True], [True, True, True]]
+    assert np.abs(after - pos)[alive].max() < 1.0
+    assert sim.read("a.id")[0].tolist() == [[1, 0, 3], [1, 2, 3]]
+    assert sim.read("a.yaw")[0].shape == (2, 3)
+    assert sim.read("a.forward")[0].shape == (2, 3, 3)
+
+
+def test_worlds_that_have_ended_are_read_as_they_ended():
+    game = mission(block(team=1), block("b", team=2), end_conditions="time, one_team", interactions=[Reaper(team=2)])
+    sim = Simulation(game, seeds=[1, 2], params={"Reaper.at": [0.3, 99.0]})
+    sim.run()
+    assert sim.read("a.pos")[0][:, 0, 0].tolist() == pytest.approx([0.4, 1.0])
+    assert sim.read("a.Drift.velocity")[0][:, 0, 0].tolist() == [1.0, 1.0]
+
+
+def test_write_reaches_the_plugins_and_the_motion():
+    sim = Simulation(mission(block(count=2), block("b", position=(5, 0, 0))), seeds=[1, 2])
+    sim.write("a.Drift.to", [[(1.0, 0, 0), (2.0, 0, 0)], [(3.0, 0, 0), (4.0, 0, 0)]])
+    sim.write("b.pos", (100.0, 0.0, 0.0))
+    sim.step()
+    assert sim.read("a.pos")[0][..., 0].tolist() == [pytest.approx([0.1, 0.2]), pytest.approx([0.3, 0.4])]
+    assert sim.read("b.pos")[0][..., 0].tolist() == [[100.1], [100.1]]
+
+
+def test_world_columns_are_read_and_written_by_world():
+    sim = Simulation(mission(metrics=[Tally()]), seeds=[1, 2])
+    sim.step(2)
+    sim.write("Tally.n", [10, 20])
+    sim.step()
+    values, there = sim.read("Tally.n")
+    assert values.tolist() == [11, 21]
+    assert there.all()
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "message"),
+    [
+        ("a.pso", 0.0, r"'a.pso': bodies have no column 'pso' \(did you mean 'pos'\?\)"),
+        ("c.pos", 0.0, r"'c.pos': there is no column by this path.*paths begin with: a, GlobalNetwork"),
+        ("a", 0.0, r"'a': there is no column by this path"),
+        ("a.Drft.to", 0.0, r"'a.Drft.to': a has no plugin 'Drft' \(did you mean 'Drift'\?\)"),
+        ("a.Drift.too", 0.0, r"'a.Drift.too': Drift has no column 'too' \(did you mean 'to'\?\); there are: to, velocity"),
+        ("a.yaw", 0.0, r"'a.yaw' cannot be written; there are: pos, vel, quat"),
+        ("a.id", 0.0, r"'a.id' cannot be written"),
+        ("a.pos", [1.0, 2.0], r"'a.pos': values have shape \(2,\); needed is \(1, 1, 3\)"),
+        ("a.pos", np.nan, r"'a.pos': values hold NaN|'a.pos': values must be finite"),
+        ("a.pos", np.inf, r"'a.pos': values must be finite"),
+        ("a.Unicycle.vel_max", -1.0, r"a.Unicycle.vel_max: Unicycle.vel_max = .*-1.0.* is not allowed; it takes .* in m/s >= 0"),
+        ("GlobalNetwork.comm_dely", 0.0, r"GlobalNetwork has no column 'comm_dely' \(did you mean 'comm_delay'\?\)"),
+    ],
+)
+def test_paths_and_values_that_are_refused(path, value, message):
+    sim = Simulation(mission(block(motion=Unicycle(), autonomy=[Substeps(), Drift()])))
+    with pytest.raises(ParameterError, match=message):
+        sim.write(path, value)
+
+
+def test_reading_what_has_no_fixed_shape_is_refused():
+    class Marks(Interaction):
+        mark = State(per="entity")
+
+    sim = Simulation(mission(interactions=[Marks()]))
+    with pytest.raises(ParameterError, match="Marks.mark.*per entity"):
+        sim.read("Marks.mark")
+
+
+def test_parameters_with_several_fields_are_checked_when_written():
+    class Bounded(Autonomy):
+        box = Param((1.0, 2.0), fields="a b", ge=0.0)
+
+        def step(self, g):
+            pass
+
+    sim = Simulation(mission(block(autonomy=[Drift(), Bounded()])))
+    with pytest.raises(ParameterError, match=r"Bounded.box = .* is not allowed.*>= 0"):
+        sim.write("a.Bounded.box", [[(1.0, -2.0)]])
+
+
+# -- parameters per world -------------------------------------------------------------------------------------------------------
+
+
+def test_params_differ_between_worlds_and_each_is_as_alone():
+    game = mission(block(count=2, variance=(9, 9, 9), autonomy=Wander()), interactions=[SimpleCollision()])
+    values = {
+        "a.Wander.spread": [0.5, 2.0, 1.0], "a.speed": [1.0, 2.0, 3.0], "a.heading": ["90 deg", 0.0, 1.0],
+        "SimpleCollision.collision_range": [0.0, 1.0, 50.0],
+    }  # fmt: skip
+    sim = Simulation(game, seeds=[1, 2, 3], params=values)
+    assert sim.read("a.yaw")[0][:2, 0].tolist() == pytest.approx([np.pi / 2, 0.0])
+    assert sim.read("a.pos")[1].tolist() == [[True] * 2, [True] * 2, [False] * 2]
+    sim.run()
+    for k in range(3):
+        one = Simulation(game, seeds=k + 1, params={path: v[k] for path, v in values.items()})
+        one.run()
+        assert one.state_hash() == sim.state_hash(k)
+
+
+def test_structural_params_split_groups_and_each_world_is_as_alone():
+    game = mission(
+        block(count=2, variance=(9, 9, 9), motion=Unicycle(vel_max=9.0), autonomy=[Substeps(), Talker(), Listener()], speed=1.0), end=1.0
+    )
+    roll = [False, True, False]
+    sim = Simulation(game, seeds=[1, 2, 3], params={"a.Unicycle.enable_roll": roll, "a.Unicycle.vel_max": [1.0, 2.0, 3.0]})
+    assert len([g for g in sim.population.groups if g.n]) == 2
+    sim.run()
+    assert sim.read("a.pos")[1].all()
+    for k in range(3):
+        one = Simulation(game, seeds=k + 1, params={"a.Unicycle.enable_roll": roll[k], "a.Unicycle.vel_max": k + 1.0})
+        one.run()
+        assert one.state_hash() == sim.state_hash(k)
+
+
+@pytest.mark.parametrize(
+    ("params", "message"),
+    [
+        ({"b.Drift.to": 1}, r"'b.Drift.to': there is no block or world plugin 'b'"),
+        ({"a.Drif.to": 1}, r"'a.Drif.to': a has no plugin 'Drif' \(did you mean 'Drift'\?\)"),
+        ({"a.Drift.two": 1}, r"'a.Drift.two': Drift has no parameter 'two' \(did you mean 'to'\?\); there are: to"),
+        ({"a.sped": 1}, r"'a.sped' names no parameter.*a has: .*speed"),
+        ({"a": 1}, r"'a' names no parameter"),
+        ({"a.speed": "3 kg"}, r"a.speed: a.speed = '3 kg'"),
+        ({"a.speed": -1.0}, r"a.speed = -1.0 is not allowed"),
+        ({"a.health": 0.0}, r"a.health = 0.0 is not allowed"),
+        ({"a.mass": [1.0, -1.0]}, r"a.mass = -1.0 is not allowed"),
+        ({"a.Drift.to": (1, 2)}, r"Drift.to = \(1, 2\) is not allowed; it takes 3 values \(x, y, z\)"),
+        ({"a.Drift.to": float("nan")}, r"Drift.to = nan is not allowed"),
+        ({"GlobalNetwork.comm_delay": [0.0, -1.0]}, r"comm_delay = -1.0 is not allowed; it takes a finite number in s >= 0"),
+    ],
+)
+def test_bad_params_are_refused_with_their_path(params, message):
+    with pytest.raises(ParameterError, match=message):
+        Simulation(mission(), seeds=[1, 2], params=params)
+
+
+def test_a_structural_param_of_a_world_plugin_belongs_to_the_mission():
+    game = mission(interactions=[SimpleCollision()])
+    with pytest.raises((MissionError, ParameterError), match="startup_collisions_only is structural.*set it in the mission"):
+        Simulation(game, seeds=[1, 2], params={"SimpleCollision.startup_collisions_only": [True, False]})
+
+
+def test_a_ragged_param_belongs_to_the_mission():
+    class Path(Autonomy):
+        points = Param([(1.0, 2.0)], fields="x y", ragged=True)
+        n = State(dtype=int)
+
+        def step(self, g):
+            for row in range(g.n):
+                self.n[row] = self.points[row].shape[1]
+
+    game = mission(
+        block("a", count=2, autonomy=[Drift(), Path(points=[(1, 2), (3, 4), (5, 6)])]), block("b", autonomy=[Drift(), Path()])
+    )
+    sim = alone(game, 1)
+    assert sim.read("a.Path.n")[0].tolist() == [[3, 3]]
+    assert sim.read("b.Path.n")[0].tolist() == [[1]]
+    with pytest.raises(ParameterError, match=r"a.Path.points. is a list.*mission"):
+        Simulation(game, params={"a.Path.points": [(1.0, 2.0)]})
+
+
