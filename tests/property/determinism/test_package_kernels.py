@@ -1,0 +1,132 @@
+"""An edit of the package itself: the new code runs, and only what depends on it compiles anew."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import tussle
+from tussle.numeric import store
+
+PACKAGE = Path(tussle.__file__).parent
+
+PROGRAM = """
+import json
+from tussle.numeric import store
+
+made, save = [], store.save
+store.save = lambda name, key, data: (made.append(name), save(name, key, data))[1]
+
+from tussle import Block, Mission, Simulation
+from tussle.numeric.kernel import stats
+from tussle.stock import Boids, NoisyState, Unicycle
+
+motion = Unicycle(vel_max=20.0, turn_rate_max=0.5, pitch_rate_max=0.5)
+flock = Block(name="flock", count=40, variance=(400.0, 400.0, 100.0), autonomy=Boids(), motion=motion, sensor=NoisyState())
+sim = Simulation(Mission(blocks=[flock]), seeds=1)
+sim.step(4)
+assert stats.compiled == len(made), (stats, made)
+print(json.dumps({"hash": sim.state_hash(), "made": sorted(made), "loaded": stats.loaded}))
+"""
+
+
+@pytest.fixture(scope="module")
+def plain_cache(tmp_path_factory):
+    """A folder with the kernels that the user has anyway, filled up by one run of the program."""
+    folder = tmp_path_factory.mktemp("kernels")
+    for path in store.directory().glob("tussle.*.kernel") if store.directory().is_dir() else ():
+        with contextlib.suppress(FileNotFoundError):  # another process has just removed an old one
+            shutil.copy2(path, folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def plain(plain_cache):
+    run(PACKAGE.parent, plain_cache)
+    found = run(PACKAGE.parent, plain_cache)
+    assert found["made"] == []
+    return found
+
+
+@pytest.fixture
+def edited(tmp_path, plain_cache, plain):
+    """Runs the program on a copy of the package in which a text is replaced, with a copy of the filled cache."""
+
+    def play(module: str, old: str, new: str):
+        source, cache = tmp_path / "src", tmp_path / "cache"
+        shutil.copytree(PACKAGE, source / "tussle", ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copytree(plain_cache, cache)
+        path = source / "tussle" / module
+        text = path.read_text(encoding="utf-8")
+        assert text.count(old) == 1, f"{module} has {old!r} {text.count(old)} times"
+        path.write_text(text.replace(old, new), encoding="utf-8")
+        return run(source, cache)
+
+    return play
+
+
+def run(source, cache):
+    env = dict(os.environ, PYTHONPATH=str(source), TUSSLE_CACHE_DIR=str(cache), PYTHONDONTWRITEBYTECODE="1")
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", PROGRAM], env=env, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+@pytest.mark.slow
+def test_moved_copy_and_comments_compile_nothing(edited, plain):
+    after = edited(
+        "numeric/elementary.py",
+        "@device\ndef sine_near_zero",
+        "# A comment.\n\n\n@device\ndef sine_near_zero",
+    )
+    assert after == plain
+
+
+@pytest.mark.slow
+def test_constant_of_the_sine_reaches_all_that_turns_or_draws(edited, plain):
+    after = edited("numeric/elementary.py", "8.33333333332248946124e-03", "8.33333333e-03")
+    assert after["hash"] != plain["hash"]
+    assert {"tussle.stock.motion.unicycle.kernels.advance_pitch", "tussle.rng.fill_normal"} <= set(
+        after["made"]
+    )
+    assert not [name for name in after["made"] if name.startswith("tussle.neighbors")]
+    assert after["loaded"] > 0
+
+
+@pytest.mark.slow
+def test_code_generator_of_the_lanes_reaches_the_laws_that_use_lanes(edited, plain):
+    after = edited("neighbors/lanes_codegen.py", '(operator.sub, "fsub")', '(operator.sub, "fadd")')
+    assert after["hash"] != plain["hash"]
+    assert "tussle.stock.autonomy.boids.kernels.neighbor_sums" in after["made"]
+    assert not [
+        name
+        for name in after["made"]
+        if name.startswith(("tussle.stock.motion", "tussle.rng", "tussle.numeric"))
+    ]
+    assert after["loaded"] > len(after["made"])
+
+
+@pytest.mark.slow
+def test_callee_of_one_motion_model_reaches_no_other_module(edited, plain):
+    head = 'def clamp(value, limit):\n    """Value held within [-limit, limit]."""\n'
+    after = edited("stock/motion/unicycle/kernels.py", head, f"{head}    value = 0.5 * value\n")
+    assert after["hash"] != plain["hash"]
+    assert after["made"]
+    assert {name.rsplit(".", 1)[0] for name in after["made"]} == {"tussle.stock.motion.unicycle.kernels"}
+
+
+@pytest.mark.slow
+def test_round_of_the_random_numbers_reaches_the_draws_only(edited, plain):
+    after = edited("rng.py", "mix(a, b, 42)", "mix(a, b, 43)")
+    assert after["hash"] != plain["hash"]
+    assert after["made"]
+    assert {name.rsplit(".", 1)[0] for name in after["made"]} == {"tussle.rng"}
