@@ -428,6 +428,12 @@ class WritesWrongColumn(Metric):
         w.bodies.health[:] = 2.0
 
 
+class SaysIdle(SoundMetric):
+    """Says that it has nothing to do, and has."""
+
+    is_idle = True
+
+
 class NanAtBound(SoundAutonomy):
     """Divides by what may be zero."""
 
@@ -568,6 +574,7 @@ BROKEN = {
     "runs": [SetsAttribute, WritesView, Raises],
     "memory in columns": [HidesAttribute, ChangesClass],
     "own columns": [WritesAroundView, WritesParameter, WritesWrongColumn],
+    "idle": [SaysIdle],
     "finite": [NanAtBound, NanInReferee, RaisesAtBound],
     "rollout": [RolloutOfItsOwn],
     "order of convergence": [JumpyDerivative],

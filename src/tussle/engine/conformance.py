@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from tussle.api import MotionModel, Plugin
-from tussle.engine.conformance_columns import check_class_values, check_columns, class_values
+from tussle.api import MotionModel, Plugin, WorldPlugin
+from tussle.engine.conformance_columns import check_class_values, check_columns, check_idle, class_values
 from tussle.engine.conformance_declarations import check_declarations
 from tussle.engine.conformance_game import build
 from tussle.engine.conformance_grade import check_grade
@@ -30,6 +30,7 @@ def check_plugin(cls: type[Plugin], *, companions: Sequence[Any] | None = None, 
     * reset: some worlds begin as if new while the others do not notice. snapshot: after restore the same future follows.
     * finite: at every finite bound, and at a tenth and ten times each default.
     * rollout, rows, body round trip, from_body, order of convergence, advance: for motion models.
+    * idle: a world plugin that says so has nothing to do.
     * runs: it fits the game and raises no error.
 
     Each structural switch and each choice of a text parameter is tried as well. With grade "external" nothing is promised of the bits,
@@ -62,10 +63,9 @@ def check_plugin(cls: type[Plugin], *, companions: Sequence[Any] | None = None, 
                 ) from error
             raise
         except TussleError as error:
-            if isinstance(
-                error.__cause__, ConformanceError
-            ):  # found inside a call, and told as that call's failure
-                raise error.__cause__ from None
+            cause = error.__cause__
+            if isinstance(cause, ConformanceError):  # found inside a call, and told as that call's failure
+                raise cause from None
             raise ConformanceError(
                 cls.__name__, "runs", f"as {variant!r} in the kit's game: {error}"
             ) from error
@@ -75,6 +75,8 @@ def check_plugin(cls: type[Plugin], *, companions: Sequence[Any] | None = None, 
 def _play(plugin: Plugin, companions: Sequence[Any], is_first: bool) -> None:
     game = build(plugin, companions)
     check_columns(game)
+    if isinstance(plugin, WorldPlugin):
+        check_idle(game)
     if isinstance(plugin, MotionModel):
         check_motion(game, is_first)
     if type(plugin).grade != "external":

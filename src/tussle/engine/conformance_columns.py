@@ -12,6 +12,7 @@ from tussle.api import Interaction, MotionModel, Plugin
 from tussle.api.bodies import FLOATS, INTS
 from tussle.engine.conformance_declarations import MACHINERY, own_classes
 from tussle.engine.conformance_game import SEEDS, STEPS, Game
+from tussle.engine.conformance_traces import columns_of, first_difference
 from tussle.engine.group import Binding, Group
 from tussle.engine.referees import Referee
 from tussle.engine.simulation import Simulation
@@ -47,6 +48,27 @@ def check_columns(game: Game) -> None:
                     MEMORY,
                     f"{extra[0]} is held by the plugin object, which serves all entities; declare a State",
                 )
+
+
+def check_idle(game: Game) -> None:
+    """A world plugin that says `is_idle` has a step that does nothing: the schedule leaves it out.
+
+    Raises:
+        ConformanceError: It does something.
+    """
+    cls = type(game.plugin)
+    with game.play(SEEDS[:1]) as sim:
+        sim.step(3)
+        idle = [r for r in sim.referees if type(r.spec) is cls and getattr(r.plugin, "is_idle", False)]
+        for referee in idle:
+            view = sim.world_view
+            before, asked = columns_of(sim, 0), [len(x) for x in (view.deaths, view.moved, view.births)]
+            view.caller = referee.plugin
+            referee.plugin.step(view)
+            difference = first_difference(before, columns_of(sim, 0))
+            if difference or asked != [len(x) for x in (view.deaths, view.moved, view.births)]:
+                text = f"it says is_idle, but its step does something: {difference or 'it kills, moves or spawns'}"
+                raise ConformanceError(cls.__name__, "idle", text)
 
 
 def class_values(cls: type[Plugin]) -> dict[str, Any]:

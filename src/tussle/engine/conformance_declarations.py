@@ -18,7 +18,7 @@ from tussle.errors import ConformanceError, TussleError, listed
 
 RULE = "declarations"
 HOOKS_NAMES = """
-    spawn step step_one start result route rejects from_body to_body derivative advance integrator active_inputs
+    spawn step step_one start result route rejects is_idle from_body to_body derivative advance integrator active_inputs
     active_outputs open_one close_one save_one load_one ready ready_timeout grade atomic max_worlds passthrough
     abstract kind
 """

@@ -106,10 +106,9 @@ def build(plugin: Any, companions: Sequence[Any] = ()) -> Game:
     plugin = _with_children(plugin)
     says, hears = _topics(plugin)
     if isinstance(plugin, WorldPlugin):
-        first = _missions(plugin, companions, says, hears)
-        for message in _asked(first.quiet):
+        for message in _asked(_missions(plugin, companions, says, hears).quiet):
             says.add((message, message.__name__, "GlobalNetwork"))
-        for message in _told(first.quiet):
+        for message in _told(_missions(plugin, companions, says, hears).quiet):
             hears.add((message, message.__name__, "GlobalNetwork"))
     return _missions(plugin, companions, says, hears)
 
@@ -169,7 +168,7 @@ def _told(mission: Mission) -> list[type[Message]]:
             told.setdefault(type_),
             publish_to(type_, network),
         )[1]
-        sim.step(3)
+        sim.step(8)
     return list(told)
 
 
@@ -181,10 +180,11 @@ def _missions(plugin: Any, companions: Sequence[Any], says: Iterable[Any], hears
     there = {"GlobalNetwork", *(n.instance_name for n in networks)}
     networks += [Wire(name=name) for name in sorted({t[2] for t in (*said, *heard)} - there)]
     varied = plugin.replace(**{name: scaled(plugin, name, 0.9) for name in plugin.params()})
-    blocks, path = [], plugin.instance_name
-    for name, team, one in (("red", 1, plugin), ("blue", 2, varied), ("late", 1, plugin)):
-        slots = _slots(one, companions, said, heard)
-        blocks.append(_block(name, team, slots))
+    # Partners are made once, so that all blocks have the same: then their entities are rows of one group.
+    slots = _slots(plugin, companions, said, heard)
+    mixed = {name: _swapped(value, plugin, varied) for name, value in slots.items()}
+    blocks = [_block("red", 1, slots), _block("blue", 2, mixed), _block("late", 1, slots)]
+    path = plugin.instance_name
     if isinstance(plugin, Behavior):
         path = f"Parent.{path}"
     paths = (path,) if isinstance(plugin, WorldPlugin) else tuple(f"{b.name}.{path}" for b in blocks)
@@ -209,10 +209,11 @@ def _topic_order(topic: Any) -> tuple[str, str, str]:
 
 def _block(name: str, team: int, slots: dict[str, Any]) -> Block:
     late: dict[str, Any] = {"rate": 10.0, "first_birth": 0.3} if name == "late" else {}
-    x, count = {"red": (0.0, 5), "blue": (10.0, 4), "late": (-10.0, 2)}[name]
+    # Near each other and the origin, where what has a place by default has it.
+    x, count = {"red": (0.0, 5), "blue": (5.0, 4), "late": (-5.0, 2)}[name]
     return Block(
-        name=name, team=team, count=count, position=(x, 0.0, 30.0), variance=(60.0, 60.0, 20.0), scatter_first=True,
-        heading=x / 5.0, heading_variance=1.0, climb=0.1, speed=6.0, **late, **slots,
+        name=name, team=team, count=count, position=(x, 0.0, 4.0), variance=(30.0, 30.0, 10.0), scatter_first=True,
+        heading=x / 2.0, heading_variance=1.0, climb=0.1, speed=6.0, **late, **slots,
     )  # fmt: skip
 
 
@@ -243,6 +244,13 @@ def _slots(
         "motion": motions[0],
         "sensor": sensors,
     }
+
+
+def _swapped(value: Any, old: Any, new: Any) -> Any:
+    """The plugins of a slot with another one in the place of `old`."""
+    if isinstance(value, list):
+        return [_swapped(v, old, new) for v in value]
+    return value.replace(behaviors=[new]) if isinstance(value, Parent) else new if value is old else value
 
 
 def _without(columns: Iterable[Channel], others: Iterable[Channel]) -> list[Channel]:

@@ -75,17 +75,21 @@ def can_say(message: type[Message]) -> bool:
 
 
 def made_up(message: type[Message], g: GroupView, rows: np.ndarray, nearest: np.ndarray) -> dict[str, Any]:
-    """Fields of one message of each of `rows` about the entity with the id `nearest`, (m,)."""
+    """Fields of one message of each of `rows` about the entity in body row `nearest`, (m,).
+
+    The first of several references, and of several teams, is the sender's own.
+    """
     refs = [name for name, column in message.fields.items() if isinstance(column, EntityRef)]
+    teams = [name for name in message.fields if "team" in name]
     out: dict[str, Any] = {}
     for number, (name, column) in enumerate(message.fields.items()):
         value = signal(g.id[rows], g.step_count[rows], number + 0.5)
         if isinstance(column, EntityRef):
-            out[name] = g.id[rows] if len(refs) > 1 and name == refs[0] else nearest
+            out[name] = g.id[rows] if len(refs) > 1 and name == refs[0] else g.bodies.id[nearest]
         elif name in {"pos", "vel", "quat"}:
             out[name] = getattr(g, name)[:, rows]
         elif "team" in name:
-            out[name] = g.team[rows]
+            out[name] = g.team[rows] if name == teams[0] else g.bodies.team[nearest]
         elif isinstance(column, Ragged):
             shape = (2, *column.shape)
             out[name] = RaggedColumn.from_rows([np.full(shape, 10.0 * v) for v in value], column)
@@ -135,7 +139,7 @@ class Driver(Autonomy):
             rows = np.flatnonzero(((g.id + g.step_count) % 3 == 0) & (nearest >= 0))
             for name in mouths if len(rows) else ():
                 message = type(self).columns[name].message  # type: ignore[attr-defined]
-                self.__dict__[name].publish(rows, **made_up(message, g, rows, g.bodies.id[nearest[rows]]))
+                self.__dict__[name].publish(rows, **made_up(message, g, rows, nearest[rows]))
 
 
 class Feeler(Sensor):
