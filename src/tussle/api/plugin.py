@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 from collections.abc import Callable
 from typing import Any, ClassVar, Self, TypeVar
 
@@ -91,7 +92,7 @@ class Plugin:
 
     def __init__(self, *, name: str | None = None, rate: float | None = None, **values: Any) -> None:
         cls = type(self)
-        if rate is not None and not rate > 0.0:
+        if rate is not None and (isinstance(rate, (bool, str)) or not 0.0 < rate < math.inf):
             raise ParameterError(
                 f"{cls.__name__}: rate = {rate!r} is not allowed; it takes a number of calls per second > 0, or None"
             )
@@ -108,6 +109,12 @@ class Plugin:
             for plugin in resolved[key]:
                 if not isinstance(plugin, child.kind):
                     raise ParameterError(f"{cls.__name__}.{key}: {plugin!r} is not a {child.kind.__name__}")
+            names = [plugin.instance_name for plugin in resolved[key]]
+            for twice in names:
+                if names.count(twice) > 1:
+                    raise ParameterError(
+                        f"{cls.__name__}.{key}: two plugins are called {twice!r}; give one of them another name with name=..."
+                    )
         self.__dict__.update(_values=resolved, instance_name=name or cls.__name__, rate=rate)
 
     # -- declarations ---------------------------------------------------------------------------------------------------

@@ -75,15 +75,22 @@ class Schedule:
         for group in groups:
             for binding in group.sensors:
                 calls.append(self._entity_call("sensor", group, binding))
-        calls += [self._world_call("interaction", r) for r in sim.interactions]
+        if sim.interactions and any(g.body_inputs for g in groups):
+            calls.append(Call("forces back to zero: the motion models have consumed them", self._clear_forces))
+        calls += [self._world_call("interaction", r) for r in sim.interactions if not r.plugin.is_idle]
         if sim.interactions:
             calls.append(Call("take over what was moved", sim.take_over_moves))
-        calls += [self._world_call("metric", r) for r in sim.metrics]
+        calls += [self._world_call("metric", r) for r in sim.metrics if not r.plugin.is_idle]
         calls.append(
             Call("deliver messages", sim.mail.deliver)
         )  # always: the world may speak first on topics of its own
         calls.append(Call("check, remove, end", sim.finish_step))
         return calls
+
+    def _clear_forces(self) -> None:
+        bodies = self.sim.population.bodies
+        bodies.force[:] = 0.0
+        bodies.torque[:] = 0.0
 
     def _motion(self, groups: list[Group]) -> list[Call]:
         sim = self.sim
@@ -201,9 +208,11 @@ class Schedule:
         rows = sim.population.bodies.world[group.first : group.last]
         if not due[rows].any():
             return
+        marks = self._marks()
         try:
             call_group(sim.population, group, due, action)
         except Exception as error:
+            self._forget_messages(marks)
             self._isolate(group, binding, error, action, due)
 
     def _world_by_world(
@@ -272,9 +281,11 @@ class Schedule:
                 found[0] = own.view.failing_row
                 raise
 
+        marks = self._marks()
         try:
             call_group(self.sim.population, group, only, watched)
         except Exception as error:
+            self._forget_messages(marks)
             return error
         return None
 
@@ -320,7 +331,16 @@ class Schedule:
                 del view.deaths[counts[0] :], view.moved[counts[1] :], view.births[counts[2] :]
                 self._isolate_referee(referee, error, action, due)
 
-        return Call(f"{kind:<12} {referee.spec.instance_name}{self._rate_text(referee.spec)}", run)
+        def lean() -> None:
+            try:
+                view.caller = plugin
+                plugin.step(view)
+            except Exception as error:
+                self._isolate_referee(referee, error, action, None)
+
+        is_plain = plugin.atomic and per_step is None
+        label = f"{kind:<12} {referee.spec.instance_name}{self._rate_text(referee.spec)}"
+        return Call(label, lean if is_plain else run)
 
     def _marks(self) -> dict[int, int]:
         return {id(topic): len(topic.sent) for topic in self.sim.topics.values()}

@@ -59,12 +59,15 @@ class Simulation:
         on_error: str | None = None,
     ) -> None:
         self.mission = mission
-        numbers = [seeds] if isinstance(seeds, (int, np.integer)) else list(seeds)
+        numbers = list(seeds) if isinstance(seeds, Iterable) else [seeds]
+        if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
+            raise ParameterError(f"threads = {threads!r} is not allowed; it takes a whole number >= 1")
         self._check(mission, numbers, on_error)
         n = self.n_worlds = len(numbers)
         self.on_error = on_error or ("raise" if n == 1 else "record")
         self._raises_when_all_fail = on_error is None
         self.running = np.ones(n, bool)
+        self.n_running = n
         self.failed = np.zeros(n, bool)
         self.results: list[WorldResult | None] = [None] * n
         self.observers: list[Callable[[Simulation], None]] = []
@@ -155,7 +158,7 @@ class Simulation:
     @property
     def is_over(self) -> bool:
         """No world is running."""
-        return not self.running.any()
+        return self.n_running == 0
 
     @property
     def schedule(self) -> list[Call]:
@@ -171,7 +174,7 @@ class Simulation:
             PluginError: With on_error="raise", a plugin failed.
         """
         for _ in range(n):
-            if not self.running.any():
+            if not self.n_running:
                 return
             self._step()
 
@@ -190,7 +193,7 @@ class Simulation:
         Returns:
             The result of each world so far.
         """
-        while self.running.any():
+        while self.n_running:
             if until is not None and float(self.t[self.running].min()) >= until - 1e-6 * self.mission.dt:
                 break
             self._resumed.wait()
@@ -199,7 +202,7 @@ class Simulation:
 
     def run_until(self, condition: Callable[[Simulation], bool]) -> None:
         """Step until condition(self) holds or all worlds have ended."""
-        while self.running.any() and not condition(self):
+        while self.n_running and not condition(self):
             self._resumed.wait()
             self._step()
 
@@ -248,6 +251,7 @@ class Simulation:
             self.context.seeds[listed_] = [s % 2**64 for s in seeds]
         self.context.clock.step[chosen] = 0
         self.running[chosen], self.failed[chosen] = True, False
+        self.n_running = int(self.running.sum())
         for world in chosen:
             self.results[world] = None
             self.parked.pop(int(world), None)
@@ -336,6 +340,7 @@ class Simulation:
 
     def after_restore(self) -> None:
         """The table has been put back: views and checks look at it."""
+        self.n_running = int(self.running.sum())
         bodies = self.population.bodies
         self.world_view.reset(bodies, 0, bodies.n)
         self._checked = None
@@ -359,7 +364,10 @@ class Simulation:
         """Check all states, remove who is gone, advance the clocks, end worlds."""
         self._check_states()
         clock = self.context.clock
-        clock.step += self.running
+        if self.n_running == self.n_worlds:
+            clock.step += 1
+        else:
+            clock.step += self.running
         self._take_out_dead()
         if clock.common >= 0:
             clock.common += 1
@@ -442,7 +450,7 @@ class Simulation:
         bodies = self.population.bodies
         for world, reason in over.items():
             self._end(world, reason)
-        if self.running.any():
+        if self.n_running:
             self._repack(np.isin(bodies.world, list(over)), None)
             mask = np.zeros(self.n_worlds, bool)
             mask[list(over)] = True
@@ -458,6 +466,7 @@ class Simulation:
         self.results[world] = result
         self.parked[world] = access.park(self, world)
         self.running[world] = False
+        self.n_running = int(self.running.sum())
 
     def _set_common_step(self) -> None:
         steps = np.unique(self.context.clock.step[self.running])
