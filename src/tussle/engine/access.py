@@ -20,7 +20,7 @@ from tussle.record import hash_columns
 if TYPE_CHECKING:
     from tussle.engine.simulation import Simulation
 
-HASHED = ("id", "team", "block", "pos", "vel", "quat", "omega", "health", "radius", "mass")
+HASHED = ("id", "team", "block", "pos", "vel", "quat", "omega", "force", "torque", "health", "radius", "mass")
 
 
 @dataclass
@@ -343,6 +343,15 @@ def _hashed(sim: Simulation, world: int) -> Iterator[tuple[str, Any]]:
             [sim.births.next_id[world : world + 1], sim.births.n_born[:, world], sim.births.n_left[:, world]]
         ),
     )
+    for times in sim.births.next_time:
+        yield "births", times[world]
+    for wish in sim.world_view.births:
+        mine = wish["world"] == world
+        if mine.any():
+            yield "wish", f"{wish['block']} {mine.sum()}".encode()
+            yield from (
+                (name, array[..., mine]) for name, array in wish.items() if name not in ("block", "world")
+            )
     for name in HASHED:
         yield name, getattr(bodies, name)[..., rows]
     parts = []
