@@ -17,7 +17,7 @@ from tussle.numeric.quaternion import quat_from_euler
 from tussle.numeric.rk4 import compile_derivative, rk4
 
 BODY_INPUTS = ("force_x", "force_y", "force_z", "torque_x", "torque_y", "torque_z", "mass")
-WRITABLE = ("pos", "vel", "quat", "omega")
+WRITABLE = ("pos", "quat", "vel", "omega")
 
 
 class MotionBody(GroupView):
@@ -25,7 +25,7 @@ class MotionBody(GroupView):
 
     Attributes:
         forward_speed: Speed along the body x axis [m/s], (n,).
-        rows: The rows of pos, vel, quat and omega one by one, thirteen (n,); for kernels.
+        rows: The rows of pos, quat, vel and omega one by one, thirteen (n,); for kernels.
     """
 
     def __getattr__(self, name: str) -> Any:

@@ -112,7 +112,7 @@ class Index:
         self.reach = np.zeros(n_worlds)
         self._rings = np.where(np.diff(self.world_start) < SPARSE_WORLD, 1.0, RINGS)
         self._cursor = np.zeros(3 * n, np.int64)
-        self._size = np.zeros(1, np.int64)
+        self._size = np.zeros(2, np.int64)
         self._fixed = False
         self._given: Floats | None = None
         self.built = 0
@@ -171,21 +171,19 @@ class Index:
             room = Room.of(last - first)
             if pos is None:
                 self._rooms[first, last] = room
-        n_blocks = kernels.group_queries(
-            self.order, self._strip_start, self._world_strip, first, last, room.queries, room.block_first, room.block_strip
-        )
-        self._query_positions(first, room.queries, pos, room.x, room.y, room.z)
+        own = pos is not None
+        east, north, up = pos if pos is not None else (self.sx, self.sy, self.sz)
         while True:
-            needed = kernels.find_spans(
-                self.inverse_cell, self.world_start, self._keys, self._strip_start, self._world_strip, room.x, room.y,
-                room.block_first, room.block_strip, self._strip_world, n_blocks, self.reach, room.span_first,
-                room.span_start, room.span_end, self._cursor, self._size,
+            needed = kernels.cut_blocks(
+                self.order, self._strip_start, self._world_strip, first, last, room.queries, room.block_first, room.block_strip,
+                east, north, up, own, room.x, room.y, room.z, self.inverse_cell, self.world_start, self._keys,
+                self._strip_world, self.reach, room.span_first, room.span_start, room.span_end, self._cursor, self._size,
             )  # fmt: skip
             if needed <= len(room.span_start):
                 break
             room.span_start, room.span_end = np.empty(2 * needed, np.int64), np.empty(2 * needed, np.int64)
         blocks = Blocks(
-            room.queries, room.x, room.y, room.z, n_blocks, room.block_first, room.span_first, room.span_start, room.span_end,
+            room.queries, room.x, room.y, room.z, int(self._size[1]), room.block_first, room.span_first, room.span_start, room.span_end,
             int(self._size[0]),
         )  # fmt: skip
         if pos is None:

@@ -299,3 +299,21 @@ def find_spans(
         size[0] = max(size[0], total)
     span_first[n_blocks] = n_spans
     return n_spans
+
+
+@kernel("I I I i8 i8 Iw Iw Iw F F F b1 Fw Fw Fw F I I I F Iw Iw Iw Iw Iw -> i8")
+def cut_blocks(
+    order, strip_start, world_strip, first, last, queries, block_first, block_strip, x, y, z, own, qx, qy, qz,
+    inverse_cell, world_start, keys, strip_world, reach, span_first, span_start, span_end, cursor, size,
+):  # fmt: skip
+    """group_queries, query_positions and find_spans in one call; size becomes (most candidates of a block, number of blocks).
+
+    Returns the number of spans, which may exceed the room for them.
+    """
+    n_blocks = group_queries(order, strip_start, world_strip, first, last, queries, block_first, block_strip)
+    query_positions(queries, order, x, y, z, first, own, qx, qy, qz)
+    size[1] = n_blocks
+    return find_spans(
+        inverse_cell, world_start, keys, strip_start, world_strip, qx, qy, block_first, block_strip, strip_world, n_blocks,
+        reach, span_first, span_start, span_end, cursor, size,
+    )  # fmt: skip

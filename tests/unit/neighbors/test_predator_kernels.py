@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from neighbor_stacks import stack
 
+from tussle.numeric.quaternion import quat_from_euler
 from tussle.stock.autonomy.predator import kernels
 
 N_WORLDS = 3
@@ -77,7 +78,8 @@ def test_without_prey_there_is_no_target_and_commands_persist():
     n = len(rows)
     own = [axis[first:].copy() for axis in s.pos]
     outputs = [np.full(n, 5.0) for _ in range(3)]
-    kernels.pursue(*own, np.zeros(n), np.zeros(n), np.full(n, 35.0), rows, *s.pos, *outputs)
+    level = np.array([np.ones(n), np.zeros(n), np.zeros(n), np.zeros(n)])
+    kernels.pursue(*own, *level, np.full(n, 35.0), rows, *s.pos, *outputs)
     kernels.point(*own[:2], np.full(n, 35.0), rows, *s.pos[:2], *outputs[:2])
     assert all((o == 5.0).all() for o in outputs)
 
@@ -105,7 +107,7 @@ def test_pursuit_points_at_the_target():
     own = [axis[first:].copy() for axis in s.pos]
     yaw, climb = np.linspace(-3, 3, n), np.linspace(-1, 1, n)
     speed, turn, pitch, heading, fast = (np.zeros(n) for _ in range(5))
-    kernels.pursue(*own, yaw, climb, np.full(n, 35.0), rows, *s.pos, speed, turn, pitch)
+    kernels.pursue(*own, *quat_from_euler(np.zeros(n), -climb, yaw), np.full(n, 35.0), rows, *s.pos, speed, turn, pitch)
     kernels.point(*own[:2], np.full(n, 35.0), rows, *s.pos[:2], heading, fast)
     d = s.pos[:, rows] - np.array(own)
     np.testing.assert_allclose(heading, np.arctan2(d[1], d[0]), atol=1e-14)

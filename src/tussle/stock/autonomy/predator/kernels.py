@@ -67,22 +67,23 @@ def hunt(
     return n_claims
 
 
-@kernel("F F F F F F I F F F Fw Fw Fw")
-def pursue(
-    x, y, z, yaw, climb, max_speed, target_row, table_x, table_y, table_z, speed, turn_rate, pitch_rate
-):
+@kernel("F F F F F F F F I F F F Fw Fw Fw")
+def pursue(x, y, z, qw, qx, qy, qz, max_speed, target_row, table_x, table_y, table_z, speed, turn_rate, pitch_rate):
     """Speed [m/s] and rates [rad/s] towards the target's position; rows without a target keep their last commands.
 
-    x, y, z [m], yaw, climb (nose up positive) [rad], max_speed [m/s], target_row (n,) of the rows; table_x, table_y, table_z
-    (N,) [m].
+    x, y, z [m], quaternion (qw ... qz), max_speed [m/s], target_row (n,) of the rows; table_x, table_y, table_z (N,) [m].
     """
     for i in range(x.shape[0]):
         row = target_row[i]
         if row >= 0:
             dx, dy, dz = table_x[row] - x[i], table_y[row] - y[i], table_z[row] - z[i]
+            east = qw[i] * qw[i] + qx[i] * qx[i] - qy[i] * qy[i] - qz[i] * qz[i]
+            north = 2.0 * (qw[i] * qz[i] + qx[i] * qy[i])
+            up = 2.0 * (qx[i] * qz[i] - qw[i] * qy[i])
+            climb = atan2(up, math.sqrt(east * east + north * north))
             speed[i] = max_speed[i]
-            turn_rate[i] = wrap(atan2(dy, dx) - yaw[i])
-            pitch_rate[i] = wrap(atan2(dz, math.sqrt(dx * dx + dy * dy)) - climb[i])
+            turn_rate[i] = wrap(atan2(dy, dx) - atan2(north, east))
+            pitch_rate[i] = wrap(atan2(dz, math.sqrt(dx * dx + dy * dy)) - climb)
 
 
 @kernel("F F F I F F Fw Fw")

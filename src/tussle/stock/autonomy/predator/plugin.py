@@ -37,23 +37,19 @@ class Predator(Autonomy):
         _, _, id_row, id_start = g.table_bodies.layout()
         x, y, z = g.pos
         target_row = np.empty(g.n, np.int64)
-        room = 16 * g.n + 64
-        while (
-            True
-        ):  # again with more room where there are more claims than expected; targets then stay as they are
+        room, n_claims = 0, 16 * g.n + 64
+        while n_claims > room:  # again, where there are more claims than expected; targets stay as they are then
+            room = n_claims
             claim_row, claimed = np.empty(room, np.int64), np.empty(room, np.int64)
             n_claims = kernels.hunt(
                 x, y, z, g.team, self.prey_team_id, self.capture_range, self.allow_prey_switching, self.target, target_row,
                 claim_row, claimed, bodies.id, index.row_world, id_start, id_row, index.place, g.first, *index.table,
                 g.by_place(index, "team")[0], index.order,
             )  # fmt: skip
-            if n_claims <= room:
-                break
-            room = n_claims
         table_x, table_y, table_z = bodies.pos
         if not self.wired.isdisjoint(("speed", "turn_rate", "pitch_rate")):
             kernels.pursue(
-                x, y, z, g.yaw, g.climb, self.max_speed, target_row, table_x, table_y, table_z, self.speed, self.turn_rate,
+                x, y, z, *g.quat, self.max_speed, target_row, table_x, table_y, table_z, self.speed, self.turn_rate,
                 self.pitch_rate,
             )  # fmt: skip
         if not self.wired.isdisjoint(("desired_heading", "desired_speed")):

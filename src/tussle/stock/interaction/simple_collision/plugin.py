@@ -27,9 +27,13 @@ class SimpleCollision(Interaction):
     def start(self, w: WorldView) -> None:
         self._collide(w)
 
+    @property
+    def is_idle(self) -> bool:
+        """With startup_collisions_only it looks at the start alone."""
+        return bool(self.startup_collisions_only)
+
     def step(self, w: WorldView) -> None:
-        if not self.startup_collisions_only:
-            self._collide(w)
+        self._collide(w)
 
     def _collide(self, w: WorldView) -> None:
         pairs = w.near(self.collision_range[w.world])

@@ -51,4 +51,4 @@ class SingleIntegrator(MotionModel):
 
     def to_body(self, body: MotionBody) -> None:
         """Publish position, attitude and velocity."""
-        kernels.to_body(self.x, *body.pos, *body.quat, *body.vel)
+        kernels.to_body(self.x, *body.rows[:10])

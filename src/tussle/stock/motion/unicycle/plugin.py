@@ -90,5 +90,5 @@ class Unicycle(MotionModel):
         third_max = self.pitch_rate_max if pitches else self.velocity_z_max
         kernels.to_body(
             self.x, self.speed, self.turn_rate, third, self.vel_max, self.turn_rate_max, third_max,
-            pitches, self.enable_roll, body.dt, *body.pos, *body.quat, *body.vel, *body.omega,
+            pitches, self.enable_roll, body.dt, *body.rows,
         )  # fmt: skip
