@@ -13,6 +13,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+OUTPUT = re.compile(r"^(<!-- output -->\n```text\n)(.+?)^```$", re.MULTILINE | re.DOTALL)
+"""In the README: what the first command prints."""
 FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
@@ -52,22 +54,32 @@ def namespace(page: Path) -> types.ModuleType:
     return module
 
 
-def run(example: Example, page: Path, module: types.ModuleType) -> str:
-    """What a block prints, and the error it ends with where the page shows one.
+def printed_by(example: Example, page: Path, module: types.ModuleType) -> tuple[str, Exception | None]:
+    """What a block prints, with the error that it ends with as the last line, and that error.
 
     Line numbers are those of the page.
     """
     code = compile("\n" * (example.line - 1) + example.code, str(page), "exec", dont_inherit=True)
-    printed = io.StringIO()
+    printed, raised = io.StringIO(), None
     with contextlib.redirect_stdout(printed):
         try:
             exec(code, module.__dict__)
-        except Exception as error:
-            last = as_in_a_file(f"{type(error).__name__}: {error}", page)
-            if example.output is None or not example.output.rstrip("\n").endswith(last):
-                raise
-            print(last)
-    return as_in_a_file(printed.getvalue(), page)
+        except Exception as error:  # noqa: BLE001 - a page may show any
+            raised = error
+            print(f"{type(error).__name__}: {error}")
+    return as_in_a_file(printed.getvalue(), page), raised
+
+
+def run(example: Example, page: Path, module: types.ModuleType) -> str:
+    """What a block prints.
+
+    Raises:
+        Exception: That of the block, unless the page shows it.
+    """
+    printed, raised = printed_by(example, page, module)
+    if raised is not None and printed != example.output:
+        raise raised
+    return printed
 
 
 def as_in_a_file(printed: str, page: Path) -> str:

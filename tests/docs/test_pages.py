@@ -14,7 +14,9 @@ def test_the_code_of_a_page_runs_and_prints_what_it_shows(page):
     for example in examples(page):
         printed = run(example, page, module)
         if example.output is not None:
-            assert printed == example.output, f"{page.name}:{example.line}"
+            assert printed == example.output, (
+                f"{page.name}:{example.line}; if meant: python tests/docs/rewrite.py"
+            )
 
 
 @pytest.mark.parametrize("page", PAGES, ids=IDS)
