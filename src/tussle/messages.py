@@ -196,6 +196,13 @@ class EntityCollided(Message):
     second_team = Field(dtype=int)
 
 
+class EntityHitGround(Message):
+    """An entity came down to the ground."""
+
+    entity = EntityRef()
+    team = Field(dtype=int)
+
+
 class BoundaryCrossed(Message):
     """An entity left the boundary that contains it, or entered one that it had left."""
 
@@ -215,6 +222,29 @@ class Waypoint(Message):
     """A point to go to."""
 
     pos = Field("x y z", unit="m m m")
+
+
+WAYPOINT_MODES = ("follow_once", "back_and_forth", "loiter", "racetrack")
+"""What is done at the end of a list of waypoints; `WaypointList.mode` is a number of these."""
+
+
+class WaypointList(Message):
+    """Points to go to one after the other."""
+
+    points = Ragged(
+        "x y z roll pitch yaw position_tolerance turn_tolerance",
+        unit="m m m rad rad rad m rad",
+        doc="Places in the world frame, attitudes there, and how near is near enough.",
+    )
+    mode = Field(dtype=int, doc="Number in WAYPOINT_MODES.")
+
+
+class WaypointStatus(Message):
+    """A waypoint has been reached."""
+
+    index = Field(dtype=int, doc="Number of the waypoint that comes next.")
+    n_waypoints = Field(dtype=int, doc="Length of the list.")
+    is_done = Field(dtype=bool, doc="Whether the list is at its end.")
 
 
 class BoundaryShape(Message):

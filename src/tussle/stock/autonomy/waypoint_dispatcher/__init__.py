@@ -1,0 +1,5 @@
+"""Leads along a list of waypoints."""
+
+from tussle.stock.autonomy.waypoint_dispatcher.plugin import WaypointDispatcher
+
+__all__ = ["WaypointDispatcher"]

@@ -1,0 +1,5 @@
+"""Says where to go, when it is time."""
+
+from tussle.stock.autonomy.waypoint_generator.plugin import WaypointGenerator
+
+__all__ = ["WaypointGenerator"]

@@ -1,0 +1,74 @@
+"""The ground as the end of a flight, or as what carries a vehicle."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tussle import units
+from tussle.api import Interaction, Param, State, WorldView
+from tussle.errors import ParameterError
+from tussle.messages import EntityHitGround
+
+GRAVITY = 9.81  # [m/s^2]
+
+
+class GroundCollision(Interaction):
+    """What comes down to the level of the ground is removed, or carried by a force that is its weight.
+
+    It says so (`EntityHitGround`) when an entity touches; the existing system said it again in every step of a stay on the ground. It
+    also keeps entities from being placed in the ground.
+    """
+
+    grade = "portable"
+    atomic = True
+
+    ground_collision_z = Param(0.0, unit="m", doc="Level of the ground above the origin's tangent plane.")
+    ground_collision_altitude = Param(
+        "",
+        doc="That level as an altitude above the ellipsoid, such as '300 m'; where given it goes before ground_collision_z.",
+    )
+    enable_startup_collisions = Param(True, doc="Nobody is placed at or below the level.")
+    remove_on_collision = Param(True, doc="Remove what touches; else push it up by its weight.")
+    team = Param("all", doc="Number of the team that the ground is there for, or 'all'.")
+    is_down = State(
+        dtype=bool, per="entity", doc="Whether an entity was at or below the level in the last step."
+    )
+
+    def start(self, w: WorldView) -> None:
+        self._touch(w)
+
+    def step(self, w: WorldView) -> None:
+        self._touch(w)
+
+    def _touch(self, w: WorldView) -> None:
+        is_down = w.pos[2] <= self._level(w)[w.world]
+        if self.team != "all":
+            is_down &= w.team == self._team()
+        rows = np.flatnonzero(is_down & ~self.is_down)
+        if len(rows):
+            w.publish(EntityHitGround, w.world[rows], entity=w.id[rows], team=w.team[rows])
+        self.is_down[:] = is_down
+        down = np.flatnonzero(is_down)
+        if len(down):
+            removes = self.remove_on_collision[w.world[down]]
+            w.kill(down[removes], "ground")
+            carried = down[~removes]
+            w.bodies.force[2, carried] += w.mass[carried] * GRAVITY
+
+    def _level(self, w: WorldView) -> np.ndarray:
+        """Height of the ground [m], (n_worlds,)."""
+        if not self.ground_collision_altitude:
+            return np.asarray(self.ground_collision_z)
+        altitude = units.parse(self.ground_collision_altitude, "m")
+        return np.full(w.n_worlds, altitude - w.scene.origin.altitude)
+
+    def _team(self) -> int:
+        try:
+            return int(self.team)
+        except ValueError:
+            raise ParameterError(
+                f"GroundCollision.team = {self.team!r} is not allowed; it takes the number of a team, or 'all'"
+            ) from None
+
+    def rejects(self, w: WorldView, world: int, pos: np.ndarray, taken: np.ndarray) -> bool:
+        return bool(self.enable_startup_collisions[world] and pos[2] <= self._level(w)[world])

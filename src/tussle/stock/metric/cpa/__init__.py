@@ -1,0 +1,5 @@
+"""The closest point of approach."""
+
+from tussle.stock.metric.cpa.plugin import CPA
+
+__all__ = ["CPA"]

@@ -1,0 +1,5 @@
+"""A damped spring along the vertical."""
+
+from tussle.stock.motion.harmonic_oscillator.plugin import HarmonicOscillator
+
+__all__ = ["HarmonicOscillator"]

@@ -1,0 +1,134 @@
+"""Unicycle3D kernels: held body rates make each substep one and the same turn, so a row needs one sine and cosine per call.
+
+The attitude is exact up to rounding; the path is Simpson's rule over begin, middle and end of each substep, of fourth
+order as RK4 is. RK4 on the quaternion was the alternative: it drifts off the unit sphere and needs a term that pulls it
+back.
+"""
+
+from __future__ import annotations
+
+import math
+
+from tussle.numeric import sincos
+from tussle.numeric.kernel import device, kernel
+
+
+@device
+def clamp(value, limit):
+    """Value held within [-limit, limit]."""
+    return min(max(value, -limit), limit)
+
+
+@device
+def multiply(aw, ax, ay, az, bw, bx, by, bz):
+    """Hamilton product a b."""
+    return (
+        aw * bw - ax * bx - ay * by - az * bz,
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+    )
+
+
+@device
+def forward(w, x, y, z):
+    """Body x axis of a unit quaternion (east, north, up)."""
+    return 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)
+
+
+@device
+def fly(x, i, p_rate, q_rate, r_rate, speed, acceleration, speed_max, dt, substeps):
+    """Advance row i by dt: body rates about x (right wing down), y (nose down), z (left) [rad/s] held.
+
+    The speed changes at `acceleration` [m/s^2] within its limit; a substep that would end beyond it ends there.
+    """
+    h = dt / substeps
+    rate = math.sqrt(p_rate * p_rate + q_rate * q_rate + r_rate * r_rate)
+    sine, dw = sincos(0.25 * h * rate)
+    gain = sine / rate if rate > 0.0 else 0.25 * h
+    dx, dy, dz = gain * p_rate, gain * q_rate, gain * r_rate
+    w, a, b, c = x[3, i], x[4, i], x[5, i], x[6, i]
+    east, north, up = x[0, i], x[1, i], x[2, i]
+    v0 = speed
+    fx, fy, fz = forward(w, a, b, c)
+    for _ in range(substeps):
+        v1 = v0 if acceleration == 0.0 else clamp(v0 + h * acceleration, speed_max)
+        vm = 0.5 * (v0 + v1)
+        w, a, b, c = multiply(w, a, b, c, dw, dx, dy, dz)
+        mx, my, mz = forward(w, a, b, c)
+        w, a, b, c = multiply(w, a, b, c, dw, dx, dy, dz)
+        ex, ey, ez = forward(w, a, b, c)
+        east += h / 6.0 * (v0 * fx + 4.0 * vm * mx + v1 * ex)
+        north += h / 6.0 * (v0 * fy + 4.0 * vm * my + v1 * ey)
+        up += h / 6.0 * (v0 * fz + 4.0 * vm * mz + v1 * ez)
+        v0, fx, fy, fz = v1, ex, ey, ez
+    length = math.sqrt(w * w + a * a + b * b + c * c)
+    x[0, i], x[1, i], x[2, i] = east, north, up
+    x[3, i], x[4, i], x[5, i], x[6, i] = w / length, a / length, b / length, c / length
+    x[7, i] = v0
+
+
+@kernel("F2w F2 F2 f8 i8")
+def advance_speed(x, u, p, dt, substeps):
+    """Advance the vehicle whose speed is commanded, in place.
+
+    Args:
+        x: x, y, z [m], quaternion w, x, y, z body to world, speed [m/s], (8, n).
+        u: speed [m/s], turn_rate, pitch_rate, roll_rate [rad/s], (4, n).
+        p: speed_max [m/s], turn_rate_max, pitch_rate_max, roll_rate_max [rad/s], (>= 4, n).
+        dt: Duration [s].
+        substeps: Number of equal substeps in dt.
+    """
+    for i in range(x.shape[1]):
+        speed = clamp(u[0, i], p[0, i])
+        turn, rise, bank = clamp(u[1, i], p[1, i]), clamp(u[2, i], p[2, i]), clamp(u[3, i], p[3, i])
+        fly(x, i, bank, -rise, turn, speed, 0.0, p[0, i], dt, substeps)
+
+
+@kernel("F2w F2 F2 f8 f8 i8")
+def advance_acceleration(x, u, p, accel_max, dt, substeps):
+    """Advance the vehicle whose acceleration is commanded, in place.
+
+    Args:
+        x: As in `advance_speed`, (8, n).
+        u: acceleration_x [m/s^2], turn_rate, pitch_rate, roll_rate [rad/s], (4, n).
+        p: As in `advance_speed`, (>= 4, n).
+        accel_max: Limit of the acceleration [m/s^2].
+        dt: Duration [s].
+        substeps: Number of equal substeps in dt.
+    """
+    for i in range(x.shape[1]):
+        pull = clamp(u[0, i], accel_max)
+        turn, rise, bank = clamp(u[1, i], p[1, i]), clamp(u[2, i], p[2, i]), clamp(u[3, i], p[3, i])
+        speed = clamp(x[7, i], p[0, i])
+        fly(x, i, bank, -rise, turn, speed, pull, p[0, i], dt, substeps)
+
+
+@kernel("F2 F F F F F F Fw Fw Fw Fw Fw Fw Fw Fw Fw Fw Fw Fw Fw")
+def to_body(
+    x, turn_rate, pitch_rate, roll_rate, turn_max, pitch_max, roll_max,
+    east, north, up, qw, qx, qy, qz, vx, vy, vz, wx, wy, wz,
+):  # fmt: skip
+    """Publish position, attitude, velocity and turn rate.
+
+    Args:
+        x: State as in `advance_speed`, (8, n).
+        turn_rate, pitch_rate, roll_rate: Commanded rates [rad/s], (n,).
+        turn_max, pitch_max, roll_max: Their limits [rad/s], (n,).
+        east, north, up: Position [m], (n,), written.
+        qw, qx, qy, qz: Quaternion body to world, (n,), written.
+        vx, vy, vz: Velocity [m/s], (n,), world frame, written.
+        wx, wy, wz: Turn rate [rad/s], (n,), world frame, written.
+    """
+    for i in range(x.shape[1]):
+        w, a, b, c, speed = x[3, i], x[4, i], x[5, i], x[6, i], x[7, i]
+        east[i], north[i], up[i] = x[0, i], x[1, i], x[2, i]
+        qw[i], qx[i], qy[i], qz[i] = w, a, b, c
+        fx, fy, fz = forward(w, a, b, c)
+        vx[i], vy[i], vz[i] = speed * fx, speed * fy, speed * fz
+        bank = clamp(roll_rate[i], roll_max[i])
+        dive = -clamp(pitch_rate[i], pitch_max[i])
+        turn = clamp(turn_rate[i], turn_max[i])
+        wx[i] = fx * bank + 2.0 * (a * b - w * c) * dive + 2.0 * (a * c + w * b) * turn
+        wy[i] = fy * bank + (1.0 - 2.0 * (a * a + c * c)) * dive + 2.0 * (b * c - w * a) * turn
+        wz[i] = fz * bank + 2.0 * (b * c + w * a) * dive + (1.0 - 2.0 * (a * a + b * b)) * turn
