@@ -29,11 +29,11 @@ class Parked:
 
     Attributes:
         bodies: Its rows.
-        tables: Number of the group -> (rows in `bodies`, dtype -> columns).
+        tables: Key of the group -> (rows in `bodies`, dtype -> columns).
     """
 
     bodies: Bodies
-    tables: dict[int, tuple[np.ndarray, dict[type, np.ndarray]]]
+    tables: dict[Any, tuple[np.ndarray, dict[type, np.ndarray]]]
 
 
 def park(sim: Simulation, world: int) -> Parked:
@@ -41,10 +41,10 @@ def park(sim: Simulation, world: int) -> Parked:
     bodies = sim.population.bodies
     rows = np.flatnonzero(bodies.world == world)
     tables = {}
-    for number, group in enumerate(sim.population.groups):
+    for group in sim.population.groups:
         mine = np.flatnonzero((rows >= group.first) & (rows < group.last))
         if len(mine):
-            tables[number] = (
+            tables[group.key] = (
                 mine,
                 {d: a[:, rows[mine] - group.first] for d, a in group.table.arrays.items()},
             )
@@ -59,10 +59,11 @@ def _sources(
 ) -> Iterator[tuple[Bodies, list[tuple[Group, np.ndarray, dict[type, np.ndarray]]]]]:
     """Body tables with the rows of each group: the live one, then the worlds that have ended."""
     groups = sim.population.groups
+    by_key = {g.key: g for g in groups}
     yield sim.population.bodies, [(g, np.arange(g.first, g.last), g.table.arrays) for g in groups]
     for world, parked in sim.parked.items():
         if not (sim.population.bodies.world == world).any():
-            yield parked.bodies, [(groups[n], rows, arrays) for n, (rows, arrays) in parked.tables.items()]
+            yield parked.bodies, [(by_key[k], rows, arrays) for k, (rows, arrays) in parked.tables.items()]
 
 
 def _binding(group: Group, path: tuple[str, ...]) -> Binding | None:
@@ -219,18 +220,18 @@ class Snapshot:
 
     mission: Any
     seeds: np.ndarray
-    groups: list[tuple[Any, ...]]
+    groups: dict[Any, tuple[Any, ...]]
     world: dict[str, Any]
 
 
 def snapshot(sim: Simulation) -> Snapshot:
     """See `Simulation.snapshot`."""
     population, births = sim.population, sim.births
-    groups = []
+    groups = {}
     for group in population.groups:
         outside = [_save_handles(b) for b in group.walk()]
         ragged = [{k: c.take(np.arange(group.n)) for k, c in _ragged(b).items()} for b in group.walk()]
-        groups.append((group.first, group.table.copy(), ragged, outside))
+        groups[group.key] = (group.first, group.table.copy(), ragged, outside)
     world = {
         "floats": population.bodies.floats.copy(),
         "ints": population.bodies.ints.copy(),
@@ -269,20 +270,19 @@ def restore(sim: Simulation, saved: Snapshot) -> None:
     """See `Simulation.restore`."""
     if saved.mission != sim.mission or len(saved.seeds) != sim.n_worlds:
         raise SnapshotError(
-            f"the snapshot is of a stack of {len(saved.seeds)} worlds of {saved.mission.name or 'another mission'!r}, not of this simulation"
+            f"the snapshot is of a stack of {len(saved.seeds)} worlds of {saved.mission.name or 'another mission'!r}, not of this"
         )
     population, births, world = sim.population, sim.births, saved.world
-    if len(saved.groups) > len(population.groups):
+    if not set(saved.groups) <= {g.key for g in population.groups}:
         raise SnapshotError(
             "the snapshot has entities of blocks that this simulation has never had; restore it into the simulation it was taken from"
         )
     sim.context.seeds[:] = saved.seeds
     population.close_handles()
     population.bodies.replace(world["floats"].copy(), world["ints"].copy())
-    for number, group in enumerate(population.groups):
-        first, arrays, ragged, outside = (
-            saved.groups[number] if number < len(saved.groups) else _no_rows(group, population.bodies.n)
-        )
+    for group in population.groups:
+        kept = saved.groups.get(group.key)
+        first, arrays, ragged, outside = kept or _no_rows(group, population.bodies.n)
         group.table.restore(arrays)
         for binding, lists in zip(group.walk(), ragged, strict=True):
             binding.ragged = {k: c.take(np.arange(len(c))) for k, c in lists.items()}

@@ -118,6 +118,7 @@ class Group:
         self.name = name
         self.block = block
         self.place = 0
+        self.key: Any = None
         self.first: int
         self.n: int
         self.context = context

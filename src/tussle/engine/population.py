@@ -97,6 +97,7 @@ class Population:
                 self.advise,
             )
             self._by_key[key] = group
+            group.key = key
             self.groups.append(group)
             if self.is_sequential:
                 group.place = place

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from tussle import stock, units
 from tussle.api import Autonomy, Controller, Interaction, Metric, MotionModel, Network, Sensor
-from tussle.errors import MissionError, listed
+from tussle.errors import MissionError, listed, nearest_name
 from tussle.scene import Scene
 
 END_CONDITIONS = ("time", "one_team", "all_dead", "none")
@@ -21,8 +21,8 @@ PLACEMENTS = ("normal", "uniform")
 
 
 def _numbers(where: str, value: Any, unit: str, n: int) -> tuple[float, ...]:
-    values = list(value) if not isinstance(value, (str, int, float)) else [value] * n
-    if len(values) != n:
+    values = list(value) if isinstance(value, Iterable) and not isinstance(value, str) else [value] * n
+    if len(values) != n or value is None:
         raise MissionError(f"{where} = {value!r}: needed are {n} numbers")
     return tuple(_number(where, v, unit) for v in values)
 
@@ -37,6 +37,20 @@ def _number(where: str, value: Any, unit: str) -> float:
             f"{where} = {value!r} is not allowed; it takes a finite number{' in ' + unit if unit else ''}"
         )
     return number
+
+
+def _whole(where: str, value: Any, bound: str = "") -> int:
+    is_number = isinstance(value, (int, float, np.integer)) and not isinstance(value, bool)
+    if not is_number or not math.isfinite(value) or int(value) != value:
+        raise MissionError(f"{where} = {value!r} is not allowed; it takes a whole number{bound}")
+    return int(value)
+
+
+def _items(where: str, value: Any, what: str) -> tuple[Any, ...]:
+    try:
+        return tuple(value)
+    except TypeError:
+        raise MissionError(f"{where} = {value!r} is not allowed; it takes {what}") from None
 
 
 def _plugins(where: str, value: Any, kind: type) -> tuple[Any, ...]:
@@ -118,6 +132,8 @@ class Block:
 
     def __post_init__(self) -> None:
         where = f"block {self.name!r}"
+        if not isinstance(self.name, str):
+            raise MissionError(f"{where}: a block's name is a text")
         if not self.name or "." in self.name:
             raise MissionError(
                 f"{where}: a block's name is not empty and has no dot, since paths such as prey.Boids.gain use dots"
@@ -127,7 +143,7 @@ class Block:
         if self.velocity is not None:
             _set(self, "velocity", _numbers(f"{where}: velocity", self.velocity, "m/s", 3))
         for name, unit in _BLOCK_NUMBERS.items():
-            if getattr(self, name) is not None:
+            if getattr(self, name) is not None or name != "rate":
                 _set(self, name, _number(f"{where}: {name}", getattr(self, name), unit))
         self._check_bounds(where)
         _set(self, "autonomy", _plugins(f"{where}: autonomy", self.autonomy, Autonomy))
@@ -141,10 +157,7 @@ class Block:
 
     def _check_bounds(self, where: str) -> None:
         for name in ("count", "slots", "team"):
-            if isinstance(getattr(self, name), bool) or int(getattr(self, name)) != getattr(self, name):
-                raise MissionError(
-                    f"{where}: {name} = {getattr(self, name)!r} is not allowed; it takes a whole number"
-                )
+            _set(self, name, _whole(f"{where}: {name}", getattr(self, name)))
         if self.placement not in PLACEMENTS:
             raise MissionError(
                 f"{where}: placement = {self.placement!r} is not allowed; {listed(PLACEMENTS)}"
@@ -219,7 +232,7 @@ class Mission:
     name: str = ""
 
     def __post_init__(self) -> None:
-        _set(self, "blocks", tuple(self.blocks))
+        _set(self, "blocks", _items("mission: blocks", self.blocks, "a list of Block"))
         for block in self.blocks:
             if not isinstance(block, Block):
                 raise MissionError(f"mission: {block!r} is not a Block")
@@ -233,32 +246,37 @@ class Mission:
             _set(self, name, _number(f"mission: {name}", getattr(self, name), "s"))
         if not self.dt > 0.0:
             raise MissionError(f"mission: dt = {self.dt!r} is not allowed; it takes a number of seconds > 0")
-        if (
-            isinstance(self.motion_multiplier, bool)
-            or self.motion_multiplier != int(self.motion_multiplier)
-            or self.motion_multiplier < 1
-        ):
-            raise MissionError(
-                f"mission: motion_multiplier = {self.motion_multiplier!r} is not allowed; it takes a whole number >= 1"
-            )
+        multiplier = _whole("mission: motion_multiplier", self.motion_multiplier, " >= 1")
+        if multiplier < 1:
+            raise MissionError(f"mission: motion_multiplier = {multiplier!r} is not allowed; it takes a whole number >= 1")
+        _set(self, "motion_multiplier", multiplier)
         if self.update not in UPDATES:
             raise MissionError(f"mission: update = {self.update!r} is not allowed; {listed(UPDATES)}")
         conditions = self.end_conditions
         conditions = (
             tuple(c.strip() for c in conditions.split(","))
             if isinstance(conditions, str)
-            else tuple(conditions)
+            else _items("mission: end_conditions", conditions, f"a list; {listed(END_CONDITIONS)}")
         )
         for condition in conditions:
             if condition not in END_CONDITIONS:
                 raise MissionError(
-                    f"mission: end condition {condition!r} is not allowed; {listed(END_CONDITIONS)}"
+                    f"mission: end condition {condition!r} is not allowed{nearest_name(str(condition), END_CONDITIONS)}; "
+                    f"{listed(END_CONDITIONS)}"
                 )
         _set(self, "end_conditions", conditions)
         for name, kind in (("interactions", Interaction), ("metrics", Metric), ("networks", Network)):
             _set(self, name, _plugins(f"mission: {name}", getattr(self, name), kind))
         if "GlobalNetwork" not in [p.instance_name for p in self.networks]:
             _set(self, "networks", (stock.load("GlobalNetwork")(), *self.networks))
+        _plugins("mission", self.world_plugins, object)
+        for plugin in self.world_plugins:
+            if plugin.instance_name in names:
+                raise MissionError(
+                    f"mission: {plugin.instance_name!r} is the name of a block and of a plugin; paths need them to differ"
+                )
+        if not isinstance(self.scene, Scene):
+            raise MissionError(f"mission: scene = {self.scene!r} is not a Scene")
 
     @property
     def steps(self) -> int:

@@ -1,0 +1,157 @@
+"""Synchronous and sequential: who sees whom where."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from small_worlds import VELOCITY, Drift, Wander, block, hashes, mission
+
+from tussle import Simulation
+from tussle.api import Autonomy, EasyAutonomy, Output, Param, State
+from tussle.stock import NoisyContacts, SimpleCollision
+
+
+class Follow(Autonomy):
+    """Fly so that this step ends where the nearest other is seen now."""
+
+    seen = State(unit="m")
+    velocity = Output(VELOCITY, unit="m/s")
+
+    def step(self, g):
+        found = g.nearest()
+        self.seen[:] = g.bodies.pos[0, found.other[0]]
+        self.velocity[:] = found.offset[:, 0] / g.dt
+
+
+class EasyFollow(EasyAutonomy):
+    seen = State(unit="m")
+    velocity = Output(VELOCITY, unit="m/s")
+
+    def step_one(self, me):
+        other = me.nearest()
+        me.seen = other.pos[0]
+        me.velocity = (other.pos - me.pos) / me.dt
+
+
+class NearFollow(Autonomy):
+    """The same by pairs within a range."""
+
+    seen = State(unit="m")
+    velocity = Output(VELOCITY, unit="m/s")
+
+    def step(self, g):
+        near = g.near(1e3)
+        self.seen[near.row] = near.pos[0]
+        self.velocity[:] = near.mean(near.offset) / g.dt
+
+
+def pair(update, leader_first, follow):
+    runner = block("runner", position=(10.0, 0, 0), autonomy=Drift(to=(30.0, 0, 0)))
+    follower = block("follower", autonomy=follow())
+    blocks = [runner, follower] if leader_first else [follower, runner]
+    return mission(*blocks, update=update, end=0.3)
+
+
+@pytest.mark.parametrize("follow", [Follow, EasyFollow, NearFollow])
+@pytest.mark.parametrize(
+    ("update", "leader_first", "seen"),
+    [
+        # The runner is at 10, 13, 16 m at the steps' beginnings; in each it moves 3 m.
+        ("synchronous", True, [10.0, 13.0, 16.0]),
+        ("synchronous", False, [10.0, 13.0, 16.0]),
+        ("sequential", True, [13.0, 16.0, 19.0]),  # it has moved already when the follower looks
+        ("sequential", False, [10.0, 13.0, 16.0]),
+    ],
+)
+def test_what_a_follower_sees(update, leader_first, seen, follow):
+    sim = Simulation(pair(update, leader_first, follow))
+    found = []
+    while not sim.is_over:
+        sim.step()
+        found.append(float(sim.read(f"follower.{follow.__name__}.seen")[0][0, 0]))
+        assert sim.read("follower.pos")[0][0, 0, 0] == pytest.approx(found[-1])
+    assert found == pytest.approx(seen)
+
+
+class Shy(Autonomy):
+    """Flees the mean of those in sight."""
+
+    sight = Param(20.0, unit="m")
+    velocity = Output(VELOCITY, unit="m/s")
+
+    def step(self, g):
+        near = g.near(self.sight)
+        self.velocity[:] = -0.3 * near.mean(near.offset) + g.normal("jitter", 3) + 0.1 * near.mean(near.vel)
+
+
+def herd(update="sequential", **values):
+    return mission(
+        block("a", team=1, count=5, variance=(40, 40, 40), autonomy=Shy(), sensor=NoisyContacts()),
+        block("b", team=2, count=3, variance=(40, 40, 40), autonomy=[Wander(), Shy(rate=5.0)]),
+        block("late", team=2, count=3, rate=5.0, variance=(40, 40, 40), autonomy=Shy()),
+        update=update, interactions=[SimpleCollision(collision_range=1.0)], end=1.5, **values,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("update", ["sequential", "synchronous"])
+def test_a_world_is_the_same_in_any_stack(update):
+    game = herd(update)
+    lone = [hashes(game, [seed])[0] for seed in (3, 4, 5)]
+    assert hashes(game, [3, 4, 5]) == lone
+    assert hashes(game, [5, 9, 3, 4]) == [lone[2], hashes(game, [9])[0], lone[0], lone[1]]
+    assert len(set(lone)) == 3
+    assert lone != [hashes(herd("synchronous" if update == "sequential" else "sequential"), [seed])[0] for seed in (3, 4, 5)]
+
+
+def test_sequential_snapshot_and_reset():
+    sim = Simulation(herd(), seeds=[3, 4])
+    sim.step(4)
+    saved = sim.snapshot()
+    first = [r.state_hash for r in sim.run()]
+    assert first == hashes(herd(), [3, 4])
+    sim.restore(saved)
+    assert [r.state_hash for r in sim.run()] == first
+    sim.restore(saved)
+    sim.reset([0], seeds=[5])
+    assert [r.state_hash for r in sim.run()] == hashes(herd(), [5, 4])
+
+
+def test_sequential_with_structural_params_is_restored_into_the_right_groups():
+    from small_worlds import Talker
+    from tussle.stock import Unicycle
+
+    class Steady(Autonomy):
+        speed = Output(unit="m/s")
+        turn_rate = Output(unit="rad/s")
+        pitch_rate = Output(unit="rad/s")
+
+        def step(self, g):
+            self.speed[:] = g.id.astype(float)
+
+    game = mission(block(count=3, autonomy=[Steady(), Talker()], motion=Unicycle(vel_max=9.0)), update="sequential")
+    sim = Simulation(game, seeds=[1, 2])
+    sim.step(3)
+    saved = sim.snapshot()
+    first = [r.state_hash for r in sim.run()]
+    ended = sim.read("a.pos")[0].copy()
+    sim.reset([1], params={"a.Unicycle.enable_roll": True})  # new groups come between the old ones
+    sim.run()
+    assert np.array_equal(sim.read("a.pos")[0][0], ended[0])
+    sim.restore(saved)
+    assert [r.state_hash for r in sim.run()] == first
+
+
+def test_the_schedule_lists_the_places_one_by_one():
+    text = Simulation(pair("sequential", True, Follow)).describe()
+    lines = [line.split(maxsplit=1)[1] for line in text.splitlines()[1:5]]
+    assert lines == ["autonomy     runner 1: Drift", "motion       runner 1: SingleIntegrator",
+                     "autonomy     follower 2: Follow", "motion       follower 2: SingleIntegrator"]  # fmt: skip
+
+
+def test_sequential_substeps_are_all_of_one_entity_before_the_next():
+    def seen(multiplier):
+        sim = Simulation(pair("sequential", True, Follow).replace(motion_multiplier=multiplier))
+        sim.step()
+        return float(sim.read("follower.Follow.seen")[0][0, 0])
+
+    assert seen(1) == pytest.approx(seen(4)) == pytest.approx(13.0)
