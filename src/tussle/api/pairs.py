@@ -8,7 +8,6 @@ import numpy as np
 
 from tussle.errors import ParameterError
 from tussle.neighbors import queries, search
-from tussle.neighbors.index import Index
 
 if TYPE_CHECKING:
     from tussle.api.group import GroupView

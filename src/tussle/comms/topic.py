@@ -137,7 +137,7 @@ class Inbox:
         )
 
     def pairs(self) -> tuple[np.ndarray, Batch]:
-        """(row, messages): one item per receiving row and message, ordered by row, then arrival, then sender; row numbers are the group's own."""
+        """(row, messages): one item per receiving row of the group and message, by row, then arrival, then sender."""
         view = self.view
         rows, batches = [], []
         for parcel in self.parcels:

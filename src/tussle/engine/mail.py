@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from itertools import zip_longest
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -149,8 +148,8 @@ class Mail:
             )  # a topic or group that came later has had nothing then
             topic.queue = list(queue)
             topic.clear_outbox()
-            for inbox, mine in zip_longest(topic.inboxes, parcels, fillvalue=()):
-                inbox.parcels = list(mine)
+            for i, inbox in enumerate(topic.inboxes):
+                inbox.parcels = list(parcels[i]) if i < len(parcels) else []
 
     def columns(self, world: int) -> list[bytes]:
         """What is on its way in one world, for the state hash."""

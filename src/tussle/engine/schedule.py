@@ -81,10 +81,12 @@ class Schedule:
         if sim.interactions:
             calls.append(Call("take over what was moved", sim.take_over_moves))
         calls += [self._world_call("metric", r) for r in sim.metrics if not r.plugin.is_idle]
+        if sim.events:
+            calls.append(Call("tell of captures and collisions", sim.events.messages))
         calls.append(
             Call("deliver messages", sim.mail.deliver)
         )  # always: the world may speak first on topics of its own
-        calls.append(Call("check, remove, end", sim.finish_step))
+        calls.append(Call("check, remove, end", sim.step_end.run))
         return calls
 
     def _clear_forces(self) -> None:

@@ -9,7 +9,6 @@ from typing import Any, Self
 
 import numpy as np
 
-from tussle.api import kernels
 from tussle.api.clock import Clock
 from tussle.api.context import Context
 from tussle.api.kinds import Interaction
@@ -17,6 +16,7 @@ from tussle.api.plugin import GRADES
 from tussle.api.world import WorldView
 from tussle.engine import access, failure
 from tussle.engine.births import Births, Newborn
+from tussle.engine.events import Herald
 from tussle.engine.group import Binding, Group
 from tussle.engine.mail import Mail
 from tussle.engine.params import Overrides
@@ -24,6 +24,7 @@ from tussle.engine.population import Population
 from tussle.engine.referees import Referee
 from tussle.engine.result import WorldResult
 from tussle.engine.schedule import Call, Schedule
+from tussle.engine.step_end import StepEnd
 from tussle.engine.subset import call_referee
 from tussle.errors import MissionError, ParameterError, PluginError
 from tussle.mission import Mission
@@ -60,7 +61,7 @@ class Simulation:
     ) -> None:
         self.mission = mission
         numbers = list(seeds) if isinstance(seeds, Iterable) else [seeds]
-        if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
+        if isinstance(threads, bool) or int(threads) != threads or threads < 1:
             raise ParameterError(f"threads = {threads!r} is not allowed; it takes a whole number >= 1")
         self._check(mission, numbers, on_error)
         n = self.n_worlds = len(numbers)
@@ -72,8 +73,9 @@ class Simulation:
         self.results: list[WorldResult | None] = [None] * n
         self.observers: list[Callable[[Simulation], None]] = []
         self.parked: dict[int, access.Parked] = {}
+        self.events = Herald(self)
         self.is_closed = False
-        self._has_failures = False
+        self.step_end = StepEnd(self)
         self._resumed = threading.Event()
         self._resumed.set()
         clock = Clock(n, mission.start, mission.dt)
@@ -86,7 +88,7 @@ class Simulation:
         self._build(seeds_)
         try:
             self.reset(range(n))
-            self._schedule = Schedule(self).compose()
+            self._schedule: list[Call] | None = Schedule(self).compose()
         except Exception:
             self.close()
             raise
@@ -125,18 +127,18 @@ class Simulation:
         view.templates = [b.name for b in mission.blocks]
         view.publish_to = self.mail.publish_to
         self.mail.names = [p.instance_name for p in mission.networks]
+
         def bind(specs: Iterable[Any]) -> list[Referee]:
             return [Referee.bind(p, view, self.overrides) for p in specs]
 
         self.networks = bind(mission.networks)
         self.mail.networks = {r.spec.instance_name: r for r in self.networks}
         self.interactions, self.metrics = bind(mission.interactions), bind(mission.metrics)
-        self._schedule: list[Call] | None = None
-        self.population.on_new_group = self._forget_schedule
+        self.population.on_new_group = self.forget_schedule
         self.population.on_failure = self.record_failure
         self.population.prepare()
 
-    def _forget_schedule(self) -> None:
+    def forget_schedule(self) -> None:
         self._schedule = None
 
     @property
@@ -265,10 +267,10 @@ class Simulation:
             referee.fill_params(self.overrides, chosen)
         due = self.births.begin(chosen)
         gone = mask | ~self.running  # worlds that ended last keep their rows as long as nobody runs
-        self._repack(gone[self.population.bodies.world], self._create(due, at_start=True))
+        self.repack(gone[self.population.bodies.world], self._create(due, at_start=True))
         self._set_common_step()
         self._start_referees(mask)
-        self._take_out_dead()
+        self.step_end.take_out_dead()
 
     def _start_referees(self, mask: np.ndarray) -> None:
         for referee in self.referees:
@@ -327,24 +329,25 @@ class Simulation:
         born = self._create(due) if due else None
         parts += [born] if born is not None else []
         if parts:
-            self._repack(None, Newborn.join(parts))
+            self.repack(None, Newborn.join(parts))
 
-    def _repack(self, gone: np.ndarray | None, new: Newborn | None) -> None:
+    def repack(self, gone: np.ndarray | None, new: Newborn | None) -> None:
+        """Remove rows (gone, (n,), true) and add newborn ones."""
         index = self.population.repack(gone, new)
         bodies = self.population.bodies
         self.world_view.reset(bodies, 0, bodies.n)
         for referee in self.referees:
             referee.rearrange(index)
-        self._checked: tuple[Any, ...] | None = None
-        self._has_changed = True
+        self.step_end.rows_changed()
+        if self.events and new is not None:
+            self.events.births(new)
 
     def after_restore(self) -> None:
         """The table has been put back: views and checks look at it."""
         self.n_running = int(self.running.sum())
         bodies = self.population.bodies
         self.world_view.reset(bodies, 0, bodies.n)
-        self._checked = None
-        self._has_changed = True
+        self.step_end.rows_changed()
 
     # -- the end of a step ----------------------------------------------------------------------------------------------------
 
@@ -360,114 +363,6 @@ class Simulation:
             if len(mine):
                 group.motion.plugin.from_body(group.moving, mine)
 
-    def finish_step(self) -> None:
-        """Check all states, remove who is gone, advance the clocks, end worlds."""
-        self._check_states()
-        clock = self.context.clock
-        if self.n_running == self.n_worlds:
-            clock.step += 1
-        else:
-            clock.step += self.running
-        self._take_out_dead()
-        if clock.common >= 0:
-            clock.common += 1
-        self._end_worlds()
-
-    def _check_states(self) -> None:
-        if self._checked is None:
-            b = self.population.bodies
-            self._checked = (b.pos, b.quat, b.health, np.empty(b.n, bool))
-        if kernels.check(*self._checked):
-            bodies, faulty = self.population.bodies, self._checked[-1]
-            for row in np.flatnonzero(faulty):
-                world = int(bodies.world[row])
-                if not self.failed[world]:
-                    group = next(g for g in self.population.groups if g.first <= row < g.last)
-                    self.record_failure(
-                        world,
-                        failure.not_finite(group, bodies, int(row), int(self.context.clock.step[world])),
-                    )
-            self.world_view.kill(~faulty & ~(bodies.health > 0.0), "health")
-
-    def _take_out_dead(self) -> bool:
-        view, bodies = self.world_view, self.population.bodies
-        if not view.deaths and not self._has_failures:
-            return False
-        ended = self.failed & self.running
-        self._has_failures = False
-        gone = np.zeros(bodies.n, bool)
-        for rows, _ in view.deaths:
-            gone[rows] = True
-        view.deaths = []
-        for world in np.flatnonzero(ended):
-            self._end(int(world), "error")
-            gone |= bodies.world == world
-        self._repack(gone, None)
-        return True
-
-    def _end_worlds(self) -> None:
-        mission, clock = self.mission, self.context.clock
-        conditions = mission.end_conditions
-        over: dict[int, str] = {}
-        if "time" in conditions:
-            for world in (
-                np.flatnonzero(self.running & (clock.step >= mission.steps)) if self._may_be_time() else ()
-            ):
-                over[int(world)] = "time"
-        if (
-            self._has_changed
-        ):  # who is there has changed since the last look: births count too, since the last one may decide
-            self._has_changed = False
-            for number, reason in self._lost_teams():
-                over.setdefault(number, reason)
-        if over:
-            self._end_and_park(over)
-
-    def _may_be_time(self) -> bool:
-        common = self.context.clock.common
-        return common < 0 or common >= self.mission.steps
-
-    def _lost_teams(self) -> Iterable[tuple[int, str]]:
-        conditions = self.mission.end_conditions
-        if "none" in conditions or not {"one_team", "all_dead"} & set(conditions):
-            return
-        bodies = self.population.bodies
-        number = np.searchsorted(self.context.teams, bodies.team)
-        n_teams = len(self.context.teams) + 1
-        counts = np.bincount(bodies.world * n_teams + number, minlength=self.n_worlds * n_teams).reshape(
-            self.n_worlds, n_teams
-        )
-        left = (counts > 0).sum(axis=1)
-        for world in np.flatnonzero(self.running & (left <= 1)):
-            if not self.births.is_over(int(world)):
-                continue
-            if left[world] == 0:
-                yield int(world), "all_dead"
-            elif "one_team" in conditions and len(self.context.teams) > 1:
-                yield int(world), "one_team"
-
-    def _end_and_park(self, over: Mapping[int, str]) -> None:
-        bodies = self.population.bodies
-        for world, reason in over.items():
-            self._end(world, reason)
-        if self.n_running:
-            self._repack(np.isin(bodies.world, list(over)), None)
-            mask = np.zeros(self.n_worlds, bool)
-            mask[list(over)] = True
-            self.mail.drop_worlds(mask)
-        else:
-            self.population.close_handles()
-
-    def _end(self, world: int, reason: str) -> None:
-        result = access.world_result(self, world, reason)
-        previous = self.results[world]
-        if previous is not None:
-            result.error = previous.error
-        self.results[world] = result
-        self.parked[world] = access.park(self, world)
-        self.running[world] = False
-        self.n_running = int(self.running.sum())
-
     def _set_common_step(self) -> None:
         steps = np.unique(self.context.clock.step[self.running])
         self.context.clock.common = int(steps[0]) if len(steps) == 1 else -1
@@ -476,8 +371,7 @@ class Simulation:
 
     def as_plugin_error(self, error: Exception, plugin: Any, text: str = "") -> PluginError:
         """The error with place and cause; `text` says more."""
-        found = failure.raised(error, plugin, where=text, step=int(self.context.clock.step.max()), world=None)
-        return found
+        return failure.raised(error, plugin, where=text, step=int(self.context.clock.step.max()), world=None)
 
     def fail(self, world: int, plugin: Any, error: Exception, where: str) -> None:
         """A plugin has failed in a world: it will end with this step."""
@@ -491,7 +385,7 @@ class Simulation:
     def record_failure(self, world: int, error: PluginError) -> None:
         if self.on_error == "raise":
             raise error
-        self.failed[world] = self._has_failures = True
+        self.failed[world] = self.step_end.has_failures = True
         self.results[world] = WorldResult(
             world, int(self.context.seeds[world]), "error", 0, 0.0, {}, error=error
         )

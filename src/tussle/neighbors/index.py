@@ -158,7 +158,10 @@ class Index:
         return out
 
     def blocks(self, first: int, last: int, pos: tuple[Floats, Floats, Floats] | None = None) -> Blocks:
-        """Blocks of rows [first, last) of the table, good until the next call for these. `pos`: where the rows stand [m], three (n,), if not where the table says."""
+        """Blocks of rows [first, last) of the table, good until the next call for these.
+
+        `pos`: where the rows stand [m], three (n,), if not where the table says.
+        """
         if pos is None:
             fixed, built, blocks = self._cache.get((first, last), (False, -1, None))
             if blocks is not None and fixed:
