@@ -160,6 +160,8 @@ class Param(Numbers):
             ParameterError: It has another type or unit, is not finite, or is out of bounds.
         """
         if self.ragged:
+            if isinstance(value, str) or not isinstance(value, Iterable):
+                raise self._error(where, value, f"a list of {self.allowed()}")
             return tuple(
                 tuple(self._numbers(row, where)) if self.fields else self._number(row, 0, where)
                 for row in value
@@ -192,7 +194,7 @@ class Param(Numbers):
         ):
             raise self._error(where, value, self.allowed())
         if self.dtype is int:
-            if int(value) != value:
+            if not math.isfinite(value) or int(value) != value:
                 raise self._error(where, value, self.allowed())
             number: float = int(value)
         else:

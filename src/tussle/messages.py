@@ -153,6 +153,8 @@ def _empty(type_: Any) -> Batch:
 def _field_values(type_: type[Message], name: str, column: Column, value: Any, n: int) -> Any:
     where = f"{type_.__name__}.{name}"
     if isinstance(column, Handle):
+        if isinstance(value, list) and len(value) != n:
+            raise ParameterError(f"{where}: {len(value)} objects; needed is one object, or a list of {n}")
         return list(value) if isinstance(value, list) else [value] * n
     if isinstance(column, Ragged):
         if value is None:
