@@ -33,10 +33,17 @@ NUMBERS: dict[str, tuple[type, ...]] = {
 
 @dataclass
 class Stats:
-    """How many kernels this process has compiled, and how many it has loaded from disk."""
+    """How many kernels this process has compiled, and how many it has loaded from disk.
+
+    Attributes:
+        compiled: Compiled so far.
+        loaded: Loaded so far.
+        on_compile: Called with a kernel's name before it is compiled, so that a program can say what its user waits for.
+    """
 
     compiled: int = 0
     loaded: int = 0
+    on_compile: Callable[[str], None] | None = None
 
 
 stats = Stats()
@@ -246,6 +253,8 @@ class Kernel(Device):
                 main.add_overload(result)
                 stats.loaded += 1
             else:
+                if stats.on_compile is not None:
+                    stats.on_compile(self.name)
                 for holder in reached.holders:
                     if isinstance(holder, Device):
                         holder.refresh()
