@@ -34,6 +34,10 @@ class SnapshotError(TussleError):
     """A snapshot cannot be taken, or does not belong to the simulation it is restored into."""
 
 
+class RecordError(TussleError):
+    """A run cannot be recorded, or what is there is no recorded run; what had been written before stays whole."""
+
+
 class MissingExtraError(TussleError, ImportError):
     """A feature needs a package that only an extra installs; the message names both."""
 

@@ -1,0 +1,94 @@
+"""Tells those who listen what happens in a game; when nobody does, nothing is done for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tussle.messages import EntityCaptured, EntityCollided
+from tussle.record import Happenings
+from tussle.record.happenings import BIRTH, CAPTURE, COLLISION, DEATH, END
+
+if TYPE_CHECKING:
+    from tussle.engine.births import Newborn
+    from tussle.engine.simulation import Simulation
+
+TOLD = {EntityCaptured: (CAPTURE, "source", "target"), EntityCollided: (COLLISION, "first", "second")}
+"""Message types that are told of: kind, and the fields that are its id and other."""
+
+
+class Herald:
+    """Births, deaths, captures, collisions and ends, as `Happenings`; true while somebody listens.
+
+    Args:
+        sim: The simulation.
+    """
+
+    def __init__(self, sim: Simulation) -> None:
+        self._sim = sim
+        self._listeners: list[Callable[[Happenings], None]] = []
+        self._by: dict[tuple[int, int], int] = {}
+
+    def __bool__(self) -> bool:
+        return bool(self._listeners)
+
+    def listen(self, listener: Callable[[Happenings], None]) -> None:
+        """Tell `listener` from now on."""
+        self._listeners.append(listener)
+        self._sim.forget_schedule()  # a step has a call for messages only while somebody listens
+
+    def forget(self, listener: Callable[[Happenings], None]) -> None:
+        """Tell it no more; nothing happens if it was not told."""
+        if listener in self._listeners:
+            self._listeners.remove(listener)
+            self._sim.forget_schedule()
+
+    def _tell(
+        self, kind: str, world: np.ndarray, step: np.ndarray, ids: np.ndarray, other: np.ndarray, text: list[str]
+    ) -> None:
+        happenings = Happenings(kind, world, step, ids, other, text)
+        for listener in list(self._listeners):
+            listener(happenings)
+
+    def births(self, new: Newborn) -> None:
+        """Entities have come."""
+        names = self._sim.context.block_names
+        step = self._sim.context.clock.step[new.world]
+        self._tell(BIRTH, new.world, step, new.id, np.zeros_like(new.id), [names[b] for b in new.block])
+
+    def messages(self) -> None:
+        """Captures and collisions of this step, which lie in the outboxes."""
+        self._by.clear()
+        step = self._sim.context.clock.step
+        for type_, (kind, first, second) in TOLD.items():
+            batch = self._sim.world_view.inbox(type_)
+            if batch.n:
+                one, two = batch.data[first], batch.data[second]
+                self._tell(kind, batch.world, step[batch.world], one, two, [""] * batch.n)
+                for world, a, b in zip(batch.world.tolist(), one.tolist(), two.tolist(), strict=True):
+                    self._by.setdefault((world, b), a)
+                    if kind == COLLISION:
+                        self._by.setdefault((world, a), b)
+
+    def deaths(self, deaths: list[tuple[np.ndarray, str]], step: np.ndarray) -> None:
+        """Rows of the body table are about to go; the first reason counts.
+
+        Args:
+            deaths: (rows, why).
+            step: Step of each world in which it happened, (n_worlds,).
+        """
+        bodies = self._sim.population.bodies
+        number = np.repeat(np.arange(len(deaths)), [len(rows) for rows, _ in deaths])
+        rows, first = np.unique(np.concatenate([rows for rows, _ in deaths]), return_index=True)
+        order = np.lexsort((bodies.id[rows], bodies.world[rows]))
+        rows, why = rows[order], [deaths[i][1] for i in number[first[order]]]
+        world, ids = bodies.world[rows], bodies.id[rows]
+        by = [self._by.get(key, 0) for key in zip(world.tolist(), ids.tolist(), strict=True)]
+        self._tell(DEATH, world, step[world], ids, np.array(by, np.int64), why)
+
+    def end(self, world: int, reason: str) -> None:
+        """A world has ended; its last rows are parked."""
+        numbers, none = np.array([world]), np.zeros(1, np.int64)
+        self._tell(END, numbers, self._sim.context.clock.step[numbers], none, none, [reason])

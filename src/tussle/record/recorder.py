@@ -1,0 +1,249 @@
+"""Records a simulation into a run directory while it plays."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol, Self
+
+import numpy as np
+import pyarrow as pa
+
+from tussle.errors import ParameterError, RecordError
+from tussle.record import run_file
+from tussle.record.happenings import BIRTH, END, Happenings
+from tussle.record.row_buffer import RowBuffer, Rows
+from tussle.record.schema import EVENTS, EVENTS_FILE, FILES, MISSION_FILE, TRAJECTORY, TRAJECTORY_FILE
+from tussle.record.stream import Stream
+
+if TYPE_CHECKING:
+    from tussle.api.bodies import Bodies
+
+
+class Recorded(Protocol):
+    """What the recorder asks of a simulation; the engine stands above this package and is not imported here."""
+
+    mission: Any
+    n_worlds: int
+    running: np.ndarray
+    parked: dict[int, Any]
+    observers: list[Any]
+    context: Any
+    population: Any
+    events: Any
+
+    @property
+    def grade(self) -> str: ...
+
+    def result(self) -> list[Any]: ...
+
+
+class Recorder:
+    """Writes what happens in a simulation into a directory, from now until it is closed.
+
+    What has been flushed is with the operating system: killing the process loses at most what came after. The state of each recorded
+    step is that of its beginning; the last state of each world is always recorded. `run.json` is written last.
+
+    Args:
+        sim: The simulation; it is recorded from its present state on.
+        directory: Made if need be; holds no run yet.
+        period: Time between recorded states [s]; None records every step.
+        mission_text: Mission file with all its values, to be kept as `mission.xml`.
+        parameters: What was set beside the mission, for `run.json`.
+        flush_every: Wall time between flushes [s].
+
+    Raises:
+        RecordError: The directory holds a run, or cannot be written.
+        ParameterError: A period is not allowed.
+    """
+
+    def __init__(
+        self,
+        sim: Recorded,
+        directory: str | Path,
+        *,
+        period: float | None = None,
+        mission_text: str | None = None,
+        parameters: Mapping[str, Any] | None = None,
+        flush_every: float = 1.0,
+    ) -> None:
+        for name, value in (("period", period), ("flush_every", flush_every)):
+            if value is not None and not 0.0 < value < float("inf"):
+                raise ParameterError(f"{name} = {value!r} is not allowed; it takes a number of seconds > 0")
+        self.sim, self.directory = sim, Path(directory)
+        self.period, self.flush_every = period, flush_every
+        self.parameters = dict(parameters or {})
+        self.is_closed = False
+        self._timings = run_file.Timings()
+        clock, mission = sim.context.clock, sim.mission
+        per_step = 1 if period is None else Fraction(str(mission.dt)) / Fraction(str(period))
+        self._per_step = None if per_step >= 1 else Fraction(per_step)
+        self._buffer = RowBuffer([b.name for b in mission.blocks], clock.start, clock.dt)
+        self._events: list[Happenings] = []
+        self._seen: np.ndarray | None = None
+        self._rows: Rows
+        self._common_step = -1
+        self._steps = np.full(sim.n_worlds, -1, np.int64)
+        self._open(mission_text)
+        self._flush_at = time.monotonic() + flush_every
+        self._begin()
+
+    def _open(self, mission_text: str | None) -> None:
+        try:
+            self.directory.mkdir(parents=True, exist_ok=True)
+            held = [name for name in FILES if (self.directory / name).exists()]
+            if held:
+                raise RecordError(f"{self.directory}: holds a run already ({held[0]}); choose another directory, or remove it")
+            if mission_text is not None:
+                (self.directory / MISSION_FILE).write_text(mission_text, encoding="utf-8")
+        except OSError as error:
+            raise RecordError(f"{self.directory}: no run can be recorded there: {error.strerror or error}") from error
+        self._trajectory = Stream(self.directory / TRAJECTORY_FILE, TRAJECTORY)
+        self._happened = Stream(self.directory / EVENTS_FILE, EVENTS)
+
+    def _begin(self) -> None:
+        """Attach, and tell of those who are there."""
+        sim = self.sim
+        bodies, clock = sim.population.bodies, sim.context.clock
+        names = sim.context.block_names
+        rows = Rows(bodies.ints, sim.running)
+        world, ids, _, block = rows.columns
+        nobody = np.zeros(rows.n, np.int64)
+        self._events.append(Happenings(BIRTH, world, clock.step[world], ids, nobody, [names[b] for b in block]))
+        sim.observers.append(self._observe)
+        sim.events.listen(self._hear)
+
+    # -- while the game is played ---------------------------------------------------------------------------------------------
+
+    def _observe(self, sim: Recorded) -> None:
+        """Record the beginning of a step."""
+        clock = sim.context.clock
+        step = clock.common
+        if step < 0:
+            self._observe_apart(sim)
+        else:
+            if step <= self._common_step:
+                self._refuse_past()
+            self._common_step = step
+            due = self._per_step
+            if due is None or (step * due.numerator) // due.denominator != ((step - 1) * due.numerator) // due.denominator:
+                bodies = sim.population.bodies
+                if bodies.ints is not self._seen:
+                    self._seen, self._rows = bodies.ints, Rows(bodies.ints)
+                self._add(bodies.floats, self._rows, step)
+        if time.monotonic() >= self._flush_at:
+            self.flush()
+
+    def _observe_apart(self, sim: Recorded) -> None:
+        """Record the worlds that are due, each in a step of its own."""
+        step = sim.context.clock.step
+        last = np.maximum(self._steps, self._common_step)
+        if (step <= last)[sim.running].any():
+            self._refuse_past()
+        self._steps = np.where(sim.running, step, last)
+        due = sim.running.copy()
+        if self._per_step is not None:
+            p, q = self._per_step.numerator, self._per_step.denominator
+            due &= (step * p) // q != ((step - 1) * p) // q
+        bodies = sim.population.bodies
+        rows = Rows(bodies.ints, due)
+        self._add(bodies.floats, rows, step[rows.world])
+
+    def _refuse_past(self) -> None:
+        self.close("a world was begun anew, or put back to an earlier step, while it was recorded")
+        raise RecordError(
+            f"{self.directory}: a world has been begun anew or put back to an earlier step, and a run directory holds one game per world; "
+            "close the recorder before `reset` or `restore`, and make another"
+        )
+
+    def _add(self, floats: np.ndarray, rows: Rows, step: Any) -> None:
+        if not self._buffer.has_room(rows.n):
+            self._write(self._trajectory, self._buffer.take())
+        self._buffer.add(floats, rows, step)
+
+    def _hear(self, happenings: Happenings) -> None:
+        """Take note of events; the end of a world is also its last state."""
+        self._events.append(happenings)
+        if happenings.kind == END:
+            for world, step in zip(happenings.world, happenings.step, strict=True):
+                self._add_last(self.sim.parked[int(world)].bodies, int(step))
+
+    def _add_last(self, bodies: Bodies, step: int) -> None:
+        self._add(bodies.floats, Rows(bodies.ints), step)
+
+    def _write(self, stream: Stream, batch: pa.RecordBatch) -> None:
+        try:
+            stream.write(batch)
+        except RecordError:
+            self._detach()
+            self.is_closed = True
+            raise
+
+    def flush(self) -> None:
+        """Hand all that was recorded so far to the operating system."""
+        if self._events:
+            self._write(self._happened, self._take_events())
+        if self._buffer.n:
+            self._write(self._trajectory, self._buffer.take())
+        self._flush_at = time.monotonic() + self.flush_every
+
+    def _take_events(self) -> pa.RecordBatch:
+        events, self._events = self._events, []
+        clock = self.sim.context.clock
+        step = np.concatenate([e.step for e in events])
+        columns: dict[str, Any] = {
+            "world": np.concatenate([e.world for e in events]).astype(np.int32),
+            "t": clock.start + step * clock.dt,
+            "step": step.astype(np.int32),
+            "kind": [e.kind for e in events for _ in range(len(e))],
+            "id": np.concatenate([e.id for e in events]).astype(np.int32),
+            "other": np.concatenate([e.other for e in events]).astype(np.int32),
+            "text": [text for e in events for text in e.text],
+        }
+        arrays = [pa.array(columns[field.name], field.type) for field in EVENTS]
+        return pa.RecordBatch.from_arrays(arrays, schema=EVENTS)
+
+    # -- the end --------------------------------------------------------------------------------------------------------------
+
+    def close(self, interrupted: str = "") -> None:
+        """Record the last states, and write the summary and `run.json`. A second call does nothing.
+
+        Args:
+            interrupted: Why the game stops before it should; the run then counts as incomplete.
+
+        Raises:
+            RecordError: The files cannot be written.
+        """
+        if self.is_closed:
+            return
+        self.is_closed = True
+        self._detach()
+        sim, step = self.sim, self.sim.context.clock.step
+        last = np.maximum(self._steps, self._common_step)
+        going_on = sim.running & (step > last)
+        if going_on.any():
+            rows = Rows(sim.population.bodies.ints, going_on)
+            self._add(sim.population.bodies.floats, rows, step[rows.world])
+        self.flush()
+        for stream in (self._trajectory, self._happened):
+            stream.close()
+        run_file.write(
+            self.directory,
+            sim,
+            self._timings,
+            [self._trajectory, self._happened],
+            {"period": self.period, "parameters": self.parameters, "interrupted": interrupted},
+        )
+
+    def _detach(self) -> None:
+        if self._observe in self.sim.observers:
+            self.sim.observers.remove(self._observe)
+        self.sim.events.forget(self._hear)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
+        self.close("" if kind is None else f"{kind.__name__}: {error}" if str(error) else kind.__name__)

@@ -1,0 +1,103 @@
+"""Rows of the body table on their way to a file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pyarrow as pa
+
+from tussle.api.bodies import FLOATS, INTS
+from tussle.record.schema import FLOAT_COLUMNS, INT_COLUMNS, TRAJECTORY
+
+CAPACITY = 32_768
+"""Rows that are kept before a batch is written: at 5 MB, Arrow's overhead per batch is lost in the writing of it."""
+
+_FIRST = {name: sum(list(FLOATS.values())[:i]) for i, name in enumerate(FLOATS)}
+_N_STATE = FLOATS["pos"] + FLOATS["vel"] + FLOATS["quat"]
+assert (_FIRST["vel"], _FIRST["quat"]) == (3, 6), "pos, vel and quat are copied as one piece"
+
+
+class Rows:
+    """Who is in a body table, as long as nobody comes or goes.
+
+    Args:
+        ints: Whole-number columns of the table, (5, n).
+        worlds: Worlds whose rows are wanted, (n_worlds,); None for all.
+
+    Attributes:
+        order: Rows in the order (world, id), (m,); None when that is all rows as they lie.
+        columns: INT_COLUMNS of these rows, (4, m).
+        world: World of each, (m,).
+    """
+
+    def __init__(self, ints: np.ndarray, worlds: np.ndarray | None = None) -> None:
+        by_name = dict(zip(INTS, ints, strict=True))
+        world, ids = by_name["world"], by_name["id"]
+        order = np.lexsort((ids, world))
+        if worlds is not None:
+            order = order[worlds[world[order]]]
+        is_all = len(order) == len(world) and bool((order[1:] > order[:-1]).all())
+        self.order = None if is_all else order
+        self.columns = np.array([by_name[name][order] for name in INT_COLUMNS], np.int32)
+        self.world = world[order]
+        self.n = len(order)
+
+
+class RowBuffer:
+    """Preallocated columns that are filled step by step and written batch by batch.
+
+    Args:
+        blocks: Names of the blocks, by number.
+        start: Time of step 0 [s].
+        dt: Length of a step [s].
+    """
+
+    def __init__(self, blocks: Sequence[str], start: float, dt: float, capacity: int = CAPACITY) -> None:
+        self.start, self.dt = start, dt
+        self._blocks = pa.array(blocks, pa.string())
+        self._allocate(capacity)
+
+    def _allocate(self, capacity: int) -> None:
+        self.capacity, self.n = capacity, 0
+        self._floats = np.empty((len(FLOAT_COLUMNS), capacity))
+        self._ints = np.empty((len(INT_COLUMNS), capacity), np.int32)
+        self._step = np.empty(capacity, np.int32)
+
+    def has_room(self, n: int) -> bool:
+        return self.n + n <= self.capacity
+
+    def add(self, floats: np.ndarray, rows: Rows, step: int | np.ndarray) -> None:
+        """Copy rows of a body table; the buffer is empty or has room.
+
+        Args:
+            floats: Real columns of the table, (22, n).
+            rows: Which rows.
+            step: Step of all, or of each, (m,).
+        """
+        if not self.has_room(rows.n):
+            assert self.n == 0
+            self._allocate(rows.n)
+        first, last = self.n, self.n + rows.n
+        out = self._floats[:, first:last]
+        if rows.order is None:
+            out[:_N_STATE] = floats[:_N_STATE]
+            out[_N_STATE] = floats[_FIRST["health"]]
+        else:
+            out[:_N_STATE] = floats[:_N_STATE].take(rows.order, axis=1)
+            out[_N_STATE] = floats[_FIRST["health"]].take(rows.order)
+        self._ints[:, first:last] = rows.columns
+        self._step[first:last] = step
+        self.n = last
+
+    def take(self) -> pa.RecordBatch:
+        """All rows as a batch that looks into the buffer: it is to be written before the next `add`."""
+        n = self.n
+        self.n = 0
+        step = self._step[:n]
+        columns = dict(zip(FLOAT_COLUMNS, self._floats[:, :n], strict=True))
+        columns |= dict(zip(INT_COLUMNS, self._ints[:, :n], strict=True))
+        columns |= {"step": step, "t": self.start + step.astype(np.int64) * self.dt}  # as the clock computes it
+        arrays = {name: pa.array(column) for name, column in columns.items()}
+        arrays["block"] = pa.DictionaryArray.from_arrays(arrays["block"], self._blocks)
+        return pa.RecordBatch.from_arrays([arrays[name] for name in TRAJECTORY.names], schema=TRAJECTORY)

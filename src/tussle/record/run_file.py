@@ -1,0 +1,156 @@
+"""The end of a record: `summary.csv`, and `run.json`, whose presence says that all before it is there."""
+
+from __future__ import annotations
+
+import csv
+import datetime
+import io
+import json
+import math
+import os
+import platform
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tussle.errors import RecordError
+from tussle.record.schema import FORMAT, RUN_FILE, SUMMARY_FILE
+from tussle.record.stream import Stream
+
+PACKAGES = ("tussle", "numpy", "numba", "pyarrow")
+
+
+class Timings:
+    """When recording began, in wall and CPU time."""
+
+    def __init__(self) -> None:
+        self.began = datetime.datetime.now(datetime.UTC)
+        self._wall, self._cpu = time.perf_counter(), time.process_time()
+
+    def so_far(self) -> dict[str, Any]:
+        """Wall and CPU seconds since then."""
+        return {
+            "began": self.began.isoformat(timespec="seconds"),
+            "wall_s": round(time.perf_counter() - self._wall, 6),
+            "cpu_s": round(time.process_time() - self._cpu, 6),
+        }
+
+
+def versions() -> dict[str, str]:
+    """Of Python and of the packages that a result may depend on."""
+    found = {"python": platform.python_version()}
+    for name in PACKAGES:
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:  # run from a source tree that was never installed
+            found[name] = str(getattr(sys.modules.get(name), "__version__", "unknown"))
+    return found
+
+
+def write(directory: Path, sim: Any, timings: Timings, streams: Sequence[Stream], about: Mapping[str, Any]) -> None:
+    """Write both files.
+
+    Args:
+        directory: The run directory.
+        sim: The simulation, see `recorder.Recorded`.
+        timings: Of the recording.
+        streams: The files whose sizes are kept.
+        about: Further values of `run.json`; "interrupted" says why it is incomplete.
+
+    Raises:
+        RecordError: They cannot be written.
+    """
+    mission = sim.mission
+    results = sim.result()
+    info = {
+        "format": FORMAT,
+        "is_complete": not about["interrupted"],
+        **about,
+        "mission": _mission(mission),
+        "grade": sim.grade,
+        "versions": versions(),
+        "platform": platform.platform(),
+        "command": sys.argv,
+        "timings": timings.so_far(),
+        "steps": sum(r.steps for r in results),
+        "worlds": [_world(r) for r in results],
+        "files": {s.path.name: {"bytes": s.size, "rows": s.rows} for s in streams},
+    }
+    try:
+        _put(directory / SUMMARY_FILE, _summary(results))
+        _put(directory / RUN_FILE, json.dumps(plain(info), indent=1, allow_nan=False) + "\n")
+    except OSError as error:
+        raise RecordError(f"{directory}: the end of the run cannot be written: {os.strerror(error.errno or 0)}") from error
+
+
+def _put(path: Path, text: str) -> None:
+    """Write a file so that it is there whole or not at all."""
+    draft = path.with_name(path.name + ".part")
+    try:
+        draft.write_text(text, encoding="utf-8")
+        draft.replace(path)
+    except OSError:
+        draft.unlink(missing_ok=True)
+        raise
+
+
+def _mission(mission: Any) -> dict[str, Any]:
+    names = ("name", "dt", "start", "end", "motion_multiplier", "update", "end_conditions")
+    return {name: getattr(mission, name) for name in names} | {
+        "blocks": [
+            {"name": b.name, "team": b.team, "count": b.count, "plugins": [repr(p) for p in b.plugins]}
+            for b in mission.blocks
+        ],
+        "world_plugins": [repr(p) for p in mission.world_plugins],
+    }
+
+
+def _world(result: Any) -> dict[str, Any]:
+    return {
+        "world": result.world,
+        "seed": result.seed,
+        "end": result.end,
+        "steps": result.steps,
+        "t": result.t,
+        "alive": result.alive,
+        "scores": result.scores,
+        "winner": result.winner,
+        "metrics": result.metrics,
+        "state_hash": result.state_hash,
+        "error": None if result.error is None else str(result.error),
+    }
+
+
+def _summary(results: Sequence[Any]) -> str:
+    """One line per world and team; what a metric says of the world stands in the lines of all its teams."""
+    columns = {(plugin, name): None for r in results for plugin, found in r.metrics.items() for name in found}
+    out = io.StringIO()
+    lines = csv.writer(out, lineterminator="\n")
+    head = ["world", "seed", "team", "score", "alive", "end", "steps", "t"]
+    lines.writerow([*head, *(f"{plugin}.{name}" for plugin, name in columns)])
+    for r in results:
+        for team in r.alive:
+            row = [r.world, r.seed, team, r.scores.get(team, ""), r.alive[team], r.end, r.steps, r.t]
+            for plugin, name in columns:
+                value = r.metrics.get(plugin, {}).get(name, "")
+                row.append(value.get(team, "") if isinstance(value, dict) else value)
+            lines.writerow(row)
+    return out.getvalue()
+
+
+def plain(value: Any) -> Any:
+    """A value as JSON has it; numbers that it does not know (inf, nan) become their names."""
+    if isinstance(value, Mapping):
+        return {str(k): plain(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple, set, np.ndarray)):
+        return [plain(v) for v in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    return value if value is None or isinstance(value, (bool, int, float, str)) else str(value)

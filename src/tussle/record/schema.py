@@ -1,0 +1,55 @@
+"""The columns of the recorded tables, and the names of the files of a run directory."""
+
+from __future__ import annotations
+
+import pyarrow as pa
+
+FORMAT = 1
+"""Version of the run directory; the loader refuses those it does not know."""
+
+TRAJECTORY_FILE = "trajectory.arrow"
+EVENTS_FILE = "events.arrow"
+SUMMARY_FILE = "summary.csv"
+MISSION_FILE = "mission.xml"
+RUN_FILE = "run.json"
+FILES = (TRAJECTORY_FILE, EVENTS_FILE, SUMMARY_FILE, MISSION_FILE, RUN_FILE)
+
+FLOAT_COLUMNS = ("x", "y", "z", "vx", "vy", "vz", "qw", "qx", "qy", "qz", "health")
+"""Real columns in the order in which they lie in the body table."""
+INT_COLUMNS = ("world", "id", "team", "block")
+
+
+def _field(name: str, kind: pa.DataType, doc: str) -> pa.Field:
+    return pa.field(name, kind, nullable=False, metadata={"doc": doc})
+
+
+_I, _F = pa.int32(), pa.float64()
+_BLOCK = pa.dictionary(pa.int32(), pa.string())
+
+TRAJECTORY = pa.schema(
+    [
+        _field("world", _I, "number of the world in its stack"),
+        _field("t", _F, "time [s]"),
+        _field("step", _I, "number of the step that begins with this state"),
+        _field("id", _I, "entity, unique in its world"),
+        _field("block", _BLOCK, "name of its block"),
+        _field("team", _I, "team"),
+        *(_field(c, _F, "position [m], East North Up") for c in ("x", "y", "z")),
+        *(_field(c, _F, "attitude, body to world") for c in ("qw", "qx", "qy", "qz")),
+        *(_field(c, _F, "ground velocity [m/s], East North Up") for c in ("vx", "vy", "vz")),
+        _field("health", _F, "what is left before it is removed at 0"),
+    ]
+)
+"""One row per entity and recorded step, ordered by step, world and id."""
+
+EVENTS = pa.schema(
+    [
+        _field("world", _I, "number of the world in its stack"),
+        _field("t", _F, "time of the beginning of the step in which it happened; of a birth or an end, its time [s]"),
+        _field("step", _I, "that step"),
+        _field("kind", pa.string(), "birth, death, capture, collision or end"),
+        _field("id", _I, "who was born, died, captured, or has the smaller id of two that met"),
+        _field("other", _I, "who was captured, or who captured or met the dead; 0 for nobody"),
+        _field("text", pa.string(), "block of the born, why one died, why a world ended"),
+    ]
+)

@@ -1,0 +1,87 @@
+"""A table on its way to a file, and back from one that may be cut anywhere."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pyarrow as pa
+
+from tussle.errors import RecordError
+
+
+class Stream:
+    """An Arrow stream in a file. What `write` has returned from is with the operating system.
+
+    Raises:
+        RecordError: The file cannot be made or written. What was written before stays whole.
+    """
+
+    def __init__(self, path: Path, schema: pa.Schema) -> None:
+        self.path = path
+        self.rows = 0
+        self.whole = 0
+        try:
+            self._file = pa.OSFile(str(path), "wb")
+            self._writer = pa.ipc.new_stream(self._file, schema)
+            self.whole = self._file.tell()
+        except OSError as error:
+            raise self._failed(error) from error
+
+    def write(self, batch: pa.RecordBatch) -> None:
+        """Append a batch."""
+        try:
+            self._writer.write_batch(batch)
+            self.whole = self._file.tell()
+        except OSError as error:
+            self._drop()
+            raise self._failed(error) from error
+        self.rows += batch.num_rows
+
+    def close(self) -> None:
+        """Write the end mark. A second call does nothing."""
+        if self._file.closed:
+            return
+        try:
+            self._writer.close()
+            self._file.close()
+        except OSError as error:
+            self._drop()
+            raise self._failed(error) from error
+
+    @property
+    def size(self) -> int:
+        """Length of the file [B]."""
+        return self.path.stat().st_size
+
+    def _drop(self) -> None:
+        """Leave the file with its whole batches only: half a batch is of no use to anybody."""
+        self._file.close()
+        os.truncate(self.path, self.whole)
+
+    def _failed(self, error: OSError) -> RecordError:
+        reason = error.strerror or str(error)
+        kept = f"; the {self.rows} rows written before are whole" if self.rows else ""
+        return RecordError(f"{self.path}: cannot be written: {reason}{kept}")
+
+
+def read_stream(path: Path, schema: pa.Schema) -> tuple[pa.Table, str]:
+    """All whole batches of a file, and "" or what is missing. A file that is absent or cut gives what there is.
+
+    Args:
+        path: The file.
+        schema: Columns of the empty table when not even its head is there.
+    """
+    batches: list[pa.RecordBatch] = []
+    if not path.exists():
+        return schema.empty_table(), f"{path.name} is not there"
+    try:
+        with pa.OSFile(str(path), "rb") as file, pa.ipc.open_stream(file) as reader:
+            schema = reader.schema
+            while True:
+                batches.append(reader.read_next_batch())
+    except StopIteration:
+        return pa.Table.from_batches(batches, schema), ""
+    except (pa.ArrowInvalid, OSError) as error:
+        note = f"{path.name} is cut after {len(batches)} whole batches ({error})"
+        return pa.Table.from_batches(batches, schema), note
