@@ -18,6 +18,8 @@ from tussle.scene import Scene
 END_CONDITIONS = ("time", "one_team", "all_dead", "none")
 UPDATES = ("synchronous", "sequential")
 PLACEMENTS = ("normal", "uniform")
+ALWAYS_THERE = ("GlobalNetwork", "LocalNetwork")
+"""Networks of every mission: from everyone to everyone, and within one entity."""
 
 
 def _numbers(where: str, value: Any, unit: str, n: int) -> tuple[float, ...]:
@@ -213,7 +215,7 @@ class Mission:
         end_conditions: Which of time, one_team, all_dead, none end a world.
         interactions: Referees and fields, in order.
         metrics: What is counted, in order.
-        networks: What carries messages; GlobalNetwork is always there.
+        networks: What carries messages; GlobalNetwork and LocalNetwork are always there.
         scene: Origin, ground, boundaries, bases.
         name: Title.
     """
@@ -267,8 +269,9 @@ class Mission:
         _set(self, "end_conditions", conditions)
         for name, kind in (("interactions", Interaction), ("metrics", Metric), ("networks", Network)):
             _set(self, name, _plugins(f"mission: {name}", getattr(self, name), kind))
-        if "GlobalNetwork" not in [p.instance_name for p in self.networks]:
-            _set(self, "networks", (stock.load("GlobalNetwork")(), *self.networks))
+        given = [p.instance_name for p in self.networks]
+        missing = tuple(stock.load(n)() for n in ALWAYS_THERE if n not in given)
+        _set(self, "networks", (*missing, *self.networks))
         _plugins("mission", self.world_plugins, object)
         for plugin in self.world_plugins:
             if plugin.instance_name in names:

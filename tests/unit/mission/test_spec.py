@@ -9,7 +9,7 @@ from small_worlds import Drift, block, mission
 
 from tussle import Block, Mission
 from tussle.errors import MissionError, ParameterError, TussleError
-from tussle.stock import DirectController, GlobalNetwork, NoisyState, SimpleCapture, SimpleCaptureMetrics, SingleIntegrator
+from tussle.stock import DirectController, GlobalNetwork, LocalNetwork, NoisyState, SimpleCapture, SimpleCaptureMetrics, SingleIntegrator
 
 MOTION = {"motion": SingleIntegrator(), "autonomy": Drift()}
 
@@ -41,9 +41,12 @@ def test_one_plugin_or_several():
     ]  # fmt: skip
 
 
-def test_the_global_network_is_always_there_once():
-    assert mission(block()).networks == (GlobalNetwork(),)
-    assert mission(block(), networks=[GlobalNetwork(comm_delay=1.0)]).networks == (GlobalNetwork(comm_delay=1.0),)
+def test_the_networks_to_everyone_and_within_an_entity_are_always_there_once():
+    assert mission(block()).networks == (GlobalNetwork(), LocalNetwork())
+    assert mission(block(), networks=[GlobalNetwork(comm_delay=0.5)]).networks == (
+        LocalNetwork(),
+        GlobalNetwork(comm_delay=0.5),
+    )
 
 
 @pytest.mark.parametrize(("end", "steps"), [(1.0, 10), (1.04, 10), (1.06, 11), (0.0, 0), (-1.0, 0)])

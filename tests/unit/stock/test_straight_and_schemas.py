@@ -210,7 +210,7 @@ def test_a_waypoint_of_the_world_is_heard_by_all():
         def step(self, w):
             w.publish(Waypoint, np.flatnonzero(w.step_count == 0), pos=(1.0, 2.0, 3.0))
 
-    mover = MotorSchemas(behaviors=[MoveToGoalMS()], pub_vel_vec=True)
+    mover = MotorSchemas(behaviors=[MoveToGoalMS(network_name="GlobalNetwork")], pub_vel_vec=True)
     sim = Simulation(mission(block(count=2, autonomy=mover), interactions=[Tower()]), seeds=[1, 2])
     sim.step(2)
     assert sim.read("a.MotorSchemas.MoveToGoalMS.target")[0].tolist() == [[[1.0, 2.0, 3.0]] * 2] * 2

@@ -24,7 +24,7 @@ class MoveToGoalMS(Behavior):
     integral = State(unit="m s", doc="Of the distance.")
     previous = State(unit="m", doc="Distance at the last call.")
     waypoints = Subscribe(Waypoint, network_param="network_name")
-    network_name = Param("GlobalNetwork", doc="Network that carries the waypoints.")
+    network_name = Param("LocalNetwork", doc="Network that carries the waypoints.")
 
     def spawn(self, g: GroupView, rows: np.ndarray) -> None:
         ahead = g.pos + AHEAD * g.forward
