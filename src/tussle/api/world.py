@@ -9,15 +9,14 @@ import numpy as np
 
 from tussle import rng
 from tussle.api.bodies import Bodies, BodyView
-from tussle.api.context import Context, stream
-from tussle.api.draw import Draw
+from tussle.api.context import Context
 from tussle.api.group import GOLDEN, GroupView
 from tussle.comms import TopicBuffer
 from tussle.errors import MissionError, ParameterError, listed, nearest_name
 from tussle.messages import Batch, Message
 
 if TYPE_CHECKING:
-    from tussle.scene import Scene
+    pass
 
 WRITABLE = ("health", "force", "torque")
 
@@ -212,17 +211,6 @@ class WorldView(GroupView):
         seeds = self.context.seeds[world] ^ (first.astype(np.uint64) * GOLDEN)
         draws = rng.uniform(seeds, self._stream(label), second, self.context.clock.step[world], 0, 1)
         return np.asarray(draws[0])
-
-    def _stream(self, label: str) -> int:
-        return stream(self.caller.instance_name if self.caller is not None else "", label)
-
-    @property
-    def scene(self) -> Scene:
-        return self.context.scene
-
-    @property
-    def draw(self) -> Draw:
-        return self.context.draw
 
     def call(self, service: str, *args: Any, **kwargs: Any) -> Any:
         """Call a service of a world plugin."""
