@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -24,11 +24,15 @@ from tussle.engine.population import Population
 from tussle.engine.referees import Referee
 from tussle.engine.result import WorldResult
 from tussle.engine.schedule import Call, Schedule
+from tussle.engine.start_from import RecordedBirths
 from tussle.engine.step_end import StepEnd
 from tussle.engine.subset import call_referee
 from tussle.errors import MissionError, ParameterError, PluginError
 from tussle.mission import Mission
 from tussle.stock import advise_controllers
+
+if TYPE_CHECKING:
+    from tussle.record import FirstStates
 
 
 class Simulation:
@@ -43,6 +47,7 @@ class Simulation:
         threads: Threads that a step may use; the result is the same with any number.
         on_error: "raise" stops at the first plugin that fails; "record" ends the world with the error in its result, and the others
             go on. By default "raise" for one world and "record" for several, but for the error that ends the last of them all.
+        start_from: Ids, times of birth and first states, in all worlds, instead of the blocks' placement; see `tussle.read_table`.
 
     Raises:
         MissionError: The mission cannot be played.
@@ -58,6 +63,7 @@ class Simulation:
         *,
         threads: int = 1,
         on_error: str | None = None,
+        start_from: FirstStates | None = None,
     ) -> None:
         self.mission = mission
         numbers = list(seeds) if isinstance(seeds, Iterable) else [seeds]
@@ -85,7 +91,7 @@ class Simulation:
         )
         self.overrides = Overrides(mission, n)
         self.overrides.set(params or {}, np.arange(n))
-        self._build(seeds_)
+        self._build(seeds_, start_from)
         try:
             self.reset(range(n))
             self._schedule: list[Call] | None = Schedule(self).compose()
@@ -108,9 +114,13 @@ class Simulation:
                     f"{plugin.instance_name} takes part in at most {most} worlds of one stack, not {len(seeds)}"
                 )
 
-    def _build(self, seeds: np.ndarray) -> None:
+    def _build(self, seeds: np.ndarray, start_from: FirstStates | None) -> None:
         mission = self.mission
-        self.births = Births(self.overrides, seeds, mission.start)
+        self.births = (
+            Births(self.overrides, seeds, mission.start)
+            if start_from is None
+            else RecordedBirths(self.overrides, seeds, mission.start, start_from)
+        )
         self.mail = Mail(self)
         self.topics = self.mail.topics
         self.context.topic = self.mail.topic

@@ -1,0 +1,114 @@
+"""Births by a recorded table instead of by the blocks' placement."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tussle.engine.births import Births, Newborn
+from tussle.engine.params import Overrides
+from tussle.errors import MissionError, listed, nearest_name
+from tussle.mission import Block
+
+if TYPE_CHECKING:
+    from tussle.record import FirstStates
+
+
+class RecordedBirths(Births):
+    """Ids, times of birth and first states come from a table; what plugins ask for is born as ever.
+
+    Args:
+        overrides: As for `Births`.
+        seeds: As for `Births`.
+        start: Time of step 0 [s].
+        table: Who enters when and where.
+
+    Raises:
+        MissionError: The table does not fit the mission's blocks.
+    """
+
+    def __init__(self, overrides: Overrides, seeds: np.ndarray, start: float, table: FirstStates) -> None:
+        super().__init__(overrides, seeds, start)
+        self.table = table
+        mission = overrides.mission
+        block = blocks_of(table, mission.blocks)
+        self.rows = [np.flatnonzero(block == i) for i in range(len(mission.blocks))]
+        """Rows of the table by block, in the order of birth."""
+        # Half a step of slack: a recorded time need not be the step's to the last bit.
+        self.step = np.maximum(0, np.floor((table.t - start) / mission.dt + 0.5)).astype(np.int64)
+        self.dt = mission.dt
+        self.has_rates = bool((self.step > 0).any())
+
+    def begin(self, worlds: np.ndarray) -> dict[int, np.ndarray]:
+        self.next_id[worlds] = int(self.table.id.max(initial=0)) + 1
+        self.n_born[:, worlds] = 0
+        for i, rows in enumerate(self.rows):
+            self.n_left[i, worlds] = len(rows)
+        return self._enter(worlds, np.zeros(len(worlds), np.int64))
+
+    def due(self, t: np.ndarray, running: np.ndarray) -> dict[int, np.ndarray]:
+        worlds = np.flatnonzero(running)
+        return self._enter(worlds, np.floor((t[worlds] - self.start) / self.dt + 0.5).astype(np.int64))
+
+    def _enter(self, worlds: np.ndarray, step: np.ndarray) -> dict[int, np.ndarray]:
+        found = {}
+        for i, rows in enumerate(self.rows):
+            n_so_far = np.searchsorted(self.step[rows], step, side="right")
+            n_new = n_so_far - (len(rows) - self.n_left[i, worlds])
+            if n_new.any():
+                found[i] = np.repeat(worlds, n_new)
+                self.n_left[i, worlds] -= n_new
+        return found
+
+    def create(
+        self, block: int, worlds: np.ndarray, where: dict[str, np.ndarray] | None = None, rejects: Callable[..., bool] | None = None,
+        taken: Callable[[int], np.ndarray] | None = None,
+    ) -> Newborn:  # fmt: skip
+        if where is not None:
+            return super().create(block, worlds, where, rejects, taken)
+        rows, table = self.rows[block], self.table
+        # Those who are due have been taken off n_left before: the last of them is the last that has entered.
+        n_entered = len(rows) - self.n_left[block, worlds]
+        _, first, counts = np.unique(worlds, return_index=True, return_counts=True)
+        place = np.arange(len(worlds)) - np.repeat(first, counts)
+        mine = rows[n_entered - np.repeat(counts, counts) + place]
+        states = {"pos": table.pos[:, mine], "quat": table.quat[:, mine], "vel": table.vel[:, mine]}
+        if table.team is not None:
+            states["team"] = table.team[mine]
+        next_id = self.next_id.copy()
+        born = super().create(block, worlds, states)
+        self.next_id[:] = next_id
+        born.id[:] = table.id[mine]
+        return born
+
+
+def blocks_of(table: FirstStates, blocks: tuple[Block, ...]) -> np.ndarray:
+    """Number of the block of each entity, (m,): by name, else the first of its team, in order of ids, that is not full.
+
+    Raises:
+        MissionError: An entity has no block, or a team that the mission does not have.
+    """
+    names, teams = [b.name for b in blocks], {b.team for b in blocks}
+    block = np.full(len(table), -1)
+    room = np.array([b.count for b in blocks])
+    for row in np.argsort(table.id, kind="stable"):
+        entity = f"{table.source}: entity {table.id[row]}"
+        team = None if table.team is None else int(table.team[row])
+        if team is not None and team not in teams:
+            raise MissionError(f"{entity} is of team {team}, which no block has; {listed(map(str, sorted(teams)))}")
+        if table.block is not None:
+            name = table.block[row]
+            if name not in names:
+                raise MissionError(f"{entity} is of block {name!r}, which the mission does not have{nearest_name(name, names)}; {listed(names)}")
+            block[row] = names.index(name)
+            continue
+        fitting = [i for i, b in enumerate(blocks) if room[i] > 0 and team in (None, b.team)]
+        if not fitting:
+            whose = "" if team is None else f" of team {team}"
+            count = sum(b.count for b in blocks if team in (None, b.team))
+            raise MissionError(f"{entity} is one more than the {count} entities{whose} that the mission's blocks have")
+        block[row] = fitting[0]
+        room[fitting[0]] -= 1
+    return block
