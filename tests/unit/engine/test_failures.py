@@ -471,3 +471,34 @@ def test_simulations_that_cannot_be():
         Simulation(mission(), threads=0)
 
 
+
+
+def test_a_plugin_that_fails_only_in_company_stops_the_whole():
+    """It breaks the promise that a world of a stack is as alone, so there is no world to blame."""
+
+    class Crowded(Autonomy):
+        def step(self, g):
+            if len(np.unique(g.world)) > 1:
+                raise ValueError("too many")
+
+    class CrowdedReferee(Interaction):
+        def step(self, w):
+            if len(np.unique(w.world)) > 1:
+                raise ValueError("too many")
+
+    for game in (crowd(Drift(), autonomies=[Crowded()]), crowd(Drift(), interactions=[CrowdedReferee()])):
+        with pytest.raises(PluginError, match=r"fails in the stack but in none of its worlds alone.*step 0: test_failures.py.*too many"):
+            Simulation(game, seeds=[1, 2]).step()
+        Simulation(game).step()
+
+
+def test_names_that_the_api_does_not_have():
+    import tussle.api
+    import tussle.stock
+
+    with pytest.raises(AttributeError, match="module 'tussle.api' has no attribute 'Autonmy'"):
+        _ = tussle.api.Autonmy
+    with pytest.raises(AttributeError, match=r"module 'tussle.stock' has no attribute 'Boid' \(did you mean 'Boids'\?\)"):
+        _ = tussle.stock.Boid
+    with pytest.raises(ParameterError, match=r"there is no plugin 'Boid' \(did you mean 'Boids'\?\); there are: "):
+        tussle.stock.load("Boid")
