@@ -1,11 +1,36 @@
 """tussle: thousands of robots in one 3D world, played fast and repeatably."""
 
+from typing import TYPE_CHECKING, Any
+
 from tussle.engine.result import WorldResult
 from tussle.engine.simulation import Simulation
 from tussle.errors import TussleError
 from tussle.mission import Block, Mission
 from tussle.scene import Scene
 
-__all__ = ["Block", "Mission", "Scene", "Simulation", "TussleError", "WorldResult", "__version__"]
+if TYPE_CHECKING:
+    from tussle.record import Recorder, load_run, read_table
+
+__all__ = [
+    "Block",
+    "Mission",
+    "Recorder",
+    "Scene",
+    "Simulation",
+    "TussleError",
+    "WorldResult",
+    "__version__",
+    "load_run",
+    "read_table",
+]
 
 __version__ = "0.1.0.dev0"
+
+
+def __getattr__(name: str) -> Any:
+    # Recording needs Arrow, whose import takes as long as all the rest: it is loaded when it is first asked for.
+    if name in ("Recorder", "load_run", "read_table"):
+        from tussle import record
+
+        return getattr(record, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -46,7 +46,13 @@ class Herald:
             self._sim.forget_schedule()
 
     def _tell(
-        self, kind: str, world: np.ndarray, step: np.ndarray, ids: np.ndarray, other: np.ndarray, text: list[str]
+        self,
+        kind: str,
+        world: np.ndarray,
+        step: np.ndarray,
+        ids: np.ndarray,
+        other: np.ndarray,
+        text: list[str],
     ) -> None:
         happenings = Happenings(kind, world, step, ids, other, text)
         for listener in list(self._listeners):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -84,7 +84,7 @@ class RecordedBirths(Births):
         return born
 
 
-def blocks_of(table: FirstStates, blocks: tuple[Block, ...]) -> np.ndarray:
+def blocks_of(table: FirstStates, blocks: Sequence[Block]) -> np.ndarray:
     """Number of the block of each entity, (m,): by name, else the first of its team, in order of ids, that is not full.
 
     Raises:
@@ -97,18 +97,24 @@ def blocks_of(table: FirstStates, blocks: tuple[Block, ...]) -> np.ndarray:
         entity = f"{table.source}: entity {table.id[row]}"
         team = None if table.team is None else int(table.team[row])
         if team is not None and team not in teams:
-            raise MissionError(f"{entity} is of team {team}, which no block has; {listed(map(str, sorted(teams)))}")
+            raise MissionError(
+                f"{entity} is of team {team}, which no block has; {listed(map(str, sorted(teams)))}"
+            )
         if table.block is not None:
             name = table.block[row]
             if name not in names:
-                raise MissionError(f"{entity} is of block {name!r}, which the mission does not have{nearest_name(name, names)}; {listed(names)}")
+                raise MissionError(
+                    f"{entity} is of block {name!r}, which there is not{nearest_name(name, names)}; {listed(names)}"
+                )
             block[row] = names.index(name)
             continue
         fitting = [i for i, b in enumerate(blocks) if room[i] > 0 and team in (None, b.team)]
         if not fitting:
             whose = "" if team is None else f" of team {team}"
             count = sum(b.count for b in blocks if team in (None, b.team))
-            raise MissionError(f"{entity} is one more than the {count} entities{whose} that the mission's blocks have")
+            raise MissionError(
+                f"{entity} is one more than the {count} entities{whose} that the mission's blocks have"
+            )
         block[row] = fitting[0]
         room[fitting[0]] -= 1
     return block

@@ -58,7 +58,9 @@ class FirstStates:
         length = np.sqrt((self.quat**2).sum(axis=0))
         wrong = np.abs(length - 1.0) > 1e-6  # a table in plain text rounds, but not more than this
         if wrong.any():
-            raise ParameterError(f"{self.source}: the quaternion of entity {self.id[wrong][0]} has length {length[wrong][0]:g}, not 1")
+            raise ParameterError(
+                f"{self.source}: the quaternion of entity {self.id[wrong][0]} has length {length[wrong][0]:g}, not 1"
+            )
         if len(np.unique(self.id)) < m or (m and self.id.min() < 1):
             raise ParameterError(f"{self.source}: ids are whole numbers >= 1, each once")
 
@@ -89,7 +91,9 @@ def read_table(path: str | Path, *, world: int = 0) -> FirstStates:
     if "world" in table.column_names:
         table = table.filter(pc.equal(table["world"], world))
     if not table.num_rows:
-        raise RecordError(f"{place}: there are no rows{f' of world {world}' if 'world' in table.column_names else ''}")
+        raise RecordError(
+            f"{place}: there are no rows{f' of world {world}' if 'world' in table.column_names else ''}"
+        )
     assert time is not None
     t, ids = _numbers(place, table, time), _numbers(place, table, "id").astype(np.int64)
     order = np.lexsort((ids, t))
@@ -114,7 +118,9 @@ def _numbers(place: Path, table: pa.Table, name: str) -> np.ndarray:
 def _read(place: Path) -> pa.Table:
     name = place.name.lower()
     if not name.endswith(SUFFIXES):
-        raise RecordError(f"{place}: a table to start from is a run directory or ends in {', '.join(SUFFIXES)}")
+        raise RecordError(
+            f"{place}: a table to start from is a run directory or ends in {', '.join(SUFFIXES)}"
+        )
     if not place.exists():
         raise RecordError(f"{place}: there is no such file")
     if name.endswith(".arrow"):

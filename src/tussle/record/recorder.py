@@ -95,11 +95,15 @@ class Recorder:
             self.directory.mkdir(parents=True, exist_ok=True)
             held = [name for name in FILES if (self.directory / name).exists()]
             if held:
-                raise RecordError(f"{self.directory}: holds a run already ({held[0]}); choose another directory, or remove it")
+                raise RecordError(
+                    f"{self.directory}: holds a run already ({held[0]}); choose another directory, or remove it"
+                )
             if mission_text is not None:
                 (self.directory / MISSION_FILE).write_text(mission_text, encoding="utf-8")
         except OSError as error:
-            raise RecordError(f"{self.directory}: no run can be recorded there: {error.strerror or error}") from error
+            raise RecordError(
+                f"{self.directory}: no run can be recorded there: {error.strerror or error}"
+            ) from error
         self._trajectory = Stream(self.directory / TRAJECTORY_FILE, TRAJECTORY)
         self._happened = Stream(self.directory / EVENTS_FILE, EVENTS)
 
@@ -111,7 +115,9 @@ class Recorder:
         rows = Rows(bodies.ints, sim.running)
         world, ids, _, block = rows.columns
         nobody = np.zeros(rows.n, np.int64)
-        self._events.append(Happenings(BIRTH, world, clock.step[world], ids, nobody, [names[b] for b in block]))
+        self._events.append(
+            Happenings(BIRTH, world, clock.step[world], ids, nobody, [names[b] for b in block])
+        )
         sim.observers.append(self._observe)
         sim.events.listen(self._hear)
 
@@ -128,7 +134,11 @@ class Recorder:
                 self._refuse_past()
             self._common_step = step
             due = self._per_step
-            if due is None or (step * due.numerator) // due.denominator != ((step - 1) * due.numerator) // due.denominator:
+            if (
+                due is None
+                or (step * due.numerator) // due.denominator
+                != ((step - 1) * due.numerator) // due.denominator
+            ):
                 bodies = sim.population.bodies
                 if bodies.ints is not self._seen:
                     self._seen, self._rows = bodies.ints, Rows(bodies.ints)

@@ -97,7 +97,10 @@ class RowBuffer:
         step = self._step[:n]
         columns = dict(zip(FLOAT_COLUMNS, self._floats[:, :n], strict=True))
         columns |= dict(zip(INT_COLUMNS, self._ints[:, :n], strict=True))
-        columns |= {"step": step, "t": self.start + step.astype(np.int64) * self.dt}  # as the clock computes it
+        columns |= {
+            "step": step,
+            "t": self.start + step.astype(np.int64) * self.dt,
+        }  # as the clock computes it
         arrays = {name: pa.array(column) for name, column in columns.items()}
         arrays["block"] = pa.DictionaryArray.from_arrays(arrays["block"], self._blocks)
         return pa.RecordBatch.from_arrays([arrays[name] for name in TRAJECTORY.names], schema=TRAJECTORY)

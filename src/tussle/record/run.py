@@ -52,7 +52,9 @@ class Run:
     def _read_info(self) -> None:
         path = self.path / RUN_FILE
         if not path.exists():
-            self.notes.append(f"{RUN_FILE} is not there: the run goes on, or was cut short; the tables hold what had been written")
+            self.notes.append(
+                f"{RUN_FILE} is not there: the run goes on, or was cut short; the tables hold what had been written"
+            )
             return
         try:
             info = json.loads(path.read_text(encoding="utf-8"))
@@ -71,7 +73,11 @@ class Run:
         path = self.path / name
         table, note = read_stream(path, schema)
         said = self.info.get("files", {}).get(name)
-        if not note and said is not None and (path.stat().st_size, table.num_rows) != (said["bytes"], said["rows"]):
+        if (
+            not note
+            and said is not None
+            and (path.stat().st_size, table.num_rows) != (said["bytes"], said["rows"])
+        ):
             note = f"{name} has {table.num_rows} rows, {said['rows']} were written"
         if note:
             self.notes.append(note)
@@ -140,8 +146,12 @@ def load_run(path: str | Path, frames: str = "") -> Run:
         ParameterError: `frames` names something else.
     """
     if frames not in ("", *FRAMES):
-        raise ParameterError(f"frames = {frames!r} is not allowed{nearest_name(frames, FRAMES)}; {listed(FRAMES)}")
+        raise ParameterError(
+            f"frames = {frames!r} is not allowed{nearest_name(frames, FRAMES)}; {listed(FRAMES)}"
+        )
     place = Path(path)
     if not any((place / name).exists() for name in FILES):
-        raise RecordError(f"{place}: no run has been recorded there; {'it is a file' if place.is_file() else listed(FILES)}")
+        raise RecordError(
+            f"{place}: no run has been recorded there; {'it is a file' if place.is_file() else listed(FILES)}"
+        )
     return Run(place, frames)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-import datetime
+import datetime as dt
 import io
 import json
 import math
@@ -29,7 +29,7 @@ class Timings:
     """When recording began, in wall and CPU time."""
 
     def __init__(self) -> None:
-        self.began = datetime.datetime.now(datetime.UTC)
+        self.began = dt.datetime.now(dt.UTC)
         self._wall, self._cpu = time.perf_counter(), time.process_time()
 
     def so_far(self) -> dict[str, Any]:
@@ -52,7 +52,9 @@ def versions() -> dict[str, str]:
     return found
 
 
-def write(directory: Path, sim: Any, timings: Timings, streams: Sequence[Stream], about: Mapping[str, Any]) -> None:
+def write(
+    directory: Path, sim: Any, timings: Timings, streams: Sequence[Stream], about: Mapping[str, Any]
+) -> None:
     """Write both files.
 
     Args:
@@ -85,7 +87,9 @@ def write(directory: Path, sim: Any, timings: Timings, streams: Sequence[Stream]
         _put(directory / SUMMARY_FILE, _summary(results))
         _put(directory / RUN_FILE, json.dumps(plain(info), indent=1, allow_nan=False) + "\n")
     except OSError as error:
-        raise RecordError(f"{directory}: the end of the run cannot be written: {os.strerror(error.errno or 0)}") from error
+        raise RecordError(
+            f"{directory}: the end of the run cannot be written: {os.strerror(error.errno or 0)}"
+        ) from error
 
 
 def _put(path: Path, text: str) -> None:

@@ -45,7 +45,11 @@ TRAJECTORY = pa.schema(
 EVENTS = pa.schema(
     [
         _field("world", _I, "number of the world in its stack"),
-        _field("t", _F, "time of the beginning of the step in which it happened; of a birth or an end, its time [s]"),
+        _field(
+            "t",
+            _F,
+            "time of the beginning of the step in which it happened; of a birth or an end, its time [s]",
+        ),
         _field("step", _I, "that step"),
         _field("kind", pa.string(), "birth, death, capture, collision or end"),
         _field("id", _I, "who was born, died, captured, or has the smaller id of two that met"),
