@@ -1,4 +1,4 @@
-"""The golden missions: small games that between them run every shipped plugin and every path of a step."""
+"""The golden missions: small games that between them take every path of a step: orders, rates, births, deaths, messages, beliefs."""
 
 from __future__ import annotations
 
