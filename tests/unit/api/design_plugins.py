@@ -6,7 +6,19 @@ import math
 
 import numpy as np
 
-from tussle.api import Autonomy, EasyAutonomy, EntityRef, Input, MotionModel, Output, Param, Publish, State, unit, wrap
+from tussle.api import (
+    Autonomy,
+    EasyAutonomy,
+    EntityRef,
+    Input,
+    MotionModel,
+    Output,
+    Param,
+    Publish,
+    State,
+    unit,
+    wrap,
+)
 from tussle.messages import CaptureEntity
 from tussle.numeric import cos, sin, tan
 
@@ -47,7 +59,11 @@ class Flock(Autonomy):
     def step(self, g):
         near = g.near(self.sight, teams="own")
         push = np.maximum(0.0, 1.0 - near.distance / self.space[near.row]) / near.distance
-        v = 2.0 * near.sum(-push * near.offset) + 0.5 * unit(near.mean(near.vel)) + unit(near.mean(near.offset))
+        v = (
+            2.0 * near.sum(-push * near.offset)
+            + 0.5 * unit(near.mean(near.vel))
+            + unit(near.mean(near.offset))
+        )
         self.velocity[:] = self.max_speed * unit(v)
 
 

@@ -10,7 +10,22 @@ import pytest
 from design_plugins import Chaser
 from small_worlds import Note, Parcel
 
-from tussle.api import Autonomy, Batch, Children, EntityRef, Field, Handle, Input, Message, Output, Param, Publish, Ragged, RaggedColumn, State
+from tussle.api import (
+    Autonomy,
+    Batch,
+    Children,
+    EntityRef,
+    Field,
+    Handle,
+    Input,
+    Message,
+    Output,
+    Param,
+    Publish,
+    Ragged,
+    RaggedColumn,
+    State,
+)
 from tussle.errors import DeclarationError, ParameterError, UnitError
 from tussle.messages import EntityCaptured
 from tussle.stock import Boids, MotorSchemas, MoveToGoalMS, Predator, Unicycle
@@ -84,7 +99,11 @@ def test_values_are_taken_in_si(name, given, value):
         ("path", 5, r"Sample.path = 5 is not allowed; it takes a list"),
         ("path", [5], r"Sample.path = 5 is not allowed; it takes 2 values \(x, y\)"),
         ("weights", 5, r"Sample.weights = 5 is not allowed; it takes a list"),
-        ("sped", 5, r"Sample has no parameter 'sped' \(did you mean 'speed'\?\); there are: speed, count, is_on"),
+        (
+            "sped",
+            5,
+            r"Sample has no parameter 'sped' \(did you mean 'speed'\?\); there are: speed, count, is_on",
+        ),
         ("rate", 0, r"Sample: rate = 0 is not allowed; it takes a number of calls per second > 0, or None"),
         ("rate", math.nan, r"Sample: rate = nan"),
         ("rate", math.inf, r"Sample: rate = inf"),
@@ -134,11 +153,14 @@ def test_the_signature_shows_names_and_defaults():
 
 def test_a_plugin_is_a_value_and_has_no_arrays():
     one = Sample()
-    with pytest.raises(ParameterError, match=r"Sample.speed cannot be changed: a plugin is a value; make another with .replace\(speed=...\)"):
+    with pytest.raises(
+        ParameterError,
+        match=r"Sample.speed cannot be changed: a plugin is a value; make another with .replace\(speed=...\)",
+    ):
         one.speed = 3.0
-    with pytest.raises(AttributeError, match="Sample.wings is not declared"):
+    with pytest.raises(AttributeError, match=r"Sample.wings is not declared"):
         one.wings = 3.0
-    with pytest.raises(AttributeError, match="Sample.places is an array only inside a simulation"):
+    with pytest.raises(AttributeError, match=r"Sample.places is an array only inside a simulation"):
         _ = one.places
     assert one.speed == 20.0
     assert isinstance(Sample.speed, Param)
@@ -159,12 +181,24 @@ def test_shipped_plugins_are_data(kind):
         (lambda: Param((1.0, 2.0), fields="a a"), r"Param: a name stands twice in 'a a'"),
         (lambda: State(dtype=complex), r"State: dtype <class 'complex'> is not one of float, int, bool"),
         (lambda: State(per="block"), r"State: per='block' is not one of entity, world, team"),
-        (lambda: type("A", (Autonomy,), {"grade": "perfect"}), r"A.grade is 'perfect'; it is one of portable, machine, external"),
-        (lambda: type("A", (Autonomy,), {"name": State()}), r"A.name: the name is reserved; choose another for this State"),
+        (
+            lambda: type("A", (Autonomy,), {"grade": "perfect"}),
+            r"A.grade is 'perfect'; it is one of portable, machine, external",
+        ),
+        (
+            lambda: type("A", (Autonomy,), {"name": State()}),
+            r"A.name: the name is reserved; choose another for this State",
+        ),
         (lambda: type("A", (Autonomy,), {"_x": Param(1.0)}), r"A._x: the name is reserved"),
-        (lambda: type("M", (Message,), {"x": State()}), r"M.x: a message holds Field, EntityRef, Ragged or Handle, not State"),
+        (
+            lambda: type("M", (Message,), {"x": State()}),
+            r"M.x: a message holds Field, EntityRef, Ragged or Handle, not State",
+        ),
         (lambda: type("M", (Message,), {"sender": Field()}), r"M.sender: the name is reserved in messages"),
-        (lambda: type("M", (Message,), {"a": Ragged(), "b": Ragged()}), r"M has more than one ragged field; make two message types of it"),
+        (
+            lambda: type("M", (Message,), {"a": Ragged(), "b": Ragged()}),
+            r"M has more than one ragged field; make two message types of it",
+        ),
     ],
 )
 def test_unsound_declarations_are_refused_where_they_stand(make, message):
@@ -213,7 +247,9 @@ def test_ragged_columns():
     assert taken.start.tolist() == [0, 1, 1, 3]
     assert taken.data.tolist() == [[5.0, 1.0, 3.0], [6.0, 2.0, 4.0]]
     assert RaggedColumn.empty(0, Ragged()).take(np.array([-1, -1])).start.tolist() == [0, 0, 0]
-    with pytest.raises(ValueError, match=r"start is \(2,\) and data \(2, 3\); needed \(4,\) and \(2,\) \+ \(total,\)"):
+    with pytest.raises(
+        ValueError, match=r"start is \(2,\) and data \(2, 3\); needed \(4,\) and \(2,\) \+ \(total,\)"
+    ):
         column.set([0, 3], np.zeros((2, 3)))
     with pytest.raises(ValueError, match="start must rise from 0 to the number of items, 3"):
         column.set([0, 2, 1, 3], np.zeros((2, 3)))
@@ -227,7 +263,10 @@ def test_batches_of_messages():
     assert both.sender.tolist() == [1, 3, 7]
     assert both.value.tolist() == [30, 20, 10]
     assert len(Batch.empty(Note)) == 0
-    with pytest.raises(AttributeError, match=r"messages of this type have no field 'valu' \(did you mean 'value'\?\); there are: value"):
+    with pytest.raises(
+        AttributeError,
+        match=r"messages of this type have no field 'valu' \(did you mean 'value'\?\); there are: value",
+    ):
         _ = both.valu
     with pytest.raises(ParameterError, match=r"Note.value: shape \(3,\) does not fit \(2,\)"):
         Batch.make(Note, np.zeros(2, int), np.zeros(2, int), {"value": [1, 2, 3]})

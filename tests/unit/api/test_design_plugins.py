@@ -10,20 +10,46 @@ from small_worlds import block, mission
 from tussle import Block, Mission, Simulation
 from tussle.api import Autonomy, Output, Param
 from tussle.errors import DeclarationError, ParameterError, PluginError
-from tussle.stock import SimpleCapture, SimpleCaptureMetrics, SingleIntegrator, Straight, Unicycle, UnicyclePID
+from tussle.stock import (
+    SimpleCapture,
+    SimpleCaptureMetrics,
+    SingleIntegrator,
+    Straight,
+    Unicycle,
+    UnicyclePID,
+)
 
 
 def hunt(n_prey=6, **values):
     fast = Unicycle(vel_max=35.0, turn_rate_max=2.0, pitch_rate_max=2.0)
     return Mission(
         blocks=[
-            Block(name="chaser", team=2, count=2, position=(300, 0, 100), variance=(400, 400, 0), heading="180 deg",
-                  autonomy=Chaser(capture_range=20.0), motion=fast),
-            Block(name="prey", team=1, count=n_prey, position=(0, 0, 100), variance=(900, 900, 100), autonomy=Flock(),
-                  motion=SingleIntegrator()),
+            Block(
+                name="chaser",
+                team=2,
+                count=2,
+                position=(300, 0, 100),
+                variance=(400, 400, 0),
+                heading="180 deg",
+                autonomy=Chaser(capture_range=20.0),
+                motion=fast,
+            ),
+            Block(
+                name="prey",
+                team=1,
+                count=n_prey,
+                position=(0, 0, 100),
+                variance=(900, 900, 100),
+                autonomy=Flock(),
+                motion=SingleIntegrator(),
+            ),
         ],
-        end=40.0, end_conditions="time, one_team", interactions=[SimpleCapture(capture_range=20.0)], metrics=[SimpleCaptureMetrics()], **values,
-    )  # fmt: skip
+        end=40.0,
+        end_conditions="time, one_team",
+        interactions=[SimpleCapture(capture_range=20.0)],
+        metrics=[SimpleCaptureMetrics()],
+        **values,
+    )
 
 
 def test_chaser_and_flock_play_the_game_to_its_end():
@@ -36,7 +62,12 @@ def test_chaser_and_flock_play_the_game_to_its_end():
 
 def test_chaser_steers_to_its_prey_by_the_numbers():
     prey = block("prey", team=1, position=(30.0, 40.0, 20.0))
-    chaser = block("chaser", team=2, autonomy=Chaser(max_speed=12.0), motion=Unicycle(vel_max=99.0, turn_rate_max=9.0, pitch_rate_max=9.0))
+    chaser = block(
+        "chaser",
+        team=2,
+        autonomy=Chaser(max_speed=12.0),
+        motion=Unicycle(vel_max=99.0, turn_rate_max=9.0, pitch_rate_max=9.0),
+    )
     sim = Simulation(mission(prey, chaser))
     sim.step()
     assert sim.read("chaser.Chaser.speed")[0][0, 0] == 12.0
@@ -59,14 +90,19 @@ def test_chaser_keeps_its_target_until_it_is_gone_then_takes_the_next():
 
 
 def test_chaser_without_any_prey_stands_still():
-    sim = Simulation(mission(block("chaser", team=2, autonomy=Chaser(), motion=Unicycle(vel_max=35.0), speed=3.0)))
+    sim = Simulation(
+        mission(block("chaser", team=2, autonomy=Chaser(), motion=Unicycle(vel_max=35.0), speed=3.0))
+    )
     sim.run()
     assert sim.read("chaser.pos")[0].tolist() == [[[0.0, 0.0, 0.0]]]
 
 
 def test_flock_velocity_of_two_by_hand():
     # 10 m apart: push = (1 - 10 / 20) / 10, so 2 * 0.05 * 10 = 1 m/s apart and 1 together, which leaves the alignment.
-    pair = [block(n, position=(x, 0, 0), velocity=(0, 2, 0), autonomy=Flock()) for n, x in (("a", 0.0), ("b", 10.0))]
+    pair = [
+        block(n, position=(x, 0, 0), velocity=(0, 2, 0), autonomy=Flock())
+        for n, x in (("a", 0.0), ("b", 10.0))
+    ]
     sim = Simulation(mission(*pair))
     sim.step()
     assert sim.read("a.Flock.velocity")[0][0, 0] == pytest.approx([0.0, 15.0, 0.0])
@@ -86,7 +122,9 @@ class Driver(Autonomy):
 
 
 def drive(multiplier):
-    car = Block(name="car", autonomy=Driver(), motion=LaggedCar(lag=0.7), heading=0.4, speed=1.5, variance=(0, 0, 0))
+    car = Block(
+        name="car", autonomy=Driver(), motion=LaggedCar(lag=0.7), heading=0.4, speed=1.5, variance=(0, 0, 0)
+    )
     return Mission(blocks=[car], end=3.0, motion_multiplier=multiplier)
 
 
@@ -157,7 +195,7 @@ def test_a_model_without_from_body_says_so():
     class Half(MotionModelWithState):
         pass
 
-    with pytest.raises(PluginError, match="Half, a, world 0, step 0: .*Half has no from_body"):
+    with pytest.raises(PluginError, match=r"Half, a, world 0, step 0: .*Half has no from_body"):
         Simulation(mission(block(motion=Half(), autonomy=Driver())))
 
 
@@ -193,6 +231,10 @@ def test_declarations_of_models_that_mean_nothing_are_refused():
 
 
 def test_no_controller_is_needed_where_channels_fit_and_one_is_advised_where_not():
-    fits = Simulation(mission(block(autonomy=Straight(), controller=UnicyclePID(), motion=Unicycle(vel_max=30.0), speed=21.0)))
+    fits = Simulation(
+        mission(
+            block(autonomy=Straight(), controller=UnicyclePID(), motion=Unicycle(vel_max=30.0), speed=21.0)
+        )
+    )
     fits.run()
     assert fits.read("a.pos")[0][0, 0, 0] == pytest.approx(21.0, abs=1.0)

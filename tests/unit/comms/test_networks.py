@@ -4,10 +4,32 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from small_worlds import EasyListener, Listener, Note, NoteMetric, Parcel, Reaper, Talker, alone, block, mission
+from small_worlds import (
+    EasyListener,
+    Listener,
+    Note,
+    NoteMetric,
+    Parcel,
+    Reaper,
+    Talker,
+    alone,
+    block,
+    mission,
+)
 
 from tussle import Simulation
-from tussle.api import EVERYONE, Autonomy, Interaction, Metric, Network, Param, Publish, State, Subscribe, service
+from tussle.api import (
+    EVERYONE,
+    Autonomy,
+    Interaction,
+    Metric,
+    Network,
+    Param,
+    Publish,
+    State,
+    Subscribe,
+    service,
+)
 from tussle.errors import MissionError, ParameterError, PluginError, TussleError, WiringError
 from tussle.stock import GlobalNetwork, LocalNetwork, SimpleCollision, SphereNetwork
 
@@ -23,7 +45,10 @@ def heard(sim, path, column="n_heard"):
 
 
 def test_global_network_reaches_everybody_of_the_world_and_the_sender_itself():
-    game = mission(still("talker", Talker(last=1), Listener()), still("others", Listener(), count=3, position=(1e6, 0, 0)))
+    game = mission(
+        still("talker", Talker(last=1), Listener()),
+        still("others", Listener(), count=3, position=(1e6, 0, 0)),
+    )
     sim = Simulation(game, seeds=[1, 2])
     sim.run()
     assert heard(sim, "talker.Listener").tolist() == [[1], [1]]
@@ -40,7 +65,11 @@ def test_a_message_is_read_at_the_receivers_next_call():
 
 def test_local_network_reaches_only_the_sender():
     local = [Talker(network="LocalNetwork"), Listener(network="LocalNetwork")]
-    game = mission(still("pair", *local, count=2), still("deaf", Listener(network="LocalNetwork")), networks=[LocalNetwork()])
+    game = mission(
+        still("pair", *local, count=2),
+        still("deaf", Listener(network="LocalNetwork")),
+        networks=[LocalNetwork()],
+    )
     sim = alone(game, 1)
     assert heard(sim, "pair.Listener").tolist() == [[9, 9]]
     assert heard(sim, "pair.Listener", "sender").tolist() == [[1, 2]]
@@ -90,8 +119,10 @@ def lossy(count=100, p=0.3, **values):
     return mission(
         still("talker", Talker(network="SphereNetwork"), position=(0, 0, 0)),
         still("crowd", Listener(network="SphereNetwork"), count=count),
-        networks=[SphereNetwork(range=1e9, prob_transmit=p)], end=4.0, **values,
-    )  # fmt: skip
+        networks=[SphereNetwork(range=1e9, prob_transmit=p)],
+        end=4.0,
+        **values,
+    )
 
 
 def test_share_of_messages_that_arrive_is_prob_transmit():
@@ -119,9 +150,10 @@ def test_losses_are_the_same_in_a_stack_and_whoever_else_talks():
 def test_a_delayed_message_arrives_on_time_though_nobody_talks_any_more(delay, read_in):
     """Said in step 2; handed over at the end of the first step at or after t + delay, read in the next."""
     game = mission(
-        still("a", Talker(first=2, last=3, network="slow")), still("b", Listener(network="slow")),
+        still("a", Talker(first=2, last=3, network="slow")),
+        still("b", Listener(network="slow")),
         networks=[GlobalNetwork(name="slow", comm_delay=delay)],
-    )  # fmt: skip
+    )
     sim = alone(game, 1)
     assert heard(sim, "b.Listener", "read_in").tolist() == [[read_in]]
     assert heard(sim, "b.Listener", "value").tolist() == [[2]]
@@ -130,17 +162,20 @@ def test_a_delayed_message_arrives_on_time_though_nobody_talks_any_more(delay, r
 
 def test_a_message_on_its_way_when_the_sender_is_gone_still_arrives():
     game = mission(
-        still("a", Talker(first=2, last=3, network="slow"), team=1), still("b", Listener(network="slow"), team=2),
-        networks=[GlobalNetwork(name="slow", comm_delay=0.4)], interactions=[Reaper(team=1, at=0.4)],
-    )  # fmt: skip
+        still("a", Talker(first=2, last=3, network="slow"), team=1),
+        still("b", Listener(network="slow"), team=2),
+        networks=[GlobalNetwork(name="slow", comm_delay=0.4)],
+        interactions=[Reaper(team=1, at=0.4)],
+    )
     assert heard(alone(game, 1), "b.Listener", "read_in").tolist() == [[7]]
 
 
 def test_delay_is_a_parameter_per_world():
     game = mission(
-        still("a", Talker(first=2, last=3, network="slow")), still("b", Listener(network="slow")),
+        still("a", Talker(first=2, last=3, network="slow")),
+        still("b", Listener(network="slow")),
         networks=[GlobalNetwork(name="slow")],
-    )  # fmt: skip
+    )
     sim = Simulation(game, seeds=[1, 2], params={"slow.comm_delay": [0.1, 0.4]})
     sim.run()
     assert heard(sim, "b.Listener", "read_in").tolist() == [[4], [7]]
@@ -166,7 +201,9 @@ def test_what_only_the_world_says_is_counted_once():
             return {"n": self.n}
 
     game = mission(
-        block("a", count=2, health=1.0), interactions=[SimpleCollision(startup_collision_range=0.0)], metrics=[Meetings()]
+        block("a", count=2, health=1.0),
+        interactions=[SimpleCollision(startup_collision_range=0.0)],
+        metrics=[Meetings()],
     )
     assert alone(game, 1).result()[0].metrics["Meetings"]["n"] <= 1
 
@@ -231,7 +268,10 @@ def test_topic_and_network_can_be_parameters():
 
 
 def test_a_network_that_is_not_there_is_refused():
-    with pytest.raises(WiringError, match=r"block 'a'.*network 'LocalNetwrk' \(did you mean 'LocalNetwork'\?\); there are: GlobalNetwork, LocalNetwork"):
+    with pytest.raises(
+        WiringError,
+        match=r"block 'a'.*network 'LocalNetwrk' \(did you mean 'LocalNetwork'\?\); there are: GlobalNetwork, LocalNetwork",
+    ):
         Simulation(mission(still("a", Talker(network="LocalNetwrk")), networks=[LocalNetwork()]))
 
 
@@ -265,7 +305,9 @@ def test_a_network_that_raises_ends_only_the_world_it_raises_in():
                 raise OSError("jammed")
             return EVERYONE
 
-    game = mission(still("a", Talker(network="Jammed")), still("b", Listener(network="Jammed")), networks=[Jammed()])
+    game = mission(
+        still("a", Talker(network="Jammed")), still("b", Listener(network="Jammed")), networks=[Jammed()]
+    )
     sim = Simulation(game, seeds=[1, 2, 3], params={"Jammed.at": [99, 4, 99]})
     results = sim.run()
     assert [r.end for r in results] == ["time", "error", "time"]
@@ -280,7 +322,9 @@ def test_a_network_without_a_route_is_told_so():
     class Dumb(Network):
         pass
 
-    game = mission(still("a", Talker(network="Dumb")), still("b", Listener(network="Dumb")), networks=[Dumb()])
+    game = mission(
+        still("a", Talker(network="Dumb")), still("b", Listener(network="Dumb")), networks=[Dumb()]
+    )
     with pytest.raises(PluginError, match="Dumb has no route"):
         Simulation(game).step()
 
@@ -293,7 +337,9 @@ class Sender(Autonomy):
 
         rows = np.flatnonzero(g.step_count == 1)
         points = RaggedColumn.from_rows([[(1.0, 2.0)] * (i % 3) for i in g.id[rows]], Parcel.fields["points"])
-        self.parcels.publish(rows, value=g.id[rows] * 10, points=points, thing=[{"id": int(i)} for i in g.id[rows]])
+        self.parcels.publish(
+            rows, value=g.id[rows] * 10, points=points, thing=[{"id": int(i)} for i in g.id[rows]]
+        )
 
 
 class Receiver(Autonomy):
@@ -313,7 +359,9 @@ class Receiver(Autonomy):
 @pytest.mark.parametrize("delay", [0.0, 0.3])
 def test_messages_carry_lists_and_objects(delay):
     game = mission(
-        still("a", Sender(), count=5), still("b", Receiver(), count=2), networks=[GlobalNetwork(comm_delay=delay)]
+        still("a", Sender(), count=5),
+        still("b", Receiver(), count=2),
+        networks=[GlobalNetwork(comm_delay=delay)],
     )
     sim = alone(game, 1)
     assert sim.read("b.Receiver.n_points")[0].tolist() == [[6, 6]]  # 1 + 2 + 0 + 1 + 2
@@ -347,8 +395,11 @@ def test_services_are_called_by_name():
             self.seen[:] = g.call("brightness")
             self.wind[:] = g.call("wind_speed", g.world)
 
-    sim = Simulation(mission(still("a", Lamp(), Asker(), count=2), interactions=[Weather()]), seeds=[1, 2],
-                     params={"Weather.wind": [5.0, 6.0]})  # fmt: skip
+    sim = Simulation(
+        mission(still("a", Lamp(), Asker(), count=2), interactions=[Weather()]),
+        seeds=[1, 2],
+        params={"Weather.wind": [5.0, 6.0]},
+    )
     sim.run()
     assert sim.read("a.Asker.seen")[0].tolist() == [[6.0, 6.0], [6.0, 6.0]]
     assert sim.read("a.Asker.wind")[0].tolist() == [[5.0, 5.0], [6.0, 6.0]]
@@ -357,7 +408,9 @@ def test_services_are_called_by_name():
         def step(self, g):
             g.call("brightnes")
 
-    with pytest.raises(PluginError, match=r"nobody offers a service 'brightnes' \(did you mean 'brightness'\?\)"):
+    with pytest.raises(
+        PluginError, match=r"nobody offers a service 'brightnes' \(did you mean 'brightness'\?\)"
+    ):
         Simulation(mission(still("a", Lamp(), Lost()))).step()
 
 
@@ -385,7 +438,9 @@ def test_capture_of_names_that_are_not_there():
         def step(self, g):
             self.notes.publish([0], valu=3)
 
-    with pytest.raises(PluginError, match=r"Note has no field 'valu' \(did you mean 'value'\?\); there are: value"):
+    with pytest.raises(
+        PluginError, match=r"Note has no field 'valu' \(did you mean 'value'\?\); there are: value"
+    ):
         Simulation(mission(still("a", Misspelt()))).step()
 
 
@@ -394,7 +449,7 @@ def test_publishing_to_a_network_that_is_not_there():
         def step(self, w):
             w.publish(Note, [0], network="Nowhere", value=7)
 
-    with pytest.raises(TussleError, match="network 'Nowhere'.*there are: GlobalNetwork"):
+    with pytest.raises(TussleError, match=r"network 'Nowhere'.*there are: GlobalNetwork"):
         Simulation(mission(still("a"), interactions=[Herald()])).step()
 
 
@@ -404,7 +459,8 @@ def test_two_networks_of_one_name_are_refused():
 
 
 def test_prob_transmit_is_a_probability():
-    with pytest.raises(ParameterError, match=r"SphereNetwork.prob_transmit = 1.5 is not allowed; it takes a finite number >= 0 and <= 1"):
+    with pytest.raises(
+        ParameterError,
+        match=r"SphereNetwork.prob_transmit = 1.5 is not allowed; it takes a finite number >= 0 and <= 1",
+    ):
         SphereNetwork(prob_transmit=1.5)
-
-

@@ -1,6 +1,6 @@
 """A program that integrates x' = u for one entity: reads lines, answers each with one line. It says why it dies on standard error.
 
-    step DT U V W -> X Y Z      save -> X Y Z      crash -> (no answer, exit status 3)      sleep S -> awake
+step DT U V W -> X Y Z      save -> X Y Z      crash -> (no answer, exit status 3)      sleep S -> awake
 """
 
 import sys

@@ -5,7 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from tussle import Block, Mission, Simulation
-from tussle.api import Autonomy, EasyAutonomy, Interaction, Message, Metric, Output, Param, Publish, State, Subscribe
+from tussle.api import (
+    Autonomy,
+    EasyAutonomy,
+    Interaction,
+    Message,
+    Metric,
+    Output,
+    Param,
+    Publish,
+    State,
+    Subscribe,
+)
 from tussle.columns import Field, Handle, Ragged
 from tussle.stock import SingleIntegrator
 

@@ -63,10 +63,14 @@ def test_times_between_births_vary_with_interval_sd_and_by_seed_only():
 
 
 def test_first_is_exactly_there_and_scatter_first_scatters_it():
-    exact = Simulation(mission(block(count=3, position=(10, 20, 30), variance=(100, 100, 25)))).read("a.pos")[0][0]
+    exact = Simulation(mission(block(count=3, position=(10, 20, 30), variance=(100, 100, 25)))).read("a.pos")[
+        0
+    ][0]
     assert exact[0].tolist() == [10.0, 20.0, 30.0]
     assert (exact[1:] != exact[0]).all()
-    scattered = Simulation(mission(block(count=3, position=(10, 20, 30), variance=(100, 100, 25), scatter_first=True))).read("a.pos")[0][0]
+    scattered = Simulation(
+        mission(block(count=3, position=(10, 20, 30), variance=(100, 100, 25), scatter_first=True))
+    ).read("a.pos")[0][0]
     assert (scattered[0] != exact[0]).all()
     assert np.array_equal(scattered[1:], exact[1:])
 
@@ -104,7 +108,11 @@ def test_a_climbing_nose_points_the_velocity_up():
 
 
 def scattered(*extra, count=4, before=()):
-    return mission(*before, block("a", count=count, variance=(100, 100, 9), heading_variance=0.1, autonomy=Wander()), *extra)
+    return mission(
+        *before,
+        block("a", count=count, variance=(100, 100, 9), heading_variance=0.1, autonomy=Wander()),
+        *extra,
+    )
 
 
 def test_another_block_or_more_entities_change_no_draw():
@@ -129,7 +137,11 @@ class Quiet(Metric):
 def test_referees_room_is_kept_at_placement_and_elsewhere_nothing_changes():
     crowd = {"count": 12, "position": (0, 0, 0), "variance": (4, 4, 4)}
     free = Simulation(mission(block(**crowd))).read("a.pos")[0][0]
-    game = mission(block(**crowd), block("b", **crowd), interactions=[SimpleCollision(collision_range=0.0, startup_collision_range=1.45)])
+    game = mission(
+        block(**crowd),
+        block("b", **crowd),
+        interactions=[SimpleCollision(collision_range=0.0, startup_collision_range=1.45)],
+    )
     sim = Simulation(game, seeds=[1, 2])
     for world in (0, 1):
         pos = np.concatenate([sim.read("a.pos")[0][world], sim.read("b.pos")[0][world]])
@@ -140,7 +152,10 @@ def test_referees_room_is_kept_at_placement_and_elsewhere_nothing_changes():
 
 
 def test_room_at_a_reset_is_that_of_a_fresh_start():
-    game = mission(block(count=12, variance=(9, 9, 9), autonomy=Wander()), interactions=[SimpleCollision(collision_range=0.0)])
+    game = mission(
+        block(count=12, variance=(9, 9, 9), autonomy=Wander()),
+        interactions=[SimpleCollision(collision_range=0.0)],
+    )
     sim = Simulation(game, seeds=[1, 2])
     start = sim.read("a.pos")[0]
     sim.step(3)
@@ -163,12 +178,19 @@ def test_births_during_the_run_keep_room_to_those_that_are_there():
 
 
 def test_a_mission_too_crowded_says_so():
-    with pytest.raises(MissionError, match=r"block 'a': no free place for entity 2 of 2 after 10000 tries.*placement 'normal'"):
+    with pytest.raises(
+        MissionError,
+        match=r"block 'a': no free place for entity 2 of 2 after 10000 tries.*placement 'normal'",
+    ):
         Simulation(mission(block(count=2), interactions=[SimpleCollision()]))
 
 
 def test_ids_are_never_used_again():
-    game = mission(block("a", team=1, count=2), block("b", team=2, rate=5.0, count=3), interactions=[Reaper(team=1, at=0.0)])
+    game = mission(
+        block("a", team=1, count=2),
+        block("b", team=2, rate=5.0, count=3),
+        interactions=[Reaper(team=1, at=0.0)],
+    )
     sim = Simulation(game)
     seen = []
     while not sim.is_over:
@@ -191,8 +213,13 @@ class Mother(Interaction):
 
 
 def with_children(*world, **values):
-    return mission(block("a", team=1), block("child", count=0, team=1, position=(1, 1, 1)), block("b", team=2, position=(9, 9, 9)),
-                   interactions=list(world), **values)  # fmt: skip
+    return mission(
+        block("a", team=1),
+        block("child", count=0, team=1, position=(1, 1, 1)),
+        block("b", team=2, position=(9, 9, 9)),
+        interactions=list(world),
+        **values,
+    )
 
 
 def test_w_spawn_is_born_at_the_beginning_of_the_next_step():
@@ -223,12 +250,19 @@ def test_w_spawn_takes_one_place_for_all_or_one_each():
     class Three(Interaction):
         def step(self, w):
             if w.step_count[0] == 0:
-                w.spawn("child", [0, 0, 0], pos=(1.0, 2.0, 3.0), vel=np.array([[1.0, 2.0, 3.0], [0, 0, 0], [0, 0, 0]]))
+                w.spawn(
+                    "child",
+                    [0, 0, 0],
+                    pos=(1.0, 2.0, 3.0),
+                    vel=np.array([[1.0, 2.0, 3.0], [0, 0, 0], [0, 0, 0]]),
+                )
 
     sim = Simulation(with_children(Three()))
     sim.step(1)
     starts = []
-    sim.observers.append(lambda s: starts.append((s.read("child.pos")[0][0].tolist(), s.read("child.vel")[0][0].tolist())))
+    sim.observers.append(
+        lambda s: starts.append((s.read("child.pos")[0][0].tolist(), s.read("child.vel")[0][0].tolist()))
+    )
     sim.step(1)
     assert starts[0] == ([[1.0, 2.0, 3.0]] * 3, [[1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [3.0, 0.0, 0.0]])
 
@@ -236,9 +270,18 @@ def test_w_spawn_takes_one_place_for_all_or_one_each():
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda w: w.spawn("chld", [0]), r"there is no block 'chld' \(did you mean 'child'\?\); there are: a, child, b"),
-        (lambda w: w.spawn("child", [0], speed=3), r"w.spawn: unknown 'speed'; there are: pos, vel, quat, team"),
-        (lambda w: w.spawn("child", [0], team=7), r"w.spawn: team = 7 is not allowed; teams of the mission are 1, 2"),
+        (
+            lambda w: w.spawn("chld", [0]),
+            r"there is no block 'chld' \(did you mean 'child'\?\); there are: a, child, b",
+        ),
+        (
+            lambda w: w.spawn("child", [0], speed=3),
+            r"w.spawn: unknown 'speed'; there are: pos, vel, quat, team",
+        ),
+        (
+            lambda w: w.spawn("child", [0], team=7),
+            r"w.spawn: team = 7 is not allowed; teams of the mission are 1, 2",
+        ),
         (lambda w: w.spawn("child", [0], pos=(1, 2)), r"w.spawn: pos has shape \(2,\); needed is \(3, 1\)"),
         (lambda w: w.move([0], pos=(1, 2)), r"w.move: pos has shape \(2, 1\); needed is \(3, 1\)"),
     ],
@@ -262,11 +305,20 @@ class Asker(Autonomy):
     def step(self, g):
         rows = np.flatnonzero(g.step_count == self.at)
         turned = np.array([[0.0], [0.0], [0.0], [1.0]])
-        self.births.publish(rows, block=[self.template] * len(rows), pos=g.pos[:, rows] + 10.0, vel=g.vel[:, rows], quat=turned)
+        self.births.publish(
+            rows,
+            block=[self.template] * len(rows),
+            pos=g.pos[:, rows] + 10.0,
+            vel=g.vel[:, rows],
+            quat=turned,
+        )
 
 
 def asking(**values):
-    return mission(block("a", team=1, count=2, autonomy=[Drift(), Asker(**values)], position=(100, 0, 0)), block("child", count=0, team=2))
+    return mission(
+        block("a", team=1, count=2, autonomy=[Drift(), Asker(**values)], position=(100, 0, 0)),
+        block("child", count=0, team=2),
+    )
 
 
 def test_an_autonomy_asks_for_an_entity_by_message():
@@ -293,8 +345,9 @@ def test_attitude_of_the_asked_for():
 def test_births_by_message_of_several_blocks_get_the_same_ids_in_any_stack():
     game = mission(
         block("a", autonomy=[Drift(), Asker(template="x"), Asker(template="y", name="Second")]),
-        block("x", count=0), block("y", count=0),
-    )  # fmt: skip
+        block("x", count=0),
+        block("y", count=0),
+    )
     params = {"a.Asker.at": [2, 2, 3], "a.Second.at": [3, 2, 2]}
     stack = Simulation(game, seeds=[1, 2, 3], params=params)
     stack.run()
@@ -343,5 +396,5 @@ def test_a_referee_due_in_some_worlds_asks_only_there():
 def test_negative_count_is_refused():
     with pytest.raises(MissionError, match=r"block 'a': count = -1 is not allowed; it takes a number >= 0"):
         block(count=-1)
-    with pytest.raises(ParameterError, match="a seed|seed"):
+    with pytest.raises(ParameterError, match=r"seed '1' is not allowed"):
         Simulation(mission(), seeds=["1"])

@@ -61,7 +61,15 @@ def no_orphans():
 
 def start(pos) -> Link:
     command = [sys.executable, "-S", str(PROGRAM), *[repr(float(c)) for c in pos]]
-    link = Link(subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": ""}))
+    link = Link(
+        subprocess.Popen(
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            env={**os.environ, "PYTHONPATH": ""},
+        )
+    )
     assert link.process.stdout.readline() == "ready\n"
     diary.opened.append(link)
     return link
@@ -110,7 +118,13 @@ class Outside(MotionModel):
 
 
 def game(motion=None, count=2, autonomy=None, **values):
-    blocks = Block(name="a", count=count, position=(1.0, 2.0, 3.0), autonomy=autonomy or Drift(to=(1.0, 0.5, 0.0)), motion=motion or Outside())
+    blocks = Block(
+        name="a",
+        count=count,
+        position=(1.0, 2.0, 3.0),
+        autonomy=autonomy or Drift(to=(1.0, 0.5, 0.0)),
+        motion=motion or Outside(),
+    )
     return mission(blocks, **values)
 
 
@@ -196,7 +210,10 @@ def test_a_plugin_that_cannot_save_says_so():
         def step(self, g):
             pass
 
-    with Simulation(game(SingleIntegrator(), autonomy=[Drift(), Mute()])) as sim, pytest.raises(SnapshotError, match="Mute holds objects outside"):
+    with (
+        Simulation(game(SingleIntegrator(), autonomy=[Drift(), Mute()])) as sim,
+        pytest.raises(SnapshotError, match="Mute holds objects outside"),
+    ):
         sim.snapshot()
 
 
@@ -222,9 +239,9 @@ def test_a_crash_of_a_child_ends_its_world_and_no_other():
 
 
 def test_a_crash_alone_is_raised():
-    with Simulation(game(Outside(crash_at=2))) as sim:
-        with pytest.raises(PluginError, match=r"Outside, a, world 0, step 2: .*ConnectionError"):
-            sim.run()
+    message = r"Outside, a, world 0, step 2: .*ConnectionError"
+    with Simulation(game(Outside(crash_at=2))) as sim, pytest.raises(PluginError, match=message):
+        sim.run()
 
 
 class Slow(Autonomy):
@@ -282,7 +299,9 @@ def test_those_that_did_start_are_closed_when_another_does_not():
                 raise OSError("no more")
             return start(row.pos)
 
-    with pytest.raises(PluginError, match=r"Third, a 3, world 0, step 0: test_external.py:\d+: OSError: no more"):
+    with pytest.raises(
+        PluginError, match=r"Third, a 3, world 0, step 0: test_external.py:\d+: OSError: no more"
+    ):
         Simulation(game(Third(), count=3))
     assert len(diary.closed) == 2
 
@@ -308,7 +327,9 @@ def test_one_that_cannot_be_closed_is_told_and_the_others_are_closed():
                 raise OSError("stuck")
 
     sim = Simulation(game(Stuck(), count=3))
-    with pytest.warns(RuntimeWarning, match=r"Stuck, a: could not be closed: test_external.py:\d+: OSError: stuck"):
+    with pytest.warns(
+        RuntimeWarning, match=r"Stuck, a: could not be closed: test_external.py:\d+: OSError: stuck"
+    ):
         sim.close()
     assert len(diary.closed) == 3
 
@@ -320,7 +341,14 @@ class Pen(Autonomy):
     velocity = Output(VELOCITY, unit="m/s")
 
     def open_one(self, row):
-        return {"id": row.id, "world": row.world, "seed": row.seed, "team": row.team, "dt": row.dt, "pos": row.pos.tolist()}
+        return {
+            "id": row.id,
+            "world": row.world,
+            "seed": row.seed,
+            "team": row.team,
+            "dt": row.dt,
+            "pos": row.pos.tolist(),
+        }
 
     def save_one(self, handle):
         return handle

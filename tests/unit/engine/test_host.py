@@ -30,7 +30,14 @@ def test_a_hosted_predator_turns_to_its_prey_and_claims_what_is_near() -> None:
 
 
 def test_hosted_flight_is_the_missions_flight() -> None:
-    block = Block(name="prey", count=3, placement="uniform", half_width=(30, 30, 10), autonomy=Boids(), motion=Unicycle(vel_max=30.0))
+    block = Block(
+        name="prey",
+        count=3,
+        placement="uniform",
+        half_width=(30, 30, 10),
+        autonomy=Boids(),
+        motion=Unicycle(vel_max=30.0),
+    )
     sim = Simulation(Mission(blocks=[block], dt=0.1, end=2.0), seeds=3)
     host = Host(autonomy=Boids(), motion=Unicycle(vel_max=30.0), n=3, team=0, seed=3)
     host.pos[:] = sim.read("prey.pos")[0][0].T

@@ -8,8 +8,18 @@ import time
 import numpy as np
 import pytest
 from small_worlds import (
-    Drift, Listener, Note, NoteMetric, Reaper, Talker, Wander, alone, block, hashes, mission,
-)  # fmt: skip
+    Drift,
+    Listener,
+    Note,
+    NoteMetric,
+    Reaper,
+    Talker,
+    Wander,
+    alone,
+    block,
+    hashes,
+    mission,
+)
 
 from tussle import Simulation
 from tussle.api import Autonomy, Interaction, Metric, Output, Param, State
@@ -73,7 +83,9 @@ def test_a_plugin_sees_the_time_of_the_steps_beginning():
     ],
 )
 def test_due_rule(rate, due):
-    sim = Simulation(mission(block(autonomy=[Drift(), Counter(rate=rate)]), metrics=[Tally(rate=rate)], end=1.2))
+    sim = Simulation(
+        mission(block(autonomy=[Drift(), Counter(rate=rate)]), metrics=[Tally(rate=rate)], end=1.2)
+    )
     seen = []
     while not sim.is_over:
         step = int(sim.steps[0])
@@ -133,7 +145,11 @@ def test_the_last_call_has_the_engines_dt_and_controllers_the_substeps():
             self.when[:] = g.t
             self.speed[:] = self.speed_in
 
-    sim = Simulation(mission(block(autonomy=Substeps(), controller=Watch(), motion=Unicycle(vel_max=9.0)), motion_multiplier=4))
+    sim = Simulation(
+        mission(
+            block(autonomy=Substeps(), controller=Watch(), motion=Unicycle(vel_max=9.0)), motion_multiplier=4
+        )
+    )
     sim.step(3)
     assert sim.read("a.Watch.n")[0].tolist() == [[12]]
     assert sim.read("a.Watch.dt")[0].tolist() == [[0.025]]
@@ -167,7 +183,13 @@ def test_end_conditions(conditions, reapers, end, steps):
 
 
 def test_no_condition_ends_nothing():
-    sim = Simulation(mission(*teams(), end_conditions="none", interactions=[Reaper(team=1, at=0.1), Reaper(team=2, at=0.1, name="R")]))
+    sim = Simulation(
+        mission(
+            *teams(),
+            end_conditions="none",
+            interactions=[Reaper(team=1, at=0.1), Reaper(team=2, at=0.1, name="R")],
+        )
+    )
     sim.step(30)
     assert not sim.is_over
     assert sim.steps[0] == 30
@@ -181,7 +203,13 @@ def test_a_mission_of_one_team_is_no_last_team_standing():
 def test_the_game_is_open_while_births_are_to_come():
     """Team 1 is gone at 0.2 s, but another of it comes at 0.5 s; all of team 2 stay."""
     late = block("late", team=1, count=1, rate=1.0, first_birth=0.5)
-    game = mission(block("one", team=1), block("two", team=2), late, end_conditions="time, one_team", interactions=[Reaper(team=1, at=0.2)])
+    game = mission(
+        block("one", team=1),
+        block("two", team=2),
+        late,
+        end_conditions="time, one_team",
+        interactions=[Reaper(team=1, at=0.2)],
+    )
     result = Simulation(game).run()[0]
     assert (result.end, result.steps) == ("one_team", 6)
 
@@ -189,7 +217,13 @@ def test_the_game_is_open_while_births_are_to_come():
 def test_the_game_ends_when_the_last_birth_changes_nothing():
     """Team 1 is gone at 0.2 s; the last birth, of team 2, decides that it has lost: nobody dies in that step."""
     late = block("late", team=2, count=1, rate=1.0, first_birth=0.5)
-    game = mission(block("one", team=1), block("two", team=2), late, end_conditions="time, one_team", interactions=[Reaper(team=1, at=0.2)])
+    game = mission(
+        block("one", team=1),
+        block("two", team=2),
+        late,
+        end_conditions="time, one_team",
+        interactions=[Reaper(team=1, at=0.2)],
+    )
     result = Simulation(game).run()[0]
     assert (result.end, result.steps) == ("one_team", 6)
 
@@ -197,14 +231,21 @@ def test_the_game_ends_when_the_last_birth_changes_nothing():
 def test_a_game_that_is_decided_before_it_begins_ends_with_the_first_step_also_after_a_reset():
     game = mission(block("one", team=1, count=0), block("two", team=2), end_conditions="time, one_team")
     assert Simulation(game).run()[0].steps == 1
-    sim = Simulation(game.replace(blocks=[block("one", team=1), block("two", team=2)], interactions=[Reaper(team=1, at=0.5)]), seeds=[1, 2])
+    sim = Simulation(
+        game.replace(
+            blocks=[block("one", team=1), block("two", team=2)], interactions=[Reaper(team=1, at=0.5)]
+        ),
+        seeds=[1, 2],
+    )
     sim.step(3)
     sim.reset([1], params={"Reaper.at": 0.0})
     assert [r.steps for r in sim.run()] == [6, 1]
 
 
 def test_worlds_end_apart_and_each_as_it_would_alone():
-    game = mission(*teams(autonomy=Wander()), end_conditions="time, one_team", interactions=[Reaper(team=1)], end=2.0)
+    game = mission(
+        *teams(autonomy=Wander()), end_conditions="time, one_team", interactions=[Reaper(team=1)], end=2.0
+    )
     at = [0.5, 99.0, 0.2, 1.0]
     sim = Simulation(game, seeds=[1, 2, 3, 4], params={"Reaper.at": at})
     results = sim.run()
@@ -236,7 +277,14 @@ def test_the_killed_are_seen_until_the_end_of_the_step():
         def step(self, w):
             self.n[:] = np.bincount(w.world, minlength=w.n_worlds)
 
-    sim = Simulation(mission(block(team=1, count=2), interactions=[Reaper(team=1, at=0.0)], metrics=[Watch()], end_conditions="none"))
+    sim = Simulation(
+        mission(
+            block(team=1, count=2),
+            interactions=[Reaper(team=1, at=0.0)],
+            metrics=[Watch()],
+            end_conditions="none",
+        )
+    )
     sim.step()
     assert sim.read("Watch.n")[0].tolist() == [2]
     assert sim.read("a.pos")[1].sum() == 0
@@ -303,10 +351,28 @@ def sensor_block():
 def rich(**values):
     """A game with nearly everything in it that a reset has to put back."""
     return mission(
-        block("a", team=1, count=4, variance=(50, 50, 50), autonomy=[Wander(), Talker(), Listener(rate=2.5)], sensor=NoisyContacts()),
-        block("late", team=2, count=5, rate=4.0, interval_sd=0.05, variance=(50, 50, 50), autonomy=[Wander(), Listener()]),
-        interactions=[SimpleCollision(collision_range=3.0)], metrics=[NoteMetric()], end=2.0, **values,
-    )  # fmt: skip
+        block(
+            "a",
+            team=1,
+            count=4,
+            variance=(50, 50, 50),
+            autonomy=[Wander(), Talker(), Listener(rate=2.5)],
+            sensor=NoisyContacts(),
+        ),
+        block(
+            "late",
+            team=2,
+            count=5,
+            rate=4.0,
+            interval_sd=0.05,
+            variance=(50, 50, 50),
+            autonomy=[Wander(), Listener()],
+        ),
+        interactions=[SimpleCollision(collision_range=3.0)],
+        metrics=[NoteMetric()],
+        end=2.0,
+        **values,
+    )
 
 
 @pytest.mark.parametrize("after", [1, 7, 20])
@@ -402,7 +468,9 @@ def test_a_snapshot_fits_another_simulation_of_the_mission():
 
 
 def test_a_snapshot_keeps_worlds_that_have_ended_and_clocks_that_differ():
-    game = mission(*teams(autonomy=Wander()), end_conditions="time, one_team", interactions=[Reaper(team=1)], end=2.0)
+    game = mission(
+        *teams(autonomy=Wander()), end_conditions="time, one_team", interactions=[Reaper(team=1)], end=2.0
+    )
     sim = Simulation(game, seeds=[1, 2, 3], params={"Reaper.at": [0.2, 99.0, 1.0]})
     sim.step(5)
     sim.reset([2])
@@ -430,7 +498,11 @@ def test_restore_takes_messages_back():
         def step(self, w):
             w.publish(Note, np.flatnonzero(w.step_count == 2), value=7)
 
-    game = mission(block(autonomy=[Drift(), Listener()]), block("b", autonomy=[Drift(), Talker(last=2)]), interactions=[Herald()])
+    game = mission(
+        block(autonomy=[Drift(), Listener()]),
+        block("b", autonomy=[Drift(), Talker(last=2)]),
+        interactions=[Herald()],
+    )
     sim = Simulation(game)
     start = sim.snapshot()
     first = sim.run()[0].state_hash
@@ -459,7 +531,9 @@ def test_snapshot_of_groups_that_are_not_there():
 
 
 def test_read_is_in_stable_agent_order_with_who_lives():
-    sim = Simulation(mission(block("a", count=3, autonomy=Wander(), variance=(9, 9, 9)), block("b", team=1)), seeds=[1, 2])
+    sim = Simulation(
+        mission(block("a", count=3, autonomy=Wander(), variance=(9, 9, 9)), block("b", team=1)), seeds=[1, 2]
+    )
     pos, alive = sim.read("a.pos")
     assert pos.shape == (2, 3, 3)
     sim.write("a.health", [[1.0, 0.0, 1.0], [1.0, 1.0, 1.0]])
@@ -473,7 +547,9 @@ def test_read_is_in_stable_agent_order_with_who_lives():
 
 
 def test_worlds_that_have_ended_are_read_as_they_ended():
-    game = mission(block(team=1), block("b", team=2), end_conditions="time, one_team", interactions=[Reaper(team=2)])
+    game = mission(
+        block(team=1), block("b", team=2), end_conditions="time, one_team", interactions=[Reaper(team=2)]
+    )
     sim = Simulation(game, seeds=[1, 2], params={"Reaper.at": [0.3, 99.0]})
     sim.run()
     assert sim.read("a.pos")[0][:, 0, 0].tolist() == pytest.approx([0.4, 1.0])
@@ -506,14 +582,26 @@ def test_world_columns_are_read_and_written_by_world():
         ("c.pos", 0.0, r"'c.pos': there is no column by this path.*paths begin with: a, GlobalNetwork"),
         ("a", 0.0, r"'a': there is no column by this path"),
         ("a.Drft.to", 0.0, r"'a.Drft.to': a has no plugin 'Drft' \(did you mean 'Drift'\?\)"),
-        ("a.Drift.too", 0.0, r"'a.Drift.too': Drift has no column 'too' \(did you mean 'to'\?\); there are: to, velocity"),
+        (
+            "a.Drift.too",
+            0.0,
+            r"'a.Drift.too': Drift has no column 'too' \(did you mean 'to'\?\); there are: to, velocity",
+        ),
         ("a.yaw", 0.0, r"'a.yaw' cannot be written; there are: pos, vel, quat"),
         ("a.id", 0.0, r"'a.id' cannot be written"),
         ("a.pos", [1.0, 2.0], r"'a.pos': values have shape \(2,\); needed is \(1, 1, 3\)"),
         ("a.pos", np.nan, r"'a.pos': values hold NaN|'a.pos': values must be finite"),
         ("a.pos", np.inf, r"'a.pos': values must be finite"),
-        ("a.Unicycle.vel_max", -1.0, r"a.Unicycle.vel_max: Unicycle.vel_max = .*-1.0.* is not allowed; it takes .* in m/s >= 0"),
-        ("GlobalNetwork.comm_dely", 0.0, r"GlobalNetwork has no column 'comm_dely' \(did you mean 'comm_delay'\?\)"),
+        (
+            "a.Unicycle.vel_max",
+            -1.0,
+            r"a.Unicycle.vel_max: Unicycle.vel_max = .*-1.0.* is not allowed; it takes .* in m/s >= 0",
+        ),
+        (
+            "GlobalNetwork.comm_dely",
+            0.0,
+            r"GlobalNetwork has no column 'comm_dely' \(did you mean 'comm_delay'\?\)",
+        ),
     ],
 )
 def test_paths_and_values_that_are_refused(path, value, message):
@@ -527,7 +615,7 @@ def test_reading_what_has_no_fixed_shape_is_refused():
         mark = State(per="entity")
 
     sim = Simulation(mission(interactions=[Marks()]))
-    with pytest.raises(ParameterError, match="Marks.mark.*per entity"):
+    with pytest.raises(ParameterError, match=r"Marks.mark.*per entity"):
         sim.read("Marks.mark")
 
 
@@ -549,9 +637,11 @@ def test_parameters_with_several_fields_are_checked_when_written():
 def test_params_differ_between_worlds_and_each_is_as_alone():
     game = mission(block(count=2, variance=(9, 9, 9), autonomy=Wander()), interactions=[SimpleCollision()])
     values = {
-        "a.Wander.spread": [0.5, 2.0, 1.0], "a.speed": [1.0, 2.0, 3.0], "a.heading": ["90 deg", 0.0, 1.0],
+        "a.Wander.spread": [0.5, 2.0, 1.0],
+        "a.speed": [1.0, 2.0, 3.0],
+        "a.heading": ["90 deg", 0.0, 1.0],
         "SimpleCollision.collision_range": [0.0, 1.0, 50.0],
-    }  # fmt: skip
+    }
     sim = Simulation(game, seeds=[1, 2, 3], params=values)
     assert sim.read("a.yaw")[0][:2, 0].tolist() == pytest.approx([np.pi / 2, 0.0])
     assert sim.read("a.pos")[1].tolist() == [[True] * 2, [True] * 2, [False] * 2]
@@ -564,15 +654,26 @@ def test_params_differ_between_worlds_and_each_is_as_alone():
 
 def test_structural_params_split_groups_and_each_world_is_as_alone():
     game = mission(
-        block(count=2, variance=(9, 9, 9), motion=Unicycle(vel_max=9.0), autonomy=[Substeps(), Talker(), Listener()], speed=1.0), end=1.0
+        block(
+            count=2,
+            variance=(9, 9, 9),
+            motion=Unicycle(vel_max=9.0),
+            autonomy=[Substeps(), Talker(), Listener()],
+            speed=1.0,
+        ),
+        end=1.0,
     )
     roll = [False, True, False]
-    sim = Simulation(game, seeds=[1, 2, 3], params={"a.Unicycle.enable_roll": roll, "a.Unicycle.vel_max": [1.0, 2.0, 3.0]})
+    sim = Simulation(
+        game, seeds=[1, 2, 3], params={"a.Unicycle.enable_roll": roll, "a.Unicycle.vel_max": [1.0, 2.0, 3.0]}
+    )
     assert len([g for g in sim.population.groups if g.n]) == 2
     sim.run()
     assert sim.read("a.pos")[1].all()
     for k in range(3):
-        one = Simulation(game, seeds=k + 1, params={"a.Unicycle.enable_roll": roll[k], "a.Unicycle.vel_max": k + 1.0})
+        one = Simulation(
+            game, seeds=k + 1, params={"a.Unicycle.enable_roll": roll[k], "a.Unicycle.vel_max": k + 1.0}
+        )
         one.run()
         assert one.state_hash() == sim.state_hash(k)
 
@@ -582,7 +683,10 @@ def test_structural_params_split_groups_and_each_world_is_as_alone():
     [
         ({"b.Drift.to": 1}, r"'b.Drift.to': there is no block or world plugin 'b'"),
         ({"a.Drif.to": 1}, r"'a.Drif.to': a has no plugin 'Drif' \(did you mean 'Drift'\?\)"),
-        ({"a.Drift.two": 1}, r"'a.Drift.two': Drift has no parameter 'two' \(did you mean 'to'\?\); there are: to"),
+        (
+            {"a.Drift.two": 1},
+            r"'a.Drift.two': Drift has no parameter 'two' \(did you mean 'to'\?\); there are: to",
+        ),
         ({"a.sped": 1}, r"'a.sped' names no parameter.*a has: .*speed"),
         ({"a": 1}, r"'a' names no parameter"),
         ({"a.speed": "3 kg"}, r"a.speed: a.speed = '3 kg'"),
@@ -591,7 +695,10 @@ def test_structural_params_split_groups_and_each_world_is_as_alone():
         ({"a.mass": [1.0, -1.0]}, r"a.mass = -1.0 is not allowed"),
         ({"a.Drift.to": (1, 2)}, r"Drift.to = \(1, 2\) is not allowed; it takes 3 values \(x, y, z\)"),
         ({"a.Drift.to": float("nan")}, r"Drift.to = nan is not allowed"),
-        ({"GlobalNetwork.comm_delay": [0.0, -1.0]}, r"comm_delay = -1.0 is not allowed; it takes a finite number in s >= 0"),
+        (
+            {"GlobalNetwork.comm_delay": [0.0, -1.0]},
+            r"comm_delay = -1.0 is not allowed; it takes a finite number in s >= 0",
+        ),
     ],
 )
 def test_bad_params_are_refused_with_their_path(params, message):
@@ -601,7 +708,9 @@ def test_bad_params_are_refused_with_their_path(params, message):
 
 def test_a_structural_param_of_a_world_plugin_belongs_to_the_mission():
     game = mission(interactions=[SimpleCollision()])
-    with pytest.raises((MissionError, ParameterError), match="startup_collisions_only is structural.*set it in the mission"):
+    with pytest.raises(
+        (MissionError, ParameterError), match=r"startup_collisions_only is structural.*set it in the mission"
+    ):
         Simulation(game, seeds=[1, 2], params={"SimpleCollision.startup_collisions_only": [True, False]})
 
 
@@ -615,12 +724,11 @@ def test_a_ragged_param_belongs_to_the_mission():
                 self.n[row] = self.points[row].shape[1]
 
     game = mission(
-        block("a", count=2, autonomy=[Drift(), Path(points=[(1, 2), (3, 4), (5, 6)])]), block("b", autonomy=[Drift(), Path()])
+        block("a", count=2, autonomy=[Drift(), Path(points=[(1, 2), (3, 4), (5, 6)])]),
+        block("b", autonomy=[Drift(), Path()]),
     )
     sim = alone(game, 1)
     assert sim.read("a.Path.n")[0].tolist() == [[3, 3]]
     assert sim.read("b.Path.n")[0].tolist() == [[1]]
     with pytest.raises(ParameterError, match=r"a.Path.points. is a list.*mission"):
         Simulation(game, params={"a.Path.points": [(1.0, 2.0)]})
-
-

@@ -89,8 +89,11 @@ def herd(update="sequential", **values):
         block("a", team=1, count=5, variance=(40, 40, 40), autonomy=Shy(), sensor=NoisyContacts()),
         block("b", team=2, count=3, variance=(40, 40, 40), autonomy=[Wander(), Shy(rate=5.0)]),
         block("late", team=2, count=3, rate=5.0, variance=(40, 40, 40), autonomy=Shy()),
-        update=update, interactions=[SimpleCollision(collision_range=1.0)], end=1.5, **values,
-    )  # fmt: skip
+        update=update,
+        interactions=[SimpleCollision(collision_range=1.0)],
+        end=1.5,
+        **values,
+    )
 
 
 @pytest.mark.parametrize("update", ["sequential", "synchronous"])
@@ -100,7 +103,10 @@ def test_a_world_is_the_same_in_any_stack(update):
     assert hashes(game, [3, 4, 5]) == lone
     assert hashes(game, [5, 9, 3, 4]) == [lone[2], hashes(game, [9])[0], lone[0], lone[1]]
     assert len(set(lone)) == 3
-    assert lone != [hashes(herd("synchronous" if update == "sequential" else "sequential"), [seed])[0] for seed in (3, 4, 5)]
+    assert lone != [
+        hashes(herd("synchronous" if update == "sequential" else "sequential"), [seed])[0]
+        for seed in (3, 4, 5)
+    ]
 
 
 def test_sequential_snapshot_and_reset():
@@ -118,6 +124,7 @@ def test_sequential_snapshot_and_reset():
 
 def test_sequential_with_structural_params_is_restored_into_the_right_groups():
     from small_worlds import Talker
+
     from tussle.stock import Unicycle
 
     class Steady(Autonomy):
@@ -128,7 +135,9 @@ def test_sequential_with_structural_params_is_restored_into_the_right_groups():
         def step(self, g):
             self.speed[:] = g.id.astype(float)
 
-    game = mission(block(count=3, autonomy=[Steady(), Talker()], motion=Unicycle(vel_max=9.0)), update="sequential")
+    game = mission(
+        block(count=3, autonomy=[Steady(), Talker()], motion=Unicycle(vel_max=9.0)), update="sequential"
+    )
     sim = Simulation(game, seeds=[1, 2])
     sim.step(3)
     saved = sim.snapshot()

@@ -7,11 +7,28 @@ import pytest
 from small_worlds import VELOCITY, Drift, Wander, alone, block, mission
 
 from tussle import Simulation
-from tussle.api import Autonomy, Behavior, Children, Controller, Input, Interaction, Metric, Output, Param, Sensor, State, service
+from tussle.api import (
+    Autonomy,
+    Behavior,
+    Children,
+    Controller,
+    Input,
+    Interaction,
+    Metric,
+    Output,
+    Param,
+    Sensor,
+    State,
+    service,
+)
 from tussle.errors import DeclarationError, ParameterError, WiringError
 from tussle.stock import (
-    DirectController, NoisyState, SingleIntegratorControllerSimple, Unicycle, UnicyclePID,
-)  # fmt: skip
+    DirectController,
+    NoisyState,
+    SingleIntegratorControllerSimple,
+    Unicycle,
+    UnicyclePID,
+)
 
 
 class Pilot(Autonomy):
@@ -35,14 +52,20 @@ def test_a_missing_writer_is_told_with_what_is_there_and_what_would_fit():
 
 
 def test_a_controller_without_its_input_is_named():
-    with pytest.raises(WiringError, match=r"nobody writes channel 'desired_altitude' for UnicyclePID; written are: velocity_x, velocity_y, velocity_z$"):
+    with pytest.raises(
+        WiringError,
+        match=r"nobody writes channel 'desired_altitude' for UnicyclePID; written are: velocity_x, velocity_y, velocity_z$",
+    ):
         Simulation(mission(block(controller=UnicyclePID(), motion=Unicycle())))
     with pytest.raises(WiringError, match="written are: none"):
         Simulation(mission(block(autonomy=[], motion=Unicycle())))
 
 
 def test_a_pass_through_that_does_not_pass_what_is_needed():
-    with pytest.raises(WiringError, match="nobody writes channel 'speed' for Unicycle through SingleIntegratorControllerSimple"):
+    with pytest.raises(
+        WiringError,
+        match="nobody writes channel 'speed' for Unicycle through SingleIntegratorControllerSimple",
+    ):
         Simulation(mission(block(controller=SingleIntegratorControllerSimple(), motion=Unicycle())))
 
 
@@ -53,7 +76,9 @@ def test_units_are_checked_at_both_ends():
         def step(self, g):
             pass
 
-    with pytest.raises(WiringError, match=r"block 'a': Feet.velocity writes channel 'velocity_x' in 'm', but it is in 'm/s'"):
+    with pytest.raises(
+        WiringError, match=r"block 'a': Feet.velocity writes channel 'velocity_x' in 'm', but it is in 'm/s'"
+    ):
         Simulation(mission(block(autonomy=Feet())))
 
     class Reader(Autonomy):
@@ -95,7 +120,9 @@ def test_a_sensor_is_read_with_its_value_of_the_last_step():
 
 
 def test_an_optional_input_stays_at_its_default():
-    assert alone(mission(block(autonomy=[Drift(), Captain()])), 1).read("a.Captain.seen")[0].tolist() == [[-7.0]]
+    assert alone(mission(block(autonomy=[Drift(), Captain()])), 1).read("a.Captain.seen")[0].tolist() == [
+        [-7.0]
+    ]
 
 
 def test_an_input_that_is_not_optional_must_be_written():
@@ -176,7 +203,14 @@ def test_controllers_stand_in_a_chain():
         def step(self, g):
             self.velocity[:] = 0.5 * self.wanted
 
-    sim = alone(mission(block(autonomy=Drift(to=(8.0, 0, 0)), controller=[Half(), DirectController(), Half(name="Second")])), 1)
+    sim = alone(
+        mission(
+            block(
+                autonomy=Drift(to=(8.0, 0, 0)), controller=[Half(), DirectController(), Half(name="Second")]
+            )
+        ),
+        1,
+    )
     assert sim.read("a.pos")[0][0, 0, 0] == pytest.approx(2.0)
 
 
@@ -191,7 +225,9 @@ def test_a_pass_through_is_no_call():
     assert np.array_equal(plain.read("a.pos")[0], direct.read("a.pos")[0])
     working = Simulation(mission(block(controller=Swap()), motion_multiplier=3))
     assert [line for line in working.describe().splitlines() if "Swap" in line] == [
-        line for line in working.describe().splitlines() if line.strip().split(maxsplit=1)[-1].startswith("controller")
+        line
+        for line in working.describe().splitlines()
+        if line.strip().split(maxsplit=1)[-1].startswith("controller")
     ]
     assert working.describe().count("Swap (") == 3
 
@@ -199,7 +235,13 @@ def test_a_pass_through_is_no_call():
 def test_describe_prints_the_step_and_the_grade():
     game = mission(block(autonomy=[Wander(), Pilot(rate=2.0)], sensor=NoisyState()), name="demo")
     text = Simulation(game).describe()
-    order = ["autonomy     a: Wander", "autonomy     a: Pilot at 2 Hz", "motion       a: SingleIntegrator", "sensor       a: NoisyState", "deliver"]
+    order = [
+        "autonomy     a: Wander",
+        "autonomy     a: Pilot at 2 Hz",
+        "motion       a: SingleIntegrator",
+        "sensor       a: NoisyState",
+        "deliver",
+    ]
     assert sorted(order, key=text.index) == order
     assert text.startswith("demo: 1 world(s), dt 0.1 s, update synchronous")
     assert text.endswith("grade: machine")
@@ -271,7 +313,12 @@ def test_autonomies_and_controllers_see_the_belief_and_everybody_else_the_truth(
             self.x[:] = g.pos[0]
             self.velocity[:] = self.wanted
 
-    sim = Simulation(mission(block("a", autonomy=[Drift(), Look()], controller=Feel(), sensor=Shifted()), block("b", autonomy=[Drift(), Look()])))
+    sim = Simulation(
+        mission(
+            block("a", autonomy=[Drift(), Look()], controller=Feel(), sensor=Shifted()),
+            block("b", autonomy=[Drift(), Look()]),
+        )
+    )
     sim.step()
     # Before the sensor's first call the belief is the truth of the placement.
     assert sim.read("a.Look.me_x")[0].tolist() == [[0.0]]
@@ -293,7 +340,12 @@ def test_neighbours_are_sought_from_where_one_believes_to_be():
         def step(self, g):
             self.n[:] = g.near(5.0).count
 
-    sim = Simulation(mission(block("a", autonomy=[Drift(to=(0, 0, 0)), Near()], sensor=Shifted()), block("b", position=(102, 0, 0), autonomy=Drift(to=(0, 0, 0)))))
+    sim = Simulation(
+        mission(
+            block("a", autonomy=[Drift(to=(0, 0, 0)), Near()], sensor=Shifted()),
+            block("b", position=(102, 0, 0), autonomy=Drift(to=(0, 0, 0))),
+        )
+    )
     sim.step(2)
     assert sim.read("a.Near.n")[0].tolist() == [[1]]
 
@@ -342,7 +394,11 @@ class Sum(Autonomy):
 
 def test_children_have_columns_and_channels_of_their_own():
     parts = [Push(gain=1.0), Push(to=(0, 3, 0), gain=0.5, name="North"), Push(to=(0, 0, 1), name="Up")]
-    sim = Simulation(mission(block(count=2, autonomy=Sum(parts=parts))), seeds=[1, 2], params={"a.Sum.North.gain": [0.5, 1.0]})
+    sim = Simulation(
+        mission(block(count=2, autonomy=Sum(parts=parts))),
+        seeds=[1, 2],
+        params={"a.Sum.North.gain": [0.5, 1.0]},
+    )
     sim.run()
     assert sim.read("a.vel")[0].tolist() == [[[2.0, 3.0, 2.0]] * 2, [[2.0, 6.0, 2.0]] * 2]
     assert sim.read("a.Sum.North.wish")[0][0, 0].tolist() == [0.0, 6.0, 0.0]
@@ -352,7 +408,10 @@ def test_children_have_columns_and_channels_of_their_own():
 def test_children_of_the_wrong_kind_or_of_one_name_are_refused():
     with pytest.raises(ParameterError, match=r"Sum.parts: Drift\(\) is not a Behavior"):
         Sum(parts=[Drift()])
-    with pytest.raises(ParameterError, match=r"Sum.parts: two plugins are called 'Push'; give one of them another name with name=\.\.\."):
+    with pytest.raises(
+        ParameterError,
+        match=r"Sum.parts: two plugins are called 'Push'; give one of them another name with name=\.\.\.",
+    ):
         Sum(parts=[Push(), Push()])
 
 
@@ -363,7 +422,9 @@ def test_a_child_with_an_input_is_refused():
         def step(self, g):
             pass
 
-    with pytest.raises(WiringError, match=r"Sum.Needy.level is an input, and a plugin inside another has none"):
+    with pytest.raises(
+        WiringError, match=r"Sum.Needy.level is an input, and a plugin inside another has none"
+    ):
         Simulation(mission(block(autonomy=Sum(parts=[Needy()]))))
 
 
@@ -409,7 +470,9 @@ def test_a_model_with_a_switched_off_input_reads_the_other_one():
             self.velocity_z[:] = 2.0
 
     level = Unicycle(use_pitch=False, vel_max=9.0, velocity_z_max=9.0)
-    assert alone(mission(block(autonomy=Climber(), motion=level)), 1).read("a.pos")[0][0, 0].tolist() == pytest.approx([1.0, 0.0, 2.0])
+    assert alone(mission(block(autonomy=Climber(), motion=level)), 1).read("a.pos")[0][
+        0, 0
+    ].tolist() == pytest.approx([1.0, 0.0, 2.0])
     with pytest.raises(WiringError, match="nobody writes channel 'pitch_rate' for Unicycle"):
         Simulation(mission(block(autonomy=Climber(), motion=Unicycle())))
 
@@ -438,9 +501,11 @@ def test_forces_are_summed_by_interactions_and_consumed_by_the_motion_model():
         def step(self, w):
             w.bodies.force[2] += self.g[w.world] * w.mass
 
-    game = mission(block(autonomy=[], motion=Ball(), mass=4.0), interactions=[Gravity(), Gravity(g=1.81, name="Buoyancy")], end=1.0)
+    game = mission(
+        block(autonomy=[], motion=Ball(), mass=4.0),
+        interactions=[Gravity(), Gravity(g=1.81, name="Buoyancy")],
+        end=1.0,
+    )
     sim = alone(game, 1)
     # The first step is free of force, since interactions come after motion; nine steps at -8 m/s^2.
     assert sim.read("a.vel")[0][0, 0].tolist() == pytest.approx([0.0, 0.0, -8.0 * 0.9])
-
-

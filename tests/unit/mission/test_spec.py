@@ -9,13 +9,29 @@ from small_worlds import Drift, block, mission
 
 from tussle import Block, Mission
 from tussle.errors import MissionError, ParameterError, TussleError
-from tussle.stock import DirectController, GlobalNetwork, LocalNetwork, NoisyState, SimpleCapture, SimpleCaptureMetrics, SingleIntegrator
+from tussle.stock import (
+    DirectController,
+    GlobalNetwork,
+    LocalNetwork,
+    NoisyState,
+    SimpleCapture,
+    SimpleCaptureMetrics,
+    SingleIntegrator,
+)
 
 MOTION = {"motion": SingleIntegrator(), "autonomy": Drift()}
 
 
 def test_numbers_are_understood_with_units():
-    made = Block(name="a", position=("1 km", 0, "30 ft"), heading="180 deg", speed="40 kt", rate="2 Hz", first_birth="1 min", **MOTION)
+    made = Block(
+        name="a",
+        position=("1 km", 0, "30 ft"),
+        heading="180 deg",
+        speed="40 kt",
+        rate="2 Hz",
+        first_birth="1 min",
+        **MOTION,
+    )
     assert made.position == pytest.approx((1000.0, 0.0, 9.144))
     assert made.heading == pytest.approx(3.14159265)
     assert made.speed == pytest.approx(20.5777778)
@@ -37,8 +53,11 @@ def test_one_plugin_or_several():
     assert block(autonomy=Drift()).autonomy == block(autonomy=[Drift()]).autonomy == (Drift(),)
     assert block(sensor=None).sensor == ()
     assert [p.instance_name for p in block(controller=DirectController(), sensor=[NoisyState()]).plugins] == [
-        "Drift", "DirectController", "SingleIntegrator", "NoisyState",
-    ]  # fmt: skip
+        "Drift",
+        "DirectController",
+        "SingleIntegrator",
+        "NoisyState",
+    ]
 
 
 def test_the_networks_to_everyone_and_within_an_entity_are_always_there_once():
@@ -63,9 +82,15 @@ def test_steps_until_the_end(end, steps):
         ({"position": (1, 2)}, r"block 'a': position = \(1, 2\): needed are 3 numbers"),
         ({"position": None}, r"block 'a': position = None: needed are 3 numbers"),
         ({"position": (1, 2, "3 kg")}, r"block 'a': position = '3 kg' is not allowed: .*kg"),
-        ({"position": (1, 2, float("nan"))}, r"block 'a': position = nan is not allowed; it takes a finite number in m"),
+        (
+            {"position": (1, 2, float("nan"))},
+            r"block 'a': position = nan is not allowed; it takes a finite number in m",
+        ),
         ({"velocity": (1, 2)}, r"block 'a': velocity = \(1, 2\): needed are 3 numbers"),
-        ({"variance": (1, -1, 0)}, r"block 'a': variance = \(1.0, -1.0, 0.0\) is not allowed; it takes numbers >= 0"),
+        (
+            {"variance": (1, -1, 0)},
+            r"block 'a': variance = \(1.0, -1.0, 0.0\) is not allowed; it takes numbers >= 0",
+        ),
         ({"half_width": -1}, r"block 'a': half_width"),
         ({"heading": "3 m"}, r"block 'a': heading = '3 m' is not allowed"),
         ({"heading": [1]}, r"block 'a': heading = \[1\] is not allowed"),
@@ -85,18 +110,27 @@ def test_steps_until_the_end(end, steps):
         ({"count": float("nan")}, r"block 'a': count = nan is not allowed; it takes a whole number"),
         ({"count": True}, r"block 'a': count = True is not allowed"),
         ({"team": 1.5}, r"block 'a': team = 1.5 is not allowed; it takes a whole number"),
-        ({"placement": "gauss"}, r"block 'a': placement = 'gauss' is not allowed; there are: normal, uniform"),
+        (
+            {"placement": "gauss"},
+            r"block 'a': placement = 'gauss' is not allowed; there are: normal, uniform",
+        ),
         ({"motion": None}, r"block 'a': motion = None is not a motion model; each block has exactly one"),
         ({"motion": SingleIntegrator}, r"is not a motion model"),
         ({"motion": Drift()}, r"motion = Drift\(\) is not a motion model"),
-        ({"autonomy": Drift}, r"block 'a': autonomy: .* is not a Autonomy \(an instance is needed: write it with parentheses\)"),
+        (
+            {"autonomy": Drift},
+            r"block 'a': autonomy: .* is not a Autonomy \(an instance is needed: write it with parentheses\)",
+        ),
         ({"autonomy": SingleIntegrator()}, r"block 'a': autonomy: SingleIntegrator\(\) is not a Autonomy"),
         ({"controller": "UnicyclePID"}, r"block 'a': controller: 'UnicyclePID' is not a Controller"),
         ({"sensor": Drift()}, r"block 'a': sensor: Drift\(\) is not a Sensor"),
-        ({"autonomy": [Drift(), Drift()]}, r"two plugins are called 'Drift'; give one of them another name with name=\.\.\."),
+        (
+            {"autonomy": [Drift(), Drift()]},
+            r"two plugins are called 'Drift'; give one of them another name with name=\.\.\.",
+        ),
         ({"autonomy": [Drift(name="SingleIntegrator")]}, r"two plugins are called 'SingleIntegrator'"),
     ],
-)  # fmt: skip
+)
 def test_blocks_that_cannot_be(values, message):
     with pytest.raises(MissionError, match=message):
         Block(**{"name": "a", **MOTION, **values})
@@ -113,18 +147,39 @@ def test_blocks_that_cannot_be(values, message):
         ({"dt": "3 m"}, r"mission: dt = '3 m' is not allowed"),
         ({"dt": None}, r"mission: dt = None is not allowed"),
         ({"end": float("inf")}, r"mission: end = inf is not allowed; it takes a finite number in s"),
-        ({"motion_multiplier": 0}, r"mission: motion_multiplier = 0 is not allowed; it takes a whole number >= 1"),
+        (
+            {"motion_multiplier": 0},
+            r"mission: motion_multiplier = 0 is not allowed; it takes a whole number >= 1",
+        ),
         ({"motion_multiplier": 1.5}, r"motion_multiplier = 1.5"),
-        ({"motion_multiplier": "two"}, r"mission: motion_multiplier = 'two' is not allowed; it takes a whole number >= 1"),
+        (
+            {"motion_multiplier": "two"},
+            r"mission: motion_multiplier = 'two' is not allowed; it takes a whole number >= 1",
+        ),
         ({"motion_multiplier": None}, r"mission: motion_multiplier = None is not allowed"),
-        ({"update": "async"}, r"mission: update = 'async' is not allowed; there are: synchronous, sequential"),
-        ({"end_conditions": "time, one_taem"}, r"mission: end condition 'one_taem' is not allowed \(did you mean 'one_team'\?\); there are: time, one_team"),
+        (
+            {"update": "async"},
+            r"mission: update = 'async' is not allowed; there are: synchronous, sequential",
+        ),
+        (
+            {"end_conditions": "time, one_taem"},
+            r"mission: end condition 'one_taem' is not allowed \(did you mean 'one_team'\?\); there are: time, one_team",
+        ),
         ({"end_conditions": 5}, r"mission: end_conditions = 5 is not allowed"),
-        ({"interactions": SimpleCaptureMetrics()}, r"mission: interactions: SimpleCaptureMetrics\(\) is not a Interaction"),
+        (
+            {"interactions": SimpleCaptureMetrics()},
+            r"mission: interactions: SimpleCaptureMetrics\(\) is not a Interaction",
+        ),
         ({"metrics": [SimpleCapture()]}, r"mission: metrics: SimpleCapture\(\) is not a Metric"),
         ({"networks": "GlobalNetwork"}, r"mission: networks: 'GlobalNetwork' is not a Network"),
-        ({"interactions": [SimpleCapture(), SimpleCapture()]}, r"mission: interactions: two plugins are called 'SimpleCapture'"),
-        ({"interactions": SimpleCapture(name="x"), "metrics": SimpleCaptureMetrics(name="x")}, r"two plugins are called 'x'"),
+        (
+            {"interactions": [SimpleCapture(), SimpleCapture()]},
+            r"mission: interactions: two plugins are called 'SimpleCapture'",
+        ),
+        (
+            {"interactions": SimpleCapture(name="x"), "metrics": SimpleCaptureMetrics(name="x")},
+            r"two plugins are called 'x'",
+        ),
         ({"interactions": SimpleCapture(name="a")}, r"mission: 'a' is the name of a block and of a plugin"),
         ({"scene": "flat"}, r"mission: scene = 'flat' is not a Scene"),
     ],

@@ -46,9 +46,11 @@ def hunt(*claimers, prey=(0.0, 0.0, 0.0), speed=0.0, **referee):
         for i, (distance, team, values) in enumerate(claimers)
     ]
     return mission(
-        block("prey", team=1, position=prey, autonomy=Drift(to=(speed, 0, 0))), *hunters,
-        interactions=[SimpleCapture(**referee)], metrics=[SimpleCaptureMetrics(), Credits()],
-    )  # fmt: skip
+        block("prey", team=1, position=prey, autonomy=Drift(to=(speed, 0, 0))),
+        *hunters,
+        interactions=[SimpleCapture(**referee)],
+        metrics=[SimpleCaptureMetrics(), Credits()],
+    )
 
 
 def judged(game, seed=1):
@@ -123,7 +125,9 @@ def test_a_captured_prey_is_not_captured_again():
 
 
 def test_teleport_puts_the_captured_elsewhere_and_it_flies_on_from_there():
-    sim = Simulation(hunt((3.0, 2, {"first": 2, "last": 3}), speed=1.0, effect="teleport", teleport_to=(100.0, 0.0, 0.0)))
+    sim = Simulation(
+        hunt((3.0, 2, {"first": 2, "last": 3}), speed=1.0, effect="teleport", teleport_to=(100.0, 0.0, 0.0))
+    )
     sim.step(3)
     assert sim.read("prey.pos")[0][0, 0].tolist() == [100.0, 0.0, 0.0]
     assert sim.read("prey.SingleIntegrator.x")[0][0, 0, :3].tolist() == [100.0, 0.0, 0.0]
@@ -140,10 +144,14 @@ def test_heal_gives_health():
 
 
 def test_parameters_differ_by_world():
-    sim = Simulation(hunt((3.0, 2, {}), effect="teleport"), seeds=[1, 2, 3], params={
-        "SimpleCapture.capture_range": [5.0, 2.0, 5.0],
-        "SimpleCapture.teleport_to": [(1.0, 2.0, 3.0), (0, 0, 0), (4.0, 5.0, 6.0)],
-    })  # fmt: skip
+    sim = Simulation(
+        hunt((3.0, 2, {}), effect="teleport"),
+        seeds=[1, 2, 3],
+        params={
+            "SimpleCapture.capture_range": [5.0, 2.0, 5.0],
+            "SimpleCapture.teleport_to": [(1.0, 2.0, 3.0), (0, 0, 0), (4.0, 5.0, 6.0)],
+        },
+    )
     sim.run()
     assert sim.read("prey.pos")[0][:, 0].tolist() == [[1.0, 2.0, 3.0], [0.0, 0.0, 0.0], [4.0, 5.0, 6.0]]
 
@@ -164,7 +172,9 @@ def test_counts_are_columns_per_team_and_world():
 
 
 def test_choices_are_told():
-    with pytest.raises(ParameterError, match=r"SimpleCapture.credit = 'twice' is not allowed; it takes one of 'once', 'each'"):
+    with pytest.raises(
+        ParameterError, match=r"SimpleCapture.credit = 'twice' is not allowed; it takes one of 'once', 'each'"
+    ):
         SimpleCapture(credit="twice")
     with pytest.raises(ParameterError, match="one of 'remove', 'teleport', 'heal'"):
         SimpleCapture(effect="explode")

@@ -28,7 +28,10 @@ class Log(Metric):
 def meet(*entities, **referee):
     """Entities of (x, speed in x, team)."""
     referee.setdefault("startup_collision_range", 0.0)
-    blocks = [block(f"e{i}", team=team, position=(x, 0, 0), autonomy=Drift(to=(v, 0, 0))) for i, (x, v, team) in enumerate(entities)]
+    blocks = [
+        block(f"e{i}", team=team, position=(x, 0, 0), autonomy=Drift(to=(v, 0, 0)))
+        for i, (x, v, team) in enumerate(entities)
+    ]
     return mission(*blocks, interactions=[SimpleCollision(**referee)], metrics=[Log()], end_conditions="time")
 
 
@@ -54,7 +57,7 @@ def test_the_range_is_strict():
 
 
 def test_all_pairs_of_a_cluster_count():
-    alive, sim = left(meet((0.0, 0.0, 1), (1.5, 0.0, 2), (3.0, 0.0, 3), (9.0, 0.0, 4)))
+    alive, _ = left(meet((0.0, 0.0, 1), (1.5, 0.0, 2), (3.0, 0.0, 3), (9.0, 0.0, 4)))
     assert alive == [False, False, False, True]
 
 
@@ -77,7 +80,14 @@ def test_those_that_overlap_at_the_start_are_gone_before_the_first_step():
 
 def test_room_in_height_alone():
     crowd = block("a", count=6, placement="uniform", half_width=(0, 0, 30))
-    deep = Simulation(mission(crowd, interactions=[SimpleCollision(init_alt_deconflict=True, startup_collision_range=3.0, collision_range=0.0)]))
+    deep = Simulation(
+        mission(
+            crowd,
+            interactions=[
+                SimpleCollision(init_alt_deconflict=True, startup_collision_range=3.0, collision_range=0.0)
+            ],
+        )
+    )
     z = np.sort(deep.read("a.pos")[0][0, :, 2])
     assert np.diff(z).min() >= 3.0
 
@@ -109,8 +119,9 @@ def test_crossings_are_told_once_with_direction(region, out, into):
     game = mission(
         block("a", autonomy=Drift(to=(3.0, 0, 0))),  # from 0 to 3: out at 1
         block("b", position=(3.0, 0, 0), autonomy=Drift(to=(-2.6, 0, 0))),  # from 3 to 0.4: in at 1
-        interactions=[Boundary(boundary_id=5, **region)], metrics=[Fence()],
-    )  # fmt: skip
+        interactions=[Boundary(boundary_id=5, **region)],
+        metrics=[Fence()],
+    )
     sim = Simulation(game, seeds=[1, 2])
     sim.run()
     assert sim.read("Fence.went_out")[0].tolist() == [out, out]
@@ -120,7 +131,11 @@ def test_crossings_are_told_once_with_direction(region, out, into):
 
 def test_rotation_of_a_cuboid_counts():
     def crossings(**values):
-        game = mission(block(autonomy=Drift(to=(3.0, 0, 0))), interactions=[Boundary(lengths=(2.0, 20.0, 2.0), **values)], metrics=[Fence()])
+        game = mission(
+            block(autonomy=Drift(to=(3.0, 0, 0))),
+            interactions=[Boundary(lengths=(2.0, 20.0, 2.0), **values)],
+            metrics=[Fence()],
+        )
         sim = Simulation(game)
         sim.run()
         return int(sim.read("Fence.went_out")[0][0])
@@ -160,4 +175,11 @@ def test_the_region_answers_by_service():
             self.inside[:] = w.call("is_inside", w.pos)
             assert self.inside.tolist() == [True, False]
 
-    Simulation(mission(block(autonomy=Drift(to=(0, 0, 0))), block("b", position=(9, 0, 0)), interactions=[Boundary()], metrics=[Asks()])).run()
+    Simulation(
+        mission(
+            block(autonomy=Drift(to=(0, 0, 0))),
+            block("b", position=(9, 0, 0)),
+            interactions=[Boundary()],
+            metrics=[Asks()],
+        )
+    ).run()

@@ -11,8 +11,16 @@ from tussle.api import Autonomy, Behavior, Interaction, Param, Publish
 from tussle.errors import PluginError
 from tussle.messages import Waypoint
 from tussle.stock import (
-    AvoidEntityMS, Boundary, LocalNetwork, MotorSchemas, MoveToGoalMS, NoisyState, Straight, Unicycle, UnicyclePID,
-)  # fmt: skip
+    AvoidEntityMS,
+    Boundary,
+    LocalNetwork,
+    MotorSchemas,
+    MoveToGoalMS,
+    NoisyState,
+    Straight,
+    Unicycle,
+    UnicyclePID,
+)
 
 
 def wants(sim, name="Straight", agent=0):
@@ -21,8 +29,15 @@ def wants(sim, name="Straight", agent=0):
 
 
 def straight(sensor=(), **values):
-    return block(position=(10, 20, 30), heading="30 deg", climb="40 deg", autonomy=Straight(**values), controller=UnicyclePID(),
-                 motion=Unicycle(vel_max=50.0), sensor=sensor)  # fmt: skip
+    return block(
+        position=(10, 20, 30),
+        heading="30 deg",
+        climb="40 deg",
+        autonomy=Straight(**values),
+        controller=UnicyclePID(),
+        motion=Unicycle(vel_max=50.0),
+        sensor=sensor,
+    )
 
 
 def test_straight_holds_heading_altitude_and_speed():
@@ -30,7 +45,9 @@ def test_straight_holds_heading_altitude_and_speed():
     sim.step()
     # 1000 km ahead along the body x axis, at the height of the start.
     assert wants(sim) == pytest.approx([np.pi / 6, 30.0, 15.0])
-    goal = np.array([10 + 1e6 * np.cos(np.radians(40)) * np.cos(np.pi / 6), 20 + 1e6 * np.cos(np.radians(40)) * 0.5, 30.0])
+    goal = np.array(
+        [10 + 1e6 * np.cos(np.radians(40)) * np.cos(np.pi / 6), 20 + 1e6 * np.cos(np.radians(40)) * 0.5, 30.0]
+    )
     assert sim.read("a.Straight.goal")[0][0, 0] == pytest.approx(goal)
 
 
@@ -43,7 +60,9 @@ def test_straight_flies_by_its_belief():
 
 def test_straight_turns_back_at_a_boundary_and_keeps_its_height():
     fence = Boundary(lengths=(100.0, 100.0, 1000.0), center=(10.0, 0.0, 0.0))
-    sim = Simulation(mission(straight(enable_boundary_control=True, speed=20.0), interactions=[fence], end=9.0))
+    sim = Simulation(
+        mission(straight(enable_boundary_control=True, speed=20.0), interactions=[fence], end=9.0)
+    )
     sim.step(2)
     assert wants(sim)[0] == pytest.approx(np.pi / 6, abs=1e-6)
     sim.write("a.pos", (50.0, 60.0, 77.0))
@@ -58,13 +77,29 @@ def test_straight_turns_back_at_a_boundary_and_keeps_its_height():
 
 
 def test_straight_asks_for_company_every_two_seconds():
-    child = block("gen_straight", count=0, autonomy=Straight(speed=0.0), controller=UnicyclePID(), motion=Unicycle(vel_max=50.0))
-    parent = block(heading=0.0, autonomy=Straight(generate_entities=True, speed=10.0), controller=UnicyclePID(), motion=Unicycle(vel_max=50.0), speed=10.0)
+    child = block(
+        "gen_straight",
+        count=0,
+        autonomy=Straight(speed=0.0),
+        controller=UnicyclePID(),
+        motion=Unicycle(vel_max=50.0),
+    )
+    parent = block(
+        heading=0.0,
+        autonomy=Straight(generate_entities=True, speed=10.0),
+        controller=UnicyclePID(),
+        motion=Unicycle(vel_max=50.0),
+        speed=10.0,
+    )
     sim = Simulation(mission(parent, child, end=5.0))
     sim.step(21)
     assert sim.read("gen_straight.pos")[1].sum() == 0
     born = []
-    sim.observers.append(lambda s: born.append((s.read("gen_straight.pos")[0][0].tolist(), s.read("gen_straight.yaw")[0][0].tolist())))
+    sim.observers.append(
+        lambda s: born.append(
+            (s.read("gen_straight.pos")[0][0].tolist(), s.read("gen_straight.yaw")[0][0].tolist())
+        )
+    )
     sim.step()
     assert born[0][0][0] == pytest.approx([20.0, 10.0, 0.0], abs=0.05)
     assert born[0][1][0] == pytest.approx(np.pi / 2)
@@ -73,7 +108,9 @@ def test_straight_asks_for_company_every_two_seconds():
 
 
 def test_straight_with_a_template_that_is_not_there():
-    parent = block(autonomy=Straight(generate_entities=True), controller=UnicyclePID(), motion=Unicycle(vel_max=50.0))
+    parent = block(
+        autonomy=Straight(generate_entities=True), controller=UnicyclePID(), motion=Unicycle(vel_max=50.0)
+    )
     with pytest.raises(PluginError, match=r"there is no block 'gen_straight'; there are: a"):
         Simulation(mission(parent, end=5.0)).run()
 
@@ -87,8 +124,13 @@ class Wish(Behavior):
 
 def schemas(*behaviors, **values):
     values.setdefault("max_speed", 10.0)
-    return block(position=(0, 0, 100), autonomy=MotorSchemas(behaviors=behaviors, **values), controller=UnicyclePID(),
-                 motion=Unicycle(vel_max=50.0), heading="90 deg")  # fmt: skip
+    return block(
+        position=(0, 0, 100),
+        autonomy=MotorSchemas(behaviors=behaviors, **values),
+        controller=UnicyclePID(),
+        motion=Unicycle(vel_max=50.0),
+        heading="90 deg",
+    )
 
 
 def wished(*behaviors, **values):
@@ -102,7 +144,10 @@ def wished(*behaviors, **values):
     [
         ([Wish(to=(3, 4, 0))], (3, 4, 0)),
         ([Wish(to=(30, 40, 0))], (6, 8, 0)),  # shortened to 10 m/s
-        ([Wish(to=(4, 0, 0)), Wish(to=(0, 8, 2), gain=3.0, name="B")], (1, 6, 1.5)),  # (4 + 0, 0 + 24, 0 + 6) / 4
+        (
+            [Wish(to=(4, 0, 0)), Wish(to=(0, 8, 2), gain=3.0, name="B")],
+            (1, 6, 1.5),
+        ),  # (4 + 0, 0 + 24, 0 + 6) / 4
         ([Wish(to=(4, 0, 0)), Wish(gain=9.0, name="B")], (4, 0, 0)),  # who wishes nothing dilutes nothing
         ([Wish(to=(40, 0, 0)), Wish(to=(0, 2, 0), name="B")], (5, 1, 0)),  # shortened before the mean
         ([Wish()], (0, 10, 0)),  # no wish: on at full speed
@@ -116,7 +161,9 @@ def test_motor_schemas_take_the_mean_by_gain_of_those_that_wish(behaviors, veloc
 
 def test_motor_schemas_write_a_velocity_if_asked():
     def fly(**values):
-        flier = block(autonomy=MotorSchemas(behaviors=[Wish(to=(1.0, 2.0, -3.0))], pub_vel_vec=True, **values))
+        flier = block(
+            autonomy=MotorSchemas(behaviors=[Wish(to=(1.0, 2.0, -3.0))], pub_vel_vec=True, **values)
+        )
         sim = Simulation(mission(flier))
         sim.run()
         return sim.read("a.pos")[0][0, 0].tolist()
@@ -129,8 +176,13 @@ def test_motor_schemas_write_a_velocity_if_asked():
 def avoiding(*others, **values):
     values.setdefault("sphere_of_influence", 10.0)
     values.setdefault("minimum_range", 4.0)
-    me = block(autonomy=MotorSchemas(behaviors=[AvoidEntityMS(**values)], max_speed=6.0, pub_vel_vec=True), team=1)
-    there = [block(f"o{i}", team=team, position=pos, autonomy=Drift(to=(0, 0, 0))) for i, (pos, team) in enumerate(others)]
+    me = block(
+        autonomy=MotorSchemas(behaviors=[AvoidEntityMS(**values)], max_speed=6.0, pub_vel_vec=True), team=1
+    )
+    there = [
+        block(f"o{i}", team=team, position=pos, autonomy=Drift(to=(0, 0, 0)))
+        for i, (pos, team) in enumerate(others)
+    ]
     sim = Simulation(mission(me, *there))
     sim.step()
     return sim.read("a.MotorSchemas.AvoidEntityMS.wish")[0][0, 0].tolist()
@@ -157,7 +209,10 @@ def test_others_are_avoided_if_asked_and_the_one_at_the_same_place_never():
 
 
 def going(steps=1, **values):
-    mover = block(autonomy=MotorSchemas(behaviors=[MoveToGoalMS(**values)], max_speed=1e6, pub_vel_vec=True), heading="90 deg")
+    mover = block(
+        autonomy=MotorSchemas(behaviors=[MoveToGoalMS(**values)], max_speed=1e6, pub_vel_vec=True),
+        heading="90 deg",
+    )
     sim = Simulation(mission(mover, end=5.0))
     sim.step(steps)
     return sim, sim.read("a.MotorSchemas.MoveToGoalMS.wish")[0][0, 0].tolist()
@@ -197,12 +252,17 @@ class Guide(Autonomy):
 
 
 def test_a_waypoint_replaces_the_goal_of_the_entity_it_is_for():
-    mover = MotorSchemas(behaviors=[MoveToGoalMS(goal=(100.0, 0, 0), network_name="LocalNetwork")], pub_vel_vec=True)
+    mover = MotorSchemas(
+        behaviors=[MoveToGoalMS(goal=(100.0, 0, 0), network_name="LocalNetwork")], pub_vel_vec=True
+    )
     sim = Simulation(mission(block(count=2, autonomy=[mover, Guide()]), networks=[LocalNetwork()]))
     sim.step(3)
     assert sim.read("a.MotorSchemas.MoveToGoalMS.target")[0][0].tolist() == [[100.0, 0.0, 0.0]] * 2
     sim.step()
-    assert sim.read("a.MotorSchemas.MoveToGoalMS.target")[0][0].tolist() == [[0.0, 8.0, 0.0], [0.0, 16.0, 0.0]]
+    assert sim.read("a.MotorSchemas.MoveToGoalMS.target")[0][0].tolist() == [
+        [0.0, 8.0, 0.0],
+        [0.0, 16.0, 0.0],
+    ]
 
 
 def test_a_waypoint_of_the_world_is_heard_by_all():
