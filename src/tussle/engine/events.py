@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tussle.messages import EntityCaptured, EntityCollided
+from tussle.messages import EntityCaptured, EntityCollided, EntityHitGround, Message
 from tussle.record import Happenings
 from tussle.record.happenings import BIRTH, CAPTURE, COLLISION, DEATH, END
 
@@ -15,8 +15,12 @@ if TYPE_CHECKING:
     from tussle.engine.births import Newborn
     from tussle.engine.simulation import Simulation
 
-TOLD = {EntityCaptured: (CAPTURE, "source", "target"), EntityCollided: (COLLISION, "first", "second")}
-"""Message types that are told of: kind, and the fields that are its id and other."""
+TOLD: dict[type[Message], tuple[str, str, str, str]] = {
+    EntityCaptured: (CAPTURE, "source", "target", ""),
+    EntityCollided: (COLLISION, "first", "second", ""),
+    EntityHitGround: (COLLISION, "entity", "", "ground"),
+}
+"""Message types that are told of: kind, the fields that are its id and other ("" for nobody), and its text."""
 
 
 class Herald:
@@ -66,17 +70,27 @@ class Herald:
 
     def messages(self) -> None:
         """Captures and collisions of this step, which lie in the outboxes."""
-        self._by.clear()
-        step = self._sim.context.clock.step
-        for type_, (kind, first, second) in TOLD.items():
-            batch = self._sim.world_view.inbox(type_)
-            if batch.n:
-                one, two = batch.data[first], batch.data[second]
-                self._tell(kind, batch.world, step[batch.world], one, two, [""] * batch.n)
-                for world, a, b in zip(batch.world.tolist(), one.tolist(), two.tolist(), strict=True):
-                    self._by.setdefault((world, b), a)
-                    if kind == COLLISION:
-                        self._by.setdefault((world, a), b)
+        if self._by:
+            self._by.clear()
+        by_type = self._sim.world_view.by_type
+        for type_ in TOLD:
+            for topic in by_type.get(type_, ()):
+                if topic.sent:
+                    self._tell_messages(type_)
+                    break
+
+    def _tell_messages(self, type_: type[Message]) -> None:
+        kind, first, second, text = TOLD[type_]
+        batch = self._sim.world_view.inbox(type_)
+        one = batch.data[first]
+        two = batch.data[second] if second else np.zeros_like(one)
+        self._tell(kind, batch.world, self._sim.context.clock.step[batch.world], one, two, [text] * batch.n)
+        if not second:
+            return
+        for world, a, b in zip(batch.world.tolist(), one.tolist(), two.tolist(), strict=True):
+            self._by.setdefault((world, b), a)
+            if kind == COLLISION:
+                self._by.setdefault((world, a), b)
 
     def deaths(self, deaths: list[tuple[np.ndarray, str]], step: np.ndarray) -> None:
         """Rows of the body table are about to go; the first reason counts.

@@ -24,7 +24,7 @@ class Happenings:
         step: Step in which it happened, (m,): that of the trajectory row before it; for births and ends that of the row with it.
         id: Who was born, died, captured, or has the smaller id of two that met; 0 for ends, (m,).
         other: Who was captured; who captured the dead or met it; the larger id of two that met; 0 for nobody, (m,).
-        text: Block of the born; why one died; why a world ended, (m,).
+        text: Block of the born; "ground" where one met that; why one died; why a world ended, (m,).
     """
 
     kind: str

@@ -1,0 +1,65 @@
+"""What recording every step of the 500 s game costs: the same games with and without it, in turn.
+
+    python benchmarks/logging_cost.py [--sizes 1 8] [--repeats 5] [--json FILE]
+
+Sizes are worlds in the stack. A game counts from its first step to its last, with opening and closing of the run directory, which lies in
+the folder for temporary files; `cost` is the time that recording adds, in CPU and in wall time, as part of that without it.
+"""
+
+from __future__ import annotations
+
+import statistics
+import tempfile
+import time
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import game
+import measuring
+
+from tussle import Recorder, Simulation
+
+SIZES = (1, 8)
+
+
+def play(n_worlds: int, seed: int, folder: str | None, period: float | None = None) -> tuple[float, float]:
+    """CPU and wall seconds of one stack of games, recorded into a folder or not at all."""
+    sim = Simulation(game.mission(), seeds=range(seed, seed + n_worlds))
+    with ExitStack() as stack:
+        cpu, wall = time.process_time(), time.perf_counter()
+        if folder is not None:
+            stack.enter_context(Recorder(sim, folder, period=period))
+        sim.run()
+        stack.close()
+        return time.process_time() - cpu, time.perf_counter() - wall
+
+
+def measure(n_worlds: int, repeats: int, period: float | None) -> dict[str, Any]:
+    """Medians over pairs of games with the same seeds, one after the other."""
+    cpu, wall, mega = [], [], 0.0
+    for i in range(repeats + 1):
+        seed = 1 + i * n_worlds
+        with tempfile.TemporaryDirectory() as folder:
+            plain = play(n_worlds, seed, None)
+            recorded = play(n_worlds, seed, f"{folder}/run", period)
+            mega = sum(f.stat().st_size for f in Path(folder).rglob("*") if f.is_file()) / 1e6
+        if i:  # the first pair warms up
+            cpu.append((plain[0], recorded[0]))
+            wall.append((plain[1], recorded[1]))
+    row: dict[str, Any] = {"n": n_worlds, "period_s": period or 0.1, "MB": mega}
+    for name, pairs in (("cpu", cpu), ("wall", wall)):
+        row[f"{name}_s"] = statistics.median(p for p, _ in pairs)
+        row[f"{name}_s_recorded"] = statistics.median(r for _, r in pairs)
+        row[f"{name}_cost"] = statistics.median(r / p - 1.0 for p, r in pairs)
+    return row
+
+
+def main() -> None:
+    args = measuring.arguments(__doc__.splitlines()[0], SIZES)
+    rows = [measure(n, args.repeats, period) for n in args.sizes for period in (None, 1.0)]
+    measuring.report("The 500 s game without and with recording, by worlds in the stack (n)", rows, args.json)
+
+
+if __name__ == "__main__":
+    main()
