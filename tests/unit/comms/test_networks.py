@@ -22,7 +22,6 @@ from tussle.api import (
     EVERYONE,
     Autonomy,
     Interaction,
-    Metric,
     Network,
     Param,
     Publish,
@@ -31,7 +30,7 @@ from tussle.api import (
     service,
 )
 from tussle.errors import MissionError, ParameterError, PluginError, TussleError, WiringError
-from tussle.stock import GlobalNetwork, LocalNetwork, SimpleCollision, SphereNetwork
+from tussle.stock import GlobalNetwork, LocalNetwork, SphereNetwork
 
 
 def still(name, *autonomies, **values):
@@ -188,24 +187,6 @@ def test_world_plugins_read_in_the_same_step_the_last_one_included():
 
 def test_what_only_the_world_says_is_counted_once():
     """No plugin of any entity has a topic here; the first one appears when the world speaks."""
-
-    class Meetings(Metric):
-        n = State(dtype=int, per="world")
-
-        def step(self, w):
-            from tussle.messages import EntityCollided
-
-            np.add.at(self.n, w.inbox(EntityCollided).world, 1)
-
-        def result(self, w):
-            return {"n": self.n}
-
-    game = mission(
-        block("a", count=2, health=1.0),
-        interactions=[SimpleCollision(startup_collision_range=0.0)],
-        metrics=[Meetings()],
-    )
-    assert alone(game, 1).result()[0].metrics["Meetings"]["n"] <= 1
 
     class Herald(Interaction):
         def step(self, w):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import traceback
+
 import numpy as np
 import pytest
 from small_worlds import Drift, Listener, NoteMetric, Talker, Wander, block, mission
@@ -21,7 +23,7 @@ from tussle.api import (
     Sensor,
     State,
 )
-from tussle.errors import MissionError, ParameterError, PluginError
+from tussle.errors import DeclarationError, MissionError, ParameterError, PluginError
 from tussle.messages import CaptureEntity
 
 NEVER = 10**9
@@ -487,15 +489,32 @@ def test_easy_mode_says_what_is_wrong(step, message):
 
 def test_plugins_without_their_method_say_so():
     class Easy(EasyAutonomy):
-        pass
+        def stepone(self, me):
+            pass
 
     class Plain(Autonomy):
         pass
 
-    with pytest.raises(PluginError, match="Easy has no step_one"):
-        Simulation(mission(block(autonomy=[Drift(), Easy()]))).step()
-    with pytest.raises(PluginError, match="Plain has no step"):
-        Simulation(mission(block(autonomy=[Drift(), Plain()]))).step()
+    with pytest.raises(
+        DeclarationError, match=r"block 'a': Easy: Easy has no method 'step_one' \(did you mean 'stepone'\?\)"
+    ):
+        Simulation(mission(block(autonomy=[Drift(), Easy()])))
+    with pytest.raises(DeclarationError, match="Plain has no method 'step'"):
+        Simulation(mission(block(autonomy=[Drift(), Plain()])))
+
+
+def test_a_failure_shows_the_plugins_lines_and_not_the_way_through_the_engine():
+    class Careless(EasyAutonomy):
+        def step_one(self, me):
+            return 1.0 / 0.0
+
+    with pytest.raises(PluginError, match="ZeroDivisionError") as caught:
+        Simulation(mission(block(autonomy=[Drift(), Careless()]))).step(3)
+    lines = "".join(traceback.format_exception(caught.value))
+    assert "return 1.0 / 0.0" in lines
+    assert "schedule.py" not in lines
+    assert "easy.py" not in lines
+    assert "During handling" not in lines
 
 
 def test_a_model_without_to_body_says_so():
@@ -510,7 +529,7 @@ def test_a_model_without_to_body_says_so():
         def from_body(self, body, rows):
             pass
 
-    with pytest.raises(PluginError, match="Half has no to_body"):
+    with pytest.raises(DeclarationError, match="Half has no method 'to_body'"):
         Simulation(mission(block(motion=Half()))).step()
 
 

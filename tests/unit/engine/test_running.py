@@ -336,15 +336,6 @@ def test_pause_holds_run_in_its_thread_and_changes_nothing():
     assert sim.state_hash() == alone(game, 7).state_hash()
 
 
-def test_threads_change_no_bit():
-    game = mission(block(autonomy=Wander(), count=50, variance=(9, 9, 9)), sensor_block(), end=0.5)
-    assert hashes(game, [1, 2], threads=3) == hashes(game, [1, 2])
-
-
-def sensor_block():
-    return block("eyes", count=20, variance=(9, 9, 9), sensor=NoisyContacts())
-
-
 # -- reset ------------------------------------------------------------------------------------------------------------------------
 
 
