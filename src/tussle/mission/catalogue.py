@@ -1,0 +1,133 @@
+"""Plugins by name: those that ship, those of installed packages, and those of files that were named."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import sys
+import tomllib
+import traceback
+from collections.abc import Iterable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from tussle import stock
+from tussle.api import Autonomy, Behavior, Controller, Interaction, Metric, MotionModel, Network, Sensor
+from tussle.api.plugin import Plugin
+from tussle.errors import MissionError, listed, nearest_name
+
+KINDS: dict[str, type] = {
+    "autonomy": Autonomy,
+    "controller": Controller,
+    "motion_model": MotionModel,
+    "sensor": Sensor,
+    "entity_interaction": Interaction,
+    "metrics": Metric,
+    "network": Network,
+    "behaviors": Behavior,
+}
+"""What each tag names."""
+
+
+@cache
+def historic() -> dict[str, Any]:
+    """What is known of the existing system's plugins."""
+    return tomllib.loads((Path(__file__).parent / "historic.toml").read_text(encoding="utf-8"))
+
+
+def historic_names() -> set[str]:
+    """Names of all plugins of the existing system."""
+    return {name for names in historic()["plugins"].values() for name in names}
+
+
+class AbsentPluginError(MissionError):
+    """A plugin of the existing system that tussle does not have yet."""
+
+
+class Catalogue:
+    """Finds plugin classes by name.
+
+    Args:
+        plugin_files: Python files whose plugins can be named too; they win over others of the same name.
+
+    Raises:
+        MissionError: A file cannot be imported, or holds no plugin.
+    """
+
+    def __init__(self, plugin_files: Iterable[str | Path] = ()) -> None:
+        self.own: dict[str, type[Plugin]] = {}
+        for path in plugin_files:
+            self.own.update(load_plugin_file(path))
+
+    def names(self) -> list[str]:
+        """All that can be named."""
+        return sorted({*self.own, *stock.manifest(), *stock.others()})
+
+    def load(self, name: str) -> type[Plugin]:
+        """The class of this name.
+
+        Raises:
+            AbsentPluginError: The existing system has it, tussle not yet.
+            MissionError: There is none, or its module cannot be imported.
+        """
+        if name in self.own:
+            return self.own[name]
+        known = self.names()
+        if name not in known:
+            if name in historic_names():
+                raise AbsentPluginError(f"{name} is not in tussle yet")
+            raise MissionError(
+                f"there is no plugin {name[:80]!r}{nearest_name(name[:80], known)}; {listed(known)}"
+            )
+        try:
+            found = stock.load(name)
+        except Exception as error:
+            raise MissionError(
+                f"plugin {name!r} cannot be imported: {type(error).__name__}: {error}"
+            ) from error
+        if not (isinstance(found, type) and issubclass(found, Plugin)):
+            raise MissionError(f"plugin {name!r} is {found!r}, which is no plugin class")
+        return found
+
+
+def load_plugin_file(path: str | Path) -> dict[str, type[Plugin]]:
+    """The plugins that a Python file defines, by the names of their classes. The file is run, as an import does.
+
+    Raises:
+        MissionError: It cannot be read or imported, or defines no plugin; the message has the file's own line.
+    """
+    file = Path(path).expanduser()
+    if not file.is_file():
+        raise MissionError(f"{path}: there is no such plugin file")
+    # Under a name of its own, so that plugins of two files called alike pickle, and the same file is the same module.
+    digest = hashlib.blake2b(str(file.resolve()).encode(), digest_size=4).hexdigest()
+    name = f"tussle_plugin_file_{digest}_{file.stem if file.stem.isidentifier() else 'plugin'}"
+    spec = importlib.util.spec_from_file_location(name, file.resolve())
+    if spec is None or spec.loader is None:
+        raise MissionError(f"{path}: this is not a Python file (its name ends with .py)")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    try:
+        spec.loader.exec_module(module)
+    except (Exception, SystemExit) as error:
+        sys.modules.pop(name, None)
+        raise MissionError(
+            f"{_line(error, file)}: it cannot be imported: {type(error).__name__}: {error}"
+        ) from error
+    found = {
+        key: value
+        for key, value in vars(module).items()
+        if isinstance(value, type) and issubclass(value, Plugin) and value.__module__ == name
+    }
+    if not found:
+        raise MissionError(f"{path}: it defines no plugin (a class derived from Autonomy, MotionModel, ...)")
+    return found
+
+
+def _line(error: BaseException, file: Path) -> str:
+    """The last line of the file that the error passed through."""
+    if isinstance(error, SyntaxError) and error.lineno:
+        return f"{error.filename or file}:{error.lineno}"
+    own = [f for f in traceback.extract_tb(error.__traceback__) if Path(f.filename) == file.resolve()]
+    return f"{file}:{own[-1].lineno}" if own else str(file)

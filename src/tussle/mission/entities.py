@@ -1,0 +1,298 @@
+"""Entities' tags: what they take from <entity_common>, and a block of each."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from tussle.errors import MissionError, TussleError, listed, nearest_name
+from tussle.mission import codecs
+from tussle.mission.node import Node
+from tussle.mission.plugin_tags import PluginReader, Written
+from tussle.mission.problems import Place, Problems, shown
+from tussle.mission.spec import PLACEMENTS, Block
+from tussle.mission.tags import BASE, ENTITY, ENTITY_ATTRIBUTES, MANY, Known
+from tussle.scene import Base, Origin
+
+MOST_TEAM = 2**31 - 1
+
+
+def expanded(root: Node, problems: Problems) -> None:
+    """Give each <entity> of a mission the tags of its <entity_common>, which then goes away."""
+    shared: dict[str, Node] = {}
+    for node in root.find_all("entity_common"):
+        name = node.attributes.get("name", "")
+        if not name:
+            problems.error(node.place, "entity_common has no name, by which entities take it")
+        shared[name] = node
+    for node in root.find_all("entity"):
+        wanted = node.attributes.pop("entity_common", None)
+        if wanted is None:
+            continue
+        if wanted not in shared:
+            text = f"there is no entity_common {shown(wanted)}{nearest_name(wanted[:80], shared)}; {listed(shared)}"
+            problems.error(node.where("entity_common"), text)
+            continue
+        node.children = _merged(shared[wanted].children, node.children)
+    root.children = [child for child in root.children if child.tag != "entity_common"]
+
+
+def _merged(common: Iterable[Node], own: list[Node]) -> list[Node]:
+    """The shared tags but for those that the entity has itself, then its own; plugins of both act, the shared ones first."""
+    taken = []
+    for node in common:
+        same = [n for n in own if n.tag == node.tag]
+        if node.tag == "name" or (same and node.tag not in MANY):
+            for mine in same:
+                if mine.text == node.text:
+                    mine.attributes = {**node.attributes, **mine.attributes}
+            continue
+        taken.append(node.copied())
+    return [*taken, *own]
+
+
+def block_names(nodes: Iterable[Node]) -> list[str]:
+    """Name of each entity's block: its tag, else its name, else "team_ID"; a second one of a name is "NAME_2"."""
+    taken: set[str] = set()
+    names = []
+    for node in nodes:
+        texts = {child.tag: child.text for child in node.children}
+        wanted = node.attributes.get("tag") or texts.get("name") or f"team_{texts.get('team_id') or 0}"
+        wanted = "_".join(wanted.replace(".", "_").split())[:80] or "entity"
+        name, n = wanted, 2
+        while name in taken:
+            name, n = f"{wanted}_{n}", n + 1
+        taken.add(name)
+        names.append(name)
+    return names
+
+
+@dataclass
+class Fields:
+    """The tags in a tag that hold one value each, read on demand; what is wrong goes to the problems.
+
+    Attributes:
+        node: The tag.
+        known: What may be in it.
+        problems: Receives what is wrong.
+        found: The last tag of each name.
+    """
+
+    node: Node
+    known: Mapping[str, Known]
+    problems: Problems
+    found: dict[str, Node] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.node.text and self.node.children:
+            self.problems.note(
+                self.node.place,
+                f"text between the tags of <{self.node.tag}> is ignored: {shown(self.node.text)}",
+            )
+        for child in self.node.children:
+            if child.tag not in self.known:
+                self.problems.unknown(child.place, f"tag in <{self.node.tag}>", child.tag, self.known)
+            elif child.tag in self.found and child.tag not in MANY:
+                self.problems.note(
+                    child.place, f"<{child.tag}> stands here for the second time; the last one counts"
+                )
+            self.found[child.tag] = child
+
+    def has(self, *names: str) -> bool:
+        return all(name in self.found for name in names)
+
+    def place(self, name: str) -> Place:
+        return self.found[name].place if name in self.found else self.node.place
+
+    def read(self, name: str, codec: Callable[[str], Any]) -> Any:
+        """Value of a tag, or its default where it is absent or wrong."""
+        if name in self.found:
+            try:
+                return codec(self.found[name].text)
+            except MissionError as error:
+                self.problems.error(self.found[name].place, f"{name}: {error}")
+        default = self.known[name].default
+        return codec(default) if default and default != "none" else None
+
+    def number(self, name: str, unit: str = "") -> float:
+        """A number in SI units; a bare one is in the tag's unit."""
+        text_unit = self.known[name].unit
+        value: float = self.read(name, lambda text: codecs.number(text, unit or text_unit, text_unit))
+        return value
+
+    def vector(self, *names: str) -> tuple[float, ...]:
+        return tuple(self.number(name) for name in names)
+
+    def position(self, origin: Origin) -> tuple[float, ...]:
+        """x, y, z, or what latitude, longitude and altitude say where all three are given."""
+        geodetic = ("latitude", "longitude", "altitude")
+        given = [name for name in geodetic if self.has(name)]
+        if len(given) == len(geodetic):
+            angles = [self.number(name, "rad") for name in geodetic[:2]]
+            if max(abs(a) for a in angles) <= 2.0 * math.pi:
+                return tuple(
+                    float(v) for v in origin.from_geodetic(np.array([*angles, self.number("altitude")]))
+                )
+            self.problems.error(
+                self.place("latitude"), "latitude and longitude are out of range; they take degrees"
+            )
+        for name in given:
+            others = ", ".join(geodetic)
+            self.problems.note(
+                self.place(name), f"<{name}> counts for nothing without the others of {others}; x, y, z hold"
+            )
+        return self.vector("x", "y", "z")
+
+
+@dataclass
+class EntityReader:
+    """Makes the blocks and bases of a mission.
+
+    Attributes:
+        plugins: Makes the plugins.
+        problems: Receives what is wrong.
+        origin: Where the mission lies.
+        most_rows: Entities that there may be.
+        rows: Entities so far.
+        bases: Homes of the teams so far.
+        drawn: Block name -> settings kept for the viewer.
+        places: Block name -> its place.
+    """
+
+    plugins: PluginReader
+    problems: Problems
+    origin: Origin
+    most_rows: int
+    rows: int = 0
+    bases: list[Base] = field(default_factory=list)
+    drawn: dict[str, dict[str, str]] = field(default_factory=dict)
+    places: dict[str, Place] = field(default_factory=dict)
+
+    def block(self, node: Node, name: str) -> Block | None:
+        """The block of one <entity>; None where it is wrong, and the problems say why."""
+        for attribute in node.attributes:
+            if attribute not in ENTITY_ATTRIBUTES:
+                self.problems.unknown(
+                    node.where(attribute), "attribute of <entity>", attribute, ENTITY_ATTRIBUTES
+                )
+        fields = Fields(node, ENTITY, self.problems)
+        self.places[name] = node.place
+        self._remarks(fields)
+        team = fields.read("team_id", lambda text: codecs.whole(text, -MOST_TEAM, MOST_TEAM))
+        values: dict[str, Any] = {"name": name, "team": team, "count": self._count(fields)}
+        values |= self._body(fields) | self._births(fields)
+        taken: set[str] = set()
+        for kind in ("autonomy", "controller", "sensor"):
+            values[kind] = self.plugins.many(node.find_all(kind), taken)
+        values["motion"] = self._motion(fields, taken)
+        for base in node.find_all("base"):
+            self._base(base, team)
+        drawn = {
+            key: fields.found[key].text for key, known in ENTITY.items() if known.kept_for and fields.has(key)
+        }
+        if drawn:
+            self.drawn[name] = drawn
+        if values["motion"] is None:
+            return None
+        try:
+            return Block(**values)
+        except TussleError as error:
+            self.problems.error(node.place, str(error))
+            return None
+
+    def _remarks(self, fields: Fields) -> None:
+        """Say what the format has and tussle does otherwise."""
+        if not fields.has("team_id"):
+            self.problems.note(fields.node.place, "the entity has no <team_id>; it is of team 0")
+        if fields.has("id"):
+            self.problems.note(
+                fields.place("id"), "<id> is ignored: ids count up from 1 in the order of the file"
+            )
+        if fields.has("script_name"):
+            self.problems.note(
+                fields.place("script_name"), "<script_name> is ignored: it belongs to JSBSim models"
+            )
+        if fields.has("connect_entity") and fields.found["connect_entity"].text.lower() in codecs.FALSE:
+            self.problems.note(
+                fields.place("connect_entity"), "<connect_entity> is ignored: wires are always checked"
+            )
+        for tag, node in fields.found.items():
+            if tag in ENTITY and tag not in MANY and tag != "motion_model":
+                for attribute in node.attributes:
+                    self.problems.unknown(node.where(attribute), f"attribute of <{tag}>", attribute, ())
+
+    def _count(self, fields: Fields) -> int:
+        count: int = fields.read("count", lambda text: codecs.whole(text, 0))
+        self.rows += count
+        if self.rows > self.most_rows >= self.rows - count:
+            self.problems.error(
+                fields.place("count"),
+                f"count: with these there are {self.rows:,} entities, more than {self.most_rows:,}; "
+                f"for a file you trust there is allow_large",
+            )
+        return min(count, self.most_rows)
+
+    def _body(self, fields: Fields) -> dict[str, Any]:
+        """Where the entities are and how they move at first."""
+        degrees_squared = math.radians(1.0) ** 2
+        velocity = fields.vector("vx", "vy", "vz")
+        return {
+            "health": fields.number("health"),
+            "radius": fields.number("radius"),
+            "mass": fields.number("mass"),
+            "position": fields.position(self.origin),
+            "heading": fields.number("heading", "rad"),
+            "roll": fields.number("roll", "rad"),
+            "climb": -fields.number("pitch", "rad"),
+            "velocity": velocity if any(velocity) else None,
+            "speed": fields.number("speed"),
+            "placement": fields.read("placement", lambda text: codecs.chosen(text, PLACEMENTS)),
+            "variance": fields.vector("variance_x", "variance_y", "variance_z"),
+            "half_width": fields.vector("half_width_x", "half_width_y", "half_width_z"),
+            "heading_variance": fields.read("variance_heading", codecs.number) * degrees_squared,
+            "scatter_first": fields.read("use_variance_all_ents", codecs.truth),
+        }
+
+    def _births(self, fields: Fields) -> dict[str, Any]:
+        """When they are born; empty where all are there from the start."""
+        if not fields.has("generate_rate"):
+            return {}
+        rate = fields.read("generate_rate", lambda text: codecs.fraction(text, "1/s")) or 0.0
+        slots = (
+            fields.read("generate_count", lambda text: codecs.whole(text, -self.most_rows, self.most_rows))
+            or 0
+        )
+        if not (rate > 0.0 and slots > 0):
+            text = "<generate_rate> counts only with a rate > 0 and <generate_count> > 0; all entities are there from the start"
+            self.problems.note(fields.place("generate_rate"), text)
+            return {}
+        return {
+            "rate": rate,
+            "slots": slots,
+            "first_birth": fields.number("generate_start_time"),
+            "interval_sd": fields.number("generate_time_variance"),
+        }
+
+    def _motion(self, fields: Fields, taken: set[str]) -> Any:
+        if fields.has("motion_model"):
+            return self.plugins.make(Written.of(fields.found["motion_model"]), taken)
+        still = Written("motion_model", "Still", {}, lambda _: fields.node.place)
+        return self.plugins.make(still, taken)
+
+    def _base(self, node: Node, team: int) -> None:
+        fields = Fields(node, BASE, self.problems)
+        try:
+            self.bases.append(
+                Base(
+                    team=team,
+                    position=fields.position(self.origin),  # type: ignore[arg-type]
+                    radius=fields.number("radius"),
+                    opacity=fields.number("opacity"),
+                )
+            )
+        except TussleError as error:
+            self.problems.error(node.place, str(error))

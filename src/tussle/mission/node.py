@@ -1,0 +1,197 @@
+"""XML text to a plain tree with the file and line of each tag and attribute.
+
+The parser is expat from the standard library: it tells where a tag begins (libxml2 tells where it ends), and every construct that
+could reach outside the text or grow is seen before it acts, so it can be refused.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+from xml.parsers import expat
+from xml.sax.saxutils import escape, quoteattr
+
+from tussle.errors import MissionError
+from tussle.mission.limits import Limits
+from tussle.mission.problems import Place
+
+NAMESPACE_END = "}"
+ATTRIBUTE = re.compile(rb"\s+([^\s=<>/]+)\s*=\s*(?:\"[^\"]*\"|'[^']*')")
+
+
+@dataclass(slots=True)
+class Node:
+    """A tag.
+
+    Attributes:
+        tag: Its name; one of a namespace is written "{address}name".
+        attributes: As written, in order.
+        text: Its own text without that of its children, stripped.
+        children: The tags in it.
+        place: Where it begins.
+        lines: Line of each attribute.
+    """
+
+    tag: str
+    attributes: dict[str, str]
+    text: str
+    children: list[Node]
+    place: Place
+    lines: dict[str, int] = field(default_factory=dict)
+
+    def where(self, attribute: str = "") -> Place:
+        """Place of an attribute, or of the tag."""
+        return Place(self.place.file, self.lines.get(attribute, self.place.line))
+
+    def find_all(self, tag: str) -> Iterator[Node]:
+        return (child for child in self.children if child.tag == tag)
+
+    def copied(self) -> Node:
+        """A copy that shares nothing that changes."""
+        return Node(
+            self.tag,
+            dict(self.attributes),
+            self.text,
+            [c.copied() for c in self.children],
+            self.place,
+            dict(self.lines),
+        )
+
+    def to_text(self, indent: str = "") -> str:
+        """The tree as XML again."""
+        attributes = "".join(f" {_local(k)}={quoteattr(v)}" for k, v in self.attributes.items())
+        start = f"{indent}<{_local(self.tag)}{attributes}"
+        if not self.children:
+            return f"{start}>{escape(self.text)}</{_local(self.tag)}>\n" if self.text else f"{start}/>\n"
+        inner = "".join(child.to_text(indent + "  ") for child in self.children)
+        text = f"{indent}  {escape(self.text)}\n" if self.text else ""
+        return f"{start}>\n{text}{inner}{indent}</{_local(self.tag)}>\n"
+
+
+def _local(name: str) -> str:
+    return name.rpartition(NAMESPACE_END)[2]
+
+
+@dataclass
+class Budget:
+    """What is left of the limits that all files of a mission share."""
+
+    limits: Limits
+    nodes: int = 0
+    text: int = 0
+    files: int = 0
+
+    def spend_text(self, amount: int, file: str) -> None:
+        """Count characters.
+
+        Raises:
+            MissionError: There are too many.
+        """
+        self.text += amount
+        if self.text > self.limits.text:
+            raise MissionError(
+                f"{file}: the mission is longer than {self.limits.text:,} characters; for a file you trust there is allow_large"
+            )
+
+
+class _Builder:
+    """Builds the tree from expat's events."""
+
+    def __init__(self, data: bytes, file: str, line_of: Callable[[int], int], budget: Budget) -> None:
+        self.data, self.file, self.line_of, self.budget = data, file, line_of, budget
+        self.stack: list[tuple[Node, list[str]]] = []
+        self.root: Node | None = None
+        self.parser = parser = expat.ParserCreate("utf-8", namespace_separator=NAMESPACE_END)
+        parser.buffer_text = True
+        parser.ordered_attributes = True
+        parser.StartElementHandler = self.start
+        parser.EndElementHandler = self.end
+        parser.CharacterDataHandler = self.characters
+        parser.StartDoctypeDeclHandler = self.doctype
+
+    def refuse(self, text: str) -> MissionError:
+        return MissionError(f"{Place(self.file, self.line_of(self.parser.CurrentLineNumber))}: {text}")
+
+    def doctype(self, name: str, *_: Any) -> None:
+        raise self.refuse(
+            "a DOCTYPE is not allowed: it can define entities that grow or read other files, and a mission needs none; remove it"
+        )
+
+    def start(self, tag: str, flat: list[str]) -> None:
+        limits = self.budget.limits
+        self.budget.nodes += 1
+        if self.budget.nodes > limits.nodes:
+            raise self.refuse(
+                f"there are more than {limits.nodes:,} tags; for a file you trust there is allow_large"
+            )
+        if len(self.stack) >= limits.depth:
+            raise self.refuse(f"tags stand in one another more than {limits.depth} deep")
+        names = flat[::2]
+        line = self.parser.CurrentLineNumber
+        node = Node(
+            tag, dict(zip(names, flat[1::2], strict=True)), "", [], Place(self.file, self.line_of(line))
+        )
+        if names:
+            node.lines = self.lines_of_attributes(line)
+        if self.stack:
+            self.stack[-1][0].children.append(node)
+        else:
+            self.root = node
+        self.stack.append((node, []))
+
+    def lines_of_attributes(self, line: int) -> dict[str, int]:
+        """Line of each attribute of the tag that begins here; expat tells that of the tag only."""
+        place, lines = self.parser.CurrentByteIndex, {}
+        name = re.compile(rb"<[^\s<>/]+").match(self.data, place)
+        place = name.end() if name else place
+        while match := ATTRIBUTE.match(self.data, place):
+            begin = match.start(1)
+            line += self.data.count(b"\n", place, begin)
+            lines[match[1].decode("utf-8", "replace")] = self.line_of(line)
+            line += self.data.count(b"\n", begin, match.end())
+            place = match.end()
+        return lines
+
+    def end(self, _tag: str) -> None:
+        node, parts = self.stack.pop()
+        node.text = "".join(parts).strip()
+
+    def characters(self, text: str) -> None:
+        if self.stack:
+            self.stack[-1][1].append(text)
+
+
+def parse(text: str, file: str, budget: Budget, line_of: Callable[[int], int] = int) -> Node:
+    """The root tag of an XML text.
+
+    Args:
+        text: Of the whole file.
+        file: Its name, for messages.
+        budget: Limits that it shares with the mission's other files.
+        line_of: From a line of `text` to the line of the file that it was made from.
+
+    Raises:
+        MissionError: It is malformed, has a DOCTYPE, or is too large.
+    """
+    data = text.encode("utf-8", "surrogatepass")
+    builder = _Builder(data, file, line_of, budget)
+    try:
+        builder.parser.Parse(data, True)
+    except expat.ExpatError as error:
+        place = Place(file, line_of(error.lineno))
+        raise MissionError(
+            f"{place}: this is not well-formed XML: {expat.ErrorString(error.code)}{_hint(error)}"
+        ) from None
+    assert builder.root is not None
+    return builder.root
+
+
+def _hint(error: expat.ExpatError) -> str:
+    hints = {
+        expat.errors.XML_ERROR_TAG_MISMATCH: " (a tag is closed by another name, or not at all, before here)",
+        expat.errors.XML_ERROR_UNDEFINED_ENTITY: " (there are &lt; &gt; &amp; &quot; and &apos; only)",
+        expat.errors.XML_ERROR_INVALID_TOKEN: " (in text, & is written &amp; and < is written &lt;)",
+    }
+    return hints.get(expat.ErrorString(error.code), "")

@@ -1,0 +1,232 @@
+"""A plugin's tag, or a behaviour in a parameter, to the plugin."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from tussle.api.plugin import Plugin
+from tussle.errors import MissionError, TussleError, listed, nearest_name
+from tussle.mission import codecs
+from tussle.mission.catalogue import KINDS, AbsentPluginError, Catalogue, historic
+from tussle.mission.node import Node
+from tussle.mission.problems import Place, Problems, shown
+from tussle.mission.tags import PLUGIN
+
+MOST_NESTED = 4
+"""Behaviours in behaviours."""
+RATED = ("autonomy", "controller", "sensor", "behaviors")
+
+
+@dataclass
+class Written:
+    """A plugin as it stands in the file.
+
+    Attributes:
+        tag: What kind is wanted: a key of KINDS.
+        plugin: Its name.
+        attributes: As written.
+        where: Place of an attribute, of the tag for "".
+    """
+
+    tag: str
+    plugin: str
+    attributes: dict[str, str]
+    where: Callable[[str], Place]
+
+    @classmethod
+    def of(cls, node: Node) -> Written:
+        return cls(node.tag, node.text, dict(node.attributes), node.where)
+
+
+@dataclass
+class PluginReader:
+    """Makes plugins.
+
+    Attributes:
+        catalogue: Finds the classes.
+        problems: Receives what is wrong.
+        shared: <param_common> name -> attributes.
+        from_geodetic: Latitude, longitude [rad], altitude [m], (3,), to world positions [m].
+        drawn: Receives attributes that are kept for the viewer: "plugin@attribute" -> text.
+    """
+
+    catalogue: Catalogue
+    problems: Problems
+    shared: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    from_geodetic: Callable[..., Any] | None = None
+    drawn: dict[str, str] = field(default_factory=dict)
+
+    def many(self, nodes: Iterable[Node], taken: set[str] | None = None) -> list[Any]:
+        """The plugins of several tags; those that are wrong are missing in it.
+
+        Args:
+            nodes: The tags.
+            taken: Instance names that are in use, to which theirs are added.
+        """
+        made = (self.make(Written.of(node), set() if taken is None else taken) for node in nodes)
+        return [plugin for plugin in made if plugin is not None]
+
+    def make(self, written: Written, taken: set[str], depth: int = 0) -> Plugin | None:
+        """One plugin; None where it is wrong, and the problems say why."""
+        cls = self._class_of(written)
+        if cls is None:
+            return None
+        self._add_shared(written)
+        name, rate = self._name(written, taken), self._rate(written)
+        values: dict[str, Any] = {}
+        known, is_right = _Attributes.of(cls), True
+        self._join(written, known)
+        for attribute, text in written.attributes.items():
+            if attribute in PLUGIN:
+                continue
+            parameter = known.renamed.get(attribute, attribute)
+            if parameter in cls.params() or parameter in cls.children():
+                try:
+                    values[parameter] = self._value(cls, parameter, text, written, depth)
+                except TussleError as error:
+                    self._say(written.where(attribute), cls, parameter, error)
+                    is_right = False
+            else:
+                self._not_a_parameter(written, cls, attribute, known)
+        for attribute, text in historic()["differs"].get(cls.__name__, {}).items():
+            if attribute not in values:
+                self.problems.note(written.where(""), text)
+        if not is_right:
+            return None
+        try:
+            return cls(name=name, rate=rate, **values)
+        except TussleError as error:
+            self.problems.error(written.where(""), str(error))
+            return None
+
+    def _class_of(self, written: Written) -> type[Plugin] | None:
+        place, tag = written.where(""), "behavior" if written.tag == "behaviors" else written.tag
+        if not written.plugin:
+            self.problems.error(place, f"<{tag}> is empty; it takes the name of a plugin")
+            return None
+        try:
+            cls = self.catalogue.load(written.plugin)
+        except AbsentPluginError as error:
+            self.problems.error(place, f"{tag} {error}")
+            return None
+        except MissionError as error:
+            self.problems.error(place, f"{tag}: {error}")
+            return None
+        if not issubclass(cls, KINDS[written.tag]):
+            its = next(
+                (t for t, kind in KINDS.items() if issubclass(cls, kind) and t != "behaviors"), "no tag"
+            )
+            self.problems.error(place, f"{written.plugin} does not go into {tag}; it goes into {its}")
+            return None
+        return cls
+
+    def _add_shared(self, written: Written) -> None:
+        name = written.attributes.get("param_common")
+        if name is None:
+            return
+        if name not in self.shared:
+            text = f"there is no param_common {shown(name)}{nearest_name(name[:80], self.shared)}; {listed(self.shared)}"
+            self.problems.error(written.where("param_common"), text)
+            return
+        for key, text in self.shared[name].items():
+            written.attributes.setdefault(key, text)
+
+    def _name(self, written: Written, taken: set[str]) -> str:
+        wanted = written.attributes.get("name", written.plugin).strip()
+        if not wanted or "." in wanted:
+            text = f"name {shown(wanted)} is not allowed: a name is not empty and has no dot, since paths such as prey.Boids.gain use dots"
+            self.problems.error(written.where("name"), text)
+            wanted = written.plugin
+        name, n = wanted, 2
+        while name in taken:
+            name, n = f"{wanted}_{n}", n + 1
+        if name != wanted:
+            self.problems.note(
+                written.where("name"), f"a second {wanted} is called {name}; give it a name='...' of its own"
+            )
+        taken.add(name)
+        return name
+
+    def _rate(self, written: Written) -> float | None:
+        text = written.attributes.get("loop_rate")
+        if text is None:
+            return None
+        place = written.where("loop_rate")
+        if written.tag not in RATED:
+            self.problems.note(place, f"loop_rate of a {written.tag} is ignored; it acts in every step")
+            return None
+        try:
+            rate = codecs.number(text, "1/s")
+            if rate < 0.0:
+                raise MissionError(
+                    f"{shown(text)} is not allowed; it takes a number of calls per second >= 0"
+                )
+        except MissionError as error:
+            self.problems.error(place, f"loop_rate: {error}")
+            return None
+        return rate or None
+
+    def _join(self, written: Written, known: _Attributes) -> None:
+        """Put attributes that are components of one parameter into it."""
+        for parameter, parts in known.joined.items():
+            if any(part in written.attributes for part in parts):
+                column = known.cls.params()[parameter]
+                components = zip(parts, column.default, strict=True)
+                text = ", ".join(written.attributes.pop(part, repr(default)) for part, default in components)
+                written.attributes.setdefault(parameter, text)
+
+    def _value(self, cls: type[Plugin], parameter: str, text: str, written: Written, depth: int) -> Any:
+        if parameter not in cls.children():
+            if parameter in _Attributes.of(cls).least_zero and text.strip().startswith("-"):
+                text = "0"
+            return codecs.param(text, cls.params()[parameter], self.from_geodetic)
+        if depth >= MOST_NESTED:
+            raise MissionError(f"plugins stand in one another more than {MOST_NESTED} deep")
+        place = written.where(parameter)
+        taken: set[str] = set()
+        made = [
+            self.make(Written("behaviors", told.name, told.attributes, lambda _: place), taken, depth + 1)
+            for told in codecs.behaviors(text)
+        ]
+        return [plugin for plugin in made if plugin is not None]
+
+    def _not_a_parameter(
+        self, written: Written, cls: type[Plugin], attribute: str, known: _Attributes
+    ) -> None:
+        viewer, place = historic()["viewer"], written.where(attribute)
+        if attribute.startswith(tuple(viewer["prefixes"])) or attribute in viewer["names"]:
+            self.drawn[f"{written.plugin}@{attribute}"] = written.attributes[attribute]
+        elif attribute in known.unread or attribute in historic()["unread"]["names"]:
+            self.problems.note(place, f"{attribute} of {written.plugin} has no meaning here; it is ignored")
+        else:
+            allowed = [*cls.params(), *cls.children(), *known.renamed, *PLUGIN]
+            self.problems.unknown(place, f"attribute of {cls.__name__}", attribute, allowed, lists=True)
+
+    def _say(self, place: Place, cls: type[Plugin], parameter: str, error: TussleError) -> None:
+        name = f"{cls.__name__}.{parameter}"
+        text = str(error)
+        self.problems.error(place, text if text.startswith(name) else f"{name}: {text}")
+
+
+@dataclass(frozen=True)
+class _Attributes:
+    """How a class's attributes differ from its parameters."""
+
+    cls: type[Plugin]
+    renamed: Mapping[str, str]
+    joined: Mapping[str, list[str]]
+    unread: tuple[str, ...]
+    least_zero: tuple[str, ...]
+
+    @classmethod
+    def of(cls, plugin: type[Plugin]) -> _Attributes:
+        table = historic()["attributes"].get(plugin.__name__, {})
+        return cls(
+            plugin,
+            {k: v for k, v in table.get("renamed", {}).items() if v in plugin.params()},
+            {k: v for k, v in table.get("joined", {}).items() if k in plugin.params()},
+            tuple(table.get("unread", ())),
+            tuple(table.get("least_zero", ())),
+        )

@@ -1,0 +1,95 @@
+"""What is wrong with a mission file, and what is worth saying about it: collected, so that all of it is told at once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from tussle.errors import MissionError, listed, nearest_name
+
+LONGEST_SHOWN = 80
+MOST_LINES = 100
+"""Errors told at once; a file with more is most likely not a mission."""
+
+
+class Place(NamedTuple):
+    """A file and a line of it."""
+
+    file: str
+    line: int
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}"
+
+
+def shown(text: str) -> str:
+    """A text from the file for a message, on one line and not longer than a message bears."""
+    flat = " ".join(text.split())
+    return repr(flat if len(flat) <= LONGEST_SHOWN else flat[:LONGEST_SHOWN] + "...")
+
+
+class Problems:
+    """Errors and notes of one reading.
+
+    Args:
+        strict: What is unknown is an error instead of a note.
+    """
+
+    def __init__(self, *, strict: bool = False) -> None:
+        self.strict = strict
+        self._errors: dict[str, list[Place]] = {}
+        self._notes: dict[str, list[Place]] = {}
+
+    def error(self, place: Place, text: str) -> None:
+        """Something that keeps the mission from being played."""
+        self._errors.setdefault(text, []).append(place)
+
+    def note(self, place: Place, text: str) -> None:
+        """Something that the reader of the file should know."""
+        self._notes.setdefault(text, []).append(place)
+
+    def unknown(
+        self, place: Place, what: str, name: str, allowed: Iterable[str], *, lists: bool = False
+    ) -> None:
+        """A tag or attribute that means nothing: a note, or with `strict` an error."""
+        known = sorted(allowed)
+        text = f"{what} {shown(name)} is unknown{nearest_name(name[:LONGEST_SHOWN], known)}"
+        if self.strict:
+            self.error(place, f"{text}; {listed(known)}" if lists else text)
+        else:
+            self.note(place, f"{text}; it is ignored")
+
+    @property
+    def has_errors(self) -> bool:
+        return bool(self._errors)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """One line each, in the order of the file."""
+        return tuple(_lines(self._notes))
+
+    def check(self) -> None:
+        """Raise what there is.
+
+        Raises:
+            MissionError: There are errors; one line each.
+        """
+        if not self._errors:
+            return
+        lines = _lines(self._errors)
+        more = len(lines) - MOST_LINES
+        raise MissionError("\n".join(lines[:MOST_LINES]) + (f"\n... and {more} more" if more > 0 else ""))
+
+
+def _lines(found: dict[str, list[Place]]) -> list[str]:
+    """Each text once, with all its places; ordered by file and line of the first."""
+    order = sorted(found.items(), key=lambda item: item[1][0].line)
+    return [f"{_places(places)}: {text}" for text, places in order]
+
+
+def _places(places: list[Place]) -> str:
+    """For instance "a.xml:12", or "a.xml:12, 40, 41" for the same thing at several lines."""
+    first = places[0]
+    lines = list(dict.fromkeys(p.line for p in places if p.file == first.file))
+    rest = f", {', '.join(str(line) for line in lines[1:6])}" if len(lines) > 1 else ""
+    return f"{first}{rest}{' ...' if len(lines) > 6 else ''}"
