@@ -121,7 +121,9 @@ class Param(Numbers):
         doc: str = "",
     ) -> None:
         self.is_text = isinstance(default, str)
-        dtype = bool if isinstance(default, bool) else int if isinstance(default, int) else float
+        dtype: type = bool if isinstance(default, bool) else int if isinstance(default, int) else float
+        if dtype is int and unit:
+            dtype = float  # whoever writes Param(35, unit="m/s") does not mean that 35.5 is not a speed
         super().__init__(fields, unit, dtype, doc)
         self.text_units = units.split_units(text_unit or unit, max(1, len(self.fields)))
         self.ge, self.gt, self.le, self.lt = ge, gt, le, lt

@@ -60,9 +60,7 @@ class Context:
         if self._pool is None:
             self._pool = ThreadPoolExecutor(self.threads)
         edges = [n * i // self.threads for i in range(self.threads + 1)]
-        for done in [
-            self._pool.submit(run, a, b) for a, b in pairwise(edges) if b > a
-        ]:
+        for done in [self._pool.submit(run, a, b) for a, b in pairwise(edges) if b > a]:
             done.result()
 
     def close(self) -> None:

@@ -94,7 +94,7 @@ class Me:
         column = plugin.columns.get(name)
         if column is not None:
             return self._column(name, column)
-        if name in VECTORS:
+        if name in VECTORS or name == "motion_state":
             return getattr(g, name)[:, row]
         if name in NUMBERS:
             return getattr(g, name)[row].item()

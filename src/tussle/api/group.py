@@ -39,6 +39,7 @@ class GroupView:
         pos: Position [m], (3, n), world frame. Likewise vel [m/s], quat (w, x, y, z), omega [rad/s], force, torque, health, radius,
             mass, and the whole numbers id, team, world, block, place_in_block. For autonomies and controllers pos, vel and quat are the
             entity's belief where a sensor writes one.
+        motion_state: State of the entity's motion model, (m, n), fields in order of declaration: where a planner's rollout begins.
         caller: The plugin that is being called.
     """
 
@@ -50,6 +51,7 @@ class GroupView:
         self.substep = 0
         self.caller: Any = None
         self.failing_row: int | None = None
+        self.motion_state: np.ndarray = np.empty((0, 0))
         self._seen: list[str] = []
         self.services: dict[str, Callable[..., Any]] = {}
         self.belief: dict[str, np.ndarray] = {}

@@ -132,14 +132,14 @@ def longest_reach(radius, world, reach):
 
 @kernel("F2 F2 F Bw -> i8")
 def check(pos, quat, health, faulty):
-    """Number of rows that are not sound; faulty marks rows whose position or attitude is not finite. Rows without health count too.
+    """Number of rows that are not sound; faulty marks rows whose position or attitude is not finite, or health NaN. Rows without health count too.
 
     A sum of the seven numbers minus itself is 0 only where all are finite, so one test a row does, and it vectorises.
     """
     count = 0
     for i in range(health.shape[0]):
         total = pos[0, i] + pos[1, i] + pos[2, i] + quat[0, i] + quat[1, i] + quat[2, i] + quat[3, i]
-        bad = not (total - total == 0.0)
+        bad = not (total - total == 0.0) or health[i] != health[i]
         faulty[i] = bad
         count += 1 if bad or not (health[i] > 0.0) else 0
     return count

@@ -90,8 +90,14 @@ class Plugin:
         params += [inspect.Parameter(k, inspect.Parameter.KEYWORD_ONLY, default=None) for k in RESERVED]
         cls.__signature__ = inspect.Signature(params)  # type: ignore[attr-defined]
 
-    def __init__(self, *, name: str | None = None, rate: float | None = None, **values: Any) -> None:
+    def __init__(
+        self, *unnamed: Any, name: str | None = None, rate: float | None = None, **values: Any
+    ) -> None:
         cls = type(self)
+        if unnamed:
+            raise ParameterError(
+                f"{cls.__name__}({', '.join(map(repr, unnamed))}): parameters are given by name; {listed(cls.params())}"
+            )
         if rate is not None and (isinstance(rate, (bool, str)) or not 0.0 < rate < math.inf):
             raise ParameterError(
                 f"{cls.__name__}: rate = {rate!r} is not allowed; it takes a number of calls per second > 0, or None"
@@ -108,7 +114,7 @@ class Plugin:
             resolved[key] = tuple(values.get(key, ()))
             for plugin in resolved[key]:
                 if not isinstance(plugin, child.kind):
-                    raise ParameterError(f"{cls.__name__}.{key}: {plugin!r} is not a {child.kind.__name__}")
+                    raise ParameterError(f"{cls.__name__}.{key}: {plugin!r} is no {child.kind.__name__}")
             names = [plugin.instance_name for plugin in resolved[key]]
             for twice in names:
                 if names.count(twice) > 1:

@@ -32,7 +32,14 @@ def _place_of(error: BaseException, plugin: Any) -> str:
 
 
 def raised(error: BaseException, plugin: Any, *, where: str, step: int, world: int | None) -> PluginError:
-    """The error that a plugin has raised."""
+    """The error that a plugin has raised; its traceback begins where the plugin's code does."""
+    place = error.__traceback__
+    while (
+        place is not None and place.tb_frame.f_code.co_filename.startswith(_OWN) and place.tb_next is not None
+    ):
+        place = place.tb_next
+    if place is not None and not place.tb_frame.f_code.co_filename.startswith(_OWN):
+        error = error.with_traceback(place)
     text = f"{_place_of(error, plugin)}: {type(error).__name__}: {error}"
     return PluginError(text, where=where, step=step, world=world, plugin=plugin.instance_name, cause=error)
 
@@ -40,7 +47,7 @@ def raised(error: BaseException, plugin: Any, *, where: str, step: int, world: i
 def not_finite(group: Group, bodies: Bodies, row: int, step: int) -> PluginError:
     """Who made the position or attitude of a body row not finite: back along the wires to the first output that is not."""
     i, world = row - group.first, int(bodies.world[row])
-    who = f"{group.name} {int(bodies.id[row])}"
+    who = f"{group.block_of(i)} {int(bodies.id[row])}"
     for binding in [*group.autonomies, *group.controllers]:
         found = _not_finite_output(binding, group, i)
         if found:
@@ -52,7 +59,8 @@ def not_finite(group: Group, bodies: Bodies, row: int, step: int) -> PluginError
                 plugin=binding.spec.instance_name,
             )
     values = ", ".join(
-        f"{name} = {np.array2string(getattr(bodies, name)[:, row], precision=6)}" for name in ("pos", "quat")
+        f"{name} = {np.array2string(getattr(bodies, name)[..., row], precision=6)}"
+        for name in ("pos", "quat", "health")
     )
     motion = group.motion.spec.instance_name
     return PluginError(

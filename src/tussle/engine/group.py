@@ -10,6 +10,7 @@ import numpy as np
 
 from tussle.api.bodies import Bodies, read_only
 from tussle.api.context import Context
+from tussle.api.easy import EasyAutonomy
 from tussle.api.group import GroupView
 from tussle.api.kinds import Behavior
 from tussle.api.motion import MotionBody
@@ -29,7 +30,7 @@ from tussle.columns import (
 from tussle.comms import Inbox, Publisher
 from tussle.engine.table import Place, Table
 from tussle.engine.wiring import BELIEF, Link, Wiring
-from tussle.errors import WiringError
+from tussle.errors import DeclarationError, WiringError, nearest_name
 
 
 @dataclass
@@ -92,6 +93,31 @@ class Binding:
                 data[list(link.rows or ())] = table.array(self.places[name])
 
 
+def check_hooks(spec: Any, where: str) -> None:
+    """Refuse a plugin without the method that it is there for.
+
+    Raises:
+        DeclarationError: It has none, or one by another name.
+    """
+    needed = {"motion": ("from_body", "to_body"), "network": ("route",)}.get(spec.kind, ("step",))
+    if isinstance(spec, EasyAutonomy):
+        needed = ("step_one",)
+    if getattr(spec, "passthrough", False):
+        return
+    abstract = [c for c in type(spec).__mro__ if c.__module__.startswith("tussle.api.")]
+    for hook in needed:
+        if any(getattr(type(spec), hook) is getattr(base, hook, None) for base in abstract):
+            own = [
+                name
+                for name, value in vars(type(spec)).items()
+                if callable(value) and not name.startswith("__")
+            ]
+            found = f"; it has: {', '.join(own)}" if own else ""
+            raise DeclarationError(
+                f"{where}: {type(spec).__name__} has no method {hook!r}{nearest_name(hook, own)}{found}"
+            )
+
+
 class Group:
     """Rows [first, first + n) of the body table with one list of plugins.
 
@@ -115,7 +141,7 @@ class Group:
         substeps: int,
         advise: Callable[..., list[str]],
     ) -> None:
-        self.name = name
+        self.names = [name]
         self.block = block
         self.place = 0
         self.key: Any = None
@@ -152,6 +178,15 @@ class Group:
             yield from binding.walk()
 
     @property
+    def name(self) -> str:
+        """Names of the blocks whose entities are in it."""
+        return ", ".join(self.names)
+
+    def block_of(self, row: int) -> str:
+        """Name of the block of a row of the group."""
+        return self.context.block_names[int(self.bodies.block[self.first + row])]
+
+    @property
     def last(self) -> int:
         return self.first + self.n
 
@@ -162,6 +197,7 @@ class Group:
     # -- binding ------------------------------------------------------------------------------------------------------------
 
     def _bind(self, spec: Any, view: GroupView, path: tuple[str, ...], is_motion: bool = False) -> Binding:
+        check_hooks(spec, f"{self.wiring.where}: {spec.instance_name}")
         binding = Binding(spec.bound(), spec, view, (*path, spec.instance_name))
         plugin, key = binding.plugin, binding.path
         wired = set(self.wiring.wired.get(id(spec), ()))
@@ -286,6 +322,8 @@ class Group:
     def _attach_motion(self) -> None:
         data = self.table.arrays[float]
         self.x, self.u, self.p = self.table.array(self.x_place), data[self.u_slice], data[self.p_rows]
+        for view in self.views:
+            view.motion_state = read_only(self.x)
 
     def _rows_of(self, binding: Binding, name: str) -> tuple[int, ...]:
         link = binding.links.get(name)

@@ -50,12 +50,19 @@ class Overrides:
         for path, value in values.items():
             key, column = self._find(path)
             if column.ragged:
-                raise ParameterError(f"{path!r} is a list, which is no column of a stack; set it in the mission")
+                raise ParameterError(
+                    f"{path!r} is a list, which is no column of a stack; set it in the mission"
+                )
             many = (
                 isinstance(value, (list, np.ndarray))
                 and len(value) == len(worlds)
                 and np.ndim(value) > len(column.shape)
             )
+            is_list = isinstance(value, (list, np.ndarray)) and np.ndim(value) > len(column.shape)
+            if is_list and not many and not column.is_text:
+                raise ParameterError(
+                    f"{path!r} has {len(value)} values for {len(worlds)} worlds; it takes one value, or one per world"
+                )
             items = [column.convert(v, path) for v in (value if many else [value] * len(worlds))]
             checked.append((key, column, items))
         for key, column, items in checked:
@@ -72,11 +79,15 @@ class Overrides:
 
     def save(self) -> list[dict[Any, Any]]:
         """What has been set, for snapshots."""
-        return [{k: copy.copy(v) for k, v in part.items()} for part in (self.columns, self.given, self.structural)]
+        return [
+            {k: copy.copy(v) for k, v in part.items()} for part in (self.columns, self.given, self.structural)
+        ]
 
     def restore(self, saved: list[dict[Any, Any]]) -> None:
         """Go back to what `save` gave."""
-        self.columns, self.given, self.structural = ({k: copy.copy(v) for k, v in part.items()} for part in saved)
+        self.columns, self.given, self.structural = (
+            {k: copy.copy(v) for k, v in part.items()} for part in saved
+        )
 
     def _find(self, path: str) -> tuple[tuple[str, tuple[str, ...], str], Param]:
         head, *rest = path.split(".")

@@ -103,7 +103,11 @@ class Population:
                 group.place = place
                 self.groups.sort(key=lambda g: g.place)
             self.on_new_group()
-        return self._by_key[key]
+        group = self._by_key[key]
+        if block.name not in group.names:
+            group.names.append(block.name)
+            self.on_new_group()
+        return group
 
     def prepare(self) -> None:
         """Make the groups of all blocks, so that wiring errors show before anything runs."""

@@ -189,9 +189,7 @@ class Schedule:
                     whole()
                 elif due.any():
                     self._part(group, binding, due, action)
-            for (
-                inbox
-            ) in inboxes:  # of a group without rows too: who comes later has not heard what was said before
+            for inbox in inboxes:  # of a group without rows too: who comes later has not heard what was said before
                 inbox.clear(due)
 
         def lean() -> None:
@@ -296,8 +294,8 @@ class Schedule:
             return group.name
         bodies = self.sim.population.bodies
         rows = np.flatnonzero(bodies.world[group.first : group.last] == world)
-        entity = int(bodies.id[group.first + (row if is_alone else rows[row])])
-        return f"{group.name} {entity}"
+        at = row if is_alone else int(rows[row])
+        return f"{group.block_of(at)} {int(bodies.id[group.first + at])}"
 
     # -- world plugins ----------------------------------------------------------------------------------------------------------
 

@@ -191,13 +191,16 @@ class Simulation:
             self._step()
 
     def _step(self) -> None:
-        births = self.births
-        if births.has_rates or self.world_view.births:
-            self._give_birth()
-        for observer in self.observers:
-            observer(self)
-        for call in self.schedule:
-            call.run()
+        try:
+            if self.births.has_rates or self.world_view.births:
+                self._give_birth()
+            for observer in self.observers:
+                observer(self)
+            for call in self.schedule:
+                call.run()
+        except PluginError as error:
+            # From here on, so that what is printed is the plugin's own lines and not the way through the engine.
+            raise error.with_traceback(None) from error.cause
 
     def run(self, until: float | None = None) -> list[WorldResult]:
         """Step until all worlds have ended, or have reached the time `until` [s]; waits while paused.

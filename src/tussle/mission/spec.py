@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -14,6 +15,8 @@ from tussle import stock, units
 from tussle.api import Autonomy, Controller, Interaction, Metric, MotionModel, Network, Sensor
 from tussle.errors import MissionError, listed, nearest_name
 from tussle.scene import Scene
+
+T = TypeVar("T")
 
 END_CONDITIONS = ("time", "one_team", "all_dead", "none")
 UPDATES = ("synchronous", "sequential")
@@ -60,7 +63,7 @@ def _plugins(where: str, value: Any, kind: type) -> tuple[Any, ...]:
     for plugin in plugins:
         if not isinstance(plugin, kind):
             hint = " (an instance is needed: write it with parentheses)" if isinstance(plugin, type) else ""
-            raise MissionError(f"{where}: {plugin!r} is not a {kind.__name__}{hint}")
+            raise MissionError(f"{where}: {plugin!r} is no {kind.__name__}{hint}")
     names = [p.instance_name for p in plugins]
     for name in names:
         if names.count(name) > 1:
@@ -74,6 +77,27 @@ def _set(frozen: Any, name: str, value: Any) -> None:
     object.__setattr__(frozen, name, value)
 
 
+def _check_names(where: str, kind: Any, given: Iterable[str]) -> None:
+    names = [f.name for f in dataclasses.fields(kind)]
+    for name in given:
+        if name not in names:
+            raise MissionError(f"{where} has no {name!r}{nearest_name(name, names)}; {listed(names)}")
+
+
+def _named(kind: type[T]) -> type[T]:
+    """Tell an unknown argument of a dataclass with the nearest right name."""
+    construct = kind.__init__
+
+    @functools.wraps(construct)
+    def checked(self: Any, **values: Any) -> None:
+        _check_names(kind.__name__, kind, values)
+        construct(self, **values)
+
+    kind.__init__ = checked  # type: ignore[method-assign, assignment]
+    return kind
+
+
+@_named
 @dataclass(frozen=True, kw_only=True)
 class Block:
     """Entities of one make: how many, where, with which plugins.
@@ -179,6 +203,11 @@ class Block:
             if value is not None and not value > 0:
                 raise MissionError(f"{where}: {name} = {value!r} is not allowed; it takes a number > 0")
 
+    def replace(self, **changes: Any) -> Block:
+        """A copy with other values."""
+        _check_names("Block", Block, changes)
+        return dataclasses.replace(self, **changes)
+
     @property
     def plugins(self) -> tuple[Any, ...]:
         """All plugins in the order of a step."""
@@ -200,6 +229,7 @@ _BLOCK_NUMBERS = {
 }
 
 
+@_named
 @dataclass(frozen=True, kw_only=True)
 class Mission:
     """A game: its entities, its world, its referees, its end.
@@ -250,7 +280,9 @@ class Mission:
             raise MissionError(f"mission: dt = {self.dt!r} is not allowed; it takes a number of seconds > 0")
         multiplier = _whole("mission: motion_multiplier", self.motion_multiplier, " >= 1")
         if multiplier < 1:
-            raise MissionError(f"mission: motion_multiplier = {multiplier!r} is not allowed; it takes a whole number >= 1")
+            raise MissionError(
+                f"mission: motion_multiplier = {multiplier!r} is not allowed; it takes a whole number >= 1"
+            )
         _set(self, "motion_multiplier", multiplier)
         if self.update not in UPDATES:
             raise MissionError(f"mission: update = {self.update!r} is not allowed; {listed(UPDATES)}")
@@ -297,4 +329,5 @@ class Mission:
 
     def replace(self, **changes: Any) -> Mission:
         """A copy with other values."""
+        _check_names("Mission", Mission, changes)
         return dataclasses.replace(self, **changes)

@@ -406,7 +406,7 @@ def test_children_have_columns_and_channels_of_their_own():
 
 
 def test_children_of_the_wrong_kind_or_of_one_name_are_refused():
-    with pytest.raises(ParameterError, match=r"Sum.parts: Drift\(\) is not a Behavior"):
+    with pytest.raises(ParameterError, match=r"Sum.parts: Drift\(\) is no Behavior"):
         Sum(parts=[Drift()])
     with pytest.raises(
         ParameterError,

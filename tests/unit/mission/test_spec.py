@@ -119,11 +119,11 @@ def test_steps_until_the_end(end, steps):
         ({"motion": Drift()}, r"motion = Drift\(\) is not a motion model"),
         (
             {"autonomy": Drift},
-            r"block 'a': autonomy: .* is not a Autonomy \(an instance is needed: write it with parentheses\)",
+            r"block 'a': autonomy: .* is no Autonomy \(an instance is needed: write it with parentheses\)",
         ),
-        ({"autonomy": SingleIntegrator()}, r"block 'a': autonomy: SingleIntegrator\(\) is not a Autonomy"),
-        ({"controller": "UnicyclePID"}, r"block 'a': controller: 'UnicyclePID' is not a Controller"),
-        ({"sensor": Drift()}, r"block 'a': sensor: Drift\(\) is not a Sensor"),
+        ({"autonomy": SingleIntegrator()}, r"block 'a': autonomy: SingleIntegrator\(\) is no Autonomy"),
+        ({"controller": "UnicyclePID"}, r"block 'a': controller: 'UnicyclePID' is no Controller"),
+        ({"sensor": Drift()}, r"block 'a': sensor: Drift\(\) is no Sensor"),
         (
             {"autonomy": [Drift(), Drift()]},
             r"two plugins are called 'Drift'; give one of them another name with name=\.\.\.",
@@ -168,10 +168,10 @@ def test_blocks_that_cannot_be(values, message):
         ({"end_conditions": 5}, r"mission: end_conditions = 5 is not allowed"),
         (
             {"interactions": SimpleCaptureMetrics()},
-            r"mission: interactions: SimpleCaptureMetrics\(\) is not a Interaction",
+            r"mission: interactions: SimpleCaptureMetrics\(\) is no Interaction",
         ),
-        ({"metrics": [SimpleCapture()]}, r"mission: metrics: SimpleCapture\(\) is not a Metric"),
-        ({"networks": "GlobalNetwork"}, r"mission: networks: 'GlobalNetwork' is not a Network"),
+        ({"metrics": [SimpleCapture()]}, r"mission: metrics: SimpleCapture\(\) is no Metric"),
+        ({"networks": "GlobalNetwork"}, r"mission: networks: 'GlobalNetwork' is no Network"),
         (
             {"interactions": [SimpleCapture(), SimpleCapture()]},
             r"mission: interactions: two plugins are called 'SimpleCapture'",
@@ -190,8 +190,15 @@ def test_missions_that_cannot_be(values, message):
 
 
 def test_unknown_arguments_are_refused():
-    with pytest.raises(TypeError, match="sped"):
+    with pytest.raises(MissionError, match=r"Block has no 'sped' \(did you mean 'speed'\?\); there are: name, team"):
         block(sped=3)
+    with pytest.raises(MissionError, match=r"Mission has no 'ned' \(did you mean 'end'\?\)"):
+        Mission(blocks=[block()], ned=3.0)
+    with pytest.raises(MissionError, match="Mission has no 'foo'"):
+        Mission(blocks=[block()]).replace(foo=3)
+    with pytest.raises(MissionError, match="Block has no 'foo'"):
+        block().replace(foo=3)
+    assert block().replace(count=7).count == 7
 
 
 def test_all_these_are_errors_of_ours():

@@ -1,0 +1,74 @@
+"""What a planner needs: the state of its own motion model, and the function that flies it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from small_worlds import block
+
+from tussle import Mission, Simulation
+from tussle.api import Autonomy, EasyAutonomy, Output, Param, State
+from tussle.errors import ParameterError
+from tussle.stock import Unicycle
+
+MODEL = Unicycle(vel_max=20.0)
+
+
+class Planner(EasyAutonomy):
+    """Turn left, and note where a rollout says that this leads in one step."""
+
+    foreseen = State("x y z yaw pitch", unit="m m m rad rad")
+    speed = Output(unit="m/s")
+    turn_rate = Output(unit="rad/s")
+    pitch_rate = Output(unit="rad/s")
+
+    def step_one(self, me):
+        me.speed, me.turn_rate, me.pitch_rate = 10.0, 0.3, 0.1
+        me.foreseen = MODEL.rollout(me.motion_state, [[10.0, 0.3, 0.1]], me.dt, substeps=4)[-1]
+
+
+def test_a_rollout_from_the_motion_state_is_what_is_flown() -> None:
+    game = Mission(
+        blocks=[block(count=3, variance=(100, 100, 0), autonomy=Planner(), motion=MODEL)], dt=0.1, end=2.0, motion_multiplier=4
+    )
+    sim = Simulation(game)
+    sim.step(7)
+    foreseen, _ = sim.read("a.Planner.foreseen")
+    flown, _ = sim.read("a.Unicycle.x")
+    assert foreseen.tobytes() == flown.tobytes()
+    assert len(np.unique(flown[0, :, 0])) == 3
+
+
+def test_the_motion_state_is_read_only() -> None:
+    class Pushy(Autonomy):
+        speed = Output(unit="m/s")
+        turn_rate = Output(unit="rad/s")
+        pitch_rate = Output(unit="rad/s")
+
+        def step(self, g):
+            assert not g.motion_state.flags.writeable
+
+    Simulation(Mission(blocks=[block(autonomy=Pushy(), motion=MODEL)])).step()
+
+
+def test_a_whole_number_with_a_unit_is_a_real_parameter() -> None:
+    class Runner(Autonomy):
+        top_speed = Param(35, unit="m/s")
+        prey_team = Param(1)
+
+    assert Runner(top_speed=35.5).top_speed == 35.5
+    with pytest.raises(ParameterError, match="whole number"):
+        Runner(prey_team=1.5)
+
+
+def test_parameters_are_given_by_name() -> None:
+    with pytest.raises(
+        ParameterError, match=r"Unicycle\(5\): parameters are given by name; there are: vel_max"
+    ):
+        Unicycle(5)
+
+
+def test_a_list_of_another_length_than_the_stack_is_refused() -> None:
+    game = Mission(blocks=[block(autonomy=Planner(), motion=MODEL)])
+    with pytest.raises(ParameterError, match=r"'a.Unicycle.vel_max' has 2 values for 3 worlds"):
+        Simulation(game, seeds=[1, 2, 3], params={"a.Unicycle.vel_max": [1.0, 2.0]})
