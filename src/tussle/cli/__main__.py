@@ -1,0 +1,5 @@
+"""`python -m tussle.cli` is `tussle`."""
+
+from tussle.cli import main
+
+main()

@@ -1,0 +1,184 @@
+"""The commands and their options."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+import tussle
+from tussle.cli.terminal import EXIT_CODES, OK, out, run_guarded, told
+
+if TYPE_CHECKING:
+    from tussle.cli.play import Source
+
+EPILOG = "Exit codes: " + " · ".join(f"{code} {meaning}" for code, meaning in EXIT_CODES.items())
+
+app = typer.Typer(
+    help="Thousands of robots in one 3D world: play missions, look at plugins, write your own.",
+    epilog=EPILOG, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+)  # fmt: skip
+
+MissionName = Annotated[str, typer.Argument(metavar="MISSION", help="A mission file, or the name of one that ships (tussle missions).", show_default=False)]
+Seed = Annotated[int | None, typer.Option(help="Seed of the game; by default the mission's, or 1.", show_default=False)]
+Set = Annotated[list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A value of the mission's ${name=default}, or of anything by path: prey.Boids.max_speed='50 kt', prey.motion_model=SimpleAircraft, run.dt=0.05. As often as needed.", show_default=False)]
+More = Annotated[list[str] | None, typer.Argument(hidden=True)]
+End = Annotated[str | None, typer.Option(metavar="TIME", help="End the game at this time: 60, or '2 min'.", show_default=False)]
+Strict = Annotated[bool, typer.Option("--strict", help="Unknown tags and attributes of the mission are errors.")]
+PluginFiles = Annotated[list[Path] | None, typer.Option("--plugin-path", metavar="FILE", help="A Python file with plugins of yours. As often as needed.", show_default=False)]
+Large = Annotated[bool, typer.Option("--allow-large", help="Lift the limits on how much a mission may ask for.")]
+Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
+
+
+def _version(is_asked: bool) -> None:
+    if is_asked:
+        out().print(f"tussle {tussle.__version__}")
+        raise typer.Exit(OK)
+
+
+@app.callback()
+def _options(
+    version: Annotated[bool, typer.Option("--version", help="Show the version.", callback=_version, is_eager=True)] = False,
+) -> None:
+    pass
+
+
+@app.command(epilog=EPILOG)
+def run(
+    mission: MissionName,
+    more: More = None,
+    seed: Seed = None,
+    settings: Set = None,
+    end: End = None,
+    directory: Annotated[Path | None, typer.Option("--out", metavar="DIR", help="The run directory; by default runs/NAME-SEED-TIMESTAMP.", show_default=False)] = None,
+    no_log: Annotated[bool, typer.Option("--no-log", help="Record nothing.")] = False,
+    log_period: Annotated[float | None, typer.Option(metavar="S", help="Time between recorded states [s]; by default every step.", show_default=False)] = None,
+    pace: Annotated[float | None, typer.Option(metavar="X", help="Play no faster than X times real time. The result is the same.", show_default=False)] = None,
+    start_from: Annotated[Path | None, typer.Option(metavar="TABLE", help="Take ids, times of birth and first states from a recorded trajectory.", show_default=False)] = None,
+    strict: Strict = False,
+    plugin_files: PluginFiles = None,
+    allow_large: Large = False,
+    debug: Debug = False,
+) -> None:
+    """Play one game, record it, and show what came of it."""
+    if no_log and (directory is not None or log_period is not None):
+        raise typer.BadParameter("--no-log records nothing, so --out and --log-period mean nothing beside it")
+    for name, value in (("--pace", pace), ("--log-period", log_period)):
+        if value is not None and not 0.0 < value < float("inf"):
+            raise typer.BadParameter(f"{name} {value:g} is not allowed; it takes a number > 0")
+    with told(debug):
+        from tussle.cli.play import Record, play
+
+        source = _source(mission, settings, more, seed, end, strict, plugin_files, allow_large)
+        code = play(source, Record(directory, not no_log, log_period), pace, start_from)
+    raise typer.Exit(code)
+
+
+@app.command(epilog=EPILOG)
+def check(
+    mission: MissionName,
+    more: More = None,
+    settings: Set = None,
+    strict: Strict = False,
+    plugin_files: PluginFiles = None,
+    allow_large: Large = False,
+    debug: Debug = False,
+) -> None:
+    """Read a mission and build its game without playing it; tell all that is wrong with it."""
+    with told(debug):
+        from tussle.engine.simulation import Simulation
+
+        source = _source(mission, settings, more, None, None, strict, plugin_files, allow_large)
+        loaded, made, seed = source.read()
+        with Simulation(made, seed) as simulation:
+            n = sum(block.count for block in made.blocks)
+            notes = f", {len(loaded.notes)} note(s)" if loaded.notes else ""
+            out().print(f"{loaded.name} can be played: {n} entities, grade {simulation.grade}{notes}", soft_wrap=True)
+
+
+@app.command(epilog=EPILOG)
+def describe(
+    name: Annotated[str, typer.Argument(metavar="MISSION|PLUGIN", help="A mission file, a mission that ships, or a plugin.", show_default=False)],
+    more: More = None,
+    settings: Set = None,
+    strict: Strict = False,
+    plugin_files: PluginFiles = None,
+    allow_large: Large = False,
+    debug: Debug = False,
+) -> None:
+    """Show a plugin's parameters and channels, or who takes part in a mission and the list of its step."""
+    with told(debug):
+        from tussle.cli import pages
+        from tussle.cli.lookup import plugin_named
+
+        found = plugin_named(name, plugin_files or ())
+        if found is not None:
+            pages.show_plugin(name, found)
+            return
+        from tussle.engine.simulation import Simulation
+
+        loaded, made, seed = _source(name, settings, more, None, None, strict, plugin_files, allow_large).read()
+        with Simulation(made, seed) as simulation:
+            pages.show_mission(loaded.name, loaded.path, made, simulation, seed)
+
+
+@app.command(epilog=EPILOG)
+def plugins(plugin_files: PluginFiles = None, debug: Debug = False) -> None:
+    """List all plugins: those that ship, those of other packages, those of your files."""
+    with told(debug):
+        from tussle.cli import pages
+        from tussle.cli.lookup import plugins_of
+
+        pages.show_plugins(plugins_of(plugin_files or ()))
+
+
+@app.command(epilog=EPILOG)
+def missions(debug: Debug = False) -> None:
+    """List the missions that ship."""
+    with told(debug):
+        from tussle.cli import pages
+
+        pages.show_missions()
+
+
+@app.command(epilog=EPILOG)
+def new(
+    kind: Annotated[str, typer.Argument(metavar="KIND", help="autonomy, motion, controller, sensor, interaction, metric or network.", show_default=False)],
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Of the class, such as MyBoids.", show_default=False)],
+    origin: Annotated[str | None, typer.Option("--from", metavar="STOCK", help="Begin with a copy of a plugin that ships.", show_default=False)] = None,
+    directory: Annotated[Path, typer.Option("--out", metavar="DIR", help="Where the files are written.")] = Path(),
+    debug: Debug = False,
+) -> None:
+    """Write a plugin that works, its test, and a mission that plays it."""
+    with told(debug):
+        from tussle.cli import pages
+        from tussle.cli.progress import compiling
+        from tussle.cli.scaffold import write_plugin
+
+        with compiling():
+            written = write_plugin(kind, name, origin, directory)
+        pages.show_written(written.files, written.next_steps)
+
+
+def _source(
+    mission: str,
+    settings: list[str] | None,
+    more: list[str] | None,
+    seed: int | None,
+    end: str | None,
+    strict: bool,
+    plugin_files: list[Path] | None,
+    allow_large: bool,
+) -> Source:
+    from tussle.cli.play import Source
+    from tussle.cli.settings import read_settings
+
+    given = read_settings([*(settings or ()), *(more or ())])
+    return Source(mission, given, seed, end, strict, tuple(plugin_files or ()), allow_large)
+
+
+def start() -> None:
+    """Run the command line."""
+    run_guarded(lambda: app(prog_name="tussle"))

@@ -1,0 +1,171 @@
+"""`tussle run`: one game, played, shown and recorded."""
+
+from __future__ import annotations
+
+import datetime
+import re
+import time
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tussle.cli.interrupt import Interrupt
+from tussle.cli.progress import Meter, compiling
+from tussle.cli.settings import ending_by_time, read_end
+from tussle.cli.summary import Speed, show_summary
+from tussle.cli.terminal import say, say_note
+from tussle.engine.simulation import Simulation
+from tussle.errors import PluginError
+from tussle.mission import Loaded, Mission, read_mission
+
+if TYPE_CHECKING:
+    from tussle.record import Recorder
+
+NAP = 0.05  # [s] longest sleep of a paced run, so that Ctrl-C is heard
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where a mission comes from, and what is set in it; the options that run, check and describe share.
+
+    Attributes:
+        mission: A file, or the name of a mission that ships.
+        settings: Values of the file's ${name=default}, and of anything by path.
+        seed: Instead of the mission's.
+        end: Time that ends the game, whatever else does.
+        strict: What is unknown is an error.
+        plugin_files: Python files with plugins.
+        allow_large: Without limits on how much the mission may ask for.
+    """
+
+    mission: str
+    settings: dict[str, str]
+    seed: int | None = None
+    end: str | None = None
+    strict: bool = False
+    plugin_files: Sequence[Path] = ()
+    allow_large: bool = False
+
+    def read(self) -> tuple[Loaded, Mission, int]:
+        """The file as read, the mission, and the seed."""
+        end = {} if self.end is None else {"run.end": repr(read_end(self.end))}
+        loaded = read_mission(
+            self.mission,
+            {**self.settings, **end},
+            strict=self.strict,
+            plugin_files=tuple(self.plugin_files),
+            allow_large=self.allow_large,
+        )
+        for note in loaded.notes:
+            say_note(note)
+        seed = self.seed if self.seed is not None else loaded.seed if loaded.seed is not None else 1
+        return loaded, ending_by_time(loaded.mission) if end else loaded.mission, seed
+
+    @property
+    def given(self) -> dict[str, str]:
+        """All that was set, for the run directory."""
+        return self.settings if self.end is None else {**self.settings, "run.end": self.end}
+
+
+@dataclass(frozen=True)
+class Record:
+    """Where a run is written, and how often."""
+
+    directory: Path | None = None
+    is_on: bool = True
+    period: float | None = None
+
+
+def play(source: Source, record: Record, pace: float | None, start_from: Path | None) -> int:
+    """Play a mission and show what came of it.
+
+    Returns:
+        The exit code.
+    """
+    began = time.perf_counter()
+    loaded, mission, seed = source.read()
+    more: dict[str, Any] = {}
+    if start_from is not None:
+        from tussle.record import read_table
+
+        more["start_from"] = read_table(start_from)
+    with ExitStack() as stack:
+        with compiling():
+            simulation = stack.enter_context(Simulation(mission, seed, **more))
+        interrupt = stack.enter_context(Interrupt())
+        recorder = _recorder(simulation, record, loaded, seed, source.given) if record.is_on else None
+        speed = Speed(began)
+        try:
+            _run(simulation, loaded.path.stem, speed, pace, interrupt)
+        except PluginError as error:
+            _close(recorder, str(error))
+            _tell_directory(recorder)
+            raise
+        _close(recorder, "interrupted" if interrupt.code else "")
+        show_summary(simulation, loaded.name, speed, recorder.directory if recorder else None, bool(interrupt.code))
+    if interrupt.code:
+        kept = f"what was played is kept in {recorder.directory}" if recorder else "nothing was recorded (--no-log)"
+        say("interrupted", f"at t = {simulation.t[0]:g} s, after step {simulation.steps[0]}; {kept}", "bold yellow")
+    return interrupt.code
+
+
+def _run(simulation: Simulation, name: str, speed: Speed, pace: float | None, interrupt: Interrupt) -> None:
+    """Play to the end, or until an interrupt. The first step, which loads and compiles, counts as preparation."""
+    with compiling():
+        simulation.step()
+    start = float(simulation.t[0])
+    speed.begin(start)
+    end = simulation.mission.end if "time" in simulation.mission.end_conditions else None
+
+    with Meter(name, start, end) as meter:
+
+        def is_enough(s: Simulation) -> bool:
+            t = float(s.t[0])
+            meter.show(t)
+            if pace is not None:
+                _wait(speed.wall_began + (t - start) / pace, meter, t, interrupt)
+            return bool(interrupt.code)
+
+        simulation.run_until(is_enough)
+    speed.end(float(simulation.t[0]))
+
+
+def _wait(until: float, meter: Meter, t: float, interrupt: Interrupt) -> None:
+    """Sleep until a moment of the wall clock, so that the game keeps its pace; a game that is late is not hurried."""
+    while (left := until - time.perf_counter()) > 0.0 and not interrupt.code:
+        time.sleep(min(left, NAP))
+        meter.show(t)
+
+
+def _recorder(simulation: Simulation, record: Record, loaded: Loaded, seed: int, given: dict[str, str]) -> Recorder:
+    from tussle.record import Recorder
+
+    directory = record.directory or _new_directory(loaded.path.stem, seed)
+    return Recorder(
+        simulation, directory, period=record.period, mission_text=loaded.text, parameters=given
+    )
+
+
+def _new_directory(name: str, seed: int) -> Path:
+    """runs/NAME-SEED-TIMESTAMP, with a number behind it where that is taken."""
+    stamp = datetime.datetime.now().strftime("%Y%m%d-%H%M%S")  # noqa: DTZ005 - the user's own clock
+    plain = re.sub(r"[^A-Za-z0-9_.-]+", "_", name).strip("._") or "mission"
+    base = Path("runs") / f"{plain[:80]}-{seed}-{stamp}"
+    number, path = 1, base
+    while path.exists():
+        number += 1
+        path = base.with_name(f"{base.name}-{number}")
+    return path
+
+
+def _close(recorder: Recorder | None, interrupted: str) -> None:
+    if recorder is not None:
+        recorder.close(interrupted)
+
+
+def _tell_directory(recorder: Recorder | None) -> None:
+    if recorder is not None:
+        say_note(f"what was played until then is kept in {recorder.directory}")
+

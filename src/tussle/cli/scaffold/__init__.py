@@ -1,0 +1,119 @@
+"""`tussle new`: a plugin of your own that works from the start, with its test and a mission that plays it."""
+
+from __future__ import annotations
+
+import keyword
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tussle import stock
+from tussle.api import Plugin
+from tussle.cli.scaffold.copied import class_renamed, merged
+from tussle.cli.scaffold.played import mission_text
+from tussle.errors import MissionError, ParameterError, listed, nearest_name
+
+TEMPLATES = Path(__file__).parent / "templates"
+KINDS = ("autonomy", "motion", "controller", "sensor", "interaction", "metric", "network")
+
+TEST = '''"""{name} keeps the contract of plugins, and its mission can be played."""
+
+from pathlib import Path
+
+from {module} import {name}
+
+from tussle import Simulation
+from tussle.api import check_plugin
+from tussle.mission import read_mission
+
+HERE = Path(__file__).parent
+
+
+def test_it_keeps_the_contract():
+    check_plugin({name})
+
+
+def test_its_mission_is_played_to_the_end():
+    loaded = read_mission(HERE / "{module}.xml", plugin_files=[HERE / "{module}.py"])
+    (result,) = Simulation(loaded.mission, seeds=1).run()
+    assert result.end == "time"
+'''
+
+
+@dataclass(frozen=True)
+class Written:
+    """What was written.
+
+    Attributes:
+        files: Path -> what it is.
+        next_steps: What to type next.
+    """
+
+    files: dict[Path, str]
+    next_steps: str
+
+
+def write_plugin(kind: str, name: str, origin: str | None, directory: Path) -> Written:
+    """Write NAME.py, test_NAME.py and NAME.xml.
+
+    Args:
+        kind: "autonomy", "motion", "controller", "sensor", "interaction", "metric" or "network".
+        name: Name of the class, such as "MyBoids"; the files are called after it.
+        origin: A plugin that ships, to begin with a copy of it.
+        directory: Where; made if need be.
+
+    Raises:
+        ParameterError: The kind or the plugin to copy is unknown, or the name cannot be a class's.
+        MissionError: One of the files is there already, or cannot be written.
+    """
+    _check_names(kind, name)
+    source, plugin = _from_template(kind, name) if origin is None else _from_stock(kind, name, origin)
+    module = re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", name).lower()
+    texts = {
+        directory / f"{module}.py": (source, f"the {kind}"),
+        directory / f"test_{module}.py": (TEST.format(name=name, module=module), "its test"),
+        directory / f"{module}.xml": (mission_text(kind, name, plugin), "a mission that plays it"),
+    }
+    _write({path: text for path, (text, _) in texts.items()})
+    at = directory / module
+    steps = f"tussle run {at}.xml --plugin-path {at}.py\npytest {directory / f'test_{module}.py'}"
+    return Written({path: what for path, (_, what) in texts.items()}, steps)
+
+
+def _check_names(kind: str, name: str) -> None:
+    if kind not in KINDS:
+        raise ParameterError(f"there is no kind {kind!r}{nearest_name(kind, KINDS)}; {listed(KINDS)}")
+    if not re.fullmatch(r"[A-Z][A-Za-z0-9]*", name) or keyword.iskeyword(name):
+        raise ParameterError(
+            f"{name!r} is no name of a plugin; it takes letters and digits, a capital first, such as MyBoids"
+        )
+    if name in stock.manifest():
+        raise ParameterError(f"a plugin that ships is called {name!r}; give yours a name of its own, such as My{name}")
+
+
+def _from_template(kind: str, name: str) -> tuple[str, Plugin]:
+    from importlib import import_module
+
+    text = (TEMPLATES / f"{kind}.py").read_text(encoding="utf-8")
+    plugin: Plugin = import_module(f"tussle.cli.scaffold.templates.{kind}").New()
+    return class_renamed(text, "New", name), plugin
+
+
+def _from_stock(kind: str, name: str, origin: str) -> tuple[str, Plugin]:
+    cls: Any = stock.load(origin)
+    if cls.kind != kind:
+        raise ParameterError(f"--from {origin}: this is of the kind {cls.kind}, not {kind}")
+    return class_renamed(merged(cls), origin, name), cls()
+
+
+def _write(texts: dict[Path, str]) -> None:
+    for path in texts:
+        if path.exists():
+            raise MissionError(f"{path}: there is such a file already; choose another name, or remove it")
+    for path, text in texts.items():
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text, encoding="utf-8")
+        except OSError as error:
+            raise MissionError(f"{path}: it cannot be written: {error.strerror or error}") from error

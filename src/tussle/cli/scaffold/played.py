@@ -1,0 +1,120 @@
+"""A small mission around one plugin, as text."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from xml.sax.saxutils import quoteattr
+
+from tussle import stock
+from tussle.api import Plugin
+from tussle.engine.simulation import Simulation
+from tussle.errors import MissionError, TussleError
+from tussle.mission import Block, Mission
+
+SELF = "SELF"
+"""Stands for the plugin itself in a lineup."""
+
+LINEUPS: dict[str, list[tuple[str, str, str]]] = {
+    # (autonomies, controller, motion) to be tried in turn.
+    "autonomy": [
+        (SELF, "DirectController", "Unicycle"),
+        (SELF, "UnicyclePID", "Unicycle"),
+        (SELF, "SingleIntegratorControllerSimple", "SingleIntegrator"),
+        (SELF, "SimpleAircraftControllerPID", "SimpleAircraft"),
+        (f"{SELF} Boids", "DirectController", "Unicycle"),
+    ],
+    "motion": [
+        ("Boids", "DirectController", SELF),
+        ("Straight", "UnicyclePID", SELF),
+        ("Straight", "SimpleAircraftControllerPID", SELF),
+        ("Straight", "HarmonicOscillatorConstController", SELF),
+    ],
+    "controller": [
+        ("Straight", SELF, "Unicycle"),
+        ("Straight", SELF, "SimpleAircraft"),
+        ("Boids", SELF, "SingleIntegrator"),
+        ("Boids", SELF, "Unicycle"),
+        ("Straight", SELF, "HarmonicOscillator"),
+    ],
+}
+USUAL = [("Boids", "DirectController", "Unicycle")]
+
+TEXT = """\
+<?xml version="1.0"?>
+<runscript name={title}>
+
+  <run start="0" end="60" dt="0.1" motion_multiplier="{substeps}"/>
+  <end_condition>time</end_condition>
+  <seed>1</seed>
+{world}
+  <entity>
+    <name>robots</name>
+    <team_id>1</team_id>
+    <count>${{count=20}}</count>
+    <x>0</x> <y>0</y> <z>200</z>
+    <variance_x>40000</variance_x> <variance_y>40000</variance_y> <variance_z>400</variance_z>
+    <speed>15</speed>
+{autonomy}    <controller>{controller}</controller>
+    <motion_model>{motion}</motion_model>
+{sensor}  </entity>
+
+  <entity>
+    <name>others</name>
+    <team_id>2</team_id>
+    <count>5</count>
+    <x>800</x> <y>0</y> <z>200</z> <heading>180</heading>
+    <variance_x>10000</variance_x> <variance_y>10000</variance_y>
+    <autonomy>Boids</autonomy>
+    <motion_model>Unicycle</motion_model>
+  </entity>
+
+</runscript>
+"""
+
+
+def mission_text(kind: str, name: str, plugin: Plugin) -> str:
+    """A mission in which 20 robots and 5 others play, and the plugin with them.
+
+    Args:
+        kind: Of the plugin.
+        name: By which it will be known.
+        plugin: As data; found out with it is which other plugins it goes with.
+
+    Raises:
+        MissionError: It goes with none of those that ship.
+    """
+    autonomies, controller, motion = (part.replace(SELF, name) for part in _lineup(kind, plugin))
+    autonomy = "".join(f"    <autonomy>{each}</autonomy>\n" for each in autonomies.split())
+    tags = {"interaction": "entity_interaction", "metric": "metrics", "network": "network"}
+    world = f"\n  <{tags[kind]}>{name}</{tags[kind]}>\n" if kind in tags else ""
+    return TEXT.format(
+        title=quoteattr(f"{name} at work"), substeps=10, world=world, autonomy=autonomy, controller=controller,
+        motion=motion, sensor=f"    <sensor>{name}</sensor>\n" if kind == "sensor" else "",
+    )  # fmt: skip
+
+
+def _lineup(kind: str, plugin: Plugin) -> tuple[str, str, str]:
+    """The first lineup that can be built."""
+    why = ""
+    for lineup in LINEUPS.get(kind, USUAL):
+        try:
+            with Simulation(_mission(kind, plugin, lineup)):
+                return lineup
+        except TussleError as error:
+            why = str(error)
+    raise MissionError(f"no mission could be made for {plugin!r}: it goes with none of the plugins that ship ({why})")
+
+
+def _mission(kind: str, plugin: Plugin, lineup: tuple[str, str, str]) -> Mission:
+    autonomies, controller, motion = ([plugin if n == SELF else stock.load(n)() for n in part.split()] for part in lineup)
+    sensor = plugin if kind == "sensor" else ()
+    block = Block(
+        name="robots", position=(0, 0, 200), autonomy=autonomies, controller=controller, motion=motion[0], sensor=sensor
+    )  # fmt: skip
+    world = dict(_world(kind, plugin))
+    return Mission(blocks=[block], end=1.0, **world)
+
+
+def _world(kind: str, plugin: Plugin) -> Iterator[tuple[str, Plugin]]:
+    if kind in ("interaction", "metric", "network"):
+        yield f"{kind}s", plugin

@@ -1,0 +1,25 @@
+"""A network: who hears whom."""
+
+import numpy as np
+
+from tussle.api import Batch, Network, Param, WorldView
+
+
+class New(Network):
+    """Radio with a range: a message reaches the sender, and whoever is nearer than that."""
+
+    grade = "portable"
+
+    radius = Param(400.0, unit="m", ge=0.0, doc="Distance within which others hear.")
+
+    def route(self, w: WorldView, messages: Batch) -> tuple[np.ndarray, np.ndarray]:
+        """For each delivery, the number of the message and the row of the receiver."""
+        sender = w.rows_at(messages.world, messages.sender)
+        near = w.near(self.radius[w.world])  # pairs (row, other), ordered by row
+        first = np.searchsorted(near.row, sender, side="left")
+        count = np.where(sender >= 0, np.searchsorted(near.row, sender, side="right") - first, 0)
+        number = np.repeat(np.arange(messages.n), count)
+        place = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+        own = np.flatnonzero(sender >= 0)
+        receiver = near.other[np.repeat(first, count) + place]
+        return np.concatenate([own, number]), np.concatenate([sender[own], receiver])

@@ -1,0 +1,124 @@
+"""What is said on the terminal, how errors are told, and what exit codes mean."""
+
+from __future__ import annotations
+
+import sys
+import traceback
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache
+from typing import Any
+
+import typer
+from rich.console import Console
+from rich.text import Text
+
+from tussle.errors import PluginError, RecordError, TussleError
+
+WIDEST = 100
+"""Tables and bars grow no wider than this, on the widest of screens."""
+
+OK, WRONG_INPUT, USAGE, PLUGIN_FAILED, NOT_WRITTEN, OWN_FAULT = 0, 1, 2, 3, 4, 70
+INTERRUPTED, TERMINATED = 130, 143
+
+EXIT_CODES = {
+    OK: "all went well",
+    WRONG_INPUT: "the mission, a parameter or a plugin file is wrong; nothing was played",
+    USAGE: "the command line itself is wrong",
+    PLUGIN_FAILED: "a plugin failed while the game was played",
+    NOT_WRITTEN: "the run directory could not be written or read",
+    OWN_FAULT: "tussle itself failed, which is a bug: please report it",
+    INTERRUPTED: "interrupted by Ctrl-C (143: by SIGTERM); what was played is kept",
+}
+
+
+@cache
+def out() -> Console:
+    """Where results go."""
+    return _console(stderr=False)
+
+
+@cache
+def err() -> Console:
+    """Where progress, notes and errors go, so that results can be piped."""
+    return _console(stderr=True)
+
+
+def _console(stderr: bool) -> Console:
+    console = Console(stderr=stderr, highlight=False, emoji=False)
+    console.width = min(console.width, WIDEST)
+    return console
+
+
+def say(label: str, text: str, style: str = "") -> None:
+    """One message on the error stream, its label in front; lines are left to the terminal, so that file:line can be clicked."""
+    first, *more = text.splitlines() or [""]
+    message = Text.assemble((f"{label}: ", style), first, *(f"\n{line}" for line in more))
+    err().print(message, soft_wrap=True)
+
+
+def say_error(text: str) -> None:
+    """What went wrong."""
+    say("error", text, "bold red")
+
+
+def say_note(text: str) -> None:
+    """What the user should know."""
+    say("note", text, "bold yellow")
+
+
+def code_of(error: BaseException) -> int:
+    """The exit code that an error stands for."""
+    if isinstance(error, KeyboardInterrupt):
+        return INTERRUPTED
+    if isinstance(error, PluginError):
+        return PLUGIN_FAILED
+    if isinstance(error, RecordError):
+        return NOT_WRITTEN
+    return WRONG_INPUT if isinstance(error, TussleError) else OWN_FAULT
+
+
+@contextmanager
+def told(is_debugging: bool) -> Iterator[None]:
+    """Ends the command with one message and an exit code where something fails inside; with a traceback when debugging.
+
+    Raises:
+        typer.Exit: Something failed, and has been told.
+    """
+    with warnings.catch_warnings():
+        warnings.showwarning = _show_warning
+        try:
+            yield
+        except (typer.Exit, typer.BadParameter):
+            raise
+        except BaseException as error:  # noqa: BLE001 - whatever it is, the user gets a message and an exit code
+            if isinstance(error, SystemExit):
+                raise
+            if is_debugging:
+                traceback.print_exc()
+            _tell(error)
+            raise typer.Exit(code_of(error)) from None
+
+
+def _tell(error: BaseException) -> None:
+    if isinstance(error, KeyboardInterrupt):
+        say("interrupted", "nothing was played", "bold yellow")
+    elif isinstance(error, TussleError):
+        say_error(str(error))
+    else:
+        say_error(
+            f"tussle itself failed: {type(error).__name__}: {error}\nThis is a bug. --debug shows where it happened."
+        )
+
+
+def _show_warning(message: Warning | str, *_: Any) -> None:
+    say("warning", str(message), "bold yellow")
+
+
+def run_guarded(program: Callable[[], Any]) -> None:
+    """Call the program with streams that can print anything: a terminal that lacks a character shows another one."""
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")
+    program()
