@@ -162,6 +162,14 @@ class Me:
         x, y, z = other.pos - self.pos
         return math.sqrt(x * x + y * y + z * z)
 
+    def uniform(self, label: str) -> float:
+        """A draw in [0, 1): the same for this entity whatever else there is in the world. A second draw needs another label."""
+        return float(self._g.draws_of(self._row, "uniform", label, 1)[0])
+
+    def normal(self, label: str) -> float:
+        """A standard normal draw; as `uniform`."""
+        return float(self._g.draws_of(self._row, "normal", label, 1)[0])
+
     def publish(self, topic: str, **fields: Any) -> None:
         """Send a message to a `Publish` column; entity references may be given as entities."""
         publisher = self._plugin.__dict__.get(topic)

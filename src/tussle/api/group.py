@@ -234,6 +234,16 @@ class GroupView:
         )
         return out if k is not None else out[0]
 
+    def draws_of(self, row: int, law: str, label: str, k: int) -> np.ndarray:
+        """The draws of one row, (k,): the same that `uniform` and `normal` give it."""
+        one = slice(row, row + 1)
+        function = rng.uniform if law == "uniform" else rng.normal
+        place, step = (
+            np.ascontiguousarray(self.place_in_block[one]),
+            np.ascontiguousarray(self.step_count[one]),
+        )
+        return np.asarray(function(self._seeds[one], self._stream(label), place, step, self.substep, k)[:, 0])
+
     def normal_pairs(self, label: str, row: np.ndarray, other_id: np.ndarray, k: int) -> np.ndarray:
         """Standard normal draws of pairs, (k, m): keyed by the row's entity and the other's id."""
         seeds = self._seeds[row] ^ (other_id.astype(np.uint64) * GOLDEN)

@@ -49,6 +49,7 @@ class Newborn:
         world = np.concatenate([p.world for p in parts])
         ids = np.concatenate([p.id for p in parts])
         order = np.lexsort((ids, world))
+
         def take(name: str) -> np.ndarray:
             return np.asarray(np.concatenate([getattr(p, name) for p in parts], axis=-1)[..., order])
 
@@ -192,6 +193,7 @@ class Births:
         elif rejects is not None:
             assert taken is not None
             self._separate(block, spec, worlds, places, pos, rejects, taken)
+
         def value(name: str) -> np.ndarray:
             return self.overrides.block_values(spec, name, worlds)
 

@@ -267,7 +267,8 @@ class Population:
                     except Exception as error:
                         where, step = f"{group.name} {about.id}", int(self.context.clock.step[about.world])
                         self.on_failure(
-                            about.world, failure.raised(error, binding.plugin, where=where, step=step, world=about.world)
+                            about.world,
+                            failure.raised(error, binding.plugin, where=where, step=step, world=about.world),
                         )
 
     def _close_handles(self, gone: np.ndarray) -> None:

@@ -76,7 +76,9 @@ class Schedule:
             for binding in group.sensors:
                 calls.append(self._entity_call("sensor", group, binding))
         if sim.interactions and any(g.body_inputs for g in groups):
-            calls.append(Call("forces back to zero: the motion models have consumed them", self._clear_forces))
+            calls.append(
+                Call("forces back to zero: the motion models have consumed them", self._clear_forces)
+            )
         calls += [self._world_call("interaction", r) for r in sim.interactions if not r.plugin.is_idle]
         if sim.interactions:
             calls.append(Call("take over what was moved", sim.take_over_moves))
@@ -189,7 +191,9 @@ class Schedule:
                     whole()
                 elif due.any():
                     self._part(group, binding, due, action)
-            for inbox in inboxes:  # of a group without rows too: who comes later has not heard what was said before
+            for (
+                inbox
+            ) in inboxes:  # of a group without rows too: who comes later has not heard what was said before
                 inbox.clear(due)
 
         def lean() -> None:

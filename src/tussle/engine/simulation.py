@@ -365,7 +365,7 @@ class Simulation:
     # -- the end of a step ----------------------------------------------------------------------------------------------------
 
     def take_over_moves(self) -> None:
-        """Motion models and beliefs take over the rows that world plugins have moved."""
+        """Motion models take over the rows that world plugins have moved; beliefs follow with the next reading of their sensor."""
         view = self.world_view
         if not view.moved:
             return

@@ -63,6 +63,7 @@ def _sub_group(group: Group, bodies: Bodies, first: int, rows: np.ndarray) -> Gr
         view.services = {}
         views[id(getattr(group, name))] = view
         setattr(sub, name, view)
+
     def clone(b: Binding) -> Binding:
         return _sub_binding(b, views[id(b.view)], rows)
 

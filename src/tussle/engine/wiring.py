@@ -99,7 +99,10 @@ class Wiring:
                 continue
             offered = {c for _, column in written_channels(controller) for c in column.channels}
             needed = [
-                c for _, column in read_channels(following[0]) for c in column.channels if not getattr(column, "optional", False)
+                c
+                for _, column in read_channels(following[0])
+                for c in column.channels
+                if not getattr(column, "optional", False)
             ]
             for channel in needed if offered else []:
                 if channel not in offered:

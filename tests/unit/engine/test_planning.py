@@ -29,7 +29,10 @@ class Planner(EasyAutonomy):
 
 def test_a_rollout_from_the_motion_state_is_what_is_flown() -> None:
     game = Mission(
-        blocks=[block(count=3, variance=(100, 100, 0), autonomy=Planner(), motion=MODEL)], dt=0.1, end=2.0, motion_multiplier=4
+        blocks=[block(count=3, variance=(100, 100, 0), autonomy=Planner(), motion=MODEL)],
+        dt=0.1,
+        end=2.0,
+        motion_multiplier=4,
     )
     sim = Simulation(game)
     sim.step(7)
@@ -59,6 +62,36 @@ def test_a_whole_number_with_a_unit_is_a_real_parameter() -> None:
     assert Runner(top_speed=35.5).top_speed == 35.5
     with pytest.raises(ParameterError, match="whole number"):
         Runner(prey_team=1.5)
+
+
+def test_easy_mode_draws_what_vector_mode_draws() -> None:
+    class Easy(EasyAutonomy):
+        seen = State("u n")
+        speed = Output(unit="m/s")
+        turn_rate = Output(unit="rad/s")
+        pitch_rate = Output(unit="rad/s")
+
+        def step_one(self, me):
+            me.seen = me.uniform("wind"), me.normal("gust")
+
+    class Vector(Autonomy):
+        seen = State("u n")
+
+        def step(self, g):
+            self.seen[:] = g.uniform("wind"), g.normal("gust")
+
+    pair = [Easy(name="same"), Vector(name="other")]
+    game = Mission(blocks=[block(count=4, autonomy=pair, motion=MODEL)])
+    sim = Simulation(game, seeds=[5, 6])
+    sim.step(3)
+    easy, _ = sim.read("a.same.seen")
+    alone = Simulation(
+        game.replace(blocks=[block(count=4, autonomy=[Easy(name="x"), Vector(name="same")], motion=MODEL)]),
+        seeds=[5, 6],
+    )
+    alone.step(3)
+    assert easy.tobytes() == alone.read("a.same.seen")[0].tobytes()
+    assert len(np.unique(easy)) == easy.size
 
 
 def test_parameters_are_given_by_name() -> None:

@@ -190,7 +190,9 @@ def test_missions_that_cannot_be(values, message):
 
 
 def test_unknown_arguments_are_refused():
-    with pytest.raises(MissionError, match=r"Block has no 'sped' \(did you mean 'speed'\?\); there are: name, team"):
+    with pytest.raises(
+        MissionError, match=r"Block has no 'sped' \(did you mean 'speed'\?\); there are: name, team"
+    ):
         block(sped=3)
     with pytest.raises(MissionError, match=r"Mission has no 'ned' \(did you mean 'end'\?\)"):
         Mission(blocks=[block()], ned=3.0)

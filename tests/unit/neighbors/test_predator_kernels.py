@@ -107,7 +107,9 @@ def test_pursuit_points_at_the_target():
     own = [axis[first:].copy() for axis in s.pos]
     yaw, climb = np.linspace(-3, 3, n), np.linspace(-1, 1, n)
     speed, turn, pitch, heading, fast = (np.zeros(n) for _ in range(5))
-    kernels.pursue(*own, *quat_from_euler(np.zeros(n), -climb, yaw), np.full(n, 35.0), rows, *s.pos, speed, turn, pitch)
+    kernels.pursue(
+        *own, *quat_from_euler(np.zeros(n), -climb, yaw), np.full(n, 35.0), rows, *s.pos, speed, turn, pitch
+    )
     kernels.point(*own[:2], np.full(n, 35.0), rows, *s.pos[:2], heading, fast)
     d = s.pos[:, rows] - np.array(own)
     np.testing.assert_allclose(heading, np.arctan2(d[1], d[0]), atol=1e-14)

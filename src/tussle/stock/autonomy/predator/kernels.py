@@ -68,7 +68,9 @@ def hunt(
 
 
 @kernel("F F F F F F F F I F F F Fw Fw Fw")
-def pursue(x, y, z, qw, qx, qy, qz, max_speed, target_row, table_x, table_y, table_z, speed, turn_rate, pitch_rate):
+def pursue(
+    x, y, z, qw, qx, qy, qz, max_speed, target_row, table_x, table_y, table_z, speed, turn_rate, pitch_rate
+):
     """Speed [m/s] and rates [rad/s] towards the target's position; rows without a target keep their last commands.
 
     x, y, z [m], quaternion (qw ... qz), max_speed [m/s], target_row (n,) of the rows; table_x, table_y, table_z (N,) [m].

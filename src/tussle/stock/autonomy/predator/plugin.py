@@ -38,7 +38,9 @@ class Predator(Autonomy):
         x, y, z = g.pos
         target_row = np.empty(g.n, np.int64)
         room, n_claims = 0, 16 * g.n + 64
-        while n_claims > room:  # again, where there are more claims than expected; targets stay as they are then
+        while (
+            n_claims > room
+        ):  # again, where there are more claims than expected; targets stay as they are then
             room = n_claims
             claim_row, claimed = np.empty(room, np.int64), np.empty(room, np.int64)
             n_claims = kernels.hunt(
