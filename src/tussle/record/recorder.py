@@ -118,6 +118,9 @@ class Recorder:
         self._events.append(
             Happenings(BIRTH, world, clock.step[world], ids, nobody, [names[b] for b in block])
         )
+        # A batch without rows too: it brings the heads of the files, and a full disk shows now rather than in the game.
+        self._write(self._happened, self._take_events())
+        self._write(self._trajectory, self._buffer.take())
         sim.observers.append(self._observe)
         sim.events.listen(self._hear)
 
@@ -189,6 +192,8 @@ class Recorder:
         except RecordError:
             self._detach()
             self.is_closed = True
+            for other in (self._trajectory, self._happened):
+                other.abandon()
             raise
 
     def flush(self) -> None:

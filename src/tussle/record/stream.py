@@ -23,8 +23,7 @@ class Stream:
         self.whole = 0
         try:
             self._file = pa.OSFile(str(path), "wb")
-            self._writer = pa.ipc.new_stream(self._file, schema)
-            self.whole = self._file.tell()
+            self._writer = pa.ipc.new_stream(self._file, schema)  # writes nothing before the first batch
         except OSError as error:
             raise self._failed(error) from error
 
@@ -54,13 +53,17 @@ class Stream:
         """Length of the file [B]."""
         return self.path.stat().st_size
 
+    def abandon(self) -> None:
+        """Close the file as it is, without the end mark. A second call does nothing."""
+        self._file.close()
+
     def _drop(self) -> None:
         """Leave the file with its whole batches only: half a batch is of no use to anybody."""
-        self._file.close()
+        self.abandon()
         os.truncate(self.path, self.whole)
 
     def _failed(self, error: OSError) -> RecordError:
-        reason = error.strerror or str(error)
+        reason = os.strerror(error.errno) if error.errno else str(error)
         kept = f"; the {self.rows} rows written before are whole" if self.rows else ""
         return RecordError(f"{self.path}: cannot be written: {reason}{kept}")
 
