@@ -51,6 +51,10 @@ class Catalogue:
     Args:
         plugin_files: Python files whose plugins can be named too; they win over others of the same name.
 
+    Attributes:
+        own: The plugins of these files.
+        names: All that can be named.
+
     Raises:
         MissionError: A file cannot be imported, or holds no plugin.
     """
@@ -59,10 +63,7 @@ class Catalogue:
         self.own: dict[str, type[Plugin]] = {}
         for path in plugin_files:
             self.own.update(load_plugin_file(path))
-
-    def names(self) -> list[str]:
-        """All that can be named."""
-        return sorted({*self.own, *stock.manifest(), *stock.others()})
+        self.names = sorted({*self.own, *stock.manifest(), *stock.others()})
 
     def load(self, name: str) -> type[Plugin]:
         """The class of this name.
@@ -73,12 +74,11 @@ class Catalogue:
         """
         if name in self.own:
             return self.own[name]
-        known = self.names()
-        if name not in known:
+        if name not in self.names:
             if name in historic_names():
                 raise AbsentPluginError(f"{name} is not in tussle yet")
             raise MissionError(
-                f"there is no plugin {name[:80]!r}{nearest_name(name[:80], known)}; {listed(known)}"
+                f"there is no plugin {name[:80]!r}{nearest_name(name[:80], self.names)}; {listed(self.names)}"
             )
         try:
             found = stock.load(name)

@@ -15,6 +15,8 @@ from tussle.mission.problems import shown
 TRUE, FALSE = ("true", "1", "yes", "on"), ("false", "0", "no", "off")
 MOST_INTEGER = 2**53
 """Beyond it a double, through which whole numbers are read, skips some."""
+MOST_ITEMS = 100_000
+"""Numbers, or plugins times a hundred, in one parameter."""
 BEHAVIOR = re.compile(r"\s*\[\s*([^\s\[\]='\"]+)")
 PAIR = re.compile(r"\s*([^\s\[\]='\"]+)\s*=\s*(?:'([^']*)'|\"([^\"]*)\"|([^\s\[\]'\"]+))")
 ROW = re.compile(r"\s*\[([^\[\]]*)\]")
@@ -175,6 +177,8 @@ def behaviors(text: str) -> list[Told]:
             )
         place = end.end()
         found.append(Told(match[1], attributes))
+        if len(found) > MOST_ITEMS // 100:
+            raise MissionError(f"there are more than {MOST_ITEMS // 100:,} plugins in it")
     if text[place:].strip(" \t\n,"):
         raise MissionError(f"{shown(text[place:])} is not a plugin; it takes [ NAME key='value' ... ]")
     return found
@@ -192,6 +196,8 @@ def param(text: str, column: Param, from_geodetic: Callable[..., Any] | None = N
         MissionError: It is not written as this parameter is.
         ParameterError: Its value is not allowed.
     """
+    if not column.is_text and len(text.replace(",", " ").split()) > MOST_ITEMS:
+        raise MissionError(f"{shown(text)} has more than {MOST_ITEMS:,} numbers")
     if column.ragged:
         return column.convert(_ragged(text, column, from_geodetic))
     if column.is_text:

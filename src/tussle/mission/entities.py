@@ -58,14 +58,16 @@ def _merged(common: Iterable[Node], own: list[Node]) -> list[Node]:
 def block_names(nodes: Iterable[Node]) -> list[str]:
     """Name of each entity's block: its tag, else its name, else "team_ID"; a second one of a name is "NAME_2"."""
     taken: set[str] = set()
+    last: dict[str, int] = {}
     names = []
     for node in nodes:
         texts = {child.tag: child.text for child in node.children}
         wanted = node.attributes.get("tag") or texts.get("name") or f"team_{texts.get('team_id') or 0}"
         wanted = "_".join(wanted.replace(".", "_").split())[:80] or "entity"
-        name, n = wanted, 2
+        name = wanted
         while name in taken:
-            name, n = f"{wanted}_{n}", n + 1
+            last[wanted] = last.get(wanted, 1) + 1
+            name = f"{wanted}_{last[wanted]}"
         taken.add(name)
         names.append(name)
     return names
@@ -119,27 +121,39 @@ class Fields:
         return codec(default) if default and default != "none" else None
 
     def number(self, name: str, unit: str = "") -> float:
-        """A number in SI units; a bare one is in the tag's unit."""
-        text_unit = self.known[name].unit
-        value: float = self.read(name, lambda text: codecs.number(text, unit or text_unit, text_unit))
-        return value
+        """A number in SI units, 0 where there is neither a right one nor a default; a bare one is in the tag's unit."""
+        text_unit, bound = self.known[name].unit, self.known[name].bound
+
+        def codec(text: str) -> float:
+            value = codecs.number(text, unit or text_unit, text_unit)
+            if (bound == "> 0" and not value > 0.0) or (bound == ">= 0" and value < 0.0):
+                raise MissionError(f"{shown(text)} is not allowed; it takes a number {bound}")
+            return value
+
+        return self.read(name, codec) or 0.0
 
     def vector(self, *names: str) -> tuple[float, ...]:
         return tuple(self.number(name) for name in names)
+
+    def angles(self, latitude: str, longitude: str) -> tuple[float, float]:
+        """Latitude and longitude [rad], within their ranges."""
+        found = []
+        for name, most in ((latitude, 90.0), (longitude, 360.0)):
+            value = self.number(name, "rad")
+            if abs(value) > math.radians(most):
+                text = f"{name}: {math.degrees(value):g} deg is not allowed; it takes degrees from -{most:g} to {most:g}"
+                self.problems.error(self.place(name), text)
+                value = 0.0
+            found.append(value)
+        return found[0], found[1]
 
     def position(self, origin: Origin) -> tuple[float, ...]:
         """x, y, z, or what latitude, longitude and altitude say where all three are given."""
         geodetic = ("latitude", "longitude", "altitude")
         given = [name for name in geodetic if self.has(name)]
         if len(given) == len(geodetic):
-            angles = [self.number(name, "rad") for name in geodetic[:2]]
-            if max(abs(a) for a in angles) <= 2.0 * math.pi:
-                return tuple(
-                    float(v) for v in origin.from_geodetic(np.array([*angles, self.number("altitude")]))
-                )
-            self.problems.error(
-                self.place("latitude"), "latitude and longitude are out of range; they take degrees"
-            )
+            angles = self.angles("latitude", "longitude")
+            return tuple(float(v) for v in origin.from_geodetic(np.array([*angles, self.number("altitude")])))
         for name in given:
             others = ", ".join(geodetic)
             self.problems.note(
@@ -184,7 +198,7 @@ class EntityReader:
         self._remarks(fields)
         team = fields.read("team_id", lambda text: codecs.whole(text, -MOST_TEAM, MOST_TEAM))
         values: dict[str, Any] = {"name": name, "team": team, "count": self._count(fields)}
-        values |= self._body(fields) | self._births(fields)
+        values |= self._body(fields) | self._births(fields, values["count"])
         taken: set[str] = set()
         for kind in ("autonomy", "controller", "sensor"):
             values[kind] = self.plugins.many(node.find_all(kind), taken)
@@ -238,7 +252,6 @@ class EntityReader:
 
     def _body(self, fields: Fields) -> dict[str, Any]:
         """Where the entities are and how they move at first."""
-        degrees_squared = math.radians(1.0) ** 2
         velocity = fields.vector("vx", "vy", "vz")
         return {
             "health": fields.number("health"),
@@ -253,11 +266,11 @@ class EntityReader:
             "placement": fields.read("placement", lambda text: codecs.chosen(text, PLACEMENTS)),
             "variance": fields.vector("variance_x", "variance_y", "variance_z"),
             "half_width": fields.vector("half_width_x", "half_width_y", "half_width_z"),
-            "heading_variance": fields.read("variance_heading", codecs.number) * degrees_squared,
+            "heading_variance": fields.number("variance_heading", "rad^2"),
             "scatter_first": fields.read("use_variance_all_ents", codecs.truth),
         }
 
-    def _births(self, fields: Fields) -> dict[str, Any]:
+    def _births(self, fields: Fields, count: int) -> dict[str, Any]:
         """When they are born; empty where all are there from the start."""
         if not fields.has("generate_rate"):
             return {}
@@ -272,7 +285,7 @@ class EntityReader:
             return {}
         return {
             "rate": rate,
-            "slots": slots,
+            "slots": min(slots, max(1, count)),  # more never have a birth
             "first_birth": fields.number("generate_start_time"),
             "interval_sd": fields.number("generate_time_variance"),
         }

@@ -13,6 +13,8 @@ class Limits:
         text: Characters of one file, and of all files with their includes and replaced placeholders.
         nodes: Tags of all files together.
         depth: Tags inside tags.
+        blocks: <entity> tags.
+        plugins: Plugins of one entity, and of the world.
         files: Files that one mission includes.
         include_depth: Files that include files.
         rows: Entities of all blocks together, unborn ones included.
@@ -23,6 +25,8 @@ class Limits:
     text: int = 4_000_000
     nodes: int = 100_000
     depth: int = 32
+    blocks: int = 5_000
+    plugins: int = 1_000
     files: int = 64
     include_depth: int = 8
     rows: int = 200_000

@@ -9,7 +9,7 @@ from tussle.errors import MissionError, listed, nearest_name
 
 LONGEST_SHOWN = 80
 MOST_LINES = 100
-"""Errors told at once; a file with more is most likely not a mission."""
+"""Errors told at once, and notes; a file with more is most likely not a mission."""
 
 
 class Place(NamedTuple):
@@ -39,19 +39,33 @@ class Problems:
         self.strict = strict
         self._errors: dict[str, list[Place]] = {}
         self._notes: dict[str, list[Place]] = {}
+        self._n_unsaid = 0
 
     def error(self, place: Place, text: str) -> None:
-        """Something that keeps the mission from being played."""
+        """Something that keeps the mission from being played.
+
+        Raises:
+            MissionError: There are too many by now.
+        """
         self._errors.setdefault(text, []).append(place)
+        if len(self._errors) >= MOST_LINES:
+            self._errors["there may be more: reading stopped here"] = [place]
+            self.check()
 
     def note(self, place: Place, text: str) -> None:
         """Something that the reader of the file should know."""
-        self._notes.setdefault(text, []).append(place)
+        if len(self._notes) < MOST_LINES or text in self._notes:
+            self._notes.setdefault(text, []).append(place)
+        else:
+            self._n_unsaid += 1
 
     def unknown(
         self, place: Place, what: str, name: str, allowed: Iterable[str], *, lists: bool = False
     ) -> None:
         """A tag or attribute that means nothing: a note, or with `strict` an error."""
+        if not self.strict and len(self._notes) >= MOST_LINES:
+            self._n_unsaid += 1  # without the guess at the right name, which takes a while
+            return
         known = sorted(allowed)
         text = f"{what} {shown(name)} is unknown{nearest_name(name[:LONGEST_SHOWN], known)}"
         if self.strict:
@@ -66,7 +80,8 @@ class Problems:
     @property
     def notes(self) -> tuple[str, ...]:
         """One line each, in the order of the file."""
-        return tuple(_lines(self._notes))
+        more = [f"... and {self._n_unsaid} notes more"] if self._n_unsaid else []
+        return (*_lines(self._notes), *more)
 
     def check(self) -> None:
         """Raise what there is.
@@ -76,9 +91,7 @@ class Problems:
         """
         if not self._errors:
             return
-        lines = _lines(self._errors)
-        more = len(lines) - MOST_LINES
-        raise MissionError("\n".join(lines[:MOST_LINES]) + (f"\n... and {more} more" if more > 0 else ""))
+        raise MissionError("\n".join(_lines(self._errors)))
 
 
 def _lines(found: dict[str, list[Place]]) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import stat
 from collections.abc import Mapping, Sequence
@@ -43,17 +44,30 @@ def find_mission(source: str | Path, search: Sequence[str | Path] = ()) -> Path:
         return shipped[source][0]
     if "\0" in str(source):
         raise MissionError(f"{shown(str(source))} is not a file name")
-    path = Path(source).expanduser()
-    candidates = [path] if path.is_absolute() else [path, *(Path(s).expanduser() / path for s in search)]
+    path = _expanded(source)
+    candidates = [path] if path.is_absolute() else [path, *(_expanded(s) / path for s in search)]
     for candidate in candidates:
-        if candidate.is_file():
+        if _is_file(candidate):
             return candidate
-    why = "is a folder, not a mission file" if path.is_dir() else "is no file and no mission that ships"
-    if path.exists() and not path.is_dir():
-        why = "is not a regular file"
+    is_folder = os.path.isdir(path)  # noqa: PTH112  it is False where Path.is_dir raises, as for a name too long
+    why = "is a folder, not a mission file" if is_folder else "is no file and no mission that ships"
     raise MissionError(
-        f"{source}: {why}{nearest_name(path.stem or str(path), shipped)}; shipped {listed(shipped)}"
+        f"{shown(str(source))} {why}{nearest_name(path.stem[:80], shipped)}; shipped {listed(shipped)}"
     )
+
+
+def _expanded(path: str | Path) -> Path:
+    try:
+        return Path(path).expanduser()
+    except RuntimeError:
+        return Path(path)
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:  # a name too long for the file system, or no right to look
+        return False
 
 
 def read_text(path: Path, budget: Budget) -> str:
@@ -79,6 +93,9 @@ def read_text(path: Path, budget: Budget) -> str:
         raise MissionError(f"{path}:1: encoding {name!r} is not read; {listed(ENCODINGS)}")
     try:
         text = data.decode("utf-8-sig" if name == "utf-8" else name)
+        if declared and name != "utf-8":
+            # The resolved text is written as UTF-8.
+            text = text.replace(declared[1].decode("ascii"), "utf-8", 1)
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         raise MissionError(f"{path}:{line}: byte {data[error.start]:#04x} is not {name} text") from None
@@ -124,7 +141,7 @@ class Reader:
         self.overrides = overrides
         self.problems = problems
         self.budget = Budget(limits)
-        self.search = [Path(s).expanduser() for s in search]
+        self.search = [_expanded(s) for s in search]
         self.placeholders: dict[str, str] = {}
         self.files: list[Path] = []
 
@@ -209,7 +226,7 @@ class Reader:
             raise MissionError(f"{place}: an include needs href='FILE'")
         start = [including.parent, *self.search]
         try:
-            found = [p for p in ((s / base / href).resolve() for s in start) if p.is_file()]
+            found = [p for p in ((s / base / href).resolve() for s in start) if _is_file(p)]
         except (OSError, RuntimeError) as error:
             raise MissionError(f"{place}: {shown(href)} cannot be included: {error}") from None
         inside = [p for p in found if any(p.is_relative_to(root) for root in roots)]

@@ -14,6 +14,7 @@ class Known(NamedTuple):
         unit: Unit of a bare number; "" for none.
         kept_for: "viewer" or "log" where nothing of the game depends on it.
         reads: How its text is read: "text", "truth", "number", "whole", "words".
+        bound: Of a number: "> 0" or ">= 0".
     """
 
     doc: str
@@ -21,6 +22,7 @@ class Known(NamedTuple):
     unit: str = ""
     kept_for: str = ""
     reads: str = "number"
+    bound: str = ""
 
 
 def _viewer(doc: str, default: str = "", reads: str = "text", unit: str = "") -> Known:
@@ -34,7 +36,7 @@ def _log(doc: str, default: str = "", reads: str = "text") -> Known:
 RUN = {
     "start": Known("Time of the first step.", "0", "s"),
     "end": Known("Time at which the condition `time` ends the mission.", "50", "s"),
-    "dt": Known("Length of a step.", "0.00833333", "s"),
+    "dt": Known("Length of a step.", "0.00833333", "s", bound="> 0"),
     "motion_multiplier": Known("Substeps of controllers and motion per step.", "1", reads="whole"),
     "update": Known(
         "`synchronous`: all decide on the states of the step's start; `sequential`: one entity after another decides and moves "
@@ -107,9 +109,9 @@ ENTITY = {
         "Number of the first entity; here ids count up in the order of the file.", "next", reads="whole"
     ),
     "count": Known("How many there will be.", "1", reads="whole"),
-    "health": Known("What is left before it is removed at 0.", "1"),
-    "radius": Known("Of its body.", "1", "m"),
-    "mass": Known("Of its body (addition to the format).", "1", "kg"),
+    "health": Known("What is left before it is removed at 0.", "1", bound="> 0"),
+    "radius": Known("Of its body.", "1", "m", bound="> 0"),
+    "mass": Known("Of its body (addition to the format).", "1", "kg", bound="> 0"),
     "x": Known("Start position of the first, East.", "0", "m"),
     "y": Known("North.", "0", "m"),
     "z": Known("Up.", "0", "m"),
@@ -122,15 +124,19 @@ ENTITY = {
     "vx": Known("Initial velocity, East.", "0", "m/s"),
     "vy": Known("North.", "0", "m/s"),
     "vz": Known("Up.", "0", "m/s"),
-    "speed": Known("Initial speed along the heading, where vx, vy, vz are 0.", "0", "m/s"),
+    "speed": Known("Initial speed along the heading, where vx, vy, vz are 0.", "0", "m/s", bound=">= 0"),
     "placement": Known("`normal` or `uniform` (addition to the format).", "normal", reads="text"),
-    "variance_x": Known("Variance (not deviation) of the start position of all but the first.", "100", "m^2"),
-    "variance_y": Known("The same, North.", "100", "m^2"),
-    "variance_z": Known("The same, up.", "0", "m^2"),
-    "half_width_x": Known("With uniform placement: all but the first lie within this (addition).", "0", "m"),
-    "half_width_y": Known("The same, North.", "0", "m"),
-    "half_width_z": Known("The same, up.", "0", "m"),
-    "variance_heading": Known("Variance of the heading.", "0", "deg^2"),
+    "variance_x": Known(
+        "Variance (not deviation) of the start position of all but the first.", "100", "m^2", bound=">= 0"
+    ),
+    "variance_y": Known("The same, North.", "100", "m^2", bound=">= 0"),
+    "variance_z": Known("The same, up.", "0", "m^2", bound=">= 0"),
+    "half_width_x": Known(
+        "With uniform placement: all but the first lie within this (addition).", "0", "m", bound=">= 0"
+    ),
+    "half_width_y": Known("The same, North.", "0", "m", bound=">= 0"),
+    "half_width_z": Known("The same, up.", "0", "m", bound=">= 0"),
+    "variance_heading": Known("Variance of the heading.", "0", "deg^2", bound=">= 0"),
     "use_variance_all_ents": Known("Scatter the first one too.", "false", reads="truth"),
     "generate_rate": Known(
         "Births per second in each slot, `a / b` or a number; counts with generate_count > 0.", "none", "1/s"
@@ -139,7 +145,7 @@ ENTITY = {
         "Slots: births that run side by side (the total is `count`).", "none", reads="whole"
     ),
     "generate_start_time": Known("Time of the first birth.", "0", "s"),
-    "generate_time_variance": Known("Standard deviation of the time between births.", "0", "s"),
+    "generate_time_variance": Known("Standard deviation of the time between births.", "0", "s", bound=">= 0"),
     "autonomy": Known("An autonomy; several act in the order of the file.", "none", reads="text"),
     "controller": Known("A controller; several stand one behind the other.", "none", reads="text"),
     "motion_model": Known("The motion model.", "Still", reads="text"),
@@ -168,7 +174,7 @@ BASE = {
     "latitude": Known("Centre instead of x, y, z, where all three are given.", "", "deg"),
     "longitude": Known("East positive.", "", "deg"),
     "altitude": Known("Above the ellipsoid.", "", "m"),
-    "radius": Known("Its radius.", "25", "m"),
+    "radius": Known("Its radius.", "25", "m", bound="> 0"),
     "opacity": Known("How it is drawn, 0 to 1.", "1"),
 }
 """Tags of <base>."""

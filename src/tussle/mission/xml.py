@@ -11,7 +11,7 @@ from typing import Any
 from tussle.errors import MissionError, TussleError
 from tussle.geodesy import Origin
 from tussle.mission import codecs
-from tussle.mission.catalogue import Catalogue
+from tussle.mission.catalogue import KINDS, Catalogue
 from tussle.mission.entities import EntityReader, Fields, block_names, expanded
 from tussle.mission.limits import Limits
 from tussle.mission.node import Node
@@ -127,6 +127,7 @@ class _WorldReader:
         world = self._world_plugins(plugins)
         entities = EntityReader(plugins, problems, origin, self.limits.rows)
         nodes = list(root.find_all("entity"))
+        self._count_tags(nodes)
         blocks = [entities.block(node, name) for node, name in zip(nodes, block_names(nodes), strict=True)]
         conditions, seed = self._end_conditions(), self._seed()
         self._settings()
@@ -154,6 +155,23 @@ class _WorldReader:
             self.source.placeholders, places,
         )  # fmt: skip
 
+    def _count_tags(self, entities: list[Node]) -> None:
+        """Refuse what would take a while only to be compared.
+
+        Raises:
+            MissionError: There are too many blocks, or plugins in one place.
+        """
+        hint = "for a file you trust there is allow_large"
+        if len(entities) > self.limits.blocks:
+            raise MissionError(
+                f"{entities[-1].place}: there are more than {self.limits.blocks:,} <entity>; {hint}"
+            )
+        for node in (self.root, *entities):
+            if sum(child.tag in KINDS for child in node.children) > self.limits.plugins:
+                raise MissionError(
+                    f"{node.place}: there are more than {self.limits.plugins:,} plugins in <{node.tag}>; {hint}"
+                )
+
     def _last(self, tag: str) -> Node | None:
         """The last tag of a name, which counts."""
         return next((child for child in reversed(self.root.children) if child.tag == tag), None)
@@ -170,14 +188,11 @@ class _WorldReader:
         for name, known in RUN.items():
             if known.kept_for and fields.has(name):
                 self._keep(self.viewer, name, fields.found[name], known, f"run@{name}")
+        # Where one is wrong that has been told, and its default stands in for it.
         dt, start, end = fields.number("dt"), fields.number("start"), fields.number("end")
         most = self.limits.substeps
         substeps = fields.read("motion_multiplier", lambda text: codecs.whole(text, 1, most))
-        if not dt > 0.0:
-            self.problems.error(
-                fields.place("dt"), f"dt = {dt:g} s is not allowed; it takes a number of seconds > 0"
-            )
-        elif not (end - start) / dt <= self.limits.steps:
+        if not (end - start) / dt <= self.limits.steps:
             text = (
                 f"from {start:g} to {end:g} s in steps of {dt:g} s are more than {self.limits.steps:,} steps"
             )
@@ -189,12 +204,7 @@ class _WorldReader:
         names = ("latitude_origin", "longitude_origin", "altitude_origin")
         nodes = [node for name in names if (node := self._last(name))]
         fields = Fields(Node("runscript", {}, "", nodes, self.root.place), WORLD, self.problems)
-        angles = [fields.number(name, "rad") for name in names[:2]]
-        try:
-            return Origin(angles[0], angles[1], fields.number(names[2]))
-        except TussleError as error:
-            self.problems.error(fields.place(names[0]), str(error))
-            return Origin()
+        return Origin(*fields.angles(names[0], names[1]), fields.number(names[2]))
 
     def _shared(self) -> dict[str, dict[str, str]]:
         """<param_common> name -> attributes."""
