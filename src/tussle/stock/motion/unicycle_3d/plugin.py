@@ -17,12 +17,12 @@ class Unicycle3D(MotionModel):
     turn_rate is that of the heading and pitch_rate that of the elevation; banked, they are not, as in an aircraft. With `accel_max`
     >= 0 the speed is a state and the command its rate, `acceleration_x`; else `speed` is the command.
 
-    Other than in the existing system: the rates are about the body's own axes (there, about axes that had been turned away from the
-    world's by the start attitude, so that a vehicle that started banked or climbing turned about axes of nothing that moved);
-    positive pitch_rate raises the nose; `accel_max` limits the acceleration both ways (there, its lower limit was read from the
-    upper one's key, so every command gave the same acceleration), and the accelerated speed stays within speed_max. A limit is the
-    same both ways; there are no `speed_min` and the like. External forces, which there gave a velocity of force over mass, have no
-    meaning in a model without inertia and are ignored. `omega` is filled.
+    Other than in the existing system: the rates are about the body's own axes (there, about axes that move with the vehicle but were
+    the world's at the start, so that one that started banked or climbing turned about axes of nothing); positive pitch_rate raises
+    the nose; `accel_max` limits the acceleration both ways (there, the lower limit was read from the upper one's key, so every command
+    gave the same acceleration), and the accelerated speed stays within speed_max. A limit is the same both ways; there is no
+    `speed_min` and the like. External forces, which there gave a velocity of force over mass, mean nothing to a model without inertia
+    and are ignored. `omega` is filled.
     """
 
     grade = "portable"

@@ -1,0 +1,82 @@
+"""The existing system's missions fly as it flew them, where the laws are those it had (see variants.py).
+
+Compared are, from the recorded ids, times of birth and first states on, over the whole length: every position, attitude, who is
+there in each frame, the frame in which each entity was last seen, and what the collision metric counted. Not compared are start
+placement, which comes out of the old system's random numbers, and velocities, whose z had the wrong sign there. None of these
+missions draws a random number after the start.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import pytest
+from recorded_missions import RECORDED_AS, mission
+from recordings import load
+from replay import Flight, fly
+from variants import VARIANTS, historic
+
+LIMIT = 1e-6  # [m]
+ATTITUDE_LIMIT = (
+    1e-8  # of a quaternion's components; waypoints went through degrees of latitude there, 1e-9 m
+)
+NAMES = list(RECORDED_AS.values())
+AS_THE_PRODUCT_FLIES = ["straight-no-gui", "harmonic-oscillator"]
+NEEDED = [
+    ("SimpleAircraft", "straight", 1.0),
+    ("SimpleAircraft", "waypoint_follower", 10.0),
+    ("Unicycle3D", "unicycle", 10.0),
+    ("Unicycle3D", "batch-example-mission", 1e-5),
+]
+
+
+@cache
+def flown(name: str) -> Flight:
+    return fly(historic(mission(name)), load(name))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_positions_agree_over_the_whole_length(name: str) -> None:
+    flight, recording = flown(name), load(name)
+    assert set(flight.error) == set(recording.frames.tolist())
+    assert flight.max_error <= LIMIT, f"{flight.max_error:.1e} m, largest at (frame, id) {flight.worst}"
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_attitudes_agree_over_the_whole_length(name: str) -> None:
+    assert max(flown(name).turn.values()) <= ATTITUDE_LIMIT
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_everybody_is_there_just_as_long(name: str) -> None:
+    assert flown(name).strangers is None
+    assert flown(name).last_frame == load(name).last_frame
+
+
+@pytest.mark.parametrize("name", [n for n in NAMES if n != "harmonic-oscillator"])
+def test_collisions_and_time_in_the_air_are_counted_alike(name: str) -> None:
+    flight, recording = flown(name), load(name)
+    assert flight.result is not None
+    counted = flight.result.metrics["SimpleCollisionMetrics"]
+    for team, row in recording.summary.items():
+        for column in ("score", "entity_count", "non_team_coll", "team_coll", "ground_coll"):
+            assert counted[column][team] == row[column], (team, column)
+    # There, nobody's time counted beyond the last death, and everybody's ended a step early; so from the frames, which both have.
+    dt, n_steps = 0.1, flight.result.steps
+    team_of = dict(zip(recording.id.tolist(), recording.team.tolist(), strict=True))
+    for team in recording.summary:
+        steps = [min(last + 1, n_steps) for i, last in recording.last_frame.items() if team_of[i] == team]
+        assert counted["flight_time"][team] == pytest.approx(dt * sum(steps), rel=1e-12)
+
+
+@pytest.mark.parametrize("name", AS_THE_PRODUCT_FLIES)
+def test_some_missions_need_no_variant(name: str) -> None:
+    assert fly(mission(name), load(name)).max_error <= LIMIT
+
+
+@pytest.mark.parametrize(("law", "name", "least"), NEEDED)
+def test_without_the_variant_the_recording_is_missed(law: str, name: str, least: float) -> None:
+    """Each variant is there because the product's law flies otherwise, by more than this."""
+    others = {cls: variant for cls, variant in VARIANTS.items() if cls.__name__ != law}
+    assert len(others) == len(VARIANTS) - 1
+    assert fly(historic(mission(name), others), load(name)).max_error > least
