@@ -9,9 +9,11 @@ import pytest
 from recorded_games import head_on, hunt
 
 import tussle
-from tussle import Recorder, Simulation, load_run
+from tussle import Block, Mission, Recorder, Simulation, load_run
+from tussle.api import Autonomy, Output
 from tussle.errors import ParameterError, RecordError
 from tussle.record.happenings import Happenings
+from tussle.stock import GroundCollision, SingleIntegrator
 
 FILES = {"trajectory.arrow", "events.arrow", "summary.csv", "run.json"}
 
@@ -155,6 +157,35 @@ def test_events_tell_who_came_who_went_and_why(tmp_path):
         ["death", 1, 2, "collision"],
         ["death", 2, 1, "collision"],
         ["end", 0, 0, "one_team"],
+    ]
+
+
+def test_the_ground_is_told_as_a_collision_with_nobody(tmp_path):
+    class Fall(Autonomy):
+        """Fall at 10 m/s."""
+
+        velocity = Output("velocity_x velocity_y velocity_z", unit="m/s")
+
+        def step(self, g):
+            self.velocity[2] = -10.0
+
+    stones = Block(
+        name="stones",
+        count=2,
+        position=(0, 0, 1.5),
+        scatter_first=False,
+        autonomy=Fall(),
+        motion=SingleIntegrator(),
+    )
+    _, run = play(
+        tmp_path / "run",
+        Mission(blocks=[stones], end_conditions="all_dead", interactions=[GroundCollision()]),
+    )
+    rows = run.events[["kind", "step", "id", "other", "text"]].to_numpy().tolist()[2:]
+    assert rows == [
+        *(["collision", 1, i, 0, "ground"] for i in (1, 2)),
+        *(["death", 1, i, 0, "ground"] for i in (1, 2)),
+        ["end", 2, 0, 0, "all_dead"],
     ]
 
 
