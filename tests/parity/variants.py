@@ -81,8 +81,8 @@ class RelativeUnicycle3D(Unicycle3D):
     """The attitude is integrated as the turn since the start, by RK4 with a pull towards length 1.
 
     So the rates act about axes that move with the vehicle but were the world's at the start, the body's own only where it started
-    with (1, 0, 0, 0); tussle takes the body's own always. And attitude and path carry RK4's errors, 2e-5 m where a turn at full rate ends at 25 m/s; tussle's attitude is
-    exact for held rates. Differing: the kernel, and the start attitude that is kept for it.
+    with (1, 0, 0, 0); tussle takes the body's own always. And attitude and path carry RK4's errors, 2e-5 m where a turn at full
+    rate ends at 25 m/s; tussle's attitude is exact for held rates. Differing: the kernel, and the start attitude kept for it.
     """
 
     x = State(

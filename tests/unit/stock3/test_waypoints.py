@@ -1,0 +1,264 @@
+"""Lists of waypoints: when they are told, and how an entity is led along them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from small_worlds import Drift, block, mission
+
+from tussle import Simulation
+from tussle.api import Autonomy, Publish, RaggedColumn, State, Subscribe
+from tussle.messages import WAYPOINT_MODES, Waypoint, WaypointList, WaypointStatus
+from tussle.stock import (
+    MotorSchemas,
+    MoveToGoalMS,
+    SingleIntegrator,
+    Still,
+    WaypointDispatcher,
+    WaypointGenerator,
+)
+
+
+def point(x, y=0.0, z=0.0, time=0.0, tolerance=5.0):
+    return (time, x, y, z, 0.1, 0.2, 0.3, tolerance, -1.0)
+
+
+class Ear(Autonomy):
+    """Remembers what it hears of waypoints, and counts it."""
+
+    n_lists = State(dtype=int)
+    n_points = State(dtype=int)
+    mode = State(dtype=int, default=-1)
+    first = State("x y z roll pitch yaw tolerance turn")
+    goal = State("x y z")
+    n_told = State(dtype=int)
+    index = State(dtype=int, default=-1)
+    is_done = State(dtype=bool)
+    lists = Subscribe(WaypointList)
+    goals = Subscribe(Waypoint, network="LocalNetwork")
+    reached = Subscribe(WaypointStatus, network="LocalNetwork")
+
+    def step(self, g):
+        rows, heard = self.lists.pairs()
+        np.add.at(self.n_lists, rows, 1)
+        for number, row in enumerate(rows):
+            self.n_points[row] = heard.points[number].shape[1]
+            if self.n_points[row]:
+                self.first[:, row] = heard.points[number][:, 0]
+            self.mode[row] = heard.mode[number]
+        rows, heard = self.goals.latest()
+        self.goal[:, rows] = heard.pos
+        rows, heard = self.reached.pairs()
+        np.add.at(self.n_told, rows, 1)
+        for number, row in enumerate(rows):
+            self.index[row], self.is_done[row] = heard.index[number], heard.is_done[number]
+
+
+# -- WaypointGenerator ------------------------------------------------------------------------------------------------------------
+
+
+def station(end=10.0, seeds=1, **values):
+    blocks = [
+        block("station", autonomy=WaypointGenerator(**values), motion=Still()),
+        block("ear", autonomy=Ear(), motion=Still()),
+    ]
+    return Simulation(mission(*blocks, end=end), seeds)
+
+
+def heard(sim, column):
+    return sim.read(f"ear.Ear.{column}")[0][0, 0].tolist()
+
+
+def test_a_list_is_told_when_its_time_has_come():
+    sim = station(
+        waypoints=[point(1.0), point(2.0, time=0.5), point(3.0, time=0.3), point(4.0, time=0.5)],
+        mode="loiter",
+    )
+    sim.step(2)
+    assert (heard(sim, "n_lists"), heard(sim, "n_points")) == (1, 1)
+    sim.step(2)  # step 3 begins at 0.30000000000000004 s, and the list is heard in the step after that
+    assert heard(sim, "n_lists") == 1
+    sim.step()
+    assert (heard(sim, "n_lists"), heard(sim, "first")[0]) == (2, 3.0)
+    sim.step(2)
+    assert (heard(sim, "n_lists"), heard(sim, "n_points"), heard(sim, "first")[0]) == (3, 2, 2.0)
+    sim.step(50)
+    assert heard(sim, "n_lists") == 3
+    assert WAYPOINT_MODES[heard(sim, "mode")] == "loiter"
+
+
+def test_a_time_that_no_step_begins_at_exactly_is_met_all_the_same():
+    for k in range(1, 60):
+        sim = station(waypoints=[point(1.0, time=float(f"{k / 10:.1f}"))])
+        sim.step(k + 1)
+        assert heard(sim, "n_lists") == 0
+        sim.step()
+        assert heard(sim, "n_lists") == 1
+
+
+def test_what_a_list_carries():
+    sim = station(waypoints=[point(1.0, 2.0, 3.0, tolerance=-1.0)])
+    sim.step(2)
+    assert heard(sim, "first") == [1.0, 2.0, 3.0, 0.1, 0.2, 0.3, math.inf, math.inf]
+
+
+def test_by_default_it_tells_two_points_and_later_one_more():
+    sim = station(end=60.0)
+    sim.step(501)
+    assert (heard(sim, "n_lists"), heard(sim, "n_points")) == (1, 2)
+    sim.step()
+    assert (heard(sim, "n_lists"), heard(sim, "first")[:3]) == (2, [0.0, 0.0, 100.0])
+
+
+# -- WaypointDispatcher -----------------------------------------------------------------------------------------------------------
+
+
+def flight(points, pos, *, mode="follow_once", end=60.0, steps=2, velocity=(0.0, 0.0, 0.0), **values):
+    """A dispatcher at a place, with an ear in the same entity, after some steps."""
+    led = block(
+        "led", position=pos, motion=SingleIntegrator(),
+        autonomy=[WaypointDispatcher(**values), Ear(), Drift(to=velocity)],
+    )  # fmt: skip
+    tower = block("tower", autonomy=WaypointGenerator(waypoints=points, mode=mode), motion=Still())
+    sim = Simulation(mission(led, tower, end=end))
+    sim.step(steps + 1)
+    return sim
+
+
+def led(sim, column):
+    return sim.read(f"led.Ear.{column}")[0][0, 0].tolist()
+
+
+def test_towards_the_first_waypoint_the_line_is_from_the_entity_itself():
+    sim = flight([point(300.0, 400.0)], (0.0, 0.0, 0.0))
+    assert led(sim, "goal") == pytest.approx([30.0, 40.0, 0.0])
+    sim = flight([point(300.0, 400.0)], (0.0, 0.0, 0.0), lead_distance=100.0)
+    assert led(sim, "goal") == pytest.approx([60.0, 80.0, 0.0])
+    sim = flight([point(3.0, 4.0)], (0.0, 0.0, 10.0))
+    assert led(sim, "goal") == pytest.approx([3.0, 4.0, 0.0])
+
+
+def on_the_way(pos, **values):
+    """From (0, 0, 0), which is reached at once, to (200, 0, 0): an entity that has been moved to pos since."""
+    sim = flight([point(0.0), point(200.0)], (0.0, 0.0, 0.0), **values)
+    sim.write("led.pos", pos)
+    sim.step(2)
+    return led(sim, "goal")
+
+
+def test_the_point_lies_on_the_line_ahead_of_the_foot():
+    assert on_the_way((60.0, 35.0, -20.0)) == pytest.approx([110.0, 0.0, 0.0])
+
+
+def test_behind_the_begin_of_the_line_the_point_stays_ahead_of_that():
+    assert on_the_way((-80.0, 10.0, 0.0)) == pytest.approx([50.0, 0.0, 0.0])
+
+
+def test_the_point_never_lies_beyond_the_waypoint():
+    assert on_the_way((170.0, 10.0, 0.0)) == pytest.approx([200.0, 0.0, 0.0])
+    assert on_the_way((250.0, 10.0, 0.0)) == pytest.approx([200.0, 0.0, 0.0])
+
+
+def visits(mode, n_points, n_events):
+    """Numbers of the next waypoint, one per waypoint reached, with everything near enough to everything."""
+    points = [point(10.0 * i, tolerance=-1.0) for i in range(n_points)]
+    sim = flight(points, (0.0, 0.0, 0.0), mode=mode, steps=0)
+    seen = []
+    for _ in range(n_events):
+        sim.step()
+        seen.append(sim.read("led.WaypointDispatcher.current")[0][0, 0].item())
+    return seen
+
+
+def test_round_and_round():
+    assert visits("racetrack", 3, 7) == [1, 2, 0, 1, 2, 0, 1]
+
+
+def test_back_and_forth():
+    assert visits("back_and_forth", 3, 8) == [1, 2, 1, 0, 1, 2, 1, 0]
+    assert visits("back_and_forth", 2, 4) == [1, 0, 1, 0]
+    assert visits("back_and_forth", 1, 3) == [0, 0, 0]
+
+
+def test_once_through_and_staying_with_the_first():
+    assert visits("follow_once", 3, 5) == [1, 2, 2, 2, 2]
+    assert visits("loiter", 3, 3) == [0, 0, 0]
+
+
+def test_what_is_reached_is_told_once():
+    sim = flight([point(0.0), point(100.0)], (0.0, 0.0, 0.0), velocity=(10.0, 0.0, 0.0))
+    assert (led(sim, "n_told"), led(sim, "index"), led(sim, "is_done")) == (1, 1, False)
+    sim.step(88)
+    assert led(sim, "n_told") == 1
+    sim.step(30)
+    assert (led(sim, "n_told"), led(sim, "index"), led(sim, "is_done")) == (2, 1, True)
+
+
+def test_near_enough_may_mean_in_the_plane():
+    points = [point(0.0, z=50.0), point(100.0)]
+    assert led(flight(points, (0.0, 0.0, 0.0)), "n_told") == 0
+    assert led(flight(points, (0.0, 0.0, 0.0), tolerance_in_2d=True), "n_told") == 1
+
+
+def test_waypoints_on_top_of_the_one_before_are_dropped():
+    points = [point(500.0), point(500.5), point(501.2), point(501.9), point(900.0)]
+
+    def kept(**values):
+        groups = flight(points, (0.0, 0.0, 0.0), **values).population.groups
+        binding = next(b for g in groups for b in g.walk() if b.path == ("WaypointDispatcher",))
+        return binding.ragged["points"][0][0].tolist()
+
+    assert kept() == [500.0, 501.2, 900.0]
+    assert kept(filter_dist=0.0) == [500.0, 500.5, 501.2, 501.9, 900.0]
+
+
+def test_a_new_list_begins_anew():
+    points = [point(0.0), point(100.0), point(0.0, 700.0, time=1.0)]
+    sim = flight(points, (0.0, 0.0, 0.0), steps=3)
+    assert led(sim, "goal") == pytest.approx([50.0, 0.0, 0.0])
+    sim.step(12)
+    assert led(sim, "goal") == pytest.approx([0.0, 50.0, 0.0])
+
+
+def test_entities_are_led_each_along_its_own_list_and_without_one_not_at_all():
+    own = [
+        block(
+            f"led{i}", position=(0.0, 100.0 * i, 0.0), motion=SingleIntegrator(),
+            autonomy=[
+                *([WaypointGenerator(waypoints=[point(300.0, 100.0 * i)] * n, network_name="LocalNetwork")] if n else []),
+                WaypointDispatcher(waypointlist_network="LocalNetwork"),
+                MotorSchemas(pub_vel_vec=True, behaviors=[MoveToGoalMS(goal=(0.0, -500.0, 0.0))]),
+            ],
+        )
+        for i, n in ((1, 1), (2, 2), (3, 0))
+    ]  # fmt: skip
+    sim = Simulation(mission(*own, end=5.0), seeds=[1, 2])
+    sim.step(4)
+    target = [sim.read(f"led{i}.MotorSchemas.MoveToGoalMS.target")[0][:, 0].tolist() for i in (1, 2, 3)]
+    assert target[0][0][1:] == pytest.approx([100.0, 0.0], abs=15.0)
+    assert target[1][1][1:] == pytest.approx([200.0, 0.0], abs=15.0)
+    assert target[2] == [[0.0, -500.0, 0.0]] * 2
+
+
+class Silent(Autonomy):
+    """Says a list without points, once."""
+
+    lists = Publish(WaypointList)
+
+    def step(self, g):
+        if (g.step_count == 0).all():
+            nothing = RaggedColumn.empty(g.n, WaypointList.fields["points"])
+            self.lists.publish(np.arange(g.n), points=nothing, mode=0)
+
+
+def test_an_empty_list_leads_nowhere():
+    blocks = [
+        block("led", autonomy=[WaypointDispatcher(), Ear(), Drift(to=(0.0, 0.0, 0.0))]),
+        block("silent", autonomy=Silent(), motion=Still()),
+    ]
+    sim = Simulation(mission(*blocks))
+    sim.run()
+    assert led(sim, "n_lists") == 1
+    assert led(sim, "goal") == [0.0, 0.0, 0.0]
