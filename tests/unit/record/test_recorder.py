@@ -115,7 +115,7 @@ def test_the_same_inputs_give_the_same_tables_however_often_they_are_flushed(tmp
     assert one.trajectory_table == two.trajectory_table
     assert one.events_table == two.events_table
     assert one.info["worlds"] == two.info["worlds"]
-    assert two.trajectory_table["x"].num_chunks == 1 + 61  # the head of the file comes with an empty batch
+    assert two.trajectory_table["x"].num_chunks >= 61 > one.trajectory_table["x"].num_chunks
 
 
 def test_recording_changes_nothing_and_leaves_nothing_behind(tmp_path):
