@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from tussle.mission import Mission, read_mission
 from tussle.record import FirstStates, read_table
 
 VARIABLE = "TUSSLE_RECORDINGS"
@@ -85,3 +86,22 @@ def load(name: str) -> Recording:
             int(row["team_id"]): {k: float(v) for k, v in row.items() if v} for row in csv.DictReader(file)
         }
     return Recording(frame, ids, team, table[3:6], table[6:10], table[10:13], last, summary, read_table(path))
+
+
+NAMES = (
+    "straight",
+    "straight-no-gui",
+    "unicycle",
+    "harmonic-oscillator",
+    "waypoint_follower",
+    "batch-example-mission",
+)
+"""Missions whose plugins all exist here."""
+
+
+@cache
+def mission(name: str) -> Mission:
+    """The mission of a recording, from the existing system's own file."""
+    place = folder()
+    assert place is not None
+    return read_mission(place / "missions" / f"{name}.xml").mission

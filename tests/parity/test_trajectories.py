@@ -1,9 +1,9 @@
 """The existing system's missions fly as it flew them, where the laws are those it had (see variants.py).
 
-Compared are, from the recorded ids, times of birth and first states on, over the whole length: every position, attitude, who is
-there in each frame, the frame in which each entity was last seen, and what the collision metric counted. Not compared are start
-placement, which comes out of the old system's random numbers, and velocities, whose z had the wrong sign there. None of these
-missions draws a random number after the start.
+The missions are read from its own files. Compared are, from the recorded ids, times of birth and first states on and over the
+whole length: every position, attitude, who is there in each frame, the frame in which each entity was last seen, and what the
+collision metric counted. Not compared are start placement, which comes out of the old system's random numbers, and velocities,
+whose z had the wrong sign there. After the start, none of these missions draws a random number that counts.
 """
 
 from __future__ import annotations
@@ -11,16 +11,14 @@ from __future__ import annotations
 from functools import cache
 
 import pytest
-from recorded_missions import RECORDED_AS, mission
-from recordings import load
+from recordings import NAMES, load, mission
 from replay import Flight, fly
 from variants import VARIANTS, historic
 
 LIMIT = 1e-6  # [m]
 ATTITUDE_LIMIT = (
-    1e-8  # of a quaternion's components; waypoints went through degrees of latitude there, 1e-9 m
+    1e-8  # of a quaternion's components; waypoints went by latitude there, which rounds to 1e-9 m
 )
-NAMES = list(RECORDED_AS.values())
 AS_THE_PRODUCT_FLIES = ["straight-no-gui", "harmonic-oscillator"]
 NEEDED = [
     ("SimpleAircraft", "straight", 1.0),
