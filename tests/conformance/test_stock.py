@@ -12,6 +12,9 @@ COMPANIONS = {
     "Straight": ["Boundary"],
     "SimpleCaptureMetrics": ["SimpleCapture"],
     "SimpleCapture": ["SimpleCaptureMetrics"],
+    "SimpleCollisionMetrics": ["SimpleCollision", "GroundCollision"],
+    "WaypointDispatcher": ["WaypointGenerator"],
+    "MoveToGoalMS": ["WaypointDispatcher"],
 }
 
 
