@@ -179,7 +179,9 @@ class Bodies:
         key = reach if isinstance(reach, float) else reach.tobytes()
         kept = self._laid_out.get(key)
         if kept is None:
-            index = self._indexes.setdefault(key, Index())
+            index = self._indexes.get(key)
+            if index is None:
+                index = self._indexes[key] = Index()
             index.layout(self.world, self.id, self.n_worlds)
             reaches = np.full(self.n_worlds, reach) if isinstance(reach, float) else reach
             kept = self._laid_out[key] = Kept(-1, (index, reaches, *self.pos))

@@ -170,9 +170,8 @@ class GroupView:
         if known is not None:
             return known[1]
         longest = np.zeros(self._bodies.n_worlds)
-        kernels.longest_reach(radius, self.world, longest)
-        some = longest[longest > 0.0]
-        reach = float(some[0]) if len(some) and (some == some[0]).all() else longest
+        common = kernels.longest_reach(radius, self.world, longest)
+        reach = longest if common < 0.0 else float(common)
         if not radius.flags.writeable:  # a parameter: it stays as it is until the next repack
             self._reaches[id(radius)] = (radius, reach)
         return reach

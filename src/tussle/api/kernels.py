@@ -122,17 +122,26 @@ def find_rows(world, ids, id_row, id_start, rows):
             rows[i] = id_row[id_start[w] + ids[i]]
 
 
-@kernel("F I Fw")
+@kernel("F I Fw -> f8")
 def longest_reach(radius, world, reach):
-    """reach[w] = largest radius of its rows [m]; comes in as 0."""
+    """reach[w] = largest radius of its rows [m]; comes in as 0. Returns what all worlds that have rows share, or -1."""
     for i in range(radius.shape[0]):
         w = world[i]
         reach[w] = max(reach[w], radius[i])
+    common = 0.0
+    for w in range(reach.shape[0]):
+        if reach[w] > 0.0 and common == 0.0:
+            common = reach[w]
+        if reach[w] > 0.0 and reach[w] != common:
+            return -1.0
+    return common
 
 
 @kernel("F2 F2 F Bw -> i8")
 def check(pos, quat, health, faulty):
-    """Number of rows that are not sound; faulty marks rows whose position or attitude is not finite, or health NaN. Rows without health count too.
+    """Number of rows that are not sound, those without health among them.
+
+    faulty marks rows whose position or attitude is not finite, or whose health is NaN.
 
     A sum of the seven numbers minus itself is 0 only where all are finite, so one test a row does, and it vectorises.
     """

@@ -93,7 +93,7 @@ def _named(kind: type[T]) -> type[T]:
         _check_names(kind.__name__, kind, values)
         construct(self, **values)
 
-    kind.__init__ = checked  # type: ignore[method-assign, assignment]
+    kind.__init__ = checked  # type: ignore[method-assign]
     return kind
 
 

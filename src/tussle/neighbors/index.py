@@ -67,10 +67,21 @@ class Room:
     @classmethod
     def of(cls, n: int) -> Room:
         """For n rows; the spans may turn out to need more."""
+
         def longs(k: int) -> Longs:
             return np.empty(k, np.int64)
 
-        return cls(longs(n), longs(n + 1), longs(n), padded(n), padded(n), padded(n), longs(n + 1), longs(2 * n + 64), longs(2 * n + 64))
+        return cls(
+            longs(n),
+            longs(n + 1),
+            longs(n),
+            padded(n),
+            padded(n),
+            padded(n),
+            longs(n + 1),
+            longs(2 * n + 64),
+            longs(2 * n + 64),
+        )
 
 
 class Index:
@@ -110,7 +121,7 @@ class Index:
         self._world_strip = np.zeros(n_worlds + 1, np.int64)
         self.inverse_cell = np.zeros(n_worlds)
         self.reach = np.zeros(n_worlds)
-        self._rings = np.where(np.diff(self.world_start) < SPARSE_WORLD, 1.0, RINGS)
+        self._rings = np.where(self.world_start[1:] - self.world_start[:-1] < SPARSE_WORLD, 1.0, RINGS)
         self._cursor = np.zeros(3 * n, np.int64)
         self._size = np.zeros(2, np.int64)
         self._fixed = False
