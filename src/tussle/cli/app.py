@@ -13,22 +13,69 @@ from tussle.cli.terminal import EXIT_CODES, OK, out, run_guarded, told
 if TYPE_CHECKING:
     from tussle.cli.play import Source
 
-EPILOG = "Exit codes: " + " · ".join(f"{code} {meaning}" for code, meaning in EXIT_CODES.items())
+# The mark \b keeps click from filling the lines that follow.
+EPILOG = "\b\nExit codes:\n" + "\n".join(f"  {code:>3}  {meaning}" for code, meaning in EXIT_CODES.items())
+
+SET_HELP = (
+    "A value of the mission's ${name=default}, or of anything by path: prey.Boids.max_speed='50 kt', "
+    "prey.motion_model=SimpleAircraft, run.dt=0.05. As often as needed."
+)
 
 app = typer.Typer(
     help="Thousands of robots in one 3D world: play missions, look at plugins, write your own.",
-    epilog=EPILOG, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode="rich",
-    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+    epilog=EPILOG, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 80},
 )  # fmt: skip
 
-MissionName = Annotated[str, typer.Argument(metavar="MISSION", help="A mission file, or the name of one that ships (tussle missions).", show_default=False)]
-Seed = Annotated[int | None, typer.Option(help="Seed of the game; by default the mission's, or 1.", show_default=False)]
-Set = Annotated[list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A value of the mission's ${name=default}, or of anything by path: prey.Boids.max_speed='50 kt', prey.motion_model=SimpleAircraft, run.dt=0.05. As often as needed.", show_default=False)]
-More = Annotated[list[str] | None, typer.Argument(hidden=True)]
-End = Annotated[str | None, typer.Option(metavar="TIME", help="End the game at this time: 60, or '2 min'.", show_default=False)]
-Strict = Annotated[bool, typer.Option("--strict", help="Unknown tags and attributes of the mission are errors.")]
-PluginFiles = Annotated[list[Path] | None, typer.Option("--plugin-path", metavar="FILE", help="A Python file with plugins of yours. As often as needed.", show_default=False)]
-Large = Annotated[bool, typer.Option("--allow-large", help="Lift the limits on how much a mission may ask for.")]
+MissionName = Annotated[
+    str,
+    typer.Argument(
+        metavar="MISSION",
+        help="A mission file, or the name of one that ships (tussle missions).",
+        show_default=False,
+    ),
+]
+Seed = Annotated[
+    int | None,
+    typer.Option(
+        metavar="N",
+        min=0,
+        max=2**64 - 1,
+        help="Seed of the game; by default the mission's, or 1.",
+        show_default=False,
+    ),
+]
+Set = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="NAME=VALUE",
+        help=SET_HELP,
+        show_default=False,
+    ),
+]
+More = Annotated[
+    list[str] | None, typer.Argument(metavar="NAME=VALUE", help="As with --set.", show_default=False)
+]
+End = Annotated[
+    str | None,
+    typer.Option(metavar="TIME", help="End the game at this time: 60, or '2 min'.", show_default=False),
+]
+Strict = Annotated[
+    bool, typer.Option("--strict", help="Unknown tags and attributes of the mission are errors.")
+]
+PluginFiles = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--plugin-path",
+        metavar="FILE",
+        help="A Python file with plugins of yours. As often as needed.",
+        show_default=False,
+    ),
+]
+Large = Annotated[
+    bool, typer.Option("--allow-large", help="Lift the limits on how much a mission may ask for.")
+]
 Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
 
 
@@ -40,7 +87,9 @@ def _version(is_asked: bool) -> None:
 
 @app.callback()
 def _options(
-    version: Annotated[bool, typer.Option("--version", help="Show the version.", callback=_version, is_eager=True)] = False,
+    version: Annotated[
+        bool, typer.Option("--version", help="Show the version.", callback=_version, is_eager=True)
+    ] = False,
 ) -> None:
     pass
 
@@ -52,11 +101,38 @@ def run(
     seed: Seed = None,
     settings: Set = None,
     end: End = None,
-    directory: Annotated[Path | None, typer.Option("--out", metavar="DIR", help="The run directory; by default runs/NAME-SEED-TIMESTAMP.", show_default=False)] = None,
+    directory: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            metavar="DIR",
+            help="The run directory; by default runs/NAME-SEED-TIMESTAMP.",
+            show_default=False,
+        ),
+    ] = None,
     no_log: Annotated[bool, typer.Option("--no-log", help="Record nothing.")] = False,
-    log_period: Annotated[float | None, typer.Option(metavar="S", help="Time between recorded states [s]; by default every step.", show_default=False)] = None,
-    pace: Annotated[float | None, typer.Option(metavar="X", help="Play no faster than X times real time. The result is the same.", show_default=False)] = None,
-    start_from: Annotated[Path | None, typer.Option(metavar="TABLE", help="Take ids, times of birth and first states from a recorded trajectory.", show_default=False)] = None,
+    log_period: Annotated[
+        float | None,
+        typer.Option(
+            metavar="S", help="Time between recorded states [s]; by default every step.", show_default=False
+        ),
+    ] = None,
+    pace: Annotated[
+        float | None,
+        typer.Option(
+            metavar="X",
+            help="Play no faster than X times real time. The result is the same.",
+            show_default=False,
+        ),
+    ] = None,
+    start_from: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="TABLE",
+            help="Take ids, times of birth and first states from a recorded trajectory.",
+            show_default=False,
+        ),
+    ] = None,
     strict: Strict = False,
     plugin_files: PluginFiles = None,
     allow_large: Large = False,
@@ -88,19 +164,28 @@ def check(
 ) -> None:
     """Read a mission and build its game without playing it; tell all that is wrong with it."""
     with told(debug):
-        from tussle.engine.simulation import Simulation
+        from tussle.cli.play import simulate
 
         source = _source(mission, settings, more, None, None, strict, plugin_files, allow_large)
         loaded, made, seed = source.read()
-        with Simulation(made, seed) as simulation:
+        with simulate(loaded, made, seed) as simulation:
             n = sum(block.count for block in made.blocks)
             notes = f", {len(loaded.notes)} note(s)" if loaded.notes else ""
-            out().print(f"{loaded.name} can be played: {n} entities, grade {simulation.grade}{notes}", soft_wrap=True)
+            out().print(
+                f"{loaded.name} can be played: {n} entities, grade {simulation.grade}{notes}", soft_wrap=True
+            )
 
 
 @app.command(epilog=EPILOG)
 def describe(
-    name: Annotated[str, typer.Argument(metavar="MISSION|PLUGIN", help="A mission file, a mission that ships, or a plugin.", show_default=False)],
+    name: Annotated[
+        str,
+        typer.Argument(
+            metavar="MISSION|PLUGIN",
+            help="A mission file, a mission that ships, or a plugin.",
+            show_default=False,
+        ),
+    ],
     more: More = None,
     settings: Set = None,
     strict: Strict = False,
@@ -117,10 +202,12 @@ def describe(
         if found is not None:
             pages.show_plugin(name, found)
             return
-        from tussle.engine.simulation import Simulation
+        from tussle.cli.play import simulate
 
-        loaded, made, seed = _source(name, settings, more, None, None, strict, plugin_files, allow_large).read()
-        with Simulation(made, seed) as simulation:
+        loaded, made, seed = _source(
+            name, settings, more, None, None, strict, plugin_files, allow_large
+        ).read()
+        with simulate(loaded, made, seed) as simulation:
             pages.show_mission(loaded.name, loaded.path, made, simulation, seed)
 
 
@@ -145,10 +232,26 @@ def missions(debug: Debug = False) -> None:
 
 @app.command(epilog=EPILOG)
 def new(
-    kind: Annotated[str, typer.Argument(metavar="KIND", help="autonomy, motion, controller, sensor, interaction, metric or network.", show_default=False)],
-    name: Annotated[str, typer.Argument(metavar="NAME", help="Of the class, such as MyBoids.", show_default=False)],
-    origin: Annotated[str | None, typer.Option("--from", metavar="STOCK", help="Begin with a copy of a plugin that ships.", show_default=False)] = None,
-    directory: Annotated[Path, typer.Option("--out", metavar="DIR", help="Where the files are written.")] = Path(),
+    kind: Annotated[
+        str,
+        typer.Argument(
+            metavar="KIND",
+            help="autonomy, motion, controller, sensor, interaction, metric or network.",
+            show_default=False,
+        ),
+    ],
+    name: Annotated[
+        str, typer.Argument(metavar="NAME", help="Of the class, such as MyBoids.", show_default=False)
+    ],
+    origin: Annotated[
+        str | None,
+        typer.Option(
+            "--from", metavar="STOCK", help="Begin with a copy of a plugin that ships.", show_default=False
+        ),
+    ] = None,
+    directory: Annotated[
+        Path, typer.Option("--out", metavar="DIR", help="Where the files are written.")
+    ] = Path(),
     debug: Debug = False,
 ) -> None:
     """Write a plugin that works, its test, and a mission that plays it."""

@@ -35,6 +35,8 @@ class Interrupt:
         if self.code:
             # In the middle of a step there is no state worth recording; what has been flushed stays as it is.
             err().show_cursor(True)
-            os.write(2, b"\nstopped in the middle of a step; what was recorded until the last flush is kept\n")
+            os.write(
+                2, b"\nstopped in the middle of a step; what was recorded until the last flush is kept\n"
+            )
             os._exit(code)
         self.code = code

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tussle.errors import MissionError, listed, nearest_name
+from tussle.errors import MissionError, nearest_name
 from tussle.mission import shipped_missions
 from tussle.mission.catalogue import Catalogue
 
@@ -30,12 +30,12 @@ def plugin_named(name: str, files: Iterable[Path]) -> type[Plugin] | None:
         MissionError: There is neither a plugin nor a mission of this name.
     """
     catalogue = Catalogue(files)
-    if name in catalogue.names():
+    if name in catalogue.names:
         return catalogue.load(name)
     if name in shipped_missions() or Path(name).exists() or Path(name).suffix == ".xml":
         return None
-    known = [*shipped_missions(), *catalogue.names()]
+    known = [*shipped_missions(), *catalogue.names]
     raise MissionError(
-        f"there is no mission and no plugin {name!r}{nearest_name(name, known)}; missions that ship: "
-        f"{', '.join(shipped_missions())}; plugins: {listed(catalogue.names())}"
+        f"there is no mission and no plugin {name!r}{nearest_name(name, known)}; "
+        f"tussle missions and tussle plugins list what there is, and the name of a mission file ends with .xml"
     )

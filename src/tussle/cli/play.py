@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import datetime
+import datetime as dt
 import re
 import time
 from collections.abc import Sequence
@@ -17,13 +17,15 @@ from tussle.cli.settings import ending_by_time, read_end
 from tussle.cli.summary import Speed, show_summary
 from tussle.cli.terminal import say, say_note
 from tussle.engine.simulation import Simulation
-from tussle.errors import PluginError
+from tussle.errors import MissionError, ParameterError, WiringError
 from tussle.mission import Loaded, Mission, read_mission
 
 if TYPE_CHECKING:
     from tussle.record import Recorder
 
 NAP = 0.05  # [s] longest sleep of a paced run, so that Ctrl-C is heard
+
+FOR_VIEWER = ": kept for the viewer: "
 
 
 @dataclass(frozen=True)
@@ -48,8 +50,8 @@ class Source:
     plugin_files: Sequence[Path] = ()
     allow_large: bool = False
 
-    def read(self) -> tuple[Loaded, Mission, int]:
-        """The file as read, the mission, and the seed."""
+    def read(self, tells_all: bool = True) -> tuple[Loaded, Mission, int]:
+        """The file as read, the mission, and the seed. Without `tells_all`, nothing is said of settings kept for the viewer."""
         end = {} if self.end is None else {"run.end": repr(read_end(self.end))}
         loaded = read_mission(
             self.mission,
@@ -59,7 +61,8 @@ class Source:
             allow_large=self.allow_large,
         )
         for note in loaded.notes:
-            say_note(note)
+            if tells_all or FOR_VIEWER not in note:
+                say_note(note)
         seed = self.seed if self.seed is not None else loaded.seed if loaded.seed is not None else 1
         return loaded, ending_by_time(loaded.mission) if end else loaded.mission, seed
 
@@ -67,6 +70,21 @@ class Source:
     def given(self) -> dict[str, str]:
         """All that was set, for the run directory."""
         return self.settings if self.end is None else {**self.settings, "run.end": self.end}
+
+
+def simulate(loaded: Loaded, mission: Mission, seed: int, **more: Any) -> Simulation:
+    """The game of a mission that was read, before its first step.
+
+    Raises:
+        TussleError: It cannot be played; the message begins with file and line where it names a block.
+    """
+    try:
+        with compiling():
+            return Simulation(mission, seed, on_error="record", **more)
+    except (MissionError, ParameterError, WiringError) as error:
+        block = re.match(r"block '([^']*)'", str(error))
+        place = loaded.places.get(block[1]) if block else None
+        raise type(error)(f"{place or loaded.path}: {error}") from error
 
 
 @dataclass(frozen=True)
@@ -83,31 +101,35 @@ def play(source: Source, record: Record, pace: float | None, start_from: Path | 
 
     Returns:
         The exit code.
+
+    Raises:
+        PluginError: A plugin failed; all until then is recorded and shown.
     """
     began = time.perf_counter()
-    loaded, mission, seed = source.read()
+    loaded, mission, seed = source.read(tells_all=False)
     more: dict[str, Any] = {}
     if start_from is not None:
         from tussle.record import read_table
 
         more["start_from"] = read_table(start_from)
     with ExitStack() as stack:
-        with compiling():
-            simulation = stack.enter_context(Simulation(mission, seed, **more))
+        simulation = stack.enter_context(simulate(loaded, mission, seed, **more))
         interrupt = stack.enter_context(Interrupt())
         recorder = _recorder(simulation, record, loaded, seed, source.given) if record.is_on else None
         speed = Speed(began)
-        try:
-            _run(simulation, loaded.path.stem, speed, pace, interrupt)
-        except PluginError as error:
-            _close(recorder, str(error))
-            _tell_directory(recorder)
-            raise
-        _close(recorder, "interrupted" if interrupt.code else "")
-        show_summary(simulation, loaded.name, speed, recorder.directory if recorder else None, bool(interrupt.code))
+        _run(simulation, loaded.path.stem, speed, pace, interrupt)
+        error = simulation.result()[0].error
+        if recorder is not None:
+            recorder.close(str(error) if error else "interrupted" if interrupt.code else "")
+        show_summary(simulation, loaded.path.stem, speed, recorder.directory if recorder else None)
+    if error is not None:
+        raise error
     if interrupt.code:
-        kept = f"what was played is kept in {recorder.directory}" if recorder else "nothing was recorded (--no-log)"
-        say("interrupted", f"at t = {simulation.t[0]:g} s, after step {simulation.steps[0]}; {kept}", "bold yellow")
+        say(
+            "interrupted",
+            "the step was ended, and all files were written" if recorder else "the step was ended",
+            "bold yellow",
+        )
     return interrupt.code
 
 
@@ -139,18 +161,18 @@ def _wait(until: float, meter: Meter, t: float, interrupt: Interrupt) -> None:
         meter.show(t)
 
 
-def _recorder(simulation: Simulation, record: Record, loaded: Loaded, seed: int, given: dict[str, str]) -> Recorder:
+def _recorder(
+    simulation: Simulation, record: Record, loaded: Loaded, seed: int, given: dict[str, str]
+) -> Recorder:
     from tussle.record import Recorder
 
     directory = record.directory or _new_directory(loaded.path.stem, seed)
-    return Recorder(
-        simulation, directory, period=record.period, mission_text=loaded.text, parameters=given
-    )
+    return Recorder(simulation, directory, period=record.period, mission_text=loaded.text, parameters=given)
 
 
 def _new_directory(name: str, seed: int) -> Path:
     """runs/NAME-SEED-TIMESTAMP, with a number behind it where that is taken."""
-    stamp = datetime.datetime.now().strftime("%Y%m%d-%H%M%S")  # noqa: DTZ005 - the user's own clock
+    stamp = dt.datetime.now().strftime("%Y%m%d-%H%M%S")  # noqa: DTZ005 - the user's own clock
     plain = re.sub(r"[^A-Za-z0-9_.-]+", "_", name).strip("._") or "mission"
     base = Path("runs") / f"{plain[:80]}-{seed}-{stamp}"
     number, path = 1, base
@@ -158,14 +180,3 @@ def _new_directory(name: str, seed: int) -> Path:
         number += 1
         path = base.with_name(f"{base.name}-{number}")
     return path
-
-
-def _close(recorder: Recorder | None, interrupted: str) -> None:
-    if recorder is not None:
-        recorder.close(interrupted)
-
-
-def _tell_directory(recorder: Recorder | None) -> None:
-    if recorder is not None:
-        say_note(f"what was played until then is kept in {recorder.directory}")
-

@@ -6,6 +6,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Self
 
 from rich.progress import BarColumn, Progress, TextColumn
 from rich.status import Status
@@ -42,7 +43,7 @@ class Meter:
         total = None if end is None else end - start
         self._task = self._bar.add_task(name, total=total, at="", speed="", left="")
 
-    def __enter__(self) -> Meter:
+    def __enter__(self) -> Self:
         if self._is_bar:
             self._bar.start()
         return self
@@ -90,7 +91,10 @@ def compiling() -> Iterator[None]:
     def tell(name: str) -> None:
         names.append(name)
         if len(names) == 1:
-            console.print(f"compiling kernels for this machine, once; they are kept in {home_short(store.directory())}", soft_wrap=True)
+            console.print(
+                f"compiling kernels for this machine, once; they are kept in {home_short(store.directory())}",
+                soft_wrap=True,
+            )
         if console.is_terminal:
             status.start()
             status.update(f"{len(names)}  {name.removeprefix('tussle.').removeprefix('stock.')}")

@@ -21,7 +21,9 @@ def read_settings(texts: Iterable[str]) -> dict[str, str]:
     for text in texts:
         name, equals, value = (part.strip() for part in text.partition("="))
         if not equals or not name:
-            raise typer.BadParameter(f"{text!r} is not written as NAME=VALUE, such as prey.Boids.max_speed='50 kt'")
+            raise typer.BadParameter(
+                f"{text!r} is not written as NAME=VALUE, such as prey.Boids.max_speed='50 kt'"
+            )
         if name in settings:
             raise typer.BadParameter(f"{name} is set twice, to {settings[name]!r} and to {value!r}")
         settings[name] = value
@@ -41,6 +43,14 @@ def read_end(text: str) -> float:
 
 
 def ending_by_time(mission: Mission) -> Mission:
-    """The mission with the condition "time" among those that end it."""
+    """The mission with the condition "time" among those that end it.
+
+    Raises:
+        ParameterError: Its end is not after its start.
+    """
+    if not mission.end > mission.start:
+        raise ParameterError(
+            f"--end {mission.end:g} is not allowed; it takes a time in s > {mission.start:g}, the start"
+        )
     conditions = tuple(mission.end_conditions)
     return mission if "time" in conditions else mission.replace(end_conditions=(*conditions, "time"))

@@ -8,12 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from rich import box
-from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
 from tussle.cli.progress import times
-from tussle.cli.terminal import out
+from tussle.cli.terminal import put
 from tussle.engine.result import WorldResult
 from tussle.engine.simulation import Simulation
 from tussle.mission import Mission
@@ -23,6 +22,7 @@ ENDS = {
     "one_team": "one team is left",
     "all_dead": "nobody is left",
     "error": "a plugin failed",
+    "": "interrupted",
 }
 
 
@@ -53,25 +53,31 @@ class Speed:
         ready = f"ready after {self.preparation:.1f} s"
         if self.wall <= 0.0 or self.played <= 0.0:
             return ready
-        return f"{times(self.played / self.wall)} × real time: {self.wall:.2f} s, {self.cpu:.2f} CPU s; {ready}"
+        return (
+            f"{times(self.played / self.wall)} × real time ({self.wall:.2f} s, {self.cpu:.2f} CPU s), {ready}"
+        )
 
 
-def show_summary(simulation: Simulation, name: str, speed: Speed, directory: Path | None, is_cut: bool) -> None:
+def show_summary(simulation: Simulation, name: str, speed: Speed, directory: Path | None) -> None:
     """Print what came of the only world of a simulation."""
-    result, mission, console = simulation.result()[0], simulation.mission, out()
+    result, mission = simulation.result()[0], simulation.mission
     n = sum(block.count for block in mission.blocks)
     title = mission.name or name
-    console.print()
-    console.print(Text.assemble(" ", (title, "bold"), f" · seed {result.seed} · {n} entities · {result.steps} steps of {mission.dt:g} s"))
-    console.print(teams_table(result, mission))
-    console.print(Padding(_facts(simulation, result, speed, directory, is_cut), (0, 0, 1, 0)))
+    facts = f"seed {result.seed} · {n} entities · {result.steps} steps of {mission.dt:g} s"
+    put(
+        "",
+        Text.assemble(" ", (title, "bold"), (f"\n {facts}", "dim")),
+        teams_table(result, mission),
+        _facts(simulation, result, speed, directory),
+        "",
+    )
 
 
 def teams_table(result: WorldResult, mission: Mission) -> Table:
     """One line per team: who it is, how many are left, what the metrics say of it."""
     columns = list(_team_columns(result))
     table = Table(box=box.SIMPLE_HEAD, header_style="bold", pad_edge=False, padding=(0, 1))
-    table.add_column(" team")
+    table.add_column(" team", overflow="fold")
     table.add_column("start", justify="right")
     table.add_column("left", justify="right")
     for _, short, _ in columns:
@@ -103,13 +109,11 @@ def _team_columns(result: WorldResult) -> Iterable[tuple[str, str, dict[int, Any
         yield plugin, name if names.count(name) == 1 else f"{plugin}.{name}", values
 
 
-def _facts(
-    simulation: Simulation, result: WorldResult, speed: Speed, directory: Path | None, is_cut: bool
-) -> Table:
+def _facts(simulation: Simulation, result: WorldResult, speed: Speed, directory: Path | None) -> Table:
     grid = Table.grid(padding=(0, 2))
     grid.add_column(style="dim", no_wrap=True)
     grid.add_column(overflow="fold")
-    why = "interrupted" if is_cut and not result.end else ENDS.get(result.end, result.end)
+    why = ENDS.get(result.end, result.end)
     grid.add_row(" ended", f"{why}, at t = {result.t:g} s")
     for plugin, named in result.metrics.items():
         for name, value in named.items():

@@ -11,7 +11,7 @@ from functools import cache
 from typing import Any
 
 import typer
-from rich.console import Console
+from rich.console import Console, RenderableType
 from rich.text import Text
 
 from tussle.errors import PluginError, RecordError, TussleError
@@ -24,12 +24,13 @@ INTERRUPTED, TERMINATED = 130, 143
 
 EXIT_CODES = {
     OK: "all went well",
-    WRONG_INPUT: "the mission, a parameter or a plugin file is wrong; nothing was played",
-    USAGE: "the command line itself is wrong",
+    WRONG_INPUT: "the mission, a setting or a plugin file is wrong",
+    USAGE: "the command line is wrong",
     PLUGIN_FAILED: "a plugin failed while the game was played",
-    NOT_WRITTEN: "the run directory could not be written or read",
-    OWN_FAULT: "tussle itself failed, which is a bug: please report it",
-    INTERRUPTED: "interrupted by Ctrl-C (143: by SIGTERM); what was played is kept",
+    NOT_WRITTEN: "a run directory cannot be written or read",
+    OWN_FAULT: "tussle itself failed: a bug, please report it",
+    INTERRUPTED: "interrupted by Ctrl-C; what was played is kept",
+    TERMINATED: "the same, by SIGTERM",
 }
 
 
@@ -51,15 +52,28 @@ def _console(stderr: bool) -> Console:
     return console
 
 
+def put(*parts: RenderableType) -> None:
+    """Print results. In a file, lines end where their text does."""
+    console = out()
+    if console.is_terminal:
+        for part in parts:
+            console.print(part)
+        return
+    with console.capture() as captured:
+        for part in parts:
+            console.print(part)
+    for line in captured.get().splitlines():
+        console.print(line.rstrip(), soft_wrap=True, markup=False)
+
+
 def say(label: str, text: str, style: str = "") -> None:
-    """One message on the error stream, its label in front; lines are left to the terminal, so that file:line can be clicked."""
-    first, *more = text.splitlines() or [""]
-    message = Text.assemble((f"{label}: ", style), first, *(f"\n{line}" for line in more))
-    err().print(message, soft_wrap=True)
+    """A message on the error stream, with its label before each line; lines are left to the terminal to wrap, and can be clicked."""
+    for line in text.splitlines() or [""]:
+        err().print(Text.assemble((f"{label}: ", style), line), soft_wrap=True)
 
 
 def say_error(text: str) -> None:
-    """What went wrong."""
+    """What went wrong, one line each."""
     say("error", text, "bold red")
 
 
@@ -92,7 +106,7 @@ def told(is_debugging: bool) -> Iterator[None]:
             yield
         except (typer.Exit, typer.BadParameter):
             raise
-        except BaseException as error:  # noqa: BLE001 - whatever it is, the user gets a message and an exit code
+        except BaseException as error:  # whatever it is, the user gets a message and an exit code
             if isinstance(error, SystemExit):
                 raise
             if is_debugging:
@@ -112,7 +126,7 @@ def _tell(error: BaseException) -> None:
         )
 
 
-def _show_warning(message: Warning | str, *_: Any) -> None:
+def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
     say("warning", str(message), "bold yellow")
 
 

@@ -60,7 +60,7 @@ def apply_path(root: Node, path: str, value: str) -> None:
             if node.tag in WORLD_PLUGINS
         }
         if first in world and len(rest) == 1:
-            world[first].attributes[rest[0]] = value
+            _set_attribute(world[first], rest[0], value)
             return
         known = ["run", *blocks, *world]
         raise MissionError(f"there is no {first[:80]!r}{nearest_name(first[:80], known)}; {listed(known)}")
@@ -75,7 +75,12 @@ def _set_run(root: Node, attribute: str, value: str) -> None:
     if not runs:
         runs = [Node("run", {}, "", [], root.place)]
         root.children.insert(0, runs[0])
-    runs[-1].attributes[attribute] = value
+    _set_attribute(runs[-1], attribute, value)
+
+
+def _set_attribute(node: Node, name: str, value: str) -> None:
+    node.attributes[name] = value
+    node.lines[name] = 0  # not of the file: what is wrong with it is an error even where the file's own would be a note
 
 
 def _set_in_block(block: Node, rest: list[str], value: str) -> None:
@@ -88,7 +93,7 @@ def _set_in_block(block: Node, rest: list[str], value: str) -> None:
         raise MissionError(
             f"the block has no plugin {name[:80]!r}{nearest_name(name[:80], plugins)}; {listed(plugins)}"
         )
-    plugins[name].attributes[attribute] = value
+    _set_attribute(plugins[name], attribute, value)
 
 
 def _set_tag(block: Node, tag: str, value: str) -> None:
@@ -101,6 +106,6 @@ def _set_tag(block: Node, tag: str, value: str) -> None:
     if tag in ENTITY_PLUGINS:
         if value.strip():
             told = codecs.told(value)
-            block.children.append(Node(tag, told.attributes, told.name, [], block.place))
+            block.children.append(Node(tag, told.attributes, told.name, [], block.place, dict.fromkeys(told.attributes, 0)))
     else:
         block.children.append(Node(tag, {}, value.strip(), [], block.place))

@@ -13,13 +13,13 @@ MOST_LINES = 100
 
 
 class Place(NamedTuple):
-    """A file and a line of it."""
+    """A file and a line of it; line 0 is what was set from outside."""
 
     file: str
     line: int
 
     def __str__(self) -> str:
-        return f"{self.file}:{self.line}"
+        return f"{self.file}:{self.line}" if self.line else f"{self.file}, as set"
 
 
 def shown(text: str) -> str:
@@ -62,13 +62,13 @@ class Problems:
     def unknown(
         self, place: Place, what: str, name: str, allowed: Iterable[str], *, lists: bool = False
     ) -> None:
-        """A tag or attribute that means nothing: a note, or with `strict` an error."""
+        """A tag or attribute that means nothing: a note, or with `strict` or where it was set from outside an error."""
         if not self.strict and len(self._notes) >= MOST_LINES:
             self._n_unsaid += 1  # without the guess at the right name, which takes a while
             return
         known = sorted(allowed)
         text = f"{what} {shown(name)} is unknown{nearest_name(name[:LONGEST_SHOWN], known)}"
-        if self.strict:
+        if self.strict or not place.line:
             self.error(place, f"{text}; {listed(known)}" if lists else text)
         else:
             self.note(place, f"{text}; it is ignored")

@@ -89,7 +89,9 @@ def _check_names(kind: str, name: str) -> None:
             f"{name!r} is no name of a plugin; it takes letters and digits, a capital first, such as MyBoids"
         )
     if name in stock.manifest():
-        raise ParameterError(f"a plugin that ships is called {name!r}; give yours a name of its own, such as My{name}")
+        raise ParameterError(
+            f"a plugin that ships is called {name!r}; give yours a name of its own, such as My{name}"
+        )
 
 
 def _from_template(kind: str, name: str) -> tuple[str, Plugin]:

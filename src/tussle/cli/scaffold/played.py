@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 from xml.sax.saxutils import quoteattr
 
 from tussle import stock
@@ -55,7 +56,7 @@ TEXT = """\
     <variance_x>40000</variance_x> <variance_y>40000</variance_y> <variance_z>400</variance_z>
     <speed>15</speed>
 {autonomy}    <controller>{controller}</controller>
-    <motion_model>{motion}</motion_model>
+    <motion_model{pitching}>{motion}</motion_model>
 {sensor}  </entity>
 
   <entity>
@@ -65,7 +66,7 @@ TEXT = """\
     <x>800</x> <y>0</y> <z>200</z> <heading>180</heading>
     <variance_x>10000</variance_x> <variance_y>10000</variance_y>
     <autonomy>Boids</autonomy>
-    <motion_model>Unicycle</motion_model>
+    <motion_model use_pitch="true">Unicycle</motion_model>
   </entity>
 
 </runscript>
@@ -87,9 +88,11 @@ def mission_text(kind: str, name: str, plugin: Plugin) -> str:
     autonomy = "".join(f"    <autonomy>{each}</autonomy>\n" for each in autonomies.split())
     tags = {"interaction": "entity_interaction", "metric": "metrics", "network": "network"}
     world = f"\n  <{tags[kind]}>{name}</{tags[kind]}>\n" if kind in tags else ""
+    sensor = f"    <sensor>{name}</sensor>\n" if kind == "sensor" else ""
+    pitching = ' use_pitch="true"' if motion == "Unicycle" else ""
     return TEXT.format(
         title=quoteattr(f"{name} at work"), substeps=10, world=world, autonomy=autonomy, controller=controller,
-        motion=motion, sensor=f"    <sensor>{name}</sensor>\n" if kind == "sensor" else "",
+        motion=motion, pitching=pitching, sensor=sensor,
     )  # fmt: skip
 
 
@@ -102,11 +105,15 @@ def _lineup(kind: str, plugin: Plugin) -> tuple[str, str, str]:
                 return lineup
         except TussleError as error:
             why = str(error)
-    raise MissionError(f"no mission could be made for {plugin!r}: it goes with none of the plugins that ship ({why})")
+    raise MissionError(
+        f"no mission could be made for {plugin!r}: it goes with none of the plugins that ship ({why})"
+    )
 
 
 def _mission(kind: str, plugin: Plugin, lineup: tuple[str, str, str]) -> Mission:
-    autonomies, controller, motion = ([plugin if n == SELF else stock.load(n)() for n in part.split()] for part in lineup)
+    autonomies, controller, motion = (
+        [plugin if n == SELF else stock.load(n)() for n in part.split()] for part in lineup
+    )
     sensor = plugin if kind == "sensor" else ()
     block = Block(
         name="robots", position=(0, 0, 200), autonomy=autonomies, controller=controller, motion=motion[0], sensor=sensor
@@ -115,6 +122,6 @@ def _mission(kind: str, plugin: Plugin, lineup: tuple[str, str, str]) -> Mission
     return Mission(blocks=[block], end=1.0, **world)
 
 
-def _world(kind: str, plugin: Plugin) -> Iterator[tuple[str, Plugin]]:
+def _world(kind: str, plugin: Plugin) -> Iterator[tuple[str, Any]]:
     if kind in ("interaction", "metric", "network"):
         yield f"{kind}s", plugin
