@@ -17,6 +17,7 @@ MOST_INTEGER = 2**53
 """Beyond it a double, through which whole numbers are read, skips some."""
 MOST_ITEMS = 100_000
 """Numbers, or plugins times a hundred, in one parameter."""
+RATIO = re.compile(r"\s*([-+.\deE]+)\s*/\s*([-+.\deE]+)\s*", re.ASCII)
 BEHAVIOR = re.compile(r"\s*\[\s*([^\s\[\]='\"]+)")
 PAIR = re.compile(r"\s*([^\s\[\]='\"]+)\s*=\s*(?:'([^']*)'|\"([^\"]*)\"|([^\s\[\]'\"]+))")
 ROW = re.compile(r"\s*\[([^\[\]]*)\]")
@@ -78,13 +79,14 @@ def fraction(text: str, unit: str) -> float:
     Raises:
         MissionError: It is neither, or the second is zero.
     """
-    above, solidus, below = text.partition("/")
-    if not solidus or re.search(r"[A-Za-z]", above):
+    match = RATIO.fullmatch(text)
+    if match is None:
         return number(text, unit)
-    divisor = number(below)
-    if divisor == 0.0:
+    divisor = number(match[2])
+    value = number(match[1]) / divisor if divisor else math.nan
+    if not math.isfinite(value):
         raise MissionError(f"{shown(text)} is not allowed: it divides by zero")
-    return number(above) / divisor
+    return value
 
 
 def words(text: str) -> list[str]:
@@ -202,7 +204,7 @@ def param(text: str, column: Param, from_geodetic: Callable[..., Any] | None = N
         return column.convert(_ragged(text, column, from_geodetic))
     if column.is_text:
         return column.convert(text.strip())
-    if column.dtype is bool and not column.fields:
+    if column.dtype is bool:
         return column.convert(truth(text))
     values = (
         numbers(text, _parts(column))
@@ -212,8 +214,7 @@ def param(text: str, column: Param, from_geodetic: Callable[..., Any] | None = N
     for value in values:
         if column.dtype is int and not abs(value) <= MOST_INTEGER:
             raise MissionError(f"{shown(text)} is not allowed; it takes {column.allowed()}")
-    typed: Any = tuple(bool(v) for v in values) if column.dtype is bool else values
-    return column.convert(typed if column.fields else typed[0])
+    return column.convert(values if column.fields else values[0])
 
 
 def _parts(column: Param) -> list[tuple[str, str, str]]:

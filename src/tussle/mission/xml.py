@@ -192,7 +192,7 @@ class _WorldReader:
         dt, start, end = fields.number("dt"), fields.number("start"), fields.number("end")
         most = self.limits.substeps
         substeps = fields.read("motion_multiplier", lambda text: codecs.whole(text, 1, most))
-        if not (end - start) / dt <= self.limits.steps:
+        if not abs((end - start) / dt) <= self.limits.steps:
             text = (
                 f"from {start:g} to {end:g} s in steps of {dt:g} s are more than {self.limits.steps:,} steps"
             )

@@ -1,0 +1,176 @@
+"""Files that want too much, or are no missions: one message each, soon, and nothing is read that may not be."""
+
+from __future__ import annotations
+
+import os
+import time
+
+import pytest
+
+from tussle.errors import MissionError
+from tussle.mission import read_mission
+
+BOMB = (
+    "<!DOCTYPE r [<!ENTITY a0 'ha'>"
+    + "".join(f"<!ENTITY a{i} '{f'&a{i - 1};' * 10}'>" for i in range(1, 12))
+    + "]><runscript>&a11;</runscript>"
+)
+SECONDS = 8.0
+"""A bound for the slowest of these files on a busy machine; most take milliseconds."""
+
+
+@pytest.fixture(autouse=True)
+def soon():
+    begin = time.process_time()
+    yield
+    assert time.process_time() - begin < SECONDS
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "not well-formed"),
+        ("no xml at all", "not well-formed"),
+        ("<runscript>", "not well-formed XML: no element found"),
+        ("<runscript><entity></runscript>", "mismatched tag"),
+        ("<runscript/><runscript/>", "junk after document element"),
+        ("<runscript>\n\n&nope;</runscript>", r"m\.xml:3: this is not well-formed XML: undefined entity"),
+        ("<runscript a='1' a='2'/>", "duplicate attribute"),
+        ("<x:runscript/>", "unbound prefix"),
+        ("<runscript>\x00</runscript>", "not well-formed"),
+        ("<mission/>", "the outermost tag is <mission>"),
+        ("<runscript/>", "the mission has no <entity>"),
+        (BOMB, r"m\.xml:1: a DOCTYPE is not allowed"),
+        ("<!DOCTYPE r SYSTEM 'http://example.org/x.dtd'><runscript/>", "a DOCTYPE is not allowed"),
+        ("<!DOCTYPE r [<!ENTITY x SYSTEM 'file:///etc/passwd'>]><runscript>&x;</runscript>", "a DOCTYPE is not allowed"),
+        ("<!DOCTYPE r><runscript/>", "a DOCTYPE is not allowed"),
+        ("<a>" * 5000, "tags stand in one another more than 32 deep"),
+        ("<runscript>" + "<a/>" * 200_000 + "</runscript>", "more than 100,000 tags"),
+        ("<runscript>" + " " * 5_000_000 + "</runscript>", "longer than 4,000,000 characters"),
+        ("<runscript>" + "<entity/>" * 6000 + "</runscript>", "more than 5,000 <entity>"),
+        ("<runscript>" + "<metrics/>" * 1001 + "<entity/></runscript>", "more than 1,000 plugins in <runscript>"),
+        ("<runscript>" + "<!--" * 500_000 + "</runscript>", "not well-formed"),
+        ("${" * 500_000, "not well-formed"),
+        ("<runscript " + " ".join(f"a{i}='1'" for i in range(50_000)) + "/>", "has no <entity>"),
+        ("<runscript>" + "".join(f"<u{i}/>" for i in range(50_000)) + "</runscript>", "has no <entity>"),
+        ("<runscript>" + "".join(f"<metrics>P{i}</metrics>" for i in range(900)) + "<entity/></runscript>", "reading stopped here"),
+    ],
+    ids=lambda text: text[:30],
+)  # fmt: skip
+def test_no_missions(files, text, said):
+    with pytest.raises(MissionError, match=said):
+        files.read(text)
+
+
+@pytest.mark.parametrize(
+    ("tags", "inside", "said"),
+    [
+        ("", "<count>1000000000</count>", r"count: with these there are 1,000,000,000 entities, more than 200,000"),
+        ("", "<count>1e300</count>", "count: '1e300' is not allowed"),
+        ("", "<count>-1</count>", "count: '-1' is not allowed"),
+        ("", "<count>1.5</count>", "count: '1.5' is not allowed"),
+        ("", "<team_id>99999999999</team_id>", "team_id"),
+        ("", "<x>1e999</x>", "x: "),
+        ("", "<x>nan</x>", "x: 'nan' is not a number"),
+        ("", "<x>inf</x>", "takes a finite number"),
+        ("", f"<x>{'9' * 100_000}</x>", "is not a number"),
+        ("", "<health>0</health>", "health: '0' is not allowed; it takes a number > 0"),
+        ("", "<variance_x>-1</variance_x>", "variance_x: '-1' is not allowed; it takes a number >= 0"),
+        ("", "<heading>90 m</heading>", "heading: '90 m' is in m, which cannot become rad"),
+        ("", "<latitude>95</latitude><longitude>0</longitude><altitude>0</altitude>", "latitude: 95 deg is not allowed"),
+        ("", "<latitude>x</latitude><longitude>0</longitude><altitude>0</altitude>", "latitude: 'x' is not a number"),
+        ("", "<placement>square</placement>", "placement: 'square' is not allowed; there are: normal, uniform"),
+        ("", "<generate_rate>1/0</generate_rate>", "it divides by zero"),
+        ("", "<base><radius>-1</radius></base>", "radius: '-1' is not allowed"),
+        ("", "<base><opacity>2</opacity></base>", "opacity"),
+        ("", "<autonomy/>", "<autonomy> is empty"),
+        ("", f"<autonomy>{'x' * 10_000}</autonomy>", "there is no plugin"),
+        ("", "<autonomy loop_rate='-1'>Boids</autonomy>", "loop_rate: '-1' is not allowed"),
+        ("", "<autonomy loop_rate='inf'>Boids</autonomy>", "loop_rate"),
+        ("", "<autonomy behaviors=\"[ NoSuch ]\">MotorSchemas</autonomy>", "behavior: there is no plugin 'NoSuch'"),
+        ("", "<autonomy behaviors=\"[ TrailMS ]\">MotorSchemas</autonomy>", "behavior TrailMS is not in tussle yet"),
+        ("", "<autonomy behaviors=\"[ Boids ]\">MotorSchemas</autonomy>", "Boids does not go into behavior"),
+        ("", f"<autonomy behaviors=\"{'[ AvoidEntityMS ]' * 5000}\">MotorSchemas</autonomy>", "more than 1,000 plugins"),
+        ("", f"<autonomy behaviors=\"{'[' * 100_000}\">MotorSchemas</autonomy>", "is not a plugin"),
+        ("", f"<autonomy goal=\"{'1 ' * 500_000}\">Boids</autonomy>", "has more than 100,000 numbers"),
+        ("<latitude_origin>-95</latitude_origin>", "", "latitude_origin: -95 deg is not allowed; it takes degrees from -90 to 90"),
+        ("<run dt='0'/>", "", "dt: '0' is not allowed; it takes a number > 0"),
+        ("<run dt='-0.1'/>", "", "dt: '-0.1' is not allowed"),
+        ("<run dt='nan'/>", "", "dt: 'nan' is not a number"),
+        ("<run dt='1e-300'/>", "", "are more than 1,000,000,000 steps"),
+        ("<run end='1e300'/>", "", "are more than 1,000,000,000 steps"),
+        ("<run start='-1e308' end='1e308'/>", "", "are more than 1,000,000,000 steps"),
+        ("<run motion_multiplier='0'/>", "", "motion_multiplier: '0' is not allowed"),
+        ("<run motion_multiplier='1.5'/>", "", "motion_multiplier"),
+        ("<run motion_multiplier='1000000000'/>", "", "motion_multiplier"),
+        ("<run enable_gui='perhaps'/>", "", "enable_gui: 'perhaps' is not allowed; it takes true or false"),
+        ("<run update='parallel'/>", "", "update: 'parallel' is not allowed"),
+        ("<param_common/>", "", "param_common has no name"),
+        ("<entity_common/>", "", "entity_common has no name"),
+    ],
+    ids=lambda text: text[:40],
+)  # fmt: skip
+def test_values_that_are_not_allowed(files, tags, inside, said):
+    with pytest.raises(MissionError, match=rf"m\.xml:\d+: .*{said}"):
+        files.world(tags, inside)
+
+
+def test_large_files_are_read_when_allowed(files):
+    text = "<runscript>" + "<x/>" * 150_000 + "<entity><count>300000</count></entity></runscript>"
+    with pytest.raises(MissionError, match="allow_large"):
+        files.read(text)
+    loaded = files.read(text, allow_large=True)
+    assert loaded.mission.blocks[0].count == 300_000
+    assert len(loaded.notes) <= 102
+
+
+def test_placeholders_cannot_grow_beyond_the_limit(files):
+    with pytest.raises(MissionError, match="with its placeholders replaced"):
+        files.read("<runscript>" + "${a=1}" * 100_000 + "</runscript>", {"a": "x" * 10_000})
+
+
+def test_encodings(files):
+    text = "<?xml version='1.0' encoding='{}'?><runscript name='é'><entity/></runscript>"
+    for name in ("utf-8", "UTF-8", "iso-8859-1", "windows-1252"):
+        path = files.write(text.format(name).encode(name))
+        loaded = read_mission(path)
+        assert loaded.name == "é"
+        assert files.read(loaded.text).name == "é"
+    assert read_mission(files.write(b"\xef\xbb\xbf" + text.format("utf-8").encode())).name == "é"
+    with pytest.raises(MissionError, match=r"m\.xml:1: encoding 'utf-16' is not read"):
+        read_mission(files.write(text.format("utf-16").encode()))
+    with pytest.raises(MissionError, match=r"m\.xml:2: byte 0xff is not utf-8 text"):
+        read_mission(files.write(b"<runscript>\n\xff</runscript>"))
+
+
+def test_line_ends(files):
+    with pytest.raises(MissionError, match=r"m\.xml:3: "):
+        files.read("<runscript>\r\n<entity>\r\n<count>x</count></entity></runscript>")
+
+
+@pytest.mark.parametrize(
+    "name", ["nothing.xml", "", "x" * 5000, "a\0b", "~nobody-of-this-name/x", "predator_pray"]
+)
+def test_missions_that_are_not_there(name):
+    with pytest.raises(
+        MissionError, match=r"no file and no mission that ships|is not a file name|is a folder"
+    ):
+        read_mission(name)
+
+
+def test_what_is_no_file_is_not_opened(files, tmp_path):
+    os.mkfifo(tmp_path / "pipe.xml")
+    with pytest.raises(MissionError, match="is no file"):
+        read_mission(tmp_path / "pipe.xml")
+    with pytest.raises(MissionError, match="is a folder"):
+        read_mission(tmp_path)
+    path = files.write("<runscript/>")
+    path.chmod(0)
+    if not os.access(path, os.R_OK):
+        with pytest.raises(MissionError, match="cannot be read"):
+            read_mission(path)
+
+
+def test_reading_writes_nothing(files, tmp_path):
+    files.world("<log_dir>./logs</log_dir><output_type>all</output_type>")
+    assert [p.name for p in tmp_path.iterdir()] == ["m.xml"]

@@ -1,0 +1,164 @@
+"""The missions that ship, and those of the existing system."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tussle import Block, Mission, Simulation, stock
+from tussle.errors import MissionError
+from tussle.mission import catalogue, read_mission, shipped_missions, tags
+from tussle.scene import Origin, Scene
+from tussle.stock import Boids, DirectController, Predator, SimpleCapture, SimpleCaptureMetrics, Unicycle
+
+PAGE = Path(__file__).parents[3] / "docs" / "mission-format.md"
+RUN_AS_THEY_ARE = {
+    "straight.xml": 3, "straight-no-gui.xml": 2, "unicycle.xml": 2, "harmonic-oscillator.xml": 1, "waypoint_follower.xml": 2,
+    "batch-example-mission.xml": 2, "straight_include/straight_complete.xml": 2,
+}  # fmt: skip
+"""Number of blocks of each."""
+WAIT_FOR_PLUGINS = {
+    "capture-the-flag-simple.xml": "EnforceBoundaryInteraction CaptureInBoundaryInteraction FlagCaptureInteraction FlagCaptureMetrics "
+    "BoundaryDefense TakeFlag",
+    "colliding_spheres.xml": "BulletCollision SimpleCarControllerHeading SimpleCar",
+    "fixed_wing_6dof.xml": "AircraftPIDController FixedWing6DOF",
+    "multirotor-test.xml": "RigidBody6DOFStateSensor MultirotorTests Multirotor MultirotorControllerPID",
+    "predator_prey_boids.xml": "JSBSimModel JSBSimModelControllerHeadingPID",
+    "rlsimple.xml": "OpenAIRewards RLSimpleSensor RLSimple",
+    "straight_jsbsim.xml": "JSBSimModel JSBSimModelControllerHeadingPID",
+}
+
+
+def game(*, update: str, boids: Boids, credit: str, health: float) -> Mission:
+    """The paper's game in Python."""
+
+    def hunters(name: str, team: int, north: float, *, switches: bool) -> Block:
+        return Block(
+            name=name, team=team, count=5, position=(2000, north, 200), placement="uniform", half_width=(500, 500, 100),
+            heading="180 deg", health=health, autonomy=Predator(max_speed=35, allow_prey_switching=switches),
+            controller=DirectController(), motion=Unicycle(vel_max=35, turn_rate_max=2, pitch_rate_max=1.5),
+        )  # fmt: skip
+
+    prey = Block(
+        name="prey", team=1, count=100, position=(0, 0, 200), placement="uniform", half_width=(200, 200, 100), health=health,
+        autonomy=boids, controller=DirectController(), motion=Unicycle(vel_max=30),
+    )  # fmt: skip
+    return Mission(
+        blocks=[prey, hunters("keepers", 2, -1000, switches=False), hunters("switchers", 3, 1000, switches=True)],
+        end=20, update=update, end_conditions="time, one_team, all_dead", interactions=[SimpleCapture(credit=credit)],
+        metrics=[SimpleCaptureMetrics()], scene=Scene(origin=Origin.from_degrees(35.721025, -120.767925, 300)),
+    )  # fmt: skip
+
+
+GAMES = {
+    "predator_prey": game(update="synchronous", boids=Boids(), credit="once", health=1),
+    "predator_prey_paper": game(
+        update="sequential", boids=Boids(goal_distance=1e4, means="historic"), credit="each", health=5
+    ),
+}
+
+
+@pytest.mark.parametrize("name", GAMES)
+def test_the_games_are_those_built_in_python(name):
+    loaded = read_mission(name, {"end": "20"}, strict=True)
+    mission = GAMES[name].replace(name=loaded.mission.name)
+    assert loaded.mission == mission
+    assert loaded.seed == 1
+    short = {"end": 2.0} if mission.update == "sequential" else {}
+    read, built = (Simulation(m.replace(**short), seeds=7).run()[0] for m in (loaded.mission, mission))
+    assert read.state_hash == built.state_hash
+    assert read.scores == built.scores
+
+
+def test_shipped_missions_have_titles_and_are_packaged():
+    shipped = shipped_missions()
+    assert set(shipped) == {*GAMES}
+    for path, title in shipped.values():
+        assert title
+        assert read_mission(path, strict=True).name == title
+        assert path.parent == Path(catalogue.__file__).parent / "library"
+    assert read_mission("predator_prey").mission.end == 500.0
+
+
+@pytest.mark.parametrize("name", RUN_AS_THEY_ARE)
+def test_missions_of_the_existing_system_run(existing, name):
+    loaded = read_mission(existing(name))
+    assert len(loaded.mission.blocks) == RUN_AS_THEY_ARE[name]
+    sim = Simulation(loaded.mission, seeds=loaded.seed or 1)
+    for _ in range(3):
+        sim.step()
+    assert read_mission(existing(name)).mission == loaded.mission
+
+
+@pytest.mark.parametrize("name", WAIT_FOR_PLUGINS)
+def test_what_a_mission_of_the_existing_system_lacks_is_named_in_one_line_each(existing, name):
+    missing = [plugin for plugin in WAIT_FOR_PLUGINS[name].split() if plugin not in stock.manifest()]
+    if not missing:
+        assert read_mission(existing(name)).mission.blocks
+        return
+    with pytest.raises(MissionError) as error:
+        read_mission(existing(name))
+    lines = str(error.value).splitlines()
+    assert len(lines) == len(missing)
+    for plugin, line in zip(missing, lines, strict=True):
+        assert line.endswith(f" {plugin} is not in tussle yet")
+        assert f"{name.split('/')[-1]}:" in line
+
+
+def test_missing_plugins_have_an_error_of_their_own():
+    with pytest.raises(catalogue.AbsentPluginError, match="JSBSimModel is not in tussle yet"):
+        catalogue.Catalogue().load("JSBSimModel")
+
+
+def test_every_plugin_that_ships_under_a_historic_name_is_under_the_right_tag():
+    for tag, names in catalogue.historic()["plugins"].items():
+        for name in set(names) & set(stock.manifest()):
+            assert issubclass(stock.load(name), catalogue.KINDS[tag]), name
+
+
+def test_the_table_of_historic_attributes_names_parameters_that_are_there():
+    table = catalogue.historic()
+    for plugin, entry in table["attributes"].items():
+        params = stock.load(plugin).params()
+        assert set(entry.get("renamed", {}).values()) | set(entry.get("joined", {})) | set(
+            entry.get("least_zero", ())
+        ) <= set(params), plugin
+        for parameter, parts in entry.get("joined", {}).items():
+            assert len(parts) == len(params[parameter].fields)
+    for plugin, entry in table["differs"].items():
+        cls = stock.load(plugin)
+        assert set(entry) <= {*cls.params(), *cls.children()}
+
+
+TABLES = {
+    "run": tags.RUN, "runscript": tags.WORLD, "entity": tags.ENTITY, "attributes of entity": tags.ENTITY_ATTRIBUTES, "base": tags.BASE,
+    "plugin": tags.PLUGIN,
+}  # fmt: skip
+
+
+def row(name: str, known: tags.Known) -> str:
+    """The line of the page about a tag."""
+    words = {
+        "truth": "true/false",
+        "whole": "whole number",
+        "number": "number",
+        "text": "text",
+        "words": "words",
+    }
+    takes = f"number in {known.unit}" if known.unit else words[known.reads]
+    bound = f", {known.bound}" if known.bound else ""
+    return f"| `{name}` | {takes}{bound} | {known.default or '–'} | {known.doc} |"
+
+
+@pytest.mark.parametrize("table", TABLES)
+def test_every_tag_that_the_reader_knows_stands_in_the_page(table):
+    lines = PAGE.read_text().splitlines()
+    missing = [line for name, known in TABLES[table].items() if (line := row(name, known)) not in lines]
+    assert not missing, "\n".join(missing)
+
+
+def test_every_plugin_tag_and_addition_stands_in_the_page():
+    page = PAGE.read_text()
+    for word in ("${name=default}", "xi:include", "--set", "not in tussle yet", "credit"):
+        assert word in page
