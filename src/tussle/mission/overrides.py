@@ -80,7 +80,8 @@ def _set_run(root: Node, attribute: str, value: str) -> None:
 
 def _set_attribute(node: Node, name: str, value: str) -> None:
     node.attributes[name] = value
-    node.lines[name] = 0  # not of the file: what is wrong with it is an error even where the file's own would be a note
+    # Not of the file: what is wrong with it is an error even where the file's own would be a note.
+    node.lines[name] = 0
 
 
 def _set_in_block(block: Node, rest: list[str], value: str) -> None:
@@ -106,6 +107,8 @@ def _set_tag(block: Node, tag: str, value: str) -> None:
     if tag in ENTITY_PLUGINS:
         if value.strip():
             told = codecs.told(value)
-            block.children.append(Node(tag, told.attributes, told.name, [], block.place, dict.fromkeys(told.attributes, 0)))
+            block.children.append(
+                Node(tag, told.attributes, told.name, [], block.place, dict.fromkeys(told.attributes, 0))
+            )
     else:
         block.children.append(Node(tag, {}, value.strip(), [], block.place))
