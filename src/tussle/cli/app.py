@@ -165,14 +165,15 @@ def check(
     """Read a mission and build its game without playing it; tell all that is wrong with it."""
     with told(debug):
         from tussle.cli.play import simulate
+        from tussle.cli.progress import compiling
 
         source = _source(mission, settings, more, None, None, strict, plugin_files, allow_large)
         loaded, made, seed = source.read()
-        with simulate(loaded, made, seed) as simulation:
+        with compiling(), simulate(loaded, made, seed) as simulation:
             n = sum(block.count for block in made.blocks)
             notes = f", {len(loaded.notes)} note(s)" if loaded.notes else ""
             out().print(
-                f"{loaded.name} can be played: {n} entities, grade {simulation.grade}{notes}", soft_wrap=True
+                f"{mission} can be played: {n} entities, grade {simulation.grade}{notes}", soft_wrap=True
             )
 
 
@@ -203,11 +204,12 @@ def describe(
             pages.show_plugin(name, found)
             return
         from tussle.cli.play import simulate
+        from tussle.cli.progress import compiling
 
         loaded, made, seed = _source(
             name, settings, more, None, None, strict, plugin_files, allow_large
         ).read()
-        with simulate(loaded, made, seed) as simulation:
+        with compiling(), simulate(loaded, made, seed) as simulation:
             pages.show_mission(loaded.name, loaded.path, made, simulation, seed)
 
 

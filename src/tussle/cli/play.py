@@ -79,8 +79,7 @@ def simulate(loaded: Loaded, mission: Mission, seed: int, **more: Any) -> Simula
         TussleError: It cannot be played; the message begins with file and line where it names a block.
     """
     try:
-        with compiling():
-            return Simulation(mission, seed, on_error="record", **more)
+        return Simulation(mission, seed, on_error="record", **more)
     except (MissionError, ParameterError, WiringError) as error:
         block = re.match(r"block '([^']*)'", str(error))
         place = loaded.places.get(block[1]) if block else None
@@ -113,9 +112,11 @@ def play(source: Source, record: Record, pace: float | None, start_from: Path | 
 
         more["start_from"] = read_table(start_from)
     with ExitStack() as stack:
-        simulation = stack.enter_context(simulate(loaded, mission, seed, **more))
-        interrupt = stack.enter_context(Interrupt())
-        recorder = _recorder(simulation, record, loaded, seed, source.given) if record.is_on else None
+        with compiling():
+            simulation = stack.enter_context(simulate(loaded, mission, seed, **more))
+            interrupt = stack.enter_context(Interrupt())
+            recorder = _recorder(simulation, record, loaded, seed, source.given) if record.is_on else None
+            simulation.step()  # loads or compiles what the game needs, and so counts as preparation
         speed = Speed(began)
         _run(simulation, loaded.path.stem, speed, pace, interrupt)
         error = simulation.result()[0].error
@@ -134,9 +135,7 @@ def play(source: Source, record: Record, pace: float | None, start_from: Path | 
 
 
 def _run(simulation: Simulation, name: str, speed: Speed, pace: float | None, interrupt: Interrupt) -> None:
-    """Play to the end, or until an interrupt. The first step, which loads and compiles, counts as preparation."""
-    with compiling():
-        simulation.step()
+    """Play on to the end, or until an interrupt."""
     start = float(simulation.t[0])
     speed.begin(start)
     end = simulation.mission.end if "time" in simulation.mission.end_conditions else None

@@ -1,0 +1,59 @@
+"""The command, run as a user runs it: in a process and an empty folder of its own."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from cli_process import COMMAND, environment
+
+Tussle = Callable[..., "subprocess.CompletedProcess[str]"]
+
+MISSION = """\
+<?xml version="1.0"?>
+<runscript name="A small game">
+  <run start="0" end="${end=3}" dt="0.1"/>
+  <seed>7</seed>
+  <metrics>SimpleCaptureMetrics</metrics>
+  <entity_interaction>SimpleCapture</entity_interaction>
+  <entity>
+    <name>prey</name> <team_id>1</team_id> <count>${n=10}</count>
+    <variance_x>400</variance_x> <variance_y>400</variance_y>
+    <autonomy>Boids</autonomy>
+    <motion_model use_pitch="true">Unicycle</motion_model>
+  </entity>
+  <entity>
+    <name>hunters</name> <team_id>2</team_id> <count>2</count> <x>60</x>
+    <autonomy max_speed="35">${mind=Predator}</autonomy>
+    <motion_model use_pitch="true" vel_max="35" turn_rate_max="2">Unicycle</motion_model>
+  </entity>
+</runscript>
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Where the command runs; it holds game.xml and nothing else."""
+    (tmp_path / "game.xml").write_text(MISSION)
+    return tmp_path
+
+
+@pytest.fixture
+def tussle(folder: Path) -> Tussle:
+    """Runs the command in the folder; `code` is the exit code that it must end with."""
+
+    def run(*arguments: str | Path, code: int = 0, timeout: float = 60.0) -> subprocess.CompletedProcess[str]:
+        done = subprocess.run(
+            [*COMMAND, *map(str, arguments)],
+            check=False, capture_output=True, text=True, timeout=timeout, cwd=folder, env=environment(),
+        )  # fmt: skip
+        assert done.returncode == code, (done.returncode, done.stdout, done.stderr)
+        return done
+
+    return run

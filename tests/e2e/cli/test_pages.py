@@ -1,0 +1,83 @@
+"""The pages that need no game: help, lists, a plugin, a mission."""
+
+from __future__ import annotations
+
+import pytest
+
+import tussle as package
+from tussle import stock
+from tussle.cli import pages, terminal
+from tussle.mission import shipped_missions
+
+
+def test_the_version(tussle):
+    assert tussle("--version").stdout == f"tussle {package.__version__}\n"
+
+
+def test_help_names_all_commands_options_and_exit_codes(tussle):
+    text = tussle("--help").stdout
+    for command in ("run", "check", "describe", "plugins", "missions", "new"):
+        assert f"\n  {command} " in text
+    text = tussle("run", "--help").stdout
+    for option in (
+        "--seed", "--set", "--end", "--out", "--no-log", "--log-period", "--pace", "--start-from", "--strict",
+        "--plugin-path", "--debug",
+    ):  # fmt: skip
+        assert f"\n  {option} " in text
+    for code, meaning in terminal.EXIT_CODES.items():
+        assert f"{code:>3}  {meaning}\n" in text
+    assert max(map(len, text.splitlines())) <= 80
+
+
+def test_plugins_are_listed_by_kind_and_own_ones_too(tussle, folder):
+    (folder / "mine.py").write_text(
+        'from tussle.stock import Boids\n\n\nclass Mine(Boids):\n    """Sheep. They sleep."""\n'
+    )
+    lines = tussle("plugins", "--plugin-path", "mine.py").stdout.splitlines()
+    names = {line.split()[0] for line in lines if line.startswith("   ") and line[3] != " "}
+    assert names == {*stock.manifest(), "Mine"}
+    assert any(line.split() == ["Mine", "Sheep"] for line in lines)
+    assert lines.index(" autonomy") < lines.index(" motion") < lines.index(" metric")
+    assert max(map(len, lines)) <= 80
+
+
+def test_missions_are_listed_with_their_titles(tussle):
+    text = tussle("missions").stdout
+    for name, (_, title) in shipped_missions().items():
+        assert any(line.split(maxsplit=1) == [name, title] for line in text.splitlines())
+
+
+def test_a_plugin_page_has_parameters_channels_and_units(tussle):
+    lines = [line.split() for line in tussle("describe", "Predator").stdout.splitlines()]
+    for name, column in stock.load("Predator").params().items():
+        (line,) = (line for line in lines if line[:1] == [name] and len(line) > 2)
+        assert not isinstance(column.default, float) or line[1] == f"{column.default:g}"
+    assert ["turn_rate", "rad/s"] in [line[:2] for line in lines]
+
+
+@pytest.mark.parametrize("name", stock.manifest())
+def test_the_page_of_each_plugin_fits_80_columns(name, capsys):
+    terminal.out.cache_clear()
+    pages.show_plugin(name, stock.load(name))
+    lines = capsys.readouterr().out.splitlines()
+    place = 3  # the path of the file, as long as it is
+    assert lines[1] == f" {name}"
+    assert max(len(line) for i, line in enumerate(lines) if i != place) <= 80
+    terminal.out.cache_clear()
+
+
+def test_a_mission_page_has_blocks_plugins_and_the_step(tussle):
+    text = tussle("describe", "game.xml", "--set", "n=4").stdout
+    for words in (
+        "prey 1 4 Boids",
+        "hunters 2 2 Predator(max_speed=35.0)",
+        "1 autonomy prey: Boids",
+        "grade: portable",
+    ):
+        assert any(line.split() == words.split() for line in text.splitlines()), words
+
+
+def test_check_says_that_a_mission_can_be_played(tussle, folder):
+    done = tussle("check", "game.xml")
+    assert done.stdout == "game.xml can be played: 12 entities, grade portable\n"
+    assert [p.name for p in folder.iterdir()] == ["game.xml"]

@@ -1,0 +1,218 @@
+"""`tussle run`: what it shows, what it writes, and what each option does."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import pytest
+
+from tussle.record import load_run
+
+
+def hash_of(done):
+    return re.search(r"^ hash +([0-9a-f]{32,})$", done.stdout, re.MULTILINE)[1]
+
+
+def info_of(folder, name="out"):
+    return json.loads((folder / name / "run.json").read_text())
+
+
+def test_it_shows_what_came_of_the_game_and_where_it_is_recorded(tussle, folder):
+    done = tussle("run", "game.xml")
+    (run,) = (folder / "runs").iterdir()
+    assert re.fullmatch(r"game-7-\d{8}-\d{6}", run.name)
+    info = info_of(folder, run.relative_to(folder))
+    assert info["is_complete"]
+    assert info["worlds"][0]["seed"] == 7
+    assert info["worlds"][0]["state_hash"] == hash_of(done)
+    lines = done.stdout.splitlines()
+    assert " A small game" in lines
+    assert " seed 7 · 12 entities · 30 steps of 0.1 s" in lines
+    scores = info["worlds"][0]["scores"]
+    for team, name, start in (("1", "prey", "10"), ("2", "hunters", "2")):
+        (line,) = (line.split() for line in lines if line.startswith(f"  {team} {name}"))
+        assert line[2:4] == [start, str(info["worlds"][0]["alive"][team])]
+        assert line[6] == f"{scores[team]:g}"
+    for label in (
+        " ended  its end time is reached, at t = 3 s",
+        " grade  portable",
+        f" run    runs/{run.name}",
+    ):
+        assert label in lines
+    assert re.search(
+        r"^ speed  \S+ × real time \(\S+ s, \S+ CPU s\), ready after \S+ s$", done.stdout, re.MULTILINE
+    )
+    assert max(map(len, lines)) <= 80
+    assert not any(line != line.rstrip() for line in lines)
+    assert not done.stderr
+
+
+def test_the_run_directory_opens(tussle, folder):
+    tussle("run", "game.xml", "--out", "out")
+    run = load_run(folder / "out")
+    assert run.is_complete
+    assert len(run.trajectory) >= 12 * 25
+    assert sorted(p.name for p in (folder / "out").iterdir()) == [
+        "events.arrow", "mission.xml", "run.json", "summary.csv", "trajectory.arrow",
+    ]  # fmt: skip
+
+
+def test_it_is_the_same_again_and_another_with_another_seed(tussle, folder):
+    first = tussle("run", "game.xml", "--no-log")
+    again = tussle("run", "game.xml", "--out", "out")
+    other = tussle("run", "game.xml", "--no-log", "--seed", "8")
+    assert hash_of(first) == hash_of(again) != hash_of(other)
+    kept = tussle("run", "out/mission.xml", "--no-log")
+    assert hash_of(kept) == hash_of(first)
+
+
+def test_without_log_nothing_is_written(tussle, folder):
+    done = tussle("run", "game.xml", "--no-log")
+    assert " run    not recorded (--no-log)" in done.stdout.splitlines()
+    assert [p.name for p in folder.iterdir()] == ["game.xml"]
+
+
+def test_a_shipped_mission_is_played_by_its_name(tussle, folder):
+    done = tussle("run", "predator_prey", "--end", "1", "--set", "prey=20")
+    assert " seed 1 · 30 entities · 10 steps of 0.1 s" in done.stdout.splitlines()
+    assert next((folder / "runs").iterdir()).name.startswith("predator_prey-1-")
+
+
+def test_set_reaches_placeholders_parameters_with_units_and_whole_plugins(tussle, folder):
+    settings = ["n=5", "prey.Boids.max_speed=36 km/h", "SimpleCapture.capture_range=100"]
+    tussle("run", "game.xml", "--out", "out", *(a for s in settings for a in ("--set", s)))
+    info = info_of(folder)
+    assert info["parameters"] == dict(s.split("=", 1) for s in settings)
+    prey = info["mission"]["blocks"][0]
+    assert prey["count"] == 5
+    assert "Boids(max_speed=10.0)" in prey["plugins"]
+    assert "SimpleCapture(capture_range=100.0)" in info["mission"]["world_plugins"]
+    plugins = "prey.motion_model=SingleIntegrator", "prey.controller=SingleIntegratorControllerSimple"
+    tussle("run", "game.xml", "--out", "flat", "--set", *plugins)
+    assert "SingleIntegrator()" in info_of(folder, "flat")["mission"]["blocks"][0]["plugins"]
+
+
+def test_end_takes_a_unit_and_ends_a_mission_that_has_no_such_end(tussle, folder):
+    text = (folder / "game.xml").read_text().replace("<seed>", "<end_condition>none</end_condition><seed>")
+    (folder / "endless.xml").write_text(text)
+    done = tussle("run", "endless.xml", "--no-log", "--end", "0.05 min")
+    assert " ended  its end time is reached, at t = 3 s" in done.stdout.splitlines()
+    assert hash_of(done) == hash_of(tussle("run", "game.xml", "--no-log"))
+
+
+def test_log_period_thins_the_trajectory_and_changes_nothing(tussle, folder):
+    dense = tussle("run", "game.xml", "--out", "dense")
+    thin = tussle("run", "game.xml", "--out", "thin", "--log-period", "1")
+    assert hash_of(dense) == hash_of(thin)
+    steps = [set(load_run(folder / name).trajectory["t"].round(6)) for name in ("dense", "thin")]
+    assert len(steps[0]) == 31
+    assert steps[1] == {0.0, 1.0, 2.0, 3.0}
+
+
+def test_pace_takes_its_time_and_changes_nothing(tussle, folder):
+    fast = tussle("run", "game.xml", "--out", "fast", "--end", "2")
+    slow = tussle("run", "game.xml", "--out", "slow", "--end", "2", "--pace", "2")
+    assert hash_of(fast) == hash_of(slow)
+    walls = [info_of(folder, name)["timings"]["wall_s"] for name in ("fast", "slow")]
+    assert walls[1] > 0.85  # 18 steps of 0.1 s between the first and the last, at twice their pace
+
+
+def test_start_from_places_everybody_as_recorded(tussle, folder):
+    tussle("run", "game.xml", "--out", "first", "--seed", "3")
+    tussle("run", "game.xml", "--out", "again", "--seed", "4", "--start-from", "first")
+    tables = [load_run(folder / name).trajectory for name in ("first", "again")]
+    begin = [t[t["t"] == 0.0].set_index("id")[["x", "y", "z"]] for t in tables]
+    assert (begin[0] == begin[1]).all().all()
+
+
+def test_a_plugin_of_ones_own_is_played(tussle, folder):
+    (folder / "mine.py").write_text(
+        '"""Mine."""\n\nfrom tussle.stock import Predator\n\n\nclass Mine(Predator):\n    """A predator."""\n'
+    )
+    done = tussle("run", "game.xml", "--plugin-path", "mine.py", "--set", "mind=Mine", "--out", "out")
+    assert "Mine(max_speed=35.0)" in info_of(folder)["mission"]["blocks"][1]["plugins"]
+    assert done.stdout
+
+
+def test_strict_makes_notes_errors(tussle, folder):
+    text = (folder / "game.xml").read_text().replace("<seed>", "<sed>1</sed><seed>")
+    (folder / "typo.xml").write_text(text)
+    lax = tussle("run", "typo.xml", "--no-log")
+    assert lax.stderr == "note: typo.xml:4: tag 'sed' is unknown (did you mean 'seed'?); it is ignored\n"
+    strict = tussle("run", "typo.xml", "--no-log", "--strict", code=1)
+    assert strict.stderr.startswith("error: typo.xml:4: tag 'sed' is unknown (did you mean 'seed'?)")
+
+
+FAILING = '''\
+"""Fails."""
+
+from tussle.stock import Predator
+
+
+class Fails(Predator):
+    """Fails in step 10."""
+
+    def step(self, g):
+        if (g.step_count == 10).any():
+            raise RuntimeError("out of fuel")
+        super().step(g)
+'''
+
+
+def test_a_plugin_that_fails_ends_the_game_and_what_was_played_is_kept(tussle, folder):
+    (folder / "fails.py").write_text(FAILING)
+    arguments = ["run", "game.xml", "--plugin-path", "fails.py", "--set", "mind=Fails", "--out", "out"]
+    done = tussle(*arguments, code=3)
+    (line,) = done.stderr.splitlines()
+    assert re.fullmatch(r"error: Fails, .*step 10: fails\.py:11: RuntimeError: out of fuel", line)
+    assert " ended  a plugin failed, at t = 1.1 s" in done.stdout.splitlines()
+    run = load_run(folder / "out")
+    assert not run.is_complete
+    assert run.trajectory["t"].max() >= 1.0
+    arguments[-1] = "out2"
+    assert "Traceback" in tussle(*arguments, "--debug", code=3).stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "text"),
+    [
+        (["run"], 2, "MISSION"),
+        (["run", "game.xml", "--sed", "1"], 2, "--sed"),
+        (["run", "game.xml", "--seed", "-1"], 2, "--seed"),
+        (["run", "game.xml", "--set", "n"], 2, "'n' is not written as NAME=VALUE"),
+        (["run", "game.xml", "--set", "n=1", "n=2"], 2, "n is set twice, to '1' and to '2'"),
+        (["run", "game.xml", "--pace", "0"], 2, "--pace 0 is not allowed"),
+        (["run", "game.xml", "--log-period", "nan"], 2, "--log-period nan is not allowed"),
+        (["run", "game.xml", "--no-log", "--out", "x"], 2, "--no-log"),
+        (["run", "nothing.xml"], 1, "nothing.xml"),
+        (["run", "predator_pray"], 1, "did you mean 'predator_prey'?"),
+        (["run", "game.xml", "--set", "m=3"], 1, "the mission has no setting 'm'"),
+        (["run", "game.xml", "--set", "prey.Boids.max_sped=3"], 1, "did you mean 'max_speed'?"),
+        (["run", "game.xml", "--set", "prey.Boids.max_speed=3 kg"], 1, "kg"),
+        (["run", "game.xml", "--set", "pry.Boids.max_speed=3"], 1, "did you mean 'prey'?"),
+        (["run", "game.xml", "--end", "-3"], 1, "--end -3 is not allowed"),
+        (["run", "game.xml", "--end", "soon"], 1, "--end: 'soon'"),
+        (["run", "game.xml", "--plugin-path", "no.py"], 1, "no.py: there is no such plugin file"),
+        (["run", "game.xml", "--start-from", "no.csv"], 4, "no.csv"),
+        (["run", "game.xml", "--out", "game.xml"], 4, "game.xml"),
+        (["check", "game.xml", "--set", "prey.motion_model=SimpleAircraft"], 1, "game.xml:7: block 'prey': nobody writes"),
+        (["describe", "Boid"], 1, "did you mean 'Boids'?"),
+        (["fly"], 2, "fly"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_said_once_with_an_exit_code_and_nothing_is_written(
+    tussle, folder, arguments, code, text
+):
+    done = tussle(*arguments, code=code)
+    assert text in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not done.stdout
+    assert [p.name for p in folder.iterdir()] == ["game.xml"]
+
+
+def test_a_directory_that_holds_a_run_is_left_alone(tussle, folder):
+    tussle("run", "game.xml", "--out", "out")
+    before = {p: p.read_bytes() for p in (folder / "out").iterdir()}
+    assert "holds a run already" in tussle("run", "game.xml", "--out", "out", "--seed", "9", code=4).stderr
+    assert {p: p.read_bytes() for p in (folder / "out").iterdir()} == before

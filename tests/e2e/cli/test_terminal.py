@@ -1,0 +1,70 @@
+"""What a user sees on a terminal of 80 columns, and what a log file gets instead."""
+
+from __future__ import annotations
+
+import os
+import pty
+import re
+import subprocess
+import termios
+
+from cli_process import COMMAND, environment
+
+ESCAPE = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
+
+
+def seen(folder, *arguments):
+    """All that a terminal of 80 columns gets, escapes included, and the exit code."""
+    ours, its = pty.openpty()
+    termios.tcsetwinsize(its, (24, 80))
+    process = subprocess.Popen(
+        [*COMMAND, *arguments], stdin=its, stdout=its, stderr=its, cwd=folder, env=environment()
+    )
+    os.close(its)
+    chunks = []
+    while True:
+        try:
+            chunk = os.read(ours, 65536)
+        except OSError:  # the last one who held the terminal has gone
+            break
+        if not chunk:
+            break
+        chunks.append(chunk)
+    os.close(ours)
+    return b"".join(chunks).decode(), process.wait(timeout=30)
+
+
+def test_a_bar_with_the_speed_is_shown_while_it_plays_and_gone_after(folder):
+    text, code = seen(folder, "run", "game.xml", "--no-log", "--pace", "3")
+    assert code == 0
+    bars = [line for line in re.split(r"[\r\n]", ESCAPE.sub("", text)) if "left" in line and "game" in line]
+    assert len(bars) >= 5
+    for bar in bars:
+        assert re.search(r"game \S.* \d/3 s +\S+ × real time +0:0\d left", bar)
+        assert len(bar.rstrip()) <= 80
+    assert text.rindex("× real time ") < text.index("A small game") + 2000
+    assert "\x1b[2K" in text  # the bar is wiped
+    assert "\x1b[?25h" in text  # and the cursor is back
+
+
+def test_colours_are_for_terminals_only(folder, tussle):
+    text, _ = seen(folder, "run", "nothing.xml")
+    assert "\x1b[1;31merror: " in text
+    assert "\x1b" not in tussle("run", "nothing.xml", code=1).stderr
+    assert "\x1b" not in tussle("plugins").stdout
+
+
+def test_the_first_run_ever_says_that_it_compiles_and_the_next_does_not(folder, monkeypatch):
+    monkeypatch.setenv("TUSSLE_CACHE_DIR", str(folder / "kernels"))
+    (folder / "still.xml").write_text(
+        '<runscript><run end="1" dt="0.1"/><entity><motion_model>Still</motion_model></entity></runscript>'
+    )
+    command = [*COMMAND, "run", "still.xml", "--no-log"]
+    runs = [
+        subprocess.run(command, check=True, capture_output=True, text=True, cwd=folder, env=environment())
+        for _ in range(2)
+    ]
+    first, last = runs[0].stderr.splitlines()
+    assert first == f"compiling kernels for this machine, once; they are kept in {folder / 'kernels'}"
+    assert re.fullmatch(r"compiled \d+ kernels? in \d+\.\d s", last)
+    assert not runs[1].stderr
