@@ -93,7 +93,7 @@ def show_written(files: Mapping[Path, str], next_steps: str) -> None:
     page = Table.grid(padding=(0, 2))
     for path, what in files.items():
         page.add_row(f" {path}", Text(what, "dim"))
-    show(page, Text("\n".join(f" {line}" for line in next_steps.splitlines()), "bold"))
+    show(page, Text(next_steps, "bold"))
 
 
 # -- a plugin ---------------------------------------------------------------------------------------------------------------

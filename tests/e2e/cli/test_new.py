@@ -1,0 +1,81 @@
+"""`tussle new`: what it writes works at once, with its test and on the command line, for every kind."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+
+import pytest
+from cli_process import environment
+
+from tussle import Simulation, stock
+from tussle.cli.scaffold import KINDS, write_plugin
+from tussle.mission import load_plugin_file, read_mission
+
+FROM = {
+    "autonomy": "Boids", "motion": "Unicycle", "controller": "UnicyclePID", "sensor": "NoisyState",
+    "interaction": "SimpleCapture", "metric": "SimpleCollisionMetrics", "network": "SphereNetwork",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("origin", [None, *FROM.values()])
+def test_each_begins_with_a_plugin_that_plays_and_a_test_that_passes(tussle, folder, origin):
+    kinds = KINDS if origin is None else [k for k, name in FROM.items() if name == origin]
+    for kind in kinds:
+        name = f"My{kind.capitalize()}"
+        done = tussle("new", kind, name, *(() if origin is None else ("--from", origin)), "--out", "mine")
+        assert f" mine/my_{kind}.py " in done.stdout
+        assert f"\n tussle run mine/my_{kind}.xml --plugin-path mine/my_{kind}.py\n" in done.stdout
+        played = tussle(
+            "run", f"mine/my_{kind}.xml", "--plugin-path", f"mine/my_{kind}.py", "--no-log", "--end", "3"
+        )
+        assert not re.search("note|warning", played.stderr)
+    tests = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-W", "error", "-p", "no:xdist", "-p", "no:cacheprovider", "mine"],
+        check=False, capture_output=True, text=True, cwd=folder, env=environment(), timeout=300,
+    )  # fmt: skip
+    assert tests.returncode == 0, tests.stdout
+    assert f"{2 * len(kinds)} passed" in tests.stdout
+
+
+def test_every_plugin_that_ships_can_be_begun_with(tmp_path):
+    for name in stock.manifest():
+        cls = stock.load(name)
+        if cls.kind not in KINDS:
+            continue
+        written = list(write_plugin(cls.kind, f"My{name}", name, tmp_path).files)
+        copy = load_plugin_file(written[0])[f"My{name}"]
+        assert list(copy.params()) == list(cls.params())
+        assert copy.__doc__ == re.sub(rf"\b{name}\b", f"My{name}", cls.__doc__)
+        loaded = read_mission(written[2], plugin_files=[written[0]])
+        with Simulation(loaded.mission) as simulation:
+            simulation.step(2)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["thing", "Mine"], "there is no kind 'thing'"),
+        (["autonomi", "Mine"], "did you mean 'autonomy'?"),
+        (["autonomy", "mine"], "a capital first"),
+        (["autonomy", "../Mine"], "is no name of a plugin"),
+        (["autonomy", "Boids"], "a plugin that ships is called 'Boids'"),
+        (["autonomy", "Mine", "--from", "Boid"], "did you mean 'Boids'?"),
+        (["autonomy", "Mine", "--from", "Unicycle"], "this is of the kind motion, not autonomy"),
+    ],
+)
+def test_what_cannot_be_begun_is_told(tussle, folder, arguments, text):
+    done = tussle("new", *arguments, code=1)
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("error: ")
+    assert text in line
+    assert [p.name for p in folder.iterdir()] == ["game.xml"]
+
+
+def test_files_of_the_same_name_are_left_alone(tussle, folder):
+    (folder / "test_mine.py").write_text("precious")
+    done = tussle("new", "metric", "Mine", code=1)
+    assert "test_mine.py: there is such a file already" in done.stderr
+    assert (folder / "test_mine.py").read_text() == "precious"
+    assert not (folder / "mine.py").exists()
