@@ -32,7 +32,7 @@ BRUTE = 600
 """Rows per world up to which a search for the nearest needs no cells."""
 
 _DERIVING = {name: getattr(kernels, name) for name in DERIVED}
-_OFFSETS = {name: sum(list(FLOATS.values())[:i]) for i, name in enumerate(FLOATS)}
+OFFSETS = {name: sum(list(FLOATS.values())[:i]) for i, name in enumerate(FLOATS)}
 _UNITS = {
     "pos": "m",
     "vel": "m/s",
@@ -91,8 +91,8 @@ class Bodies:
         """N rows at the origin, unit mass and health, level."""
         floats = np.zeros((N_FLOATS, n))
         for name in ("health", "radius", "mass"):
-            floats[_OFFSETS[name]] = 1.0
-        floats[_OFFSETS["quat"]] = 1.0
+            floats[OFFSETS[name]] = 1.0
+        floats[OFFSETS["quat"]] = 1.0
         return cls(floats, np.zeros((len(INTS), n), np.int64), n_worlds)
 
     def replace(self, floats: np.ndarray, ints: np.ndarray) -> None:
@@ -101,7 +101,7 @@ class Bodies:
         self.n = floats.shape[1]
         own = self.__dict__
         for name, k in FLOATS.items():
-            first = _OFFSETS[name]
+            first = OFFSETS[name]
             own[name] = floats[first : first + k] if k > 1 else floats[first]
         for i, name in enumerate(INTS):
             own[name] = ints[i]

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from tussle.api.bodies import DERIVED, FLOATS, derive
+from tussle.api.bodies import DERIVED, FLOATS, OFFSETS, derive
 from tussle.api.group import GroupView
 from tussle.api.kinds import EntityPlugin
 from tussle.columns import Param, State
@@ -18,6 +18,7 @@ from tussle.numeric.rk4 import compile_derivative, rk4
 
 BODY_INPUTS = ("force_x", "force_y", "force_z", "torque_x", "torque_y", "torque_z", "mass")
 WRITABLE = ("pos", "quat", "vel", "omega")
+_ROWS = [OFFSETS[name] + i for name in WRITABLE for i in range(FLOATS[name])]
 
 
 class MotionBody(GroupView):
@@ -35,7 +36,8 @@ class MotionBody(GroupView):
             self._seen.append(name)
             return array
         if name == "rows":
-            rows = tuple(row for column in WRITABLE for row in getattr(self, column))
+            floats = self._bodies.floats
+            rows = tuple(floats[i, self.first : self.last] for i in _ROWS)
             self.__dict__[name] = rows
             self._seen.append(name)
             return rows

@@ -24,6 +24,7 @@ class StepEnd:
     def __init__(self, sim: Simulation) -> None:
         self.sim = sim
         self.has_failures = False
+        self._steps = sim.mission.steps
         self._has_changed = True
         self._checked: tuple[Any, ...] | None = None
 
@@ -40,10 +41,12 @@ class StepEnd:
             clock.step += 1
         else:
             clock.step += self.sim.running
-        self.take_out_dead()
+        if self.sim.world_view.deaths or self.has_failures:
+            self.take_out_dead()
         if clock.common >= 0:
             clock.common += 1
-        self._end_worlds()
+        if self._has_changed or clock.common < 0 or clock.common >= self._steps:
+            self._end_worlds()
 
     def _check_states(self) -> None:
         if self._checked is None:
@@ -84,24 +87,16 @@ class StepEnd:
         conditions = mission.end_conditions
         over: dict[int, str] = {}
         if "time" in conditions:
-            for world in (
-                np.flatnonzero(self.sim.running & (clock.step >= mission.steps))
-                if self._may_be_time()
-                else ()
-            ):
+            for world in np.flatnonzero(self.sim.running & (clock.step >= self._steps)):
                 over[int(world)] = "time"
         if (
             self._has_changed
-        ):  # who is there has changed since the last look: births count too, since the last one may decide
+        ):  # who is there, since the last look: births count too, since the last one may decide
             self._has_changed = False
             for number, reason in self._lost_teams():
                 over.setdefault(number, reason)
         if over:
             self._end_and_park(over)
-
-    def _may_be_time(self) -> bool:
-        common = self.sim.context.clock.common
-        return common < 0 or common >= self.sim.mission.steps
 
     def _lost_teams(self) -> Iterable[tuple[int, str]]:
         conditions = self.sim.mission.end_conditions

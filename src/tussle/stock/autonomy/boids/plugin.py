@@ -106,6 +106,9 @@ class Boids(Autonomy):
                 *places, quat, self.fov_az, self.fov_el, sums, g.first, a, b, blocks.most
             )
         else:
+            if g.context.threads == 1:
+                kernels.neighbor_sums(*places, sums, g.first, 0, blocks.n_blocks, blocks.most)
+                return sums
             run = lambda a, b: kernels.neighbor_sums(*places, sums, g.first, a, b, blocks.most)  # noqa: E731
         g.context.split(blocks.n_blocks, run)
         return sums
