@@ -10,15 +10,20 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import tempfile
 
-from pages import OUTPUT, PAGES, ROOT, examples, namespace, printed_by
+from pages import OUTPUT, PAGES, examples, namespace, printed_by
 
 
 def game() -> str:
     """What the first command of the README prints, run as a user runs it."""
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
-    command = [sys.executable, str(ROOT / "examples" / "01_predator_prey.py")]
-    return subprocess.run(command, check=True, capture_output=True, text=True, env=environment).stdout
+    command = [sys.executable, "-m", "tussle.cli", "run", "predator_prey"]
+    with tempfile.TemporaryDirectory() as folder:
+        done = subprocess.run(
+            command, check=True, capture_output=True, text=True, env=environment, cwd=folder
+        )
+    return done.stdout.strip("\n") + "\n"
 
 
 def main() -> None:
