@@ -149,6 +149,21 @@ def test_threads_that_call_first_compile_once(own_cache):
     assert stats.compiled == before + 1
 
 
+def test_who_waits_is_told_before_a_kernel_compiles(own_cache, monkeypatch):
+    told = []
+    monkeypatch.setattr(stats, "on_compile", lambda name: told.append((name, stats.compiled)))
+
+    @kernel("F Fw")
+    def announced(x, out):
+        out[0] = x[0] + 43.0
+
+    before = stats.compiled
+    for _ in range(2):
+        announced(np.ones(1), np.empty(1))
+    assert told == [(announced.name, before)]
+    assert stats.compiled == before + 1
+
+
 # What the key sees -----------------------------------------------------------------------------------------
 
 
