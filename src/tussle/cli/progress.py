@@ -34,7 +34,7 @@ class Meter:
         self._due = self._began + (0.0 if self._is_bar else LINE_EVERY)
         self._bar = Progress(
             TextColumn("{task.description}", style="bold"),
-            BarColumn(bar_width=None),
+            BarColumn(bar_width=None, complete_style="cyan", finished_style="cyan", pulse_style="cyan"),
             TextColumn("{task.fields[at]}"),
             TextColumn("{task.fields[speed]}", style="cyan"),
             TextColumn("{task.fields[left]}", style="dim"),

@@ -67,9 +67,11 @@ def put(*parts: RenderableType) -> None:
 
 
 def say(label: str, text: str, style: str = "") -> None:
-    """A message on the error stream, with its label before each line; lines are left to the terminal to wrap, and can be clicked."""
+    """A message on the error stream, with its label before each line; on a terminal wrapped between words."""
+    console = err()
     for line in text.splitlines() or [""]:
-        err().print(Text.assemble((f"{label}: ", style), line), soft_wrap=True)
+        message = Text.assemble((f"{label}: ", style), line)
+        console.print(message, soft_wrap=not console.is_terminal)
 
 
 def say_error(text: str) -> None:
@@ -88,7 +90,7 @@ def code_of(error: BaseException) -> int:
         return INTERRUPTED
     if isinstance(error, PluginError):
         return PLUGIN_FAILED
-    if isinstance(error, RecordError):
+    if isinstance(error, (RecordError, OSError)):
         return NOT_WRITTEN
     return WRONG_INPUT if isinstance(error, TussleError) else OWN_FAULT
 
@@ -104,7 +106,11 @@ def told(is_debugging: bool) -> Iterator[None]:
         warnings.showwarning = _show_warning
         try:
             yield
-        except (typer.Exit, typer.BadParameter):
+        except (
+            typer.Exit,
+            typer.BadParameter,
+            BrokenPipeError,
+        ):  # the last: whoever read the output has seen enough
             raise
         except BaseException as error:  # whatever it is, the user gets a message and an exit code
             if isinstance(error, SystemExit):
@@ -118,7 +124,7 @@ def told(is_debugging: bool) -> Iterator[None]:
 def _tell(error: BaseException) -> None:
     if isinstance(error, KeyboardInterrupt):
         say("interrupted", "nothing was played", "bold yellow")
-    elif isinstance(error, TussleError):
+    elif isinstance(error, (TussleError, OSError)):
         say_error(str(error))
     else:
         say_error(

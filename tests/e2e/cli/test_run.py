@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
+import subprocess
 
 import pytest
+from cli_process import COMMAND, environment
 
 from tussle.record import load_run
 
@@ -209,6 +212,31 @@ def test_what_is_wrong_is_said_once_with_an_exit_code_and_nothing_is_written(
     assert "Traceback" not in done.stderr
     assert not done.stdout
     assert [p.name for p in folder.iterdir()] == ["game.xml"]
+
+
+def test_a_full_disk_is_told(folder):
+    with open("/dev/full", "w") as full:  # noqa: PTH123 - a device
+        done = subprocess.run(
+            [*COMMAND, "run", "game.xml", "--no-log"],
+            check=False, stdout=full, stderr=subprocess.PIPE, text=True, cwd=folder, env=environment(), timeout=60,
+        )  # fmt: skip
+    assert done.returncode == 4
+    assert done.stderr.startswith("error: [Errno 28] No space left on device")
+
+
+def test_output_that_nobody_reads_is_no_error(folder):
+    script = f"{shlex.join(COMMAND)} describe Boids | head -n 2; echo"
+    done = subprocess.run(
+        ["sh", "-c", script],
+        check=False,
+        capture_output=True,
+        text=True,
+        cwd=folder,
+        env=environment(),
+        timeout=60,
+    )
+    assert done.stdout == "\n Boids\n\n"
+    assert not done.stderr
 
 
 def test_a_directory_that_holds_a_run_is_left_alone(tussle, folder):
