@@ -279,7 +279,9 @@ class Mission:
         if not self.dt > 0.0:
             raise MissionError(f"mission: dt = {self.dt!r} is not allowed; it takes a number of seconds > 0")
         if not math.isfinite((self.end - self.start) / self.dt):
-            raise MissionError(f"mission: end = {self.end!r} with dt = {self.dt!r} is not allowed; that many steps cannot be counted")
+            raise MissionError(
+                f"mission: end = {self.end!r} with dt = {self.dt!r} is not allowed; that many steps cannot be counted"
+            )
         multiplier = _whole("mission: motion_multiplier", self.motion_multiplier, " >= 1")
         if multiplier < 1:
             raise MissionError(

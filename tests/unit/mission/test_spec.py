@@ -139,7 +139,10 @@ def test_blocks_that_cannot_be(values, message):
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"end": 1e308, "dt": 1e-300}, r"mission: end = 1e\+308 with dt = 1e-300 is not allowed; that many steps"),
+        (
+            {"end": 1e308, "dt": 1e-300},
+            r"mission: end = 1e\+308 with dt = 1e-300 is not allowed; that many steps",
+        ),
         ({"blocks": [5]}, r"mission: 5 is not a Block"),
         ({"blocks": 5}, r"mission: blocks = 5 is not allowed; it takes a list of Block"),
         ({"blocks": block()}, r"mission: blocks = Block\(.* is not allowed; it takes a list of Block"),
