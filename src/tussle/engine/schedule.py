@@ -191,9 +191,8 @@ class Schedule:
                     whole()
                 elif due.any():
                     self._part(group, binding, due, action)
-            for (
-                inbox
-            ) in inboxes:  # of a group without rows too: who comes later has not heard what was said before
+            # Of a group without rows too: who comes later has not heard what was said before
+            for inbox in inboxes:
                 inbox.clear(due)
 
         def lean() -> None:

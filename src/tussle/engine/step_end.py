@@ -89,9 +89,8 @@ class StepEnd:
         if "time" in conditions:
             for world in np.flatnonzero(self.sim.running & (clock.step >= self._steps)):
                 over[int(world)] = "time"
-        if (
-            self._has_changed
-        ):  # who is there, since the last look: births count too, since the last one may decide
+        # Who is there has changed since the last look: births count too, since the last one may decide
+        if self._has_changed:
             self._has_changed = False
             for number, reason in self._lost_teams():
                 over.setdefault(number, reason)
