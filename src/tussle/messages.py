@@ -213,13 +213,6 @@ class BoundaryCrossed(Message):
     inside = Field(dtype=bool, doc="Whether it is inside now.")
 
 
-class StateEstimate(Message):
-    """What an entity believes of its own state."""
-
-    pos = Field("x y z", unit="m m m")
-    vel = Field("vx vy vz", unit="m/s m/s m/s")
-
-
 class Waypoint(Message):
     """A point to go to."""
 

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import ast
-import dis
 import inspect
 import sys
 import textwrap
 import types
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -17,7 +15,7 @@ from tussle.api import Plugin
 from tussle.engine.conformance_declarations import own_classes
 from tussle.engine.conformance_source import Reader
 from tussle.errors import ConformanceError
-from tussle.numeric.fingerprint import EXACT, Fingerprint, codes_of, has_power, package
+from tussle.numeric.fingerprint import EXACT, libm_names, package
 
 RULE = "grade"
 # Shapes, choices and exact arithmetic; what IEEE 754 rounds correctly, and sums that go one by one.
@@ -82,8 +80,7 @@ class Scan:
     def _compiled(self, function: Any, label: str) -> None:
         if function is not None and id(function) not in self._seen:
             self._seen.add(id(function))
-            reached = Fingerprint(getattr(function, "py_func", function)).functions
-            for name in sorted({name for each in reached for name in libm_of(each)}):
+            for name in libm_names(getattr(function, "py_func", function)):
                 self.found.append(
                     f"the compiled {label} uses {name}, whose last bits are the machine's; take it from tussle.numeric"
                 )
@@ -135,30 +132,6 @@ class Scan:
             self.found.append(
                 f"{place} uses {module}.{name}, of which nobody has promised that it is the same on every machine"
             )
-
-
-def libm_of(function: types.FunctionType) -> Iterator[str]:
-    """What the machine's mathematical library computes for one compiled function, as "math.cos".
-
-    Read from the bytecode: `Fingerprint.libm` takes every name for an attribute of every module the function mentions, which is right
-    for its keys, and finds math.atan2 where tussle.numeric's atan2 stands beside math.sqrt.
-    """
-    for code in codes_of(function.__code__):
-        if has_power(code):
-            yield "**"
-        value: Any = None
-        for instruction in dis.get_instructions(code):
-            if instruction.opname == "LOAD_GLOBAL":
-                value = function.__globals__.get(instruction.argval)
-            elif instruction.opname in {"LOAD_ATTR", "LOAD_METHOD"} and isinstance(value, types.ModuleType):
-                value = getattr(value, instruction.argval, None)
-            elif instruction.opname not in {"CACHE", "PUSH_NULL"}:
-                value = None
-            name = getattr(value, "__name__", "")
-            if isinstance(value, np.ufunc) and name not in EXACT:
-                yield f"numpy.{name}"
-            elif package(value) in {"math", "cmath"} and callable(value) and name not in EXACT:
-                yield f"math.{name}"
 
 
 def is_chance(value: Any) -> bool:

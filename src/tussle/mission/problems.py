@@ -74,10 +74,6 @@ class Problems:
             self.note(place, f"{text}; it is ignored")
 
     @property
-    def has_errors(self) -> bool:
-        return bool(self._errors)
-
-    @property
     def notes(self) -> tuple[str, ...]:
         """One line each, in the order of the file."""
         more = [f"... and {self._n_unsaid} notes more"] if self._n_unsaid else []

@@ -41,14 +41,12 @@ class Fingerprint:
     Attributes:
         functions: The Python functions reached, the first one included.
         holders: The objects with a `py_func` (devices, kernels, Numba's dispatchers) that stand for some of them.
-        libm: Names of functions reached that the machine's mathematical library computes, as "math.cos".
         opaque: What was reached and cannot be described; code that depends on it must not be kept.
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
         self.functions: list[Any] = []
         self.holders: list[Any] = []
-        self.libm: set[str] = set()
         self.opaque: list[str] = []
         self._hash = hashlib.blake2b(digest_size=16)
         self._seen: dict[tuple[int, frozenset[str]], int] = {}
@@ -95,7 +93,6 @@ class Fingerprint:
     def _visit_function(self, function: types.FunctionType) -> None:
         if is_fixed(function):
             self._write("fixed", f"{function.__module__}.{function.__qualname__}")
-            self._note_libm(function)
             return
         self.functions.append(function)
         code = function.__code__
@@ -104,8 +101,6 @@ class Fingerprint:
         self._write(repr(sorted(function.__kwdefaults__ or ())))
         self._visit(tuple((function.__kwdefaults__ or {}).values()), frozenset())
         names = frozenset(names_of(code))
-        if has_power(code):
-            self.libm.add("**")
         for name in sorted(names):
             if name in function.__globals__:
                 self._write("global", name)
@@ -134,7 +129,6 @@ class Fingerprint:
         name = f"{getattr(value, '__module__', '')}.{getattr(value, '__qualname__', getattr(value, '__name__', ''))}"
         if isinstance(value, np.ufunc):
             self._write("ufunc", value.__name__)
-            self._note_libm(value)
         elif isinstance(value, np.dtype):
             self._write("dtype", repr(value))
         elif isinstance(value, np.ndarray) and not value.dtype.hasobject:
@@ -146,18 +140,9 @@ class Fingerprint:
             self._write("fields", name, repr(value._fields))
         elif package(value) in FIXED_PACKAGES or package(type(value)) in {"numba", "numpy"}:
             self._write("fixed", name, repr(value) if package(type(value)) == "numba" else "")
-            self._note_libm(value)
         else:
             self._write("opaque", name)
             self.opaque.append(f"{type(value).__qualname__} {name.strip('.')}".strip())
-
-    def _note_libm(self, function: Any) -> None:
-        name = getattr(function, "__name__", "")
-        if isinstance(function, np.ufunc):
-            if name not in EXACT:
-                self.libm.add(f"numpy.{name}")
-        elif getattr(function, "__module__", "") in ("math", "cmath") and name not in EXACT:
-            self.libm.add(f"{function.__module__}.{name}")
 
 
 def constant(value: Any) -> str | None:
@@ -268,6 +253,35 @@ def overload_table(n_entries: int) -> dict[int, list[Any]]:
     return table
 
 
-def uses_libm(function: Callable[..., Any]) -> bool:
-    """Whether the function, or any that it reaches, calls the machine's mathematical library: it is then not portable."""
-    return bool(Fingerprint(function).libm)
+def libm_names(function: Callable[..., Any]) -> list[str]:
+    """What the machine's mathematical library computes for a function or any that it reaches, as "math.cos": it is not portable.
+
+    Read from the bytecode: the key's walk takes every name for an attribute of every module that a function mentions, which would find
+    math.atan2 where tussle.numeric's atan2 stands beside math.sqrt.
+    """
+    if isinstance(function, np.ufunc):
+        return [] if function.__name__ in EXACT else [f"numpy.{function.__name__}"]
+    return sorted({name for each in Fingerprint(function).functions for name in libm_in(each)})
+
+
+def libm_in(function: types.FunctionType) -> Iterator[str]:
+    """The same for the function's own code alone."""
+    cells = dict(zip(function.__code__.co_freevars, function.__closure__ or (), strict=True))
+    for code in codes_of(function.__code__):
+        if has_power(code):
+            yield "**"
+        value: Any = None
+        for instruction in dis.get_instructions(code):
+            if instruction.opname == "LOAD_GLOBAL":
+                value = function.__globals__.get(instruction.argval)
+            elif instruction.opname == "LOAD_DEREF" and instruction.argval in cells:
+                value = cells[instruction.argval].cell_contents
+            elif instruction.opname in {"LOAD_ATTR", "LOAD_METHOD"} and isinstance(value, types.ModuleType):
+                value = getattr(value, instruction.argval, None)
+            elif instruction.opname not in {"CACHE", "PUSH_NULL"}:
+                value = None
+            name = getattr(value, "__name__", "")
+            if isinstance(value, np.ufunc) and name not in EXACT:
+                yield f"numpy.{name}"
+            elif package(value) in {"math", "cmath"} and callable(value) and name not in EXACT:
+                yield f"{package(value)}.{name}"

@@ -274,3 +274,18 @@ def test_a_waypoint_of_the_world_is_heard_by_all():
     sim = Simulation(mission(block(count=2, autonomy=mover), interactions=[Tower()]), seeds=[1, 2])
     sim.step(2)
     assert sim.read("a.MotorSchemas.MoveToGoalMS.target")[0].tolist() == [[[1.0, 2.0, 3.0]] * 2] * 2
+
+
+def test_who_is_born_later_has_no_kick_of_the_derivative_either():
+    mover = MoveToGoalMS(goal=(100.0, 0.0, 0.0), distance_pid=(0.0, 0.0, 1.0, 0.0))
+    late = block(
+        autonomy=MotorSchemas(behaviors=[mover], max_speed=1e6, pub_vel_vec=True),
+        count=1,
+        rate=1.0,
+        first_birth=0.5,
+    )
+    sim = Simulation(mission(late))
+    sim.step(6)
+    wish, alive = sim.read("a.MotorSchemas.MoveToGoalMS.wish")
+    assert alive.all()
+    assert wish.tolist() == [[[0.0, 0.0, 0.0]]]

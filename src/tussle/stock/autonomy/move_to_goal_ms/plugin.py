@@ -10,6 +10,11 @@ from tussle.messages import Waypoint
 AHEAD = 1e6  # [m]
 
 
+def length(v: np.ndarray) -> np.ndarray:
+    """Lengths of vectors (3, n), (n,)."""
+    return np.asarray(np.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]))
+
+
 class MoveToGoalMS(Behavior):
     """Wish towards the goal, at a speed that a PID on the distance gives; a `Waypoint` message replaces the goal."""
 
@@ -29,16 +34,18 @@ class MoveToGoalMS(Behavior):
     def spawn(self, g: GroupView, rows: np.ndarray) -> None:
         ahead = g.pos + AHEAD * g.forward
         self.target[:, rows] = np.where(self.use_initial_heading, ahead, self.goal)[:, rows]
+        self.previous[rows] = length(self.target - g.pos)[
+            rows
+        ]  # so that the first call has no change to answer
 
     def step(self, g: GroupView) -> None:
         if self.waypoints:
             rows, heard = self.waypoints.latest()
             self.target[:, rows] = heard.pos
         offset = self.target - g.pos
-        distance = np.sqrt(offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2])
+        distance = length(offset)
         kp, ki, kd, band = self.distance_pid
         self.integral[:] = np.where(distance > band, 0.0, self.integral + distance * g.dt)
-        change = np.where(g.step_count > 0, distance - self.previous, 0.0)
-        speed = kp * distance + ki * self.integral + kd * change / g.dt
+        speed = kp * distance + ki * self.integral + kd * (distance - self.previous) / g.dt
         self.previous[:] = distance
         self.wish[:] = unit(offset) * speed

@@ -11,23 +11,13 @@ import math
 
 from tussle.numeric import sincos
 from tussle.numeric.kernel import device, kernel
+from tussle.numeric.quaternion import quat_multiply
 
 
 @device
 def clamp(value, limit):
     """Value held within [-limit, limit]."""
     return min(max(value, -limit), limit)
-
-
-@device
-def multiply(aw, ax, ay, az, bw, bx, by, bz):
-    """Hamilton product a b."""
-    return (
-        aw * bw - ax * bx - ay * by - az * bz,
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-    )
 
 
 @device
@@ -54,9 +44,9 @@ def fly(x, i, p_rate, q_rate, r_rate, speed, acceleration, speed_max, dt, subste
     for _ in range(substeps):
         v1 = v0 if acceleration == 0.0 else clamp(v0 + h * acceleration, speed_max)
         vm = 0.5 * (v0 + v1)
-        w, a, b, c = multiply(w, a, b, c, dw, dx, dy, dz)
+        w, a, b, c = quat_multiply(w, a, b, c, dw, dx, dy, dz)
         mx, my, mz = forward(w, a, b, c)
-        w, a, b, c = multiply(w, a, b, c, dw, dx, dy, dz)
+        w, a, b, c = quat_multiply(w, a, b, c, dw, dx, dy, dz)
         ex, ey, ez = forward(w, a, b, c)
         east += h / 6.0 * (v0 * fx + 4.0 * vm * mx + v1 * ex)
         north += h / 6.0 * (v0 * fy + 4.0 * vm * my + v1 * ey)
