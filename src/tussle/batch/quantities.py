@@ -1,0 +1,176 @@
+"""Numbers of a run by name, and sums, differences, products and quotients of them."""
+
+from __future__ import annotations
+
+import ast
+import json
+import keyword
+import math
+import warnings
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from tussle.errors import ParameterError, listed, nearest_name
+
+LONGEST_TEXT = 200
+MOST_LISTED = 12
+SHARES = ("wins", "ties")
+OPERATORS = (ast.Add, ast.Sub, ast.Mult, ast.Div)
+TAKES = "it takes names as score[2], ties or CPA.cpa[1], numbers, + - * / and parentheses"
+
+
+def column_name(metric: str, team: int | None) -> str:
+    """What a metric of a team, or of the world, is called: "score[2]", "CPA.cpa[1]", '"my metric.hits"[2]', "ties"."""
+    is_plain = metric.isascii() and all(
+        part.isidentifier() and not keyword.iskeyword(part) for part in metric.split(".")
+    )
+    name = metric if is_plain else json.dumps(metric, ensure_ascii=False)
+    return name if team is None else f"{name}[{team}]"
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A number that each run has, by its expression.
+
+    Attributes:
+        text: The expression.
+    """
+
+    text: str
+    _tree: ast.expr = field(repr=False, compare=False)
+
+    @staticmethod
+    def parse(text: str) -> Quantity:
+        """Read an expression such as "score[2]-score[3]" or "lost[1] / start[1]".
+
+        Raises:
+            ParameterError: It is none.
+        """
+        if len(text) > LONGEST_TEXT:
+            raise ParameterError(
+                f"quantity {text[:40]!r}... has {len(text)} characters; at most {LONGEST_TEXT} are allowed"
+            )
+        try:
+            with warnings.catch_warnings():  # the parser has opinions about "1if"; it is refused below
+                warnings.simplefilter("ignore")
+                tree = ast.parse(text.strip(), mode="eval").body
+        except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+            why = getattr(error, "msg", None) or str(error) or "it is nested too deeply"
+            raise ParameterError(f"quantity {text!r} cannot be read: {why}; {TAKES}") from None
+        if not sum(1 for _ in _names(tree, text)):
+            raise ParameterError(f"quantity {text!r} names nothing that a run has; {TAKES}")
+        return Quantity(text.strip(), tree)
+
+    @property
+    def is_share(self) -> bool:
+        """It is 1 in runs that a team wins, or that are ties, and 0 in others."""
+        is_name = not isinstance(self._tree, (ast.BinOp, ast.UnaryOp))
+        return is_name and next(_names(self._tree, self.text))[0] in SHARES
+
+    def names(self, columns: Collection[str]) -> list[str]:
+        """The columns that it is made of, each once, in order.
+
+        Args:
+            columns: Names of all that there are.
+
+        Raises:
+            ParameterError: There is no such column, or a team must be named.
+        """
+        found = (_column(metric, team, self.text, columns) for metric, team in _names(self._tree, self.text))
+        return list(dict.fromkeys(found))
+
+    def evaluate(self, columns: Mapping[str, np.ndarray]) -> np.ndarray:
+        """Its value for each run, (n,); NaN where a part of it is not known and where it divides by zero.
+
+        Args:
+            columns: Name -> value for each run, (n,).
+
+        Raises:
+            ParameterError: There is no such column, or a team must be named.
+        """
+        with np.errstate(all="ignore"):  # infinite distances, and what becomes of them
+            return np.array(self._value(self._tree, columns), dtype=np.float64)
+
+    def _value(self, node: ast.expr, columns: Mapping[str, np.ndarray]) -> np.ndarray | float:
+        if isinstance(node, ast.BinOp):
+            a, b = self._value(node.left, columns), self._value(node.right, columns)
+            if isinstance(node.op, ast.Add):
+                return a + b
+            if isinstance(node.op, ast.Sub):
+                return a - b
+            if isinstance(node.op, ast.Mult):
+                return a * b
+            divisor = np.asarray(b, dtype=np.float64)
+            return a / np.where(divisor == 0.0, np.nan, divisor)
+        if isinstance(node, ast.UnaryOp):
+            value = self._value(node.operand, columns)
+            return -value if isinstance(node.op, ast.USub) else value
+        if isinstance(node, ast.Constant) and isinstance(node.value, (int, float)):
+            return float(node.value)
+        metric, team = _metric(node, self.text)
+        return columns[_column(metric, team, self.text, columns)]
+
+    def __str__(self) -> str:
+        return self.text
+
+
+def _names(node: ast.expr, text: str) -> Iterator[tuple[str, int | None]]:
+    """Metric and team of each name in an expression; refuses all that is not arithmetic."""
+    if isinstance(node, ast.BinOp) and isinstance(node.op, OPERATORS):
+        yield from _names(node.left, text)
+        yield from _names(node.right, text)
+    elif isinstance(node, ast.UnaryOp) and isinstance(node.op, (ast.UAdd, ast.USub)):
+        yield from _names(node.operand, text)
+    elif isinstance(node, ast.Constant) and not isinstance(node.value, str):
+        value = node.value
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+            raise _refused(node, text)
+    else:
+        yield _metric(node, text)
+
+
+def _metric(node: ast.expr, text: str) -> tuple[str, int | None]:
+    if not isinstance(node, ast.Subscript):
+        return _dotted(node, text), None
+    team, sign = node.slice, 1
+    if isinstance(team, ast.UnaryOp) and isinstance(team.op, ast.USub):
+        team, sign = team.operand, -1
+    if not isinstance(team, ast.Constant) or type(team.value) is not int:
+        raise ParameterError(
+            f"quantity {text!r}: {ast.unparse(node)!r} names no team; in brackets stands the team's number"
+        )
+    return _dotted(node.value, text), sign * team.value
+
+
+def _dotted(node: ast.expr, text: str) -> str:
+    if isinstance(node, ast.Name):
+        return node.id
+    if isinstance(node, ast.Attribute):
+        return f"{_dotted(node.value, text)}.{node.attr}"
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        return node.value
+    raise _refused(node, text)
+
+
+def _refused(node: ast.expr, text: str) -> ParameterError:
+    return ParameterError(f"quantity {text!r}: {ast.unparse(node)!r} is not allowed; {TAKES}")
+
+
+def _column(metric: str, team: int | None, text: str, columns: Collection[str]) -> str:
+    """The column that is meant; without a team the only one of that metric."""
+    name = column_name(metric, team)
+    if name in columns:
+        return name
+    stem = column_name(metric, None)
+    of_teams = [c for c in columns if c.startswith(f"{stem}[")]
+    if team is None and len(of_teams) == 1:
+        return of_teams[0]
+    if team is None and of_teams:
+        raise ParameterError(f"quantity {text!r}: {name!r} needs a team; {listed(of_teams)}")
+    known = of_teams or list(columns)
+    more = f" and {len(known) - MOST_LISTED} more" if len(known) > MOST_LISTED else ""
+    raise ParameterError(
+        f"quantity {text!r}: there is no {name!r}{nearest_name(name, columns)}; {listed(known[:MOST_LISTED])}{more}"
+    )

@@ -1,0 +1,366 @@
+"""The results of a batch, as tables, arrays and statistics."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from functools import cached_property
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from tussle.batch import run_table
+from tussle.batch.quantities import Quantity, column_name
+from tussle.batch.selection import known_point, paired_points, select_points, written
+from tussle.batch.sensitivity import Effect, effects
+from tussle.batch.statistics import (
+    BLOCKS_FROM,
+    Comparison,
+    Mean,
+    Share,
+    mean_of,
+    means_of,
+    paired_difference,
+    share_of,
+)
+from tussle.batch.survival import N_TIMES, Survival, survival_of
+from tussle.batch.variables import Choice, Range, Variable
+from tussle.errors import MissingExtraError, ParameterError, listed, nearest_name
+
+if TYPE_CHECKING:
+    from tussle.batch.store import Stored
+
+FIRST = ("wins", "ties", "score", "alive", "lost", "start", "t", "steps")
+"""Quantities that every game has, in the order in which they are listed; what plugins report comes behind."""
+FRAMES = ("pandas", "polars")
+
+
+class Results:
+    """What came of the runs of a batch: of those that are finished, where it goes on.
+
+    Failed runs are in no share, mean or comparison; `n_failed` says how many there are. Where several points are taken together,
+    the runs of a seed count as one block if there are 20 seeds or more: they share their random numbers.
+
+    Args:
+        stored: The batch as it was read.
+
+    Attributes:
+        path: The batch directory; None for a batch in memory.
+        info: What `batch.json` says.
+        notes: What is missing, one line each.
+        design: One row per planned run: run, point, seed and the variables.
+        table: One row per run, team and metric.
+        alive: Entities of each run and team whenever their number changes.
+        runs: One row per finished run: keys, variables, how it ended, and each quantity.
+    """
+
+    def __init__(self, stored: Stored) -> None:
+        self.path: Path | None = stored.path
+        self.info: dict[str, Any] = stored.info
+        self.notes: list[str] = stored.notes
+        self.design: pa.Table = stored.design
+        self.table: pa.Table = stored.table
+        self.alive: pa.Table = stored.alive
+        facts = run_table.first_rows(self.table)
+        self._run: np.ndarray = facts["run"].to_numpy()
+        self._point: np.ndarray = facts["point"].to_numpy()
+        self._seed_index: np.ndarray = self._run // max(1, len(self.points))
+        self._is_failed = run_table.is_failed(facts)
+        self._columns = self._quantities_of(facts)
+        keyed = run_table.with_values(facts, self.design, [v.name for v in self.variables])
+        self.runs: pa.Table = pa.table({name: keyed[name] for name in keyed.column_names} | self._new(keyed))
+
+    def _quantities_of(self, facts: pa.Table) -> dict[str, np.ndarray]:
+        metrics = run_table.metric_columns(self.table)
+        columns: dict[str, np.ndarray] = {}
+        scored = [team for team in self.teams if column_name("score", team) in metrics]
+        winner = run_table.floats(facts["winner"])
+        for team in scored:
+            columns[column_name("wins", team)] = (winner == team).astype(np.float64)
+        if scored:
+            columns["ties"] = np.isnan(winner).astype(np.float64)
+        for team in self.teams:
+            start, left = (metrics.get(column_name(name, team)) for name in ("start", "alive"))
+            if start is not None and left is not None:
+                columns[column_name("lost", team)] = start - left
+        columns["t"], columns["steps"] = (run_table.floats(facts[name]) for name in ("t", "steps"))
+        columns = metrics | columns
+        order = [column_name(metric, team) for metric in FIRST for team in (*self.teams, None)]
+        columns = {name: columns[name] for name in dict.fromkeys([*order, *columns]) if name in columns}
+        return {name: np.where(self._is_failed, np.nan, values) for name, values in columns.items()}
+
+    def _new(self, keyed: pa.Table) -> dict[str, pa.Array]:
+        """The quantities that are no column of the runs yet."""
+        return {n: pa.array(v) for n, v in self._columns.items() if n not in keyed.column_names}
+
+    # -- what there is ----------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def variables(self) -> list[Variable]:
+        """What was varied."""
+        return [_variable(said) for said in self.info["variables"]]
+
+    @cached_property
+    def teams(self) -> dict[int, str]:
+        """Number of each team -> its name."""
+        named = {int(team): str(name) for team, name in self.info["teams"].items()}
+        found = (team for team in pc.unique(self.table["team"]).to_pylist() if team is not None)
+        return dict(sorted(({team: f"team {team}" for team in found} | named).items()))
+
+    @cached_property
+    def points(self) -> list[dict[str, Any]]:
+        """The values of the variables at each point."""
+        _, first = np.unique(self.design["point"].to_numpy(), return_index=True)
+        if not self.variables:
+            return [{} for _ in first]
+        rows = self.design.take(pa.array(first))
+        columns = [[_original(value, v) for value in rows[v.name].to_pylist()] for v in self.variables]
+        return [
+            dict(zip((v.name for v in self.variables), values, strict=True))
+            for values in zip(*columns, strict=True)
+        ]
+
+    @property
+    def n_runs(self) -> int:
+        """Finished runs, failed ones included."""
+        return len(self._run)
+
+    @property
+    def n_failed(self) -> int:
+        """Finished runs that failed."""
+        return int(self._is_failed.sum())
+
+    @property
+    def n_planned(self) -> int:
+        """Runs that were to be played."""
+        return int(self.info["n_runs"])
+
+    @property
+    def quantities(self) -> list[str]:
+        """Names of all numbers that a run has."""
+        return list(self._columns)
+
+    @property
+    def scored(self) -> dict[int, str]:
+        """Number -> name of the teams that have a score."""
+        return {
+            team: name for team, name in self.teams.items() if column_name("score", team) in self._columns
+        }
+
+    def label(self, point: int) -> str:
+        """The values of a point: "prey_speed=23.4 kt, tactic=keep"; "" where nothing varies."""
+        values = self.points[known_point(self.points, point)]
+        return ", ".join(f"{v.name}={_with_unit(values[v.name], v)}" for v in self.variables)
+
+    def title(self, expression: str) -> str:
+        """A quantity with the teams by name: "score of keepers"."""
+        return re.sub(r"\[(-?\d+)\]", lambda m: f" of {self.teams.get(int(m[1]), m[0])}", expression)
+
+    # -- numbers ----------------------------------------------------------------------------------------------------------
+
+    def quantity(self, expression: str, runs: Iterable[int] | None = None) -> np.ndarray:
+        """A number of each run, (n,); NaN where it failed.
+
+        Args:
+            expression: A name such as "score[2]", or arithmetic with names.
+            runs: Numbers of the runs; None for all that are finished, in order.
+
+        Raises:
+            ParameterError: There is no such name, or a run is not finished.
+        """
+        values = Quantity.parse(expression).evaluate(self._columns)
+        if runs is None:
+            return values
+        wanted = np.asarray(list(runs), dtype=np.int64)
+        place = np.minimum(np.searchsorted(self._run, wanted), max(0, len(self._run) - 1))
+        is_there = self._run[place] == wanted if len(self._run) else np.zeros(len(wanted), bool)
+        if not is_there.all():
+            raise ParameterError(f"run {wanted[~is_there][0]} is not among the {self.n_runs} finished runs")
+        return values[place]
+
+    def shares(self, point: int | None = None) -> list[Share]:
+        """Games that each team won, and ties, with Wilson's interval; nothing for games without scores.
+
+        Args:
+            point: The runs of this point; None for all runs.
+        """
+        rows = self._rows(point)
+        blocks = self._blocks(rows, point)
+        names = [(name, team, column_name("wins", team)) for team, name in self.scored.items()]
+        all_names = [*names, ("ties", None, "ties")] if names else []
+        return [share_of(name, team, self._columns[c][rows], blocks) for name, team, c in all_names]
+
+    def means(self, expressions: Sequence[str] | None = None, point: int | None = None) -> list[Mean]:
+        """Means of quantities with their intervals.
+
+        Args:
+            expressions: What; by default the scores, what is left of each team, and the time at the end.
+            point: Over the runs of this point; None for all runs.
+
+        Raises:
+            ParameterError: There is no such name or point.
+        """
+        rows = self._rows(point)
+        blocks = self._blocks(rows, point)
+        chosen = self.usual if expressions is None else expressions
+        return [mean_of(text, self.quantity(text)[rows], blocks) for text in chosen]
+
+    def means_by_point(self, expression: str) -> list[Mean]:
+        """The mean of a quantity at each point."""
+        values = self.quantity(expression)
+        order = np.argsort(self._point, kind="stable")
+        cuts = np.searchsorted(self._point[order], np.arange(1, len(self.points)))
+        return means_of(expression, np.split(values[order], cuts))
+
+    @property
+    def usual(self) -> list[str]:
+        """The quantities that are looked at first: scores, what is left of each team, the time at the end."""
+        names = [column_name(metric, team) for metric in ("score", "alive") for team in self.teams]
+        return [name for name in [*names, "t"] if name in self._columns]
+
+    def compare(self, expression: str, a: int | str, b: int | str) -> Comparison:
+        """What b has more than a, in pairs of runs with the same seed.
+
+        Args:
+            expression: The quantity.
+            a: A point, or values such as "tactic=keep" that select points.
+            b: The same; points of a and b are paired that agree in all variables which the texts do not name.
+
+        Raises:
+            ParameterError: There is no such quantity or point, or no two points that can be paired.
+        """
+        firsts, seconds = paired_points(self.variables, self.points, a, b)
+        matrix = self.by_seed(expression)
+        blocks = None
+        if len(firsts) > 1 and len(matrix) >= BLOCKS_FROM:
+            blocks = np.repeat(np.arange(len(matrix)), len(firsts))
+        names = (a if isinstance(a, str) else self.label(a), b if isinstance(b, str) else self.label(b))
+        return paired_difference(
+            expression, names, matrix[:, firsts].ravel(), matrix[:, seconds].ravel(), blocks
+        )
+
+    def by_seed(self, expression: str) -> np.ndarray:
+        """A quantity by seed and point, (n_seeds, n_points); NaN where it failed or is not finished."""
+        n_seeds = int(self._seed_index.max()) + 1 if len(self._run) else 0
+        matrix = np.full((n_seeds, len(self.points)), np.nan)
+        matrix[self._seed_index, self._point] = self.quantity(expression)
+        return matrix
+
+    def select(self, text: str) -> list[int]:
+        """The points at which variables have the values that a text such as "tactic=keep, prey_speed=20" names.
+
+        Raises:
+            ParameterError: There is no such variable, or no such point.
+        """
+        return select_points(self.variables, self.points, text)
+
+    def sensitivity(self, expression: str) -> list[Effect]:
+        """What each variable does to a quantity.
+
+        Raises:
+            ParameterError: There is no such quantity.
+            MissingExtraError: The points were sampled for indices that take a package which is not there.
+        """
+        sample = str(self.info.get("sample") or "")
+        return effects(self.variables, self.points, sample, self.by_seed(expression))
+
+    def survival(self, team: int, point: int | None = None) -> Survival:
+        """Mean number of a team left over time; a run that ended early stays as it ended.
+
+        Args:
+            team: Its number.
+            point: Over the runs of this point; None for all runs.
+
+        Raises:
+            ParameterError: There is no such team or point.
+        """
+        if team not in self.teams:
+            raise ParameterError(
+                f"there is no team {team!r}; {listed(f'{n} ({t})' for n, t in self.teams.items())}"
+            )
+        chosen = self._run[self._rows(point) & ~self._is_failed]
+        run, t, of_team, alive = (self.alive[name].to_numpy() for name in ("run", "t", "team", "alive"))
+        is_chosen = np.isin(run, chosen)
+        last = float(t[is_chosen].max()) if is_chosen.any() else float(self.info["start"])
+        times = np.linspace(float(self.info["start"]), last, N_TIMES)
+        rows = np.flatnonzero(is_chosen & (of_team == team))
+        rows = rows[np.lexsort((t[rows], run[rows]))]
+        label = "" if point is None else self.label(point)
+        return survival_of(label, team, run[rows], t[rows], alive[rows].astype(np.int64), len(chosen), times)
+
+    # -- tables -----------------------------------------------------------------------------------------------------------
+
+    def failed(self) -> pa.Table:
+        """The runs that failed: keys, variables, error."""
+        names = [n for n in self.runs.column_names if n not in self._columns]
+        return self.runs.select(names).filter(pa.array(self._is_failed))
+
+    def slowest(self, n: int = 10) -> pa.Table:
+        """The runs that took most CPU time: keys, variables, how they ended."""
+        names = [n for n in self.runs.column_names if n not in self._columns or n in run_table.FACTS]
+        order = np.argsort(-run_table.floats(self.runs["cpu_s"]), kind="stable")[:n]
+        return self.runs.select(names).take(pa.array(order))
+
+    def frame(self, package: str = "") -> Any:
+        """The runs as a frame.
+
+        Args:
+            package: "pandas" or "polars"; by default the first of them that is installed.
+
+        Raises:
+            ParameterError: `package` names something else.
+            MissingExtraError: It is not installed.
+        """
+        if package not in ("", *FRAMES):
+            raise ParameterError(
+                f"package = {package!r} is not allowed{nearest_name(package, FRAMES)}; {listed(FRAMES)}"
+            )
+        name = package or next((f for f in FRAMES if find_spec(f)), "")
+        if not name or find_spec(name) is None:
+            raise MissingExtraError(
+                f"frames need {name or 'pandas or polars'}, which is not installed: pip install 'tussle[frames]' brings pandas; "
+                "`runs` is an Arrow table and needs neither"
+            )
+        return self.runs.to_pandas() if name == "pandas" else import_module(name).from_arrow(self.runs)
+
+    # -- rows -------------------------------------------------------------------------------------------------------------
+
+    def _rows(self, point: int | None) -> np.ndarray:
+        """Which runs are of a point, (n_runs,)."""
+        return np.ones(self.n_runs, bool) if point is None else self._point == known_point(self.points, point)
+
+    def _blocks(self, rows: np.ndarray, point: int | None) -> np.ndarray | None:
+        """Block of each of these runs; None where they count as independent."""
+        if point is not None or len(self.points) == 1:
+            return None
+        seeds = self._seed_index[rows]
+        return seeds if len(np.unique(seeds)) >= BLOCKS_FROM else None
+
+    def __repr__(self) -> str:
+        failed = f", {self.n_failed} failed" if self.n_failed else ""
+        return f"<Results {str(self.path)!r}: {self.n_runs} of {self.n_planned} runs{failed}>"
+
+
+def _variable(said: dict[str, Any]) -> Variable:
+    """A variable as `batch.json` tells it."""
+    if said["kind"] == "choice":
+        return Choice(said["name"], tuple(said["values"]))
+    fields = ("name", "low", "high", "is_int", "is_log", "levels", "unit")
+    return Range(**{name: said[name] for name in fields})
+
+
+def _original(value: Any, variable: Variable) -> Any:
+    """A value as it was given: a column of texts holds numbers and truth values as texts where others are texts."""
+    if isinstance(value, str) and isinstance(variable, Choice):
+        return next((given for given in variable.values if str(given) == value), value)
+    return value
+
+
+def _with_unit(value: Any, variable: Variable) -> str:
+    unit = variable.unit if isinstance(variable, Range) else ""
+    return f"{written(value)} {unit}" if unit else written(value)

@@ -1,0 +1,74 @@
+"""One row per run, from one row per run, team and metric."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from tussle.batch.quantities import column_name
+
+FACTS = ("end", "t", "steps", "winner", "error", "state_hash", "cpu_s", "host")
+"""Columns of the results that are the same in all rows of a run, in the order in which the runs show them."""
+KEYS = ("run", "point", "seed")
+
+
+def first_rows(table: pa.Table) -> pa.Table:
+    """The first row of each run, in order of run."""
+    _, first = np.unique(table["run"].to_numpy(), return_index=True)
+    return table.take(pa.array(first))
+
+
+def metric_columns(table: pa.Table) -> dict[str, np.ndarray]:
+    """Name such as "score[2]" -> value for each run, (n_runs,); NaN where the run does not have it.
+
+    Args:
+        table: One row per run, team and metric; in any order.
+    """
+    numbers, row = np.unique(table["run"].to_numpy(), return_inverse=True)
+    metric = table["metric"].combine_chunks().dictionary_encode()
+    team = table["team"].combine_chunks().dictionary_encode(null_encoding="encode")
+    n_teams = max(1, len(team.dictionary))
+    code = pc.fill_null(metric.indices, -1).to_numpy().astype(np.int64) * n_teams + team.indices.to_numpy()
+    is_metric = code >= 0
+    code, row = code[is_metric], row[is_metric]
+    present = np.flatnonzero(np.bincount(code))
+    place = np.zeros(present[-1] + 1 if len(present) else 0, dtype=np.int64)
+    place[present] = np.arange(len(present))
+    values = np.full((len(present), len(numbers)), np.nan)
+    values[place[code], row] = floats(table["value"])[is_metric]
+    metrics, teams = metric.dictionary.to_pylist(), team.dictionary.to_pylist()
+    keys = [(metrics[c // n_teams], teams[c % n_teams]) for c in present]
+    order = sorted(range(len(keys)), key=lambda i: (keys[i][0], keys[i][1] is not None, keys[i][1] or 0))
+    return {column_name(*keys[i]): values[i] for i in order}
+
+
+def floats(column: pa.ChunkedArray) -> np.ndarray:
+    """A column of numbers as float64, (n,); NaN where it says nothing."""
+    array: np.ndarray = column.cast(pa.float64()).to_numpy()
+    return array
+
+
+def is_failed(runs: pa.Table) -> np.ndarray:
+    """Which runs failed, (n_runs,)."""
+    has_error = pc.fill_null(pc.not_equal(runs["error"], ""), False)
+    failed: np.ndarray = pc.or_(has_error, pc.equal(runs["end"], "error")).to_numpy()
+    return failed
+
+
+def with_values(runs: pa.Table, design: pa.Table, names: Sequence[str]) -> pa.Table:
+    """Keys, values of the variables and facts of each run; a variable called as one of the facts stands as "varied NAME".
+
+    Args:
+        runs: One row per run.
+        design: One row per planned run, in order.
+        names: Of the variables.
+    """
+    place = np.searchsorted(design["run"].to_numpy(), runs["run"].to_numpy())
+    values = design.select(list(names)).take(pa.array(place))
+    columns = {name: runs[name] for name in KEYS}
+    for name in names:
+        columns[f"varied {name}" if name in FACTS else name] = values[name]
+    return pa.table(columns | {name: runs[name] for name in FACTS})

@@ -1,0 +1,128 @@
+"""Points by the values that they have, and pairs of points that differ in nothing else."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from tussle.batch.variables import Range, Variable
+from tussle.errors import ParameterError, listed, nearest_name
+
+Points = Sequence[Mapping[str, Any]]
+MOST_LISTED = 12
+
+
+def select_points(variables: Sequence[Variable], points: Points, text: str) -> list[int]:
+    """The points that have the values which a text names: "tactic=keep", "tactic=keep, prey_speed=20", or "3" for a point itself.
+
+    Raises:
+        ParameterError: There is no such variable, or no such point.
+    """
+    if text.strip().isdigit():
+        return [known_point(points, int(text))]
+    wanted = _values(variables, text)
+    found = [i for i, point in enumerate(points) if all(_agree(point[v.name], said, v) for v, said in wanted)]
+    if found:
+        return found
+    for variable, said in wanted:
+        if not any(_agree(point[variable.name], said, variable) for point in points):
+            there = list(dict.fromkeys(written(point[variable.name]) for point in points))
+            more = f" and {len(there) - MOST_LISTED} more" if len(there) > MOST_LISTED else ""
+            raise ParameterError(
+                f"{text!r}: no point has {variable.name}={said}{nearest_name(said, there)}; "
+                f"{listed(there[:MOST_LISTED])}{more}"
+            )
+    raise ParameterError(f"{text!r}: each of these values is there, but no point has all of them")
+
+
+def known_point(points: Points, number: int) -> int:
+    """The number of a point, if there is such a point.
+
+    Raises:
+        ParameterError: There is none.
+    """
+    if isinstance(number, bool) or not 0 <= number < len(points):
+        raise ParameterError(f"there is no point {number}; there are points 0 to {len(points) - 1}")
+    return int(number)
+
+
+def paired_points(
+    variables: Sequence[Variable], points: Points, a: int | str, b: int | str
+) -> tuple[list[int], list[int]]:
+    """Points of a and, place by place, those points of b that agree with them in all that the texts do not name.
+
+    Raises:
+        ParameterError: There is no such point, or no two points can be paired.
+    """
+    if a == b:
+        raise ParameterError(f"{a!r} is compared with itself")
+    chosen = [_points_of(variables, points, side) for side in (a, b)]
+    if len(chosen[0]) == len(chosen[1]) == 1:
+        return chosen[0], chosen[1]
+    named = [_names_in(variables, side) for side in (a, b)]
+    if named[0] != named[1]:
+        raise ParameterError(
+            f"{a!r} and {b!r} select several points by different variables; to be paired they name the same ones"
+        )
+    others = [v.name for v in variables if v.name not in named[0]]
+    places: dict[tuple[Any, ...], list[int]] = {}
+    for i in chosen[1]:
+        places.setdefault(tuple(points[i][name] for name in others), []).append(i)
+    firsts, seconds = [], []
+    for i in chosen[0]:
+        partners = places.get(tuple(points[i][name] for name in others))
+        if partners:  # points that are there twice are paired in their order
+            firsts.append(i)
+            seconds.append(partners.pop(0))
+    if not firsts:
+        raise ParameterError(f"no point with {a} has one with {b} that agrees with it in {', '.join(others)}")
+    return firsts, seconds
+
+
+def written(value: Any) -> str:
+    """A value as it is shown: six digits of a real number."""
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def _points_of(variables: Sequence[Variable], points: Points, side: int | str) -> list[int]:
+    return select_points(variables, points, side) if isinstance(side, str) else [known_point(points, side)]
+
+
+def _names_in(variables: Sequence[Variable], side: int | str) -> set[str]:
+    is_number = not isinstance(side, str) or side.strip().isdigit()
+    return {v.name for v in variables} if is_number else {v.name for v, _ in _values(variables, str(side))}
+
+
+def _values(variables: Sequence[Variable], text: str) -> list[tuple[Variable, str]]:
+    """Variable and wanted value of each "name=value" in a text."""
+    by_name = {v.name: v for v in variables}
+    found = []
+    next_name = "|".join(re.escape(name) for name in by_name)
+    for part in re.split(rf",(?=\s*(?:{next_name})\s*=)", text):  # values may have commas too
+        name, sign, value = (piece.strip() for piece in part.partition("="))
+        if not sign or not value:
+            raise ParameterError(
+                f"{text!r} selects no points; it takes NAME=VALUE, several with commas, or a point's number"
+            )
+        if name not in by_name:
+            raise ParameterError(
+                f"{text!r}: {name!r} was not varied{nearest_name(name, by_name)}; {listed(by_name)}"
+            )
+        variable = by_name[name]
+        if isinstance(variable, Range) and variable.unit:
+            value = value.removesuffix(variable.unit).strip()
+        found.append((variable, value))
+    return found
+
+
+def _agree(value: Any, said: str, variable: Variable) -> bool:
+    """Whether a value is the one said; of a number the six digits that are shown are enough."""
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        try:
+            number = float(said)
+        except ValueError:
+            return False
+        return math.isclose(value, number, rel_tol=5e-6)
+    return str(value) == said

@@ -1,0 +1,331 @@
+"""Shares, means, paired differences, and the intervals in which chance leaves them.
+
+All intervals are of 95 %. Values that are not finite are runs of which nothing is known; they are left out, and `n` says how many
+were not.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from statistics import NormalDist
+
+import numpy as np
+
+LEVEL = 0.95
+QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+
+BOOTSTRAP_FROM = 20
+"""Fewer values hold too little of their distribution to be drawn from again: the BCa interval of the mean of ten exponential numbers
+holds in 88 % of cases. Below, Student's t."""
+BOOTSTRAP_UP_TO = 2000
+"""More values make the mean normal enough (the skewness of its distribution falls with 1/sqrt(n)), and the jackknife in the BCa
+interval takes n^2 numbers. Above, the normal interval."""
+N_RESAMPLES = 2000
+"""Efron and Tibshirani, An Introduction to the Bootstrap (1993), section 14: at least 1,000 for intervals of 95 %."""
+NUMBERS_AT_ONCE = 4_000_000
+"""Most numbers that the bootstrap holds at a time, 32 MB."""
+BLOCKS_FROM = BOOTSTRAP_FROM
+"""So many seeds must there be for the runs of a seed, over all points, to count as one block."""
+SEED = 20180101
+
+
+@dataclass(frozen=True)
+class Share:
+    """How many of the runs were so.
+
+    Attributes:
+        name: Of the team, or "ties".
+        team: Its number; None for ties.
+        n: Runs that were so.
+        of: Runs.
+        value: n / of.
+        low: Lower end of Wilson's interval.
+        high: Its upper end.
+    """
+
+    name: str
+    team: int | None
+    n: int
+    of: int
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Mean:
+    """Mean of a quantity over runs.
+
+    Attributes:
+        name: The quantity.
+        n: Runs.
+        value: The mean; NaN for none.
+        low: Lower end of the interval of the mean; NaN for less than two runs.
+        high: Its upper end.
+        sd: Standard deviation of the runs.
+        quantiles: Share -> value below which that share of the runs is, for 5, 25, 50, 75 and 95 %.
+    """
+
+    name: str
+    n: int
+    value: float
+    low: float
+    high: float
+    sd: float
+    quantiles: dict[float, float]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What b has more than a, in pairs of runs with the same seed.
+
+    Attributes:
+        quantity: What is compared.
+        a: What is compared with.
+        b: What is compared.
+        n: Pairs.
+        mean_a: Mean of a's runs.
+        mean_b: Mean of b's runs.
+        difference: mean_b - mean_a.
+        low: Lower end of the interval of the difference.
+        high: Its upper end.
+        n_greater: Pairs in which b has more.
+        n_less: Pairs in which b has less.
+        n_equal: Pairs in which both have the same.
+        p: Of the exact sign test, two-sided.
+    """
+
+    quantity: str
+    a: str
+    b: str
+    n: int
+    mean_a: float
+    mean_b: float
+    difference: float
+    low: float
+    high: float
+    n_greater: int
+    n_less: int
+    n_equal: int
+    p: float
+
+
+# -- shares ---------------------------------------------------------------------------------------------------------------
+
+
+def wilson(k: float, n: float, level: float = LEVEL) -> tuple[float, float]:
+    """Interval of a share, k of n (Wilson, JASA 22 (1927), 209-212); NaN for n = 0."""
+    if n <= 0:
+        return math.nan, math.nan
+    z2 = NormalDist().inv_cdf(0.5 + level / 2.0) ** 2
+    p = k / n
+    middle = (p + z2 / (2.0 * n)) / (1.0 + z2 / n)
+    half = math.sqrt(z2) / (1.0 + z2 / n) * math.sqrt(p * (1.0 - p) / n + z2 / (4.0 * n * n))
+    low = 0.0 if k <= 0 else max(0.0, middle - half)  # exactly; rounding would leave 1e-17
+    return low, 1.0 if k >= n else min(1.0, middle + half)
+
+
+def share_of(name: str, team: int | None, won: np.ndarray, blocks: np.ndarray | None = None) -> Share:
+    """Share of the runs that were so.
+
+    Args:
+        name: Of the team, or "ties".
+        team: Its number; None for ties.
+        won: 1 where it was so, 0 where not, NaN where the run is not known, (n,).
+        blocks: Number of the block that each run belongs to, (n,); None where runs are independent.
+    """
+    is_known = np.isfinite(won)
+    won = won[is_known]
+    k, n = int(won.sum()), len(won)
+    value = k / n if n else math.nan
+    size = effective_size(won, None if blocks is None else blocks[is_known])
+    low, high = wilson(value * size, size) if n else (math.nan, math.nan)
+    return Share(name, team, k, n, value, low, high)
+
+
+def effective_size(won: np.ndarray, blocks: np.ndarray | None) -> float:
+    """How many independent runs would give their share the variance that runs in blocks give it.
+
+    Kish, Survey Sampling (1965), 8.2: n over the design effect. Not less than the blocks, not more than the runs.
+    """
+    n = len(won)
+    if blocks is None or n == 0:
+        return float(n)
+    sums = block_values(won, blocks)
+    share = float(won.mean())
+    variance = float(sums.var(ddof=1)) / len(sums) if len(sums) > 1 else 0.0
+    if variance == 0.0:  # always or never so
+        return float(n)
+    return min(max(share * (1.0 - share) / variance, float(len(sums))), float(n))
+
+
+def running_result(wins: Mapping[str, int], n: int) -> str:
+    """Who has won so far, on one line: "keepers 59.8 % ±3.0, switchers 35.9 % ±3.0, ties 4.3 %".
+
+    Args:
+        wins: Name of a team -> runs that it has won; teams without a win are left out.
+        n: Runs, ties included.
+    """
+    if not wins or n == 0:
+        return ""
+    parts = []
+    for name, k in wins.items():
+        if k:
+            low, high = wilson(k, n)
+            parts.append(f"{name} {100.0 * k / n:.1f} % ±{50.0 * (high - low):.1f}")
+    n_ties = n - sum(wins.values())
+    return ", ".join([*parts, *([f"ties {100.0 * n_ties / n:.1f} %"] if n_ties else [])])
+
+
+# -- means ----------------------------------------------------------------------------------------------------------------
+
+
+def mean_of(name: str, values: np.ndarray, blocks: np.ndarray | None = None) -> Mean:
+    """Mean of a quantity over runs.
+
+    Args:
+        name: The quantity.
+        values: Its value for each run, (n,).
+        blocks: Number of the block that each run belongs to, (n,); None where runs are independent.
+    """
+    is_known = np.isfinite(values)
+    known = values[is_known]
+    parts = known if blocks is None else block_values(known, blocks[is_known])
+    low, high = mean_intervals(parts[None, :])
+    return _mean(name, known, float(low[0]), float(high[0]))
+
+
+def means_of(name: str, rows: list[np.ndarray]) -> list[Mean]:
+    """Mean of a quantity over the runs of each point; what `mean_of` gives for each, faster.
+
+    Args:
+        name: The quantity.
+        rows: Its values for the runs of each point.
+    """
+    known = [row[np.isfinite(row)] for row in rows]
+    found: list[Mean | None] = [None] * len(rows)
+    for n in {len(row) for row in known}:
+        places = [i for i, row in enumerate(known) if len(row) == n]
+        low, high = mean_intervals(np.array([known[i] for i in places]))
+        for k, i in enumerate(places):
+            found[i] = _mean(name, known[i], float(low[k]), float(high[k]))
+    return [mean for mean in found if mean is not None]
+
+
+def _mean(name: str, values: np.ndarray, low: float, high: float) -> Mean:
+    n = len(values)
+    if n == 0:
+        return Mean(name, 0, math.nan, math.nan, math.nan, math.nan, dict.fromkeys(QUANTILES, math.nan))
+    quantiles = dict(zip(QUANTILES, np.quantile(values, QUANTILES).tolist(), strict=True))
+    sd = float(values.std(ddof=1)) if n > 1 else math.nan
+    return Mean(name, n, float(values.mean()), low, high, sd, quantiles)
+
+
+def mean_interval(values: np.ndarray) -> tuple[float, float]:
+    """Interval of the mean of n values, (n,): BCa bootstrap for 20 to 2,000 values, Student's t below, normal above."""
+    low, high = mean_intervals(np.asarray(values, dtype=np.float64)[None, :])
+    return float(low[0]), float(high[0])
+
+
+def mean_intervals(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Lower and upper ends of the intervals of the means of rows, (k,).
+
+    Args:
+        rows: Finite values, (k, n).
+    """
+    k, n = rows.shape
+    if n < 2:
+        return np.full(k, np.nan), np.full(k, np.nan)
+    low, high = _by_t(rows)
+    varies = np.ptp(rows, axis=1) > 0.0
+    if BOOTSTRAP_FROM <= n <= BOOTSTRAP_UP_TO and varies.any():
+        low[varies], high[varies] = _by_bootstrap(rows[varies])
+    return low, high
+
+
+def _by_t(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Student's interval; with many values the normal one."""
+    from scipy.special import stdtrit
+
+    n = rows.shape[1]
+    mean = rows.mean(axis=1)
+    half = float(stdtrit(n - 1, 0.5 + LEVEL / 2.0)) * rows.std(axis=1, ddof=1) / math.sqrt(n)
+    half[np.ptp(rows, axis=1) == 0.0] = (
+        0.0  # where the mean of equal values is not their value to the last bit
+    )
+    return mean - half, mean + half
+
+
+def _by_bootstrap(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """BCa interval (Efron, JASA 82 (1987), 171-185); all rows are drawn from with the same numbers."""
+    from scipy.stats import bootstrap
+
+    k, n = rows.shape
+    n_at_once = max(1, NUMBERS_AT_ONCE // n)  # rows are taken a few at a time, and resamples a few at a time
+    low, high = np.empty(k), np.empty(k)
+    step = max(1, n_at_once // N_RESAMPLES)
+    for i in range(0, k, step):
+        some = rows[i : i + step]
+        found = bootstrap(
+            (some,), np.mean, n_resamples=N_RESAMPLES, batch=max(1, n_at_once // len(some)), vectorized=True,
+            axis=-1, confidence_level=LEVEL, method="BCa", rng=np.random.default_rng(SEED),
+        )  # fmt: skip
+        low[i : i + step] = found.confidence_interval.low
+        high[i : i + step] = found.confidence_interval.high
+    return low, high
+
+
+def block_values(values: np.ndarray, blocks: np.ndarray) -> np.ndarray:
+    """One value for each block, (n_blocks,), whose mean is the mean of all values and varies as that does from block to block.
+
+    The mean plus what the block adds to it; for blocks of equal size, the mean of the block.
+
+    Args:
+        values: Value of each run, (n,).
+        blocks: Number of the block that it belongs to, (n,).
+    """
+    if len(values) == 0:
+        return values
+    mean = values.mean()
+    numbers, block = np.unique(blocks, return_inverse=True)
+    sums: np.ndarray = np.bincount(block, values - mean)
+    shares: np.ndarray = mean + sums * (len(numbers) / len(values))
+    return shares
+
+
+# -- differences ----------------------------------------------------------------------------------------------------------
+
+
+def sign_test(n_greater: int, n_less: int) -> float:
+    """Probability of signs at least as uneven as these where both are equally likely, exactly; 1 without any."""
+    if n_greater + n_less == 0:
+        return 1.0
+    from scipy.stats import binomtest
+
+    return float(binomtest(n_greater, n_greater + n_less, 0.5).pvalue)
+
+
+def paired_difference(
+    quantity: str, names: tuple[str, str], a: np.ndarray, b: np.ndarray, blocks: np.ndarray | None = None
+) -> Comparison:
+    """What b has more than a.
+
+    Args:
+        quantity: What is compared.
+        names: Of a and b.
+        a: Value of each pair's first run, (n,).
+        b: Value of each pair's second run, (n,).
+        blocks: Number of the block that each pair belongs to, (n,); None where pairs are independent.
+    """
+    is_known = np.isfinite(a) & np.isfinite(b)
+    a, b = a[is_known], b[is_known]
+    more = b - a
+    n_greater, n_less = int((more > 0.0).sum()), int((more < 0.0).sum())
+    mean = mean_of(quantity, more, None if blocks is None else blocks[is_known])
+    mean_a, mean_b = (float(v.mean()) if len(v) else math.nan for v in (a, b))
+    return Comparison(
+        quantity, *names, len(more), mean_a, mean_b, mean.value, mean.low, mean.high,
+        n_greater, n_less, len(more) - n_greater - n_less, sign_test(n_greater, n_less),
+    )  # fmt: skip
