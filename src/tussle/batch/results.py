@@ -17,7 +17,7 @@ import pyarrow.compute as pc
 from tussle.batch import run_table
 from tussle.batch.quantities import Quantity, column_name
 from tussle.batch.selection import known_point, paired_points, select_points, written
-from tussle.batch.sensitivity import Effect, effects
+from tussle.batch.sensitivity import Effect, effects, rank_effects
 from tussle.batch.statistics import (
     BLOCKS_FROM,
     Comparison,
@@ -159,7 +159,8 @@ class Results:
 
     def title(self, expression: str) -> str:
         """A quantity with the teams by name: "score of keepers"."""
-        return re.sub(r"\[(-?\d+)\]", lambda m: f" of {self.teams.get(int(m[1]), m[0])}", expression)
+        spaced = re.sub(r"(?<!\[)\s*([-+*/])\s*", r" \1 ", expression).strip()
+        return re.sub(r"\[(-?\d+)\]", lambda m: f" of {self.teams.get(int(m[1]), m[0])}", spaced)
 
     # -- numbers ----------------------------------------------------------------------------------------------------------
 
@@ -191,9 +192,10 @@ class Results:
         """
         rows = self._rows(point)
         blocks = self._blocks(rows, point)
-        names = [(name, team, column_name("wins", team)) for team, name in self.scored.items()]
-        all_names = [*names, ("ties", None, "ties")] if names else []
-        return [share_of(name, team, self._columns[c][rows], blocks) for name, team, c in all_names]
+        return [
+            share_of(name, team, self._columns[column][rows], blocks)
+            for name, team, column in self._outcomes()
+        ]
 
     def means(self, expressions: Sequence[str] | None = None, point: int | None = None) -> list[Mean]:
         """Means of quantities with their intervals.
@@ -211,11 +213,36 @@ class Results:
         return [mean_of(text, self.quantity(text)[rows], blocks) for text in chosen]
 
     def means_by_point(self, expression: str) -> list[Mean]:
-        """The mean of a quantity at each point."""
-        values = self.quantity(expression)
+        """The mean of a quantity at each point, without gathering its runs anew for each."""
+        return means_of(expression, self._by_point(self.quantity(expression)))
+
+    def shares_by_point(self) -> list[list[Share]]:
+        """Games that each team won at each point."""
+        names = self._outcomes()
+        columns = [self._by_point(self._columns[column]) for _, _, column in names]
+        return [
+            [share_of(name, team, rows[i]) for (name, team, _), rows in zip(names, columns, strict=True)]
+            for i in range(len(self.points))
+        ]
+
+    def n_runs_by_point(self) -> tuple[np.ndarray, np.ndarray]:
+        """Finished runs that did not fail, and runs that failed, at each point, (n_points,)."""
+        n_points = len(self.points)
+        failed = np.bincount(self._point[self._is_failed], minlength=n_points)
+        return np.bincount(self._point, minlength=n_points) - failed, failed
+
+    def _by_point(self, values: np.ndarray) -> list[np.ndarray]:
+        """Values of the runs of each point."""
         order = np.argsort(self._point, kind="stable")
         cuts = np.searchsorted(self._point[order], np.arange(1, len(self.points)))
-        return means_of(expression, np.split(values[order], cuts))
+        return np.split(values[order], cuts)
+
+    def _outcomes(self) -> list[tuple[str, int | None, str]]:
+        """Name, team and column of each way in which a game can end."""
+        found: list[tuple[str, int | None, str]] = [
+            (name, team, column_name("wins", team)) for team, name in self.scored.items()
+        ]
+        return [*found, ("ties", None, "ties")] if found else []
 
     @property
     def usual(self) -> list[str]:
@@ -266,8 +293,17 @@ class Results:
             ParameterError: There is no such quantity.
             MissingExtraError: The points were sampled for indices that take a package which is not there.
         """
-        sample = str(self.info.get("sample") or "")
-        return effects(self.variables, self.points, sample, self.by_seed(expression))
+        return effects(self.variables, self.points, self.by_seed(expression), self._step)
+
+    def rank_correlations(self, expression: str) -> list[Effect]:
+        """As `sensitivity`, without parts of the variance: what can be said without a further package."""
+        return rank_effects(self.variables, self.points, self.by_seed(expression), self._step)
+
+    @property
+    def _step(self) -> int:
+        """Points from one base row to the next of a sample for Saltelli's indices; 0 for other samples."""
+        step = len(self.variables) + 2
+        return step if self.info.get("sample") == "saltelli" and len(self.points) % step == 0 else 0
 
     def survival(self, team: int, point: int | None = None) -> Survival:
         """Mean number of a team left over time; a run that ended early stays as it ended.

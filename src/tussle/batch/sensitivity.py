@@ -59,24 +59,22 @@ class Effect:
 Points = Sequence[dict[str, Any]]
 
 
-def effects(variables: Sequence[Variable], points: Points, sample: str, matrix: np.ndarray) -> list[Effect]:
+def effects(variables: Sequence[Variable], points: Points, matrix: np.ndarray, step: int = 0) -> list[Effect]:
     """What each variable does.
 
     Args:
         variables: What was varied.
         points: Its values at each point.
-        sample: How the points were sampled.
         matrix: The quantity by seed and point, (n_seeds, n_points); NaN where it is not known.
+        step: Of a sample for Saltelli's indices, points from one base row to the next; 0 for other samples.
 
     Raises:
         MissingExtraError: The points were sampled for Saltelli's indices, and SALib is not there.
     """
     if not variables:
         return []
-    step = len(variables) + 2
-    is_saltelli = sample == "saltelli" and len(points) % step == 0
-    found = rank_effects(variables, points, matrix, step if is_saltelli else 0)
-    if is_saltelli:
+    found = rank_effects(variables, points, matrix, step)
+    if step:
         return _by_saltelli(found, _means(matrix))
     values = as_factorial([[p[v.name] for p in points] for v in variables], matrix)
     if values is not None and (len(variables) > 1 or len(matrix) > 1):
@@ -96,8 +94,7 @@ def rank_effects(
         variables: What was varied.
         points: Its values at each point.
         matrix: The quantity by seed and point, (n_seeds, n_points).
-        step: Of a sample for Saltelli's indices, points from one base row to the next, of which the first and the last are
-            independent of each other; 0 for other samples.
+        step: As for `effects`; of each base row only the first and the last point are independent of each other.
     """
     chosen = np.arange(matrix.shape[1])
     if step:
@@ -114,7 +111,9 @@ def rank_effects(
     for variable in variables:
         x = _numbers(variable, points)
         ends = (math.nan,) * 3 if x is None else spearman(x[place], y)
-        found.append(Effect(variable.name, *ends, note=note if x is not None else "has no order"))
+        found.append(
+            Effect(variable.name, *ends, note=note if x is not None else f"{variable.name} has no order")
+        )
     return found
 
 

@@ -7,8 +7,8 @@ were not.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from statistics import NormalDist
 
 import numpy as np
@@ -18,7 +18,7 @@ QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 BOOTSTRAP_FROM = 20
 """Fewer values hold too little of their distribution to be drawn from again: the BCa interval of the mean of ten exponential numbers
-holds in 88 % of cases. Below, Student's t."""
+holds the true one in 87 % of cases, Student's in 90 %. Below, Student's."""
 BOOTSTRAP_UP_TO = 2000
 """More values make the mean normal enough (the skewness of its distribution falls with 1/sqrt(n)), and the jackknife in the BCa
 interval takes n^2 numbers. Above, the normal interval."""
@@ -190,14 +190,15 @@ def mean_of(name: str, values: np.ndarray, blocks: np.ndarray | None = None) -> 
         values: Its value for each run, (n,).
         blocks: Number of the block that each run belongs to, (n,); None where runs are independent.
     """
+    mean = means_of(name, [values])[0]
+    if blocks is None or mean.n == 0:
+        return mean
     is_known = np.isfinite(values)
-    known = values[is_known]
-    parts = known if blocks is None else block_values(known, blocks[is_known])
-    low, high = mean_intervals(parts[None, :])
-    return _mean(name, known, float(low[0]), float(high[0]))
+    low, high = mean_interval(block_values(values[is_known], blocks[is_known]))
+    return replace(mean, low=low, high=high)
 
 
-def means_of(name: str, rows: list[np.ndarray]) -> list[Mean]:
+def means_of(name: str, rows: Sequence[np.ndarray]) -> list[Mean]:
     """Mean of a quantity over the runs of each point; what `mean_of` gives for each, faster.
 
     Args:
@@ -206,21 +207,22 @@ def means_of(name: str, rows: list[np.ndarray]) -> list[Mean]:
     """
     known = [row[np.isfinite(row)] for row in rows]
     found: list[Mean | None] = [None] * len(rows)
-    for n in {len(row) for row in known}:
-        places = [i for i, row in enumerate(known) if len(row) == n]
-        low, high = mean_intervals(np.array([known[i] for i in places]))
-        for k, i in enumerate(places):
-            found[i] = _mean(name, known[i], float(low[k]), float(high[k]))
+    sizes = np.array([len(row) for row in known])
+    for n in np.unique(sizes).tolist():
+        places = np.flatnonzero(sizes == n).tolist()
+        same = np.array([known[i] for i in places])
+        low, high = mean_intervals(same)
+        sd = same.std(axis=1, ddof=1) if n > 1 else np.full(len(same), np.nan)
+        quantiles = (
+            np.quantile(same, QUANTILES, axis=1).T if n else np.full((len(same), len(QUANTILES)), np.nan)
+        )
+        mean = same.mean(axis=1) if n else np.full(len(same), np.nan)
+        numbers = zip(
+            mean.tolist(), low.tolist(), high.tolist(), sd.tolist(), quantiles.tolist(), strict=True
+        )
+        for i, (m, lower, upper, spread, q) in zip(places, numbers, strict=True):
+            found[i] = Mean(name, n, m, lower, upper, spread, dict(zip(QUANTILES, q, strict=True)))
     return [mean for mean in found if mean is not None]
-
-
-def _mean(name: str, values: np.ndarray, low: float, high: float) -> Mean:
-    n = len(values)
-    if n == 0:
-        return Mean(name, 0, math.nan, math.nan, math.nan, math.nan, dict.fromkeys(QUANTILES, math.nan))
-    quantiles = dict(zip(QUANTILES, np.quantile(values, QUANTILES).tolist(), strict=True))
-    sd = float(values.std(ddof=1)) if n > 1 else math.nan
-    return Mean(name, n, float(values.mean()), low, high, sd, quantiles)
 
 
 def mean_interval(values: np.ndarray) -> tuple[float, float]:

@@ -1,0 +1,238 @@
+"""All that is said about a batch at once: for the terminal, for programs as JSON, for the report."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from tussle.batch.quantities import column_name
+from tussle.batch.results import Results
+from tussle.batch.sensitivity import Effect
+from tussle.batch.statistics import Comparison, Mean, Share
+from tussle.batch.variables import Choice, Variable
+from tussle.batch.varied import about
+from tussle.errors import MissingExtraError, ParameterError
+
+MOST_PAIRED_POINTS = 20
+"""Points that are all compared with the first, where choices cannot be compared by themselves."""
+
+
+@dataclass(frozen=True)
+class PointResult:
+    """What came of the runs of a point.
+
+    Attributes:
+        point: Its number.
+        label: Its values.
+        values: Its values by name.
+        n: Finished runs that did not fail.
+        n_failed: Runs that failed.
+        shares: Who won.
+        means: Of the quantities.
+    """
+
+    point: int
+    label: str
+    values: dict[str, Any]
+    n: int
+    n_failed: int
+    shares: list[Share]
+    means: list[Mean]
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Runs that failed in the same way.
+
+    Attributes:
+        error: What was said.
+        n: How many runs.
+        run: The first of them.
+        seed: Its seed.
+        point: Its values.
+    """
+
+    error: str
+    n: int
+    run: int
+    seed: int
+    point: str
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """What came of a batch.
+
+    Attributes:
+        name: Of the mission.
+        path: The batch directory.
+        n_runs: Finished runs, failed ones included.
+        n_failed: Runs that failed; they are in nothing else.
+        n_planned: Runs that were to be played.
+        n_points: Points.
+        n_seeds: Games of each point.
+        first_seed: Of them.
+        stopped_by: Rule that ended the batch before its last run; None for none.
+        variables: What was varied.
+        quantities: What is looked at.
+        titles: The same with the teams' names.
+        shares: Who won, over all points.
+        means: Over all points.
+        points: Point by point; empty where nothing varies.
+        comparisons: Paired by seed.
+        sensitivity: Quantity -> what each variable does to it.
+        failures: Most frequent first.
+        notes: What is missing, one line each.
+    """
+
+    name: str
+    path: str
+    n_runs: int
+    n_failed: int
+    n_planned: int
+    n_points: int
+    n_seeds: int
+    first_seed: int
+    stopped_by: str | None
+    variables: list[Variable]
+    quantities: list[str]
+    titles: dict[str, str]
+    shares: list[Share]
+    means: list[Mean]
+    points: list[PointResult] = field(default_factory=list)
+    comparisons: list[Comparison] = field(default_factory=list)
+    sensitivity: dict[str, list[Effect]] = field(default_factory=dict)
+    failures: list[Failure] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    def as_dict(self) -> dict[str, Any]:
+        """The same for JSON: None where a number is not known."""
+        fields = dataclasses.asdict(self) | {"variables": [about(v) for v in self.variables]}
+        plain: dict[str, Any] = _plain(fields)
+        return plain
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(key): _plain(inner) for key, inner in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(inner) for inner in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def analyse(
+    results: Results, quantities: Sequence[str] = (), compare: Sequence[tuple[int | str, int | str]] = ()
+) -> Analysis:
+    """Look at a batch.
+
+    Args:
+        results: The batch.
+        quantities: What to look at; by default the scores, what is left of each team and the time at the end.
+        compare: Pairs of points, or of values that select points; by default the values of each choice with its first.
+
+    Raises:
+        ParameterError: There is no such quantity or point.
+    """
+    notes, info = list(results.notes), results.info
+    chosen = list(dict.fromkeys(quantities)) or results.usual
+    looked_at = list(dict.fromkeys(quantities)) or leading(results)
+    has_points = len(results.points) > 1
+    return Analysis(
+        name=str(info["name"]),
+        path=str(results.path or ""),
+        n_runs=results.n_runs,
+        n_failed=results.n_failed,
+        n_planned=results.n_planned,
+        n_points=len(results.points),
+        n_seeds=int(info["n_seeds"]),
+        first_seed=int(info["first_seed"]),
+        stopped_by=info.get("stopped_by"),
+        variables=results.variables,
+        quantities=chosen,
+        titles={name: results.title(name) for name in chosen},
+        shares=results.shares(),
+        means=results.means(chosen),
+        points=_points(results, looked_at) if has_points else [],
+        comparisons=_comparisons(results, looked_at, compare),
+        sensitivity=_sensitivity(results, looked_at, notes) if has_points else {},
+        failures=_failures(results),
+        notes=notes,
+    )
+
+
+def leading(results: Results) -> list[str]:
+    """The quantities by which points are looked at where nobody says which: scores, else what is left, if they differ at all."""
+    for metric in ("score", "alive"):
+        names = [column_name(metric, team) for team in results.teams]
+        found = [name for name in names if name in results.quantities and _varies(results.quantity(name))]
+        if found:
+            return found
+    return ["t"]
+
+
+def _varies(values: np.ndarray) -> bool:
+    known = values[np.isfinite(values)]
+    return bool(len(known)) and bool(np.ptp(known) > 0.0)
+
+
+def _points(results: Results, quantities: Sequence[str]) -> list[PointResult]:
+    shares = results.shares_by_point()
+    means = [results.means_by_point(name) for name in quantities]
+    n, n_failed = results.n_runs_by_point()
+    return [
+        PointResult(
+            i, results.label(i), values, int(n[i]), int(n_failed[i]), shares[i], [m[i] for m in means]
+        )
+        for i, values in enumerate(results.points)
+    ]
+
+
+def _comparisons(
+    results: Results, quantities: Sequence[str], asked: Sequence[tuple[int | str, int | str]]
+) -> list[Comparison]:
+    if asked:
+        return [results.compare(name, a, b) for a, b in asked for name in quantities]
+    choices = [v for v in results.variables if isinstance(v, Choice) and len(v.values) > 1]
+    pairs = [(f"{v.name}={v.values[0]}", f"{v.name}={value}") for v in choices for value in v.values[1:]]
+    found = []
+    for a, b in pairs:
+        try:
+            found += [results.compare(name, a, b) for name in quantities]
+        except ParameterError:  # points of a list may agree in nothing else
+            continue
+    if choices and not found and len(results.points) <= MOST_PAIRED_POINTS:
+        found = [results.compare(name, 0, i) for i in range(1, len(results.points)) for name in quantities]
+    return found
+
+
+def _sensitivity(results: Results, quantities: Sequence[str], notes: list[str]) -> dict[str, list[Effect]]:
+    found = {}
+    for name in quantities:
+        try:
+            effects = results.sensitivity(name)
+        except MissingExtraError as error:
+            effects = results.rank_correlations(name)
+            if str(error) not in notes:
+                notes.append(str(error))
+        if any(not math.isnan(e.rank_correlation) or e.first_order is not None for e in effects):
+            found[name] = effects
+    return found
+
+
+def _failures(results: Results) -> list[Failure]:
+    failed = results.failed()
+    if not failed.num_rows:
+        return []
+    grouped = failed.group_by("error").aggregate([("run", "count"), ("run", "min")])
+    rows = {row["run"]: row for row in failed.select(["run", "seed", "point", "error"]).to_pylist()}
+    counts = zip(grouped["run_min"].to_pylist(), grouped["run_count"].to_pylist(), strict=True)
+    found = [
+        Failure(rows[run]["error"] or "", n, run, rows[run]["seed"], results.label(rows[run]["point"]))
+        for run, n in counts
+    ]
+    return sorted(found, key=lambda failure: (-failure.n, failure.run))
