@@ -1,0 +1,89 @@
+"""Reads the ranges file of SCRIMMAGE's batch scripts: one XML tag per placeholder, `<max_speed low="15" high="25" type="float"/>`."""
+
+from __future__ import annotations
+
+from tussle.batch.variables import Choice, Range, Variable, parse_bounds, read_value, shown
+from tussle.errors import MissionError, ParameterError, listed, nearest_name
+from tussle.mission.limits import Limits
+from tussle.mission.node import Budget, Node, parse
+
+ATTRIBUTES = ("low", "high", "type", "count", "vec", "scale")
+TYPES = ("float", "int")
+SCALES = ("linear", "log")
+
+
+def read_ranges(text: str, file: str) -> tuple[list[Variable], list[str]]:
+    """What varies, and what is wrong, one line each with its place.
+
+    `count` is the number of levels, `vec` a list of the values to choose from, beside which low and high, which those scripts
+    demand, say nothing. `scale="log"`, which they leave unread, is obeyed. Whole numbers include the high bound, which
+    they never reach; a range whose bounds are equal is the one value.
+
+    Raises:
+        ParameterError: It is no XML, or a mission.
+    """
+    try:
+        root = parse(text, file, Budget(Limits()))
+    except MissionError as error:
+        raise ParameterError(str(error)) from None
+    if root.tag == "runscript":
+        raise ParameterError(
+            f"{root.place}: this is a mission; a ranges file has one tag for each placeholder"
+        )
+    variables: list[Variable] = []
+    problems: list[str] = []
+    seen: set[str] = set()
+    for node in root.children:
+        # A name space, should there be one, is not part of the placeholder's name.
+        name = node.tag.rpartition("}")[2]
+        try:
+            if name in seen:
+                raise ParameterError(f"{name}: it stands there twice")
+            seen.add(name)
+            variables.append(_variable(name, node))
+        except ParameterError as error:
+            problems.append(f"{node.place}: {error}")
+    if not root.children:
+        problems.append(
+            f'{root.place}: nothing varies; write tags such as <prey_speed low="20" high="30" type="float"/>'
+        )
+    return variables, problems
+
+
+def _variable(name: str, node: Node) -> Variable:
+    told = {key: value.strip() for key, value in node.attributes.items()}
+    for key in told:
+        if key not in ATTRIBUTES:
+            raise ParameterError(
+                f"{name}: the attribute {key!r} is unknown{nearest_name(key, ATTRIBUTES)}; {listed(ATTRIBUTES)}"
+            )
+    for key, allowed in (("type", TYPES), ("scale", SCALES)):
+        if key in told and told[key] not in allowed:
+            raise ParameterError(
+                f"{name}: {key}={told[key]!r} is not allowed{nearest_name(told[key], allowed)}; {listed(allowed)}"
+            )
+    is_int = told.get("type") == "int"
+    if "vec" in told:
+        return Choice(name, tuple(_number(name, item, is_int=is_int) for item in told["vec"].split(",")))
+    missing = [key for key in ("low", "high", "type") if key not in told]
+    if missing:
+        raise ParameterError(f"{name}: it has no {' and no '.join(missing)}; a range has low, high and type")
+    low, high, unit = parse_bounds(name, told["low"], told["high"])
+    count = read_value(told["count"]) if "count" in told else None
+    if isinstance(count, str | float):
+        raise ParameterError(f"{name}: count={told['count']!r} is not allowed; it takes a whole number")
+    if low == high or count == 1:
+        value = f"{shown(low)} {unit}" if unit else _number(name, shown(low), is_int=is_int)
+        return Choice(name, (value,))
+    return Range(name, low, high, is_int, told.get("scale") == "log", count, unit)
+
+
+def _number(name: str, text: str, *, is_int: bool) -> int | float:
+    value = read_value(text.strip())
+    if isinstance(value, str):
+        raise ParameterError(
+            f"{name}: {value[:80]!r} is not a number; vec takes numbers, as in vec='1, 2, 5'"
+        )
+    if is_int and not float(value).is_integer():
+        raise ParameterError(f"{name}: {value!r} is not a whole number, and type='int' asks for such")
+    return int(value) if is_int else float(value)
