@@ -38,6 +38,10 @@ class RecordError(TussleError):
     """A run cannot be recorded, or what is there is no recorded run; what had been written before stays whole."""
 
 
+class BatchError(TussleError):
+    """A batch cannot be played, or what is there is no batch or another one; what had been played before stays whole."""
+
+
 class MissingExtraError(TussleError, ImportError):
     """A feature needs a package that only an extra installs; the message names both."""
 

@@ -35,10 +35,16 @@ def is_within(name: str, packages: tuple[str, ...]) -> bool:
 
 
 def requirements(project: dict, *extras: str) -> set[str]:
+    """Packages that the project needs with some extras, by the names they are imported under; extras may name extras."""
     lists = [project["dependencies"], *(project["optional-dependencies"][extra] for extra in extras)]
-    return {
-        re.match(r"[A-Za-z0-9._-]+", line)[0].lower().replace("-", "_") for lines in lists for line in lines
-    }
+    found = set()
+    for line in (line for lines in lists for line in lines):
+        inner = re.match(r"tussle\[(.*)\]", line)
+        if inner:
+            found |= requirements(project, *inner[1].split(","))
+        else:
+            found.add(re.match(r"[A-Za-z0-9._-]+", line)[0].lower().replace("-", "_"))
+    return found
 
 
 def third_party(tree: str) -> dict[str, str]:
@@ -70,15 +76,36 @@ def test_kernels_take_from_numpy_only_what_is_the_same_on_every_machine(path):
 
 def test_declared_dependencies_are_the_imported_ones():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    used, declared = third_party("src"), requirements(project)
-    assert set(used) - {"llvmlite"} == declared, f"imported at {used}; llvmlite comes with numba"
+    extras = [name for name in project["optional-dependencies"] if name not in ("test", "frames")]
+    used = {name.lower() for name in third_party("src")}
+    declared = requirements(project, *extras)
+    assert used - {"llvmlite"} == declared, "llvmlite comes with numba"
+
+
+@pytest.mark.parametrize("path", python_files("src"), ids=relative)
+def test_packages_of_extras_are_imported_where_they_are_used(path):
+    """At the head of a module they would be needed by whoever loads it."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    core = requirements(project) | {"llvmlite", "tussle"} | sys.stdlib_module_names
+    statements = [
+        node
+        for node in parsed(path).body
+        if isinstance(node, ast.Import | ast.ImportFrom) and not getattr(node, "level", 0)
+    ]
+    for node in statements:
+        names = [a.name for a in node.names] if isinstance(node, ast.Import) else [node.module]
+        for name in names:
+            package = name.split(".")[0].lower()
+            assert package in core, (
+                f"{relative(path)}:{node.lineno} imports {name}, which only an extra installs"
+            )
 
 
 @pytest.mark.parametrize("tree", ["tests", "examples", "benchmarks"])
 def test_what_tests_and_examples_import_is_in_the_test_extra(tree):
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     used, declared = third_party(tree), requirements(project, "test")
-    missing = {name: place for name, place in used.items() if name not in declared | {"_pytest"}}
+    missing = {name: place for name, place in used.items() if name.lower() not in declared | {"_pytest"}}
     assert not missing
 
 

@@ -60,7 +60,10 @@ def show_analysis(
         parts += [_title("points", POINTS_REMARK), *_points(found, shows_all_points)]
     for pairs in _by_quantity(found.comparisons):
         what = f"{found.titles.get(pairs[0].quantity, pairs[0].quantity)} against {pairs[0].a}"
-        parts += [_title("compared", f"{what}, paired by seed; p of the sign test"), _comparisons(pairs)]
+        parts += [
+            _title("compared", f"{what}, paired by {found.paired_by}; p of the sign test"),
+            _comparisons(pairs),
+        ]
     for quantity, effects in found.sensitivity.items():
         parts += [_title(f"what matters for {found.titles.get(quantity, quantity)}"), *_effects(effects)]
     if found.failures:
@@ -229,7 +232,7 @@ def _estimate(value: float | None, low: float | None, high: float | None, sign: 
     """A number between -1 and 1 with its interval: "0.80 [0.70, 0.90]"."""
     if low is None or high is None or math.isnan(low):
         return _number(value, 2, sign)
-    return f"{_number(value, 2, sign)} [{low:.2f}, {high:.2f}]"
+    return f"{_number(value, 2, sign)} [{low:z.2f}, {high:z.2f}]"
 
 
 def _failures(found: Analysis) -> Table:
@@ -261,13 +264,13 @@ def _digits(width: float, value: float) -> int:
 
 
 def _number(value: float | None, digits: int, sign: str = "") -> str:
-    return "" if value is None or not math.isfinite(value) else f"{value:{sign},.{digits}f}"
+    return "" if value is None or not math.isfinite(value) else f"{value:{sign}z,.{digits}f}"
 
 
 def _interval(low: float | None, high: float | None, digits: int) -> str:
     if low is None or high is None or not (math.isfinite(low) and math.isfinite(high)):
         return ""
-    return f"{low:,.{digits}f} – {high:,.{digits}f}"
+    return f"{low:z,.{digits}f} – {high:z,.{digits}f}"
 
 
 def _percent(share: float) -> str:

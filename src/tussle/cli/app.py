@@ -3,80 +3,32 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 import tussle
-from tussle.cli.terminal import EXIT_CODES, OK, out, run_guarded, told
-
-if TYPE_CHECKING:
-    from tussle.cli.play import Source
-
-# The mark \b keeps click from filling the lines that follow.
-EPILOG = "\b\nExit codes:\n" + "\n".join(f"  {code:>3}  {meaning}" for code, meaning in EXIT_CODES.items())
-
-SET_HELP = (
-    "A value of the mission's ${name=default}, or of anything by path: prey.Boids.max_speed='50 kt', "
-    "prey.motion_model=SimpleAircraft, run.dt=0.05. As often as needed."
+from tussle.cli import batch_commands
+from tussle.cli.options import (
+    EPILOG,
+    Debug,
+    End,
+    Large,
+    MissionName,
+    More,
+    PluginFiles,
+    Seed,
+    Set,
+    Strict,
+    mission_source,
 )
+from tussle.cli.terminal import OK, out, run_guarded, told
 
 app = typer.Typer(
     help="Thousands of robots in one 3D world: play missions, look at plugins, write your own.",
     epilog=EPILOG, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 80},
 )  # fmt: skip
-
-MissionName = Annotated[
-    str,
-    typer.Argument(
-        metavar="MISSION",
-        help="A mission file, or the name of one that ships (tussle missions).",
-        show_default=False,
-    ),
-]
-Seed = Annotated[
-    int | None,
-    typer.Option(
-        metavar="N",
-        min=0,
-        max=2**64 - 1,
-        help="Seed of the game; by default the mission's, or 1.",
-        show_default=False,
-    ),
-]
-Set = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="NAME=VALUE",
-        help=SET_HELP,
-        show_default=False,
-    ),
-]
-More = Annotated[
-    list[str] | None, typer.Argument(metavar="NAME=VALUE", help="As with --set.", show_default=False)
-]
-End = Annotated[
-    str | None,
-    typer.Option(metavar="TIME", help="End the game at this time: 60, or '2 min'.", show_default=False),
-]
-Strict = Annotated[
-    bool, typer.Option("--strict", help="Unknown tags and attributes of the mission are errors.")
-]
-PluginFiles = Annotated[
-    list[Path] | None,
-    typer.Option(
-        "--plugin-path",
-        metavar="FILE",
-        help="A Python file with plugins of yours. As often as needed.",
-        show_default=False,
-    ),
-]
-Large = Annotated[
-    bool, typer.Option("--allow-large", help="Lift the limits on how much a mission may ask for.")
-]
-Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
 
 
 def _version(is_asked: bool) -> None:
@@ -96,8 +48,24 @@ def _options(
 
 @app.command(epilog=EPILOG)
 def run(
-    mission: MissionName,
+    mission: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="MISSION",
+            help="A mission file, or the name of one that ships (tussle missions).",
+            show_default=False,
+        ),
+    ] = None,
     more: More = None,
+    from_batch: Annotated[
+        str | None,
+        typer.Option(
+            "--from",
+            metavar="BATCH:RUN",
+            help="Play a run of a batch again, instead of a mission.",
+            show_default=False,
+        ),
+    ] = None,
     seed: Seed = None,
     settings: Set = None,
     end: End = None,
@@ -144,10 +112,24 @@ def run(
     for name, value in (("--pace", pace), ("--log-period", log_period)):
         if value is not None and not 0.0 < value < float("inf"):
             raise typer.BadParameter(f"{name} {value:g} is not allowed; it takes a number > 0")
+    is_changed = any(x for x in (mission, more, settings, plugin_files)) or (seed, end) != (None, None)
+    if from_batch is not None and is_changed:
+        raise typer.BadParameter(
+            "--from says all of what is played, so no mission, setting, seed or end goes beside it"
+        )
+    if from_batch is None and mission is None:
+        raise typer.BadParameter("a mission is needed, or --from BATCH:RUN")
     with told(debug):
-        from tussle.cli.play import Record, play
+        from tussle.cli.play import Game, Record, play
 
-        source = _source(mission, settings, more, seed, end, strict, plugin_files, allow_large)
+        if from_batch is not None:
+            from tussle.cli.from_batch import FromBatch
+
+            source: Game = FromBatch(from_batch)
+        else:
+            source = mission_source(
+                mission or "", settings, more, seed, end, strict, plugin_files, allow_large
+            )
         code = play(source, Record(directory, not no_log, log_period), pace, start_from)
     raise typer.Exit(code)
 
@@ -167,7 +149,7 @@ def check(
         from tussle.cli.play import simulate
         from tussle.cli.progress import compiling
 
-        source = _source(mission, settings, more, None, None, strict, plugin_files, allow_large)
+        source = mission_source(mission, settings, more, None, None, strict, plugin_files, allow_large)
         loaded, made, seed = source.read()
         with compiling(), simulate(loaded, made, seed) as simulation:
             n = sum(block.count for block in made.blocks)
@@ -206,7 +188,7 @@ def describe(
         from tussle.cli.play import simulate
         from tussle.cli.progress import compiling
 
-        loaded, made, seed = _source(
+        loaded, made, seed = mission_source(
             name, settings, more, None, None, strict, plugin_files, allow_large
         ).read()
         with compiling(), simulate(loaded, made, seed) as simulation:
@@ -267,21 +249,7 @@ def new(
         pages.show_written(written.files, written.next_steps)
 
 
-def _source(
-    mission: str,
-    settings: list[str] | None,
-    more: list[str] | None,
-    seed: int | None,
-    end: str | None,
-    strict: bool,
-    plugin_files: list[Path] | None,
-    allow_large: bool,
-) -> Source:
-    from tussle.cli.play import Source
-    from tussle.cli.settings import read_settings
-
-    given = read_settings([*(settings or ()), *(more or ())])
-    return Source(mission, given, seed, end, strict, tuple(plugin_files or ()), allow_large)
+batch_commands.register(app, EPILOG)
 
 
 def start() -> None:

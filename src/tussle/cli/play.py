@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from tussle.cli.interrupt import Interrupt
 from tussle.cli.progress import Meter, compiling
@@ -71,6 +71,9 @@ class Source:
         """All that was set, for the run directory."""
         return self.settings if self.end is None else {**self.settings, "run.end": self.end}
 
+    def ended(self, state_hash: str) -> None:
+        """The game has come to its end, whatever it is."""
+
 
 def simulate(loaded: Loaded, mission: Mission, seed: int, **more: Any) -> Simulation:
     """The game of a mission that was read, before its first step.
@@ -95,7 +98,21 @@ class Record:
     period: float | None = None
 
 
-def play(source: Source, record: Record, pace: float | None, start_from: Path | None) -> int:
+class Game(Protocol):
+    """What is to be played: a mission with settings, or a run of a batch."""
+
+    @property
+    def given(self) -> dict[str, str]:
+        """All that was set, for the run directory."""
+
+    def read(self, tells_all: bool = True) -> tuple[Loaded, Mission, int]:
+        """The file as read, the mission, and the seed."""
+
+    def ended(self, state_hash: str) -> None:
+        """The game has come to its end."""
+
+
+def play(source: Game, record: Record, pace: float | None, start_from: Path | None) -> int:
     """Play a mission and show what came of it.
 
     Returns:
@@ -123,6 +140,8 @@ def play(source: Source, record: Record, pace: float | None, start_from: Path | 
         if recorder is not None:
             recorder.close(str(error) if error else "interrupted" if interrupt.code else "")
         show_summary(simulation, loaded.path.stem, speed, recorder.directory if recorder else None)
+        if simulation.is_over and start_from is None:
+            source.ended(simulation.state_hash())
     if error is not None:
         raise error
     if interrupt.code:

@@ -52,5 +52,4 @@ def ending_by_time(mission: Mission) -> Mission:
         raise ParameterError(
             f"--end {mission.end:g} is not allowed; it takes a time in s > {mission.start:g}, the start"
         )
-    conditions = tuple(mission.end_conditions)
-    return mission if "time" in conditions else mission.replace(end_conditions=(*conditions, "time"))
+    return mission.ending_by_time()

@@ -14,7 +14,7 @@ import typer
 from rich.console import Console, RenderableType
 from rich.text import Text
 
-from tussle.errors import PluginError, RecordError, TussleError
+from tussle.errors import BatchError, PluginError, RecordError, TussleError
 
 WIDEST = 100
 """Tables and bars grow no wider than this, on the widest of screens."""
@@ -27,7 +27,7 @@ EXIT_CODES = {
     WRONG_INPUT: "the mission, a setting or a plugin file is wrong",
     USAGE: "the command line is wrong",
     PLUGIN_FAILED: "a plugin failed while the game was played",
-    NOT_WRITTEN: "a run directory cannot be written or read",
+    NOT_WRITTEN: "a run or batch directory cannot be written or read",
     OWN_FAULT: "tussle itself failed: a bug, please report it",
     INTERRUPTED: "interrupted by Ctrl-C; what was played is kept",
     TERMINATED: "the same, by SIGTERM",
@@ -90,7 +90,7 @@ def code_of(error: BaseException) -> int:
         return INTERRUPTED
     if isinstance(error, PluginError):
         return PLUGIN_FAILED
-    if isinstance(error, (RecordError, OSError)):
+    if isinstance(error, (BatchError, RecordError, OSError)):
         return NOT_WRITTEN
     return WRONG_INPUT if isinstance(error, TussleError) else OWN_FAULT
 

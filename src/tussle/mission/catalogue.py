@@ -29,6 +29,9 @@ KINDS: dict[str, type] = {
 }
 """What each tag names."""
 
+CONTENT = "__plugin_file_content__"
+"""In the module of a plugin file: hash of the text that it was made from."""
+
 
 @cache
 def historic() -> dict[str, Any]:
@@ -91,8 +94,21 @@ class Catalogue:
         return found
 
 
-def load_plugin_file(path: str | Path) -> dict[str, type[Plugin]]:
+def module_of_plugin_file(path: str | Path) -> str:
+    """Name of the module that a plugin file becomes: one of its own, so that plugins of two files called alike pickle."""
+    file = Path(path).expanduser()
+    digest = hashlib.blake2b(str(file.resolve()).encode(), digest_size=4).hexdigest()
+    return f"tussle_plugin_file_{digest}_{file.stem if file.stem.isidentifier() else 'plugin'}"
+
+
+def load_plugin_file(path: str | Path, module_name: str = "") -> dict[str, type[Plugin]]:
     """The plugins that a Python file defines, by the names of their classes. The file is run, as an import does.
+
+    A file that has not changed since it was loaded is not run again: its classes stay the same ones.
+
+    Args:
+        path: The file.
+        module_name: Instead of the name that follows from the path.
 
     Raises:
         MissionError: It cannot be read or imported, or defines no plugin; the message has the file's own line.
@@ -100,21 +116,26 @@ def load_plugin_file(path: str | Path) -> dict[str, type[Plugin]]:
     file = Path(path).expanduser()
     if not file.is_file():
         raise MissionError(f"{path}: there is no such plugin file")
-    # Under a name of its own, so that plugins of two files called alike pickle, and the same file is the same module.
-    digest = hashlib.blake2b(str(file.resolve()).encode(), digest_size=4).hexdigest()
-    name = f"tussle_plugin_file_{digest}_{file.stem if file.stem.isidentifier() else 'plugin'}"
+    name = module_name or module_of_plugin_file(path)
     spec = importlib.util.spec_from_file_location(name, file.resolve())
     if spec is None or spec.loader is None:
         raise MissionError(f"{path}: this is not a Python file (its name ends with .py)")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
     try:
-        spec.loader.exec_module(module)
-    except (Exception, SystemExit) as error:
-        sys.modules.pop(name, None)
-        raise MissionError(
-            f"{_line(error, file)}: it cannot be imported: {type(error).__name__}: {error}"
-        ) from error
+        content = hashlib.blake2b(file.read_bytes(), digest_size=16).hexdigest()
+    except OSError as error:
+        raise MissionError(f"{path}: it cannot be read: {error.strerror or error}") from error
+    module = sys.modules.get(name)
+    if module is None or vars(module).get(CONTENT) != content:
+        module = importlib.util.module_from_spec(spec)
+        vars(module)[CONTENT] = content
+        sys.modules[name] = module
+        try:
+            spec.loader.exec_module(module)
+        except (Exception, SystemExit) as error:
+            sys.modules.pop(name, None)
+            raise MissionError(
+                f"{_line(error, file)}: it cannot be imported: {type(error).__name__}: {error}"
+            ) from error
     found = {
         key: value
         for key, value in vars(module).items()

@@ -335,3 +335,8 @@ class Mission:
         """A copy with other values."""
         _check_names("Mission", Mission, changes)
         return dataclasses.replace(self, **changes)
+
+    def ending_by_time(self) -> Mission:
+        """A copy that ends at its end time, whatever else ends it."""
+        conditions = tuple(self.end_conditions)
+        return self if "time" in conditions else self.replace(end_conditions=(*conditions, "time"))

@@ -42,6 +42,7 @@ class Loaded:
         log: Settings about output, by tag.
         placeholders: Names that can be set, with their defaults.
         places: Block name -> "file:line", for messages about it.
+        files: All files that were read: the mission's and those it includes.
     """
 
     mission: Mission
@@ -54,6 +55,7 @@ class Loaded:
     log: dict[str, Any] = field(default_factory=dict)
     placeholders: dict[str, str] = field(default_factory=dict)
     places: dict[str, str] = field(default_factory=dict)
+    files: tuple[Path, ...] = ()
 
 
 def read_mission(
@@ -152,7 +154,7 @@ class _WorldReader:
         places = {block: str(place) for block, place in entities.places.items()}
         return Loaded(
             mission, seed, name or self.source.path.stem, self.source.path, self.source.text, problems.notes, self.viewer, self.log,
-            self.source.placeholders, places,
+            self.source.placeholders, places, tuple(self.source.files),
         )  # fmt: skip
 
     def _count_tags(self, entities: list[Node]) -> None:

@@ -84,15 +84,15 @@ def write(
         "files": {s.path.name: {"bytes": s.size, "rows": s.rows} for s in streams},
     }
     try:
-        _put(directory / SUMMARY_FILE, _summary(results))
-        _put(directory / RUN_FILE, json.dumps(plain(info), indent=1, allow_nan=False) + "\n")
+        put_whole(directory / SUMMARY_FILE, _summary(results))
+        put_whole(directory / RUN_FILE, json.dumps(plain(info), indent=1, allow_nan=False) + "\n")
     except OSError as error:
         raise RecordError(
             f"{directory}: the end of the run cannot be written: {os.strerror(error.errno or 0)}"
         ) from error
 
 
-def _put(path: Path, text: str) -> None:
+def put_whole(path: Path, text: str) -> None:
     """Write a file so that it is there whole or not at all."""
     draft = path.with_name(path.name + ".part")
     try:

@@ -1,0 +1,30 @@
+"""One mission played many times, on one machine or many, and what can be learnt from it."""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from tussle.batch.batch import Batch
+    from tussle.batch.executors import InProcess, Processes
+    from tussle.batch.reload import load_batch
+    from tussle.batch.results import Results
+    from tussle.batch.variables import Choice, Range
+
+__all__ = ["Batch", "Choice", "InProcess", "Processes", "Range", "Results", "load_batch"]
+
+_LAZY = {
+    "Batch": "batch",
+    "Choice": "variables",
+    "InProcess": "executors",
+    "Processes": "executors",
+    "Range": "variables",
+    "Results": "results",
+    "load_batch": "reload",
+}
+
+
+def __getattr__(name: str) -> Any:
+    # Analysing a batch does not wait for the engine, nor playing one for statistics.
+    if name not in _LAZY:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_LAZY[name]}"), name)

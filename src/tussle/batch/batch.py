@@ -1,0 +1,265 @@
+"""A batch: one mission played many times, with other seeds and values."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tussle.batch.executors import FEW, Executor, InProcess, Processes
+from tussle.batch.plan import Plan
+from tussle.batch.points import values_text, variables_of
+from tussle.batch.sampling import sample as sample_points
+from tussle.batch.tasks import PluginFile, Run
+from tussle.batch.treatments import Treatment, build_points, group_points, read_points
+from tussle.batch.variables import Variable
+from tussle.batch.varied import about, as_variables
+from tussle.engine.simulation import Simulation
+from tussle.errors import BatchError, ParameterError
+from tussle.mission import Loaded, Mission, read_mission
+from tussle.record.run_file import versions
+
+if TYPE_CHECKING:
+    from tussle.batch.progress import Progress
+    from tussle.batch.results import Results
+    from tussle.batch.until import Until
+
+MOST_CHECKED = 16
+"""Groups whose game is begun before the batch, to tell what is wrong with it at once."""
+
+
+class Batch:
+    """One mission, played with many seeds and values.
+
+    Args:
+        mission: A mission file, the name of one that ships, a `Mission`, or a function of the varied values that makes one.
+        runs: Games of each point, that is of each set of varied values.
+        vary: What varies: texts as on the command line ("prey_speed=20:30"), variables, or a dict by name of (low, high), lists and
+            texts ("20:30:log").
+        sample: How points are chosen: lhs, sobol, saltelli, grid, list, product; "" chooses by what varies.
+        samples: How many points; None is the method's default.
+        points: The points themselves, instead of `vary`.
+        sample_seed: Seed of the sampling.
+        first_seed: Seeds of the games count up from here.
+        independent: Each game has a seed of its own; otherwise all points meet the same seeds (common random numbers).
+        settings: Values that are set in all points, as for `read_mission` or by path.
+        plugin_files: Python files whose plugins the mission file may name.
+        ends_by_time: The game ends at its end time whatever the mission says.
+        options: Further options of `read_mission`.
+
+    Raises:
+        ParameterError: A variable or a number is not allowed.
+        MissionError: The mission cannot be played at one of the points.
+    """
+
+    def __init__(
+        self,
+        mission: str | Path | Mission | Callable[..., Mission],
+        *,
+        runs: int = 100,
+        vary: Mapping[str, Any] | Iterable[str | Variable] = (),
+        sample: str = "",
+        samples: int | None = None,
+        points: Sequence[Mapping[str, Any]] | None = None,
+        sample_seed: int = 0,
+        first_seed: int = 1,
+        independent: bool = False,
+        settings: Mapping[str, Any] | None = None,
+        plugin_files: Sequence[str | Path] = (),
+        ends_by_time: bool = False,
+        **options: Any,
+    ) -> None:
+        self.source = mission
+        self.settings = dict(settings or {})
+        self.plugin_files = tuple(PluginFile.of(Path(p)) for p in plugin_files)
+        self.variables = as_variables(vary)
+        self.sample, self.sample_seed = sample, sample_seed
+        if points is not None and self.variables:
+            raise ParameterError(
+                "points are given, so there is nothing to vary beside them; give one of the two"
+            )
+        chosen = (
+            [dict(p) for p in points]
+            if points is not None
+            else sample_points(self.variables, sample, samples, sample_seed)
+        )
+        if points is not None:
+            self.variables = variables_of(chosen)
+        self.plan = Plan(chosen, runs, first_seed, independent)
+        self._options = {**options, "plugin_files": tuple(plugin_files)}
+        self._ends_by_time = ends_by_time
+        self.loaded = self._read()
+        self.missions = list(self._missions(self.plan.points))
+        self.treatments, self.package = group_points(self.missions, self.plugin_files)
+
+    def _read(self) -> Loaded | None:
+        """The mission file as it stands without any varied value; None for a mission made in Python."""
+        if not isinstance(self.source, (str, Path)):
+            return None
+        return read_mission(self.source, {k: str(v) for k, v in self.settings.items()}, **self._options)
+
+    def _missions(self, points: Sequence[Mapping[str, Any]]) -> Iterable[Mission]:
+        if isinstance(self.source, (str, Path)):
+            settings = {k: str(v) for k, v in self.settings.items()}
+            texts = [values_text(point, self.variables) for point in points]
+            missions = read_points(self.source, settings, texts, **self._options)
+        else:
+            missions = build_points(self.source, self.settings, points)
+        return (m.ending_by_time() for m in missions) if self._ends_by_time else missions
+
+    # -- what is played -----------------------------------------------------------------------------------------------------
+
+    @property
+    def mission(self) -> Mission:
+        """The mission at the first point."""
+        return self.missions[0]
+
+    def run(self, number: int) -> Run:
+        """A run as it is handed to those who play."""
+        treatment: Treatment = self.treatments[self.plan.point(number)]
+        return Run(number, treatment.group, self.plan.seed(number), treatment.params)
+
+    def simulation(self, number: int) -> Simulation:
+        """The game of one run, alone, before its first step.
+
+        Raises:
+            BatchError: There is no such run.
+        """
+        if not 0 <= number < self.plan.n_runs:
+            raise BatchError(f"there is no run {number}; the batch has runs 0 to {self.plan.n_runs - 1}")
+        return Simulation(self.missions[self.plan.point(number)], self.plan.seed(number), on_error="record")
+
+    def check(self) -> None:
+        """Begin a game of each group, up to some number, and make its first step: what is wrong with it shows at once.
+
+        Raises:
+            TussleError: A mission cannot be played.
+        """
+        first = {t.group: point for point, t in reversed(list(enumerate(self.treatments)))}
+        for point in list(first.values())[:MOST_CHECKED]:
+            with Simulation(self.missions[point], self.plan.seed(point), on_error="record") as simulation:
+                simulation.step()
+
+    @property
+    def fingerprint(self) -> str:
+        """Hash of all that the runs depend on, but for how many there are."""
+        source = self.loaded.text if self.loaded is not None else repr(self.missions)
+        parts = [
+            source,
+            *(file.text for file in self.plugin_files),
+            json.dumps([dict(p) for p in self.plan.points], default=str),
+            repr((self.plan.first_seed, self.plan.independent, self._ends_by_time, versions()["tussle"])),
+        ]
+        return hashlib.blake2b("\0".join(parts).encode(), digest_size=16).hexdigest()
+
+    @property
+    def name(self) -> str:
+        """Short name of the mission."""
+        if self.loaded is not None:
+            return self.loaded.path.stem
+        return self.mission.name or "mission"
+
+    @property
+    def team_names(self) -> dict[int, str]:
+        """Team -> names of its blocks."""
+        teams: dict[int, list[str]] = {}
+        for block in self.mission.blocks:
+            teams.setdefault(block.team, []).append(block.name)
+        return {team: ", ".join(names) for team, names in sorted(teams.items())}
+
+    def info(self) -> dict[str, Any]:
+        """What `batch.json` says of the plan."""
+        mission = self.mission
+        return {
+            "format": 1,
+            "tussle": versions()["tussle"],
+            "name": mission.name or self.name,
+            "fingerprint": self.fingerprint,
+            "mission": self._about_mission(),
+            "variables": [about(v) for v in self.variables],
+            "sample": self.sample,
+            "sample_seed": self.sample_seed,
+            "n_points": self.plan.n_points,
+            "n_seeds": self.plan.n_seeds,
+            "first_seed": self.plan.first_seed,
+            "independent": self.plan.independent,
+            "n_runs": self.plan.n_runs,
+            "n_groups": len(self.package.missions),
+            "teams": self.team_names,
+            "dt": mission.dt,
+            "start": mission.start,
+            "end": mission.end,
+        }
+
+    def _about_mission(self) -> dict[str, Any]:
+        if self.loaded is None:
+            return {"made_in": "python"}
+        return {
+            "made_in": "file",
+            "file": self.loaded.path.name,
+            "settings": {k: str(v) for k, v in self.settings.items()},
+            "ends_by_time": self._ends_by_time,
+            "plugin_files": [f"{i}/{Path(file.path).name}" for i, file in enumerate(self.plugin_files)],
+            "options": {k: v for k, v in self._options.items() if k != "plugin_files"},
+        }
+
+    # -- playing ------------------------------------------------------------------------------------------------------------
+
+    def default_directory(self) -> Path:
+        """Where the batch goes unless told otherwise: the same for the same batch, so that the same command goes on with it."""
+        return Path("batches") / f"{self.name}-{self.fingerprint[:8]}"
+
+    def executor(
+        self, processes: int | None = None, stack: int | None = None, n_runs: int | None = None
+    ) -> Executor:
+        """Who plays best on this machine: this process where there is little to do, else one process per core."""
+        n_runs = self.plan.n_runs if n_runs is None else n_runs
+        pool = Processes(processes, stack)
+        if processes is None:
+            pool.n = max(1, min(pool.n, n_runs // FEW))
+        return InProcess(stack) if pool.n == 1 else pool
+
+    def play(
+        self,
+        directory: str | Path | None = None,
+        executor: Executor | None = None,
+        *,
+        until: str | Until | None = None,
+        command: Sequence[str] | None = None,
+        on_progress: Callable[[Progress], None] | None = None,
+    ) -> Results:
+        """Play all runs that are not finished yet.
+
+        Args:
+            directory: Batch directory, where finished runs are kept at once; None keeps all in memory.
+            executor: Who plays; by default all cores of this machine.
+            until: Stop when the interval of a result is narrow enough, such as "score[2]±0.5"; see `Until`.
+            command: What `batch.json` is to name as the command.
+            on_progress: Called after each finished run, and now and then.
+
+        Returns:
+            The results.
+
+        Raises:
+            BatchError: The directory holds another batch, or somebody else plays it.
+            RecordError: The directory cannot be written.
+        """
+        from tussle.batch.course import play_in_directory, play_in_memory
+
+        rule = _as_until(until)
+        if directory is None:
+            return play_in_memory(self, executor, rule, on_progress)
+        return play_in_directory(
+            self, Path(directory), executor, rule, list(command or sys.argv), on_progress
+        )
+
+
+def _as_until(until: str | Until | None) -> Until | None:
+    if isinstance(until, str):
+        from tussle.batch.until import Until
+
+        return Until.parse(until)
+    return until

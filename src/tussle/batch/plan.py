@@ -1,0 +1,86 @@
+"""Which runs a batch has: points × seeds, numbered so that more seeds only append."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+
+from tussle.errors import ParameterError
+
+MOST_RUNS = 10_000_000
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The runs of a batch.
+
+    Run r plays point r modulo the number of points. All points meet the same seeds (common random numbers), unless `independent`.
+
+    Attributes:
+        points: Values by name, of each point.
+        n_seeds: Games of each point.
+        first_seed: Seeds count up from here.
+        independent: Each run has a seed of its own.
+    """
+
+    points: Sequence[Mapping[str, Any]]
+    n_seeds: int
+    first_seed: int = 1
+    independent: bool = False
+
+    def __post_init__(self) -> None:
+        for name, least in (("n_seeds", 1), ("first_seed", 0)):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int) or value < least:
+                label = "runs" if name == "n_seeds" else name
+                raise ParameterError(
+                    f"{label} = {value!r} is not allowed; it takes a whole number >= {least}"
+                )
+        if not self.points:
+            raise ParameterError("a batch needs at least one point")
+        if self.n_runs > MOST_RUNS:
+            raise ParameterError(
+                f"{len(self.points):,} points with {self.n_seeds:,} seeds each are {self.n_runs:,} runs; allowed are {MOST_RUNS:,}"
+            )
+
+    @property
+    def n_points(self) -> int:
+        return len(self.points)
+
+    @property
+    def n_runs(self) -> int:
+        return self.n_points * self.n_seeds
+
+    def point(self, run: int) -> int:
+        """Point that a run plays."""
+        return run % self.n_points
+
+    def seed(self, run: int) -> int:
+        """Seed of a run."""
+        return (self.first_seed + (run if self.independent else run // self.n_points)) % 2**64
+
+    def table(self) -> pa.Table:
+        """One row per run: run, point, seed, and each varied value."""
+        run = np.arange(self.n_runs, dtype=np.int64)
+        point = (run % self.n_points).astype(np.int32)
+        step = run if self.independent else run // self.n_points
+        seed = (np.uint64(self.first_seed % 2**64) + step.astype(np.uint64)).astype(np.uint64)
+        columns: dict[str, Any] = {"run": run, "point": point, "seed": seed}
+        names = list(dict.fromkeys(name for p in self.points for name in p))
+        for name in names:
+            columns[name] = _column([p.get(name) for p in self.points]).take(pa.array(point))
+        return pa.table(columns)
+
+
+def _column(values: list[Any]) -> pa.Array:
+    """Whole numbers, real numbers, or else texts."""
+    numbers = [v for v in values if v is not None]
+    if all(isinstance(v, int) and not isinstance(v, bool) for v in numbers):
+        return pa.array(values, pa.int64())
+    if all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in numbers):
+        return pa.array([None if v is None else float(v) for v in values], pa.float64())
+    return pa.array([None if v is None else str(v) for v in values], pa.string())

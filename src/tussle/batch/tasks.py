@@ -1,0 +1,132 @@
+"""What a batch hands to those who play it, and what they give back; all of it pickles."""
+
+from __future__ import annotations
+
+import hashlib
+import pickle
+import sys
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tussle.mission import load_plugin_file
+from tussle.mission.catalogue import module_of_plugin_file
+
+if TYPE_CHECKING:
+    from tussle.mission import Mission
+
+
+@dataclass(frozen=True)
+class Run:
+    """One game of a batch.
+
+    Attributes:
+        number: Its place in the design.
+        group: Which of the package's missions it plays.
+        seed: Its seed.
+        params: What differs from that mission, by path, SI.
+        is_alone: It is to be played in a process of its own beside no other, since one that played it has died.
+    """
+
+    number: int
+    group: int
+    seed: int
+    params: Mapping[str, Any] = field(default_factory=dict)
+    is_alone: bool = False
+
+
+@dataclass(frozen=True)
+class Finished:
+    """What came of a run.
+
+    Attributes:
+        number: The run.
+        end: Why it ended; "error" where something failed.
+        t: Time at the end [s].
+        steps: Steps made.
+        winner: Team with the highest score; None for a tie, without scores, and where it failed.
+        state_hash: Hash of the state at the end.
+        error: What failed, "" for nothing.
+        cpu_s: CPU time of its share of the stack [s].
+        host: Machine that played it.
+        metrics: (team or None, name, value).
+        alive: (team, t [s], entities): how many there are whenever that changes, from the start to the end.
+    """
+
+    number: int
+    end: str
+    t: float
+    steps: int
+    winner: int | None
+    state_hash: str
+    error: str
+    cpu_s: float
+    host: str
+    metrics: list[tuple[int | None, str, float]]
+    alive: list[tuple[int, float, int]]
+
+
+@dataclass(frozen=True)
+class Beat:
+    """Sign of life of a stack.
+
+    Attributes:
+        under_way: Sum over the runs under way of the part of the longest game that each has played, 0 to 1 each.
+    """
+
+    under_way: float
+
+
+@dataclass(frozen=True)
+class PluginFile:
+    """A Python file with plugins, as it was when the batch was made."""
+
+    path: str
+    module: str
+    text: str
+
+    @staticmethod
+    def of(path: Path) -> PluginFile:
+        """The file as it is now; its plugins are loaded.
+
+        Raises:
+            MissionError: It cannot be read or imported.
+        """
+        load_plugin_file(path)
+        return PluginFile(
+            str(path), module_of_plugin_file(path), path.expanduser().read_text(encoding="utf-8")
+        )
+
+    def load(self) -> None:
+        """Have the module here under the name that pickles use, whether or not the file is on this machine."""
+        if self.module in sys.modules:
+            return
+        path = Path(self.path).expanduser()
+        if not path.is_file() or path.read_text(encoding="utf-8") != self.text:
+            digest = hashlib.blake2b(self.text.encode(), digest_size=8).hexdigest()
+            folder = Path(tempfile.mkdtemp(prefix=f"tussle-{digest}-"))
+            path = folder / path.name
+            path.write_text(self.text, encoding="utf-8")
+        load_plugin_file(path, self.module)
+
+
+@dataclass(frozen=True)
+class Package:
+    """The missions of a batch and the plugin files that they need.
+
+    Attributes:
+        missions: One per group, pickled: classes of plugin files can be found only once these are loaded.
+        plugin_files: The files.
+    """
+
+    missions: tuple[bytes, ...]
+    plugin_files: tuple[PluginFile, ...] = ()
+
+    def mission(self, group: int) -> Mission:
+        """The mission of a group."""
+        for file in self.plugin_files:
+            file.load()
+        mission: Mission = pickle.loads(self.missions[group])  # noqa: S301 - made by the process that asks for it to be played
+        return mission

@@ -1,0 +1,228 @@
+"""From points to missions, and from missions to groups whose worlds can share a stack."""
+
+from __future__ import annotations
+
+import dataclasses
+import pickle
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tussle.batch.tasks import Package, PluginFile
+from tussle.engine.params import BLOCK_VALUES
+from tussle.errors import MissionError, ParameterError, TussleError, listed, nearest_name
+from tussle.mission import Block, Mission, read_mission
+
+Point = Mapping[str, Any]
+Signature = tuple[Any, ...]
+
+
+@dataclass(frozen=True)
+class Treatment:
+    """How a point is played: in which group, with which values besides the group's mission."""
+
+    group: int
+    params: dict[str, Any]
+
+
+def read_points(
+    source: str | Path, settings: Mapping[str, str], texts: Sequence[Mapping[str, str]], **options: Any
+) -> Iterator[Mission]:
+    """The mission file once for each point.
+
+    Args:
+        source: The file.
+        settings: What is set in all points.
+        texts: What each point sets.
+        options: As for `read_mission`.
+
+    Raises:
+        MissionError: A point cannot be played; the message names it.
+    """
+    for number, text in enumerate(texts):
+        try:
+            yield read_mission(source, {**settings, **text}, **options).mission
+        except TussleError as error:
+            values = ", ".join(f"{k}={v}" for k, v in text.items())
+            where = f"point {number} ({values}): " if text else ""
+            raise type(error)(f"{where}{error}") from None
+
+
+def build_points(
+    source: Mission | Callable[..., Mission], settings: Mapping[str, Any], points: Sequence[Point]
+) -> Iterator[Mission]:
+    """A mission made in Python once for each point.
+
+    Args:
+        source: The mission, whose values are set by path, or a function of all values that makes it.
+        settings: What is set in all points.
+        points: What each point sets.
+
+    Raises:
+        ParameterError: A path leads nowhere, or a value is not allowed.
+        MissionError: A function gives no mission.
+    """
+    for point in points:
+        values = {**settings, **point}
+        if isinstance(source, Mission):
+            mission = source
+            for path, value in values.items():
+                mission = with_value(mission, path, value)
+        else:
+            mission = source(**values)
+            if not isinstance(mission, Mission):
+                raise MissionError(f"{source!r} gave {mission!r} for {values}; it is to give a Mission")
+        yield mission
+
+
+def with_value(mission: Mission, path: str, value: Any) -> Mission:
+    """A mission with one value changed, by a path such as "prey.count", "prey.Boids.gain", "SimpleCapture.capture_range", "run.dt".
+
+    Raises:
+        ParameterError: The path leads nowhere, or the value is not allowed.
+    """
+    head, *rest = path.split(".")
+    blocks = {b.name: b for b in mission.blocks}
+    if head == "run" and len(rest) == 1:
+        return mission.replace(**{rest[0]: value})
+    if head in blocks and len(rest) == 1:
+        changed = blocks[head].replace(**{rest[0]: value})
+    elif head in blocks and rest:
+        changed = _block_with(blocks[head], path, rest, value)
+    elif len(rest) == 1:
+        for kind in ("interactions", "metrics", "networks"):
+            plugins = getattr(mission, kind)
+            if head in [p.instance_name for p in plugins]:
+                return mission.replace(**{kind: _plugins_with(plugins, path, [head, *rest], value)})
+        raise _unknown(path, head, mission)
+    else:
+        raise _unknown(path, head, mission)
+    return mission.replace(blocks=[changed if b.name == head else b for b in mission.blocks])
+
+
+def _unknown(path: str, head: str, mission: Mission) -> ParameterError:
+    known = ["run", *(b.name for b in mission.blocks), *(p.instance_name for p in mission.world_plugins)]
+    return ParameterError(
+        f"{path!r} leads nowhere: there is no block or world plugin {head!r}{nearest_name(head, known)}; {listed(known)}"
+    )
+
+
+def _block_with(block: Block, path: str, names: Sequence[str], value: Any) -> Block:
+    for kind in ("autonomy", "controller", "sensor"):
+        plugins = getattr(block, kind)
+        if names[0] in [p.instance_name for p in plugins]:
+            return block.replace(**{kind: _plugins_with(plugins, path, names, value)})
+    if names[0] == block.motion.instance_name:
+        return block.replace(motion=_plugins_with([block.motion], path, names, value)[0])
+    known = [p.instance_name for p in block.plugins]
+    raise ParameterError(
+        f"{path!r}: {block.name} has no plugin {names[0]!r}{nearest_name(names[0], known)}; {listed(known)}"
+    )
+
+
+def _plugins_with(plugins: Sequence[Any], path: str, names: Sequence[str], value: Any) -> list[Any]:
+    """The plugins with a value changed in the one that the first name means, or in one of its children."""
+    known = [p.instance_name for p in plugins]
+    if names[0] not in known:
+        raise ParameterError(
+            f"{path!r}: there is no plugin {names[0]!r}{nearest_name(names[0], known)}; {listed(known)}"
+        )
+    changed = list(plugins)
+    place = known.index(names[0])
+    plugin = changed[place]
+    if len(names) == 2:
+        try:
+            changed[place] = plugin.replace(**{names[1]: value})
+        except ParameterError as error:
+            raise ParameterError(f"{path!r}: {error}") from None
+        return changed
+    for key in type(plugin).children():
+        inner = plugin.values[key]
+        if names[1] in [p.instance_name for p in inner]:
+            changed[place] = plugin.replace(**{key: _plugins_with(inner, path, names[1:], value)})
+            return changed
+    raise ParameterError(f"{path!r}: {names[0]} has no plugin {names[1]!r}")
+
+
+# -- groups ---------------------------------------------------------------------------------------------------------------
+
+
+def group_points(
+    missions: Sequence[Mission], plugin_files: Sequence[PluginFile] = ()
+) -> tuple[list[Treatment], Package]:
+    """Which points can share a stack, and what differs among those that do.
+
+    Values that are numbers of one world (parameters of plugins, speeds of blocks) may differ within a stack; what changes structure
+    (counts, the choice of plugins, times, text) may not.
+
+    Args:
+        missions: The mission of each point.
+        plugin_files: What their plugins come from.
+
+    Returns:
+        The treatment of each point, and what those who play need.
+    """
+    groups: dict[Signature, list[int]] = {}
+    values = []
+    for number, mission in enumerate(missions):
+        signature, own = split(mission)
+        groups.setdefault(signature, []).append(number)
+        values.append(own)
+    treatments: list[Treatment | None] = [None] * len(missions)
+    for group, numbers in enumerate(groups.values()):
+        first = values[numbers[0]]
+        differing = [path for path in first if any(values[n][path] != first[path] for n in numbers)]
+        for n in numbers:
+            treatments[n] = Treatment(group, {path: values[n][path] for path in differing})
+    bases = [missions[numbers[0]] for numbers in groups.values()]
+    return [t for t in treatments if t is not None], Package(
+        tuple(pickle.dumps(m) for m in bases), tuple(plugin_files)
+    )
+
+
+def split(mission: Mission) -> tuple[Signature, dict[str, Any]]:
+    """What all worlds of a stack share, hashable, and by path what may differ from world to world."""
+    own: dict[str, Any] = {}
+    blocks = tuple(_split_block(block, own) for block in mission.blocks)
+    world = tuple(
+        tuple(_split_plugin(p, p.instance_name, own) for p in getattr(mission, kind))
+        for kind in ("interactions", "metrics", "networks")
+    )
+    fields = {f.name for f in dataclasses.fields(mission)} - {"blocks", "interactions", "metrics", "networks"}
+    # Not its repr, which leaves out the middle of long arrays.
+    rest = tuple((name, pickle.dumps(getattr(mission, name))) for name in sorted(fields))
+    return (blocks, world, rest), own
+
+
+def _split_block(block: Block, own: dict[str, Any]) -> Signature:
+    kinds = ("autonomy", "controller", "sensor")
+    for name in BLOCK_VALUES:
+        own[f"{block.name}.{name}"] = getattr(block, name)
+    plugins = tuple(
+        tuple(
+            _split_plugin(p, f"{block.name}.{p.instance_name}", own, is_of_block=True)
+            for p in getattr(block, kind)
+        )
+        for kind in kinds
+    )
+    motion = _split_plugin(block.motion, f"{block.name}.{block.motion.instance_name}", own, is_of_block=True)
+    fields = {f.name for f in dataclasses.fields(block)} - {*kinds, "motion", *BLOCK_VALUES}
+    rest = tuple((name, repr(getattr(block, name))) for name in sorted(fields))
+    return (plugins, motion, rest)
+
+
+def _split_plugin(plugin: Any, path: str, own: dict[str, Any], is_of_block: bool = False) -> Signature:
+    fixed = []
+    for name, column in type(plugin).params().items():
+        if column.is_row_data:
+            own[f"{path}.{name}"] = plugin.values[name]
+        else:
+            fixed.append((name, repr(plugin.values[name])))
+    # Children of world plugins take no values by world.
+    inner = [
+        (key, _split_plugin(c, f"{path}.{c.instance_name}", own, True) if is_of_block else c)
+        for key in type(plugin).children()
+        for c in plugin.values[key]
+    ]
+    return (type(plugin), plugin.instance_name, plugin.rate, tuple(fixed), tuple(inner))

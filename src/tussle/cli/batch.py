@@ -1,0 +1,275 @@
+"""`tussle batch`: many games, played, kept, and counted."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Sequence
+from contextlib import AbstractContextManager, ExitStack, nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+from rich.console import Group
+from rich.live import Live
+from rich.progress import BarColumn, Progress, TextColumn
+from rich.text import Text
+
+from tussle.batch import store
+from tussle.batch.batch import Batch
+from tussle.batch.progress import Progress as BatchProgress
+from tussle.batch.reload import planned_run
+from tussle.batch.statistics import running_result
+from tussle.batch.sweep_file import Sweep, read_sweep
+from tussle.batch.variables import parse_variable
+from tussle.cli.batch_summary import compare_hash, show_batch
+from tussle.cli.interrupt import Interrupt
+from tussle.cli.play import FOR_VIEWER, Source, simulate
+from tussle.cli.progress import BAR_EVERY, LINE_EVERY, clock, compiling, times
+from tussle.cli.settings import read_end
+from tussle.cli.terminal import err, say, say_note
+from tussle.errors import ParameterError
+from tussle.record import Recorder
+
+if TYPE_CHECKING:
+    from tussle.batch.executors import Executor
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What the command line says of a batch; None where it says nothing.
+
+    Attributes:
+        source: The mission and what is set in it.
+        runs: Games of each point.
+        vary: Texts of `--vary`.
+        sweep: A sweep file.
+        sample: How points are chosen.
+        samples: How many points.
+        sample_seed: Seed of the sampling.
+        independent: Each game has a seed of its own.
+        until: When it is enough.
+        directory: Where it goes.
+        processes: How many.
+        stack: Worlds side by side.
+        scheduler: Address of a Dask scheduler.
+        slurm: What to ask of Slurm.
+        log: Runs that are recorded in full.
+    """
+
+    source: Source
+    runs: int | None = None
+    vary: Sequence[str] = ()
+    sweep: Path | None = None
+    sample: str | None = None
+    samples: int | None = None
+    sample_seed: int | None = None
+    independent: bool = False
+    until: str | None = None
+    directory: Path | None = None
+    processes: int | None = None
+    stack: int | None = None
+    scheduler: str | None = None
+    slurm: str | None = None
+    log: str | None = None
+
+    def batch(self) -> Batch:
+        """The batch that is meant; what the command line says comes before what the sweep file says.
+
+        Raises:
+            TussleError: Something in it is not allowed.
+        """
+        sweep = read_sweep(self.sweep) if self.sweep is not None else Sweep(())
+        own = [parse_variable(text) for text in self.vary]
+        if sweep.points is not None and own:
+            raise ParameterError(f"{self.sweep} lists its points, so --vary means nothing beside it")
+        names = [v.name for v in own]
+        end = {} if self.source.end is None else {"run.end": repr(read_end(self.source.end))}
+
+        def first(*values: Any) -> Any:
+            return next((v for v in values if v is not None), None)
+
+        batch = Batch(
+            self.source.mission,
+            runs=first(self.runs, sweep.n_seeds, 100_000 if self.until is not None else 100),
+            vary=[*(v for v in sweep.variables if v.name not in names), *own] if sweep.points is None else (),
+            points=sweep.points,
+            sample=first(self.sample, sweep.sample, ""),
+            samples=first(self.samples, sweep.n_samples),
+            sample_seed=first(self.sample_seed, sweep.sample_seed, 0),
+            first_seed=first(self.source.seed, sweep.first_seed, 1),
+            independent=self.independent,
+            settings={**self.source.settings, **end},
+            plugin_files=tuple(self.source.plugin_files),
+            ends_by_time=bool(end),
+            strict=self.source.strict,
+            allow_large=self.source.allow_large,
+        )
+        for note in batch.loaded.notes if batch.loaded is not None else ():
+            if FOR_VIEWER not in note:
+                say_note(note)
+        return batch
+
+    def executor(self, batch: Batch) -> AbstractContextManager[Executor | None]:
+        """Who plays."""
+        if self.scheduler is not None or self.slurm is not None:
+            from tussle.batch.cluster import executor_for
+
+            return executor_for(self.scheduler, self.slurm, self.stack)
+        if self.processes is None and self.stack is None:
+            return nullcontext()
+        return nullcontext(batch.executor(self.processes, self.stack))
+
+
+def play_batch(asked: Asked, command: Sequence[str]) -> int:
+    """Play a batch, or what is missing of it, and show what came of it.
+
+    Returns:
+        The exit code.
+    """
+    began = time.perf_counter()
+    batch = asked.batch()
+    logged = _numbers(asked.log, batch.plan.n_runs)
+    directory = asked.directory or batch.default_directory()
+    with ExitStack() as stack:
+        with compiling():
+            batch.check()
+        executor = stack.enter_context(asked.executor(batch))
+        interrupt = stack.enter_context(Interrupt())
+        meter = stack.enter_context(BatchMeter(batch, interrupt))
+        try:
+            results = batch.play(
+                directory, executor, until=asked.until, command=command, on_progress=meter.show
+            )
+        except Interrupted:
+            say(
+                "interrupted",
+                f"finished runs are kept in {directory}; the same command goes on",
+                "bold yellow",
+            )
+            return interrupt.code
+    if meter.n_before:
+        say_note(f"{meter.n_before:,} of {results.n_runs:,} runs were there already, in {directory}")
+    for number in logged:
+        record_run(directory, number)
+    return show_batch(results, directory, time.perf_counter() - began, results.n_runs - meter.n_before)
+
+
+def _numbers(text: str | None, n_runs: int) -> list[int]:
+    """Runs that `--log` names: "417,3,10:20", the last of a range included.
+
+    Raises:
+        ParameterError: It is written otherwise, or the batch has no such run.
+    """
+    found: list[int] = []
+    for part in (text or "").split(",") if text is not None else ():
+        low, colon, high = (item.strip() for item in part.partition(":"))
+        if not low.isdigit() or (colon and not high.isdigit()):
+            raise ParameterError(
+                f"--log {text!r} is not allowed; it takes numbers of runs, such as 417,3,10:20"
+            )
+        first, last = int(low), int(high or low)
+        if not first <= last < n_runs:
+            raise ParameterError(
+                f"--log {part.strip()!r} is not allowed; the batch has runs 0 to {n_runs - 1}"
+            )
+        found += range(first, last + 1)
+    return list(dict.fromkeys(found))
+
+
+def record_run(directory: Path, number: int) -> None:
+    """Play a run again and record all of it, unless that has been done.
+
+    Raises:
+        BatchError: It came out otherwise than in the batch.
+    """
+    target = directory / store.RUNS / f"{number:06d}"
+    if (target / "run.json").exists():
+        return
+    shutil.rmtree(target, ignore_errors=True)  # cut short
+    run = planned_run(directory, number)
+    with simulate(run.loaded, run.mission, run.seed) as simulation:
+        with Recorder(simulation, target, mission_text=run.loaded.text, parameters=run.settings):
+            simulation.run()
+        compare_hash(run, simulation.result()[0].state_hash, number)
+
+
+class Interrupted(Exception):  # noqa: N818 - it is no error
+    """The user wants the batch to stop."""
+
+
+class BatchMeter:
+    """Shows how far a batch is: a bar and the result so far on a terminal, a line now and then elsewhere.
+
+    Args:
+        batch: What is played.
+        interrupt: Where Ctrl-C is heard.
+
+    Attributes:
+        n_before: Runs that were there before.
+    """
+
+    def __init__(self, batch: Batch, interrupt: Interrupt) -> None:
+        self.n_before = 0
+        self._names = batch.team_names
+        self._interrupt = interrupt
+        self._began = time.perf_counter()
+        self._is_bar = err().is_terminal
+        self._due = self._began + (0.0 if self._is_bar else LINE_EVERY)
+        self._bar = Progress(
+            TextColumn("{task.description}", style="bold"),
+            BarColumn(bar_width=None, complete_style="cyan", finished_style="cyan", pulse_style="cyan"),
+            TextColumn("{task.fields[at]}"),
+            TextColumn("{task.fields[rate]}", style="cyan"),
+            TextColumn("{task.fields[left]}", style="dim"),
+            auto_refresh=False, expand=True,
+        )  # fmt: skip
+        self._task = self._bar.add_task(batch.name, total=batch.plan.n_runs, at="", rate="", left="")
+        self._live = Live(self._bar, console=err(), auto_refresh=False, transient=True)
+
+    def __enter__(self) -> Self:
+        if self._is_bar:
+            self._live.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._is_bar:
+            self._live.stop()
+
+    def show(self, progress: BatchProgress) -> None:
+        """The batch has come so far.
+
+        Raises:
+            Interrupted: The user has asked for an end.
+        """
+        self.n_before = progress.n_before
+        if self._interrupt.code:
+            raise Interrupted
+        now = time.perf_counter()
+        if now < self._due:
+            return
+        self._due = now + (BAR_EVERY if self._is_bar else LINE_EVERY)
+        played = progress.n_done - progress.n_before + progress.under_way
+        rate = played / max(now - self._began, 1e-9)
+        left = (progress.n_runs - progress.n_done - progress.under_way) / rate if rate > 0.0 else None
+        fields: dict[str, Any] = {
+            "at": f"{progress.n_done:,}/{progress.n_runs:,} runs",
+            "rate": f"{times(rate)} runs/s",
+            "left": "" if left is None else f"{clock(max(0.0, left))} left",
+        }
+        result = self._result(progress)
+        if self._is_bar:
+            self._bar.update(
+                self._task, total=progress.n_runs, completed=progress.n_done + progress.under_way, **fields
+            )
+            self._live.update(Group(self._bar, Text(result, style="dim")), refresh=True)
+        else:
+            err().print(", ".join(text for text in [*fields.values(), result] if text), soft_wrap=True)
+
+    def _result(self, progress: BatchProgress) -> str:
+        wins = {
+            self._names.get(team, f"team {team}"): n
+            for team, n in sorted((t, n) for t, n in progress.wins.items() if t is not None)
+        }
+        text = running_result(wins, sum(progress.wins.values()))
+        return f"{text}, {progress.n_failed} failed" if progress.n_failed else text
