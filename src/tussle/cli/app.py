@@ -31,6 +31,56 @@ app = typer.Typer(
 )  # fmt: skip
 
 
+MissionOrNone = Annotated[
+    str | None,
+    typer.Argument(
+        metavar="MISSION",
+        help="A mission file, or the name of one that ships (tussle missions).",
+        show_default=False,
+    ),
+]
+FromRun = Annotated[
+    str | None,
+    typer.Option(
+        "--from",
+        metavar="BATCH:RUN",
+        help="Play a run of a batch again, instead of a mission.",
+        show_default=False,
+    ),
+]
+RunDirectory = Annotated[
+    Path | None,
+    typer.Option(
+        "--out",
+        metavar="DIR",
+        help="The run directory; by default runs/NAME-SEED-TIMESTAMP.",
+        show_default=False,
+    ),
+]
+LogPeriod = Annotated[
+    float | None,
+    typer.Option(
+        metavar="S", help="Time between recorded states [s]; by default every step.", show_default=False
+    ),
+]
+Pace = Annotated[
+    float | None,
+    typer.Option(
+        metavar="X",
+        help="Play no faster than X times real time. The result is the same.",
+        show_default=False,
+    ),
+]
+StartFrom = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="TABLE",
+        help="Take ids, times of birth and first states from a recorded trajectory.",
+        show_default=False,
+    ),
+]
+
+
 def _version(is_asked: bool) -> None:
     if is_asked:
         out().print(f"tussle {tussle.__version__}")
@@ -48,59 +98,17 @@ def _options(
 
 @app.command(epilog=EPILOG)
 def run(
-    mission: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="MISSION",
-            help="A mission file, or the name of one that ships (tussle missions).",
-            show_default=False,
-        ),
-    ] = None,
+    mission: MissionOrNone = None,
     more: More = None,
-    from_batch: Annotated[
-        str | None,
-        typer.Option(
-            "--from",
-            metavar="BATCH:RUN",
-            help="Play a run of a batch again, instead of a mission.",
-            show_default=False,
-        ),
-    ] = None,
+    from_batch: FromRun = None,
     seed: Seed = None,
     settings: Set = None,
     end: End = None,
-    directory: Annotated[
-        Path | None,
-        typer.Option(
-            "--out",
-            metavar="DIR",
-            help="The run directory; by default runs/NAME-SEED-TIMESTAMP.",
-            show_default=False,
-        ),
-    ] = None,
+    directory: RunDirectory = None,
     no_log: Annotated[bool, typer.Option("--no-log", help="Record nothing.")] = False,
-    log_period: Annotated[
-        float | None,
-        typer.Option(
-            metavar="S", help="Time between recorded states [s]; by default every step.", show_default=False
-        ),
-    ] = None,
-    pace: Annotated[
-        float | None,
-        typer.Option(
-            metavar="X",
-            help="Play no faster than X times real time. The result is the same.",
-            show_default=False,
-        ),
-    ] = None,
-    start_from: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="TABLE",
-            help="Take ids, times of birth and first states from a recorded trajectory.",
-            show_default=False,
-        ),
-    ] = None,
+    log_period: LogPeriod = None,
+    pace: Pace = None,
+    start_from: StartFrom = None,
     strict: Strict = False,
     plugin_files: PluginFiles = None,
     allow_large: Large = False,

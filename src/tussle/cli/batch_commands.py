@@ -70,75 +70,87 @@ Stack = Annotated[
 ]
 
 
+SweepFile = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help="A sweep file (TOML) or ranges file (XML) with what varies.",
+        show_default=False,
+    ),
+]
+Sample = Annotated[
+    str | None,
+    typer.Option(
+        metavar="METHOD",
+        help="How points are chosen: lhs, sobol, saltelli, grid, list, product.",
+        show_default=False,
+    ),
+]
+Samples = Annotated[
+    int | None,
+    typer.Option(metavar="N", min=1, help="How many points are drawn.", show_default=False),
+]
+SampleSeed = Annotated[
+    int | None,
+    typer.Option(metavar="N", min=0, help="Seed of the drawing; 0 by default.", show_default=False),
+]
+Independent = Annotated[
+    bool,
+    typer.Option(
+        "--independent", help="Each game has a seed of its own, instead of the same seeds at all points."
+    ),
+]
+UntilWidth = Annotated[
+    str | None,
+    typer.Option(
+        metavar="±WIDTH",
+        help="Stop when a result is known well enough: ±0.02 (wins of each team), 'score[2]±0.5'.",
+        show_default=False,
+    ),
+]
+BatchDirectory = Annotated[
+    Path | None,
+    typer.Option(
+        "--out",
+        metavar="DIR",
+        help="The batch directory; by default batches/NAME-HASH, the same for the same batch. What is there is not played again.",
+        show_default=False,
+    ),
+]
+LogRuns = Annotated[
+    str | None,
+    typer.Option(metavar="RUNS", help="Record these runs in full: 417,3,10:20.", show_default=False),
+]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(metavar="ADDRESS", help="Play on a Dask cluster: tcp://HOST:8786.", show_default=False),
+]
+Slurm = Annotated[
+    str | None,
+    typer.Option(metavar="N[,OPTION=VALUE...]", help="Play in N Slurm jobs.", show_default=False),
+]
+
+
 def batch(
     mission: MissionName,
     more: More = None,
     runs: Runs = None,
     vary: Vary = None,
-    sweep: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="A sweep file (TOML) or ranges file (XML) with what varies.",
-            show_default=False,
-        ),
-    ] = None,
-    sample: Annotated[
-        str | None,
-        typer.Option(
-            metavar="METHOD",
-            help="How points are chosen: lhs, sobol, saltelli, grid, list, product.",
-            show_default=False,
-        ),
-    ] = None,
-    samples: Annotated[
-        int | None,
-        typer.Option(metavar="N", min=1, help="How many points are drawn.", show_default=False),
-    ] = None,
-    sample_seed: Annotated[
-        int | None,
-        typer.Option(metavar="N", min=0, help="Seed of the drawing; 0 by default.", show_default=False),
-    ] = None,
+    sweep: SweepFile = None,
+    sample: Sample = None,
+    samples: Samples = None,
+    sample_seed: SampleSeed = None,
     seed: FirstSeed = None,
-    independent: Annotated[
-        bool,
-        typer.Option(
-            "--independent", help="Each game has a seed of its own, instead of the same seeds at all points."
-        ),
-    ] = False,
-    until: Annotated[
-        str | None,
-        typer.Option(
-            metavar="±WIDTH",
-            help="Stop when a result is known well enough: ±0.02 (wins of each team), 'score[2]±0.5'.",
-            show_default=False,
-        ),
-    ] = None,
+    independent: Independent = False,
+    until: UntilWidth = None,
     settings: Set = None,
     end: End = None,
-    directory: Annotated[
-        Path | None,
-        typer.Option(
-            "--out",
-            metavar="DIR",
-            help="The batch directory; by default batches/NAME-HASH, the same for the same batch. What is there is not played again.",
-            show_default=False,
-        ),
-    ] = None,
-    log: Annotated[
-        str | None,
-        typer.Option(metavar="RUNS", help="Record these runs in full: 417,3,10:20.", show_default=False),
-    ] = None,
+    directory: BatchDirectory = None,
+    log: LogRuns = None,
     processes: Workers = None,
     stack: Stack = None,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(metavar="ADDRESS", help="Play on a Dask cluster: tcp://HOST:8786.", show_default=False),
-    ] = None,
-    slurm: Annotated[
-        str | None,
-        typer.Option(metavar="N[,OPTION=VALUE...]", help="Play in N Slurm jobs.", show_default=False),
-    ] = None,
+    scheduler: Scheduler = None,
+    slurm: Slurm = None,
     strict: Strict = False,
     plugin_files: PluginFiles = None,
     allow_large: Large = False,
