@@ -77,6 +77,7 @@ class Analysis:
         n_points: Points.
         n_seeds: Games of each point.
         first_seed: Of them.
+        paired_by: What the runs of a comparison's pair have in common: their seed, or only their order.
         stopped_by: Rule that ended the batch before its last run; None for none.
         variables: What was varied.
         quantities: What is looked at.
@@ -98,6 +99,7 @@ class Analysis:
     n_points: int
     n_seeds: int
     first_seed: int
+    paired_by: str
     stopped_by: str | None
     variables: list[Variable]
     quantities: list[str]
@@ -151,6 +153,7 @@ def analyse(
         n_points=len(results.points),
         n_seeds=int(info["n_seeds"]),
         first_seed=int(info["first_seed"]),
+        paired_by="order" if info["independent"] else "seed",
         stopped_by=info.get("stopped_by"),
         variables=results.variables,
         quantities=chosen,

@@ -16,7 +16,7 @@ import pyarrow.compute as pc
 
 from tussle.batch import run_table
 from tussle.batch.quantities import Quantity, column_name
-from tussle.batch.selection import known_point, paired_points, select_points, written
+from tussle.batch.selection import is_number, known_point, paired_points, select_points, written
 from tussle.batch.sensitivity import Effect, effects, rank_effects
 from tussle.batch.statistics import (
     BLOCKS_FROM,
@@ -251,7 +251,7 @@ class Results:
         return [name for name in [*names, "t"] if name in self._columns]
 
     def compare(self, expression: str, a: int | str, b: int | str) -> Comparison:
-        """What b has more than a, in pairs of runs with the same seed.
+        """What b has more than a, in pairs of runs with the same seed; of a batch with independent seeds, in their order.
 
         Args:
             expression: The quantity.
@@ -264,9 +264,11 @@ class Results:
         firsts, seconds = paired_points(self.variables, self.points, a, b)
         matrix = self.by_seed(expression)
         blocks = None
-        if len(firsts) > 1 and len(matrix) >= BLOCKS_FROM:
+        if len(firsts) > 1 and len(matrix) >= BLOCKS_FROM and not self.info["independent"]:
             blocks = np.repeat(np.arange(len(matrix)), len(firsts))
-        names = (a if isinstance(a, str) else self.label(a), b if isinstance(b, str) else self.label(b))
+        names = (str(a), str(b))
+        if is_number(a) or is_number(b):
+            names = (self.label(firsts[0]), self.label(seconds[0]))
         return paired_difference(
             expression, names, matrix[:, firsts].ravel(), matrix[:, seconds].ravel(), blocks
         )
@@ -372,7 +374,7 @@ class Results:
 
     def _blocks(self, rows: np.ndarray, point: int | None) -> np.ndarray | None:
         """Block of each of these runs; None where they count as independent."""
-        if point is not None or len(self.points) == 1:
+        if point is not None or len(self.points) == 1 or self.info["independent"]:
             return None
         seeds = self._seed_index[rows]
         return seeds if len(np.unique(seeds)) >= BLOCKS_FROM else None

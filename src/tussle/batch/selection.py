@@ -20,7 +20,7 @@ def select_points(variables: Sequence[Variable], points: Points, text: str) -> l
     Raises:
         ParameterError: There is no such variable, or no such point.
     """
-    if text.strip().isdigit():
+    if is_number(text):
         return [known_point(points, int(text))]
     wanted = _values(variables, text)
     found = [i for i, point in enumerate(points) if all(_agree(point[v.name], said, v) for v, said in wanted)]
@@ -59,7 +59,7 @@ def paired_points(
     if a == b:
         raise ParameterError(f"{a!r} is compared with itself")
     chosen = [_points_of(variables, points, side) for side in (a, b)]
-    if len(chosen[0]) == len(chosen[1]) == 1:
+    if len(chosen[0]) == len(chosen[1]) == 1 and (is_number(a) or is_number(b)):
         return chosen[0], chosen[1]
     named = [_names_in(variables, side) for side in (a, b)]
     if named[0] != named[1]:
@@ -81,6 +81,11 @@ def paired_points(
     return firsts, seconds
 
 
+def is_number(side: int | str) -> bool:
+    """Whether a point is meant by its number."""
+    return not isinstance(side, str) or (side.strip().isascii() and side.strip().isdigit())
+
+
 def written(value: Any) -> str:
     """A value as it is shown: six digits of a real number."""
     return f"{value:.6g}" if isinstance(value, float) else str(value)
@@ -91,8 +96,9 @@ def _points_of(variables: Sequence[Variable], points: Points, side: int | str) -
 
 
 def _names_in(variables: Sequence[Variable], side: int | str) -> set[str]:
-    is_number = not isinstance(side, str) or side.strip().isdigit()
-    return {v.name for v in variables} if is_number else {v.name for v, _ in _values(variables, str(side))}
+    return {v.name for v in variables if is_number(side)} or {
+        v.name for v, _ in _values(variables, str(side))
+    }
 
 
 def _values(variables: Sequence[Variable], text: str) -> list[tuple[Variable, str]]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from importlib import import_module
 from statistics import NormalDist
 from typing import Any
 
@@ -166,7 +165,8 @@ def _by_saltelli(found: list[Effect], y: np.ndarray) -> list[Effect]:
     if len(whole) < 2 or np.ptp(whole) == 0.0:
         return [replace(e, note=f"{e.note}; no indices: the quantity does not vary") for e in found]
     problem = {"num_vars": k, "names": [e.variable for e in found], "bounds": [[0.0, 1.0]] * k}
-    indices = _salib("sobol").analyze(
+    sobol, _ = _salib()
+    indices = sobol.analyze(
         problem, whole.ravel(), calc_second_order=False, num_resamples=N_RESAMPLES, seed=SEED
     )
     done = []
@@ -258,9 +258,8 @@ def _rbd_fast(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
     if np.ptp(x) == 0.0:
         return 0.0, 0.0
     problem = {"num_vars": 1, "names": ["x"], "bounds": [[0.0, 1.0]]}
-    found = _salib("rbd_fast").analyze(
-        problem, x[:, None], y, M=N_HARMONICS, num_resamples=N_RESAMPLES, seed=SEED
-    )
+    _, rbd_fast = _salib()
+    found = rbd_fast.analyze(problem, x[:, None], y, M=N_HARMONICS, num_resamples=N_RESAMPLES, seed=SEED)
     return float(found["S1"][0]), float(found["S1_conf"][0])
 
 
@@ -286,10 +285,16 @@ def _epsilon_squared(level: np.ndarray, y: np.ndarray, n_levels: int) -> float:
     return (between - (n_levels - 1) * (whole - between) / (n - n_levels)) / whole
 
 
-def _salib(name: str) -> Any:
+def _salib() -> tuple[Any, Any]:
+    """SALib's modules `sobol` and `rbd_fast`.
+
+    Raises:
+        MissingExtraError: It is not installed.
+    """
     try:
-        return import_module(f"SALib.analyze.{name}")
+        from SALib.analyze import rbd_fast, sobol
     except ImportError as error:
         raise MissingExtraError(
             f"parts of the variance need SALib, which is not installed: pip install 'tussle[batch]' ({error})"
         ) from None
+    return sobol, rbd_fast

@@ -28,6 +28,8 @@ NUMBERS_AT_ONCE = 4_000_000
 """Most numbers that the bootstrap holds at a time, 32 MB."""
 BLOCKS_FROM = BOOTSTRAP_FROM
 """So many seeds must there be for the runs of a seed, over all points, to count as one block."""
+ROUNDING = 1e-12
+"""Values that differ by less of their size are equal: differences of equal effects, say, that were rounded apart."""
 SEED = 20180101
 
 
@@ -241,7 +243,7 @@ def mean_intervals(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     if n < 2:
         return np.full(k, np.nan), np.full(k, np.nan)
     low, high = _by_t(rows)
-    varies = np.ptp(rows, axis=1) > 0.0
+    varies = np.ptp(rows, axis=1) > ROUNDING * np.abs(rows).max(axis=1)
     if BOOTSTRAP_FROM <= n <= BOOTSTRAP_UP_TO and varies.any():
         low[varies], high[varies] = _by_bootstrap(rows[varies])
     return low, high

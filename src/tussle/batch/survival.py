@@ -62,7 +62,7 @@ def survival_of(
     mean = total / n
     half = np.full(len(times), np.nan)
     if n > 1:
-        variance = (n * squares - total**2) / (n * (n - 1.0))
+        variance = np.maximum(squares / n - mean**2, 0.0) * n / (n - 1.0)
         half = NormalDist().inv_cdf(0.975) * np.sqrt(variance / n)
     return Survival(label, team, times, mean, np.maximum(mean - half, 0.0), mean + half, n)
 

@@ -1,0 +1,228 @@
+"""Shares, means and differences with their intervals."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import binomtest, bootstrap
+
+from tussle.batch import statistics
+from tussle.batch.statistics import (
+    block_values,
+    effective_size,
+    mean_interval,
+    mean_of,
+    means_of,
+    paired_difference,
+    running_result,
+    share_of,
+    sign_test,
+    wilson,
+)
+
+# -- shares ---------------------------------------------------------------------------------------------------------------
+
+
+@given(
+    st.integers(1, 5000).flatmap(lambda n: st.tuples(st.integers(0, n), st.just(n))),
+    st.sampled_from([0.9, 0.95, 0.99]),
+)
+def test_wilson_is_that_of_scipy(counts, level):
+    k, n = counts
+    expected = binomtest(k, n).proportion_ci(level, method="wilson")
+    assert wilson(k, n, level) == pytest.approx((expected.low, expected.high), abs=1e-12)
+
+
+def test_nothing_is_known_of_no_runs():
+    assert all(math.isnan(end) for end in wilson(0, 0))
+    share = share_of("keepers", 2, np.array([np.nan]))
+    assert (share.n, share.of) == (0, 0)
+    assert all(math.isnan(number) for number in (share.value, share.low, share.high))
+
+
+def test_a_share_leaves_out_what_failed():
+    share = share_of("keepers", 2, np.array([1.0, np.nan, 0.0, 1.0, 1.0]))
+    assert (share.n, share.of, share.value) == (3, 4, 0.75)
+    assert (share.low, share.high) == wilson(3, 4)
+
+
+def test_independent_runs_are_worth_themselves_and_equal_ones_one():
+    rng = np.random.default_rng(2)
+    seeds = np.repeat(np.arange(200), 10)
+    same = np.repeat(rng.random(200) < 0.4, 10).astype(
+        float
+    )  # whoever wins with a seed wins at all ten points
+    assert effective_size(same, None) == 2000.0
+    assert effective_size(same, seeds) == pytest.approx(200.0, rel=0.02)
+    apart = (rng.random(2000) < 0.4).astype(float)
+    assert 1500.0 < effective_size(apart, seeds) <= 2000.0
+    assert effective_size(np.ones(2000), seeds) == 2000.0
+
+
+def test_the_running_result_is_one_line():
+    wins = {"prey": 0, "keepers": 598, "switchers": 359}
+    assert running_result(wins, 1000) == "keepers 59.8 % ±3.0, switchers 35.9 % ±3.0, ties 4.3 %"
+    assert running_result({"keepers": 3}, 3).startswith("keepers 100.0 % ±")
+    assert running_result({"keepers": 0}, 5) == "ties 100.0 %"
+    assert running_result({}, 5) == running_result({"keepers": 0}, 0) == ""
+
+
+def test_the_running_result_and_the_rule_to_stop_need_no_scipy():
+    script = (
+        "import sys, numpy as np; from tussle.batch.statistics import running_result; from tussle.batch.until import Until;"
+        "running_result({'a': 3}, 9); Until.parse('±0.1').is_met([{'wins[1]': np.zeros(50)}]);"
+        "assert not [m for m in sys.modules if m.startswith(('scipy', 'matplotlib', 'SALib'))]"
+    )
+    subprocess.run([sys.executable, "-c", script], check=True)
+
+
+# -- means ----------------------------------------------------------------------------------------------------------------
+
+
+def test_a_mean_has_the_bca_interval_of_scipy():
+    values = np.random.default_rng(3).exponential(size=60)
+    expected = bootstrap(
+        (values,),
+        np.mean,
+        n_resamples=statistics.N_RESAMPLES,
+        rng=np.random.default_rng(statistics.SEED),
+        method="BCa",
+    ).confidence_interval
+    assert mean_interval(values) == pytest.approx((expected.low, expected.high), rel=1e-12)
+    low, high = mean_interval(values)
+    assert high - values.mean() > 1.1 * (values.mean() - low)  # skewed to the right, as the values are
+
+
+def test_few_values_have_students_interval_and_many_the_normal_one():
+    rng = np.random.default_rng(4)
+    few = rng.normal(5.0, 2.0, size=5)
+    half = 2.7764451 * few.std(ddof=1) / math.sqrt(5)  # t of 4 degrees of freedom, from a table
+    assert mean_interval(few) == pytest.approx((few.mean() - half, few.mean() + half), rel=1e-7)
+    many = rng.exponential(size=100_000)
+    began = time.perf_counter()
+    half = 1.959964 * many.std(ddof=1) / math.sqrt(100_000)
+    assert mean_interval(many) == pytest.approx((many.mean() - half, many.mean() + half), rel=1e-6)
+    assert time.perf_counter() - began < 1.0
+
+
+@pytest.mark.parametrize("n", [2, 19, 20, 500, 3000])
+def test_equal_values_leave_no_doubt(n):
+    mean = mean_of("t", np.full(n, 0.1))
+    assert (mean.n, mean.low, mean.high) == (n, mean.value, mean.value)
+    assert mean.value == pytest.approx(0.1)
+    assert mean.sd == pytest.approx(0.0, abs=1e-15)
+
+
+def test_one_value_has_no_interval_and_none_no_mean():
+    one = mean_of("t", np.array([np.nan, 3.0, np.inf]))
+    assert (one.n, one.value) == (1, 3.0)
+    assert all(math.isnan(number) for number in (one.low, one.high, one.sd))
+    none = mean_of("t", np.array([np.nan]))
+    assert none.n == 0
+    assert all(
+        math.isnan(number) for number in (none.value, none.low, none.high, none.sd, *none.quantiles.values())
+    )
+
+
+def test_quantiles_are_of_the_runs():
+    mean = mean_of("t", np.arange(101.0))
+    assert mean.quantiles == {0.05: 5.0, 0.25: 25.0, 0.5: 50.0, 0.75: 75.0, 0.95: 95.0}
+
+
+def test_all_points_at_once_give_what_each_gives_by_itself():
+    rng = np.random.default_rng(5)
+    rows = [rng.exponential(size=n) for n in (30, 7, 30, 1, 0, 30, 2500)]
+    rows[2][:3] = np.nan
+    for together, row in zip(means_of("t", rows), rows, strict=True):
+        alone = mean_of("t", row)
+        for name in ("n", "value", "low", "high", "sd"):
+            assert getattr(together, name) == pytest.approx(getattr(alone, name), rel=1e-12, nan_ok=True)
+
+
+def test_large_tables_take_bounded_memory_and_the_same_numbers(monkeypatch):
+    rows = [np.random.default_rng(i).exponential(size=40) for i in range(9)]
+    whole = means_of("t", rows)
+    monkeypatch.setattr(statistics, "NUMBERS_AT_ONCE", 1000)  # one row, and 25 of its resamples, at a time
+    for a, b in zip(means_of("t", rows), whole, strict=True):
+        assert (a.low, a.high) == pytest.approx((b.low, b.high), rel=1e-12)
+
+
+def test_intervals_of_means_hold_as_often_as_they_say():
+    rng = np.random.default_rng(6)
+    rows = rng.exponential(size=(400, 60))
+    low, high = statistics.mean_intervals(rows)
+    share = ((low <= 1.0) & (high >= 1.0)).mean()
+    assert 0.90 < share < 0.98  # 0.94 for so skewed a distribution; 400 draws leave ±0.024
+
+
+# -- blocks ---------------------------------------------------------------------------------------------------------------
+
+
+@given(st.lists(st.tuples(st.floats(-1e3, 1e3), st.integers(0, 6)), min_size=1, max_size=50))
+def test_values_of_blocks_have_the_mean_of_all(pairs):
+    values, blocks = np.array([v for v, _ in pairs]), np.array([b for _, b in pairs])
+    found = block_values(values, blocks)
+    assert len(found) == len(set(blocks.tolist()))
+    assert found.mean() == pytest.approx(values.mean(), abs=1e-9)
+
+
+def test_of_equal_blocks_the_values_are_their_means():
+    values = np.arange(12.0).reshape(4, 3)
+    np.testing.assert_allclose(
+        block_values(values.ravel(), np.repeat([7, 1, 3, 5], 3)), values.mean(axis=1)[[1, 2, 3, 0]]
+    )
+
+
+def test_shared_seeds_widen_the_interval_over_points_as_they_should():
+    """Forty seeds at six points; what a seed adds at all points is as large as what differs by itself."""
+    rng = np.random.default_rng(7)
+    n_seeds, n_points, blocks = 40, 6, np.repeat(np.arange(40), 6)
+    held, held_without = 0, 0
+    for _ in range(150):
+        runs = (rng.normal(size=(n_seeds, 1)) + rng.normal(size=(n_seeds, n_points))).ravel()
+        mean, naive = mean_of("score", runs, blocks), mean_of("score", runs)
+        held += mean.low <= 0.0 <= mean.high
+        held_without += naive.low <= 0.0 <= naive.high
+    assert held > 0.88 * 150
+    assert held_without < 0.85 * 150
+
+
+# -- differences ----------------------------------------------------------------------------------------------------------
+
+
+def test_the_sign_test_is_exact():
+    assert sign_test(8, 2) == pytest.approx(2 * (1 + 10 + 45) / 2**10)
+    assert sign_test(0, 6) == pytest.approx(2 / 2**6)
+    assert sign_test(5, 5) == 1.0
+    assert sign_test(0, 0) == 1.0
+
+
+def test_pairs_are_compared_within_themselves():
+    rng = np.random.default_rng(8)
+    seed = rng.normal(scale=10.0, size=100)
+    a, b = seed + rng.normal(size=100), seed + 1.0 + rng.normal(size=100)
+    a[3], b[5] = np.nan, np.nan
+    found = paired_difference("score", ("keep", "switch"), a, b)
+    is_known = np.isfinite(a) & np.isfinite(b)
+    assert (found.a, found.b, found.n) == ("keep", "switch", 98)
+    assert found.difference == pytest.approx(found.mean_b - found.mean_a)
+    assert (found.low, found.high) == mean_interval((b - a)[is_known])
+    assert 0.5 < found.low < 1.0 < found.high < 1.5  # a spread of 10 between seeds, and yet
+    assert (found.n_greater, found.n_less) == (int((b > a).sum()), int((b < a).sum()))
+    assert found.p == sign_test(found.n_greater, found.n_less) < 1e-4
+
+
+def test_equal_pairs_say_nothing():
+    found = paired_difference("score", ("a", "b"), np.arange(9.0), np.arange(9.0))
+    assert (found.difference, found.low, found.high, found.p) == (0.0, 0.0, 0.0, 1.0)
+    assert (found.n_greater, found.n_less, found.n_equal) == (0, 0, 9)
+    none = paired_difference("score", ("a", "b"), np.array([np.nan]), np.array([1.0]))
+    assert none.n == 0
+    assert math.isnan(none.difference)
