@@ -61,11 +61,14 @@ def show_analysis(
     for pairs in _by_quantity(found.comparisons):
         what = f"{found.titles.get(pairs[0].quantity, pairs[0].quantity)} against {pairs[0].a}"
         parts += [
-            _title("compared", f"{what}, paired by {found.paired_by}; p of the sign test"),
+            _title("compared", f"{what}, paired by {found.paired_by}; p by signs"),
             _comparisons(pairs),
         ]
     for quantity, effects in found.sensitivity.items():
-        parts += [_title(f"what matters for {found.titles.get(quantity, quantity)}"), *_effects(effects)]
+        parts += [
+            _title(f"what matters for {found.titles.get(quantity, quantity)}"),
+            *_effects(effects, found.variables),
+        ]
     if found.failures:
         parts += [_title("failed", f"{found.n_failed:,} runs, in none of the above"), _failures(found)]
     put("", *parts)
@@ -82,7 +85,7 @@ def _table(first: str, *numbers: str) -> Table:
     made = Table(box=box.SIMPLE_HEAD, header_style="bold", pad_edge=False, padding=(0, 1))
     made.add_column(f" {first}".rstrip(), overflow="fold")
     for name in numbers:
-        made.add_column(name, justify="right")
+        made.add_column(name, justify="right", no_wrap=True)
     return made
 
 
@@ -111,23 +114,30 @@ def _shares(shares: Sequence[Share]) -> Table:
     for share in shares:
         is_best = share.team is not None and share.n == best > 0
         bar = "█" * round(BAR * share.value) if share.of else ""
+        name = share.name if share.team is None else f"{share.team} {share.name}"
         table.add_row(
-            Text(f" {share.name}"), f"{share.n:,}", f"{share.of:,}", _percent(share.value),
+            Text(f" {name}"), f"{share.n:,}", f"{share.of:,}", _percent(share.value),
             _interval(100.0 * share.low, 100.0 * share.high, 1), bar,
             style="green" if is_best else "" if share.team is not None else "dim",
         )  # fmt: skip
     return table
 
 
+def _named(quantity: str, found: Analysis) -> Text:
+    """A quantity as it is asked for, and whose it is."""
+    metric, _, team = found.titles[quantity].partition(" of ")
+    whose = f" {team}" if team and quantity == f"{metric}[{quantity.rpartition('[')[2]}" else ""
+    return Text.assemble(f" {quantity}", (whose, "dim"))
+
+
 def _means(found: Analysis) -> Table:
     table = _table("", "mean", "95 % interval", "sd", "q 5 %", "median", "q 95 %")
     for mean in found.means:
         digits = _digits(mean.high - mean.low, mean.value)
-        is_spread = mean.high > mean.low
         values = (mean.quantiles[q] for q in (0.05, 0.5, 0.95))
         table.add_row(
-            Text(f" {found.titles[mean.name]}"), _number(mean.value, digits),
-            _interval(mean.low, mean.high, digits) if is_spread else "", _number(mean.sd, digits),
+            _named(mean.name, found), _number(mean.value, digits),
+            _interval(mean.low, mean.high, digits) if mean.sd > 0.0 else "", _number(mean.sd, digits),
             *(f"{value:.4g}" if math.isfinite(value) else "" for value in values),
         )  # fmt: skip
     return table
@@ -174,9 +184,12 @@ def _chosen(points: Sequence[PointResult], shows_all: bool) -> tuple[Sequence[Po
 
 
 def _short(variables: Sequence[Variable]) -> list[str]:
-    """The last part of each path, where that is enough to tell them apart, and its unit."""
+    """The last part of each path, where that is enough to tell them apart."""
     last = [v.name.rpartition(".")[2] for v in variables]
-    names = last if len(set(last)) == len(variables) else [v.name for v in variables]
+    return last if len(set(last)) == len(variables) else [v.name for v in variables]
+
+
+def _with_units(names: Sequence[str], variables: Sequence[Variable]) -> list[str]:
     units = [v.unit if isinstance(v, Range) else "" for v in variables]
     return [f"{name} [{unit}]" if unit else name for name, unit in zip(names, units, strict=True)]
 
@@ -216,11 +229,12 @@ def _comparisons(pairs: Sequence[Comparison]) -> Table:
     return table
 
 
-def _effects(effects: Sequence[Effect]) -> Iterable[RenderableType]:
+def _effects(effects: Sequence[Effect], variables: Sequence[Variable]) -> Iterable[RenderableType]:
     table = _table("", "rank correlation", "first order", "total")
+    short = dict(zip((v.name for v in variables), _short(variables), strict=True))
     for e in effects:
         table.add_row(
-            Text(f" {e.variable}"), Text(_estimate(e.rank_correlation, e.rank_low, e.rank_high, "+")),
+            Text(f" {short.get(e.variable, e.variable)}"), Text(_estimate(e.rank_correlation, e.rank_low, e.rank_high, "+")),
             Text(_estimate(e.first_order, e.first_low, e.first_high)), Text(_estimate(e.total, e.total_low, e.total_high)),
         )  # fmt: skip
     yield table
