@@ -8,7 +8,9 @@ from typing import Annotated
 import typer
 
 import tussle
-from tussle.cli import batch_commands
+from tussle.cli.analyze import analyze
+from tussle.cli.batch_commands import batch
+from tussle.cli.optimize import optimize
 from tussle.cli.options import (
     EPILOG,
     Debug,
@@ -22,6 +24,7 @@ from tussle.cli.options import (
     Strict,
     mission_source,
 )
+from tussle.cli.report import report
 from tussle.cli.terminal import OK, out, run_guarded, told
 
 app = typer.Typer(
@@ -257,7 +260,8 @@ def new(
         pages.show_written(written.files, written.next_steps)
 
 
-batch_commands.register(app, EPILOG)
+for command in (batch, analyze, report, optimize):
+    app.command(epilog=EPILOG)(command)
 
 
 def start() -> None:

@@ -173,8 +173,3 @@ def batch(
         )  # fmt: skip
         code = play_batch(asked, [Path(sys.argv[0]).name, *sys.argv[1:]])
     raise typer.Exit(code)
-
-
-def register(app: typer.Typer, epilog: str) -> None:
-    """Add the commands."""
-    app.command(epilog=epilog)(batch)

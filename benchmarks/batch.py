@@ -1,0 +1,127 @@
+"""Batches of the 500 s predator/prey game: wall and CPU time, by processes, stack and number of runs; memory; the cost of one.
+
+    python benchmarks/batch.py [--runs 1000] [--parts game processes stacks flat one] [--json FILE]
+
+Each row is `tussle batch` as a user calls it, in a process of its own, start-up included; 12 motion substeps, as the original was measured.
+The original takes 2.5 CPU s a game, about 21 minutes of wall time for 1,000 games on two cores.
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import measuring
+
+ORIGINAL = 2.5
+PARTS = ("game", "processes", "stacks", "flat", "one")
+GAME = ["predator_prey", "run.motion_multiplier=12"]
+SHORT = ["predator_prey", "prey=20", "predators=2", "--end", "10"]
+
+
+def tussle(*arguments: str) -> dict[str, float]:
+    """Wall time, CPU time of all processes, and the largest memory of one of them."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    begun = time.perf_counter()
+    # In a process of its own, whose children are the batch's processes.
+    script = (
+        "import resource, subprocess, sys\n"
+        "subprocess.run([sys.executable, '-m', 'tussle.cli', *sys.argv[1:]], check=True, "
+        "stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)\n"
+        "print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script, *arguments], check=True, capture_output=True, text=True
+    )
+    wall = time.perf_counter() - begun
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return {"wall_s": wall, "cpu_s": cpu, "mb": int(done.stdout) / 1024}
+
+
+def batch(mission: list[str], n: int, **options: int) -> dict[str, Any]:
+    """One batch of n runs."""
+    with tempfile.TemporaryDirectory() as folder:
+        more = [item for name, value in options.items() for item in (f"--{name}", str(value))]
+        row = tussle("batch", *mission, "--runs", str(n), "--out", f"{folder}/b", *more)
+    return {"runs": n, **options, **row, "cpu_s_per_run": row["cpu_s"] / n}
+
+
+def game(n: int) -> list[dict[str, Any]]:
+    """The figure that counts: all runs on all cores."""
+    row = batch(GAME, n)
+    return [row | {"ratio": ORIGINAL * n / row["cpu_s"]}]
+
+
+def processes(n: int) -> list[dict[str, Any]]:
+    rows = [batch(GAME, max(n // 5, 20), processes=k) for k in (1, 2)]
+    return [row | {"speedup": rows[0]["wall_s"] / row["wall_s"]} for row in rows]
+
+
+def stacks(n: int) -> list[dict[str, Any]]:
+    rows = [
+        batch(GAME, max(min(n // 4, 256), size // 4, 8), processes=1, stack=size)
+        for size in (1, 4, 16, 64, 256)
+    ]
+    return [row | {"speedup": rows[0]["cpu_s_per_run"] / row["cpu_s_per_run"]} for row in rows]
+
+
+def flat(n: int) -> list[dict[str, Any]]:
+    """Short games, so that it is the batch that is measured: 100, 1,000, 10,000 of them."""
+    return [batch(SHORT, 10 * n // factor) for factor in (100, 10, 1)]
+
+
+def one(_: int) -> list[dict[str, Any]]:
+    """A batch of one beside a plain run, both recording what they always record; medians of pairs played in turn."""
+    pairs = []
+    with tempfile.TemporaryDirectory() as folder:
+        for k in range(7):
+            plain = tussle("run", *GAME, "--out", f"{folder}/r{k}")
+            pairs.append((plain, tussle("batch", *GAME, "--runs", "1", "--out", f"{folder}/b{k}")))
+    rows = []
+    for place, name in enumerate(("tussle run", "tussle batch --runs 1")):
+        rows.append(
+            {"command": name} | {key: statistics.median(p[place][key] for p in pairs) for key in pairs[0][0]}
+        )
+    ratio = statistics.median(b["cpu_s"] / a["cpu_s"] for a, b in pairs)
+    return [rows[0], rows[1] | {"cpu_ratio": ratio}]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument(
+        "--runs", type=int, default=1000, help="games of the first part; the others follow it"
+    )
+    parser.add_argument("--parts", nargs="+", choices=PARTS, default=PARTS, help="which parts to measure")
+    parser.add_argument("--json", type=Path, help="write the rows to this file")
+    args = parser.parse_args()
+    titles = {
+        "game": "The game, on all cores",
+        "processes": "One and two processes",
+        "stacks": "Worlds side by side in one process",
+        "flat": "More and more runs of a short game: cost of a run, memory",
+        "one": "A batch of one",
+    }
+    found = []
+    for part in args.parts:
+        rows = {"game": game, "processes": processes, "stacks": stacks, "flat": flat, "one": one}[part](
+            args.runs
+        )
+        measuring.report(titles[part], rows, None)
+        print()
+        found += [{"part": part, **row} for row in rows]
+    if args.json:
+        import json
+
+        args.json.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
