@@ -73,6 +73,10 @@ def test_what_a_file_does_not_say_is_none(read):
     assert read('[vary]\nx = "0:1"') == Sweep((Range("x", 0, 1),), None, None, None, None, None, None)
 
 
+def test_a_mark_that_editors_put_before_a_text_is_no_part_of_it(read):
+    assert read('\ufeff[vary]\nx = "0:1"').variables == (Range("x", 0, 1),)
+
+
 def test_texts_of_a_list_stay_texts(read):
     (variable,) = read('[vary]\nx = ["007", "1.50", "a, b", ""]').variables
     assert variable.values == ("007", "1.50", "a, b", "")
