@@ -15,7 +15,7 @@ from tussle.batch.points import values_text, variables_of
 from tussle.batch.sampling import sample as sample_points
 from tussle.batch.tasks import PluginFile, Run
 from tussle.batch.treatments import Treatment, build_points, group_points, read_points
-from tussle.batch.variables import Variable
+from tussle.batch.variables import Range, Variable
 from tussle.batch.varied import about, as_variables
 from tussle.engine.simulation import Simulation
 from tussle.errors import BatchError, ParameterError
@@ -107,8 +107,13 @@ class Batch:
             texts = [values_text(point, self.variables) for point in points]
             missions = read_points(self.source, settings, texts, **self._options)
         else:
-            missions = build_points(self.source, self.settings, points)
+            missions = build_points(self.source, self.settings, [self._with_units(point) for point in points])
         return (m.ending_by_time() for m in missions) if self._ends_by_time else missions
+
+    def _with_units(self, point: Mapping[str, Any]) -> dict[str, Any]:
+        """The values of a point as parameters take them: with its unit as a text, otherwise as it is."""
+        units = {v.name: v for v in self.variables if isinstance(v, Range) and v.unit}
+        return {name: units[name].text(value) if name in units else value for name, value in point.items()}
 
     # -- what is played -----------------------------------------------------------------------------------------------------
 
