@@ -42,6 +42,10 @@ class BatchError(TussleError):
     """A batch cannot be played, or what is there is no batch or another one; what had been played before stays whole."""
 
 
+class ViewError(TussleError):
+    """A game cannot be shown: a page cannot be served, or a picture or film cannot be made."""
+
+
 class MissingExtraError(TussleError, ImportError):
     """A feature needs a package that only an extra installs; the message names both."""
 

@@ -1,0 +1,45 @@
+"""What is seen of a game: of a recorded run at any time, and of a simulation while it is watched.
+
+Nothing here is loaded before it is asked for: a recorded run needs Arrow, a page in the browser and a film need packages of the
+extra `tussle[view]`.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from tussle.view.frame import Frame, Happening, frame_of
+    from tussle.view.looks import Looks
+    from tussle.view.recording import Recording
+    from tussle.view.scenery import Scenery, scenery_of
+    from tussle.view.shapes import MODELS, Mesh
+
+__all__ = [
+    "MODELS",
+    "Frame",
+    "Happening",
+    "Looks",
+    "Mesh",
+    "Recording",
+    "Scenery",
+    "frame_of",
+    "scenery_of",
+]
+
+_LAZY = {
+    "MODELS": "shapes",
+    "Frame": "frame",
+    "Happening": "frame",
+    "Looks": "looks",
+    "Mesh": "shapes",
+    "Recording": "recording",
+    "Scenery": "scenery",
+    "frame_of": "frame",
+    "scenery_of": "scenery",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _LAZY:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_LAZY[name]}"), name)

@@ -1,0 +1,88 @@
+"""What is seen of one world at one moment."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from tussle.engine.simulation import Simulation
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """All entities of one world at one moment; nothing of it is ever written to again.
+
+    Attributes:
+        t: Time [s].
+        step: Number of the step that begins with this state.
+        id: Who, ascending, (n,), int32.
+        team: Team of each, (n,), int32.
+        block: Number of its block's name, (n,), int32.
+        pos: Position [m], (n, 3), world frame, East North Up.
+        quat: Attitude (w, x, y, z), (n, 4), body (forward, left, up) to world.
+        vel: Ground velocity [m/s], (n, 3), world frame.
+        health: What is left before it is removed at 0, (n,).
+    """
+
+    t: float
+    step: int
+    id: np.ndarray
+    team: np.ndarray
+    block: np.ndarray
+    pos: np.ndarray
+    quat: np.ndarray
+    vel: np.ndarray
+    health: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.id)
+
+    def row_of(self, who: int) -> int:
+        """Row of the entity with this id; -1 where it is not there."""
+        row = int(np.searchsorted(self.id, who))
+        return row if row < len(self.id) and self.id[row] == who else -1
+
+
+@dataclass(frozen=True, slots=True)
+class Happening:
+    """Something that happened in a game.
+
+    Attributes:
+        t: Time of the beginning of the step in which it happened; of a birth or an end, its time [s].
+        kind: "birth", "death", "capture", "collision" or "end".
+        id: Who was born, died, captured, or has the smaller id of two that met; 0 for an end.
+        other: Who was captured, who captured or met the dead, the larger id of two that met; 0 for nobody.
+        text: Block of the born, "ground" where one met that, why one died, why the world ended.
+    """
+
+    t: float
+    kind: str
+    id: int
+    other: int
+    text: str
+
+
+def empty_frame(t: float, step: int) -> Frame:
+    """A moment in which nobody is there."""
+    none = np.zeros(0, np.int32)
+    return Frame(t, step, none, none, none, np.zeros((0, 3)), np.zeros((0, 4)), np.zeros((0, 3)), np.zeros(0))
+
+
+def frame_of(simulation: Simulation, world: int = 0) -> Frame:
+    """A copy of what is in one world now; of a world that has ended, its last state."""
+    clock = simulation.context.clock
+    step = int(clock.step[world])
+    parked = simulation.parked.get(world)
+    bodies = simulation.population.bodies if parked is None else parked.bodies
+    rows = np.flatnonzero(bodies.world == world)
+    rows = rows[np.argsort(bodies.id[rows], kind="stable")]
+    columns = [
+        np.ascontiguousarray(a[..., rows].T, np.int32 if a.dtype == np.int64 else None)
+        for a in (bodies.id, bodies.team, bodies.block, bodies.pos, bodies.quat, bodies.vel, bodies.health)
+    ]
+    for column in columns:
+        column.flags.writeable = False
+    return Frame(float(clock.start + step * clock.dt), step, *columns)

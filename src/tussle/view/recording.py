@@ -1,0 +1,270 @@
+"""A recorded run as frames and happenings, at any time of it."""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+
+from tussle.errors import RecordError, TussleError
+from tussle.mission import Loaded, Mission, read_mission
+from tussle.record import Run, load_run
+from tussle.record.schema import MISSION_FILE
+from tussle.view.frame import Frame, Happening, empty_frame
+from tussle.view.looks import Looks
+from tussle.view.scenery import Scenery, scenery_of
+
+POS, QUAT, VEL = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("vx", "vy", "vz")
+
+
+class Recording:
+    """One world of a run directory, whole or cut.
+
+    The tables stay as they were read: a frame copies its own rows and looks at no others.
+
+    Args:
+        path: The run directory.
+        world: Number of the world.
+        plugin_files: Python files whose plugins the run's mission names.
+
+    Attributes:
+        run: The run directory as it was loaded.
+        name: The mission's title, else the directory's name.
+        blocks: Names of the blocks; the column `block` of a frame counts in them.
+        block_teams: Team of each block.
+        teams: Team number -> names of its blocks, in order of the teams.
+        t: Time of each frame [s], (T,), ascending.
+        steps: Step of each frame, (T,).
+        notes: What is missing, one line each.
+
+    Raises:
+        RecordError: It is no run directory, or has no such world.
+    """
+
+    def __init__(self, path: str | Path, world: int = 0, plugin_files: tuple[str | Path, ...] = ()) -> None:
+        self.path = Path(path)
+        self.world = world
+        self.run: Run = load_run(self.path)
+        self.notes: list[str] = list(self.run.notes)
+        self._plugin_files = plugin_files
+        table = self.run.trajectory_table
+        self._batches = table.to_batches()
+        self._starts = np.cumsum([0, *(b.num_rows for b in self._batches)])
+        self._find_frames()
+        self._name_blocks()
+
+    # -- what there is --------------------------------------------------------------------------------------------------------
+
+    def _whole(self, name: str) -> np.ndarray:
+        """A column of all worlds."""
+        column = self.run.trajectory_table[name]
+        return np.concatenate([np.zeros(0, np.int32), *(c.to_numpy() for c in column.chunks)])
+
+    def _find_frames(self) -> None:
+        """Where in the table each frame lies: rows of one world and step are side by side."""
+        worlds, step = self._whole("world"), self._whole("step")
+        n_worlds = max(len(self.run.info.get("worlds", ())), int(worlds.max(initial=-1)) + 1)
+        if not 0 <= self.world < max(n_worlds, 1):
+            raise RecordError(
+                f"{self.path}: there is no world {self.world}; there are worlds 0 to {n_worlds - 1}"
+            )
+        cuts = np.flatnonzero((np.diff(worlds) != 0) | (np.diff(step) != 0)) + 1
+        first = np.concatenate([[0], cuts]).astype(np.int64) if len(step) else np.zeros(0, np.int64)
+        last = np.concatenate([first[1:], [len(step)]]).astype(np.int64)[: len(first)]
+        mine = np.flatnonzero(worlds[first] == self.world)
+        mine = mine[np.argsort(step[first[mine]], kind="stable")]
+        self._first, self._last = first[mine], last[mine]
+        self.steps = step[self._first].astype(np.int64)
+        self._set_times()
+        self._add_empty_frames()
+
+    def _set_times(self) -> None:
+        """Times of the frames; start and step length as `run.json` says, else as the table shows."""
+        self.t = self._whole("t")[self._first].astype(np.float64)
+        said = self.run.info.get("mission", {})
+        self.start, self.dt = float(said.get("start", 0.0)), float(said.get("dt", 1.0))
+        if not said and len(self.steps) > 1:
+            self.dt = float(self.t[-1] - self.t[0]) / float(self.steps[-1] - self.steps[0])
+            self.start = float(self.t[0]) - float(self.steps[0]) * self.dt
+
+    def _usual_stride(self) -> int:
+        """The most steps between two frames with somebody in them."""
+        period, strides = self.run.info.get("period"), np.diff(self.steps)
+        if period:
+            return max(1, math.ceil(float(period) / self.dt - 1e-9))
+        return max(1, int(np.median(strides))) if len(strides) and not self.run.info else 1
+
+    def _add_empty_frames(self) -> None:
+        """Frames of moments in which nobody is there: the table has no rows of them."""
+        if not len(self.steps):
+            return
+        stride = self._usual_stride()
+        edges = np.concatenate([self.steps, [self._last_step() + 1]])
+        gaps = np.flatnonzero(np.diff(edges) > stride)
+        missing = [np.arange(edges[i] + stride, edges[i + 1], stride) for i in gaps]
+        end = self._last_step()
+        if end > self.steps[-1] and (not missing or missing[-1][-1] != end):
+            missing.append(np.array([end]))
+        if missing:
+            added = np.concatenate(missing)
+            steps, nothing = np.concatenate([self.steps, added]), np.zeros(len(added), np.int64)
+            order = np.argsort(steps, kind="stable")
+            self.steps = steps[order]
+            self.t = np.concatenate([self.t, self.start + added * self.dt])[order]
+            self._first = np.concatenate([self._first, nothing])[order]
+            self._last = np.concatenate([self._last, nothing])[order]
+
+    def _last_step(self) -> int:
+        """The last step that is known to have been reached."""
+        worlds = self.run.info.get("worlds", ())
+        said = int(worlds[self.world]["steps"]) if self.world < len(worlds) else 0
+        return max(said, int(self.steps[-1]))
+
+    def _name_blocks(self) -> None:
+        said = self.run.info.get("mission", {}).get("blocks", [])
+        names = [b["name"] for b in said]
+        teams = {name: int(b["team"]) for name, b in zip(names, said, strict=True)}
+        if self._batches and not names:
+            names = self._batches[0]["block"].dictionary.to_pylist()
+        seen = self._teams_seen()
+        for block, team in sorted(seen):
+            teams.setdefault(names[block], team)
+        self.blocks: list[str] = names
+        self.block_teams: list[int] = [teams.get(name, 0) for name in names]
+        by_team: dict[int, list[str]] = {}
+        for name, team in [
+            *zip(names, self.block_teams, strict=True),
+            *((names[b], t) for b, t in sorted(seen)),
+        ]:
+            of_team = by_team.setdefault(team, [])
+            if name not in of_team:
+                of_team.append(name)
+        self.teams: dict[int, str] = {team: ", ".join(by_team[team]) for team in sorted(by_team)}
+        self._plugins = [[p.partition("(")[0] for p in b["plugins"]] for b in said]
+
+    def _teams_seen(self) -> set[tuple[int, int]]:
+        """(block, team) of all entities."""
+        found: set[tuple[int, int]] = set()
+        for batch in self._batches:
+            pairs = np.stack([batch["block"].indices.to_numpy(), batch["team"].to_numpy()])
+            found |= {(int(b), int(t)) for b, t in np.unique(pairs, axis=1).T}
+        return found
+
+    # -- frames ---------------------------------------------------------------------------------------------------------------
+
+    @property
+    def n_frames(self) -> int:
+        return len(self.t)
+
+    def frame(self, i: int) -> Frame:
+        """The frame by its number; -1 is the last.
+
+        Raises:
+            IndexError: There are not so many.
+        """
+        i = range(self.n_frames)[i]
+        first, last = int(self._first[i]), int(self._last[i])
+        t, step = float(self.t[i]), int(self.steps[i])
+        if first == last:
+            return empty_frame(t, step)
+        ids, team = (self._column(first, last, name) for name in ("id", "team"))
+        block = self._column(first, last, "block")
+        pos, quat, vel = (self._columns(first, last, names) for names in (POS, QUAT, VEL))
+        return Frame(t, step, ids, team, block, pos, quat, vel, self._column(first, last, "health"))
+
+    def at(self, t: float) -> Frame:
+        """The last frame that is not after a time [s]; the first for times before it.
+
+        Raises:
+            IndexError: There are no frames.
+        """
+        return self.frame(self.index_at(t))
+
+    def index_at(self, t: float) -> int:
+        """Number of the last frame that is not after a time [s], within a millionth of a step; 0 for times before the first."""
+        return max(0, int(np.searchsorted(self.t, t + 1e-6 * self.dt, side="right")) - 1)
+
+    def _column(self, first: int, last: int, name: str) -> np.ndarray:
+        """Rows [first, last) of a column: a view where they lie in one batch."""
+        parts = []
+        number = int(np.searchsorted(self._starts, first, side="right")) - 1
+        while first < last:
+            start, end = int(self._starts[number]), int(self._starts[number + 1])
+            part = self._batches[number][name][first - start : min(last, end) - start]
+            parts.append((part.indices if isinstance(part, pa.DictionaryArray) else part).to_numpy())
+            first, number = min(last, end), number + 1
+        return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
+    def _columns(self, first: int, last: int, names: tuple[str, ...]) -> np.ndarray:
+        """Rows [first, last) of several columns, (rows, columns)."""
+        return np.stack([self._column(first, last, name) for name in names], axis=1)
+
+    @cached_property
+    def extent(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper corner of a box around all positions [m], each (3,)."""
+        if not (self._last > self._first).any():
+            return np.zeros(3), np.zeros(3)
+        is_mine = self._whole("world") == self.world
+        columns = [self._whole(name)[is_mine] for name in POS]
+        return np.array([c.min() for c in columns]), np.array([c.max() for c in columns])
+
+    @cached_property
+    def happenings(self) -> list[Happening]:
+        """Births, deaths, captures, collisions and the end, in order."""
+        table = self.run.events_table
+        mine = table.filter(pa.array(np.asarray(table["world"]) == self.world)) if len(table) else table
+        rows = [mine[name].to_pylist() for name in ("t", "kind", "id", "other", "text")]
+        found = [Happening(*row) for row in zip(*rows, strict=True)]
+        return sorted(found, key=lambda happening: happening.t)
+
+    # -- the mission ------------------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _loaded(self) -> Loaded | None:
+        path = self.path / MISSION_FILE
+        if not path.exists():
+            self.notes.append(f"{MISSION_FILE} is not there: a mission that was built in Python leaves none")
+            return None
+        try:
+            return read_mission(path.resolve(), plugin_files=self._plugin_files)
+        except TussleError as error:
+            first = str(error).splitlines()[0]
+            self.notes.append(
+                f"{MISSION_FILE} cannot be read, so its colours, bases and boundaries are not shown: {first}"
+            )
+            return None
+
+    @property
+    def mission(self) -> Mission | None:
+        """What was played; None where the run does not keep it or it needs plugins that are not here, which `notes` says."""
+        return None if self._loaded is None else self._loaded.mission
+
+    @property
+    def viewer(self) -> dict[str, Any]:
+        """What the mission file says for the viewer, see `tussle.mission.Loaded`; empty without one."""
+        return {} if self._loaded is None else self._loaded.viewer
+
+    @property
+    def name(self) -> str:
+        said = self.run.info.get("mission", {}).get("name")
+        return str(said) if said else self.path.resolve().name
+
+    @cached_property
+    def looks(self) -> Looks:
+        """Colours and models of the entities."""
+        return Looks(self.blocks, self.block_teams, self._plugins, self.viewer)
+
+    @cached_property
+    def scenery(self) -> Scenery:
+        """What stands still."""
+        return scenery_of(self.mission, self.viewer, self.extent)
+
+    def __len__(self) -> int:
+        return self.n_frames
+
+    def __repr__(self) -> str:
+        return f"<Recording {str(self.path)!r}, world {self.world}: {self.n_frames} frames>"

@@ -1,0 +1,118 @@
+"""Surfaces and edges of the shapes that stand in a scene."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+
+from tussle.scene import Boundary, Convex, FlatGround, Plane, Sphere
+from tussle.view.shapes import Mesh, ball
+
+N_CIRCLE = 48
+"""Lines of each circle that outlines a sphere."""
+
+
+def mesh_of(shape: Boundary, low: np.ndarray, high: np.ndarray) -> Mesh:
+    """The surface of a shape.
+
+    Args:
+        shape: The shape.
+        low: Lower corner of what is shown [m], (3,); what has no end is drawn as far as that.
+        high: Upper corner [m], (3,).
+    """
+    if isinstance(shape, Sphere):
+        return ball(3).placed(2.0 * shape.radius, shape.center)
+    return _polygons(_rings(shape, low, high))
+
+
+def outline_of(shape: Boundary, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Edges of a shape, or three circles of a sphere: ends of each line [m], (k, 2, 3), float32."""
+    if isinstance(shape, Sphere):
+        angle = 2.0 * np.pi * np.arange(N_CIRCLE + 1) / N_CIRCLE
+        wave = np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], 1) * shape.radius
+        circles = [np.roll(wave, shift, axis=1) + shape.center for shift in range(3)]
+        return np.concatenate([_lines(c) for c in circles]).astype(np.float32)
+    sides = [_lines(np.concatenate([r, r[:1]])) for r in _rings(shape, low, high)]
+    lines = np.concatenate([np.zeros((0, 2, 3)), *sides])
+    # Each edge belongs to two faces and is drawn once: as it goes up in (x, y, z).
+    rounded = lines.astype(np.float32)
+    backward = [tuple(a) > tuple(b) for a, b in rounded.tolist()]
+    rounded[backward] = rounded[backward][:, ::-1]
+    return np.unique(rounded, axis=0)
+
+
+def _lines(points: np.ndarray) -> np.ndarray:
+    """Lines from each point (k, 3) to the next, (k - 1, 2, 3)."""
+    return np.stack([points[:-1], points[1:]], axis=1)
+
+
+def _rings(shape: Boundary, low: np.ndarray, high: np.ndarray) -> list[np.ndarray]:
+    """Corners of each flat face, counter-clockwise seen from outside, each (k, 3)."""
+    if isinstance(shape, FlatGround):
+        shape = Plane((0.0, 0.0, shape.height), (0.0, 0.0, 1.0))
+    if isinstance(shape, Plane):
+        return [_square(shape, low, high)]
+    if not isinstance(shape, Convex):
+        return []
+    faces = shape.half_spaces()
+    normals = np.array([normal for normal, _ in faces])
+    offsets = np.array([offset for _, offset in faces])
+    if len(faces) < 4:
+        return []
+    corners = _corners(normals, offsets)
+    rings = []
+    slack = 1e-9 * (1.0 + float(np.abs(corners).max(initial=0.0)))
+    for normal, offset in zip(normals, offsets, strict=True):
+        own = corners[np.abs(corners @ normal - offset) <= slack]
+        first, second = _axes_in(normal)
+        about = own - own.mean(axis=0)
+        rings.append(own[np.argsort(np.arctan2(about @ second, about @ first))])
+    return rings
+
+
+def _corners(normals: np.ndarray, offsets: np.ndarray) -> np.ndarray:
+    """Where three faces of a bounded intersection of half-spaces meet, (k, 3)."""
+    found: list[np.ndarray] = []
+    slack = 1e-9 * (1.0 + float(np.abs(offsets).max()))
+    for three in combinations(range(len(offsets)), 3):
+        matrix = normals[list(three)]
+        if abs(np.linalg.det(matrix)) < 1e-9:
+            continue
+        point = np.linalg.solve(matrix, offsets[list(three)])
+        if (normals @ point <= offsets + slack).all() and not any(
+            np.abs(point - known).max() <= slack for known in found
+        ):
+            found.append(point)
+    return np.array(found).reshape(-1, 3)
+
+
+def _axes_in(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Two axes in a plane that with its normal are a right-handed frame."""
+    helper = np.eye(3)[np.argmin(np.abs(normal))]
+    first = np.cross(helper, normal)
+    first /= np.linalg.norm(first)
+    return first, np.cross(normal, first)
+
+
+def _square(plane: Plane, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """The part of a plane nearest to the middle of what is shown, and as wide."""
+    normal = np.array(plane.normal) / np.linalg.norm(plane.normal)
+    middle = 0.5 * (np.asarray(low) + high)
+    center = middle - ((middle - plane.point) @ normal) * normal
+    first, second = _axes_in(normal)
+    half = 0.5 * max(float(np.linalg.norm(np.asarray(high) - low)), 1.0)
+    return np.array(
+        [center + half * (a * first + b * second) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    )
+
+
+def _polygons(rings: list[np.ndarray]) -> Mesh:
+    """Convex polygons as triangles, each with corners of its own, so that edges are sharp."""
+    vertices, faces, n = [np.zeros((0, 3))], [np.zeros((0, 3), int)], 0
+    for ring in rings:
+        i = np.arange(1, len(ring) - 1)
+        vertices.append(ring)
+        faces.append(np.stack([np.zeros_like(i), i, i + 1], 1) + n)
+        n += len(ring)
+    return Mesh(np.concatenate(vertices), np.concatenate(faces))
