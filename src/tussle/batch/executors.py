@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import os
-import platform
 import signal
+import threading
 from collections import deque
 from collections.abc import Generator, Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import partial
-from multiprocessing import connection, get_context
 from typing import TYPE_CHECKING, Any, Protocol
 
-from tussle.batch.stack import play, stack_size
+from tussle.batch.stack import BEAT_EVERY, play, stack_size
 from tussle.batch.tasks import Beat, Finished, Package, Run
 from tussle.errors import BatchError, ParameterError
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
     from multiprocessing.context import SpawnProcess
+
+    from tussle.mission import Mission
 
 FEW = 4
 """Runs that are worth a process: fewer are played sooner than it has started."""
@@ -108,13 +110,22 @@ class Processes:
         self.stack = _whole("stack", stack)
 
     def play(self, package: Package, runs: Sequence[Run]) -> Generator[Finished | Beat, None, None]:
-        """What comes of the runs."""
+        """What comes of the runs.
+
+        Raises:
+            BatchError: A process cannot play: it ends as it starts, or cannot load what is played.
+        """
+        from multiprocessing import connection
+
         waiting = Waiting(runs)
-        n = min(self.n, len(runs))
-        players = [_Player(package, self.stack, self.n) for _ in range(n)]
+        players: list[_Player] = []
         try:
+            players.extend(_Player(package, self.stack, self.n) for _ in range(min(self.n, len(runs))))
             while players:
-                ready = connection.wait([p.pipe for p in players])
+                # Not for ever: who watches may want to stop while a plugin takes its time.
+                ready = connection.wait([p.pipe for p in players], BEAT_EVERY)
+                if not ready:
+                    yield Beat(sum(p.under_way_part for p in players))
                 for player in [p for p in players if p.pipe in ready]:
                     try:
                         for message in player.answer(waiting):
@@ -132,11 +143,21 @@ class Processes:
                 player.stop()
 
 
+@dataclass(frozen=True)
+class _Unplayable:
+    """What a process says that cannot load a mission."""
+
+    why: str
+
+
 class _Player:
     """One process, as its parent sees it."""
 
     def __init__(self, package: Package, stack: int | None, n_processes: int) -> None:
+        from multiprocessing import get_context
+
         context = get_context("spawn")
+        self.package = package
         self.pipe, theirs = context.Pipe()
         self.under_way: dict[int, Run] = {}
         self.under_way_part = 0.0
@@ -144,12 +165,19 @@ class _Player:
         self.process: SpawnProcess = context.Process(
             target=_work, args=(theirs, package, stack, n_processes), daemon=True, name="tussle-batch"
         )
-        with _quiet_threads():
-            self.process.start()
+        try:
+            with _quiet_threads(), _deaf_to_interrupts():
+                self.process.start()
+        except OSError as error:
+            raise BatchError(f"a process that was to play cannot be started: {error}") from error
         theirs.close()
 
     def answer(self, waiting: Waiting) -> Iterator[Finished | Beat]:
-        """Deal with one message of the process: a result to pass on, or a wish for runs."""
+        """Deal with one message of the process: a result to pass on, or a wish for runs.
+
+        Raises:
+            BatchError: The process cannot play.
+        """
         message = self.pipe.recv()
         if isinstance(message, Finished):
             self.under_way.pop(message.number)
@@ -159,6 +187,8 @@ class _Player:
             self.under_way_part = message.under_way
             yield message
             return
+        if isinstance(message, _Unplayable):
+            raise BatchError(message.why)
         self.has_asked = True
         group, n = message
         runs: list[Run] = []
@@ -184,32 +214,23 @@ class _Player:
         self.process.join(5.0)
         self.is_done = True
         code = self.process.exitcode
+        is_killed = code is not None and code < 0
         why = (
             f"signal {-code}, {signal.strsignal(-code)}"
-            if code is not None and code < 0
+            if code is not None and is_killed
             else f"exit code {code}"
         )
         if not self.has_asked:
-            raise BatchError(
-                f"a process that was to play ended as it started ({why}); a script that plays a batch needs "
-                f'`if __name__ == "__main__":` around what it does'
+            hint = (
+                ""
+                if is_killed
+                else '; a script that plays a batch needs `if __name__ == "__main__":` around what it does'
             )
+            raise BatchError(f"a process that was to play ended as it started ({why}){hint}")
         for run in self.under_way.values():
             if run.is_alone:
-                error = f"the process that played it died: {why}"
-                yield Finished(
-                    run.number,
-                    "error",
-                    0.0,
-                    0,
-                    None,
-                    "",
-                    error,
-                    0.0,
-                    platform.node(),
-                    [(None, "alive", float("nan"))],
-                    [],
-                )
+                teams = self.package.mission(run.group).teams
+                yield Finished.failed(run, f"the process that played it died: {why}", teams)
             else:
                 waiting.alone.append(Run(run.number, run.group, run.seed, run.params, is_alone=True))
 
@@ -219,6 +240,9 @@ class _Player:
         if not self.is_done:
             self.process.terminate()
         self.process.join(5.0)
+        if self.process.is_alive():  # it heeds neither
+            self.process.kill()
+            self.process.join()
 
 
 @contextmanager
@@ -237,34 +261,81 @@ def _quiet_threads() -> Iterator[None]:
                 os.environ[name] = value
 
 
+@contextmanager
+def _deaf_to_interrupts() -> Iterator[None]:
+    """While open, processes that are started do not hear Ctrl-C, which reaches all of a terminal; their parent ends them."""
+    from multiprocessing import resource_tracker
+
+    resource_tracker.ensure_running()  # as it starts it makes this thread hear again
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+# -- in the process that plays ----------------------------------------------------------------------------------------------
+
+
 def _work(pipe: Connection, package: Package, stack: int | None, n_processes: int) -> None:
     """The life of a process that plays."""
-    signal.signal(
-        signal.SIGINT, signal.SIG_IGN
-    )  # Ctrl-C reaches all processes of a terminal; the parent ends this one
+    threading.Thread(target=_end_with_parent, daemon=True).start()
 
     def ask(group: int | None, n: int) -> tuple[list[Run], int]:
-        pipe.send((group, n))
-        answer: tuple[list[Run], int] = pipe.recv()
+        _say(pipe, (group, n))
+        try:
+            answer: tuple[list[Run], int] = pipe.recv()
+        except (EOFError, OSError):
+            os._exit(1)
         return answer
 
     missions: dict[int, Any] = {}
-    with suppress(EOFError, BrokenPipeError, ConnectionResetError):  # the parent has gone
-        while True:
-            first, n_left = ask(None, 1)
-            if not first:
-                return
-            group, is_alone = first[0].group, first[0].is_alone
-            if group not in missions:
-                missions = {group: package.mission(group)}
-            size = 1 if is_alone else even_size(stack or stack_size(missions[group]), n_left, n_processes)
+    while True:
+        first, n_left = ask(None, 1)
+        if not first:
+            return
+        group, is_alone = first[0].group, first[0].is_alone
+        if group not in missions:
+            missions = {group: _loaded(package, group, pipe)}
+        size = 1 if is_alone else even_size(stack or stack_size(missions[group]), n_left, n_processes)
 
-            def take(
-                n: int, held: list[Run] = first, group: int = group, is_alone: bool = is_alone
-            ) -> list[Run]:
-                own = [held.pop()] if held and n else []
-                more = [] if is_alone or n == len(own) else ask(group, n - len(own))[0]
-                return own + more
+        def take(n: int, held: list[Run] = first, group: int = group, is_alone: bool = is_alone) -> list[Run]:
+            own = [held.pop()] if held and n else []
+            more = [] if is_alone or n == len(own) else ask(group, n - len(own))[0]
+            return own + more
 
-            for message in play(missions[group], take, size):
-                pipe.send(message)
+        for message in play(missions[group], take, size):
+            _say(pipe, message)
+
+
+def _say(pipe: Connection, message: Any) -> None:
+    """Tell the parent; where it has gone there is nothing left to do."""
+    try:
+        pipe.send(message)
+    except OSError:
+        os._exit(1)
+
+
+def _loaded(package: Package, group: int, pipe: Connection) -> Mission:
+    """The mission of a group; what keeps it from being loaded keeps all processes from it, and is told."""
+    try:
+        return package.mission(group)
+    except Exception as error:  # noqa: BLE001 - it is unpickled: whatever its modules and classes raise
+        _say(
+            pipe,
+            _Unplayable(
+                f"a process that was to play cannot load the mission: {type(error).__name__}: {error}; what its plugins are made of "
+                "must be in a module that can be imported, or in a plugin file"
+            ),
+        )
+        os._exit(1)
+
+
+def _end_with_parent() -> None:
+    """Wait for the parent's end, which may come without a word, and follow it whatever a plugin is at."""
+    from multiprocessing import connection, parent_process
+
+    parent = parent_process()
+    assert parent is not None
+    connection.wait([parent.sentinel])
+    os._exit(1)

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import platform
 import time
-from collections.abc import Callable, Iterator, Sequence
+import warnings
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from tussle.batch.tasks import Beat, Finished, Run
 from tussle.engine.simulation import Simulation
+from tussle.errors import PluginError, TussleError
 
 if TYPE_CHECKING:
     from tussle.engine.result import WorldResult
@@ -40,99 +42,119 @@ def most_worlds(mission: Mission) -> int:
 def play(mission: Mission, take: Take, size: int) -> Iterator[Finished | Beat]:
     """Play all runs that `take` gives.
 
-    A run that fails ends with its error. It is played again alone before that is said, since an error may have come from a neighbour
-    in its stack.
+    A run that fails beside others is played again alone before its error is told, since that may have come from a neighbour in its
+    stack. Where a stack cannot go on at all, as when a plugin raises as a game begins, its runs begin anew; from then on each run shows
+    alone that it can be begun before it joins others.
 
     Args:
         mission: What all of them play, but for their own params and seeds.
         take: Where they come from.
-        size: How many are played side by side.
+        size: How many are played side by side; fewer where a plugin takes part in fewer worlds.
     """
-    runs = list(take(size))
+    size = min(size, most_worlds(mission))
+    runs, is_wary = list(take(size)), False
     while runs:
-        stack = _Stack(mission, take, len(runs))
+        stack = _Stack(mission, take, is_wary)
+        lost, told = [], ""
         try:
             yield from stack.play(runs)
-        except Exception as error:  # noqa: BLE001 - whatever a plugin raises at a start is the error of its run
-            stack.again += stack.under_way()
-            if stack.size == 1:
-                yield _failed(stack.again.pop(), error)
+        except (Exception, SystemExit) as error:  # noqa: BLE001 - whatever a plugin raises is the error of its run
+            lost, told = stack.under_way(), _told(error)
         finally:
             stack.close()
-        for run in stack.again:
-            yield from play(mission, _only(run), 1)
-        runs = list(take(size))
+        if len(lost) == 1 == stack.size:
+            yield Finished.failed(lost.pop(), told, mission.teams)
+        elif is_wary:
+            for run in lost:
+                yield from play_alone(mission, run)
+            lost = []
+        is_wary = is_wary or bool(lost)
+        runs = lost or list(take(size))
 
 
-def _only(run: Run) -> Take:
-    """Gives one run, once."""
+def play_alone(mission: Mission, run: Run) -> Iterator[Finished | Beat]:
+    """Play one run in a simulation of its own."""
     waiting = [run]
 
     def take(n: int) -> Sequence[Run]:
         return [waiting.pop()] if waiting and n else []
 
-    return take
+    return play(mission, take, 1)
 
 
-def _failed(run: Run, error: Exception) -> Finished:
-    """A run that could not be begun."""
-    return Finished(
-        run.number,
-        "error",
-        0.0,
-        0,
-        None,
-        "",
-        _told(error),
-        0.0,
-        platform.node(),
-        [(None, "alive", float("nan"))],
-        [],
-    )
+def _can_begin(mission: Mission, run: Run) -> bool:
+    try:
+        Simulation(mission, run.seed, run.params, on_error="record").close()
+    except (Exception, SystemExit):  # noqa: BLE001 - it is told where the run is played
+        return False
+    return True
 
 
-def _told(error: Exception) -> str:
+def _told(error: BaseException) -> str:
     """What failed, without the number of the world, which depends on the stack."""
-    from tussle.errors import PluginError, TussleError
-
     if isinstance(error, PluginError):
         return str(PluginError(error.message, where=error.where, step=error.step, plugin=error.plugin))
     return str(error) if isinstance(error, TussleError) else f"{type(error).__name__}: {error}"
 
 
-class _Stack:
-    """One simulation and the runs in its slots."""
+class _CpuShare:
+    """CPU time of one world of the stack since the beginning, had it always been there.
 
-    def __init__(self, mission: Mission, take: Take, size: int) -> None:
-        self.mission, self.take, self.size = mission, take, size
-        self.slots: list[Run | None] = [None] * size
-        self.again: list[Run] = []
+    Attributes:
+        total: [s].
+    """
+
+    def __init__(self) -> None:
+        self.total = 0.0
+        self._seen = time.process_time()
+
+    def spent_by(self, n_worlds: int) -> None:
+        """What has passed since the last call was spent by so many worlds; by none: it was for something else."""
+        now = time.process_time()
+        if n_worlds:
+            self.total += (now - self._seen) / n_worlds
+        self._seen = now
+
+
+class _Stack:
+    """One simulation and the runs in its slots.
+
+    Args:
+        mission: What is played.
+        take: Where further runs come from.
+        is_wary: Begin each run alone before it joins others.
+    """
+
+    def __init__(self, mission: Mission, take: Take, is_wary: bool) -> None:
+        self.mission, self.take, self.is_wary = mission, take, is_wary
+        self.slots: list[Run | None] = []
         self.sim: Simulation | None = None
         self._host = platform.node()
-        self._alive: list[list[tuple[int, float, int]]] = [[] for _ in range(size)]
-        self._cpu_begun = np.zeros(size)
-        self._cpu = 0.0  # of one world since the beginning, were it always there [s]
+
+    @property
+    def size(self) -> int:
+        """Worlds side by side."""
+        return len(self.slots)
 
     def under_way(self) -> list[Run]:
+        """Runs that are not finished."""
         return [run for run in self.slots if run is not None]
 
     def close(self) -> None:
+        """Release what the simulation holds."""
         if self.sim is not None:
             self.sim.close()
 
     def play(self, runs: Sequence[Run]) -> Iterator[Finished | Beat]:
-        """Play runs, as many as there are slots, and all that follow them."""
+        """Play runs side by side, and all that follow them."""
+        runs = yield from self._able(runs)
+        if not runs:
+            return
         self.slots = list(runs)
-        cpu_seen, beat_at = time.process_time(), time.monotonic() + BEAT_EVERY
-        params = {path: [r.params[path] for r in runs] for path in runs[0].params}
-        sim = self.sim = Simulation(self.mission, [r.seed for r in runs], params, on_error="record")
-        teams = [int(team) for team in sim.context.teams]
-        counts = self._count()
-        self._start = counts.copy()
-        self._note_alive(range(self.size), counts, teams)
-        steps = max(1, self.mission.steps)
+        sim, teams = self._begin(runs)
+        rows, counts, n_before = sim.population.bodies.ints, self._count(), sim.n_running
+        n_steps, beat_at = max(1, self.mission.steps), time.monotonic() + BEAT_EVERY
         has_end = "time" in self.mission.end_conditions
-        rows, n_before = sim.population.bodies.ints, sim.n_running
         while sim.n_running:
             sim.step()
             now = sim.population.bodies.ints
@@ -142,21 +164,33 @@ class _Stack:
                 self._note_alive(changed, left, teams, counts)
                 counts = left
             if sim.n_running < n_before:
-                cpu = time.process_time()
-                self._cpu, cpu_seen = self._cpu + (cpu - cpu_seen) / n_before, cpu
-                over = [w for w, run in enumerate(self.slots) if run is not None and not sim.running[w]]
-                for world in over:
-                    if sim.failed[world] and self.size > 1:
-                        self.again += [r for r in [self.slots[world]] if r is not None]
-                    else:
-                        yield self._finished(world, teams)
-                self._refill(over, counts, teams)
+                self._cpu.spent_by(n_before)
+                yield from self._refill(teams)
                 rows, counts, n_before = sim.population.bodies.ints, self._count(), sim.n_running
-                cpu = time.process_time()
-                self._cpu, cpu_seen = self._cpu + (cpu - cpu_seen) / max(1, n_before), cpu
             if time.monotonic() >= beat_at:
                 beat_at = time.monotonic() + BEAT_EVERY
-                yield Beat(float(sim.steps[sim.running].sum()) / steps if has_end else 0.0)
+                yield Beat(float(sim.steps[sim.running].sum()) / n_steps if has_end else 0.0)
+
+    def _begin(self, runs: Sequence[Run]) -> tuple[Simulation, list[int]]:
+        """The simulation, before its first step, and its teams."""
+        self._cpu = _CpuShare()
+        self._cpu_begun = np.zeros(self.size)
+        self._alive: list[list[tuple[int, float, int]]] = [[] for _ in runs]
+        self.sim = Simulation(self.mission, [r.seed for r in runs], _by_path(runs), on_error="record")
+        teams = [int(team) for team in self.sim.context.teams]
+        self._start = self._count()
+        self._note_alive(range(self.size), self._start, teams)
+        return self.sim, teams
+
+    def _able(self, runs: Sequence[Run]) -> Generator[Finished | Beat, None, list[Run]]:
+        """The runs that can join others; those of which a wary stack sees that they cannot be begun are told."""
+        able = []
+        for run in runs:
+            if not self.is_wary or _can_begin(self.mission, run):
+                able.append(run)
+            else:
+                yield from play_alone(self.mission, run)
+        return able
 
     def _count(self) -> np.ndarray:
         """Entities by world and team, (n_worlds, n_teams)."""
@@ -175,50 +209,69 @@ class _Stack:
                 if before is None or counts[world, k] != before[world, k]:
                     self._alive[world].append((team, float(t[world]), int(counts[world, k])))
 
-    def _refill(self, worlds: list[int], counts: np.ndarray, teams: Sequence[int]) -> None:
-        """Begin further runs in the slots of those that are over."""
+    def _refill(self, teams: Sequence[int]) -> Iterator[Finished | Beat]:
+        """Hand on what is over, and begin further runs in the slots of these."""
         assert self.sim is not None
-        for world in worlds:
-            self.slots[world] = None
-        runs = list(self.take(len(worlds)))
+        free = []
+        for world, run in enumerate(self.slots):
+            if run is None or self.sim.running[world]:
+                continue
+            if self.sim.failed[world] and self.size > 1:
+                self.slots[world] = None
+                yield from play_alone(self.mission, run)
+            else:
+                finished = self._finished(world, run, teams)
+                self.slots[world] = None
+                yield finished
+            free.append(world)
+        runs = yield from self._able(self.take(len(free)))
+        self._cpu.spent_by(0)
         if not runs:
             return
-        chosen = worlds[: len(runs)]
+        chosen = np.array(free[: len(runs)])
         for world, run in zip(chosen, runs, strict=True):
             self.slots[world] = run
             self._alive[world] = []
-            self._cpu_begun[world] = self._cpu
-        params = {path: [r.params[path] for r in runs] for path in runs[0].params}
-        self.sim.reset(chosen, [r.seed for r in runs], params)
+        self._cpu_begun[chosen] = self._cpu.total
+        self.sim.reset(chosen, [r.seed for r in runs], _by_path(runs))
         begun = self._count()
         self._start[chosen] = begun[chosen]
         self._note_alive(chosen, begun, teams)
 
-    def _finished(self, world: int, teams: Sequence[int]) -> Finished:
+    def _finished(self, world: int, run: Run, teams: Sequence[int]) -> Finished:
         assert self.sim is not None
-        run, result = self.slots[world], self.sim.results[world]
-        assert run is not None
+        result = self.sim.results[world]
         assert result is not None
         alive = self._alive[world]
-        if result.t > alive[0][1]:
+        if alive and result.t > alive[0][1]:
             alive += [(team, result.t, n) for team, n in result.alive.items()]
         start = {team: int(n) for team, n in zip(teams, self._start[world], strict=True)}
         return Finished(
             run.number, result.end, result.t, result.steps,
             None if result.error else result.winner, result.state_hash, "" if result.error is None else _told(result.error),
-            self._cpu - float(self._cpu_begun[world]), self._host, _metrics(result, start), alive,
+            self._cpu.total - float(self._cpu_begun[world]), self._host, _metrics(result, start), alive,
         )  # fmt: skip
 
 
-def _metrics(result: WorldResult, start: dict[int, int]) -> list[tuple[int | None, str, float]]:
+def _by_path(runs: Sequence[Run]) -> dict[str, list[Any]]:
+    """What differs among runs of a group: path -> value for each run."""
+    return {path: [run.params[path] for run in runs] for path in runs[0].params}
+
+
+def _metrics(result: WorldResult, start: Mapping[int, int]) -> list[tuple[int | None, str, float]]:
     """All that is counted of a run: by team and of the world."""
     out: list[tuple[int | None, str, float]] = []
-    for name, values in (("score", result.scores), ("alive", result.alive), ("start", start)):
-        out += [(team, name, float(value)) for team, value in values.items()]
+    for name, counts in (("score", result.scores), ("alive", result.alive), ("start", start)):
+        out += [(team, name, float(value)) for team, value in counts.items()]
     for plugin, named in result.metrics.items():
-        for name, value in named.items():
-            if isinstance(value, dict):
-                out += [(team, f"{plugin}.{name}", float(v)) for team, v in value.items()]
+        for name, found in named.items():
+            by_team = found if isinstance(found, dict) else {None: found}
+            if all(isinstance(value, (bool, int, float)) for value in by_team.values()):
+                out += [(team, f"{plugin}.{name}", float(value)) for team, value in by_team.items()]
             else:
-                out.append((None, f"{plugin}.{name}", float(value)))
-    return out
+                warnings.warn(
+                    f"{plugin} reports {name!r} as {found!r}, which is no number, so the batch does not keep it",
+                    RuntimeWarning,
+                    stacklevel=2,
+                )
+    return out or [(None, "alive", 0.0)]  # a run without rows would not be there

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import pickle
+import platform
 import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -66,6 +68,20 @@ class Finished:
     host: str
     metrics: list[tuple[int | None, str, float]]
     alive: list[tuple[int, float, int]]
+
+    @staticmethod
+    def failed(run: Run, error: str, teams: Iterable[int]) -> Finished:
+        """A run of which nothing is known but that it failed.
+
+        Args:
+            run: The run.
+            error: What is known of why.
+            teams: Of its mission.
+        """
+        named: list[int | None] = [int(team) for team in teams]
+        # A run without any row would not be there.
+        metrics = [(team, "alive", math.nan) for team in named or [None]]
+        return Finished(run.number, "error", 0.0, 0, None, "", error, 0.0, platform.node(), metrics, [])
 
 
 @dataclass(frozen=True)
