@@ -5,20 +5,25 @@ from __future__ import annotations
 import hashlib
 import json
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from tussle.batch.executors import FEW, Executor, InProcess, Processes
 from tussle.batch.plan import Plan
 from tussle.batch.points import values_text, variables_of
 from tussle.batch.sampling import sample as sample_points
+from tussle.batch.store import PLUGINS
 from tussle.batch.tasks import PluginFile, Run
-from tussle.batch.treatments import Treatment, build_points, group_points, read_points
-from tussle.batch.variables import Range, Variable
+from tussle.batch.treatments import Treatment, build_points, exactly, group_points, read_points
+from tussle.batch.variables import Range, Variable, written
 from tussle.batch.varied import about, as_variables
 from tussle.engine.simulation import Simulation
-from tussle.errors import BatchError, ParameterError
+from tussle.errors import BatchError, ParameterError, PluginError
 from tussle.mission import Loaded, Mission, read_mission
 from tussle.record.run_file import versions
 
@@ -30,13 +35,16 @@ if TYPE_CHECKING:
 MOST_CHECKED = 16
 """Groups whose game is begun before the batch, to tell what is wrong with it at once."""
 
+MOST_UNASKED = (100_000, 1_000_000)
+"""Seeds and runs of a batch that stops by what it finds, where nobody says how many are too many."""
+
 
 class Batch:
     """One mission, played with many seeds and values.
 
     Args:
         mission: A mission file, the name of one that ships, a `Mission`, or a function of the varied values that makes one.
-        runs: Games of each point, that is of each set of varied values.
+        runs: Games of each point, that is of each set of varied values; None is as many as it takes to stop by what is found, see `play`.
         vary: What varies: texts as on the command line ("prey_speed=20:30"), variables, or a dict by name of (low, high), lists and
             texts ("20:30:log").
         sample: How points are chosen: lhs, sobol, saltelli, grid, list, product; "" chooses by what varies.
@@ -59,7 +67,7 @@ class Batch:
         self,
         mission: str | Path | Mission | Callable[..., Mission],
         *,
-        runs: int = 100,
+        runs: int | None = 100,
         vary: Mapping[str, Any] | Iterable[str | Variable] = (),
         sample: str = "",
         samples: int | None = None,
@@ -88,9 +96,10 @@ class Batch:
         )
         if points is not None:
             self.variables = variables_of(chosen)
-        self.plan = Plan(chosen, runs, first_seed, independent)
+        self.plan = Plan(chosen, _most_seeds(len(chosen)) if runs is None else runs, first_seed, independent)
         self._options = {**options, "plugin_files": tuple(plugin_files)}
         self._ends_by_time = ends_by_time
+        self._is_checked = False
         self.loaded = self._read()
         self.missions = list(self._missions(self.plan.points))
         self.treatments, self.package = group_points(self.missions, self.plugin_files)
@@ -99,21 +108,35 @@ class Batch:
         """The mission file as it stands without any varied value; None for a mission made in Python."""
         if not isinstance(self.source, (str, Path)):
             return None
-        return read_mission(self.source, {k: str(v) for k, v in self.settings.items()}, **self._options)
+        return read_mission(self.source, self._texts, **self._options)
 
-    def _missions(self, points: Sequence[Mapping[str, Any]]) -> Iterable[Mission]:
+    @property
+    def _texts(self) -> dict[str, str]:
+        """What is set in all points, as texts."""
+        numbers = (bool, int, float, np.generic)
+        return {k: written(v) if isinstance(v, numbers) else str(v) for k, v in self.settings.items()}
+
+    def _missions(self, points: Sequence[Mapping[str, Any]]) -> Iterator[Mission]:
+        """The mission of each point; the files that they are read from are noted."""
+        self._files: dict[Path, bytes] = {}
         if isinstance(self.source, (str, Path)):
-            settings = {k: str(v) for k, v in self.settings.items()}
             texts = [values_text(point, self.variables) for point in points]
-            missions = read_points(self.source, settings, texts, **self._options)
+            for loaded in read_points(self.source, self._texts, texts, **self._options):
+                for file in loaded.files:
+                    if file not in self._files:
+                        self._files[file] = file.read_bytes()
+                yield self._ended(loaded.mission)
         else:
-            missions = build_points(self.source, self.settings, [self._with_units(point) for point in points])
-        return (m.ending_by_time() for m in missions) if self._ends_by_time else missions
+            for mission in build_points(self.source, self.settings, [self._with_units(p) for p in points]):
+                yield self._ended(mission)
 
     def _with_units(self, point: Mapping[str, Any]) -> dict[str, Any]:
         """The values of a point as parameters take them: with its unit as a text, otherwise as it is."""
         units = {v.name: v for v in self.variables if isinstance(v, Range) and v.unit}
         return {name: units[name].text(value) if name in units else value for name, value in point.items()}
+
+    def _ended(self, mission: Mission) -> Mission:
+        return mission.ending_by_time() if self._ends_by_time else mission
 
     # -- what is played -----------------------------------------------------------------------------------------------------
 
@@ -140,25 +163,58 @@ class Batch:
     def check(self) -> None:
         """Begin a game of each group, up to some number, and make its first step: what is wrong with it shows at once.
 
+        What fails in a plugin is no matter of this: it may come from the seed, and is the result of its run.
+
         Raises:
             TussleError: A mission cannot be played.
         """
+        if self._is_checked:
+            return
         first = {t.group: point for point, t in reversed(list(enumerate(self.treatments)))}
-        for point in list(first.values())[:MOST_CHECKED]:
-            with Simulation(self.missions[point], self.plan.seed(point), on_error="record") as simulation:
+        for point in sorted(first.values())[:MOST_CHECKED]:
+            with suppress(PluginError), self.simulation(point) as simulation:
                 simulation.step()
+        self._is_checked = True
 
-    @property
+    @cached_property
     def fingerprint(self) -> str:
         """Hash of all that the runs depend on, but for how many there are."""
-        source = self.loaded.text if self.loaded is not None else repr(self.missions)
+        if self.loaded is None:
+            sources = [exactly(mission) for mission in self.missions]
+        else:
+            of_all = set(self.loaded.files)  # they are in its text
+            sources = [
+                self.loaded.text,
+                *(data.hex() for file, data in self._files.items() if file not in of_all),
+            ]
         parts = [
-            source,
+            *sources,
             *(file.text for file in self.plugin_files),
             json.dumps([dict(p) for p in self.plan.points], default=str),
             repr((self.plan.first_seed, self.plan.independent, self._ends_by_time, versions()["tussle"])),
         ]
         return hashlib.blake2b("\0".join(parts).encode(), digest_size=16).hexdigest()
+
+    def mission_files(self) -> dict[str, bytes]:
+        """The mission and all that it is made of, so that each run can be played again: path in one folder -> content.
+
+        What lies elsewhere, on a search path, is not among them: it is found there again.
+        """
+        if self.loaded is None:
+            return {}
+        home = self.loaded.path.parent.resolve()
+        inside = {file.resolve(): data for file, data in self._files.items()}
+        found = {
+            str(file.relative_to(home)): data for file, data in inside.items() if file.is_relative_to(home)
+        }
+        return found | {
+            f"{PLUGINS}/{name}": file.text.encode()
+            for name, file in zip(self._plugin_names(), self.plugin_files, strict=True)
+        }
+
+    def _plugin_names(self) -> list[str]:
+        """Each plugin file in a folder of its own, since two may be called alike."""
+        return [f"{i}/{Path(file.path).name}" for i, file in enumerate(self.plugin_files)]
 
     @property
     def name(self) -> str:
@@ -205,9 +261,9 @@ class Batch:
         return {
             "made_in": "file",
             "file": self.loaded.path.name,
-            "settings": {k: str(v) for k, v in self.settings.items()},
+            "settings": self._texts,
             "ends_by_time": self._ends_by_time,
-            "plugin_files": [f"{i}/{Path(file.path).name}" for i, file in enumerate(self.plugin_files)],
+            "plugin_files": self._plugin_names(),
             "options": {k: v for k, v in self._options.items() if k != "plugin_files"},
         }
 
@@ -249,6 +305,7 @@ class Batch:
             The results.
 
         Raises:
+            TussleError: The mission cannot be played.
             BatchError: The directory holds another batch, or somebody else plays it.
             RecordError: The directory cannot be written.
         """
@@ -260,6 +317,12 @@ class Batch:
         return play_in_directory(
             self, Path(directory), executor, rule, list(command or sys.argv), on_progress
         )
+
+
+def _most_seeds(n_points: int) -> int:
+    """Seeds of a batch that stops by what it finds."""
+    seeds, runs = MOST_UNASKED
+    return max(1, min(seeds, runs // n_points))
 
 
 def _as_until(until: str | Until | None) -> Until | None:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-import shutil
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +16,7 @@ from tussle.batch import store as files
 from tussle.batch.plan import Plan
 from tussle.batch.progress import Progress
 from tussle.batch.results import Results
+from tussle.batch.stopping import Stop
 from tussle.batch.store import PLAYED, Store, Stored
 from tussle.batch.tasks import Finished
 from tussle.errors import BatchError
@@ -25,64 +25,19 @@ from tussle.record.run_file import Timings, plain, versions
 if TYPE_CHECKING:
     from tussle.batch.batch import Batch
     from tussle.batch.executors import Executor
+    from tussle.batch.tasks import Run
     from tussle.batch.until import Until
 
-ROUND = 10
-"""Seeds between two looks at whether enough has been played."""
+MOST_AT_ONCE = 100_000
+"""Runs that are handed to those who play at once, about: more would only lie in memory."""
 
+FIRST_SEEDS = 20
+"""Seeds after which a batch that may stop looks for the first time whether it may; from then on it plays as many again each time."""
 
-class _Stop:
-    """Watches the runs of a batch until a result is known well enough.
-
-    It looks only at whole rounds of seeds, so that the answer does not depend on the order in which runs are finished.
-
-    Args:
-        rule: When it is enough.
-        plan: The runs.
-    """
-
-    def __init__(self, rule: Until, plan: Plan) -> None:
-        self.rule, self.plan = rule, plan
-        self.n_seeds: int | None = None
-        self._rows: dict[int, dict[str, float]] = {}
-        self._whole = 0  # runs from the first on, without a gap
-
-    def add(self, number: int, values: dict[str, float]) -> bool:
-        """A run is finished; true when it is enough."""
-        self._rows[number] = values
-        before = self._whole
-        while self._whole in self._rows:
-            self._whole += 1
-        per_round = ROUND * self.plan.n_points
-        for n in range(before // per_round + 1, self._whole // per_round + 1):
-            if self._is_met(n * per_round):
-                self.n_seeds = n * ROUND
-                return True
-        return False
-
-    def _is_met(self, n_runs: int) -> bool:
-        names = list(dict.fromkeys(name for run in range(n_runs) for name in self._rows[run]))
-        columns = [
-            {
-                name: np.array(
-                    [self._rows[run].get(name, np.nan) for run in range(point, n_runs, self.plan.n_points)]
-                )
-                for name in names
-            }
-            for point in range(self.plan.n_points)
-        ]
-        return bool(self.rule.is_met(columns))
-
-
-def quantities_of(finished: Finished) -> dict[str, float]:
-    """All named results of a run, as they are called in expressions; NaN where it failed."""
-    values = {f"{name}[{team}]" if team is not None else name: v for team, name, v in finished.metrics}
-    scores = [team for team, name, _ in finished.metrics if name == "score"]
-    values |= {f"wins[{team}]": float(team == finished.winner) for team in scores}
-    if scores:
-        values["ties"] = float(finished.winner is None)
-    values |= {"t": finished.t, "steps": float(finished.steps)}
-    return dict.fromkeys(values, np.nan) if finished.end == "error" else values
+IDENTITY = (
+    "tussle", "name", "mission", "variables", "sample", "sample_seed", "n_points", "first_seed", "independent", "dt", "start", "end",
+)  # fmt: skip
+"""What `batch.json` says that tells one batch from another, for people: the fingerprint decides."""
 
 
 class _Course:
@@ -90,9 +45,9 @@ class _Course:
 
     Args:
         batch: What is played.
-        n_seeds: Games of each point.
+        plan: Its runs.
         keep: Receives each finished run.
-        until: When it is enough.
+        stop: Says when it is enough.
         on_progress: Told how far it is.
     """
 
@@ -101,13 +56,17 @@ class _Course:
         batch: Batch,
         plan: Plan,
         keep: Callable[[Finished], None],
-        until: Until | None,
+        stop: Stop | None,
         on_progress: Callable[[Progress], None] | None,
     ) -> None:
-        self.batch, self.plan, self.keep, self.until = batch, plan, keep, until
-        self.stop = None if until is None else _Stop(until, plan)
+        self.batch, self.plan, self.keep, self.stop = batch, plan, keep, stop
         self.progress = Progress(plan.n_runs)
         self.tell = on_progress or (lambda _: None)
+
+    @property
+    def is_enough(self) -> bool:
+        """What was to be known is known."""
+        return self.stop is not None and self.stop.n_seeds is not None
 
     @property
     def final_plan(self) -> Plan:
@@ -117,7 +76,7 @@ class _Course:
         return dataclasses.replace(self.plan, n_seeds=self.stop.n_seeds)
 
     def take_over(self, played: Iterable[Finished]) -> set[int]:
-        """Runs that were finished before; their numbers, and true for enough."""
+        """Count runs that were finished before; their numbers."""
         numbers = set()
         for finished in played:
             numbers.add(finished.number)
@@ -125,30 +84,49 @@ class _Course:
         self.progress.n_before = self.progress.n_done
         return numbers
 
-    def _count(self, finished: Finished) -> bool:
+    def _count(self, finished: Finished) -> None:
         self.progress.count(finished)
-        return self.stop is not None and self.stop.add(finished.number, quantities_of(finished))
+        if self.stop is not None:
+            self.stop.add(finished)
 
     def play(self, done: set[int], executor: Executor | None) -> None:
-        """Play what is missing."""
+        """Play what is missing.
+
+        Raises:
+            TussleError: The mission cannot be played.
+        """
         self.tell(self.progress)
-        if self.stop is not None and self.stop.n_seeds is not None:
-            return
-        runs = [self.batch.run(number) for number in range(self.plan.n_runs) if number not in done]
-        if not runs:
-            return
-        executor = executor or self.batch.executor(n_runs=len(runs))
-        with closing(executor.play(self.batch.package, runs)) as messages:
-            for message in messages:
-                if isinstance(message, Finished):
-                    self.keep(message)
-                    is_enough = self._count(message)
+        for runs in () if self.is_enough else self._rounds(done):
+            self.batch.check()
+            who = executor or self.batch.executor(n_runs=self.plan.n_runs - len(done))
+            with closing(who.play(self.batch.package, runs)) as messages:
+                for message in messages:
+                    if isinstance(message, Finished):
+                        self.keep(message)
+                        self._count(message)
+                    else:
+                        self.progress.beat(message)
                     self.tell(self.progress)
-                    if is_enough:
-                        break
-                else:
-                    self.progress.beat(message)
-                    self.tell(self.progress)
+                    if self.is_enough:
+                        return
+
+    def _rounds(self, done: set[int]) -> Iterator[list[Run]]:
+        """The missing runs, by seeds: all points of some, then all of the next.
+
+        A batch that may stop is dealt out in small rounds at first, so that neither one group of points is played ahead of the others
+        nor much more than is needed.
+        """
+        n_points, n_seeds = self.plan.n_points, self.plan.n_seeds
+        most = max(1, MOST_AT_ONCE // n_points)
+        first = 0
+        while first < n_seeds:
+            n = most if self.stop is None else min(most, max(FIRST_SEEDS, first))
+            last = min(first + n, n_seeds)
+            numbers = range(first * n_points, last * n_points)
+            runs = [self.batch.run(number) for number in numbers if number not in done]
+            if runs:
+                yield runs
+            first = last
 
 
 def play_in_memory(
@@ -159,7 +137,8 @@ def play_in_memory(
 ) -> Results:
     """Play a batch and keep nothing on disk."""
     timings, rows = Timings(), []
-    course = _Course(batch, batch.plan, lambda f: rows.append(files.row(f)), until, on_progress)
+    stop = None if until is None else Stop(until, batch.plan)
+    course = _Course(batch, batch.plan, lambda f: rows.append(files.row(f)), stop, on_progress)
     course.play(set(), executor)
     plan = course.final_plan
     results, alive = files.tables(pa.Table.from_batches(rows, PLAYED), plan.table())
@@ -178,127 +157,140 @@ def play_in_directory(
     """Play what a batch directory lacks.
 
     Raises:
-        BatchError: It holds another batch, or somebody else plays it.
+        TussleError: The mission cannot be played.
+        BatchError: The directory holds another batch, or somebody else plays it.
         RecordError: It cannot be written.
     """
     timings = Timings()
+    if not (path / files.BATCH_FILE).exists():
+        batch.check()  # before anything is written
     store = Store(path)
     try:
         before = store.info
-        plan = _agreed_plan(batch, path, before)
-        if before is not None and _has_all(before, plan, until):
-            if on_progress is not None:
-                on_progress(Progress(before["n_runs"], before["n_runs"], before["n_runs"]))
-            return Results(files.load(path))
-        _begin(store, batch, plan, before, until, command)
-        course = _Course(batch, plan, store.add, until, on_progress)
-        known, _ = files.merged(path, store.played(), plan.table())
+        if before is not None:
+            _check_same(batch, path, before)
+            if _has_all(before, batch.plan, until):
+                if on_progress is not None:
+                    on_progress(Progress(before["n_runs"], before["n_runs"], before["n_runs"]))
+                return Results(files.load(path))
+        played = store.played()
+        n_kept = 0 if before is None else _seeds_to_keep(path, played, before, until)
+        plan = dataclasses.replace(batch.plan, n_seeds=max(batch.plan.n_seeds, n_kept))
+        _begin(store, batch, plan, n_kept, before, until, command)
+        stop = None if until is None else Stop(until, plan, n_kept)
+        course = _Course(batch, plan, store.add, stop, on_progress)
+        known, _ = files.merged(path, played, plan.table())
         done = course.take_over(files.finished_in(known))
         try:
             course.play(done, executor)
         finally:
             store.close_part()
-        design = course.final_plan.table()
-        results, alive = files.merged(path, store.played(), design)
-        if course.final_plan != plan:
-            results, alive = (t.filter(pc.less(t["run"], course.final_plan.n_runs)) for t in (results, alive))
-        store.write_table(files.DESIGN_FILE, design)
-        store.write_table(files.ALIVE_FILE, alive)
-        store.write_table(files.RESULTS_FILE, results)
-        store.drop_parts()
-        store.write_info(_final_info(batch, course, timings, command, before, results))
+        _end(store, batch, course, timings, command, before)
     finally:
         store.close()
     return Results(files.load(path))
 
 
-def _agreed_plan(batch: Batch, path: Path, before: dict[str, Any] | None) -> Plan:
-    """The plan, with as many seeds as the directory has already.
+def _check_same(batch: Batch, path: Path, before: dict[str, Any]) -> None:
+    """See that a directory holds this batch, whatever its number of seeds.
 
     Raises:
-        BatchError: The directory holds another batch.
+        BatchError: It holds another one.
     """
-    if before is None:
-        return batch.plan
-    if before["fingerprint"] != batch.fingerprint:
-        now = plain(batch.info())
-        names = (
-            "tussle",
-            "name",
-            "mission",
-            "variables",
-            "n_points",
-            "first_seed",
-            "independent",
-            "dt",
-            "end",
-        )
-        differing = [name for name in names if before.get(name) != now.get(name)]
-        what = (
-            f"it differs in {', '.join(differing)}"
-            if differing
-            else "the mission file or a plugin file has changed since"
-        )
-        raise BatchError(f"{path}: holds another batch ({what}); choose another directory, or remove it")
-    return dataclasses.replace(batch.plan, n_seeds=max(batch.plan.n_seeds, before["n_seeds_planned"]))
+    if before.get("fingerprint") == batch.fingerprint:
+        return
+    now = plain(batch.info())
+    differing = [
+        f"{name} (there {_shown(before.get(name))}, now {_shown(now.get(name))})"
+        for name in IDENTITY
+        if before.get(name) != now.get(name)
+    ]
+    what = (
+        f"it differs in {', '.join(differing)}"
+        if differing
+        else "the points, the mission or a plugin file have changed since"
+    )
+    raise BatchError(f"{path}: holds another batch: {what}; choose another directory, or remove it")
+
+
+def _shown(value: Any) -> str:
+    text = str(value)
+    return text if len(text) <= 60 else text[:57] + "..."
 
 
 def _has_all(before: dict[str, Any], plan: Plan, until: Until | None) -> bool:
     """Nothing is left to do."""
     if not before["is_complete"]:
         return False
-    is_stopped = before["stopped_by"] is not None
+    is_stopped = before.get("stopped_by") is not None
     if until is not None:
-        return bool(before["until"] == str(until) and (is_stopped or before["n_seeds"] >= plan.n_seeds))
+        return bool(before.get("until") == str(until) and (is_stopped or before["n_seeds"] >= plan.n_seeds))
     return bool(before["n_seeds"] >= plan.n_seeds)
+
+
+def _seeds_to_keep(path: Path, played: pa.Table, before: dict[str, Any], until: Until | None) -> int:
+    """Seeds that the batch has in any case, since games of them were asked for by another command and are finished.
+
+    Those that the same command, before it was killed, had played beyond what is enough do not count: with them the batch would
+    depend on when that was.
+    """
+    if before["is_complete"]:
+        return int(before["n_seeds"])
+    kept = int(before.get("n_seeds_kept", 0))
+    if until is not None and before.get("until") == str(until):
+        return kept
+    old = files.read_table(path, files.RESULTS_FILE, files.RESULTS.names)
+    last = [pc.max(table["run"]).as_py() for table in (played, old) if table is not None and table.num_rows]
+    return max(kept, *(run // int(before["n_points"]) + 1 for run in last)) if last else kept
 
 
 def _begin(
     store: Store,
     batch: Batch,
     plan: Plan,
+    n_kept: int,
     before: dict[str, Any] | None,
     until: Until | None,
     command: Sequence[str],
 ) -> None:
-    """Write down what is going to be played."""
-    if before is None:
-        _keep_mission(store, batch)
-    store.write_table(files.DESIGN_FILE, plan.table())
-    info = {**batch.info(), "n_seeds": plan.n_seeds, "n_runs": plan.n_runs, "n_seeds_planned": plan.n_seeds}
-    so_far = before or {"timings": {"wall_s": 0.0, "cpu_s": 0.0}}
+    """Write down what is going to be played; `batch.json` first, so that it is known whose all that follows is."""
     store.write_info(
         {
-            **info,
+            **batch.info(),
+            "n_seeds": plan.n_seeds,
+            "n_runs": plan.n_runs,
+            "n_seeds_kept": n_kept,
             "until": None if until is None else str(until),
             "stopped_by": None,
             "command": list(command),
             "versions": versions(),
             "is_complete": False,
-            "timings": so_far["timings"],
+            "timings": {"wall_s": _wall_of(before), "cpu_s": 0.0},
         }
     )
+    store.write_folder(files.MISSION, batch.mission_files())
+    store.write_table(files.DESIGN_FILE, plan.table())
 
 
-def _keep_mission(store: Store, batch: Batch) -> None:
-    """Copy the mission and all that it is made of, so that each run can be played again."""
-    if batch.loaded is None:
-        return
-    folder = store.path / files.MISSION
-    with files.told(store.path):
-        shutil.rmtree(folder, ignore_errors=True)
-        home = batch.loaded.path.parent.resolve()
-        for file in batch.loaded.files:
-            source = file.resolve()
-            # What lies elsewhere, on a search path, is found there again.
-            if source.is_relative_to(home):
-                target = folder / source.relative_to(home)
-                target.parent.mkdir(parents=True, exist_ok=True)
-                shutil.copyfile(source, target)
-        for number, plugin_file in enumerate(batch.plugin_files):
-            target = folder / files.PLUGINS / str(number) / Path(plugin_file.path).name
-            target.parent.mkdir(parents=True, exist_ok=True)
-            target.write_text(plugin_file.text, encoding="utf-8")
+def _end(
+    store: Store,
+    batch: Batch,
+    course: _Course,
+    timings: Timings,
+    command: Sequence[str],
+    before: dict[str, Any] | None,
+) -> None:
+    """Make the tables; `batch.json` says last that they are all there."""
+    plan = course.final_plan
+    design = plan.table()
+    results, alive = files.merged(store.path, store.played(), design)
+    if plan != course.plan:
+        results, alive = (t.filter(pc.less(t["run"], plan.n_runs)) for t in (results, alive))
+    store.write_table(files.ALIVE_FILE, alive)
+    store.write_table(files.RESULTS_FILE, results)
+    store.write_table(files.DESIGN_FILE, design)
+    store.drop_parts()
+    store.write_info(_final_info(batch, course, timings, command, before, results))
 
 
 def _final_info(
@@ -309,23 +301,26 @@ def _final_info(
     before: dict[str, Any] | None,
     results: pa.Table,
 ) -> dict[str, Any]:
-    plan, until = course.final_plan, course.until
+    plan, until = course.final_plan, course.stop and course.stop.rule
     spent = timings.so_far()
-    earlier = (before or {}).get("timings", {}).get("wall_s", 0.0)
     first_rows = np.flatnonzero(np.diff(results["run"].to_numpy(), prepend=-1))
     return {
         **batch.info(),
         "n_seeds": plan.n_seeds,
         "n_runs": plan.n_runs,
-        "n_seeds_planned": course.plan.n_seeds,
         "until": None if until is None else str(until),
-        "stopped_by": None if plan == course.plan else str(until),
+        "stopped_by": str(until) if course.is_enough else None,
         "command": list(command),
         "versions": versions(),
         "is_complete": True,
         "timings": {
             "began": spent["began"],
-            "wall_s": round(earlier + spent["wall_s"], 3),
+            "wall_s": round(_wall_of(before) + spent["wall_s"], 3),
             "cpu_s": round(float(results["cpu_s"].to_numpy()[first_rows].sum()), 3),
         },
     }
+
+
+def _wall_of(before: dict[str, Any] | None) -> float:
+    """Wall time of earlier calls that came to their end [s]."""
+    return float((before or {}).get("timings", {}).get("wall_s", 0.0))

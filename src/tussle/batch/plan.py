@@ -42,9 +42,18 @@ class Plan:
                 )
         if not self.points:
             raise ParameterError("a batch needs at least one point")
+        if self.first_seed >= 2**64:
+            raise ParameterError(
+                f"first_seed = {self.first_seed} is not allowed; it takes a whole number from 0 to 2^64 - 1"
+            )
         if self.n_runs > MOST_RUNS:
             raise ParameterError(
                 f"{len(self.points):,} points with {self.n_seeds:,} seeds each are {self.n_runs:,} runs; allowed are {MOST_RUNS:,}"
+            )
+        if self.seed(self.n_runs - 1) >= 2**64:
+            raise ParameterError(
+                f"seeds count up from {self.first_seed}, but the largest is 2^64 - 1, so there are fewer than this batch needs; "
+                "begin with a smaller one"
             )
 
     @property
@@ -61,14 +70,14 @@ class Plan:
 
     def seed(self, run: int) -> int:
         """Seed of a run."""
-        return (self.first_seed + (run if self.independent else run // self.n_points)) % 2**64
+        return self.first_seed + (run if self.independent else run // self.n_points)
 
     def table(self) -> pa.Table:
         """One row per run: run, point, seed, and each varied value."""
         run = np.arange(self.n_runs, dtype=np.int64)
         point = (run % self.n_points).astype(np.int32)
         step = run if self.independent else run // self.n_points
-        seed = (np.uint64(self.first_seed % 2**64) + step.astype(np.uint64)).astype(np.uint64)
+        seed = np.uint64(self.first_seed) + step.astype(np.uint64)
         columns: dict[str, Any] = {"run": run, "point": point, "seed": seed}
         names = list(dict.fromkeys(name for p in self.points for name in p))
         for name in names:

@@ -7,9 +7,10 @@ import fcntl
 import json
 import math
 import os
-from collections.abc import Iterator, Mapping
+import shutil
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
 from pathlib import Path
 from typing import IO, Any
 
@@ -51,6 +52,23 @@ PLAYED = pa.schema(
     ]
 )
 """One row per finished run, as it is appended."""
+
+IS_OWN = (BATCH_FILE, f"{BATCH_FILE}.part", LOCK)
+"""What may lie in a directory in which no batch has been begun: one was killed as it began."""
+
+NEEDED = (
+    "name",
+    "mission",
+    "variables",
+    "n_points",
+    "n_seeds",
+    "first_seed",
+    "independent",
+    "n_runs",
+    "is_complete",
+    "teams",
+)
+"""What `batch.json` says in any case."""
 
 OF_RUN = ("end", "t", "steps", "winner", "state_hash", "error", "cpu_s", "host")
 
@@ -164,17 +182,24 @@ class Store:
         self._stream: Stream | None = None
         with told(path):
             path.mkdir(parents=True, exist_ok=True)
-            foreign = [p.name for p in path.iterdir() if p.name not in (BATCH_FILE, LOCK)]
-            if foreign and not (path / BATCH_FILE).exists():
+            if (path / BATCH_FILE).exists():
+                read_info(path)
+            elif foreign := [p.name for p in path.iterdir() if p.name not in IS_OWN]:
                 raise BatchError(
                     f"{path}: holds something that is no batch ({min(foreign)}); choose another directory"
                 )
-            self._lock: IO[str] = (path / LOCK).open("w")
+            self._lock: IO[str] = (path / LOCK).open("a")
         try:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
+        except BlockingIOError:
             self._lock.close()
             raise BatchError(f"{path}: another process is playing this batch") from None
+        except OSError as error:
+            warnings.warn(
+                f"{path}: this file system has no locks ({error.strerror}); see that nobody else plays this batch meanwhile",
+                RuntimeWarning,
+                stacklevel=2,
+            )
 
     @property
     def info(self) -> dict[str, Any] | None:
@@ -191,11 +216,30 @@ class Store:
         draft = self.path / f"{name}.part"
         with told(self.path):
             try:
-                pq.write_table(table, draft, compression="zstd")
+                pq.write_table(table, draft, compression="zstd", write_page_checksum=True)
                 draft.replace(self.path / name)
             except OSError:
                 draft.unlink(missing_ok=True)
                 raise
+
+    def write_folder(self, name: str, files: Mapping[str, bytes]) -> None:
+        """Put a folder in its place, unless it is there.
+
+        Args:
+            name: Of the folder.
+            files: Path in it -> content.
+        """
+        target, draft = self.path / name, self.path / f"{name}.part"
+        if target.exists():
+            return
+        with told(self.path):
+            shutil.rmtree(draft, ignore_errors=True)
+            draft.mkdir()
+            for inner, content in files.items():
+                file = draft / inner
+                file.parent.mkdir(parents=True, exist_ok=True)
+                file.write_bytes(content)
+            draft.replace(target)
 
     def played(self) -> pa.Table:
         """All runs that are finished, in the order in which they were."""
@@ -262,6 +306,9 @@ def read_info(path: Path) -> dict[str, Any]:
     found = info.get("format") if isinstance(info, dict) else None
     if found != FORMAT:
         raise BatchError(f"{file}: the batch has format {found!r}; this tussle reads format {FORMAT}")
+    missing = [name for name in NEEDED if name not in info]
+    if missing:
+        raise BatchError(f"{file}: it says nothing of {', '.join(missing)}")
     return dict(info)
 
 
@@ -277,31 +324,44 @@ def read_played(path: Path) -> tuple[pa.Table, list[str]]:
     return pa.concat_tables(parts), notes
 
 
-def read_table(path: Path, name: str) -> pa.Table | None:
+def read_table(path: Path, name: str, columns: Sequence[str]) -> pa.Table | None:
     """A table of a batch directory; None where there is none.
 
+    Args:
+        path: The directory.
+        name: Of the file.
+        columns: What it has at least.
+
     Raises:
-        BatchError: It cannot be read.
+        BatchError: It cannot be read, or is another table.
     """
     file = path / name
     if not file.exists():
         return None
     try:
-        return pq.read_table(file)
+        table = pq.read_table(file, page_checksum_verification=True)
     except (OSError, pa.ArrowException) as error:
         raise BatchError(f"{file}: cannot be read: {error}") from None
+    missing = [column for column in columns if column not in table.column_names]
+    if missing:
+        raise BatchError(f"{file}: is no table of a batch; it has no column {missing[0]!r}")
+    return table
 
 
 def finished_in(results: pa.Table) -> Iterator[Finished]:
     """The runs of a table of results, without the numbers over time."""
     runs = results["run"].to_numpy()
     starts = np.flatnonzero(np.diff(runs, prepend=-1))
-    for start, stop in pairwise([*starts, len(runs)]):
-        rows = results.slice(start, stop - start).to_pylist()
-        first = rows[0]
-        metrics = [(r["team"], r["metric"], np.nan if r["value"] is None else r["value"]) for r in rows]
-        of_run = {name: first[name] for name in OF_RUN} | {"error": first["error"] or ""}
-        yield Finished(number=first["run"], metrics=metrics, alive=[], **of_run)
+    named = [results[name].to_pylist() for name in ("team", "metric", "value")]
+    of_run = results.select(["run", *OF_RUN]).take(pa.array(starts)).to_pylist()
+    stops = np.append(starts, len(runs))[1:]
+    for start, stop, first in zip(starts, stops, of_run, strict=True):
+        metrics = [
+            (team, name, math.nan if value is None else value)
+            for team, name, value in zip(*(column[start:stop] for column in named), strict=True)
+        ]
+        number, error = first.pop("run"), first.pop("error") or ""
+        yield Finished(number=number, error=error, metrics=metrics, alive=[], **first)
 
 
 def load(path: str | Path) -> Stored:
@@ -312,22 +372,30 @@ def load(path: str | Path) -> Stored:
     """
     path = Path(path)
     info = read_info(path)
-    design = read_table(path, DESIGN_FILE)
+    design = read_table(path, DESIGN_FILE, ("run", "point", "seed"))
     if design is None:
         raise BatchError(
             f"{path}: {DESIGN_FILE} is not there: the batch was stopped before its first run; play it again"
         )
     played, notes = read_played(path)
+    if info["is_complete"] and not (path / RESULTS_FILE).exists():
+        raise BatchError(f"{path}: {RESULTS_FILE} is not there, though the batch was complete")
     results, alive = merged(path, played, design)
     n = len(pc.unique(results["run"]))
-    if not info.get("is_complete"):
+    if not info["is_complete"]:
         notes = [f"the batch is not complete: {n} of {design.num_rows} runs are finished"]
     return Stored(path, info, design, results, alive, notes)
 
 
 def merged(path: Path, played: pa.Table, design: pa.Table) -> tuple[pa.Table, pa.Table]:
-    """The tables of a directory with runs that have been played since."""
-    old, old_alive = read_table(path, RESULTS_FILE), read_table(path, ALIVE_FILE)
+    """The tables of a directory with runs that have been played since.
+
+    Raises:
+        BatchError: A table cannot be read, or is missing.
+    """
+    old, old_alive = read_table(path, RESULTS_FILE, RESULTS.names), read_table(path, ALIVE_FILE, ALIVE.names)
+    if old is not None and old_alive is None:
+        raise BatchError(f"{path}: {ALIVE_FILE} is not there, but {RESULTS_FILE} is; the batch is damaged")
     results, alive = tables(played, design)
     # Each by its own runs: a batch that is killed as it ends may have written one table and not the other.
     results = _with_new(old, results, ("run", "team", "metric"))

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import dataclasses
+import inspect
 import pickle
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from tussle.batch.tasks import Package, PluginFile
 from tussle.engine.params import BLOCK_VALUES
 from tussle.errors import MissionError, ParameterError, TussleError, listed, nearest_name
-from tussle.mission import Block, Mission, read_mission
+from tussle.mission import Block, Loaded, Mission, read_mission
 
 Point = Mapping[str, Any]
 Signature = tuple[Any, ...]
@@ -28,7 +33,7 @@ class Treatment:
 
 def read_points(
     source: str | Path, settings: Mapping[str, str], texts: Sequence[Mapping[str, str]], **options: Any
-) -> Iterator[Mission]:
+) -> Iterator[Loaded]:
     """The mission file once for each point.
 
     Args:
@@ -41,16 +46,14 @@ def read_points(
         MissionError: A point cannot be played; the message names it.
     """
     for number, text in enumerate(texts):
-        try:
-            yield read_mission(source, {**settings, **text}, **options).mission
-        except TussleError as error:
-            values = ", ".join(f"{k}={v}" for k, v in text.items())
-            where = f"point {number} ({values}): " if text else ""
-            raise type(error)(f"{where}{error}") from None
+        with _naming(number, text):
+            yield read_mission(source, {**settings, **text}, **options)
 
 
 def build_points(
-    source: Mission | Callable[..., Mission], settings: Mapping[str, Any], points: Sequence[Point]
+    source: Mission | Callable[..., Mission],
+    settings: Mapping[str, Any],
+    points: Sequence[Point],
 ) -> Iterator[Mission]:
     """A mission made in Python once for each point.
 
@@ -63,17 +66,51 @@ def build_points(
         ParameterError: A path leads nowhere, or a value is not allowed.
         MissionError: A function gives no mission.
     """
-    for point in points:
+    for number, point in enumerate(points):
         values = {**settings, **point}
-        if isinstance(source, Mission):
-            mission = source
-            for path, value in values.items():
-                mission = with_value(mission, path, value)
-        else:
-            mission = source(**values)
-            if not isinstance(mission, Mission):
-                raise MissionError(f"{source!r} gave {mission!r} for {values}; it is to give a Mission")
+        with _naming(number, point):
+            if isinstance(source, Mission):
+                mission = source
+                for path, value in values.items():
+                    mission = with_value(mission, path, value)
+            else:
+                mission = _made(source, values)
         yield mission
+
+
+@contextmanager
+def _naming(number: int, values: Point) -> Iterator[None]:
+    """An error inside is one of this point, and says so."""
+    try:
+        yield
+    except TussleError as error:
+        if not values:
+            raise
+        said = ", ".join(f"{k}={v}" for k, v in values.items())
+        raise type(error)(f"point {number} ({said}): {error}") from None
+
+
+def _made(function: Callable[..., Mission], values: Mapping[str, Any]) -> Mission:
+    """What a function makes of the values.
+
+    Raises:
+        ParameterError: It does not take one of them, or needs another.
+        MissionError: It gives no mission.
+    """
+    name = getattr(function, "__name__", repr(function))
+    signature = inspect.signature(function)
+    try:
+        signature.bind(**values)
+    except TypeError as error:
+        known = list(signature.parameters)
+        hint = "".join(nearest_name(k, known) for k in values if k not in known)
+        raise ParameterError(
+            f"{name} cannot be called with what varies: {error}{hint}; it takes {', '.join(known)}"
+        ) from None
+    mission = function(**values)
+    if not isinstance(mission, Mission):
+        raise MissionError(f"{name} gave {mission!r}; it is to give a Mission")
+    return mission
 
 
 def with_value(mission: Mission, path: str, value: Any) -> Mission:
@@ -179,6 +216,12 @@ def group_points(
     return [t for t in treatments if t is not None], Package(
         tuple(pickle.dumps(m) for m in bases), tuple(plugin_files)
     )
+
+
+def exactly(mission: Mission) -> str:
+    """All of a mission as text, with every digit: `repr` rounds arrays and leaves out the middle of long ones."""
+    with np.printoptions(threshold=sys.maxsize, floatmode="unique"):
+        return repr(mission)
 
 
 def split(mission: Mission) -> tuple[Signature, dict[str, Any]]:
