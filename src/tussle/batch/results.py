@@ -72,8 +72,10 @@ class Results:
         self._seed_index: np.ndarray = self._run // max(1, len(self.points))
         self._is_failed = run_table.is_failed(facts)
         self._columns = self._quantities_of(facts)
-        keyed = run_table.with_values(facts, self.design, [v.name for v in self.variables])
-        self.runs: pa.Table = pa.table({name: keyed[name] for name in keyed.column_names} | self._new(keyed))
+        names = [v.name for v in self.variables]
+        keyed = run_table.with_values(facts, self.design, names, self._columns)
+        new = {n: pa.array(v) for n, v in self._columns.items() if n not in run_table.FACTS}
+        self.runs: pa.Table = pa.table(keyed | new)
 
     def _quantities_of(self, facts: pa.Table) -> dict[str, np.ndarray]:
         metrics = run_table.metric_columns(self.table)
@@ -93,10 +95,6 @@ class Results:
         order = [column_name(metric, team) for metric in FIRST for team in (*self.teams, None)]
         columns = {name: columns[name] for name in dict.fromkeys([*order, *columns]) if name in columns}
         return {name: np.where(self._is_failed, np.nan, values) for name, values in columns.items()}
-
-    def _new(self, keyed: pa.Table) -> dict[str, pa.Array]:
-        """The quantities that are no column of the runs yet."""
-        return {n: pa.array(v) for n, v in self._columns.items() if n not in keyed.column_names}
 
     # -- what there is ----------------------------------------------------------------------------------------------------
 

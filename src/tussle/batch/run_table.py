@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 import pyarrow as pa
@@ -58,17 +58,20 @@ def is_failed(runs: pa.Table) -> np.ndarray:
     return failed
 
 
-def with_values(runs: pa.Table, design: pa.Table, names: Sequence[str]) -> pa.Table:
-    """Keys, values of the variables and facts of each run; a variable called as one of the facts stands as "varied NAME".
+def with_values(
+    runs: pa.Table, design: pa.Table, names: Sequence[str], taken: Collection[str]
+) -> dict[str, pa.ChunkedArray]:
+    """Keys, values of the variables and facts of each run; a variable whose name is taken stands as "varied NAME".
 
     Args:
         runs: One row per run.
         design: One row per planned run, in order.
         names: Of the variables.
+        taken: Names of other columns, besides the facts.
     """
     place = np.searchsorted(design["run"].to_numpy(), runs["run"].to_numpy())
     values = design.select(list(names)).take(pa.array(place))
     columns = {name: runs[name] for name in KEYS}
     for name in names:
-        columns[f"varied {name}" if name in FACTS else name] = values[name]
-    return pa.table(columns | {name: runs[name] for name in FACTS})
+        columns[f"varied {name}" if name in FACTS or name in taken else name] = values[name]
+    return columns | {name: runs[name] for name in FACTS}

@@ -98,7 +98,7 @@ def test_quantities_and_comparisons_can_be_asked_for(tussle, paired):
     first, *_folded = lines_of(done.stdout, "compared")
     assert first[1:5] == ["+3", "3", "–", "3"]
     assert "score[2]-score[3]" in done.stdout
-    assert "score[3] " not in done.stdout
+    assert "alive[1]" not in done.stdout
 
 
 def test_twenty_points_are_shown_or_all(tussle, folder):

@@ -120,14 +120,16 @@ def test_a_batch_directory_is_loaded(tmp_path, grid):
 
 
 def test_values_of_a_choice_stay_what_they_were():
-    mixed = [Choice("n", (5, "many", True, 0.5)), Choice("end", (1, 2))]
-    points = [{"n": n, "end": 1 + i % 2} for i, n in enumerate((5, "many", True, 0.5))]
+    mixed = [Choice("n", (5, "many", True, 0.5)), Choice("end", (1, 2)), Choice("ties", (7,))]
+    points = [{"n": n, "end": 1 + i % 2, "ties": 7} for i, n in enumerate((5, "many", True, 0.5))]
     results = Results(made_batch(scores(1, 4), variables=mixed, points=points))
     assert results.points == points
     assert [type(p["n"]) for p in results.points] == [int, str, bool, float]
     assert results.runs["varied end"].to_pylist() == [1, 2, 1, 2]  # a run has an end of its own
     assert results.runs["end"].to_pylist() == ["time"] * 4
-    assert results.label(1) == "n=many, end=2"
+    assert results.runs["varied ties"].to_pylist() == [7] * 4
+    assert results.runs["ties"].to_pylist() == results.quantity("ties").tolist()
+    assert results.label(1) == "n=many, end=2, ties=7"
 
 
 def test_labels_and_titles_are_for_people(grid):

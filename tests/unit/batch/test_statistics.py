@@ -9,7 +9,7 @@ import time
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import binomtest, bootstrap
 
@@ -30,6 +30,7 @@ from tussle.batch.statistics import (
 # -- shares ---------------------------------------------------------------------------------------------------------------
 
 
+@settings(deadline=None)
 @given(
     st.integers(1, 5000).flatmap(lambda n: st.tuples(st.integers(0, n), st.just(n))),
     st.sampled_from([0.9, 0.95, 0.99]),
@@ -165,6 +166,7 @@ def test_intervals_of_means_hold_as_often_as_they_say():
 # -- blocks ---------------------------------------------------------------------------------------------------------------
 
 
+@settings(deadline=None)
 @given(st.lists(st.tuples(st.floats(-1e3, 1e3), st.integers(0, 6)), min_size=1, max_size=50))
 def test_values_of_blocks_have_the_mean_of_all(pairs):
     values, blocks = np.array([v for v, _ in pairs]), np.array([b for _, b in pairs])
