@@ -150,7 +150,7 @@ def _points(found: Analysis, shows_all: bool) -> Iterable[RenderableType]:
     winners = [share.name for share in found.shares if share.n]
     names = [mean.name for mean in found.points[0].means]
     heads = [
-        *_short(found.variables),
+        *_with_units(_short(found.variables), found.variables),
         *(f"{name} %" for name in winners),
         *(found.titles.get(n, n) for n in names),
     ]
@@ -190,6 +190,7 @@ def _short(variables: Sequence[Variable]) -> list[str]:
 
 
 def _with_units(names: Sequence[str], variables: Sequence[Variable]) -> list[str]:
+    """Names with the units of their variables: "speed [kt]"."""
     units = [v.unit if isinstance(v, Range) else "" for v in variables]
     return [f"{name} [{unit}]" if unit else name for name, unit in zip(names, units, strict=True)]
 
