@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
 from collections import deque
 from collections.abc import Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
+from types import ModuleType
 from typing import TYPE_CHECKING, Any, Protocol
 
 from tussle.batch.stack import BEAT_EVERY, play, stack_size
@@ -166,7 +168,7 @@ class _Player:
             target=_work, args=(theirs, package, stack, n_processes), daemon=True, name="tussle-batch"
         )
         try:
-            with _quiet_threads(), _deaf_to_interrupts():
+            with _quiet_threads(), _deaf_to_interrupts(), _without_script(package):
                 self.process.start()
         except OSError as error:
             raise BatchError(f"a process that was to play cannot be started: {error}") from error
@@ -272,6 +274,18 @@ def _deaf_to_interrupts() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def _without_script(package: Package) -> Iterator[None]:
+    """While open, processes that are started do not run the caller's script again, unless a plugin of the package is defined there."""
+    script = sys.modules["__main__"]
+    if not any(b"__main__" in mission for mission in package.missions):
+        sys.modules["__main__"] = ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = script
 
 
 # -- in the process that plays ----------------------------------------------------------------------------------------------
