@@ -250,6 +250,18 @@ class BoundaryShape(Message):
     shape = Handle(doc="A shape of `tussle.scene`.")
 
 
+class WorldPointClicked(Message):
+    """Someone who watches has pointed at a place in the world; sender is 0."""
+
+    pos = Field("x y z", unit="m m m")
+
+
+class CustomKeyPress(Message):
+    """Someone who watches has pressed the key that is kept for the plugins; sender is 0."""
+
+    key = Handle(doc="Name of the key.")
+
+
 class SpawnEntity(Message):
     """Ask for a new entity of a block; it appears at the beginning of the next step."""
 

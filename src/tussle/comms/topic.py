@@ -98,6 +98,9 @@ class TopicBuffer:
 
     def drop_worlds(self, gone: np.ndarray) -> None:
         """Forget all messages of the worlds where gone, (n_worlds,), is true."""
+        self.sent = [batch.take(np.flatnonzero(~gone[batch.world])) for batch in self.sent]
+        self.sent = [batch for batch in self.sent if batch.n]
+        self._joined = None
         self.queue = _without(self.queue, gone)
         for inbox in self.inboxes:
             inbox.parcels = _without(inbox.parcels, gone)

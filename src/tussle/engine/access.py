@@ -297,6 +297,7 @@ def restore(sim: Simulation, saved: Snapshot) -> None:
     sim.running[:], sim.failed[:] = world["running"], world["failed"]
     sim.results, sim.parked = list(world["results"]), dict(world["parked"])
     sim.world_view.births = list(world["wishes"])
+    sim.world_view.deaths, sim.world_view.moved = [], []  # of a step that was broken off
     sim.overrides.restore(world["params"])
     sim.after_restore()
     for referee, columns in zip(sim.referees, world["referees"], strict=True):
@@ -388,8 +389,8 @@ def _hashed_columns(group: Group, binding: Binding, rows: np.ndarray) -> Iterato
         assert not isinstance(column, Handle) or name in binding.handles
 
 
-def world_result(sim: Simulation, world: int, reason: str) -> WorldResult:
-    """What a world's game has come to by now."""
+def world_result(sim: Simulation, world: int, reason: str, is_hashed: bool = True) -> WorldResult:
+    """What a world's game has come to by now; without the state hash where that is not wanted, which takes longer than the rest."""
     bodies = sim.population.bodies
     here = bodies.team[bodies.world == world]
     alive = {int(team): int((here == team).sum()) for team in sim.context.teams}
@@ -408,7 +409,8 @@ def world_result(sim: Simulation, world: int, reason: str) -> WorldResult:
         for team, score in (found.get("score") or {}).items() if referee in sim.metrics else ():
             scores[team] = scores.get(team, 0.0) + score
     result.scores = scores
-    result.state_hash = state_hash(sim, world)
+    if is_hashed:
+        result.state_hash = state_hash(sim, world)
     return result
 
 

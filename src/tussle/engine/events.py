@@ -58,6 +58,8 @@ class Herald:
         other: np.ndarray,
         text: list[str],
     ) -> None:
+        if self._sim.is_replaying:
+            return
         happenings = Happenings(kind, world, step, ids, other, text)
         for listener in list(self._listeners):
             listener(happenings)

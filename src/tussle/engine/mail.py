@@ -133,21 +133,22 @@ class Mail:
             topic.drop_worlds(gone)
 
     def save(self) -> Any:
-        """Queues and inboxes; parcels are never written to, so the lists are enough."""
+        """Outboxes, queues and inboxes; batches and parcels are never written to, so the lists are enough."""
         return {
-            key: (t.type, list(t.queue), [list(i.parcels) for i in t.inboxes])
+            key: (t.type, list(t.queue), [list(i.parcels) for i in t.inboxes], list(t.sent))
             for key, t in self.topics.items()
         }
 
     def restore(self, saved: Any) -> None:
-        for (network, name), (type_, _, _) in saved.items():
+        for (network, name), (type_, *_) in saved.items():
             self.topic(network, name, type_, "snapshot")
         for key, topic in self.topics.items():
-            _, queue, parcels = saved.get(
-                key, (None, [], [])
+            _, queue, parcels, sent = saved.get(
+                key, (None, [], [], [])
             )  # a topic or group that came later has had nothing then
             topic.queue = list(queue)
             topic.clear_outbox()
+            topic.sent.extend(sent)
             for i, inbox in enumerate(topic.inboxes):
                 inbox.parcels = list(parcels[i]) if i < len(parcels) else []
 
@@ -157,6 +158,9 @@ class Mail:
         for key in sorted(self.topics):
             topic = self.topics[key]
             name = "/".join(key).encode()
+            said = topic.outbox() if topic.sent else None  # from outside, or by a referee at the start
+            if said is not None and (mine := np.flatnonzero(said.world == world)).size:
+                found.append(b"|".join([name, b"said", *_numbers(said.take(mine))]))
             for parcel in topic.queue:
                 mine = parcel.batch.world == world
                 if mine.any():

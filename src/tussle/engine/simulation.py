@@ -28,6 +28,7 @@ from tussle.engine.start_from import RecordedBirths
 from tussle.engine.step_end import StepEnd
 from tussle.engine.subset import call_referee
 from tussle.errors import MissionError, ParameterError, PluginError
+from tussle.messages import Batch, Message
 from tussle.mission import Mission
 from tussle.stock import advise_controllers
 
@@ -81,6 +82,9 @@ class Simulation:
         self.parked: dict[int, access.Parked] = {}
         self.events = Herald(self)
         self.is_closed = False
+        self.is_replaying = (
+            False  # observers and listeners have been told of these steps and are not told again
+        )
         self.step_end = StepEnd(self)
         self._resumed = threading.Event()
         self._resumed.set()
@@ -194,8 +198,9 @@ class Simulation:
         try:
             if self.births.has_rates or self.world_view.births:
                 self._give_birth()
-            for observer in self.observers:
-                observer(self)
+            if not self.is_replaying:
+                for observer in self.observers:
+                    observer(self)
             for call in self.schedule:
                 call.run()
         except PluginError as error:
@@ -432,6 +437,40 @@ class Simulation:
     def write(self, path: str, values: Any) -> None:
         """Set a column by path, shaped as `read` gives it; rows of the dead are ignored. A parameter is set for now, not for resets."""
         access.write(self, path, values)
+
+    def publish(
+        self,
+        type_: type[Message],
+        worlds: Iterable[int] | None = None,
+        *,
+        network: str = "GlobalNetwork",
+        topic: str = "",
+        **fields: Any,
+    ) -> None:
+        """Say something to the plugins from outside, between two steps: part of the next step, in the name of the world (sender 0).
+
+        World plugins read it in that step, entities hear it in the one after, as all messages.
+
+        Args:
+            type_: The message type.
+            worlds: Worlds that it is said in; by default all that are running.
+            network: The network that carries it.
+            topic: By default the type's name.
+            **fields: Of the message; one value, or one per world along the last axis.
+
+        Raises:
+            ParameterError: There is no such world, or the type has no such field.
+            WiringError: There is no such network, or the topic carries another type.
+        """
+        chosen = (
+            np.arange(self.n_worlds)[self.running] if worlds is None else np.array(list(worlds), np.int64)
+        )
+        if len(chosen) and (chosen.min() < 0 or chosen.max() >= self.n_worlds):
+            raise ParameterError(f"publish: there are worlds 0 to {self.n_worlds - 1}, not {chosen.tolist()}")
+        batch = Batch.make(type_, chosen, np.zeros(len(chosen), np.int64), fields)
+        self.mail.topic(network, topic or type_.__name__, type_, "publish").add(
+            batch.take(np.flatnonzero(self.running[chosen]))
+        )
 
     def snapshot(self) -> access.Snapshot:
         """All columns, and nothing else. `restore` goes back to it: the same future, bit for bit."""

@@ -1,0 +1,144 @@
+"""What is said to a game from outside reaches its plugins, and snapshots keep it."""
+
+import numpy as np
+import pytest
+
+from tussle import Block, Mission, Recorder, Simulation, load_run
+from tussle.api import Autonomy, Interaction, Output, State, Subscribe
+from tussle.errors import ParameterError, WiringError
+from tussle.messages import CustomKeyPress, WorldPointClicked
+from tussle.stock import SingleIntegrator
+
+
+class GoWhereClicked(Autonomy):
+    """Stay, or fly to the last place that somebody pointed at."""
+
+    goal = State("x y z", unit="m")
+    velocity = Output("velocity_x velocity_y velocity_z", unit="m/s")
+    clicked = Subscribe(WorldPointClicked)
+
+    def spawn(self, g, rows):
+        self.goal[:, rows] = g.pos[:, rows]
+
+    def step(self, g):
+        rows, heard = self.clicked.latest()
+        self.goal[:, rows] = heard.pos
+        self.velocity[:] = self.goal - g.pos
+
+
+class CountsClicks(Interaction):
+    """Counts what it sees in the step in which it is said."""
+
+    clicks = State(dtype=int, per="world")
+    keys = State(dtype=int, per="world")
+    step_of_click = State(dtype=int, per="world")
+
+    def step(self, w):
+        for world in w.inbox(WorldPointClicked).world:
+            self.clicks[world] += 1
+            self.step_of_click[world] = w.step_count[world]
+        for world, key in zip(w.inbox(CustomKeyPress).world, w.inbox(CustomKeyPress).key, strict=True):
+            self.keys[world] += ord(key)
+
+
+def game(seeds=1, **changes):
+    block = Block(
+        name="drone", team=1, count=3, autonomy=GoWhereClicked(), motion=SingleIntegrator(max_speed=50.0)
+    )
+    mission = Mission(blocks=[block], interactions=[CountsClicks()], end=20.0).replace(**changes)
+    return Simulation(mission, seeds)
+
+
+def test_a_click_is_heard_in_the_next_step_and_acted_upon_in_the_one_after():
+    sim, other = game(), game()
+    sim.step(3)
+    other.step(3)
+    sim.publish(WorldPointClicked, pos=(100.0, 50.0, 20.0))
+    assert sim.read("CountsClicks.clicks")[0] == [0]
+    sim.step()
+    other.step()
+    assert sim.read("CountsClicks.clicks")[0] == [1]
+    assert sim.read("CountsClicks.step_of_click")[0] == [3]
+    np.testing.assert_array_equal(sim.read("drone.pos")[0], other.read("drone.pos")[0])
+    sim.step(150)
+    np.testing.assert_allclose(sim.read("drone.pos")[0][0], [[100.0, 50.0, 20.0]] * 3, atol=5.0)
+
+
+def test_a_key_carries_its_name():
+    sim = game()
+    sim.publish(CustomKeyPress, key="k")
+    sim.step()
+    assert sim.read("CountsClicks.keys")[0] == [ord("k")]
+
+
+def test_it_is_said_in_the_worlds_that_are_asked_for_and_in_none_that_has_ended():
+    sim = game(seeds=[1, 2, 3])
+    sim.publish(WorldPointClicked, [0, 2], pos=np.array([[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]]))
+    sim.step()
+    assert sim.read("CountsClicks.clicks")[0].tolist() == [1, 0, 1]
+    sim.publish(WorldPointClicked, pos=(1, 2, 3))
+    sim.step(2)
+    assert sim.read("CountsClicks.clicks")[0].tolist() == [2, 1, 2]
+    sim.run()
+    before = [sim.state_hash(w) for w in range(3)]
+    sim.publish(WorldPointClicked, pos=(1, 2, 3))
+    sim.publish(WorldPointClicked, [1], pos=(1, 2, 3))
+    sim.step()
+    assert [sim.state_hash(w) for w in range(3)] == before
+
+
+def test_a_snapshot_keeps_what_has_been_said_and_the_hash_knows_it():
+    sim = game()
+    sim.step(2)
+    silent = sim.state_hash()
+    sim.publish(WorldPointClicked, pos=(100.0, 50.0, 20.0))
+    told = sim.state_hash()
+    assert told != silent
+    saved = sim.snapshot()
+    sim.step(30)
+    future = sim.state_hash()
+    sim.restore(saved)
+    assert sim.state_hash() == told
+    sim.step(30)
+    assert sim.state_hash() == future
+    assert sim.read("CountsClicks.clicks")[0] == [1]
+
+
+def test_a_world_that_begins_anew_has_forgotten_it_and_the_others_have_not():
+    sim = game(seeds=[1, 2])
+    sim.step()
+    sim.publish(WorldPointClicked, pos=(100.0, 50.0, 20.0))
+    sim.reset([0])
+    sim.step()
+    assert sim.read("CountsClicks.clicks")[0].tolist() == [0, 1]
+
+
+def test_what_cannot_be_said():
+    sim = game()
+    with pytest.raises(ParameterError, match=r"worlds 0 to 0, not \[1\]"):
+        sim.publish(WorldPointClicked, [1], pos=(1, 2, 3))
+    with pytest.raises(ParameterError, match="has no field 'position'"):
+        sim.publish(WorldPointClicked, position=(1, 2, 3))
+    with pytest.raises(WiringError, match="did you mean 'GlobalNetwork'"):
+        sim.publish(WorldPointClicked, network="GlobalNetwerk", pos=(1, 2, 3))
+    with pytest.raises(WiringError, match="carries WorldPointClicked, not CustomKeyPress"):
+        sim.publish(CustomKeyPress, topic="WorldPointClicked", key="k")
+
+
+def test_steps_that_are_replayed_are_recorded_once(tmp_path):
+    plain = game()
+    with Recorder(plain, tmp_path / "plain"):
+        plain.run()
+    sim = game()
+    with Recorder(sim, tmp_path / "back"):
+        start = sim.snapshot()
+        sim.step(60)
+        sim.restore(start)
+        sim.is_replaying = True
+        sim.step(60)
+        sim.is_replaying = False
+        sim.run()
+    one, two = load_run(tmp_path / "plain"), load_run(tmp_path / "back")
+    assert one.trajectory_table == two.trajectory_table
+    assert one.events_table == two.events_table
+    assert two.is_complete
