@@ -151,7 +151,7 @@ def _points(found: Analysis, shows_all: bool) -> Iterable[RenderableType]:
     names = [mean.name for mean in found.points[0].means]
     heads = [
         *_with_units(_short(found.variables), found.variables),
-        *(f"{name} %" for name in winners),
+        *(f"{name}\n%" for name in winners),
         *(found.titles.get(n, n) for n in names),
     ]
     table = Table(box=box.SIMPLE_HEAD, header_style="bold", pad_edge=False, padding=(0, 1))
@@ -190,9 +190,9 @@ def _short(variables: Sequence[Variable]) -> list[str]:
 
 
 def _with_units(names: Sequence[str], variables: Sequence[Variable]) -> list[str]:
-    """Names with the units of their variables: "speed [kt]"."""
+    """Names with the units of their variables under them."""
     units = [v.unit if isinstance(v, Range) else "" for v in variables]
-    return [f"{name} [{unit}]" if unit else name for name, unit in zip(names, units, strict=True)]
+    return [f"{name}\n[{unit}]" if unit else name for name, unit in zip(names, units, strict=True)]
 
 
 def _cells(point: PointResult, winners: Sequence[str]) -> Iterable[str]:
