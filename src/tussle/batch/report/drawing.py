@@ -1,0 +1,266 @@
+"""The look of all plots, and how they become SVG and PNG: one palette, thin lines, the same bytes for the same batch."""
+
+from __future__ import annotations
+
+import io
+import re
+import unicodedata
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+from xml.etree import ElementTree as ET
+
+from tussle.errors import MissingExtraError
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+WIDTH = 4.4
+"""Of a plot [inch]: its letters stay legible where a telephone shows it 370 pixels wide."""
+
+INK, MUTED, GRID, PAPER = "#20252b", "#5f6a76", "#dfe3e8", "#fefefe"
+"""Of letters, of what stands back, of helping lines, of the ground; the page puts its own in their place."""
+
+# Okabe and Ito (2008), "Color Universal Design": told apart with any kind of colour vision. Its black is the ink of the page, and
+# its yellow, too pale for thin lines on white, comes last.
+PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", INK, "#f0e442")
+MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
+
+STYLE: dict[str, Any] = {
+    "font.family": ["DejaVu Sans"],
+    "font.size": 8.5,
+    "text.parse_math": False,  # a $ in a name is a dollar
+    "axes.unicode_minus": True,
+    "text.color": INK,
+    "axes.labelcolor": INK,
+    "axes.labelsize": 8.5,
+    "axes.edgecolor": MUTED,
+    "axes.linewidth": 0.6,
+    "axes.facecolor": "none",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.axisbelow": True,
+    "axes.formatter.useoffset": False,
+    "axes.formatter.limits": (-4, 6),
+    "grid.color": GRID,
+    "grid.linewidth": 0.6,
+    "xtick.color": MUTED,
+    "ytick.color": MUTED,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "xtick.labelsize": 8,
+    "ytick.labelsize": 8,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "xtick.major.size": 3,
+    "ytick.major.size": 3,
+    "lines.linewidth": 1.4,
+    "lines.markersize": 4.5,
+    "patch.linewidth": 0.6,
+    "legend.frameon": False,
+    "legend.fontsize": 8,
+    "legend.handlelength": 1.4,
+    "figure.facecolor": PAPER,
+    "figure.constrained_layout.use": True,
+    "savefig.dpi": 200,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "tussle",
+}
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A plot in the forms in which it is kept.
+
+    Args:
+        svg: A file of its own.
+        inline: The same as part of a page: no address, no identifier that another picture has, the colours of the page.
+        png: The same as pixels.
+        missing: Letters that the font of the pixels lacks.
+    """
+
+    svg: str
+    inline: str
+    png: bytes
+    missing: str
+
+
+@contextmanager
+def house_style() -> Iterator[None]:
+    """Plots are made and saved inside; settings of the user's own matplotlibrc do not reach them.
+
+    Raises:
+        MissingExtraError: Matplotlib is not installed.
+    """
+    try:
+        import matplotlib as mpl
+    except ImportError as error:
+        raise MissingExtraError(
+            "the report draws with matplotlib, which is not installed: pip install 'tussle[batch]' brings it"
+        ) from error
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(STYLE)  # type: ignore[arg-type]
+        yield
+
+
+def blank(height: float, n_rows: int = 1, n_columns: int = 1, **options: Any) -> tuple[Figure, Any]:
+    """A figure of the house's width and some height [inch], and its axes as an array (n_rows, n_columns)."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(WIDTH, height))
+    return figure, figure.subplots(n_rows, n_columns, squeeze=False, **options)
+
+
+def colour_of(team: int) -> str:
+    """A team's colour, the same in all plots."""
+    return PALETTE[(team - 1) % len(PALETTE)]
+
+
+def marker_of(team: int) -> str:
+    """A team's marker, for those who do not see its colour."""
+    return MARKERS[(team - 1) % len(MARKERS)]
+
+
+def mixed(colour: str, other: str, share: float) -> str:
+    """A colour with some share of another in it."""
+    a, b = (tuple(int(c[i : i + 2], 16) for i in (1, 3, 5)) for c in (colour, other))
+    return "#" + "".join(f"{round(x + (y - x) * share):02x}" for x, y in zip(a, b, strict=True))
+
+
+def rule_x(axes: Axes) -> None:
+    """Helping lines for reading off x, for plots whose rows have names."""
+    axes.grid(True, axis="x")
+    axes.tick_params(axis="y", length=0)
+    axes.spines["left"].set_visible(False)
+
+
+def rule_y(axes: Axes) -> None:
+    """Helping lines for reading off y."""
+    axes.grid(True, axis="y")
+
+
+def legend_above(figure: Figure, handles: Sequence[tuple[Any, str]]) -> None:
+    """A legend over the axes, in as many columns as the names leave room for; none for one name. The figure grows by its rows."""
+    if len(handles) < 2:
+        return
+    names = [shortened(name, 40) for _, name in handles]
+    room = 56  # letters beside each other, of which each entry's sign takes 5
+    n_columns = max(1, min(len(names), room // (max(map(_width, names)) + 5)))
+    n_rows = -(-len(names) // n_columns)
+    figure.set_figheight(figure.get_figheight() + 0.17 * (n_rows - 1))
+    figure.legend(
+        [h for h, _ in handles], names, loc="outside upper left", ncols=n_columns, borderaxespad=0.2
+    )
+
+
+def printable(text: str) -> str:
+    """A text in one line, without characters that no XML file may hold."""
+    kept = (
+        "\ufffd" if unicodedata.category(c) in ("Cc", "Cs") or c in "\ufffe\uffff" else c
+        for c in " ".join(text.split())
+    )
+    return "".join(kept)
+
+
+def shortened(text: str, most: int = 24) -> str:
+    """A name that fits beside a plot, with the room of so many letters; of a longer one, its middle is left out."""
+    text = printable(text)
+    if _width(text) <= most:
+        return text
+    head, tail = "", ""
+    while _width(head) < (most - 1) * 2 // 3:
+        head += text[len(head)]
+    while _width(tail) < most - 1 - _width(head):
+        tail = text[-1 - len(tail)] + tail
+    return f"{head}…{tail}"
+
+
+def _width(text: str) -> int:
+    """Room that a text takes, in letters of usual width."""
+    return sum(2 if unicodedata.east_asian_width(c) in "WF" else 1 for c in text)
+
+
+def pictured(figure: Figure, name: str, title: str) -> Picture:
+    """A finished figure in all its forms.
+
+    Args:
+        figure: The figure.
+        name: Begins all its identifiers.
+        title: What it shows, for those who have it read to them.
+    """
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        svg, png = io.StringIO(), io.BytesIO()
+        figure.savefig(svg, format="svg", metadata={"Date": None, "Creator": None})
+        figure.set_layout_engine("none")  # both have the same places, and finding them takes half of the time
+        figure.savefig(png, format="png", metadata={"Software": None})
+    missing: set[str] = set()
+    for warning in said:
+        glyph = re.match(r"Glyph (\d+) ", str(warning.message))
+        if glyph is None:
+            warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
+        else:
+            missing.add(chr(int(glyph[1])))
+    return Picture(
+        svg.getvalue(), inlined(svg.getvalue(), name, title), png.getvalue(), "".join(sorted(missing))
+    )
+
+
+def inlined(svg: str, name: str, title: str) -> str:
+    """An SVG file as an element of a page: no address, no identifier that another picture has, the colours of the page.
+
+    Args:
+        svg: What Matplotlib wrote.
+        name: Begins each identifier that is kept.
+        title: What the picture shows.
+    """
+    root = ET.fromstring(svg)  # noqa: S314  Matplotlib wrote it a moment ago
+    for child in list(root):
+        if _bare(child.tag) == "metadata" or child.find(f"{_SVG}style") is not None:
+            root.remove(child)  # the style holds for a whole page; page.css says it of its pictures
+    used = {
+        text for node in root.iter() for value in node.attrib.values() for text in _REFERENCE.findall(value)
+    }
+    for node in root.iter():
+        node.tag = _bare(node.tag)
+        attributes = {_bare(key): value for key, value in node.attrib.items()}
+        if attributes.get("id") in used:
+            attributes["id"] = f"{name}-{attributes['id']}"
+        else:
+            attributes.pop("id", None)
+        node.attrib.clear()
+        node.attrib.update({key: _on_page(key, value, name) for key, value in attributes.items()})
+        node.text, node.tail = _trimmed(node.text), _trimmed(node.tail)
+    view = root.get("viewBox", "")
+    root.attrib.clear()
+    root.attrib.update({"viewBox": view, "role": "img", "aria-label": printable(title)})
+    return ET.tostring(root, encoding="unicode")
+
+
+_SVG = "{http://www.w3.org/2000/svg}"
+_REFERENCE = re.compile(r"(?:^|url\()#([\w-]+)")
+_ON_PAGE = {INK: "var(--ink)", MUTED: "var(--muted)", GRID: "var(--grid)", PAPER: "var(--paper)"}
+
+
+def _bare(name: str) -> str:
+    return name.rsplit("}", 1)[-1]
+
+
+def _trimmed(text: str | None) -> str | None:
+    return None if text is None or not text.strip() else text
+
+
+def _on_page(key: str, value: str, name: str) -> str:
+    """An attribute as it stands in the page."""
+    if key == "href":
+        return value.replace("#", f"#{name}-", 1)
+    if key == "clip-path":
+        return value.replace("url(#", f"url(#{name}-")
+    if key == "style":
+        for colour, variable in _ON_PAGE.items():
+            value = value.replace(colour, variable)
+    return re.sub(r"\s+", " ", value) if key == "d" else value
