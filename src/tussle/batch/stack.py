@@ -224,7 +224,9 @@ class _Stack:
                 self.slots[world] = None
                 yield finished
             free.append(world)
-        runs = yield from self._able(self.take(len(free)))
+        runs: list[Run] = []
+        while len(runs) < len(free) and (more := self.take(len(free) - len(runs))):
+            runs += yield from self._able(more)
         self._cpu.spent_by(0)
         if not runs:
             return

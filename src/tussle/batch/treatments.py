@@ -127,22 +127,18 @@ def with_value(mission: Mission, path: str, value: Any) -> Mission:
         changed = blocks[head].replace(**{rest[0]: value})
     elif head in blocks and rest:
         changed = _block_with(blocks[head], path, rest, value)
-    elif len(rest) == 1:
-        for kind in ("interactions", "metrics", "networks"):
+    else:
+        for kind in ("interactions", "metrics", "networks") if rest else ():
             plugins = getattr(mission, kind)
             if head in [p.instance_name for p in plugins]:
                 return mission.replace(**{kind: _plugins_with(plugins, path, [head, *rest], value)})
-        raise _unknown(path, head, mission)
-    else:
-        raise _unknown(path, head, mission)
+        known = ["run", *blocks, *(p.instance_name for p in mission.world_plugins)]
+        raise ParameterError(
+            f"{path!r} leads nowhere: there is no block or world plugin {head!r}{nearest_name(head, known)}; {listed(known)}"
+            if head not in known
+            else f"{path!r} names no value of {head}; write {head}.NAME"
+        )
     return mission.replace(blocks=[changed if b.name == head else b for b in mission.blocks])
-
-
-def _unknown(path: str, head: str, mission: Mission) -> ParameterError:
-    known = ["run", *(b.name for b in mission.blocks), *(p.instance_name for p in mission.world_plugins)]
-    return ParameterError(
-        f"{path!r} leads nowhere: there is no block or world plugin {head!r}{nearest_name(head, known)}; {listed(known)}"
-    )
 
 
 def _block_with(block: Block, path: str, names: Sequence[str], value: Any) -> Block:
@@ -179,7 +175,10 @@ def _plugins_with(plugins: Sequence[Any], path: str, names: Sequence[str], value
         if names[1] in [p.instance_name for p in inner]:
             changed[place] = plugin.replace(**{key: _plugins_with(inner, path, names[1:], value)})
             return changed
-    raise ParameterError(f"{path!r}: {names[0]} has no plugin {names[1]!r}")
+    inner = [p.instance_name for key in type(plugin).children() for p in plugin.values[key]]
+    raise ParameterError(
+        f"{path!r}: {names[0]} has no plugin {names[1]!r}{nearest_name(names[1], inner)}; {listed(inner)}"
+    )
 
 
 # -- groups ---------------------------------------------------------------------------------------------------------------

@@ -1,0 +1,295 @@
+"""From points to missions: values by path, and which points can share a stack."""
+
+from __future__ import annotations
+
+import pickle
+
+import gambles
+import numpy as np
+import pytest
+from gambles import game
+
+from tussle import Block, Mission, Simulation
+from tussle.api import Autonomy, Param, Ragged
+from tussle.batch.tasks import PluginFile
+from tussle.batch.treatments import build_points, exactly, group_points, read_points, split, with_value
+from tussle.errors import MissionError, ParameterError, TussleError
+from tussle.stock import AvoidEntityMS, Boundary, MotorSchemas, MoveToGoalMS, SingleIntegrator, Still
+
+
+def schemas(**goal):
+    """A mission with a plugin inside another."""
+    inner = [MoveToGoalMS(**goal), AvoidEntityMS(name="shy", gain=2.0)]
+    walker = Block(
+        name="walkers", team=1, count=3, autonomy=MotorSchemas(behaviors=inner, pub_vel_vec=True), motion=SingleIntegrator(),
+    )  # fmt: skip
+    return Mission(blocks=[walker], dt=0.1, end=1.0, networks=())
+
+
+# -- values by path -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "found"),
+    [
+        ("run.dt", 0.05, lambda m: m.dt),
+        ("run.end", 7.0, lambda m: m.end),
+        ("reds.count", 9, lambda m: m.blocks[0].count),
+        ("reds.speed", 3.0, lambda m: m.blocks[0].speed),
+        ("Roulette.odds", 0.5, lambda m: m.interactions[0].odds),
+        ("Roulette.harm", (2.0, 3.0), lambda m: m.interactions[0].harm),
+        ("Chips.weight", 2.0, lambda m: m.metrics[0].weight),
+        ("reds.Nervous.how", "decide", lambda m: m.blocks[0].autonomy[0].how),
+    ],
+)
+def test_a_value_is_set_by_its_path_and_nothing_else_changes(path, value, found):
+    before = game()
+    after = with_value(before, path, value)
+    assert found(after) == value != found(before)
+    back = with_value(after, path, found(before))
+    assert exactly(back) == exactly(before)
+
+
+def test_a_value_of_a_plugin_within_another_is_set_by_its_path():
+    after = with_value(schemas(), "walkers.MotorSchemas.MoveToGoalMS.goal", (1.0, 2.0, 3.0))
+    assert exactly(after) == exactly(schemas(goal=(1.0, 2.0, 3.0)))
+    shy = with_value(schemas(), "walkers.MotorSchemas.shy.gain", 5.0)
+    assert [b.gain for b in shy.blocks[0].autonomy[0].values["behaviors"]] == [1.0, 5.0]
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "words"),
+    [
+        ("red.count", 1, "no block or world plugin 'red' (did you mean 'reds'?)"),
+        ("roulete.odds", 1, "no block or world plugin 'roulete' (did you mean 'Roulette'?)"),
+        ("count", 1, "no block or world plugin 'count'"),
+        ("reds.counts", 1, "Block has no 'counts' (did you mean 'count'?)"),
+        ("reds.Nervos.how", 1, "reds has no plugin 'Nervos' (did you mean 'Nervous'?)"),
+        ("reds.Nervous.hoe", 1, "Nervous has no parameter 'hoe' (did you mean 'how'?)"),
+        ("reds.Nervous.how.more", 1, "Nervous has no plugin 'how'"),
+        ("reds", 1, "'reds' names no value of reds; write reds.NAME"),
+        ("Roulette", 1, "'Roulette' names no value of Roulette; write Roulette.NAME"),
+        ("", 1, "no block or world plugin"),
+        ("run.ends", 1, "Mission has no 'ends' (did you mean 'end'?)"),
+        ("run.dt", -1, "dt = -1.0 is not allowed"),
+        ("reds.count", -1, "count = -1 is not allowed"),
+        ("reds.count", 2.5, "count = 2.5 is not allowed"),
+        ("reds.motion", "Unicycle", "'Unicycle' is not a motion model"),
+        ("Roulette.odds", 2.0, "odds = 2.0 is not allowed; it takes a finite number >= 0 and <= 1"),
+        ("Roulette.rule", "some", "rule = 'some' is not allowed"),
+        ("run", 1, "'run' names no value of run; write run.NAME"),
+        ("run.dt.x", 1, "'run.dt.x' names no value of run"),
+        ("Roulette.odds.x", 1, "Roulette has no plugin 'odds'; there are none"),
+    ],
+)
+def test_a_path_that_leads_nowhere_and_a_value_that_is_not_allowed_are_refused(path, value, words):
+    with pytest.raises(TussleError) as error:
+        with_value(game(), path, value)
+    assert words in str(error.value)
+
+
+def test_a_path_within_a_plugin_names_what_is_there():
+    with pytest.raises(ParameterError, match=r"MotorSchemas has no plugin 'shyy' \(did you mean 'shy'\?\)"):
+        with_value(schemas(), "walkers.MotorSchemas.shyy.gain", 1.0)
+
+
+# -- points -------------------------------------------------------------------------------------------------------------------
+
+
+def test_a_function_is_called_with_all_values():
+    missions = list(build_points(game, {"reds": 2}, [{"odds": 0.1}, {"odds": 0.3}]))
+    assert [(m.blocks[0].count, m.interactions[0].odds) for m in missions] == [(2, 0.1), (2, 0.3)]
+
+
+def no_mission(odds):
+    return odds
+
+
+def picky(odds):
+    return game(odds=odds)
+
+
+@pytest.mark.parametrize(
+    ("function", "points", "words"),
+    [
+        (picky, [{"ods": 1}], "point 0 (ods=1): picky cannot be called with what varies"),
+        (picky, [{"ods": 1}], "(did you mean 'odds'?); it takes odds"),
+        (no_mission, [{"odds": 1}], "point 0 (odds=1): no_mission gave 1; it is to give a Mission"),
+        (picky, [{"odds": 0.5}, {"odds": 7}], "point 1 (odds=7): Roulette.odds = 7 is not allowed"),
+        (
+            game(),
+            [{"Roulette.odd": 1}],
+            "point 0 (Roulette.odd=1): 'Roulette.odd': Roulette has no parameter",
+        ),
+    ],
+)
+def test_what_is_wrong_with_a_point_is_told_with_its_values(function, points, words):
+    with pytest.raises((ParameterError, MissionError)) as error:
+        list(build_points(function, {}, points))
+    assert words in str(error.value)
+
+
+def test_what_is_wrong_with_a_point_of_a_file_is_told_with_its_values(tmp_path):
+    file = tmp_path / "game.xml"
+    file.write_text(gambles.MISSION)
+    options = {"plugin_files": (gambles.THIS,)}
+    with pytest.raises(MissionError) as error:
+        list(read_points(file, {}, [{"odds": "0.5"}, {"odds": "-1"}], **options))
+    assert str(error.value).startswith(f"point 1 (odds=-1): {file}:5: ")
+    with pytest.raises(MissionError) as error:
+        list(read_points(file, {"odds": "-1"}, [{}], **options))
+    assert str(error.value).startswith(f"{file}:5: ")
+
+
+# -- groups -------------------------------------------------------------------------------------------------------------------
+
+
+class Listed(Autonomy):
+    """Has a list for a parameter."""
+
+    rows = Param((), fields="x y", ragged=True)
+    seen = Ragged("x y")
+
+    def step(self, g):
+        pass
+
+
+SHARED = [
+    ("Roulette.odds", [0.1, 0.2, 0.3]),
+    ("Roulette.harm", [(1.0, 1.0), (1.0, 2.0)]),
+    ("Chips.weight", [1.0, 2.0]),
+    ("reds.speed", [0.0, 1.0]),
+    ("reds.heading", [0.0, 1.0]),
+    ("reds.health", [1.0, 3.0]),
+    ("reds.radius", [1.0, 3.0]),
+    ("reds.mass", [1.0, 3.0]),
+    ("Trouble.at", [2, 3]),
+]
+SPLIT = [
+    ("reds.count", [1, 2, 3]),
+    ("reds.team", [1, 3]),
+    ("reds.position", [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)]),
+    ("reds.heading_variance", [0.0, 1.0]),
+    ("reds.motion", [Still(), SingleIntegrator()]),
+    ("run.dt", [0.1, 0.05]),
+    ("run.end", [1.0, 2.0]),
+    ("run.start", [0.0, 0.5]),
+    ("run.end_conditions", ["time", "time, all_dead"]),
+    ("Roulette.rule", ["all", "first"]),
+    ("Roulette.is_gentle", [False, True]),
+    ("Trouble.how", ["never", "step"]),
+    ("reds.Nervous.how", ["never", "spawn"]),
+]
+
+
+@pytest.mark.parametrize(("path", "values"), SHARED, ids=[p for p, _ in SHARED])
+def test_points_that_differ_in_numbers_of_one_world_share_a_stack(path, values):
+    missions = [with_value(game(), path, v) for v in values]
+    treatments, package = group_points(missions)
+    assert len(package.missions) == 1
+    assert [t.params for t in treatments] == [{path: v} for v in values]
+
+
+@pytest.mark.parametrize(("path", "values"), SPLIT, ids=[p for p, _ in SPLIT])
+def test_points_that_differ_in_structure_do_not(path, values):
+    missions = [with_value(game(), path, v) for v in [*values, *values]]
+    treatments, package = group_points(missions)
+    n = len(values)
+    assert [t.group for t in treatments] == [*range(n), *range(n)]
+    assert all(t.params == {} for t in treatments)
+    for i, mission in enumerate(missions[:n]):
+        assert exactly(pickle.loads(package.missions[i])) == exactly(mission)
+
+
+def test_a_list_is_structure():
+    def listed(*rows):
+        block = Block(name="b", team=1, autonomy=Listed(rows=rows), motion=Still())
+        return Mission(blocks=[block], end=0.2)
+
+    assert len(group_points([listed((1.0, 2.0)), listed((1.0, 3.0))])[1].missions) == 2
+
+
+def test_a_world_plugin_that_is_structural_splits():
+    def fenced(radius):
+        return game().replace(interactions=[Boundary(shape="sphere", radius=radius)])
+
+    treatments, package = group_points([fenced(r) for r in (100.0, 200.0, 100.0)])
+    assert [t.group for t in treatments] == [0, 1, 0]
+    assert len(package.missions) == 2
+
+
+def test_values_are_sent_only_where_they_differ_within_a_group():
+    missions = [
+        with_value(with_value(game(odds=0.3), "reds.count", n), "reds.health", h)
+        for n in (1, 2)
+        for h in ((1.0, 1.0) if n == 1 else (1.0, 2.0))
+    ]
+    treatments, _ = group_points(missions)
+    assert [t.params for t in treatments] == [{}, {}, {"reds.health": 1.0}, {"reds.health": 2.0}]
+
+
+def test_files_that_are_read_again_and_again_share_a_stack(tmp_path):
+    file = tmp_path / "game.xml"
+    file.write_text(gambles.MISSION)
+    texts = [{"odds": str(i / 100), "health": str(1 + i)} for i in range(10)]
+    missions = [m.mission for m in read_points(file, {}, texts, plugin_files=(gambles.THIS,))]
+    assert len(group_points(missions)[1].missions) == 1
+
+
+@pytest.mark.parametrize(
+    ("path", "values"),
+    [
+        ("walkers.MotorSchemas.MoveToGoalMS.goal", [(9.0, 0.0, 0.0), (0.0, 9.0, 1.0)]),
+        ("walkers.MotorSchemas.MoveToGoalMS.distance_pid", [(0.5, 0.0, 0.0, 0.0), (0.1, 0.2, 0.0, 5.0)]),
+        ("walkers.MotorSchemas.MoveToGoalMS.gain", [0.5, 2.0]),
+        ("walkers.MotorSchemas.MoveToGoalMS.use_initial_heading", [False, True]),
+        ("walkers.MotorSchemas.shy.gain", [0.5, 2.0]),
+        ("walkers.MotorSchemas.max_speed", [5.0, 50.0]),
+        ("walkers.health", [1.0, 2.0]),
+    ],
+)
+def test_a_world_of_a_stack_with_values_of_its_own_is_the_mission_of_its_point(path, values):
+    missions = [with_value(schemas(goal=(30.0, 40.0, 5.0)), path, v) for v in values]
+    treatments, package = group_points(missions)
+    assert len(package.missions) == 1
+    params = {p: [t.params[p] for t in treatments] for p in treatments[0].params}
+    with Simulation(package.mission(0), [1, 1], params) as stack:
+        together = [r.state_hash for r in stack.run()]
+    assert together[0] != together[1]
+    for mission, found in zip(missions, together, strict=True):
+        with Simulation(mission, 1) as simulation:
+            assert simulation.run()[0].state_hash == found
+
+
+def test_a_missions_text_has_every_digit_of_every_number():
+    def listed(n, last):
+        rows = [(float(i), 0.1 + 0.2) for i in range(n)] + [(last, 1.0)]
+        block = Block(name="b", team=1, autonomy=Listed(rows=rows), motion=Still())
+        return exactly(Mission(blocks=[block], end=0.2))
+
+    assert listed(3000, 1.0) != listed(3000, np.nextafter(1.0, 2.0))
+
+
+def test_what_all_worlds_share_can_be_a_key():
+    signature, own = split(game())
+    assert hash(signature) == hash(split(game())[0])
+    assert own["reds.health"] == 2.0
+
+
+# -- plugin files -------------------------------------------------------------------------------------------------------------
+
+
+def test_a_plugin_file_is_there_as_it_was_when_it_has_changed_or_gone(tmp_path, monkeypatch):
+    import sys
+
+    path = tmp_path / "own.py"
+    path.write_text("from tussle.api import Metric, Param\n\n\nclass Own(Metric):\n    x = Param(1.0)\n")
+    file = PluginFile.of(path)
+    kept = pickle.dumps(vars(sys.modules[file.module])["Own"](x=3.0))
+    for text in ("from tussle.api import Metric\n\n\nclass Other(Metric):\n    pass\n", None):
+        path.unlink(missing_ok=True)
+        if text is not None:
+            path.write_text(text)
+        monkeypatch.delitem(sys.modules, file.module)
+        file.load()
+        assert pickle.loads(kept).x == 3.0
