@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from tussle.view.frame import Frame, Happening, frame_of
+    from tussle.view.live import Live
     from tussle.view.looks import Looks
     from tussle.view.recording import Recording
     from tussle.view.scenery import Scenery, scenery_of
@@ -18,6 +19,7 @@ __all__ = [
     "MODELS",
     "Frame",
     "Happening",
+    "Live",
     "Looks",
     "Mesh",
     "Recording",
@@ -30,6 +32,7 @@ _LAZY = {
     "MODELS": "shapes",
     "Frame": "frame",
     "Happening": "frame",
+    "Live": "live",
     "Looks": "looks",
     "Mesh": "shapes",
     "Recording": "recording",

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tussle.api.bodies import FLOATS, OFFSETS
+
 if TYPE_CHECKING:
     from tussle.engine.simulation import Simulation
 
@@ -71,18 +73,57 @@ def empty_frame(t: float, step: int) -> Frame:
     return Frame(t, step, none, none, none, np.zeros((0, 3)), np.zeros((0, 4)), np.zeros((0, 3)), np.zeros(0))
 
 
+class Lens:
+    """Makes frames of one world of a simulation. Who is there is looked up only when somebody has come or gone.
+
+    Args:
+        simulation: The simulation; it is looked at between its steps only.
+        world: Number of the world.
+    """
+
+    def __init__(self, simulation: Simulation, world: int = 0) -> None:
+        self._simulation, self._world = simulation, world
+        self._seen: np.ndarray | None = None
+        self.order: np.ndarray | None = None
+        self._who: tuple[np.ndarray, ...] = ()
+
+    def look(self) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
+        """Real columns of the table in which the world lies, (22, n), and id, team and block of its entities, each (m,), int32.
+
+        `order` then has their rows in that table; None when these are all rows as they lie.
+        """
+        parked = self._simulation.parked.get(self._world)
+        bodies = self._simulation.population.bodies if parked is None else parked.bodies
+        if bodies.ints is not self._seen:
+            self._seen = bodies.ints
+            rows = np.flatnonzero(bodies.world == self._world)
+            rows = rows[np.argsort(bodies.id[rows], kind="stable")]
+            is_all = len(rows) == bodies.n and bool((rows[1:] > rows[:-1]).all())
+            self.order = None if is_all else rows
+            self._who = tuple(
+                _closed(a[rows].astype(np.int32)) for a in (bodies.id, bodies.team, bodies.block)
+            )
+        return bodies.floats, self._who
+
+    def frame(self) -> Frame:
+        """A copy of what is there now; of a world that has ended, its last state."""
+        floats, who = self.look()
+        clock = self._simulation.context.clock
+        step = int(clock.step[self._world])
+        columns = []
+        for name in ("pos", "quat", "vel", "health"):
+            first, k = OFFSETS[name], FLOATS[name]
+            part = floats[first : first + k] if self.order is None else floats[first : first + k, self.order]
+            columns.append(_closed(np.array(part.T if k > 1 else part[0], order="C")))
+        return Frame(float(clock.start + step * clock.dt), step, *who, *columns)
+
+
+def _closed(array: np.ndarray) -> np.ndarray:
+    """The array, from now on read-only."""
+    array.flags.writeable = False
+    return array
+
+
 def frame_of(simulation: Simulation, world: int = 0) -> Frame:
     """A copy of what is in one world now; of a world that has ended, its last state."""
-    clock = simulation.context.clock
-    step = int(clock.step[world])
-    parked = simulation.parked.get(world)
-    bodies = simulation.population.bodies if parked is None else parked.bodies
-    rows = np.flatnonzero(bodies.world == world)
-    rows = rows[np.argsort(bodies.id[rows], kind="stable")]
-    columns = [
-        np.ascontiguousarray(a[..., rows].T, np.int32 if a.dtype == np.int64 else None)
-        for a in (bodies.id, bodies.team, bodies.block, bodies.pos, bodies.quat, bodies.vel, bodies.health)
-    ]
-    for column in columns:
-        column.flags.writeable = False
-    return Frame(float(clock.start + step * clock.dt), step, *columns)
+    return Lens(simulation, world).frame()

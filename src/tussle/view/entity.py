@@ -1,0 +1,206 @@
+"""All that can be known of one entity at one moment."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tussle.api.bodies import DERIVED, FLOATS, derive
+from tussle.columns import RaggedColumn, Subscribe
+from tussle.comms import EVERYONE, SAME_ENTITY
+
+if TYPE_CHECKING:
+    from tussle.comms.topic import Parcel, TopicBuffer
+    from tussle.engine.group import Group
+    from tussle.engine.simulation import Simulation
+
+MOST_MESSAGES = 50
+"""Messages that are listed, of those heard and of those said."""
+BODY_UNITS = {
+    "pos": "m", "vel": "m/s", "quat": "", "omega": "rad/s", "force": "N", "torque": "N m", "health": "", "radius": "m",
+    "mass": "kg", "yaw": "rad", "climb": "rad", "roll": "rad",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A value of a column.
+
+    Attributes:
+        value: A number, an array (k,) of one with several fields, an array (m, k) of a list, or a text.
+        unit: Its SI unit; one per field where they differ, separated by blanks.
+        fields: Names of the components.
+        doc: What it is.
+    """
+
+    value: Any
+    unit: str = ""
+    fields: tuple[str, ...] = ()
+    doc: str = ""
+
+
+@dataclass(frozen=True)
+class Letter:
+    """A message.
+
+    Attributes:
+        topic: Network and name, "GlobalNetwork/Waypoint".
+        sender: Id of who said it, 0 for the world.
+        fields: Field -> value.
+    """
+
+    topic: str
+    sender: int
+    fields: dict[str, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class EntityState:
+    """One entity at one moment.
+
+    Attributes:
+        t: Time [s].
+        step: Number of the step that begins with this state.
+        id: Who.
+        team: Its team.
+        block: Name of its block.
+        body: Column -> reading.
+        plugins: Plugin, such as "MotorSchemas.AvoidEntityMS" -> column -> reading.
+        heard: Messages that have arrived and that it has not read yet, at most 50.
+        said: Its messages that are on their way or that somebody has yet to read, at most 50.
+    """
+
+    t: float
+    step: int
+    id: int
+    team: int
+    block: str
+    body: dict[str, Reading]
+    plugins: dict[str, dict[str, Reading]] = field(default_factory=dict)
+    heard: list[Letter] = field(default_factory=list)
+    said: list[Letter] = field(default_factory=list)
+
+
+def entity_state(simulation: Simulation, world: int, who: int) -> EntityState | None:
+    """The entity with an id; None where it is not there (any more). Of a world that has ended, as it was at the end."""
+    parked = simulation.parked.get(world)
+    bodies = simulation.population.bodies if parked is None else parked.bodies
+    found = np.flatnonzero((bodies.id == who) & (bodies.world == world))
+    if not len(found):
+        return None
+    row = int(found[0])
+    clock = simulation.context.clock
+    body = {name: Reading(_plain(getattr(bodies, name)[..., row]), BODY_UNITS[name]) for name in FLOATS}
+    for name in ("yaw", "climb", "roll"):
+        angle = np.empty(1)
+        assert DERIVED[name] == 1
+        derive(name, np.ascontiguousarray(bodies.quat[:, row : row + 1]), 0, 1, 0, angle)
+        body[name] = Reading(float(angle[0]), BODY_UNITS[name])
+    state = EntityState(
+        t=float(clock.t[world]),
+        step=int(clock.step[world]),
+        id=who,
+        team=int(bodies.team[row]),
+        block=simulation.context.block_names[int(bodies.block[row])],
+        body=body,
+    )
+    for group in simulation.population.groups:
+        if parked is None:
+            if group.first <= row < group.last:
+                _read_plugins(group, row - group.first, group.table.arrays, state.plugins, is_live=True)
+                state.heard.extend(_heard(group, world, who))
+        elif group.key in parked.tables:
+            rows, arrays = parked.tables[group.key]
+            place = np.flatnonzero(rows == row)
+            if len(place):
+                _read_plugins(group, int(place[0]), arrays, state.plugins, is_live=False)
+    state.said.extend(_said(simulation, world, who))
+    return state
+
+
+def _plain(value: Any) -> Any:
+    """A number as Python has it, an array as a copy."""
+    array = np.array(value)
+    return array if array.ndim else array.item()
+
+
+def _read_plugins(
+    group: Group,
+    row: int,
+    arrays: dict[type, np.ndarray],
+    into: dict[str, dict[str, Reading]],
+    *,
+    is_live: bool,
+) -> None:
+    """All columns of an entity's plugins, in the order of their declaration."""
+    for binding in group.walk():
+        columns = into[".".join(binding.path)] = {}
+        for name, column in type(binding.spec).columns.items():
+            about = (getattr(column, "unit", ""), getattr(column, "fields", ()), column.doc)
+            place = binding.places.get(name)
+            if place is not None:
+                data = arrays[place.dtype]
+                part = data[place.first : place.first + place.k] if place.k else data[place.first]
+                columns[name] = Reading(_plain(part[..., row]), *about)
+            elif name in binding.ragged and is_live:
+                columns[name] = Reading(np.array(binding.ragged[name][row].T), *about)
+            elif name in binding.spec.values and name not in type(binding.spec).children():
+                columns[name] = Reading(binding.spec.values[name], *about)
+
+
+def _heard(group: Group, world: int, who: int) -> list[Letter]:
+    letters: list[Letter] = []
+    for binding in group.walk():
+        for name, column in type(binding.spec).columns.items():
+            if isinstance(column, Subscribe):
+                inbox = binding.plugin.__dict__[name]
+                for parcel in inbox.parcels:
+                    letters += _letters(inbox.topic, parcel, _for_whom(parcel, world, who))
+    return letters[-MOST_MESSAGES:]
+
+
+def _for_whom(parcel: Parcel, world: int, who: int) -> np.ndarray:
+    """Numbers of the messages in a parcel that an entity hears."""
+    batch, to = parcel.batch, parcel.to
+    if isinstance(to, str):
+        assert to in (EVERYONE, SAME_ENTITY)
+        mine = batch.world == world
+        return np.flatnonzero(mine if to == EVERYONE else mine & (batch.sender == who))
+    number, receiver = to
+    return np.asarray(number[(receiver == who) & (batch.world[number] == world)])
+
+
+def _said(simulation: Simulation, world: int, who: int) -> list[Letter]:
+    letters: list[Letter] = []
+    for topic in simulation.topics.values():
+        for parcel in _under_way(topic):
+            mine = (parcel.batch.world == world) & (parcel.batch.sender == who)
+            letters += _letters(topic, parcel, np.flatnonzero(mine))
+    return letters[-MOST_MESSAGES:]
+
+
+def _under_way(topic: TopicBuffer) -> Iterator[Parcel]:
+    """Parcels that are queued or lie in an inbox, each once."""
+    known: dict[int, Parcel] = {id(p): p for p in topic.queue}
+    for inbox in topic.inboxes:
+        known |= {id(p): p for p in inbox.parcels}
+    yield from known.values()
+
+
+def _letters(topic: TopicBuffer, parcel: Parcel, numbers: np.ndarray) -> list[Letter]:
+    batch = parcel.batch
+    letters = []
+    for i in numbers[-MOST_MESSAGES:]:
+        fields: dict[str, Any] = {}
+        for name, values in batch.data.items():
+            if isinstance(values, RaggedColumn):
+                fields[name] = np.array(values[int(i)].T)
+            elif isinstance(values, list):
+                fields[name] = values[int(i)]
+            else:
+                fields[name] = _plain(values[..., i])
+        letters.append(Letter(f"{topic.network}/{topic.name}", int(batch.sender[i]), fields))
+    return letters

@@ -1,0 +1,398 @@
+"""A simulation that is watched: played in a thread of its own, paused, stepped, wound back, and seen without ever being held up."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Callable, Mapping
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+
+from tussle.engine.access import world_result
+from tussle.engine.result import WorldResult
+from tussle.errors import ParameterError, PluginError
+from tussle.messages import CustomKeyPress, Message, WorldPointClicked
+from tussle.view.conductor import Conductor, Order
+from tussle.view.drawn import Shape, Sketchbook
+from tussle.view.entity import EntityState, entity_state
+from tussle.view.frame import Frame, Happening, Lens
+from tussle.view.looks import Looks
+from tussle.view.offers import LINGER, Offer
+from tussle.view.pacing import Pace, checked_warp, faster, slower
+from tussle.view.player import Injection, Player
+from tussle.view.scenery import Scenery, scenery_of
+
+if TYPE_CHECKING:
+    from tussle.engine.simulation import Simulation
+
+FRAME_PERIOD = 1.0 / 30.0
+"""Least time between two frames [s]: browsers are sent no more."""
+STATE_PERIOD = 0.1
+"""Least time between two readings of an entity [s]: nobody reads faster."""
+RESULT_PERIOD = 0.5
+"""Least time between two results so far [s]."""
+FORGET_AFTER = 10.0
+"""How long after it was last asked for an entity is still remembered [s]."""
+
+
+class Live:
+    """A simulation that is watched.
+
+    Controls return at once and are carried out between two steps, in the order in which they were given. What is seen is handed out at
+    once too: the newest that was made, and it is made only while somebody asks for it. No control and nobody who watches changes a
+    result, except for what is said to the plugins (`publish`); to wind back and go on leads to the same future, bit for bit.
+
+    Simulations whose plugins hold things outside that cannot be saved are not wound back, and `notes` says why. What becomes of
+    recorders says `tussle.view.player.Player`.
+
+    Args:
+        simulation: What is played; nobody else may step it meanwhile.
+        world: Number of the world that is watched. The game goes on until this one ends.
+        pace: Simulated seconds per second; None is as fast as possible.
+        is_paused: Wait before the first step.
+        threaded: Play in a thread of its own, from now on. Without, the game stands still, each control is carried out by whoever
+            gives it, and what is seen is always of now.
+        snapshot_every: Least simulated time between snapshots [s]; they are also limited to 2 % of the time.
+        memory: For snapshots and for the history of frames [MB], half of it for each.
+        viewer: What the mission file says for the viewer, see `tussle.mission.Loaded`.
+
+    Raises:
+        ParameterError: A value is not allowed.
+    """
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        world: int = 0,
+        *,
+        pace: float | None = 1.0,
+        is_paused: bool = False,
+        threaded: bool = True,
+        snapshot_every: float = 1.0,
+        memory: float = 256.0,
+        viewer: Mapping[str, Any] | None = None,
+    ) -> None:
+        for name, value in (("snapshot_every", snapshot_every), ("memory", memory)):
+            if not 0.0 < value < math.inf:
+                raise ParameterError(f"{name} = {value!r} is not allowed; it takes a number > 0")
+        if not 0 <= world < simulation.n_worlds:
+            raise ParameterError(
+                f"world = {world!r} is not allowed; there are worlds 0 to {simulation.n_worlds - 1}"
+            )
+        self.simulation, self.world, self.viewer = simulation, world, dict(viewer or {})
+        self._clock = simulation.context.clock
+        self._sketchbook = Sketchbook(simulation, world)
+        self._pace = Pace(checked_warp(pace))
+        self._player = Player(simulation, world, snapshot_every, 1e6 * memory)
+        self._conductor = Conductor(self._player, self._pace, self._sketchbook, is_paused, self._renew)
+        ring = self._conductor.ring
+        self._frame: Offer[Frame] = Offer(Lens(simulation, world).frame, FRAME_PERIOD, ring)
+        self._shapes: Offer[tuple[Shape, ...]] = Offer(self._sketchbook.shapes, FRAME_PERIOD, ring)
+        self._result: Offer[WorldResult | None] = Offer(self._make_result, RESULT_PERIOD, ring)
+        self._entities: dict[int, Offer[EntityState | None]] = {}
+        self._renew(True)
+        self._thread: threading.Thread | None = None
+        if threaded:
+            self._thread = threading.Thread(target=self._conductor.run, name="tussle live", daemon=True)
+            self._thread.start()
+
+    # -- controls -----------------------------------------------------------------------------------------------------------------
+
+    def _give(self, do: Callable[[], None], *, is_seek: bool = False, may_cut_in: bool = False) -> None:
+        self._conductor.give(Order(do, is_seek, may_cut_in))
+        if self._thread is None:
+            self._conductor.drain()
+
+    def pause(self) -> None:
+        """Stand still after the step in hand."""
+        self._conductor.is_paused = True
+        self._conductor.ring()
+
+    def resume(self) -> None:
+        """Go on, when what was ordered before is done."""
+        self._conductor.is_paused = False
+        self._conductor.ring()
+
+    def toggle(self) -> None:
+        """Pause, or go on."""
+        (self.resume if self.is_paused else self.pause)()
+
+    def step(self, n: int = 1) -> None:
+        """Make exactly n steps and stand still; a game that goes on is paused first."""
+        self.pause()
+        self._give(lambda: self._conductor.move(n))
+
+    def step_back(self, n: int = 1) -> None:
+        """Go back n steps and stand still."""
+        self.step(-n)
+
+    def seek(self, t: float) -> None:
+        """Go to the last step not after a time [s], back or forth, and there stand still or go on as now.
+
+        Raises:
+            ParameterError: The time is not a number.
+        """
+        step = self._step_at(t)
+        self._give(lambda: self._conductor.go(step), is_seek=True, may_cut_in=True)
+
+    def reset(self, seed: int | None = None) -> None:
+        """Begin anew, with another seed where one is given, and stand still or go on as now.
+
+        Raises:
+            ParameterError: The seed is not a whole number.
+        """
+        if seed is not None and (isinstance(seed, bool) or not isinstance(seed, (int, np.integer))):
+            raise ParameterError(f"seed = {seed!r} is not allowed; it takes a whole number")
+        number = None if seed is None else int(seed)
+        self._give(lambda: self._conductor.begin_anew(number), may_cut_in=True)
+
+    def publish(
+        self, type_: type[Message], *, network: str = "GlobalNetwork", topic: str = "", **fields: Any
+    ) -> None:
+        """Say something to the plugins: part of the next step, and of every replay of it. What is wrong with it is told in `notes`."""
+        self._give(lambda: self._conductor.say(type_, network, topic, fields))
+
+    def publish_click(self, point: Any) -> None:
+        """Tell the plugins of a point in the world that somebody has picked [m], (3,): `WorldPointClicked` on the GlobalNetwork.
+
+        Raises:
+            ParameterError: It is not three finite numbers.
+        """
+        pos = np.array(point, float)
+        if pos.shape != (3,) or not np.isfinite(pos).all():
+            raise ParameterError(f"point = {point!r} is not allowed; it takes x, y, z in m")
+        self.publish(WorldPointClicked, pos=pos)
+
+    def publish_key(self, key: str) -> None:
+        """Tell the plugins of a key that was pressed: `CustomKeyPress` on the GlobalNetwork."""
+        self.publish(CustomKeyPress, key=key)
+
+    @property
+    def warp(self) -> float:
+        """Simulated seconds per second that are wanted; inf is as fast as possible, and so is None when it is set."""
+        return self._pace.warp
+
+    @warp.setter
+    def warp(self, warp: float | None) -> None:
+        self._pace.warp = checked_warp(warp)
+        self._pace.restart()
+        self._conductor.ring()
+
+    def faster(self) -> None:
+        """Warp up: doubled below 2, then one more."""
+        self.warp = faster(self.warp)
+
+    def slower(self) -> None:
+        """Warp down: one less above 2, then halved; from as fast as possible, to what was reached."""
+        self.warp = slower(self.warp, self.warp_reached)
+
+    def stop(self, timeout: float = 10.0) -> None:
+        """End the thread after the step in hand, and leave the simulation to whoever made it. A second call does nothing."""
+        self._conductor.end()
+        if self._thread is not None:
+            self._thread.join(timeout)
+            if self._thread.is_alive():
+                return  # a step takes that long; it is the last one
+        self._sketchbook.close()
+        self._player.close()
+
+    def settle(self, timeout: float = 60.0) -> bool:
+        """Wait until all orders given before have been carried out; whether they have within that time [s]."""
+        done = threading.Event()
+
+        def tell() -> None:
+            self._renew(True)
+            done.set()
+
+        self._give(tell)
+        return done.wait(timeout)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
+    # -- where it stands ------------------------------------------------------------------------------------------------------------
+
+    def _time_of(self, step: int) -> float:
+        return float(self._clock.start + step * self._clock.dt)
+
+    def _step_at(self, t: float) -> int:
+        if not math.isfinite(t):
+            raise ParameterError(f"t = {t!r} is not allowed; it takes a time in s")
+        return math.floor((t - self._clock.start) / self._clock.dt + 1e-6)
+
+    @property
+    def step_number(self) -> int:
+        """Number of the step that begins with what is shown; during a seek, that where it began."""
+        return self._conductor.shown_step
+
+    @property
+    def t(self) -> float:
+        """Time of what is shown [s]."""
+        return self._time_of(self._conductor.shown_step)
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """First and last time that has been simulated [s]."""
+        return self._time_of(self._player.first_step), self._time_of(self._player.last_step)
+
+    @property
+    def seed(self) -> int:
+        return int(self.simulation.context.seeds[self.world])
+
+    @property
+    def is_paused(self) -> bool:
+        return self._conductor.is_paused
+
+    @property
+    def is_over(self) -> bool:
+        """The world has ended, or something has failed: it can only be wound back or begun anew."""
+        return self._player.is_over
+
+    @property
+    def is_seeking(self) -> bool:
+        """It is on its way to another time; what is shown is where it was."""
+        return self._conductor.is_seeking
+
+    @property
+    def epoch(self) -> int:
+        """How often the game has jumped in time or begun anew: trails end there."""
+        return self._conductor.epoch
+
+    @property
+    def error(self) -> Exception | None:
+        """What stopped the game; None while nothing has. It still can be wound back."""
+        ended = self.simulation.results[self.world]
+        return self._conductor.error or (ended.error if ended is not None and self.is_over else None)
+
+    @property
+    def notes(self) -> list[str]:
+        """What the user should know, one line each."""
+        return list(self._player.notes)
+
+    @property
+    def warp_reached(self) -> float:
+        """Simulated seconds per second over the last second; 0 while it stands still."""
+        return self._conductor.speed.speed()[0]
+
+    @property
+    def steps_per_second(self) -> float:
+        """Over the last second; 0 while it stands still."""
+        return self._conductor.speed.speed()[1]
+
+    @property
+    def happenings(self) -> list[Happening]:
+        """Events in order, those after the present too where it was wound back."""
+        return list(self._player.happenings)
+
+    @property
+    def injections(self) -> list[Injection]:
+        """What was said to the plugins from outside."""
+        return list(self._player.injections)
+
+    # -- what is seen -------------------------------------------------------------------------------------------------------------
+
+    def frame(self) -> Frame:
+        """The newest frame there is. While nobody asks none is made: the first after a while may be an old one."""
+        frame = self._taken(self._frame)
+        assert frame is not None
+        return frame  # type: ignore[no-any-return]
+
+    def frame_at(self, t: float) -> Frame:
+        """The last kept frame not after a time [s], for a look back while the game goes on; the first for times before it.
+
+        Positions are in half precision, and of a long game not every step is kept; `seek` gives all that was.
+
+        Raises:
+            ParameterError: The time is not a number.
+        """
+        step = max(self._step_at(t), self._player.first_step)
+        return self._player.history.at(step) or self.frame()
+
+    def shapes(self) -> tuple[Shape, ...]:
+        """What plugins have drawn in the last step, and before where it lasts. Collected only while somebody asks."""
+        return self._taken(self._shapes) or ()
+
+    def result(self) -> WorldResult | None:
+        """What the game has come to so far, without its state hash until it ends; None when it is asked for first."""
+        return self._taken(self._result)  # type: ignore[no-any-return]
+
+    def entity(self, who: int) -> EntityState | None:
+        """Body, plugin columns and messages of an entity; None where it is not there, and when it is asked for first."""
+        if who not in self._entities:
+            make = lambda: entity_state(self.simulation, self.world, who)  # noqa: E731
+            self._entities[who] = Offer(make, STATE_PERIOD, self._conductor.ring)
+        return self._taken(self._entities[who])  # type: ignore[no-any-return]
+
+    def _taken(self, offer: Offer[Any]) -> Any:
+        value = offer.take()
+        if self._thread is None:
+            self._renew(True)
+            value = offer.value
+        return value
+
+    def _renew(self, is_still: bool) -> None:
+        """Make anew what is asked for; between two steps, by whoever makes them."""
+        conductor, version = self._conductor, self._conductor.version
+        if conductor.is_seeking:
+            return
+        self._frame.renew(version, is_still=is_still, always=is_still)
+        self._result.renew(version, is_still=is_still)
+        self._shapes.renew(version, is_still=is_still)
+        if self._shapes.idle_for < 4.0 * LINGER:
+            self._sketchbook.open()
+        else:
+            self._sketchbook.close()
+        for who, offer in list(self._entities.items()):
+            offer.renew(version, is_still=is_still)
+            if offer.idle_for > FORGET_AFTER:
+                self._entities.pop(who, None)
+
+    def _make_result(self) -> WorldResult | None:
+        ended = self.simulation.results[self.world]
+        if ended is not None and not self.simulation.running[self.world]:
+            return ended
+        try:
+            return world_result(self.simulation, self.world, "", is_hashed=False)
+        except PluginError as error:
+            self._player.note(str(error))
+            return None
+
+    # -- what stands still ----------------------------------------------------------------------------------------------------------
+
+    @property
+    def name(self) -> str:
+        return self.simulation.mission.name or "mission"
+
+    @cached_property
+    def blocks(self) -> list[str]:
+        """Names of the blocks; the column `block` of a frame counts in them."""
+        return [b.name for b in self.simulation.mission.blocks]
+
+    @cached_property
+    def block_teams(self) -> list[int]:
+        """Team of each block."""
+        return [b.team for b in self.simulation.mission.blocks]
+
+    @cached_property
+    def teams(self) -> dict[int, str]:
+        """Team number -> names of its blocks, in order of the teams."""
+        pairs = list(zip(self.block_teams, self.blocks, strict=True))
+        return {
+            t: ", ".join(name for team, name in pairs if team == t) for t in sorted(set(self.block_teams))
+        }
+
+    @cached_property
+    def looks(self) -> Looks:
+        """Colours and models of the entities."""
+        plugins = [[type(p).__name__ for p in b.plugins] for b in self.simulation.mission.blocks]
+        return Looks(self.blocks, self.block_teams, plugins, self.viewer)
+
+    @cached_property
+    def scenery(self) -> Scenery:
+        """What stands still."""
+        return scenery_of(self.simulation.mission, self.viewer)

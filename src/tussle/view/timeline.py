@@ -1,0 +1,209 @@
+"""Where a game can be taken up again, and what was seen of it: snapshots and a light history of frames."""
+
+from __future__ import annotations
+
+import math
+import time
+from bisect import bisect_right
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tussle.api.bodies import FLOATS, OFFSETS
+from tussle.columns import RaggedColumn
+from tussle.comms.topic import Parcel
+from tussle.engine.access import Parked, Snapshot
+from tussle.errors import SnapshotError
+from tussle.messages import Batch
+from tussle.view.frame import Frame, Lens
+from tussle.view.pacing import Allowance
+
+if TYPE_CHECKING:
+    from tussle.engine.simulation import Simulation
+
+SNAPSHOT_SHARE = 0.02
+"""Share of the time that goes into snapshots. To replay from one to the next then takes at most 50 times as long as to take one."""
+HISTORY_SHARE = 0.01
+"""Share of the time that goes into the history of frames."""
+
+
+class Timeline:
+    """Snapshots of a simulation while it plays, so that any earlier step can be reached by replaying from the one before it.
+
+    One is taken when `every` seconds have been simulated and the time for it has been saved up. When they take too much memory, the
+    one goes that is missed least: gaps grow in proportion to how far away they are. The first and the last stay.
+
+    Args:
+        simulation: The simulation.
+        world: The world whose steps are counted.
+        every: Least simulated time between two [s].
+        limit: Memory that they may take [B].
+
+    Attributes:
+        refusal: Why no snapshot can be taken; "" while they can.
+        size: Memory that they take [B].
+    """
+
+    def __init__(self, simulation: Simulation, world: int, every: float, limit: float) -> None:
+        self._simulation, self._world = simulation, world
+        self._every, self._limit = every, limit
+        self._allowance = Allowance(SNAPSHOT_SHARE)
+        self._steps: list[int] = []
+        self._saved: list[tuple[Snapshot, int]] = []
+        self.size = 0
+        self.refusal = ""
+        if simulation.grade == "external":
+            self.refusal = "what its plugins deal with outside the simulation cannot be wound back (their grade is external)"
+
+    @property
+    def steps(self) -> list[int]:
+        """Steps of which there is a snapshot, ascending."""
+        return list(self._steps)
+
+    def offer(self, step: int) -> None:
+        """Take a snapshot of the present, at this step, if one is due and can be afforded."""
+        place = bisect_right(self._steps, step)
+        gap = (step - self._steps[place - 1]) * self._simulation.mission.dt if place else math.inf
+        if gap < self._every * (1.0 - 1e-9):
+            return
+        if self._allowance.allows():
+            self.keep(step)
+
+    def keep(self, step: int) -> None:
+        """Take a snapshot of the present, at this step."""
+        place = bisect_right(self._steps, step)
+        if self.refusal or (place and self._steps[place - 1] == step):
+            return
+        began = time.perf_counter()
+        try:
+            snapshot = self._simulation.snapshot()
+        except SnapshotError as error:
+            self.refusal = str(error)
+            self.clear()
+            return
+        size = memory_of(snapshot)
+        self._steps.insert(place, step)
+        self._saved.insert(place, (snapshot, size))
+        self.size += size
+        self._thin(step)
+        self._allowance.pay(time.perf_counter() - began)
+
+    def _thin(self, step: int) -> None:
+        while self.size > self._limit and len(self._steps) > 2:
+            steps = np.array(self._steps)
+            loss = (steps[2:] - steps[:-2]) / (np.abs(steps[1:-1] - step) + 1)
+            self._drop(1 + int(loss.argmin()))
+
+    def _drop(self, number: int) -> None:
+        self.size -= self._saved[number][1]
+        del self._steps[number], self._saved[number]
+
+    def nearest(self, step: int) -> tuple[int, Snapshot] | None:
+        """The last snapshot not after a step, and its step."""
+        place = bisect_right(self._steps, step)
+        return (self._steps[place - 1], self._saved[place - 1][0]) if place else None
+
+    def forget_after(self, step: int) -> None:
+        """Drop what belongs to a future that will not be."""
+        while self._steps and self._steps[-1] > step:
+            self._drop(-1)
+
+    def clear(self) -> None:
+        """Drop all."""
+        self._steps, self._saved, self.size = [], [], 0
+
+
+class History:
+    """Frames of a game as it went by, in half the precision, to be looked through at once.
+
+    When they take too much memory, every other one goes, and half as many are kept from then on.
+
+    Args:
+        simulation: The simulation.
+        world: Number of the world.
+        limit: Memory that they may take [B].
+    """
+
+    def __init__(self, simulation: Simulation, world: int, limit: float) -> None:
+        self._clock = simulation.context.clock
+        self._lens = Lens(simulation, world)
+        self._limit = limit
+        self._allowance = Allowance(HISTORY_SHARE)
+        self._stride = 1
+        self.size = 0
+        # Appended to and replaced, never changed: who looks things up in another thread needs no lock.
+        self._entries: list[tuple[int, tuple[np.ndarray, ...], np.ndarray]] = []
+
+    def offer(self, step: int) -> None:
+        """Keep what is there now, at this step, if it is new and can be afforded."""
+        if (self._entries and step < self._entries[-1][0] + self._stride) or not self._allowance.allows():
+            return
+        began = time.perf_counter()
+        floats, who = self._lens.look()
+        order = slice(None) if self._lens.order is None else self._lens.order
+        state = np.empty((_N_KEPT, len(who[0])), np.float32)
+        with np.errstate(over="ignore"):  # what is beyond 3e38 m is not to be seen
+            state[:_N_STATE] = floats[:_N_STATE, order]
+            state[_N_STATE] = floats[OFFSETS["health"], order]
+        self._entries.append((step, who, state))
+        self.size += state.nbytes + 200
+        while self.size > self._limit and len(self._entries) > 2:
+            self._stride *= 2
+            self._keep_only(self._entries[::2])
+        self._allowance.pay(time.perf_counter() - began)
+
+    def _keep_only(self, entries: list[tuple[int, tuple[np.ndarray, ...], np.ndarray]]) -> None:
+        self._entries = entries
+        self.size = sum(state.nbytes + 200 for _, _, state in entries)
+
+    def at(self, step: int) -> Frame | None:
+        """The last frame not after a step; None before the first."""
+        entries = self._entries
+        place = bisect_right(entries, step, key=lambda entry: entry[0])
+        if not place:
+            return None
+        kept, (ids, team, block), state = entries[place - 1]
+
+        def column(name: str) -> np.ndarray:
+            return np.ascontiguousarray(state[OFFSETS[name] : OFFSETS[name] + FLOATS[name]].T, np.float64)
+
+        t, health = float(self._clock.start + kept * self._clock.dt), state[_N_STATE].astype(np.float64)
+        return Frame(t, kept, ids, team, block, column("pos"), column("quat"), column("vel"), health)
+
+    @property
+    def steps(self) -> list[int]:
+        """Steps of which there is a frame, ascending."""
+        return [entry[0] for entry in self._entries]
+
+    def forget_after(self, step: int) -> None:
+        """Drop what belongs to a future that will not be."""
+        self._keep_only([entry for entry in self._entries if entry[0] <= step])
+
+    def clear(self) -> None:
+        """Drop all."""
+        self._stride = 1
+        self._keep_only([])
+
+
+_N_STATE = FLOATS["pos"] + FLOATS["vel"] + FLOATS["quat"]
+_N_KEPT = _N_STATE + FLOATS["health"]
+assert (OFFSETS["vel"], OFFSETS["quat"]) == (3, 6), "pos, vel and quat are copied as one piece"
+
+
+def memory_of(item: Any) -> int:
+    """Memory of all arrays and bytes in a nest of containers [B]; what several snapshots have in common counts in each."""
+    if isinstance(item, np.ndarray):
+        return int(item.nbytes)
+    if isinstance(item, bytes):
+        return len(item)
+    if isinstance(item, dict):
+        return sum(memory_of(value) for value in item.values())
+    if isinstance(item, (list, tuple)):
+        return sum(memory_of(value) for value in item)
+    if isinstance(item, Parcel):
+        return memory_of([item.batch, item.due, item.to])
+    if isinstance(item, Parked):
+        return memory_of([item.bodies.floats, item.bodies.ints, item.tables])
+    if isinstance(item, (Snapshot, Batch, RaggedColumn)):
+        return sum(memory_of(value) for name, value in vars(item).items() if name != "mission")
+    return 0
