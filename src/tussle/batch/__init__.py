@@ -6,11 +6,25 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from tussle.batch.batch import Batch
     from tussle.batch.executors import InProcess, Processes
+    from tussle.batch.optimization import optimize
     from tussle.batch.reload import load_batch
     from tussle.batch.results import Results
+    from tussle.batch.study import Study
+    from tussle.batch.study_store import load_study
     from tussle.batch.variables import Choice, Range
 
-__all__ = ["Batch", "Choice", "InProcess", "Processes", "Range", "Results", "load_batch"]
+__all__ = [
+    "Batch",
+    "Choice",
+    "InProcess",
+    "Processes",
+    "Range",
+    "Results",
+    "Study",
+    "load_batch",
+    "load_study",
+    "optimize",
+]
 
 _LAZY = {
     "Batch": "batch",
@@ -19,7 +33,10 @@ _LAZY = {
     "Processes": "executors",
     "Range": "variables",
     "Results": "results",
+    "Study": "study",
     "load_batch": "reload",
+    "load_study": "study_store",
+    "optimize": "optimization",  # not a module of the same name, which would take its place
 }
 
 

@@ -1,0 +1,291 @@
+"""A search for the values of a mission with which a quantity is greatest, or smallest."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tussle.batch.evaluation import Crew, Evaluator
+from tussle.batch.proposals import Proposer
+from tussle.batch.quantities import Quantity
+from tussle.batch.searched_mission import SearchedMission
+from tussle.batch.study import Study, best_of
+from tussle.batch.study_store import StudyStore, notes_on_versions, read_trials, versions_of_samplers
+from tussle.batch.trials import column_type
+from tussle.batch.variables import Variable
+from tussle.batch.varied import about, as_variables
+from tussle.errors import ParameterError
+from tussle.mission import Mission
+from tussle.record.run_file import versions
+
+if TYPE_CHECKING:
+    from tussle.batch.executors import Executor
+    from tussle.batch.progress import Progress
+    from tussle.batch.trials import Trial
+
+MOST_TRIALS = 10_000
+"""Samplers look at all trials before each round, and the table of them is written after each."""
+
+
+@dataclass
+class SearchProgress:
+    """How far a search is.
+
+    Attributes:
+        n_trials: Trials that are wanted.
+        n_before: Trials that were there before this call.
+        n_done: Trials that are finished, those included.
+        n_failed: Of them, those that failed.
+        best: The best so far.
+        n_round: Trials of the round under way.
+        played: Part of the round that is played, 0 to 1.
+    """
+
+    n_trials: int
+    n_before: int
+    n_done: int
+    n_failed: int = 0
+    best: Trial | None = None
+    n_round: int = 0
+    played: float = 0.0
+
+
+class Optimization:
+    """A search for the values of a mission with which the mean of a quantity is greatest, or smallest.
+
+    Args:
+        mission: A mission file, the name of one that ships, a `Mission`, or a function of the varied values that makes one.
+        objective: The quantity, such as "score[3]-score[2]"; its mean over the runs counts.
+        vary: What varies, as for `Batch`.
+        minimize: Smaller is better.
+        runs: Games of each trial. All trials meet the same seeds (common random numbers).
+        per_round: Trials that are proposed together and played side by side, each without knowing the others.
+        sampler: Who proposes: tpe (Optuna's), cmaes, or random.
+        sample_seed: Seed of what is proposed.
+        first_seed: Seeds of the games count up from here.
+        settings: Values that are set in all trials, as for `read_mission` or by path.
+        plugin_files: Python files whose plugins the mission file may name.
+        ends_by_time: The game ends at its end time whatever the mission says.
+        options: Further options of `read_mission`.
+
+    Raises:
+        ParameterError: A variable, the quantity or a number is not allowed.
+        MissionError: The mission cannot be read.
+        MissingExtraError: Optuna is not installed.
+    """
+
+    def __init__(
+        self,
+        mission: str | Path | Mission | Callable[..., Mission],
+        objective: str,
+        *,
+        vary: Mapping[str, Any] | Iterable[str | Variable],
+        minimize: bool = False,
+        runs: int = 32,
+        per_round: int = 8,
+        sampler: str = "tpe",
+        sample_seed: int = 0,
+        first_seed: int = 1,
+        settings: Mapping[str, Any] | None = None,
+        plugin_files: Sequence[str | Path] = (),
+        ends_by_time: bool = False,
+        **options: Any,
+    ) -> None:
+        for name, value, least in (
+            ("runs", runs, 1),
+            ("per_round", per_round, 1),
+            ("sample_seed", sample_seed, 0),
+            ("first_seed", first_seed, 0),
+        ):
+            _check_whole(name, value, least)
+        settings = dict(settings or {})
+        variables = tuple(as_variables(vary))
+        if not variables:
+            raise ParameterError("nothing varies, so there is nothing to search; vary at least one value")
+        for variable in variables:
+            column_type(variable)
+            if variable.name in settings:
+                raise ParameterError(f"{variable.name} is set and varies; say one of the two")
+        self.quantity = Quantity.parse(objective)
+        self.proposer = Proposer(variables, sampler, sample_seed, per_round, minimize)
+        self.mission = SearchedMission(
+            mission, variables, runs, first_seed, settings, tuple(plugin_files), ends_by_time, options
+        )
+        self.content = self.mission.read()
+        self.evaluator = Evaluator(self.mission, self.quantity)
+
+    # -- what is searched ---------------------------------------------------------------------------------------------------
+
+    @property
+    def name(self) -> str:
+        """Short name of the mission."""
+        return self.content.name
+
+    @property
+    def info(self) -> dict[str, Any]:
+        """What `study.json` says."""
+        said = {
+            "tussle": versions()["tussle"],
+            "name": self.name,
+            "mission": self.mission.about(self.content),
+            "objective": str(self.quantity),
+            "direction": "minimize" if self.proposer.is_minimized else "maximize",
+            "variables": [about(v) for v in self.proposer.variables],
+            "runs": self.mission.runs,
+            "first_seed": self.mission.first_seed,
+            "sampler": self.proposer.sampler,
+            "sample_seed": self.proposer.seed,
+            "per_round": self.proposer.per_round,
+        }
+        text = json.dumps([said, self.content.hash], default=str)
+        fingerprint = hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
+        return {"format": 1, "fingerprint": fingerprint, **said, "versions": versions_of_samplers()}
+
+    @property
+    def fingerprint(self) -> str:
+        """Hash of all that the trials depend on, but for how many there are."""
+        return str(self.info["fingerprint"])
+
+    def default_directory(self) -> Path:
+        """Where the search goes unless told otherwise: the same for the same search, so that the same command goes on with it."""
+        return Path("optimizations") / f"{self.name}-{self.fingerprint[:8]}"
+
+    # -- the search ---------------------------------------------------------------------------------------------------------
+
+    def check(self) -> None:
+        """Begin a game with the values that are proposed first, and see that the quantity is one of its results.
+
+        Raises:
+            TussleError: None of them can be played.
+            ParameterError: There is no such quantity.
+        """
+        self.evaluator.check(self.proposer.propose(0, self.proposer.per_round, ()))
+
+    def play(
+        self,
+        directory: str | Path | None = None,
+        trials: int = 100,
+        *,
+        executor: Executor | None = None,
+        processes: int | None = None,
+        stack: int | None = None,
+        command: Sequence[str] | None = None,
+        on_progress: Callable[[SearchProgress], None] | None = None,
+    ) -> Study:
+        """Search on until there are so many trials.
+
+        Args:
+            directory: Where whole rounds are kept at once; None keeps all in memory.
+            trials: How many.
+            executor: Who plays; by default all cores of this machine.
+            processes: How many, instead of one per core.
+            stack: Worlds side by side in each.
+            command: What `study.json` is to name as the command.
+            on_progress: Called after each finished run, and now and then.
+
+        Raises:
+            BatchError: The directory holds another search, somebody else searches there, or a file has changed meanwhile.
+            RecordError: The directory cannot be written.
+        """
+        _check_whole("trials", trials, 1, MOST_TRIALS)
+        crew = Crew(executor, processes, stack)
+        variables = self.proposer.variables
+        info = {**self.info, "command": list(command or sys.argv)}
+        path = None if directory is None else Path(directory)
+        with nullcontext() if path is None else StudyStore(path, info) as store:
+            done = [] if path is None else read_trials(path, variables)
+            notes = [] if store is None else notes_on_versions(store.info, info, len(done))
+            progress = SearchProgress(trials, len(done), len(done))
+            tell = on_progress or (lambda _: None)
+            self._count(progress, done)
+            tell(progress)
+            while len(done) < trials:
+                done += self._round(done, progress, crew, tell)
+                if store is not None:
+                    store.put(done, variables)
+                self._count(progress, done)
+                tell(progress)
+            return Study(path, info if store is None else store.info, variables, tuple(done), notes)
+
+    def _round(
+        self,
+        done: Sequence[Trial],
+        progress: SearchProgress,
+        crew: Crew,
+        tell: Callable[[SearchProgress], None],
+    ) -> list[Trial]:
+        """The trials of the next round."""
+        self.content.check_same(self.mission.read())
+        number = done[-1].round + 1 if done else 0
+        progress.n_round = min(self.proposer.per_round, progress.n_trials - len(done))
+
+        def on_progress(batch: Progress) -> None:
+            progress.played = (batch.n_done + batch.under_way) / batch.n_runs
+            tell(progress)
+
+        points = self.proposer.propose(number, progress.n_round, done)
+        return self.evaluator.trials(points, number, done, crew, on_progress)
+
+    def _count(self, progress: SearchProgress, done: Sequence[Trial]) -> None:
+        progress.n_done, progress.n_round, progress.played = len(done), 0, 0.0
+        progress.n_failed = sum(not t.is_complete for t in done)
+        progress.best = best_of(done, self.proposer.is_minimized)
+
+
+def optimize(
+    mission: str | Path | Mission | Callable[..., Mission],
+    objective: str,
+    *,
+    vary: Mapping[str, Any] | Iterable[str | Variable],
+    trials: int = 100,
+    directory: str | Path | None = None,
+    executor: Executor | None = None,
+    processes: int | None = None,
+    stack: int | None = None,
+    on_progress: Callable[[SearchProgress], None] | None = None,
+    **search: Any,
+) -> Study:
+    """Search for the values of a mission with which the mean of a quantity is greatest, or smallest.
+
+    Args:
+        mission: As for `Optimization`, like all that is not said here.
+        objective: The quantity.
+        vary: What varies.
+        trials: How many sets of values are tried.
+        directory: Where whole rounds are kept at once, and from where the same search goes on; None keeps all in memory.
+        executor: Who plays; by default all cores of this machine.
+        processes: How many, instead of one per core.
+        stack: Worlds side by side in each.
+        on_progress: Called after each finished run, and now and then.
+        search: Further arguments of `Optimization`, such as minimize, runs, per_round, sampler and sample_seed.
+
+    Raises:
+        ParameterError: A variable, the quantity or a number is not allowed.
+        MissionError: The mission cannot be read, or cannot be played with any of the values that are proposed first.
+        MissingExtraError: Optuna is not installed.
+        BatchError: The directory holds another search, or somebody else searches there.
+        RecordError: The directory cannot be written.
+    """
+    optimization = Optimization(mission, objective, vary=vary, **search)
+    optimization.check()
+    return optimization.play(
+        directory, trials, executor=executor, processes=processes, stack=stack, on_progress=on_progress
+    )
+
+
+def _check_whole(name: str, value: Any, least: int, most: int | None = None) -> None:
+    """Refuse what is no whole number, or out of bounds.
+
+    Raises:
+        ParameterError: It is.
+    """
+    is_whole = isinstance(value, int) and not isinstance(value, bool)
+    if not is_whole or value < least or (most is not None and value > most):
+        bounds = f">= {least}" if most is None else f"from {least} to {most:,}"
+        raise ParameterError(f"{name} = {value!r} is not allowed; it takes a whole number {bounds}")

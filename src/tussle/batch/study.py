@@ -1,0 +1,141 @@
+"""What came of a search: its trials, the best of them, and how far it is ahead."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+
+from tussle.batch.points import values_text
+from tussle.batch.proposals import Proposer
+from tussle.batch.statistics import Comparison, paired_difference
+from tussle.batch.trials import Trial, trials_table
+from tussle.batch.variables import Value, Variable
+
+
+@dataclass(frozen=True)
+class Study:
+    """The trials of a search.
+
+    Attributes:
+        path: Its directory; None in memory.
+        info: What `study.json` says.
+        variables: What varied.
+        trials: All trials, in order.
+        notes: What the user should know, one line each.
+    """
+
+    path: Path | None
+    info: Mapping[str, Any]
+    variables: tuple[Variable, ...]
+    trials: tuple[Trial, ...]
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def is_minimized(self) -> bool:
+        """Smaller objectives are better."""
+        return bool(self.info["direction"] == "minimize")
+
+    @property
+    def objective(self) -> str:
+        """The quantity whose mean is searched."""
+        return str(self.info["objective"])
+
+    @cached_property
+    def ranking(self) -> list[Trial]:
+        """Complete trials of different values, the best first; of equal ones the earliest."""
+        sign = 1.0 if self.is_minimized else -1.0
+        ordered = sorted((t for t in self.trials if t.is_complete), key=lambda t: sign * t.objective)
+        first: dict[tuple[Any, ...], Trial] = {}
+        for trial in ordered:
+            first.setdefault(trial.key, trial)
+        return list(first.values())
+
+    @property
+    def best(self) -> Trial | None:
+        """The best trial; None where all failed."""
+        return best_of(self.trials, self.is_minimized)
+
+    @cached_property
+    def lead(self) -> Comparison | None:
+        """What the best trial has more than the next one, seed by seed; None for less than two trials of different values.
+
+        An interval that holds zero says that the two cannot be told apart. Both were picked for their objectives on these very seeds, so
+        that even one which does not says less than it seems to.
+        """
+        if len(self.ranking) < 2:
+            return None
+        best, second = self.ranking[:2]
+        return paired_difference(
+            self.objective,
+            (self.label(second.values), self.label(best.values)),
+            np.array(second.by_seed),
+            np.array(best.by_seed),
+        )
+
+    @property
+    def is_clear(self) -> bool:
+        """The interval of the lead is on the better side of zero."""
+        if self.lead is None:
+            return False
+        return self.lead.high < 0.0 if self.is_minimized else self.lead.low > 0.0
+
+    @property
+    def improvements(self) -> list[Trial]:
+        """The trials that were the best so far when they came."""
+        found: list[Trial] = []
+        for trial in self.trials:
+            if trial.is_complete and (not found or is_better(trial, found[-1], self.is_minimized)):
+                found.append(trial)
+        return found
+
+    @property
+    def table(self) -> pa.Table:
+        """One row per trial: trial, round, each variable, objective, low, high, n_failed, state, error, by_seed."""
+        return trials_table(self.trials, self.variables)
+
+    @property
+    def n_points(self) -> int:
+        """Different sets of values among the trials."""
+        return len({t.key for t in self.trials})
+
+    def importances(self) -> dict[str, float]:
+        """Variable -> how much being among the best quarter of the trials depends on it (PED-ANOVA), the greatest first.
+
+        Nothing for less than 20 complete trials, or for one variable.
+
+        Raises:
+            MissingExtraError: Optuna is not installed.
+        """
+        info = self.info
+        proposer = Proposer(
+            self.variables, info["sampler"], info["sample_seed"], info["per_round"], self.is_minimized
+        )
+        return proposer.importances(self.trials)
+
+    def settings(self, values: Mapping[str, Value]) -> dict[str, str]:
+        """Values as a mission file takes them."""
+        return values_text(values, self.variables)
+
+    def label(self, values: Mapping[str, Value]) -> str:
+        """Values on one line: "prey_speed=23.4 kt, tactic=keep"."""
+        return ", ".join(f"{name}={text}" for name, text in self.settings(values).items())
+
+
+def is_better(trial: Trial, than: Trial, is_minimized: bool) -> bool:
+    """Whether a complete trial has the better objective."""
+    return trial.objective < than.objective if is_minimized else trial.objective > than.objective
+
+
+def best_of(trials: Iterable[Trial], is_minimized: bool) -> Trial | None:
+    """The best complete trial, the earliest of equal ones; None where all failed."""
+    best: Trial | None = None
+    for trial in trials:
+        if trial.is_complete and (best is None or is_better(trial, best, is_minimized)):
+            best = trial
+    return best

@@ -1,0 +1,95 @@
+"""The command line of `tussle optimize`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tussle.cli.batch_commands import FirstSeed, Stack, Vary, Workers
+from tussle.cli.options import (
+    Debug,
+    End,
+    Large,
+    MissionName,
+    More,
+    PluginFiles,
+    Set,
+    Strict,
+    mission_source,
+)
+from tussle.cli.terminal import told
+
+Objective = Annotated[
+    str,
+    typer.Option(
+        metavar="QUANTITY",
+        help="What is to be great, on average over the games: 'score[3]-score[2]', 'wins[2]', 't'.",
+        show_default=False,
+    ),
+]
+Minimize = Annotated[bool, typer.Option("--minimize", help="It is to be small instead.")]
+Trials = Annotated[int, typer.Option(metavar="N", min=1, help="Sets of values that are tried.")]
+RunsOfTrial = Annotated[
+    int,
+    typer.Option("--runs", "-n", metavar="N", min=1, help="Games of each trial, all with the same seeds."),
+]
+PerRound = Annotated[
+    int, typer.Option(metavar="N", min=1, help="Trials that are chosen together and played side by side.")
+]
+Sampler = Annotated[str, typer.Option(metavar="NAME", help="Who chooses what is tried: tpe, cmaes, random.")]
+SampleSeed = Annotated[int, typer.Option(metavar="N", min=0, help="Seed of the choosing.")]
+StudyDirectory = Annotated[
+    Path | None,
+    typer.Option(
+        "--out",
+        metavar="DIR",
+        help="Where trials are kept; by default optimizations/NAME-HASH, the same for the same search, which goes on from there.",
+        show_default=False,
+    ),
+]
+
+
+def optimize(
+    mission: MissionName,
+    more: More = None,
+    objective: Objective = "",
+    vary: Vary = None,
+    minimize: Minimize = False,
+    trials: Trials = 100,
+    runs: RunsOfTrial = 32,
+    per_round: PerRound = 8,
+    sampler: Sampler = "tpe",
+    sample_seed: SampleSeed = 0,
+    seed: FirstSeed = None,
+    settings: Set = None,
+    end: End = None,
+    directory: StudyDirectory = None,
+    processes: Workers = None,
+    stack: Stack = None,
+    strict: Strict = False,
+    plugin_files: PluginFiles = None,
+    allow_large: Large = False,
+    debug: Debug = False,
+) -> None:
+    """Search for the values with which a quantity of the game is greatest, or smallest."""
+    if not objective:
+        raise typer.BadParameter(
+            "--objective says what is to be great: a quantity such as 'score[3]-score[2]'"
+        )
+    if not vary:
+        raise typer.BadParameter(
+            "--vary says what is searched: speed=20:30, gain=1e-3:10:log, tactic=keep,switch"
+        )
+    with told(debug):
+        from tussle.cli.optimize_course import Asked, search
+
+        source = mission_source(mission, settings, more, seed, end, strict, plugin_files, allow_large)
+        asked = Asked(
+            source, objective, tuple(vary), minimize, trials, runs, per_round, sampler, sample_seed, directory, processes,
+            stack,
+        )  # fmt: skip
+        code = search(asked, [Path(sys.argv[0]).name, *sys.argv[1:]])
+    raise typer.Exit(code)

@@ -1,0 +1,191 @@
+"""`tussle optimize`: values are tried, kept, and the best of them shown."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Self
+
+from rich.console import Group
+from rich.live import Live
+from rich.progress import BarColumn, Progress, TextColumn
+from rich.text import Text
+
+from tussle.batch.optimization import Optimization, SearchProgress
+from tussle.batch.points import values_text
+from tussle.cli.batch import Interrupted
+from tussle.cli.interrupt import Interrupt
+from tussle.cli.optimize_summary import interval, play_again, show_study
+from tussle.cli.play import FOR_VIEWER, Source
+from tussle.cli.progress import BAR_EVERY, LINE_EVERY, clock, compiling
+from tussle.cli.settings import read_end
+from tussle.cli.terminal import err, say, say_note
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What the command line says of a search.
+
+    Attributes:
+        source: The mission and what is set in it.
+        objective: The quantity.
+        vary: Texts of `--vary`.
+        minimize: Smaller is better.
+        trials: Sets of values that are tried.
+        runs: Games of each.
+        per_round: Trials that are chosen together.
+        sampler: Who chooses.
+        sample_seed: Seed of the choosing.
+        directory: Where trials are kept.
+        processes: How many.
+        stack: Worlds side by side.
+    """
+
+    source: Source
+    objective: str
+    vary: Sequence[str]
+    minimize: bool
+    trials: int
+    runs: int
+    per_round: int
+    sampler: str
+    sample_seed: int
+    directory: Path | None
+    processes: int | None
+    stack: int | None
+
+    def optimization(self) -> Optimization:
+        """The search that is meant.
+
+        Raises:
+            TussleError: Something in it is not allowed.
+        """
+        end = {} if self.source.end is None else {"run.end": repr(read_end(self.source.end))}
+        optimization = Optimization(
+            self.source.mission,
+            self.objective,
+            vary=self.vary,
+            minimize=self.minimize,
+            runs=self.runs,
+            per_round=self.per_round,
+            sampler=self.sampler,
+            sample_seed=self.sample_seed,
+            first_seed=1 if self.source.seed is None else self.source.seed,
+            settings={**self.source.settings, **end},
+            plugin_files=tuple(self.source.plugin_files),
+            ends_by_time=bool(end),
+            strict=self.source.strict,
+            allow_large=self.source.allow_large,
+        )
+        loaded = optimization.content.loaded
+        for note in loaded.notes if loaded is not None else ():
+            if FOR_VIEWER not in note:
+                say_note(note)
+        return optimization
+
+
+def search(asked: Asked, command: Sequence[str]) -> int:
+    """Search, or go on where a search was stopped, and show what came of it.
+
+    Returns:
+        The exit code.
+    """
+    began = time.perf_counter()
+    optimization = asked.optimization()
+    directory = asked.directory or optimization.default_directory()
+    with ExitStack() as stack:
+        with compiling():
+            optimization.check()
+        interrupt = stack.enter_context(Interrupt())
+        meter = stack.enter_context(SearchMeter(optimization, interrupt))
+        try:
+            study = optimization.play(
+                directory, asked.trials, processes=asked.processes, stack=asked.stack, command=command, on_progress=meter.show
+            )  # fmt: skip
+        except Interrupted:
+            kept = f"{meter.n_done} trials are kept" if meter.n_done != 1 else "1 trial is kept"
+            say("interrupted", f"{kept} in {directory}; the same command goes on", "bold yellow")
+            return interrupt.code
+    if meter.n_before:
+        say_note(f"{meter.n_before:,} of {len(study.trials):,} trials were there already, in {directory}")
+    for note in study.notes:
+        say_note(note)
+    n_new, again = len(study.trials) - meter.n_before, play_again(asked.source, study)
+    return show_study(study, optimization, directory, time.perf_counter() - began, n_new, again)
+
+
+class SearchMeter:
+    """Shows how far a search is: a bar and the best so far on a terminal, a line now and then elsewhere.
+
+    Args:
+        optimization: The search.
+        interrupt: Where Ctrl-C is heard.
+
+    Attributes:
+        n_before: Trials that were there before.
+        n_done: Trials that are finished.
+    """
+
+    def __init__(self, optimization: Optimization, interrupt: Interrupt) -> None:
+        self.n_before = self.n_done = 0
+        self._search, self._interrupt = optimization, interrupt
+        self._began = time.perf_counter()
+        self._is_bar = err().is_terminal
+        self._due = self._began + (0.0 if self._is_bar else LINE_EVERY)
+        self._bar = Progress(
+            TextColumn("{task.description}", style="bold"),
+            BarColumn(bar_width=None, complete_style="cyan", finished_style="cyan", pulse_style="cyan"),
+            TextColumn("{task.fields[at]}"),
+            TextColumn("{task.fields[left]}", style="dim"),
+            auto_refresh=False, expand=True,
+        )  # fmt: skip
+        self._task = self._bar.add_task(optimization.name, total=None, at="", left="")
+        self._live = Live(self._bar, console=err(), auto_refresh=False, transient=True)
+
+    def __enter__(self) -> Self:
+        if self._is_bar:
+            self._live.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._is_bar:
+            self._live.stop()
+
+    def show(self, progress: SearchProgress) -> None:
+        """The search has come so far.
+
+        Raises:
+            Interrupted: The user has asked for an end.
+        """
+        self.n_before, self.n_done = progress.n_before, progress.n_done
+        if self._interrupt.code:
+            raise Interrupted
+        now = time.perf_counter()
+        if now < self._due:
+            return
+        self._due = now + (BAR_EVERY if self._is_bar else LINE_EVERY)
+        completed = progress.n_done + progress.n_round * progress.played
+        rate = (completed - progress.n_before) / max(now - self._began, 1e-9)
+        at = f"{progress.n_done:,}/{progress.n_trials:,} trials"
+        left = "" if rate <= 0.0 else f"{clock(max(0.0, progress.n_trials - completed) / rate)} left"
+        best = self._best(progress)
+        if self._is_bar:
+            self._bar.update(self._task, total=progress.n_trials, completed=completed, at=at, left=left)
+            self._live.update(Group(self._bar, Text(best, style="dim")), refresh=True)
+        else:
+            err().print(", ".join(text for text in (at, left, best) if text), soft_wrap=True, markup=False)
+
+    def _best(self, progress: SearchProgress) -> str:
+        parts = []
+        if (best := progress.best) is not None:
+            values = ", ".join(
+                f"{name}={text}"
+                for name, text in values_text(best.values, self._search.proposer.variables).items()
+            )
+            parts.append(f"best {interval(best.objective, best.low, best.high)} with {values}")
+        if progress.n_failed:
+            parts.append(f"{progress.n_failed:,} failed")
+        return ", ".join(parts)

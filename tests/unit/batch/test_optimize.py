@@ -1,0 +1,557 @@
+"""Searches: they find what is known to be best, go on where they were killed, and say how sure they are."""
+
+from __future__ import annotations
+
+import json
+import logging
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import bowl
+import numpy as np
+import optuna
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from tussle.batch.evaluation import WORTH_PROCESSES, Crew
+from tussle.batch.executors import InProcess, Processes
+from tussle.batch.optimization import MOST_TRIALS, Optimization, optimize
+from tussle.batch.study_store import StudyStore, load_study, notes_on_versions
+from tussle.batch.variables import Choice, Range
+from tussle.errors import BatchError, MissingExtraError, MissionError, ParameterError
+
+PLUGIN = Path(bowl.__file__)
+PLACE = {"Bowl.x": (-10.0, 10.0), "Bowl.y": (-10.0, 10.0)}
+HERE = InProcess()
+
+
+def search(objective="Bowl.height", source=None, vary=PLACE, **more):
+    """A search of few short games in this process."""
+    return optimize(
+        bowl.mission() if source is None else source,
+        objective,
+        vary=vary,
+        **({"runs": 2, "trials": 24, "executor": HERE} | more),
+    )
+
+
+def facts(study):
+    """All that is known of the trials, comparable where it is not a number."""
+    return [repr(trial) for trial in study.trials]
+
+
+@pytest.fixture
+def game(tmp_path):
+    path = tmp_path / "bowl.xml"
+    path.write_text(bowl.MISSION)
+    return path
+
+
+# -- what is found --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("sampler", ["tpe", "cmaes"])
+def test_the_known_optimum_is_found(sampler):
+    best = search(sampler=sampler, trials=96).best
+    assert best.values["Bowl.x"] == pytest.approx(bowl.BEST_X, abs=1.0)
+    assert best.values["Bowl.y"] == pytest.approx(bowl.BEST_Y, abs=1.0)
+    assert bowl.TOP - 1.0 < best.objective <= bowl.TOP
+
+
+@pytest.mark.parametrize("sampler", ["tpe", "cmaes"])
+def test_a_sampler_is_better_than_chance(sampler):
+    means = {
+        name: np.mean([search(sampler=name, trials=64, sample_seed=seed).best.objective for seed in range(3)])
+        for name in (sampler, "random")
+    }
+    assert means[sampler] > means["random"]
+
+
+def test_the_smallest_is_found():
+    study = search("(t-t)-Bowl.height", minimize=True, trials=64)
+    assert study.best.objective == min(t.objective for t in study.trials)
+    assert study.best.values["Bowl.x"] == pytest.approx(bowl.BEST_X, abs=2.0)
+    assert study.lead.difference < 0.0
+    assert [t.objective for t in study.improvements] == sorted(
+        (t.objective for t in study.improvements), reverse=True
+    )
+
+
+def test_choices_whole_numbers_and_levels_in_a_file(game):
+    vary = ["x=-9:9:int", "y=-4:4:5", "n=1,2", "luck=0,1.5", "rough=1e-6:1e-3:log:4"]
+    study = search(source=game, vary=vary, plugin_files=[PLUGIN], trials=64, sample_seed=1)
+    for trial in study.trials:
+        x, y, n, luck, rough = trial.values.values()
+        assert isinstance(x, int)
+        assert -9 <= x <= 9
+        assert y in (-4.0, -2.0, 0.0, 2.0, 4.0)
+        assert n in (1, 2)
+        assert luck in (0, 1.5)
+        assert rough in Range("r", 1e-6, 1e-3, is_log=True, levels=4).spread(4)
+    assert abs(study.best.values["x"] - 3) <= 1
+    assert study.best.values["y"] in (-2.0, 0.0)
+
+
+def test_common_random_numbers():
+    """What two trials have in common does not hide which is better: their luck cancels, seed by seed."""
+    study = search(source=bowl.mission(luck=5.0), runs=24, trials=16)
+    best, second = study.ranking[:2]
+    assert best.high - best.low > 1.0
+    assert study.lead.difference == pytest.approx(best.objective - second.objective)
+    assert study.lead.high - study.lead.low < 1e-9
+    assert study.is_clear
+
+
+def test_noise_is_told():
+    study = search(
+        source=bowl.mission(rough=3.0),
+        vary={"Bowl.x": (2.9, 3.1), "Bowl.y": (-1.0, -0.9)},
+        runs=24,
+        trials=24,
+    )
+    assert study.lead.low < 0.0 < study.lead.high
+    assert not study.is_clear
+
+
+def test_the_objective_is_the_mean_of_the_runs(game):
+    study = search(
+        source=game, vary=["x=0:1"], plugin_files=[PLUGIN], settings={"luck": 3}, runs=5, first_seed=7
+    )
+    for trial in study.trials:
+        height = bowl.TOP - (trial.values["x"] - bowl.BEST_X) ** 2
+        luck = [(seed * 7919 % 11) / 10 - 0.5 for seed in range(7, 12)]
+        assert trial.by_seed == pytest.approx([height + 3 * v for v in luck], abs=1e-12)
+        assert trial.objective == pytest.approx(np.mean(trial.by_seed), abs=1e-12)
+        assert trial.low < trial.objective < trial.high
+
+
+def test_units_reach_the_mission():
+    def made(speed):
+        assert speed.endswith(" kt")
+        return bowl.mission(x=float(speed.removesuffix(" kt")))
+
+    study = search(source=made, vary=["speed=1:5 kt"], trials=8)
+    for trial in study.trials:
+        assert trial.objective == pytest.approx(bowl.TOP - (trial.values["speed"] - bowl.BEST_X) ** 2)
+
+
+def test_importances():
+    study = search(vary=PLACE | {"Bowl.luck": (0.0, 1e-6)}, trials=64)
+    shares = study.importances()
+    assert list(shares)[-1] == "Bowl.luck"
+    assert sum(shares.values()) == pytest.approx(1.0)
+    assert search(trials=16).importances() == {}
+    assert search(trials=24, vary=["Bowl.x=0:1"]).importances() == {}
+    assert search("start[1]", trials=24).importances() == {}
+
+
+def test_values_that_were_played_are_not_played_again():
+    n_played = []
+
+    class Counting(InProcess):
+        def play(self, package, runs):
+            n_played.append(len(runs))
+            return super().play(package, runs)
+
+    study = search(vary={"Bowl.x": [1, 2, 3]}, executor=Counting(), trials=40)
+    assert sum(n_played) == 3 * 2
+    assert study.n_points == 3
+    assert len(study.trials) == 40
+    assert {t.values["Bowl.x"]: t.objective for t in study.trials} == {1: 6.0, 2: 9.0, 3: 10.0}
+    assert len(study.ranking) == 3
+
+
+def test_processes_and_stacks_change_nothing():
+    whole = facts(search(trials=16, runs=4))
+    assert facts(search(trials=16, runs=4, executor=InProcess(3))) == whole
+    assert facts(search(trials=16, runs=4, executor=None, processes=2)) == whole
+
+
+def test_short_rounds_are_played_in_this_process(monkeypatch):
+    asked = []
+    monkeypatch.setattr(Processes, "play", lambda self, *a: (asked.append(1), InProcess().play(*a))[1])
+    crew, mission = Crew(), Optimization(bowl.mission(), "t", vary=PLACE, runs=64).mission
+    batch = mission.batch([{"Bowl.x": 1.0, "Bowl.y": 0.0}])
+    n_processes = batch.executor().n if isinstance(batch.executor(), Processes) else 1
+    crew.play(batch, lambda _: None)
+    assert len(asked) == (n_processes > 1)
+    assert crew.cpu_s < WORTH_PROCESSES
+    crew.play(batch, lambda _: None)
+    assert len(asked) == (n_processes > 1)
+
+
+# -- what fails -----------------------------------------------------------------------------------------------------------
+
+
+def test_a_trial_with_a_failed_run_is_failed_and_the_search_goes_on():
+    study = search(source=bowl.mission(fails_from=2.0), trials=32)
+    failed = [t for t in study.trials if not t.is_complete]
+    assert 0 < len(failed) < 32
+    assert all((t.values["Bowl.x"] >= 2.0) == (t in failed) for t in study.trials)
+    for trial in failed:
+        assert trial.n_failed == 2
+        assert "too far out" in trial.error
+        assert math.isnan(trial.objective)
+    assert study.best.values["Bowl.x"] < 2.0
+    assert set(study.table["state"].to_pylist()) == {"complete", "failed"}
+
+
+def test_a_search_in_which_all_fails_has_no_best():
+    study = search(source=bowl.mission(fails_from=-50.0), trials=16)
+    assert study.best is None
+    assert study.lead is None
+    assert not study.is_clear
+    assert study.importances() == {}
+
+
+@pytest.mark.parametrize("sampler", ["tpe", "cmaes", "random"])
+def test_failures_do_not_stop_a_sampler(sampler):
+    study = search(source=bowl.mission(fails_from=0.0), sampler=sampler, trials=40)
+    assert study.best.values["Bowl.x"] < 0.0
+
+
+def test_what_is_no_number_is_a_failure():
+    study = search("Bowl.log", trials=16)
+    for trial in study.trials:
+        assert trial.is_complete == (trial.values["Bowl.x"] >= 0.0)
+        if not trial.is_complete:
+            assert trial.error == "seed 1: Bowl.log is nan"
+            assert trial.n_failed == 2
+
+
+def test_values_that_cannot_be_played_fail_alone():
+    study = search(vary={"Bowl.x": (50.0, 150.0), "Bowl.y": (-1.0, 1.0)}, trials=24)
+    for trial in study.trials:
+        assert trial.is_complete == (trial.values["Bowl.x"] <= 100.0)
+    error = next(t.error for t in study.trials if not t.is_complete)
+    assert "<= 100" in error
+    assert trial.by_seed == () or trial.is_complete
+
+
+def test_the_error_of_values_in_a_file_names_no_point(game):
+    study = search(source=game, vary=["x=50:150"], plugin_files=[PLUGIN], trials=8)
+    error = next(t.error for t in study.trials if not t.is_complete)
+    assert error.startswith(f"{game}:4: ")
+
+
+def test_values_that_can_never_be_played_are_an_error(game):
+    with pytest.raises(ParameterError, match="<= 100"):
+        search(vary={"Bowl.x": (150.0, 160.0)})
+    with pytest.raises(MissionError, match="<= 100"):
+        search(source=game, vary=["x=150:160"], plugin_files=[PLUGIN])
+
+
+# -- what is refused ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"vary": {}}, "nothing varies, so there is nothing to search"),
+        (
+            {"sampler": "tp"},
+            "sampler = 'tp' is not allowed.*did you mean 'tpe'.*there are: tpe, cmaes, random",
+        ),
+        ({"sampler": "cmaes", "vary": {"Bowl.x": [1, 2]}}, "cmaes searches ranges, and Bowl.x is a choice"),
+        ({"settings": {"Bowl.x": 1}}, "Bowl.x is set and varies"),
+        ({"runs": 0}, "runs = 0 is not allowed; it takes a whole number >= 1"),
+        ({"per_round": 2.5}, "per_round = 2.5 is not allowed"),
+        ({"sample_seed": -1}, "sample_seed = -1 is not allowed"),
+        ({"first_seed": True}, "first_seed = True is not allowed"),
+        ({"trials": 0}, "trials = 0 is not allowed; it takes a whole number from 1 to 10,000"),
+        ({"trials": MOST_TRIALS + 1}, "trials = 10001 is not allowed"),
+        ({"vary": {"Bowl.x": [1, "1", "a"]}}, "Bowl.x: the choices 1 and '1' are written alike"),
+        ({"objective": "Bowl.hight"}, "there is no 'Bowl.hight' .did you mean 'Bowl.height'"),
+        ({"objective": "Bowl.height["}, "cannot be read"),
+        ({"vary": {"Bowl.z": (0.0, 1.0)}}, "'Bowl.z': Bowl has no parameter 'z'"),
+    ],
+)
+def test_what_means_nothing_is_refused(arguments, message):
+    with pytest.raises(ParameterError, match=message):
+        search(**arguments)
+
+
+def test_without_optuna(monkeypatch):
+    monkeypatch.setitem(sys.modules, "optuna", None)
+    with pytest.raises(MissingExtraError, match=r"optimisation needs optuna.*pip install 'tussle\[batch\]'"):
+        search()
+
+
+def test_without_cmaes(monkeypatch):
+    monkeypatch.setitem(sys.modules, "cmaes", None)
+    with pytest.raises(MissingExtraError, match="optimisation needs cmaes"):
+        search(sampler="cmaes")
+    assert search(trials=1).best
+
+
+def test_optuna_says_nothing_and_speaks_to_others_as_before():
+    heard = []
+    handler = logging.Handler()
+    handler.emit = heard.append
+    logger, before = logging.getLogger("optuna"), optuna.logging.get_verbosity()
+    logger.addHandler(handler)
+    optuna.logging.set_verbosity(optuna.logging.DEBUG)
+    try:
+        search(trials=16)
+        assert heard == []
+        assert optuna.logging.get_verbosity() == optuna.logging.DEBUG
+        optuna.create_study()
+        assert heard
+    finally:
+        optuna.logging.set_verbosity(before)
+        logger.removeHandler(handler)
+
+
+# -- the directory --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("sampler", ["tpe", "cmaes", "random"])
+def test_a_search_goes_on_as_if_it_had_never_stopped(tmp_path, sampler):
+    whole = search(sampler=sampler, trials=40)
+    for trials in (8, 24, 40):
+        study = search(sampler=sampler, trials=trials, directory=tmp_path / "out")
+        assert len(study.trials) == trials
+    assert facts(study) == facts(whole)
+    assert study.notes == []
+    assert facts(load_study(tmp_path / "out")) == facts(whole)
+    assert facts(search(sampler=sampler, trials=24, directory=tmp_path / "out")) == facts(whole)
+
+
+def test_seeds_change_what_is_proposed():
+    first = search(trials=8)
+    assert facts(search(trials=8)) == facts(first)
+    assert facts(search(trials=8, sample_seed=1)) != facts(first)
+    rounds = search(trials=16, sampler="random").trials
+    assert rounds[0].values != rounds[8].values
+
+
+CHILD = """\
+import sys, time
+from tussle.batch import InProcess
+from tussle.batch.optimization import optimize
+
+def stop_in_the_middle(progress):
+    if progress.n_done >= 16 and progress.played > 0.3:
+        print("in the middle", flush=True)
+        time.sleep(60)
+
+optimize(
+    "bowl.xml", "Bowl.height", vary=["x=-10:10", "y=-10:10"], plugin_files=[sys.argv[1]], settings={"luck": 1}, runs=3, trials=40,
+    sampler=sys.argv[2], directory="out", executor=InProcess(1), on_progress=stop_in_the_middle,
+)
+"""
+
+
+@pytest.mark.parametrize("sampler", ["tpe", "cmaes"])
+def test_a_search_that_was_killed_goes_on_as_if_it_had_not(game, sampler, monkeypatch):
+    monkeypatch.chdir(game.parent)
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
+    child = subprocess.Popen(
+        [sys.executable, "-W", "error", "-c", CHILD, str(PLUGIN), sampler], stdout=subprocess.PIPE, text=True, env=environment
+    )  # fmt: skip
+    try:
+        assert child.stdout.readline() == "in the middle\n"
+    finally:
+        child.send_signal(signal.SIGKILL)
+        child.communicate()
+    assert child.returncode == -signal.SIGKILL
+    assert len(load_study("out").trials) == 16
+    arguments = {
+        "source": "bowl.xml",
+        "vary": ["x=-10:10", "y=-10:10"],
+        "plugin_files": [str(PLUGIN)],
+        "settings": {"luck": 1},
+        "runs": 3,
+        "trials": 40,
+        "sampler": sampler,
+    }
+    resumed = search(**arguments, directory="out")
+    assert facts(resumed) == facts(search(**arguments))
+
+
+def test_what_the_directory_holds(tmp_path, game):
+    vary = ["x=-10:10", "n=1:3:int", "luck=0,1"]
+    search(source=game, vary=vary, plugin_files=[PLUGIN], directory=tmp_path / "out", trials=20)
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["lock", "study.json", "trials.parquet"]
+    info = json.loads((tmp_path / "out" / "study.json").read_text())
+    assert info["objective"] == "Bowl.height"
+    assert info["direction"] == "maximize"
+    assert info["mission"]["file"] == "bowl.xml"
+    table = pq.read_table(tmp_path / "out" / "trials.parquet")
+    assert table.column_names == [
+        *(
+            "trial",
+            "round",
+            "x",
+            "n",
+            "luck",
+            "objective",
+            "low",
+            "high",
+            "n_failed",
+            "state",
+            "error",
+            "by_seed",
+        )
+    ]
+    assert table["trial"].to_pylist() == list(range(20))
+    assert table["round"].to_pylist() == [0] * 8 + [1] * 8 + [2] * 4
+    assert [table.schema.field(n).type for n in ("x", "n", "luck")] == [pa.float64(), pa.int64(), pa.int64()]
+
+
+def test_choices_of_all_kinds_come_back(tmp_path):
+    def made(objective, kind):
+        return bowl.mission(x=2.0 if kind is True else 3.0 if kind == "far" else float(kind))
+
+    vary = {"objective": [0.5, 2], "kind": ["far", True, 1]}
+    study = search(source=made, vary=vary, directory=tmp_path / "out", trials=24)
+    again = load_study(tmp_path / "out")
+    assert facts(again) == facts(study)
+    assert {type(t.values["kind"]) for t in again.trials} == {str, bool, int}
+    assert again.table.column_names[2:5] == ["varied objective", "kind", "objective"]
+
+
+def test_another_search_in_the_directory(tmp_path, game):
+    def go(**more):
+        arguments = {
+            "vary": ["x=-10:10"],
+            "plugin_files": [PLUGIN],
+            "trials": 8,
+            "directory": tmp_path / "out",
+        }
+        return search(source=game, **(arguments | more))
+
+    go()
+    for more, what in (
+        ({"objective": "t"}, "its objective is 'Bowl.height', not 't'"),
+        ({"minimize": True}, "its direction is 'maximize', not 'minimize'"),
+        ({"vary": ["x=-10:11"]}, "it differs in variables"),
+        ({"runs": 3}, "its runs is 2, not 3"),
+        ({"sampler": "random"}, "its sampler is 'tpe', not 'random'"),
+        ({"settings": {"y": 3}}, "it differs in mission"),
+    ):
+        with pytest.raises(BatchError, match=f"out: holds another search .{what}"):
+            go(**more)
+    assert len(go(trials=16).trials) == 16
+    game.write_text(bowl.MISSION.replace('dt="0.1"', 'dt="0.15"'))
+    with pytest.raises(BatchError, match="the mission or a plugin file has changed since"):
+        go()
+
+
+def test_a_mission_that_changes_meanwhile(tmp_path, game):
+    def change(progress):
+        if progress.n_done == 16:
+            game.write_text(bowl.MISSION.replace('dt="0.1"', 'dt="0.15"'))
+
+    with pytest.raises(BatchError, match="has changed during the search; finished rounds are kept"):
+        search(
+            source=game, vary=["x=0:1"], plugin_files=[PLUGIN], directory=tmp_path / "out", on_progress=change
+        )
+    assert len(load_study(tmp_path / "out").trials) == 16
+
+
+def test_a_function_that_makes_another_mission(tmp_path):
+    search(source=lambda x: bowl.mission(x=x), vary=["x=0:1"], trials=8, directory=tmp_path / "out")
+    with pytest.raises(BatchError, match="the mission or a plugin file has changed since"):
+        search(source=lambda x: bowl.mission(x=2 * x), vary=["x=0:1"], trials=8, directory=tmp_path / "out")
+
+
+def test_two_processes_at_one_search(tmp_path):
+    optimization = Optimization(bowl.mission(), "t", vary=PLACE)
+    with (
+        StudyStore(tmp_path / "out", optimization.info),
+        pytest.raises(BatchError, match="another process is at this search"),
+    ):
+        optimization.play(tmp_path / "out", 8)
+    assert len(optimization.play(tmp_path / "out", 8, executor=HERE).trials) == 8
+
+
+def test_directories_that_hold_something_else(tmp_path):
+    (tmp_path / "notes.txt").write_text("mine")
+    with pytest.raises(BatchError, match=r"holds something that is no search \(notes\.txt\)"):
+        search(directory=tmp_path, trials=8)
+    with pytest.raises(BatchError, match="there is no such directory"):
+        load_study(tmp_path / "none")
+    with pytest.raises(BatchError, match=r"it has no study\.json"):
+        load_study(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("study.json", b"{", r"study\.json: cannot be read"),
+        ("study.json", b'{"format": 9}', "format 9; this tussle reads format 1"),
+        ("study.json", b"[]", "format None"),
+        ("study.json", b'{"format": 1}', r"study\.json: cannot be read: 'variables'"),
+        ("trials.parquet", b"PAR1", r"trials\.parquet: cannot be read"),
+    ],
+)
+def test_files_that_were_damaged(tmp_path, name, content, message):
+    search(directory=tmp_path / "out", trials=8)
+    (tmp_path / "out" / name).write_bytes(content)
+    with pytest.raises(BatchError, match=message):
+        load_study(tmp_path / "out")
+
+
+def test_a_table_of_other_trials(tmp_path):
+    search(directory=tmp_path / "out", trials=8)
+    pq.write_table(pa.table({"trial": [0]}), tmp_path / "out" / "trials.parquet")
+    with pytest.raises(BatchError, match="cannot be read"):
+        search(directory=tmp_path / "out", trials=8)
+
+
+def test_a_search_that_was_killed_as_it_began(tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "study.json.part").write_text("{")
+    assert len(search(directory=tmp_path / "out", trials=8).trials) == 8
+
+
+def test_other_versions_are_told(tmp_path):
+    study = search(directory=tmp_path / "out", trials=8)
+    versions = {**study.info["versions"], "optuna": "4.2.0"}
+    path = tmp_path / "out" / "study.json"
+    path.write_text(json.dumps({**study.info, "versions": versions}))
+    (note,) = search(directory=tmp_path / "out", trials=16).notes
+    now = study.info["versions"]["optuna"]
+    assert note.startswith(f"the search was begun with optuna 4.2.0, now {now}: trials from 8 on may differ")
+    assert notes_on_versions({"versions": versions}, study.info, 0) == []
+
+
+def test_default_directory():
+    first = Optimization(bowl.mission().replace(name="a/../b c"), "t", vary=PLACE)
+    assert first.default_directory() == Path("optimizations") / f"a_.._b_c-{first.fingerprint[:8]}"
+    assert Optimization(bowl.mission(), "t", vary=PLACE).name == "mission"
+
+
+def test_progress():
+    seen = []
+
+    def look(progress):
+        seen.append((progress.n_done, progress.n_round, progress.played, progress.best is not None))
+
+    search(trials=20, on_progress=look)
+    assert seen[0] == (0, 0, 0.0, False)
+    assert seen[-1] == (20, 0, 0.0, True)
+    assert (16, 4, 1.0, True) in seen
+    assert [n for n, *_ in seen] == sorted(n for n, *_ in seen)
+
+
+def test_a_variable_is_a_range_or_a_choice_too():
+    study = search(vary=[Range("Bowl.x", 2, 4), Choice("Bowl.y", (-1.0, 5.0))], trials=24)
+    assert study.best.values["Bowl.y"] == -1.0
+    assert study.label(study.best.values).endswith(", Bowl.y=-1.0")
+
+
+def test_time_of_many_trials():
+    """Looking at all trials before each round stays small beside playing them."""
+    optimization = Optimization(bowl.mission(), "t", vary=PLACE, runs=1)
+    done = list(search(trials=400, sampler="random", per_round=400, runs=1).trials)
+    began = time.perf_counter()
+    optimization.proposer.propose(50, 8, done)
+    assert time.perf_counter() - began < 5.0
