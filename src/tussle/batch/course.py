@@ -239,7 +239,7 @@ def _seeds_to_keep(path: Path, played: pa.Table, before: dict[str, Any], until: 
     kept = int(before.get("n_seeds_kept", 0))
     if until is not None and before.get("until") == str(until):
         return kept
-    old = files.read_table(path, files.RESULTS_FILE, files.RESULTS.names)
+    old = files.read_table(path, files.RESULTS_FILE, files.RESULTS)
     last = [pc.max(table["run"]).as_py() for table in (played, old) if table is not None and table.num_rows]
     return max(kept, *(run // int(before["n_points"]) + 1 for run in last)) if last else kept
 

@@ -9,7 +9,7 @@ import math
 import os
 import shutil
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any
@@ -87,6 +87,10 @@ RESULTS = pa.schema(
 
 ALIVE = pa.schema([("run", pa.int64()), ("team", pa.int32()), ("t", pa.float64()), ("alive", pa.int32())])
 """One row whenever the number of a team's entities changes, from the start of the run to its end."""
+
+
+DESIGN = pa.schema([("run", pa.int64()), ("point", pa.int32()), ("seed", pa.uint64())])
+"""One row per planned run; the variables have columns behind these."""
 
 
 @dataclass
@@ -324,7 +328,7 @@ def read_played(path: Path) -> tuple[pa.Table, list[str]]:
     return pa.concat_tables(parts), notes
 
 
-def read_table(path: Path, name: str, columns: Sequence[str]) -> pa.Table | None:
+def read_table(path: Path, name: str, columns: pa.Schema) -> pa.Table | None:
     """A table of a batch directory; None where there is none.
 
     Args:
@@ -340,11 +344,14 @@ def read_table(path: Path, name: str, columns: Sequence[str]) -> pa.Table | None
         return None
     try:
         table = pq.read_table(file, page_checksum_verification=True)
-    except (OSError, pa.ArrowException) as error:
+        found = dict(zip(table.column_names, table.schema.types, strict=True))
+    except (OSError, ValueError, TypeError, pa.ArrowException) as error:
         raise BatchError(f"{file}: cannot be read: {error}") from None
-    missing = [column for column in columns if column not in table.column_names]
+    missing = [column for column in columns if found.get(column.name) != column.type]
     if missing:
-        raise BatchError(f"{file}: is no table of a batch; it has no column {missing[0]!r}")
+        raise BatchError(
+            f"{file}: is no table of a batch; it has no column {missing[0].name!r} of {missing[0].type}"
+        )
     return table
 
 
@@ -372,7 +379,7 @@ def load(path: str | Path) -> Stored:
     """
     path = Path(path)
     info = read_info(path)
-    design = read_table(path, DESIGN_FILE, ("run", "point", "seed"))
+    design = read_table(path, DESIGN_FILE, DESIGN)
     if design is None:
         raise BatchError(
             f"{path}: {DESIGN_FILE} is not there: the batch was stopped before its first run; play it again"
@@ -393,7 +400,7 @@ def merged(path: Path, played: pa.Table, design: pa.Table) -> tuple[pa.Table, pa
     Raises:
         BatchError: A table cannot be read, or is missing.
     """
-    old, old_alive = read_table(path, RESULTS_FILE, RESULTS.names), read_table(path, ALIVE_FILE, ALIVE.names)
+    old, old_alive = read_table(path, RESULTS_FILE, RESULTS), read_table(path, ALIVE_FILE, ALIVE)
     if old is not None and old_alive is None:
         raise BatchError(f"{path}: {ALIVE_FILE} is not there, but {RESULTS_FILE} is; the batch is damaged")
     results, alive = tables(played, design)

@@ -1,0 +1,434 @@
+"""The directory of a batch: whatever it was left in, what is there is right and what is missing is played."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import math
+import os
+import shutil
+import subprocess
+
+import gambles
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from tussle.batch import Batch, InProcess, load_batch, store
+from tussle.batch.plan import Plan
+from tussle.batch.store import Store
+from tussle.batch.tasks import Finished
+from tussle.errors import BatchError, RecordError
+
+TABLES = (store.ALIVE_FILE, store.RESULTS_FILE, store.DESIGN_FILE)
+
+
+@pytest.fixture
+def mission(tmp_path):
+    """A mission file that stays where it is while batches come and go."""
+    file = tmp_path / "game.xml"
+    file.write_text(gambles.MISSION)
+    return file
+
+
+def batch_of(mission, runs=6, **options):
+    return Batch(mission, runs=runs, vary=["odds=0.1,0.3"], plugin_files=[gambles.THIS], **options)
+
+
+class Stopped(Exception):
+    pass
+
+
+def play(batch, path, until=None, stop_after=None, stack=3):
+    """Play into a directory; after so many runs, stop as if killed."""
+
+    def watch(progress):
+        if stop_after is not None and progress.n_done - progress.n_before >= stop_after:
+            raise Stopped
+
+    return batch.play(path, InProcess(stack), until=until, on_progress=watch)
+
+
+def stopped(batch, path, after, until=None):
+    with pytest.raises(Stopped):
+        play(batch, path, until, after)
+
+
+def tables_of(path):
+    """All that a batch directory holds for good, but for what it cost."""
+    results = pq.read_table(path / store.RESULTS_FILE).drop_columns(["cpu_s", "host"])
+    return results, pq.read_table(path / store.ALIVE_FILE), pq.read_table(path / store.DESIGN_FILE)
+
+
+def facts_of(path):
+    info = json.loads((path / store.BATCH_FILE).read_text())
+    return {k: v for k, v in info.items() if k not in ("timings", "command")}
+
+
+@pytest.fixture
+def reference(mission, tmp_path):
+    """A batch that nothing has disturbed."""
+    play(batch_of(mission), tmp_path / "reference")
+    return tmp_path / "reference"
+
+
+# -- tables -------------------------------------------------------------------------------------------------------------------
+
+
+def made(number, metrics, alive=(), **more):
+    values = {
+        "end": "time", "t": 1.0, "steps": 10, "winner": None, "state_hash": "ab", "error": "", "cpu_s": 0.1, "host": "h", **more,
+    }  # fmt: skip
+    return Finished(number=number, metrics=list(metrics), alive=list(alive), **values)
+
+
+def tables(*finished, n=4):
+    batches = [store.row(f) for f in finished]
+    return store.tables(
+        pa.Table.from_batches(batches, store.PLAYED), Plan([{"x": 1.5}], n, first_seed=7).table()
+    )
+
+
+def test_a_run_is_a_row_for_each_team_and_metric_in_order():
+    first = made(1, [(2, "score", 3.0), (1, "score", math.nan), (None, "M.n", 4.0), (1, "alive", math.inf)])
+    second = made(0, [(1, "score", 1.0)], error="it fell", end="error", winner=1)
+    results, _ = tables(first, second)
+    assert results.schema.equals(store.RESULTS)
+    assert [tuple(row[k] for k in ("run", "point", "seed", "team", "metric", "value")) for row in results.to_pylist()] == [
+        (0, 0, 7, 1, "score", 1.0),
+        (1, 0, 8, None, "M.n", 4.0),
+        (1, 0, 8, 1, "alive", math.inf),
+        (1, 0, 8, 1, "score", None),
+        (1, 0, 8, 2, "score", 3.0),
+    ]  # fmt: skip
+    assert results["error"].to_pylist() == ["it fell", None, None, None, None]
+    assert results["winner"].to_pylist() == [1, None, None, None, None]
+
+
+def test_of_a_run_that_is_there_twice_the_first_counts_and_others_than_planned_do_not():
+    results, alive = tables(
+        made(2, [(1, "score", 1.0)], [(1, 0.0, 5)]),
+        made(2, [(1, "score", 2.0)], [(1, 0.0, 6)]),
+        made(9, [(1, "score", 3.0)], [(1, 0.0, 7)]),
+    )
+    assert results["value"].to_pylist() == [1.0]
+    assert alive.to_pylist() == [{"run": 2, "team": 1, "t": 0.0, "alive": 5}]
+
+
+def test_no_runs_are_empty_tables():
+    results, alive = tables()
+    assert (results.num_rows, results.schema) == (0, store.RESULTS)
+    assert (alive.num_rows, alive.schema) == (0, store.ALIVE)
+    assert list(store.finished_in(results)) == []
+
+
+def test_runs_come_back_from_their_table():
+    runs = [
+        made(0, [(None, "M.n", 4.0), (1, "score", 3.0), (2, "score", math.nan)], winner=1),
+        made(3, [(1, "score", 0.0)], end="error", error="it fell", t=0.0, steps=0),
+    ]
+    back = list(store.finished_in(tables(*runs)[0]))
+    assert repr(back) == repr(runs)
+
+
+# -- killed, and the same command again ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("after", [0, 1, 5, 11, 12])
+def test_a_batch_that_was_stopped_goes_on(mission, reference, tmp_path, after):
+    path = tmp_path / "out"
+    stopped(batch_of(mission), path, after)
+    before = load_batch(path)
+    assert before.n_runs == after
+    assert before.notes == [f"the batch is not complete: {after} of 12 runs are finished"]
+    done = []
+    results = batch_of(mission).play(
+        path, InProcess(5), on_progress=lambda p: done.append((p.n_before, p.n_done))
+    )
+    assert (done[0], done[-1]) == ((after, after), (after, 12))
+    assert results.notes == []
+    assert tables_of(path) == tables_of(reference)
+    assert facts_of(path) == facts_of(reference)
+    assert not (path / store.PARTS).exists()
+
+
+def torn(state, tmp_path, mission, whole):
+    """A batch that was killed as it ended, in one of the states of that order: alive, results, design, parts, batch.json."""
+    path = tmp_path / "torn"
+    stopped(batch_of(mission), path, 5)
+    stopped(batch_of(mission), path, 7)
+    order = [*TABLES, *sorted(p.name for p in (path / store.PARTS).iterdir())]
+    assert order[3:] == ["0001.arrow", "0002.arrow"]
+    for name in order[:state]:
+        if name.endswith(".arrow"):
+            (path / store.PARTS / name).unlink()
+        else:
+            shutil.copy(whole / name, path / name)
+    if state > len(order):
+        (path / store.PARTS).rmdir()
+    for name in [*TABLES, store.BATCH_FILE]:  # and always as another file was half written
+        (path / f"{name}.part").write_bytes(b"PAR1 and no more")
+    return path
+
+
+@pytest.mark.parametrize("state", range(7))
+def test_a_batch_that_was_killed_as_it_ended_goes_on(mission, reference, tmp_path, state):
+    path = torn(state, tmp_path, mission, reference)
+    assert load_batch(path).n_runs == 12
+    results = play(batch_of(mission), path)
+    assert results.notes == []
+    assert tables_of(path) == tables_of(reference)
+    assert facts_of(path) == facts_of(reference)
+
+
+@pytest.mark.parametrize("state", range(4))
+def test_a_batch_that_was_killed_as_it_was_extended_goes_on(mission, tmp_path, state):
+    path, whole = tmp_path / "out", tmp_path / "whole"
+    play(batch_of(mission, 9), whole)
+    play(batch_of(mission, 6), path)
+    stopped(batch_of(mission, 9), path, 6)
+    for name in TABLES[:state]:
+        shutil.copy(whole / name, path / name)
+    play(batch_of(mission, 9), path)
+    assert tables_of(path) == tables_of(whole)
+    assert facts_of(path) == {**facts_of(whole), "n_seeds": 9}
+
+
+@pytest.mark.parametrize(
+    "gone", [("mission",), ("mission", "design.parquet"), ("mission", "design.parquet", "batch.json")]
+)
+def test_a_batch_that_was_killed_as_it_began_goes_on(mission, reference, tmp_path, gone):
+    path = tmp_path / "out"
+    stopped(batch_of(mission), path, 0)
+    shutil.rmtree(path / store.PARTS, ignore_errors=True)
+    for name in gone:
+        target = path / name
+        if target.is_dir():
+            target.rename(path / "mission.part")
+        else:
+            target.rename(path / f"{name}.part")
+    if "batch.json" in gone:
+        shutil.rmtree(path / "mission.part")
+        (path / "design.parquet.part").unlink()
+    elif "design.parquet" in gone:
+        with pytest.raises(BatchError, match="was stopped before its first run; play it again"):
+            load_batch(path)
+    play(batch_of(mission), path)
+    assert tables_of(path) == tables_of(reference)
+    assert sorted(p.name for p in path.iterdir()) == sorted(p.name for p in reference.iterdir())
+
+
+def test_a_part_that_was_cut_at_any_byte_gives_its_whole_runs(mission, reference, tmp_path):
+    path = tmp_path / "out"
+    stopped(batch_of(mission), path, 4)
+    part = path / store.PARTS / "0001.arrow"
+    data = part.read_bytes()
+    whole = store.read_played(path)[0]
+    assert whole.num_rows == 4
+    n_rows = {}
+    for size in [
+        *range(0, len(data), 5),
+        len(data),
+    ]:  # five has no divisor in common with the eight bytes by which all is aligned
+        part.write_bytes(data[:size])
+        played, notes = store.read_played(path)
+        assert played.equals(whole.slice(0, played.num_rows))
+        # A cut between two runs looks like an end.
+        assert len(notes) <= 1
+        n_rows.setdefault(played.num_rows, size)
+    assert list(n_rows) == [0, 1, 2, 3, 4]
+    # The directory goes on from each number of whole runs, and from the middle of one.
+    for size in [*n_rows.values(), n_rows[2] - 5]:
+        part.write_bytes(data[:size])
+        copy = tmp_path / f"from {size}"
+        shutil.copytree(path, copy)
+        play(batch_of(mission), copy)
+        assert tables_of(copy) == tables_of(reference)
+
+
+def test_zeros_at_the_end_of_a_part_are_no_runs(mission, tmp_path):
+    path = tmp_path / "out"
+    stopped(batch_of(mission), path, 4)
+    part = path / store.PARTS / "0001.arrow"
+    whole = store.read_played(path)[0]
+    with part.open("r+b") as file:
+        file.truncate(part.stat().st_size - 8)  # the end mark, which a killed batch does not have
+        file.truncate(part.stat().st_size + 4096)
+    assert store.read_played(path)[0].equals(whole)
+
+
+# -- what is no batch, or a damaged one ---------------------------------------------------------------------------------------
+
+
+def loaded(path):
+    """A batch, or what was said of it."""
+    try:
+        return load_batch(path), ""
+    except BatchError as error:
+        return None, str(error)
+
+
+@pytest.mark.parametrize("name", [store.RESULTS_FILE, store.ALIVE_FILE])
+def test_a_table_that_is_damaged_is_refused_and_never_believed(mission, reference, name):
+    file = reference / name
+    data = file.read_bytes()
+    wanted = tables_of(reference)
+    n_refused = 0
+    for place in [*range(0, len(data), 41), len(data) - 1]:
+        changed = bytearray(data)
+        changed[place] ^= 0xFF
+        file.write_bytes(bytes(changed))
+        found, said = loaded(reference)
+        if found is None:
+            assert said.startswith(f"{file}: ")
+            n_refused += 1
+        else:
+            assert (found.table.drop_columns(["cpu_s", "host"]), found.alive) == wanted[:2]
+    assert n_refused > 10
+    for size in (0, 1, 100, len(data) - 1):
+        file.write_bytes(data[:size])
+        with pytest.raises(BatchError, match="cannot be read"):
+            load_batch(reference)
+        with pytest.raises(BatchError, match="cannot be read"):
+            play(batch_of(mission, 7), reference)
+    pq.write_table(pa.table({"run": [1]}), file)
+    with pytest.raises(BatchError, match="is no table of a batch; it has no column"):
+        load_batch(reference)
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        (store.RESULTS_FILE, "results.parquet is not there, though the batch was complete"),
+        (store.ALIVE_FILE, "alive.parquet is not there, but results.parquet is; the batch is damaged"),
+        (store.DESIGN_FILE, "design.parquet is not there"),
+    ],
+)
+def test_a_table_that_is_missing_is_told(mission, reference, name, words):
+    (reference / name).unlink()
+    with pytest.raises(BatchError, match=words):
+        load_batch(reference)
+    with pytest.raises(BatchError, match=words):
+        play(batch_of(mission), reference)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "batch.json: cannot be read"),
+        ('{"format": 1, "name"', "batch.json: cannot be read"),
+        ("[1, 2]", "batch.json: the batch has format None; this tussle reads format 1"),
+        ('{"format": 2}', "batch.json: the batch has format 2; this tussle reads format 1"),
+        ('{"format": 1, "name": "x"}', "batch.json: it says nothing of mission, variables, n_points"),
+        ("\udc80", "batch.json: cannot be read"),
+    ],
+)
+def test_a_batch_file_that_says_something_else_is_refused(mission, reference, text, words):
+    (reference / store.BATCH_FILE).write_bytes(text.encode("utf-8", "surrogateescape"))
+    for attempt in (lambda: load_batch(reference), lambda: play(batch_of(mission), reference)):
+        with pytest.raises(BatchError, match=words):
+            attempt()
+
+
+def test_what_is_no_batch_is_left_as_it_is(mission, tmp_path):
+    for name in ("mission", "parts"):
+        (tmp_path / "theirs" / name).mkdir(parents=True)
+    (tmp_path / "theirs" / "lock").write_text("mine")
+    with pytest.raises(BatchError, match=r"theirs: holds something that is no batch \(mission\)"):
+        play(batch_of(mission), tmp_path / "theirs")
+    assert sorted(p.name for p in (tmp_path / "theirs").iterdir()) == ["lock", "mission", "parts"]
+    assert (tmp_path / "theirs" / "lock").read_text() == "mine"
+    with pytest.raises(BatchError, match=r"theirs: this is no batch directory; it has no batch.json"):
+        load_batch(tmp_path / "theirs")
+    with pytest.raises(BatchError, match="there is no such batch directory"):
+        load_batch(tmp_path / "nowhere")
+    with pytest.raises(RecordError, match=r"game.xml: cannot be written: File exists"):
+        play(batch_of(mission), mission)
+    with pytest.raises(RecordError, match="cannot be written: Not a directory"):
+        play(batch_of(mission), mission / "below")
+
+
+def test_only_one_plays_at_a_time(mission, tmp_path):
+    first = Store(tmp_path / "out")
+    with pytest.raises(BatchError, match="out: another process is playing this batch"):
+        play(batch_of(mission), tmp_path / "out")
+    first.close()
+    play(batch_of(mission), tmp_path / "out")
+
+
+def test_where_there_are_no_locks_it_is_said(tmp_path, monkeypatch):
+    def no_locks(*_):
+        raise OSError(95, os.strerror(95))
+
+    monkeypatch.setattr(fcntl, "flock", no_locks)
+    with pytest.warns(RuntimeWarning, match="this file system has no locks"):
+        Store(tmp_path / "out").close()
+
+
+# -- full disks ---------------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """A disk of little room; a function gives it more."""
+    place = tmp_path / "disk"
+    place.mkdir()
+
+    def mount(size, *more):
+        return subprocess.run(
+            ["mount", "-t", "tmpfs", "-o", ",".join([f"size={size}k", *more]), "tmpfs", place], check=False, capture_output=True
+        )  # fmt: skip
+
+    if shutil.which("mount") is None or mount(64).returncode != 0:
+        pytest.skip("a small disk can be mounted by root only")
+    yield place, lambda size: mount(size, "remount").check_returncode()
+    subprocess.run(["umount", place], check=True)
+
+
+def refused(batch, path):
+    """Why a batch could not be written, "" where it could."""
+    try:
+        play(batch, path)
+    except RecordError as error:
+        return str(error)
+    return ""
+
+
+def test_a_full_disk_is_told_and_with_more_room_the_batch_goes_on(mission, tmp_path, small_disk):
+    disk, make_room = small_disk
+    batch = batch_of(mission, 40)
+    play(batch, tmp_path / "reference")
+    n_runs = []
+    for size in (64, 128, 176, 212, 260):  # it is full at other places each time: in a part, in a table
+        make_room(size)
+        said = refused(batch, disk / "out")
+        if said:
+            assert "cannot be written: No space left on device" in said
+            assert "\n" not in said
+            n_runs.append(load_batch(disk / "out").n_runs)
+    assert len(n_runs) >= 2
+    assert n_runs == sorted(n_runs)
+    assert n_runs[0] > 10
+    make_room(2000)
+    play(batch, disk / "out")
+    assert tables_of(disk / "out") == tables_of(tmp_path / "reference")
+    assert facts_of(disk / "out") == facts_of(tmp_path / "reference")
+
+
+def test_a_disk_that_is_full_from_the_start_is_told(mission, small_disk):
+    disk, make_room = small_disk
+    (disk / "ballast").write_bytes(bytes(64 * 1024 - 4096))
+    for _ in range(2):
+        with pytest.raises(RecordError, match="cannot be written: No space left on device"):
+            play(batch_of(mission), disk / "out")
+    make_room(500)
+    assert play(batch_of(mission), disk / "out").n_runs == 12
+
+
+def test_numbers_of_a_run_are_kept_to_the_last_bit(mission, tmp_path):
+    in_memory = batch_of(mission).play(executor=InProcess(3))
+    play(batch_of(mission), tmp_path / "out")
+    on_disk = load_batch(tmp_path / "out")
+    for name in in_memory.quantities:
+        assert np.array_equal(in_memory.quantity(name), on_disk.quantity(name), equal_nan=True), name
