@@ -155,7 +155,7 @@ def _model_by_words(name: str, words: Mapping[str, tuple[str, ...]]) -> str:
 def _model_by_likeness(name: str) -> str:
     """The model with a word that is written nearly like a name; "" without one."""
     by_word = {word: model for model, words in _WORDS.items() for word in words}
-    close = difflib.get_close_matches(name.lower(), by_word, n=1, cutoff=0.75)
+    close = difflib.get_close_matches(name.lower(), by_word, n=1, cutoff=0.7)
     return by_word[close[0]] if close else ""
 
 

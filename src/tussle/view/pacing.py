@@ -42,7 +42,7 @@ class Pace:
         began, t_began = self._anchor
         left = began + (t + dt - t_began) / self.warp - now
         if left < -MOST_LAG:
-            self._anchor = (now, t)
+            self._anchor = (now, t + dt)
         return left
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from tussle.messages import Batch
 from tussle.record import Happenings
-from tussle.view.frame import Happening
+from tussle.view.frame import Happening, frame_of
 from tussle.view.timeline import History, Timeline
 
 if TYPE_CHECKING:
@@ -72,6 +72,7 @@ class Player:
         self.notes: list[str] = []
         self.is_broken = False
         self.first_step = self._told = self.step
+        self._tell_of_those_who_are_there()
         simulation.events.listen(self._hear)
         self._remember()
 
@@ -218,6 +219,14 @@ class Player:
         """Keep a note, once."""
         if text not in self.notes:
             self.notes.append(text)
+
+    def _tell_of_those_who_are_there(self) -> None:
+        frame = frame_of(self.simulation, self.world)
+        names = self.simulation.context.block_names
+        self.happenings += [
+            Happening(frame.t, "birth", int(who), 0, names[block])
+            for who, block in zip(frame.id, frame.block, strict=True)
+        ]
 
     def _hear(self, told: Happenings) -> None:
         clock = self.simulation.context.clock
