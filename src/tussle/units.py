@@ -198,6 +198,10 @@ def parse(value: str | float, unit: str, text_unit: str = "") -> float:
         UnitError: Its unit is unknown or measures something else.
         ParameterError: It is not a number, or is too large for one.
     """
+    return _parsed(value, unit, text_unit) if isinstance(value, str) else _in_si(value, unit, text_unit)
+
+
+def _in_si(value: str | float, unit: str, text_unit: str) -> float:
     wanted = unit_of(unit)
     number, written = _split(value) if isinstance(value, str) else (float(value), "")
     name = written or text_unit or unit
@@ -210,6 +214,10 @@ def parse(value: str | float, unit: str, text_unit: str = "") -> float:
         return float(Fraction(number) * given.factor)
     except OverflowError:
         raise ParameterError(f"{value!r} is too large for a number") from None
+
+
+_parsed = lru_cache(maxsize=4096)(_in_si)
+"""The same for texts: a mission that is read a thousand times has few that differ."""
 
 
 def _split(text: str) -> tuple[Fraction | float, str]:

@@ -12,6 +12,7 @@ import platform
 import sys
 import time
 from collections.abc import Mapping, Sequence
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -43,13 +44,15 @@ class Timings:
 
 def versions() -> dict[str, str]:
     """Of Python and of the packages that a result may depend on."""
-    found = {"python": platform.python_version()}
-    for name in PACKAGES:
-        try:
-            found[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:  # run from a source tree that was never installed
-            found[name] = str(getattr(sys.modules.get(name), "__version__", "unknown"))
-    return found
+    return {"python": platform.python_version()} | {name: _version(name) for name in PACKAGES}
+
+
+@cache
+def _version(name: str) -> str:
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:  # run from a source tree that was never installed
+        return str(getattr(sys.modules.get(name), "__version__", "unknown"))
 
 
 def write(

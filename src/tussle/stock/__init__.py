@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.metadata
+import sys
 import tomllib
 from collections.abc import Iterable
 from functools import cache
@@ -22,6 +23,12 @@ def manifest() -> dict[str, str]:
 
 def others() -> dict[str, str]:
     """Name -> "module:class" of the plugins that other installed packages offer under the entry point `tussle.plugins`."""
+    return _offered(tuple(sys.path))
+
+
+@cache
+def _offered(_path: tuple[str, ...]) -> dict[str, str]:
+    """What the packages on an import path offer: looking through them takes longer than reading a mission."""
     return {point.name: point.value for point in importlib.metadata.entry_points(group="tussle.plugins")}
 
 
