@@ -24,8 +24,10 @@ from tussle.cli.options import (
     Strict,
     mission_source,
 )
+from tussle.cli.replay import replay
 from tussle.cli.report import report
 from tussle.cli.terminal import OK, out, run_guarded, told
+from tussle.cli.view import view
 
 app = typer.Typer(
     help="Thousands of robots in one 3D world: play missions, look at plugins, write your own.",
@@ -260,7 +262,7 @@ def new(
         pages.show_written(written.files, written.next_steps)
 
 
-for command in (batch, analyze, report, optimize):
+for command in (view, replay, batch, analyze, report, optimize):
     app.command(epilog=EPILOG)(command)
 
 

@@ -1,0 +1,158 @@
+"""The camera of one who watches: free, following an entity, or behind it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from tussle.view.frame import Frame
+    from tussle.view.scenery import Scenery
+
+MODES = ("free", "follow", "behind")
+FIELD_OF_VIEW = math.radians(50.0)
+"""Vertical; the usual one of a photograph's lens."""
+FITTING = 0.62
+"""Distance from which the whole is seen, of its diagonal over the sine of half the field of view: it is never as high as wide."""
+USUAL_LENGTHS = 12.0
+"""Distance to the followed entity at first, in lengths of a model."""
+HEIGHT = 0.35
+"""Of the camera behind an entity above it, of the distance."""
+NOTICED = 0.02
+"""Who turns the view changes it by more than this; what differs less is a late echo of the camera's own moves."""
+MOST_UNDOS = 50
+
+
+@dataclass(frozen=True)
+class View:
+    """Where a camera is and where it looks.
+
+    Attributes:
+        position: [m], (3,).
+        target: Point that it looks at [m], (3,).
+        mode: One of `MODES`.
+    """
+
+    position: np.ndarray
+    target: np.ndarray
+    mode: str = "free"
+
+
+def whole_view(scenery: Scenery) -> View:
+    """From the southwest, all of the scene in sight."""
+    middle = 0.5 * (scenery.low + scenery.high)
+    distance = FITTING * scenery.size / math.sin(0.5 * FIELD_OF_VIEW)
+    direction = np.array([-0.55, -0.72, 0.45])
+    return View(middle + distance * direction / np.linalg.norm(direction), middle)
+
+
+def view_from_above(scenery: Scenery) -> View:
+    """From straight above, north at the top."""
+    middle = 0.5 * (scenery.low + scenery.high)
+    distance = 1.1 * FITTING * scenery.size / math.sin(0.5 * FIELD_OF_VIEW)
+    # A hair to the south: from exactly above, north could be anywhere.
+    return View(middle + np.array([0.0, -1e-3 * distance, distance]), middle)
+
+
+class Camera:
+    """Moves the camera of one browser. What its user does to the view with the mouse stays: only the rest is moved.
+
+    Args:
+        client: viser's handle of the browser.
+        scenery: What stands still.
+        length: Length of a model [m].
+
+    Attributes:
+        mode: One of `MODES`.
+    """
+
+    def __init__(self, client: Any, scenery: Scenery, length: float) -> None:
+        self._client, self._scenery = client, scenery
+        self.mode = "free"
+        self._usual = self._distance = USUAL_LENGTHS * length
+        self._offset: np.ndarray | None = None
+        self._undo: list[View] = []
+
+    # -- commands -----------------------------------------------------------------------------------------------------------------
+
+    def set_mode(self, mode: str) -> None:
+        """Another mode."""
+        if mode != self.mode:
+            self._keep()
+            self.mode, self._offset = mode, None
+
+    def cycle(self) -> None:
+        """The next mode."""
+        self.set_mode(MODES[(MODES.index(self.mode) + 1) % len(MODES)])
+
+    def show_whole(self) -> None:
+        """See all of the scene, freely."""
+        self._keep()
+        self.mode = "free"
+        self._go(whole_view(self._scenery))
+
+    def show_from_above(self) -> None:
+        """See all of the scene from above, freely."""
+        self._keep()
+        self.mode = "free"
+        self._go(view_from_above(self._scenery))
+
+    def zoom(self, factor: float) -> None:
+        """Nearer to what is followed, or farther."""
+        self._distance *= factor
+        if self.mode == "free":
+            self._keep()
+            view = self._view()
+            self._go(View(view.target + factor * (view.position - view.target), view.target))
+        elif self._offset is not None:
+            self._offset = self._offset * factor
+
+    def undo(self) -> None:
+        """Back to where it was before the last command."""
+        if self._undo:
+            view = self._undo.pop()
+            self.mode, self._offset = view.mode, None
+            if view.mode == "follow":
+                self._offset = view.position - view.target
+            self._go(view)
+
+    # -- each frame ---------------------------------------------------------------------------------------------------------------
+
+    def follow(self, frame: Frame, who: int | None) -> None:
+        """Move with an entity, where the mode says so and it is there."""
+        row = -1 if who is None else frame.row_of(who)
+        if self.mode == "free" or row < 0:
+            return
+        target = frame.pos[row]
+        if self.mode == "behind":
+            w, x, y, z = frame.quat[row]
+            yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+            back = np.array([-math.cos(yaw), -math.sin(yaw), HEIGHT])
+            self._go(View(target + self._distance * back, target))
+            return
+        seen = self._view()
+        offset = seen.position - seen.target
+        if self._offset is None:
+            norm = float(np.linalg.norm(offset)) or 1.0
+            self._offset = offset * (self._distance / norm)
+        elif np.linalg.norm(offset - self._offset) > NOTICED * np.linalg.norm(self._offset):
+            self._offset = offset
+        self._go(View(target + self._offset, target))
+
+    # -- the browser --------------------------------------------------------------------------------------------------------------
+
+    def _view(self) -> View:
+        camera = self._client.camera
+        return View(np.array(camera.position), np.array(camera.look_at), self.mode)
+
+    def _keep(self) -> None:
+        self._undo = [*self._undo[1 - MOST_UNDOS :], self._view()]
+
+    def _go(self, view: View) -> None:
+        camera = self._client.camera
+        with self._client.atomic():
+            camera.position = view.position
+            camera.look_at = view.target

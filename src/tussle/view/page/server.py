@@ -1,0 +1,260 @@
+"""Serves the page."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import threading
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any, Self
+
+from tussle.errors import MissingExtraError, ViewError
+from tussle.view.live import Live
+from tussle.view.page.camera import FIELD_OF_VIEW, whole_view
+from tussle.view.page.comparing import Comparison
+from tussle.view.page.display import Display
+from tussle.view.page.drawn import Drawn
+from tussle.view.page.ground import background_image, draw_ground
+from tussle.view.page.keyboard import Keyboard
+from tussle.view.page.labels import Labels
+from tussle.view.page.overlays import Overlays
+from tussle.view.page.panel import Panel
+from tussle.view.page.pusher import Parts, Pusher
+from tussle.view.page.stage import Stage
+from tussle.view.page.trails import Trails
+from tussle.view.page.visitor import Visitor
+
+if TYPE_CHECKING:
+    from tussle.mission import Mission
+    from tussle.view.frame import Frame
+    from tussle.view.page.source import Source
+
+LOOPBACK = "127.0.0.1"
+PORT = 8123
+"""Where it is served when no port is asked for and this one is free; else at one of the next."""
+MOST_PORTS = 100
+TEAL = (0, 110, 120)
+
+
+class Page:
+    """A game on a page in the browser, from when this is made until `stop`.
+
+    Nothing on the page reads files or runs code, and it asks no other server for anything. Closing all browsers leaves the game going;
+    a browser that is slow sees fewer frames and holds nothing up.
+
+    Args:
+        source: The game. The page does not stop it when it is stopped itself.
+        host: Address that it is served at; others than the loopback's can be reached from other machines.
+        port: Its port; None takes the first free one from 8123 on.
+        mission: The mission, for how far plugins reach; None where it is not known.
+        viewer: What the mission file says for the viewer, see `tussle.mission.Loaded`.
+
+    Attributes:
+        host: Where it is served.
+        display: What is shown.
+
+    Raises:
+        MissingExtraError: viser is not installed.
+        ViewError: It cannot be served there.
+    """
+
+    def __init__(
+        self,
+        source: Source,
+        *,
+        host: str = LOOPBACK,
+        port: int | None = None,
+        mission: Mission | None = None,
+        viewer: Mapping[str, Any] | None = None,
+    ) -> None:
+        viser = _viser()
+        self.source, self.host = source, host
+        viewer = viewer or {}
+        frame = source.frame()
+        self.display = Display.of(frame, source.looks, source.scenery, viewer, mission)
+        self._visitors: dict[int, Visitor] = {}
+        self._lock = threading.Lock()
+        port = _free_port(host, port)
+        with _silence():
+            self._server = _server_class(viser)(
+                host=host, port=port, label=f"tussle · {source.name}", verbose=False
+            )
+        self._is_stopped = False
+        self._set_scene(frame)
+        self._server.on_client_connect(self._welcome)
+        self._server.on_client_disconnect(self._farewell)
+
+    def _set_scene(self, frame: Frame) -> None:
+        server, source, display = self._server, self.source, self.display
+        gui, scene, looks, blocks = server.gui, server.scene, source.looks, len(source.blocks)
+        gui.configure_theme(
+            show_share_button=False, show_logo=False, control_width="medium", brand_color=TEAL
+        )
+        gui.main_panel.dock_right()
+        scene.configure_default_lights(cast_shadow=False)
+        if source.scenery.background is not None:
+            scene.set_background_image(background_image(source.scenery))
+        self._set_first_view()
+        draw_ground(scene, source.scenery, looks)
+        if isinstance(source, Comparison) and source.shift.any():
+            scene.add_frame("/beside", show_axes=False, position=tuple(source.shift))
+            draw_ground(scene, source.b.scenery, looks, "/beside", has_grid=False)
+        panel = Panel(gui, source, display, self.visitor)
+        Keyboard(gui, source, panel, self.visitor)
+        stage = Stage(scene, blocks, looks, display, self._clicked)
+        parts = Parts(
+            stage, Labels(scene, display, self.name_of), Trails(scene, source, looks, blocks, display),
+            Overlays(scene, looks, blocks, display), Drawn(scene), panel,
+        )  # fmt: skip
+        stage.show(frame)
+        panel.show(frame, 0.0)
+        self.pusher = Pusher(server, source, display, parts, self.visitors)
+
+    def _set_first_view(self) -> None:
+        view, camera, size = (
+            whole_view(self.source.scenery),
+            self._server.initial_camera,
+            self.source.scenery.size,
+        )
+        camera.position, camera.look_at = tuple(view.position), tuple(view.target)
+        camera.fov = FIELD_OF_VIEW
+        camera.near, camera.far = 1e-4 * size, 100.0 * size
+
+    # -- who watches --------------------------------------------------------------------------------------------------------------
+
+    def _welcome(self, client: Any) -> None:
+        visitor = Visitor(client, self.source, self.display, self.name_of)
+        with self._lock:
+            self._visitors[client.client_id] = visitor
+
+    def _farewell(self, client: Any) -> None:
+        with self._lock:
+            self._visitors.pop(client.client_id, None)
+
+    def visitors(self) -> list[Visitor]:
+        """Those who watch now."""
+        with self._lock:
+            return list(self._visitors.values())
+
+    def visitor(self, number: int) -> Visitor | None:
+        """One who watches, by the number of its client; None once it is gone."""
+        with self._lock:
+            return self._visitors.get(number)
+
+    def _clicked(self, number: int, who: int) -> None:
+        visitor = self.visitor(number)
+        if visitor is not None:
+            visitor.choose(who)
+
+    def name_of(self, frame: Frame, row: int) -> str:
+        """What to call the entity in a row of a frame: its block's name and its id."""
+        if isinstance(self.source, Comparison):
+            return self.source.name_of(frame, row)
+        return f"{self.source.blocks[int(frame.block[row])]} {int(frame.id[row])}"
+
+    # -- the server ---------------------------------------------------------------------------------------------------------------
+
+    @property
+    def port(self) -> int:
+        return int(self._server.get_port())
+
+    @property
+    def url(self) -> str:
+        """Address of the page, as typed on this machine."""
+        host = LOOPBACK if self.host in ("", "0.0.0.0", "::") else self.host  # noqa: S104 - it is compared, not bound
+        return f"http://{f'[{host}]' if ':' in host else host}:{self.port}"
+
+    @property
+    def is_local(self) -> bool:
+        """Only this machine can reach it."""
+        return self.host in (LOOPBACK, "localhost", "::1") or self.host.startswith("127.")
+
+    @property
+    def notes(self) -> list[str]:
+        """What the user should know, one line each."""
+        notes = [*self.source.looks.notes, *self.source.scenery.notes, *self.source.notes]
+        return list(dict.fromkeys(notes))
+
+    @property
+    def error(self) -> BaseException | None:
+        """What stopped the page from being drawn; None while nothing has."""
+        return self.pusher.error
+
+    @property
+    def is_live(self) -> bool:
+        return isinstance(self.source, Live)
+
+    def stop(self) -> None:
+        """Serve no more. A second call does nothing."""
+        if not self._is_stopped:
+            self._is_stopped = True
+            self.pusher.stop()
+            with _silence():
+                self._server.stop()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
+
+def _viser() -> Any:
+    try:
+        import viser
+    except ImportError as error:
+        raise MissingExtraError(
+            "the page needs viser, which is not installed: pip install 'tussle[view]'"
+            " (tussle export makes pages and films of a recorded run without it)"
+        ) from error
+    return viser
+
+
+def _server_class(viser: Any) -> Any:
+    class Server(viser.ViserServer):  # type: ignore[misc]
+        """viser's server without its tunnel: a message from a browser must not put the game on the internet."""
+
+        def request_share_url(self, verbose: bool = True) -> str | None:
+            """Shares nothing."""
+            return None
+
+    return Server
+
+
+@contextlib.contextmanager
+def _silence() -> Iterator[None]:
+    """Against viser, which prints its address and its end whatever it is told."""
+    import rich
+
+    console = rich.get_console()
+    before, console.quiet = console.quiet, True
+    try:
+        yield
+    finally:
+        console.quiet = before
+
+
+def _free_port(host: str, wanted: int | None) -> int:
+    """A port that can be served at.
+
+    Raises:
+        ViewError: There is none, the one that is wanted is taken, or the host is not this machine's.
+    """
+    ports = [wanted] if wanted is not None else list(range(PORT, PORT + MOST_PORTS))
+    refusal: OSError | None = None
+    for port in ports:
+        try:
+            family, kind, protocol, _, address = socket.getaddrinfo(
+                host or None, port, type=socket.SOCK_STREAM
+            )[0]
+            with socket.socket(family, kind, protocol) as probe:
+                probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+                probe.bind(address)
+        except OSError as error:
+            refusal = error
+            if isinstance(error, socket.gaierror):
+                break
+        else:
+            return port
+    where = f"port {wanted}" if wanted is not None else f"ports {PORT} to {PORT + MOST_PORTS - 1}"
+    raise ViewError(f"the page cannot be served at {host}, {where}: {refusal}")
