@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
+from inspect import signature
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -119,7 +120,7 @@ class Proposer:
         self, axes: Sequence[Axis], seed: int, n: int, past: Sequence[Trial]
     ) -> list[dict[str, Value]]:
         """By CMA-ES, told all whole generations again; Optuna's own wastes the trials of a round that its generation has no room for."""
-        import cmaes
+        import cmaes  # type: ignore[import-untyped]
 
         size = generation_size(len(axes), self.per_round)
         optimizer = cmaes.CMA(
@@ -160,7 +161,9 @@ class Proposer:
         import optuna
 
         with _quiet():
-            evaluator = optuna.importance.PedAnovaImportanceEvaluator(target_quantile=BEST)
+            made: Any = optuna.importance.PedAnovaImportanceEvaluator
+            is_older = "baseline_quantile" in signature(made).parameters  # the name before Optuna 5
+            evaluator = made(**{"baseline_quantile" if is_older else "target_quantile": BEST})
             return optuna.importance.get_param_importances(self._study(complete), evaluator=evaluator)
 
 
