@@ -138,7 +138,7 @@ def test_colours_of_the_page_stand_in_the_plots_for_those_of_the_files(of_paper)
 def test_what_the_page_says_is_on_it(of_paper, of_choices):
     _, page, _ = of_paper
     assert "keepers won 593 of 1,000 games (59.3 %, 95 % interval 56.2 to 62.3)" in page.text
-    assert {"won", "plot-wins", "plot-margin", "left", "plot-left"} <= set(page.all("id"))
+    assert {"won", "plot-wins", "plot-margin", "left", "plot-left-1"} <= set(page.all("id"))
     page, _ = of_choices
     assert "score of keepers tactic=keep → tactic=switch 40 " in page.text
 

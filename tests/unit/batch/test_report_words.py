@@ -36,7 +36,7 @@ def test_the_first_sentence_answers(paper):
 
 def test_a_batch_without_variables_has_no_section_about_them(paper):
     names = names_of(paper)
-    assert {"won", "scores", "wins", "margin", "left", "ended", "look-at", "making"} <= names
+    assert {"won", "scores", "wins", "margin", "left", "left-1", "ended", "look-at", "making"} <= names
     assert not {"effects", "maps", "strengths", "differences", "points"} & names
 
 
@@ -239,3 +239,29 @@ def test_far_values_are_said_to_lie_beyond_the_plot():
     scores[7] = 5000
     said = words_of(made_batch({2: scores, 3: noise(1, 300, 9.0, 1)}))
     assert re.search(r"The values go from \d+ to 5,000; 1 of 600 lie beyond the plot.", said)
+
+
+def test_teams_of_other_sizes_have_a_plot_of_their_own():
+    lost = {
+        run: [
+            (1, 0.0, 50),
+            (1, 9.0, 20),
+            (1, 100.0, 20),
+            (2, 0.0, 5),
+            (2, 8.0, 4),
+            (2, 100.0, 4),
+            (3, 0.0, 5),
+            (3, 100.0, 3),
+        ]
+        for run in range(10)
+    }
+    names = names_of(made_batch({2: noise(1, 10, 5.0), 3: noise(1, 10, 5.0, 1)}, alive=lost))
+    assert {"left-1", "left-2-3"} <= names
+
+
+def test_a_score_that_a_plugin_reports_as_well_is_counted_once():
+    second, third = noise(1, 10, 5.0), noise(1, 10, 5.0, 1)
+    stored = made_batch({2: second, 3: third}, metrics={"M.score": {2: second, 3: third + 1}})
+    said = words_of(stored)
+    assert "M.score of keepers" not in said
+    assert "M.score of switchers" in said

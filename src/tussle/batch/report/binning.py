@@ -198,12 +198,14 @@ def _student(clusters: np.ndarray) -> np.ndarray:
 def _wilson(
     mean: np.ndarray, variance: np.ndarray, n: np.ndarray, clusters: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Wilson's interval with as many runs as have the variance; with as many as there are clusters where it is 0."""
+    """Wilson's interval with as many games as would have the variance; with as many as there are clusters where all are alike."""
     z = NormalDist().inv_cdf(0.975)
     spread = mean * (1.0 - mean)
     corrected = variance * (clusters - 1) / np.maximum(clusters, 1)
     with np.errstate(invalid="ignore", divide="ignore"):
-        n_effective = np.where(corrected > 0.0, np.minimum(spread / corrected, n), np.minimum(clusters, n))
+        # The ratio is Korn and Graubard's, for a variance that is known from few clusters.
+        by_variance = spread / corrected * (_student(n) / _student(clusters)) ** 2
+        n_effective = np.where(spread > 0.0, np.minimum(by_variance, n), np.minimum(clusters, n))
         n_effective = np.where(np.isfinite(variance), n_effective, np.nan)
         middle = (mean + z**2 / (2.0 * n_effective)) / (1.0 + z**2 / n_effective)
         half = z / (1.0 + z**2 / n_effective) * np.sqrt(spread / n_effective + (z / (2.0 * n_effective)) ** 2)

@@ -94,5 +94,5 @@ def _how_to_replay(subject: Subject) -> tuple[str, ...]:
     if not _can_be_named(subject):
         return ()
     return (
-        "The commands hold in the folder in which the batch lies. A game played again ends in the same state, bit for bit.",
+        "The commands hold in the folder in which the batch lies. Each tells whether the game ended in the same state again.",
     )
