@@ -146,6 +146,10 @@ def _means(found: Analysis) -> Table:
 # -- points ---------------------------------------------------------------------------------------------------------------
 
 
+WIDEST_VALUE = 11
+"""Values of variables up to this long are not folded."""
+
+
 def _points(found: Analysis, shows_all: bool) -> Iterable[RenderableType]:
     winners = [share.name for share in found.shares if share.n]
     names = [mean.name for mean in found.points[0].means]
@@ -155,9 +159,21 @@ def _points(found: Analysis, shows_all: bool) -> Iterable[RenderableType]:
         *(found.titles.get(n, n) for n in names),
     ]
     table = Table(box=box.SIMPLE_HEAD, header_style="bold", pad_edge=False, padding=(0, 1))
-    for head in [" point", *heads]:
-        table.add_column(Text(head), justify="right", overflow="fold")
     rows, n_between = _chosen(found.points, shows_all)
+    for head in [" point", *heads]:
+        column = len(table.columns) - 1
+        texts = (
+            [written(list(point.values.values())[column]) for point in rows]
+            if 0 <= column < len(found.variables)
+            else []
+        )
+        # Words stay whole where there is room for them.
+        table.add_column(
+            Text(head),
+            justify="right",
+            overflow="fold",
+            min_width=min(WIDEST_VALUE, max(map(len, texts), default=1)),
+        )
     for i, point in enumerate(rows):
         if n_between and i == MOST_POINTS // 2:
             table.add_row(" ...", style="dim")

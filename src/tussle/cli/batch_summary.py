@@ -114,12 +114,13 @@ def points_table(results: Results) -> Table:
     table = Table(box=box.SIMPLE_HEAD, header_style="bold", pad_edge=False, padding=(0, 1))
     for variable in results.variables:
         table.add_column(f" {variable.name}", justify="right", overflow="fold")
-    teams = [share.name for share in results.shares()]
-    for name in teams:
-        table.add_column(name, justify="right")
+    winners = [share.team for share in results.shares() if share.n]
+    for share in results.shares():
+        if share.team in winners:
+            table.add_column(f"{share.name} won, %", justify="right")
     for point, values in list(enumerate(results.points))[:MOST_POINTS]:
         cells = [f"{v:.6g}" if isinstance(v, float) else str(v) for v in values.values()]
-        cells += [f"{100 * share.value:.1f} %" for share in results.shares(point)]
+        cells += [_share(share) for share in results.shares(point) if share.team in winners]
         table.add_row(*cells)
     if len(results.points) > MOST_POINTS:
         table.add_row(f" and {len(results.points) - MOST_POINTS:,} more", style="dim")
