@@ -16,6 +16,7 @@ import numpy as np
 from tussle.batch.executors import FEW, Executor, InProcess, Processes
 from tussle.batch.plan import Plan
 from tussle.batch.points import values_text, variables_of
+from tussle.batch.sampling import method_for
 from tussle.batch.sampling import sample as sample_points
 from tussle.batch.store import PLUGINS
 from tussle.batch.tasks import PluginFile, Run
@@ -94,6 +95,8 @@ class Batch:
             if points is not None
             else sample_points(self.variables, sample, samples, sample_seed)
         )
+        is_sampled = points is None and bool(self.variables)
+        self.sample = method_for(self.variables, sample) if is_sampled else sample
         if points is not None:
             self.variables = variables_of(chosen)
         self.plan = Plan(chosen, _most_seeds(len(chosen)) if runs is None else runs, first_seed, independent)

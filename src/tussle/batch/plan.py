@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from tussle.batch.variables import written
 from tussle.errors import ParameterError
 
 MOST_RUNS = 10_000_000
@@ -92,4 +93,4 @@ def _column(values: list[Any]) -> pa.Array:
         return pa.array(values, pa.int64())
     if all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in numbers):
         return pa.array([None if v is None else float(v) for v in values], pa.float64())
-    return pa.array([None if v is None else str(v) for v in values], pa.string())
+    return pa.array([None if v is None else written(v) for v in values], pa.string())
