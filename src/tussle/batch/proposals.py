@@ -6,6 +6,7 @@ search that was killed goes on as it would have.
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -18,7 +19,7 @@ import numpy as np
 
 from tussle.batch.search_space import Axis
 from tussle.batch.trials import Trial
-from tussle.batch.variables import Choice, Value, Variable
+from tussle.batch.variables import Choice, Range, Value, Variable
 from tussle.errors import MissingExtraError, ParameterError, listed, nearest_name
 
 if TYPE_CHECKING:
@@ -63,6 +64,11 @@ class Proposer:
         choices = [v.name for v in self.variables if isinstance(v, Choice)]
         if self.sampler == "cmaes" and choices:
             raise ParameterError(f"cmaes searches ranges, and {choices[0]} is a choice; tpe searches both")
+        for v in self.variables:
+            if isinstance(v, Range) and not math.isfinite(v.high - v.low):
+                raise ParameterError(
+                    f"{v.name}: from {v.low:g} to {v.high:g} is too far for a search; narrow the range"
+                )
         for package in ("optuna", "cmaes") if self.sampler == "cmaes" else ("optuna",):
             try:
                 import_module(package)

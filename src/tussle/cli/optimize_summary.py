@@ -61,7 +61,8 @@ def show_study(
     loaded = optimization.content.loaded
     name = (loaded.mission.name if loaded is not None else "") or study.info["name"]
     title = Text.assemble(" ", (name, "bold"), (f"\n {_facts(study)}", "dim"))
-    put("", title, trials_table(study), _ending(study, directory, wall, n_new))
+    legend = Text(" the best first; in parentheses: 95 % intervals\n", style="dim italic")
+    put("", title, trials_table(study), legend, _ending(study, directory, wall, n_new))
     if again:
         out().print(Text(f" {again}"), soft_wrap=True)  # one line, however long, so that it can be copied
     put("")
@@ -97,7 +98,6 @@ def trials_table(study: Study) -> Table:
     for place, trial in enumerate(study.ranking[:MOST_TRIALS]):
         cells = [f" {trial.number}", *study.settings(trial.values).values(), _objective(trial)]
         table.add_row(*map(Text, cells), style="" if place else "green")
-    table.caption, table.caption_justify = " the best first; in parentheses: 95 % intervals", "left"
     return table
 
 

@@ -24,7 +24,7 @@ from tussle.batch.executors import InProcess, Processes
 from tussle.batch.optimization import MOST_TRIALS, Optimization, optimize
 from tussle.batch.study_store import StudyStore, load_study, notes_on_versions
 from tussle.batch.variables import Choice, Range
-from tussle.errors import BatchError, MissingExtraError, MissionError, ParameterError
+from tussle.errors import BatchError, MissingExtraError, MissionError, ParameterError, RecordError
 
 PLUGIN = Path(bowl.__file__)
 PLACE = {"Bowl.x": (-10.0, 10.0), "Bowl.y": (-10.0, 10.0)}
@@ -259,6 +259,7 @@ def test_values_that_can_never_be_played_are_an_error(game):
             "sampler = 'tp' is not allowed.*did you mean 'tpe'.*there are: tpe, cmaes, random",
         ),
         ({"sampler": "cmaes", "vary": {"Bowl.x": [1, 2]}}, "cmaes searches ranges, and Bowl.x is a choice"),
+        ({"vary": ["Bowl.x=-1e308:1e308"]}, "Bowl.x: from -1e.308 to 1e.308 is too far for a search"),
         ({"settings": {"Bowl.x": 1}}, "Bowl.x is set and varies"),
         ({"runs": 0}, "runs = 0 is not allowed; it takes a whole number >= 1"),
         ({"per_round": 2.5}, "per_round = 2.5 is not allowed"),
@@ -504,6 +505,12 @@ def test_a_table_of_other_trials(tmp_path):
     pq.write_table(pa.table({"trial": [0]}), tmp_path / "out" / "trials.parquet")
     with pytest.raises(BatchError, match="cannot be read"):
         search(directory=tmp_path / "out", trials=8)
+
+
+def test_a_directory_that_cannot_be_made(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(RecordError, match="file: cannot be written"):
+        search(directory=tmp_path / "file", trials=8)
 
 
 def test_a_search_that_was_killed_as_it_began(tmp_path):
