@@ -19,6 +19,7 @@ from tussle.batch.results import Results
 from tussle.batch.stopping import Stop
 from tussle.batch.store import PLAYED, Store, Stored
 from tussle.batch.tasks import Finished
+from tussle.batch.varied import said
 from tussle.errors import BatchError
 from tussle.record.run_file import Timings, plain, versions
 
@@ -120,13 +121,17 @@ class _Course:
         most = max(1, MOST_AT_ONCE // n_points)
         first = 0
         while first < n_seeds:
-            n = most if self.stop is None else min(most, max(FIRST_SEEDS, first))
-            last = min(first + n, n_seeds)
+            n = n_seeds - first if self.stop is None else self._seeds_from(first, self.stop.n_least)
+            last = min(first + min(n, most), n_seeds)
             numbers = range(first * n_points, last * n_points)
             runs = [self.batch.run(number) for number in numbers if number not in done]
             if runs:
                 yield runs
             first = last
+
+    def _seeds_from(self, first: int, n_least: int) -> int:
+        """How many more seeds to play before looking whether that is enough."""
+        return n_least - first if first < n_least else max(FIRST_SEEDS, first)
 
 
 def play_in_memory(
@@ -201,7 +206,7 @@ def _check_same(batch: Batch, path: Path, before: dict[str, Any]) -> None:
         return
     now = plain(batch.info())
     differing = [
-        f"{name} (there {_shown(before.get(name))}, now {_shown(now.get(name))})"
+        f"{name} (there {_shown(name, before)}, now {_shown(name, now)})"
         for name in IDENTITY
         if before.get(name) != now.get(name)
     ]
@@ -213,9 +218,9 @@ def _check_same(batch: Batch, path: Path, before: dict[str, Any]) -> None:
     raise BatchError(f"{path}: holds another batch: {what}; choose another directory, or remove it")
 
 
-def _shown(value: Any) -> str:
-    text = str(value)
-    return text if len(text) <= 60 else text[:57] + "..."
+def _shown(name: str, info: dict[str, Any]) -> str:
+    text = said(info[name]) if name == "variables" else str(info.get(name)) or "nothing"
+    return text if len(text) <= 80 else text[:77] + "..."
 
 
 def _has_all(before: dict[str, Any], plan: Plan, until: Until | None) -> bool:

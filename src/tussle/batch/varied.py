@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from tussle.batch.variables import Choice, Range, Variable, parse_values, parse_variable
+from tussle.batch.variables import Choice, Range, Variable, parse_values, parse_variable, written
 from tussle.errors import ParameterError
 
 
@@ -59,3 +59,19 @@ def about(variable: Variable) -> dict[str, Any]:
     """A variable as `batch.json` keeps it."""
     kind = "range" if isinstance(variable, Range) else "choice"
     return {"kind": kind, **dataclasses.asdict(variable)}
+
+
+def said(variables: Iterable[Mapping[str, Any]]) -> str:
+    """Variables as `batch.json` keeps them, in the words of the command line."""
+    return "; ".join(f"{v['name']}={_values_said(v)}" for v in variables) or "nothing"
+
+
+def _values_said(variable: Mapping[str, Any]) -> str:
+    if variable["kind"] == "choice":
+        return ",".join(map(written, variable["values"]))
+    parts = [
+        f"{variable['low']:g}",
+        f"{variable['high']:g}{' ' if variable['unit'] else ''}{variable['unit']}",
+    ]
+    parts += [word for word in ("int", "log") if variable[f"is_{word}"]]
+    return ":".join([*parts, *([] if variable["levels"] is None else [str(variable["levels"])])])
