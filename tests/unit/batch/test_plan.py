@@ -55,7 +55,7 @@ def test_a_batch_without_variables_has_one_point():
 def test_a_variable_is_a_column_of_numbers_where_all_of_its_values_are(values, dtype):
     column = Plan([{"x": v} for v in values], 1).table()["x"]
     assert column.type == dtype
-    assert column.to_pylist() == [str(v) if dtype == pa.string() else v for v in values]
+    assert column.to_pylist() == [str(v).lower() if dtype == pa.string() else v for v in values]
 
 
 def test_the_last_seeds_of_all_are_there():
