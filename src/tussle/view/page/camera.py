@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import threading
+import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +25,8 @@ HEIGHT = 0.35
 """Of the camera behind an entity above it, of the distance."""
 NOTICED = 0.02
 """Who turns the view changes it by more than this; what differs less is a late echo of the camera's own moves."""
+ECHO = 0.7
+"""How long after a command the browser may still tell of the view before it [s]."""
 MOST_UNDOS = 50
 
 
@@ -72,75 +76,90 @@ class Camera:
     def __init__(self, client: Any, scenery: Scenery, length: float) -> None:
         self._client, self._scenery = client, scenery
         self.mode = "free"
-        self._usual = self._distance = USUAL_LENGTHS * length
+        self._distance = USUAL_LENGTHS * length
         self._offset: np.ndarray | None = None
+        self._echoes_until = 0.0
         self._undo: list[View] = []
+        # Commands come from viser's threads, and frames from the one that pushes: neither may overtake half of the other.
+        self._lock = threading.RLock()
 
     # -- commands -----------------------------------------------------------------------------------------------------------------
 
     def set_mode(self, mode: str) -> None:
         """Another mode."""
-        if mode != self.mode:
-            self._keep()
-            self.mode, self._offset = mode, None
-
-    def cycle(self) -> None:
-        """The next mode."""
-        self.set_mode(MODES[(MODES.index(self.mode) + 1) % len(MODES)])
+        with self._lock:
+            if mode != self.mode:
+                self._keep()
+                self.mode, self._offset = mode, None
 
     def show_whole(self) -> None:
         """See all of the scene, freely."""
-        self._keep()
-        self.mode = "free"
-        self._go(whole_view(self._scenery))
+        with self._lock:
+            self._keep()
+            self.mode = "free"
+            self._go(whole_view(self._scenery))
 
     def show_from_above(self) -> None:
         """See all of the scene from above, freely."""
-        self._keep()
-        self.mode = "free"
-        self._go(view_from_above(self._scenery))
+        with self._lock:
+            self._keep()
+            self.mode = "free"
+            self._go(view_from_above(self._scenery))
 
     def zoom(self, factor: float) -> None:
         """Nearer to what is followed, or farther."""
-        self._distance *= factor
-        if self.mode == "free":
-            self._keep()
-            view = self._view()
-            self._go(View(view.target + factor * (view.position - view.target), view.target))
-        elif self._offset is not None:
-            self._offset = self._offset * factor
+        with self._lock:
+            self._distance *= factor
+            if self.mode == "free":
+                self._keep()
+                view = self._view()
+                self._go(View(view.target + factor * (view.position - view.target), view.target))
+            elif self._offset is not None:
+                self._offset = self._offset * factor
+                target = self._view().target
+                self._go(View(target + self._offset, target))
+                self._echoes_until = time.monotonic() + ECHO
 
     def undo(self) -> None:
         """Back to where it was before the last command."""
-        if self._undo:
-            view = self._undo.pop()
-            self.mode, self._offset = view.mode, None
-            if view.mode == "follow":
-                self._offset = view.position - view.target
-            self._go(view)
+        with self._lock:
+            if self._undo:
+                view = self._undo.pop()
+                self.mode, self._offset = view.mode, None
+                if view.mode == "follow":
+                    self._offset = view.position - view.target
+                self._go(view)
 
     # -- each frame ---------------------------------------------------------------------------------------------------------------
 
     def follow(self, frame: Frame, who: int | None) -> None:
         """Move with an entity, where the mode says so and it is there."""
-        row = -1 if who is None else frame.row_of(who)
-        if self.mode == "free" or row < 0:
-            return
-        target = frame.pos[row]
-        if self.mode == "behind":
-            w, x, y, z = frame.quat[row]
-            yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-            back = np.array([-math.cos(yaw), -math.sin(yaw), HEIGHT])
-            self._go(View(target + self._distance * back, target))
-            return
-        seen = self._view()
-        offset = seen.position - seen.target
-        if self._offset is None:
-            norm = float(np.linalg.norm(offset)) or 1.0
-            self._offset = offset * (self._distance / norm)
-        elif np.linalg.norm(offset - self._offset) > NOTICED * np.linalg.norm(self._offset):
-            self._offset = offset
-        self._go(View(target + self._offset, target))
+        with self._lock:
+            row = -1 if who is None else frame.row_of(who)
+            if self.mode == "free" or row < 0:
+                return
+            target = frame.pos[row]
+            if self.mode == "behind":
+                w, x, y, z = frame.quat[row]
+                yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+                back = np.array([-math.cos(yaw), -math.sin(yaw), HEIGHT])
+                self._go(View(target + self._distance * back, target))
+                return
+            seen = self._view()
+            offset = seen.position - seen.target
+            if self._offset is None:
+                norm = float(np.linalg.norm(offset)) or 1.0
+                self._offset = offset * (self._distance / norm)
+                self._echoes_until = time.monotonic() + ECHO
+            elif self._is_turned(offset):
+                self._offset = offset
+            self._go(View(target + self._offset, target))
+
+    def _is_turned(self, offset: np.ndarray) -> bool:
+        """Whether the browser's user has turned the view, or come nearer."""
+        assert self._offset is not None
+        change = np.linalg.norm(offset - self._offset)
+        return bool(change > NOTICED * np.linalg.norm(self._offset) and time.monotonic() > self._echoes_until)
 
     # -- the browser --------------------------------------------------------------------------------------------------------------
 

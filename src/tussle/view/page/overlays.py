@@ -21,7 +21,7 @@ N_SIDES = 48
 """Corners of a ring or of a cone's rim."""
 
 
-def ring(width: float = 0.012) -> Mesh:
+def ring(width: float = 0.03) -> Mesh:
     """A flat ring of radius 1 m around the z axis."""
     angle = 2.0 * np.pi * np.arange(N_SIDES) / N_SIDES
     circle = np.stack([np.cos(angle), np.sin(angle), np.zeros(N_SIDES)], 1)

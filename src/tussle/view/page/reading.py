@@ -19,7 +19,7 @@ ATTRIBUTES: Mapping[str, tuple[str, ...]] = {
     "points": ("pos", "size"),
     "cloud": ("pos", "size", "value", "low", "high"),
     "line": ("pos", "width"),
-    "vectors": ("pos", "vec"),
+    "vectors": ("pos", "direction"),
     "sphere": ("pos", "radius"),
     "box": ("pos", "size", "quat"),
     "cone": ("pos", "direction", "length", "angle"),
@@ -97,7 +97,7 @@ def _read(shape: Shape, drawing: Drawing, size: float) -> None:
         drawing.lines.append((np.stack([pos[:-1], pos[1:]], 1), np.stack([colour[:-1], colour[1:]], 1)))
         drawing.width = float(given.get("width", drawing.width))
     elif kind == "vectors":
-        drawing.arrows.append((np.stack([pos, pos + _vectors(given, "vec", n)], 1), _colours(given, n)))
+        drawing.arrows.append((np.stack([pos, pos + _vectors(given, "direction", n)], 1), _colours(given, n)))
     elif kind == "text":
         drawing.texts.extend((str(given.get("text", "")), p) for p in pos)
     else:
