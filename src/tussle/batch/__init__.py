@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from tussle.batch.batch import Batch
     from tussle.batch.executors import InProcess, Processes
-    from tussle.batch.optimization import optimize
     from tussle.batch.reload import load_batch
     from tussle.batch.results import Results
-    from tussle.batch.study import Study
-    from tussle.batch.study_store import load_study
+    from tussle.batch.search.optimization import optimize
+    from tussle.batch.search.study import Study
+    from tussle.batch.search.study_store import load_study
     from tussle.batch.variables import Choice, Range
 
 __all__ = [
@@ -33,10 +33,10 @@ _LAZY = {
     "Processes": "executors",
     "Range": "variables",
     "Results": "results",
-    "Study": "study",
+    "Study": "search.study",
     "load_batch": "reload",
-    "load_study": "study_store",
-    "optimize": "optimization",  # not a module of the same name, which would take its place
+    "load_study": "search.study_store",
+    "optimize": "search.optimization",
 }
 
 

@@ -14,8 +14,8 @@ from rich.live import Live
 from rich.progress import BarColumn, Progress, TextColumn
 from rich.text import Text
 
-from tussle.batch.optimization import Optimization, SearchProgress
 from tussle.batch.points import values_text
+from tussle.batch.search.optimization import Optimization, SearchProgress
 from tussle.cli.batch import Interrupted
 from tussle.cli.interrupt import Interrupt
 from tussle.cli.optimize_summary import interval, play_again, show_study

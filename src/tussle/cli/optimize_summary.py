@@ -10,9 +10,9 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from tussle.batch.optimization import Optimization
-from tussle.batch.study import Study
-from tussle.batch.trials import Trial
+from tussle.batch.search.optimization import Optimization
+from tussle.batch.search.study import Study
+from tussle.batch.search.trials import Trial
 from tussle.cli.play import Source
 from tussle.cli.progress import clock
 from tussle.cli.terminal import OK, PLUGIN_FAILED, out, put, say_error, say_note

@@ -19,10 +19,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from tussle.batch.evaluation import WORTH_PROCESSES, Crew
 from tussle.batch.executors import InProcess, Processes
-from tussle.batch.optimization import MOST_TRIALS, Optimization, optimize
-from tussle.batch.study_store import StudyStore, load_study, notes_on_versions
+from tussle.batch.search.evaluation import WORTH_PROCESSES, Crew
+from tussle.batch.search.optimization import MOST_TRIALS, Optimization, optimize
+from tussle.batch.search.study_store import StudyStore, load_study, notes_on_versions
 from tussle.batch.variables import Choice, Range
 from tussle.errors import BatchError, MissingExtraError, MissionError, ParameterError, RecordError
 
@@ -335,7 +335,7 @@ def test_seeds_change_what_is_proposed():
 CHILD = """\
 import sys, time
 from tussle.batch import InProcess
-from tussle.batch.optimization import optimize
+from tussle.batch.search.optimization import optimize
 
 def stop_in_the_middle(progress):
     if progress.n_done >= 16 and progress.played > 0.3:

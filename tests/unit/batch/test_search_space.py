@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from tussle.batch.proposals import generation_size
-from tussle.batch.search_space import DIGITS, Axis
+from tussle.batch.search.proposals import generation_size
+from tussle.batch.search.search_space import DIGITS, Axis
 from tussle.batch.variables import Choice, Range
 
 SPEED = Range("speed", 20, 50)

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tussle.batch.search_space import Axis
-from tussle.batch.trials import Trial
+from tussle.batch.search.search_space import Axis
+from tussle.batch.search.trials import Trial
 from tussle.batch.variables import Choice, Range, Value, Variable
 from tussle.errors import MissingExtraError, ParameterError, listed, nearest_name
 

@@ -11,13 +11,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tussle.batch.evaluation import Crew, Evaluator
-from tussle.batch.proposals import Proposer
 from tussle.batch.quantities import Quantity
-from tussle.batch.searched_mission import SearchedMission
-from tussle.batch.study import Study, best_of
-from tussle.batch.study_store import StudyStore, notes_on_versions, read_trials, versions_of_samplers
-from tussle.batch.trials import column_type
+from tussle.batch.search.evaluation import Crew, Evaluator
+from tussle.batch.search.proposals import Proposer
+from tussle.batch.search.searched_mission import SearchedMission
+from tussle.batch.search.study import Study, best_of
+from tussle.batch.search.study_store import StudyStore, notes_on_versions, read_trials, versions_of_samplers
+from tussle.batch.search.trials import column_type
 from tussle.batch.variables import Variable
 from tussle.batch.varied import about, as_variables
 from tussle.errors import ParameterError
@@ -27,7 +27,7 @@ from tussle.record.run_file import versions
 if TYPE_CHECKING:
     from tussle.batch.executors import Executor
     from tussle.batch.progress import Progress
-    from tussle.batch.trials import Trial
+    from tussle.batch.search.trials import Trial
 
 MOST_TRIALS = 10_000
 """Samplers look at all trials before each round, and the table of them is written after each."""

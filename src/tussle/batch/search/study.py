@@ -12,9 +12,9 @@ import numpy as np
 import pyarrow as pa
 
 from tussle.batch.points import values_text
-from tussle.batch.proposals import Proposer
+from tussle.batch.search.proposals import Proposer
+from tussle.batch.search.trials import Trial, trials_table
 from tussle.batch.statistics import Comparison, paired_difference
-from tussle.batch.trials import Trial, trials_table
 from tussle.batch.variables import Value, Variable
 
 

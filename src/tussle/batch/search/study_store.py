@@ -12,9 +12,9 @@ from typing import IO, Any, Self
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from tussle.batch.search.study import Study
+from tussle.batch.search.trials import Trial, trials_of, trials_table
 from tussle.batch.store import told
-from tussle.batch.study import Study
-from tussle.batch.trials import Trial, trials_of, trials_table
 from tussle.batch.variables import Choice, Range, Variable
 from tussle.errors import BatchError
 from tussle.record.run_file import plain, put_whole, versions

@@ -12,9 +12,9 @@ import numpy as np
 from tussle.batch.batch import Batch
 from tussle.batch.executors import InProcess
 from tussle.batch.quantities import Quantity
-from tussle.batch.searched_mission import Point, SearchedMission
+from tussle.batch.search.searched_mission import Point, SearchedMission
+from tussle.batch.search.trials import Trial, key_of_values
 from tussle.batch.statistics import Mean, means_of
-from tussle.batch.trials import Trial, key_of_values
 from tussle.errors import ParameterError, TussleError
 
 if TYPE_CHECKING:
