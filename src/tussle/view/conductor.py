@@ -113,7 +113,12 @@ class Conductor:
             has_worked = self.work(may_play=True)
             self._on_moment(not has_worked and self._wait is None)
             if not has_worked:
-                self._bell.wait(self._wait)
+                self._sleep()
+
+    def _sleep(self) -> None:
+        began = time.perf_counter()
+        self._bell.wait(self._wait)
+        self.player.rest(time.perf_counter() - began)
 
     def drain(self) -> None:
         """Carry out all orders, and return."""

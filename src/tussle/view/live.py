@@ -54,7 +54,7 @@ class Live:
         is_paused: Wait before the first step.
         threaded: Play in a thread of its own, from now on. Without, the game stands still, each control is carried out by whoever
             gives it, and what is seen is always of now.
-        snapshot_every: Least simulated time between snapshots [s]; they are also limited to 2 % of the time.
+        snapshot_every: Least simulated time between snapshots [s]; they are also limited to 1 % of the CPU time.
         memory: For snapshots and for the history of frames [MB], half of it for each.
         viewer: What the mission file says for the viewer, see `tussle.mission.Loaded`.
 

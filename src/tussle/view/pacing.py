@@ -13,6 +13,8 @@ MOST_LAG = 0.25
 """Time of the wall by which a game may be late and still make up for it [s]; one that is later starts counting anew."""
 WINDOW = 1.0
 """Time of the wall over which speed is measured [s]."""
+MOMENT = 0.0005
+"""Least time between two looks at what has been saved [s]."""
 TICK = 0.05
 """Least time between two readings of the speedometer [s]."""
 
@@ -76,24 +78,43 @@ class Speedometer:
 
 
 class Allowance:
-    """What may be spent beside the game: a share of the time that goes by, saved up to a point; that of a second to begin with.
+    """What may be spent beside the game: a share of its thread's CPU time and of its rest, saved up to a point.
+
+    CPU time, since on a machine with much else to do a share of the wall's would be a larger share of the game's. It begins with
+    what a second brings.
 
     Args:
-        share: Of the wall's time.
+        share: Of that time.
     """
 
     def __init__(self, share: float) -> None:
         self.share = share
         self.cost = 0.0
         self._saved = share
-        self._last = time.perf_counter()
+        self._last = time.thread_time()
+        self._look_at = 0.0
+
+    def rest(self, seconds: float) -> None:
+        """The game has waited on purpose: nobody is kept waiting by what is done in that time."""
+        self._save(seconds)
+        self._look_at = 0.0
+
+    def _save(self, seconds: float) -> None:
+        self._saved = min(self._saved + self.share * seconds, 4.0 * self.cost + self.share)
 
     def allows(self) -> bool:
         """Whether what it cost last time can be paid for by now."""
-        now = time.perf_counter()
-        self._saved = min(self._saved + self.share * (now - self._last), 4.0 * self.cost + self.share)
+        # The thread's clock takes longer to read than the wall's, and little is saved in a moment.
+        wall = time.perf_counter()
+        if wall < self._look_at:
+            return False
+        now = time.thread_time()
+        self._save(max(0.0, now - self._last))  # another thread's clock stands elsewhere
         self._last = now
-        return self._saved >= self.cost
+        if self._saved >= self.cost:
+            return True
+        self._look_at = wall + MOMENT
+        return False
 
     def pay(self, seconds: float) -> None:
         """It has been done, and took this long."""

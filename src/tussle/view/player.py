@@ -57,6 +57,7 @@ class Player:
     Attributes:
         timeline: Snapshots.
         history: Frames as they went by.
+        step: Step that the world is in.
         injections: What was said from outside, in order of its steps.
         happenings: Births, deaths, captures, collisions, ends, in order.
         notes: What the user should know, one line each.
@@ -71,6 +72,7 @@ class Player:
         self.happenings: list[Happening] = []
         self.notes: list[str] = []
         self.is_broken = False
+        self.step = self._read_step()
         self.first_step = self._told = self.step
         self._tell_of_those_who_are_there()
         simulation.events.listen(self._hear)
@@ -80,9 +82,7 @@ class Player:
         """Leave the simulation as one that nobody watches."""
         self.simulation.events.forget(self._hear)
 
-    @property
-    def step(self) -> int:
-        """Step that the world is in."""
+    def _read_step(self) -> int:
         return int(self.simulation.context.clock.step[self.world])
 
     @property
@@ -105,7 +105,7 @@ class Player:
         sim.is_replaying = step < self._told
         self._told = max(self._told, step + 1)
         try:
-            for said in self._said_in(step):
+            for said in self.injections and [said for said in self.injections if said.step == step]:
                 sim.publish(said.type, [self.world], network=said.network, topic=said.topic, **said.fields)
             sim.step()
         except BaseException:
@@ -113,15 +113,17 @@ class Player:
             raise
         finally:
             sim.is_replaying = False
+        self.step = self._read_step()
         self._remember()
 
-    def _said_in(self, step: int) -> list[Injection]:
-        return [said for said in self.injections if said.step == step]
+    def rest(self, seconds: float) -> None:
+        """The game has waited on purpose: time for what is done beside it."""
+        self.timeline.rest(seconds)
+        self.history.rest(seconds)
 
     def _remember(self) -> None:
-        step = self.step
-        self.history.offer(step)
-        self.timeline.offer(step)
+        self.history.offer(self.step)
+        self.timeline.offer(self.step)
 
     # -- backwards ----------------------------------------------------------------------------------------------------------------
 
@@ -143,7 +145,7 @@ class Player:
         nearest = self.timeline.nearest(step)
         if nearest is not None and (is_back or nearest[0] > here):
             self.simulation.restore(nearest[1])
-            self.is_broken = False
+            self.is_broken, self.step = False, nearest[0]
         return step
 
     # -- another course -----------------------------------------------------------------------------------------------------------
@@ -183,7 +185,7 @@ class Player:
         self.happenings.clear()
         self.is_broken = False
         self.simulation.reset([self.world], None if seed is None else [seed])
-        self.first_step = self._told = self.step
+        self.first_step = self._told = self.step = self._read_step()
         self._remember()
 
     def _end_recordings(self) -> None:

@@ -21,10 +21,10 @@ from tussle.view.pacing import Allowance
 if TYPE_CHECKING:
     from tussle.engine.simulation import Simulation
 
-SNAPSHOT_SHARE = 0.02
-"""Share of the time that goes into snapshots. To replay from one to the next then takes at most 50 times as long as to take one."""
+SNAPSHOT_SHARE = 0.01
+"""Share of the CPU time that goes into snapshots. To replay from one to the next then takes some 100 times as long as to take one."""
 HISTORY_SHARE = 0.01
-"""Share of the time that goes into the history of frames."""
+"""Share of the CPU time that goes into the history of frames."""
 
 
 class Timeline:
@@ -74,7 +74,7 @@ class Timeline:
         place = bisect_right(self._steps, step)
         if self.refusal or (place and self._steps[place - 1] == step):
             return
-        began = time.perf_counter()
+        began = time.thread_time()
         try:
             snapshot = self._simulation.snapshot()
         except SnapshotError as error:
@@ -86,7 +86,7 @@ class Timeline:
         self._saved.insert(place, (snapshot, size))
         self.size += size
         self._thin(step)
-        self._allowance.pay(time.perf_counter() - began)
+        self._allowance.pay(time.thread_time() - began)
 
     def _thin(self, step: int) -> None:
         while self.size > self._limit and len(self._steps) > 2:
@@ -97,6 +97,10 @@ class Timeline:
     def _drop(self, number: int) -> None:
         self.size -= self._saved[number][1]
         del self._steps[number], self._saved[number]
+
+    def rest(self, seconds: float) -> None:
+        """The game has waited on purpose."""
+        self._allowance.rest(seconds)
 
     def nearest(self, step: int) -> tuple[int, Snapshot] | None:
         """The last snapshot not after a step, and its step."""
@@ -138,7 +142,7 @@ class History:
         """Keep what is there now, at this step, if it is new and can be afforded."""
         if (self._entries and step < self._entries[-1][0] + self._stride) or not self._allowance.allows():
             return
-        began = time.perf_counter()
+        began = time.thread_time()
         floats, who = self._lens.look()
         order = slice(None) if self._lens.order is None else self._lens.order
         state = np.empty((_N_KEPT, len(who[0])), np.float32)
@@ -150,11 +154,15 @@ class History:
         while self.size > self._limit and len(self._entries) > 2:
             self._stride *= 2
             self._keep_only(self._entries[::2])
-        self._allowance.pay(time.perf_counter() - began)
+        self._allowance.pay(time.thread_time() - began)
 
     def _keep_only(self, entries: list[tuple[int, tuple[np.ndarray, ...], np.ndarray]]) -> None:
         self._entries = entries
         self.size = sum(state.nbytes + 200 for _, _, state in entries)
+
+    def rest(self, seconds: float) -> None:
+        """The game has waited on purpose."""
+        self._allowance.rest(seconds)
 
     def at(self, step: int) -> Frame | None:
         """The last frame not after a step; None before the first."""

@@ -15,7 +15,7 @@ class Clock:
     def perf_counter(self):
         return self.now
 
-    monotonic = perf_counter
+    monotonic = thread_time = perf_counter
 
 
 @pytest.fixture
@@ -91,12 +91,23 @@ def test_an_allowance_is_a_share_of_the_time(clock):
             clock.now += 0.005
             spent += 0.005
     assert spent / (clock.now - began) == pytest.approx(0.02, rel=0.05)
-    clock.now += 3600.0  # an hour's pause buys no hour of snapshots
+    allowance.rest(3600.0)  # an hour's pause buys no hour of snapshots
     bought = 0
     while allowance.allows():
         allowance.pay(0.005)
         bought += 1
     assert bought <= 8
+
+
+def test_rest_counts_and_the_clock_of_another_thread_does_not(clock):
+    allowance = Allowance(0.02)
+    allowance.pay(0.02)
+    clock.now -= 50.0
+    assert not allowance.allows()
+    allowance.rest(0.9)
+    assert not allowance.allows()
+    allowance.rest(0.2)
+    assert allowance.allows()
 
 
 def test_warps():
