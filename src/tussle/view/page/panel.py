@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from tussle.view.live import Live
@@ -48,14 +48,15 @@ class Panel:
         with gui.add_folder("Keys", order=KEYS_ORDER, expand_by_default=False):
             gui.add_markdown(help_table(isinstance(source, Live)))
 
-    def show(self, frame: Frame, pushed: float) -> None:
+    def show(self, frame: Frame, pushed: float, notes: Sequence[str] = ()) -> None:
         """The numbers at a moment.
 
         Args:
             frame: The moment.
             pushed: Frames that were sent in the last second.
+            notes: What the user should know, beside what the game says itself.
         """
-        self._numbers.content = words.numbers_html(self._source, frame, self._source.looks, pushed)
+        self._numbers.content = words.numbers_html(self._source, frame, pushed, notes)
         self.time.show(frame)
 
     # -- what is shown ------------------------------------------------------------------------------------------------------------

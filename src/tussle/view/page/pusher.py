@@ -26,6 +26,8 @@ SLOW_PERIOD = 0.25
 """Of numbers, trails and links, which nobody reads faster [s]."""
 NAP = 0.1
 """While nobody watches [s]."""
+SHARE_OF_MODEL = 0.3
+"""Size of points that plugins draw without a size, of a model's length."""
 
 
 class Pusher:
@@ -96,12 +98,15 @@ class Pusher:
         if is_new or self._version != self._display.version:
             self._seen, self._version = frame, self._display.version
             self._draw(frame, visitors)
+        # Asked for each time: what was drawn in a step can come a moment after its frame.
+        shapes = self._source.shapes() if self._display.has_drawn else ()
+        self._parts.drawn.show(shapes, SHARE_OF_MODEL * self._display.size)
         for visitor in visitors:
             visitor.camera.follow(frame, visitor.chosen)
         if is_slow:
             self._parts.trails.show(frame)
             self._parts.overlays.show_links(frame)
-            self._parts.panel.show(frame, self.rate())
+            self._parts.panel.show(frame, self.rate(), self._parts.drawn.notes)
             for visitor in visitors:
                 visitor.show(frame)
 
@@ -111,8 +116,6 @@ class Pusher:
             parts.stage.show(frame)
             parts.overlays.show(frame)
             parts.labels.show(frame, {v.chosen for v in visitors if v.chosen is not None})
-            shapes = self._source.shapes() if self._display.has_drawn else ()
-            parts.drawn.show(shapes, 0.3 * self._display.size)
         self.n_pushed += 1
         self._moments.append(time.monotonic())
 

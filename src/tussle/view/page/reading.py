@@ -99,7 +99,7 @@ def _read(shape: Shape, drawing: Drawing, size: float) -> None:
     elif kind == "vectors":
         drawing.arrows.append((np.stack([pos, pos + _vectors(given, "direction", n)], 1), _colours(given, n)))
     elif kind == "text":
-        drawing.texts.extend((str(given.get("text", "")), p) for p in pos)
+        drawing.texts.extend((str(given.get("text", "?")), p) for p in pos)
     else:
         quat, scale = _SOLIDS[kind](given, n)
         drawing.solids.setdefault(kind, []).append((pos, quat, scale, _colours(given, n), opacity))
@@ -158,6 +158,8 @@ def _turning_x_to(direction: np.ndarray) -> np.ndarray:
 
 def _vectors(given: Mapping[str, Any], name: str, n: int | None = None) -> np.ndarray:
     """An attribute (3,) or (3, n) as (n, 3); one stands for all."""
+    if name not in given:
+        raise ViewError(f"it needs {name!r}")
     array = np.asarray(given[name], float)
     if array.ndim == 1:
         array = array[:, None]

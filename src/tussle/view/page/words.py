@@ -49,7 +49,7 @@ def number(value: Any) -> str:
     return str(value)
 
 
-def numbers_html(source: Source, frame: Frame, looks: Looks, pushed: float) -> str:
+def numbers_html(source: Source, frame: Frame, pushed: float, notes: Sequence[str] = ()) -> str:
     """The live numbers: time, warp, entities by team, metrics so far, frames per second."""
     state = "over" if source.is_over else "paused" if source.is_paused else "playing"
     where = f'<span style="{DIM};font-size:0.7em">step {frame.step:,} · {state}</span>'
@@ -58,13 +58,13 @@ def numbers_html(source: Source, frame: Frame, looks: Looks, pushed: float) -> s
         f'<div style="{STYLE}">',
         f'<div style="font-size:1.5em;font-variant-numeric:tabular-nums">t = {frame.t:.2f} s {where}</div>',
         f"<div>wanted {speed(source.warp)}, {reached} · {pushed:.0f} frames/s</div>",
-        _teams(source.teams, frame, looks),
+        _teams(source.teams, frame, source.looks),
         _result(source.result()),
         _counts(source.happenings, frame.t),
     ]
     if source.error is not None:
         parts.append(f'<div style="color:#b00020">{escape(str(source.error))}</div>')
-    parts += [f'<div style="color:#8a5a00">{escape(note)}</div>' for note in source.notes]
+    parts += [f'<div style="color:#8a5a00">{escape(note)}</div>' for note in (*source.notes, *notes)]
     return "".join([*parts, "</div>"])
 
 

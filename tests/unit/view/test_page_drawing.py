@@ -1,0 +1,189 @@
+"""What plugins draw: every kind of shape reaches the scene as it was meant, and what cannot be drawn is told."""
+
+import numpy as np
+import pytest
+from page_client import PageClient
+from recorded_games import hunt
+
+from tussle import Simulation
+from tussle.api.draw import KINDS
+from tussle.view import Live
+from tussle.view.drawn import Shape
+from tussle.view.page.colours import DRAWN
+from tussle.view.page.drawn import Drawn
+from tussle.view.page.reading import ATTRIBUTES, read_drawing
+from tussle.view.page.server import Page
+
+
+def shape(kind, **attributes):
+    return Shape(kind, attributes, 0.0)
+
+
+def read(kind, **attributes):
+    return read_drawing((shape(kind, **attributes),), 0.5)
+
+
+THREE = np.arange(9.0).reshape(3, 3)
+
+EXAMPLES = {
+    "points": {"pos": THREE},
+    "cloud": {"pos": THREE, "value": [0.0, 0.5, 1.0]},
+    "line": {"pos": THREE, "width": 3.0},
+    "vectors": {"pos": THREE, "direction": (1.0, 0.0, 0.0)},
+    "sphere": {"pos": THREE, "radius": 2.0, "opacity": 0.5},
+    "box": {"pos": (0.0, 0.0, 0.0), "size": (1.0, 2.0, 3.0)},
+    "cone": {"pos": (0.0, 0.0, 0.0), "direction": (0.0, 0.0, 2.0), "length": 4.0, "angle": 1.0},
+    "text": {"pos": (0.0, 0.0, 5.0), "text": "here"},
+    "mesh": {"vertices": THREE, "faces": [[0, 1, 2]]},
+}
+
+
+def test_there_is_an_example_of_each_kind():
+    assert set(EXAMPLES) == set(ATTRIBUTES) == set(KINDS)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_each_kind_is_read_without_a_note(kind):
+    assert read(kind, **EXAMPLES[kind], lifetime=1.0).notes == []
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_an_unknown_attribute_is_told_with_the_nearest_one(kind):
+    (note,) = read(kind, **EXAMPLES[kind], opacitty=1.0).notes
+    assert "no attribute 'opacitty' (did you mean 'opacity'?)" in note
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_is_needed_is_told(kind):
+    (note,) = read(kind, colour=(1, 2, 3)).notes
+    assert f"it needs '{ATTRIBUTES[kind][0]}'" in note
+
+
+@pytest.mark.parametrize(
+    ("kind", "wrong", "told"),
+    [
+        ("points", {"pos": np.zeros((2, 4))}, "pos must be"),
+        ("points", {"pos": (0.0, np.nan, 0.0)}, "not finite"),
+        ("sphere", {"pos": THREE, "radius": [1.0, 2.0]}, "radius must be a number"),
+        ("box", {"pos": THREE, "quat": (1.0, 0.0)}, "quat must be"),
+        ("mesh", {"vertices": THREE, "faces": [[0, 1, 3]]}, "faces must be"),
+        ("vectors", {"pos": THREE}, "direction"),
+        ("text", {"pos": "here"}, "a plugin drew text"),
+    ],
+)
+def test_what_cannot_be_drawn_is_told_once_and_the_rest_is_drawn(kind, wrong, told):
+    drawing = read_drawing((shape(kind, **wrong), shape(kind, **wrong), shape("points", pos=THREE)), 0.5)
+    (note,) = drawing.notes
+    assert told in note
+    assert len(drawing.points) == 1
+
+
+def test_colours_of_one_and_of_each_and_of_none():
+    (_, colour, size) = read("points", pos=THREE).points[0]
+    assert (colour == DRAWN).all()
+    assert (size == 0.5).all()
+    assert (read("points", pos=THREE, color=(1, 2, 300)).points[0][1] == (1, 2, 255)).all()
+    assert read("points", pos=THREE, colour=THREE).points[0][1].tolist() == THREE.T.tolist()
+
+
+def test_values_of_a_cloud_become_colours_from_dark_to_light():
+    colour = read("cloud", pos=THREE, value=[3.0, 5.0, 4.0]).points[0][1].astype(int).sum(axis=1)
+    assert colour[0] < colour[2] < colour[1]
+    bounded = read("cloud", pos=THREE, value=[3.0, 5.0, 4.0], low=5.0, high=9.0).points[0][1]
+    assert (bounded == bounded[0]).all(), "all of them are at the lower end"
+
+
+def test_a_line_joins_each_point_to_the_next():
+    ends, colours = read("line", pos=THREE).lines[0]
+    assert ends.tolist() == [
+        [THREE[:, 0].tolist(), THREE[:, 1].tolist()],
+        [THREE[:, 1].tolist(), THREE[:, 2].tolist()],
+    ]
+    assert colours.shape == (2, 2, 3)
+
+
+@pytest.mark.parametrize("direction", [(1, 0, 0), (0, 0, 2), (0, -1, 0), (-1, 0, 0), (1, 2, 3)])
+def test_a_cone_points_where_it_is_told(direction):
+    _, quat, scale, _, _ = read(
+        "cone", pos=(0, 0, 0), direction=direction, length=3.0, angle=np.pi / 2
+    ).solids["cone"][0]
+    w, x, y, z = quat[0]
+    axis = np.array([1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)])
+    assert axis == pytest.approx(np.array(direction) / np.linalg.norm(direction))
+    assert scale[0] == pytest.approx([3.0, 3.0, 3.0])
+
+
+class Notebook:
+    """What would be drawn, in the place of a scene: the calls that make a node, and what becomes of it."""
+
+    def __init__(self):
+        self.nodes = {}
+        self.n_made = 0
+
+    def __getattr__(self, method):
+        def add(name, *args, **properties):
+            self.n_made += 1
+            node = self.nodes[name] = Node(self, name, args, properties)
+            return node
+
+        return add
+
+
+class Node:
+    def __init__(self, book, name, args, properties):
+        self.__dict__.update(properties, book=book, name=name, points=args[0] if args else None)
+
+    def remove(self):
+        del self.book.nodes[self.name]
+
+
+def test_alike_shapes_share_a_node_and_what_is_no_longer_drawn_goes():
+    book = Notebook()
+    drawn = Drawn(book)
+    shapes = tuple(shape(kind, **given) for kind, given in EXAMPLES.items())
+    drawn.show((*shapes, shape("sphere", pos=(9.0, 9.0, 9.0))), 1.0)
+    assert set(book.nodes) == {
+        "/drawn/points 0", "/drawn/lines", "/drawn/arrows", "/drawn/sphere", "/drawn/box", "/drawn/cone", "/drawn/text 0",
+        "/drawn/mesh 0",
+    }  # fmt: skip
+    assert len(book.nodes["/drawn/sphere"].batched_positions) == 4
+    assert len(book.nodes["/drawn/points 0"].points) == 6, "points and clouds of one size"
+    drawn.show(shapes[:1], 1.0)
+    assert set(book.nodes) == {"/drawn/points 0"}
+    drawn.show((), 1.0)
+    assert not book.nodes
+
+
+def test_what_moves_is_updated_and_not_made_anew():
+    book = Notebook()
+    drawn = Drawn(book)
+    moving = ("points", "line", "vectors", "sphere", "box", "cone", "text")
+    drawn.show(tuple(shape(kind, **EXAMPLES[kind]) for kind in moving), 1.0)
+    made = book.n_made
+    moved = [
+        shape(kind, **(EXAMPLES[kind] | {"pos": np.asarray(EXAMPLES[kind]["pos"]) + 1.0})) for kind in moving
+    ]
+    drawn.show(tuple(moved), 1.0)
+    assert book.n_made == made
+    assert book.nodes["/drawn/points 0"].points[0].tolist() == [1.0, 4.0, 7.0]
+    assert book.nodes["/drawn/sphere"].batched_positions[0].tolist() == [1.0, 4.0, 7.0]
+    assert book.nodes["/drawn/text 0"].position == (1.0, 1.0, 6.0)
+
+
+def test_all_kinds_reach_a_browser():
+    with (
+        Simulation(hunt(end=60.0), 3) as simulation,
+        Live(simulation, is_paused=True) as live,
+        Page(live) as page,
+        PageClient(page.url) as client,
+    ):
+        client.wait(page.visitors)
+        draw = simulation.context.draw
+        client.wait(lambda: draw.sinks)
+        for kind, given in EXAMPLES.items():
+            getattr(draw, kind)(**given, lifetime=100.0)
+        draw.box(pos=(0.0, 0.0, 0.0), sise=1.0, lifetime=100.0)
+        live.step()
+        client.wait(lambda: sum(name.startswith("/drawn/") for name in list(client.nodes)) == 8)
+        client.wait(lambda: client.text("did you mean &#x27;size&#x27;?"))
+        assert page.error is None
