@@ -6,6 +6,7 @@ import math
 import threading
 from collections.abc import Callable, Mapping
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -40,7 +41,8 @@ FORGET_AFTER = 10.0
 class Live:
     """A simulation that is watched.
 
-    Controls return at once and are carried out between two steps, in the order in which they were given. What is seen is handed out at
+    Controls return at once and are carried out between two steps, in the order in which they were given; a seek and a new beginning do
+    not wait for what is under way, and end it. What is seen is handed out at
     once too: the newest that was made, and it is made only while somebody asks for it. No control and nobody who watches changes a
     result, except for what is said to the plugins (`publish`); to wind back and go on leads to the same future, bit for bit.
 
@@ -57,6 +59,7 @@ class Live:
         snapshot_every: Least simulated time between snapshots [s]; they are also limited to 1 % of the CPU time.
         memory: For snapshots and for the history of frames [MB], half of it for each.
         viewer: What the mission file says for the viewer, see `tussle.mission.Loaded`.
+        folder: Folder of the mission file, where its terrain is looked for.
 
     Raises:
         ParameterError: A value is not allowed.
@@ -73,6 +76,7 @@ class Live:
         snapshot_every: float = 1.0,
         memory: float = 256.0,
         viewer: Mapping[str, Any] | None = None,
+        folder: Path | None = None,
     ) -> None:
         for name, value in (("snapshot_every", snapshot_every), ("memory", memory)):
             if not 0.0 < value < math.inf:
@@ -82,6 +86,7 @@ class Live:
                 f"world = {world!r} is not allowed; there are worlds 0 to {simulation.n_worlds - 1}"
             )
         self.simulation, self.world, self.viewer = simulation, world, dict(viewer or {})
+        self._folder = folder
         self._clock = simulation.context.clock
         self._sketchbook = Sketchbook(simulation, world)
         self._pace = Pace(checked_warp(pace))
@@ -395,4 +400,4 @@ class Live:
     @cached_property
     def scenery(self) -> Scenery:
         """What stands still."""
-        return scenery_of(self.simulation.mission, self.viewer)
+        return scenery_of(self.simulation.mission, self.viewer, folder=self._folder)

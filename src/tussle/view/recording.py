@@ -261,7 +261,7 @@ class Recording:
     @cached_property
     def scenery(self) -> Scenery:
         """What stands still."""
-        return scenery_of(self.mission, self.viewer, self.extent)
+        return scenery_of(self.mission, self.viewer, self.extent, self.path)
 
     def __len__(self) -> int:
         return self.n_frames

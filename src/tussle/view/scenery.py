@@ -5,16 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from tussle.errors import ViewError
 from tussle.geodesy import Origin
 from tussle.mission import Block, Mission
 from tussle.scene import Boundary, Cuboid, Plane, Polyhedron, Sphere
 from tussle.stock import Boundary as BoundaryPlugin
 from tussle.view.shapes import Mesh
 from tussle.view.solids import mesh_of, outline_of
+from tussle.view.terrain import Terrain, find_terrain
 
 LEAST_EXTENT = 50.0
 """Width of what is shown of a game that takes place in one point [m]."""
@@ -61,34 +64,6 @@ class Region:
 
 
 @dataclass(frozen=True, eq=False)
-class Terrain:
-    """Ground of changing height.
-
-    Attributes:
-        x: East of the columns [m], (nx,), ascending.
-        y: North of the rows [m], (ny,), ascending.
-        height: z of the ground [m], (ny, nx).
-    """
-
-    x: np.ndarray
-    y: np.ndarray
-    height: np.ndarray
-
-    def mesh(self) -> Mesh:
-        """Two triangles between each four neighbours, seen from above."""
-        nx, ny = len(self.x), len(self.y)
-        east, north = np.meshgrid(self.x, self.y)
-        corner = (np.arange(ny - 1)[:, None] * nx + np.arange(nx - 1)).ravel()
-        faces = np.concatenate(
-            [
-                np.stack([corner, corner + 1, corner + nx + 1], 1),
-                np.stack([corner, corner + nx + 1, corner + nx], 1),
-            ]
-        )
-        return Mesh(np.stack([east.ravel(), north.ravel(), self.height.ravel()], 1), faces)
-
-
-@dataclass(frozen=True, eq=False)
 class Scenery:
     """All that stands still.
 
@@ -128,6 +103,7 @@ def scenery_of(
     mission: Mission | None,
     viewer: Mapping[str, Any] | None = None,
     extent: tuple[np.ndarray, np.ndarray] | None = None,
+    folder: Path | None = None,
 ) -> Scenery:
     """What stands still in a mission.
 
@@ -135,6 +111,7 @@ def scenery_of(
         mission: The mission; None where it is not known, which leaves the ground and the grid.
         viewer: What the mission file says for the viewer, see `tussle.mission.Loaded`.
         extent: Lower and upper corner of all positions of a game [m], each (3,); by default where the mission's entities begin.
+        folder: Folder of the mission file, where its terrain is looked for.
     """
     viewer = viewer or {}
     corners = [np.asarray(c, float) for c in extent or ()]
@@ -146,11 +123,7 @@ def scenery_of(
     low, high = _at_least(np.array(corners).reshape(-1, 3))
     scene = None if mission is None else mission.scene
     spacing = viewer.get("grid_spacing", 0.0)
-    notes = []
-    if viewer.get("terrain"):
-        notes.append(
-            f"terrain {viewer['terrain']!r}: the pictures of the existing system are not part of tussle; a flat ground is shown"
-        )
+    notes: list[str] = []
     return Scenery(
         origin=Origin() if scene is None else scene.origin,
         origin_length=_origin_length(viewer, low, high),
@@ -165,6 +138,7 @@ def scenery_of(
             Region(name, team, shape, is_wall, mesh_of(shape, low, high), outline_of(shape, low, high))
             for name, team, shape, is_wall in (_shapes(mission) if mission is not None else ())
         ],
+        terrain=_terrain(viewer, folder, notes),
         background=_background(viewer, notes),
         notes=tuple(notes),
     )
@@ -226,6 +200,18 @@ def _origin_length(viewer: Mapping[str, Any], low: np.ndarray, high: np.ndarray)
         return 0.0
     said = viewer.get("origin_length", 0.0)
     return float(said) if said > 0.0 else _round_step(low, high)
+
+
+def _terrain(viewer: Mapping[str, Any], folder: Path | None, notes: list[str]) -> Terrain | None:
+    named = viewer.get("terrain")
+    name = str(named.get("value", "") if isinstance(named, dict) else named or "").strip()
+    if not name:
+        return None
+    try:
+        return find_terrain(name, folder)
+    except ViewError as error:
+        notes.append(f"{error}; a flat ground is shown")
+        return None
 
 
 def _background(viewer: Mapping[str, Any], notes: list[str]) -> tuple[int, int, int] | None:

@@ -394,10 +394,10 @@ def test_one_world_of_a_stack_is_watched_until_it_ends():
         assert live.step_number == alone.steps[0]
         assert sim.state_hash(1) == alone.state_hash()
         assert live.happenings[-1].kind == "end"
-        live.seek(2.0)
-        live.settle()
-        assert not live.is_over
         live.pause()
+        live.seek(2.0)
+        wait_for(lambda: not live.is_seeking and live.step_number == 20)
+        assert not live.is_over
         live.reset(seed=1)
         live.settle()
         assert live.seed == 1

@@ -9,7 +9,6 @@ from tussle.mission import read_mission
 from tussle.scene import Base, Cuboid, FlatGround, Plane, Sphere
 from tussle.stock import Boundary, Still
 from tussle.view import scenery_of
-from tussle.view.scenery import Terrain
 
 ROBOT = Block(name="robot", position=(100, 0, 20), motion=Still())
 
@@ -94,6 +93,7 @@ def test_what_is_not_shown_is_told():
     seen = scenery_of(mission(), {"terrain": "mcmillan", "background_color": "blue"})
     assert seen.background is None
     assert [note.split()[0] for note in seen.notes] == ["terrain", "background_color"]
+    assert "pictures and models of the existing system" in seen.notes[0]
 
 
 def test_a_shipped_mission():
@@ -103,16 +103,3 @@ def test_a_shipped_mission():
     for block in loaded.mission.blocks:
         assert (seen.low <= block.position).all()
         assert (block.position <= seen.high).all()
-
-
-def test_terrain_is_a_surface_seen_from_above():
-    x, y = np.array([0.0, 10.0, 20.0]), np.array([-5.0, 5.0])
-    height = np.array([[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]])
-    mesh = Terrain(x, y, height).mesh()
-    assert len(mesh.faces) == 4
-    for e, n, z in mesh.vertices:
-        assert height[np.searchsorted(y, n), np.searchsorted(x, e)] == z
-    a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
-    up = np.cross(b - a, c - a)[:, 2]
-    assert (up > 0.0).all()
-    assert 0.5 * up.sum() == pytest.approx(200.0)
