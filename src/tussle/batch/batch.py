@@ -276,6 +276,16 @@ class Batch:
         """Where the batch goes unless told otherwise: the same for the same batch, so that the same command goes on with it."""
         return Path("batches") / f"{self.name}-{self.fingerprint[:8]}"
 
+    def is_played_in(self, directory: str | Path, until: Until | None = None) -> bool:
+        """All of it is in a directory already.
+
+        Raises:
+            BatchError: The directory holds another batch, or one that cannot be read.
+        """
+        from tussle.batch.course import is_played
+
+        return is_played(self, Path(directory), until)
+
     def executor(
         self, processes: int | None = None, stack: int | None = None, n_runs: int | None = None
     ) -> Executor:

@@ -196,6 +196,19 @@ def play_in_directory(
     return Results(files.load(path))
 
 
+def is_played(batch: Batch, path: Path, until: Until | None) -> bool:
+    """All of a batch is in a directory already.
+
+    Raises:
+        BatchError: The directory holds another batch, or one that cannot be read.
+    """
+    if not (path / files.BATCH_FILE).exists():
+        return False
+    info = files.read_info(path)
+    _check_same(batch, path, info)
+    return _has_all(info, batch.plan, until)
+
+
 def _check_same(batch: Batch, path: Path, before: dict[str, Any]) -> None:
     """See that a directory holds this batch, whatever its number of seeds.
 

@@ -21,15 +21,16 @@ from tussle.batch.progress import Progress as BatchProgress
 from tussle.batch.reload import planned_run
 from tussle.batch.statistics import running_result
 from tussle.batch.sweep_file import Sweep, read_sweep
+from tussle.batch.until import Until
 from tussle.batch.variables import parse_variable
 from tussle.cli.batch_summary import compare_hash, show_batch
 from tussle.cli.interrupt import Interrupt
 from tussle.cli.play import FOR_VIEWER, Source, simulate
 from tussle.cli.progress import BAR_EVERY, LINE_EVERY, clock, compiling, times
-from tussle.cli.settings import read_end
+from tussle.cli.settings import ending_by_time, read_end
 from tussle.cli.terminal import err, say, say_note
-from tussle.errors import ParameterError
-from tussle.record import Recorder
+from tussle.errors import BatchError, ParameterError, RecordError
+from tussle.record import Recorder, load_run
 
 if TYPE_CHECKING:
     from tussle.batch.executors import Executor
@@ -91,7 +92,7 @@ class Asked:
 
         batch = Batch(
             self.source.mission,
-            runs=first(self.runs, sweep.n_seeds, 100_000 if self.until is not None else 100),
+            runs=first(self.runs, sweep.n_seeds, None if self.until is not None else 100),
             vary=[*(v for v in sweep.variables if v.name not in names), *own] if sweep.points is None else (),
             points=sweep.points,
             sample=first(self.sample, sweep.sample, ""),
@@ -105,6 +106,8 @@ class Asked:
             strict=self.source.strict,
             allow_large=self.source.allow_large,
         )
+        if end:
+            ending_by_time(batch.mission)
         for note in batch.loaded.notes if batch.loaded is not None else ():
             if FOR_VIEWER not in note:
                 say_note(note)
@@ -128,31 +131,38 @@ def play_batch(asked: Asked, command: Sequence[str]) -> int:
         The exit code.
     """
     began = time.perf_counter()
+    until = None if asked.until is None else Until.parse(asked.until)
     batch = asked.batch()
     logged = _numbers(asked.log, batch.plan.n_runs)
     directory = asked.directory or batch.default_directory()
     with ExitStack() as stack:
-        with compiling():
-            batch.check()
-        executor = stack.enter_context(asked.executor(batch))
+        executor = None
+        if not batch.is_played_in(directory, until):
+            with compiling():
+                batch.check()
+            executor = stack.enter_context(asked.executor(batch))
         interrupt = stack.enter_context(Interrupt())
-        meter = stack.enter_context(BatchMeter(batch, interrupt))
         try:
-            results = batch.play(
-                directory, executor, until=asked.until, command=command, on_progress=meter.show
-            )
-        except Interrupted:
+            with BatchMeter(batch, interrupt, has_total=until is None) as meter:
+                results = batch.play(
+                    directory, executor, until=until, command=command, on_progress=meter.show
+                )
+            if meter.n_before:
+                n = min(meter.n_before, results.n_runs)
+                say_note(f"{n:,} of {results.n_runs:,} runs were there already, in {directory}")
+            for number in logged:
+                record_run(directory, number, interrupt)
+        except (Interrupted, BatchError):
+            if not interrupt.code:
+                raise
+            # Whatever became of processes that heard the signal too.
             say(
                 "interrupted",
                 f"finished runs are kept in {directory}; the same command goes on",
                 "bold yellow",
             )
             return interrupt.code
-    if meter.n_before:
-        say_note(f"{meter.n_before:,} of {results.n_runs:,} runs were there already, in {directory}")
-    for number in logged:
-        record_run(directory, number)
-    return show_batch(results, directory, time.perf_counter() - began, results.n_runs - meter.n_before)
+    return show_batch(results, directory, time.perf_counter() - began, meter.n_new)
 
 
 def _numbers(text: str | None, n_runs: int) -> list[int]:
@@ -177,21 +187,35 @@ def _numbers(text: str | None, n_runs: int) -> list[int]:
     return list(dict.fromkeys(found))
 
 
-def record_run(directory: Path, number: int) -> None:
+def record_run(directory: Path, number: int, interrupt: Interrupt) -> None:
     """Play a run again and record all of it, unless that has been done.
 
     Raises:
         BatchError: It came out otherwise than in the batch.
+        Interrupted: The user has asked for an end.
     """
     target = directory / store.RUNS / f"{number:06d}"
-    if (target / "run.json").exists():
+    if _is_recorded(target):
         return
     shutil.rmtree(target, ignore_errors=True)  # cut short
     run = planned_run(directory, number)
-    with simulate(run.loaded, run.mission, run.seed) as simulation:
-        with Recorder(simulation, target, mission_text=run.loaded.text, parameters=run.settings):
-            simulation.run()
-        compare_hash(run, simulation.result()[0].state_hash, number)
+    with (
+        simulate(run.loaded, run.mission, run.seed) as simulation,
+        Recorder(simulation, target, mission_text=run.loaded.text, parameters=run.settings) as recorder,
+    ):
+        simulation.run_until(lambda _: bool(interrupt.code))
+        if interrupt.code:
+            raise Interrupted
+        result = simulation.result()[0]
+        compare_hash(run, result.state_hash, number)
+        recorder.close("" if result.error is None else str(result.error))
+
+
+def _is_recorded(target: Path) -> bool:
+    try:
+        return load_run(target).is_complete
+    except RecordError:
+        return False
 
 
 class Interrupted(Exception):  # noqa: N818 - it is no error
@@ -204,13 +228,16 @@ class BatchMeter:
     Args:
         batch: What is played.
         interrupt: Where Ctrl-C is heard.
+        has_total: It is known how many runs there will be.
 
     Attributes:
         n_before: Runs that were there before.
+        n_new: Runs that were played since.
     """
 
-    def __init__(self, batch: Batch, interrupt: Interrupt) -> None:
-        self.n_before = 0
+    def __init__(self, batch: Batch, interrupt: Interrupt, has_total: bool = True) -> None:
+        self.n_before = self.n_new = 0
+        self._has_total = has_total
         self._names = batch.team_names
         self._interrupt = interrupt
         self._began = time.perf_counter()
@@ -224,7 +251,8 @@ class BatchMeter:
             TextColumn("{task.fields[left]}", style="dim"),
             auto_refresh=False, expand=True,
         )  # fmt: skip
-        self._task = self._bar.add_task(batch.name, total=batch.plan.n_runs, at="", rate="", left="")
+        total = batch.plan.n_runs if has_total else None
+        self._task = self._bar.add_task(batch.name, total=total, at="", rate="", left="")
         self._live = Live(self._bar, console=err(), auto_refresh=False, transient=True)
 
     def __enter__(self) -> Self:
@@ -242,7 +270,7 @@ class BatchMeter:
         Raises:
             Interrupted: The user has asked for an end.
         """
-        self.n_before = progress.n_before
+        self.n_before, self.n_new = progress.n_before, progress.n_done - progress.n_before
         if self._interrupt.code:
             raise Interrupted
         now = time.perf_counter()
@@ -251,16 +279,20 @@ class BatchMeter:
         self._due = now + (BAR_EVERY if self._is_bar else LINE_EVERY)
         played = progress.n_done - progress.n_before + progress.under_way
         rate = played / max(now - self._began, 1e-9)
-        left = (progress.n_runs - progress.n_done - progress.under_way) / rate if rate > 0.0 else None
         fields: dict[str, Any] = {
-            "at": f"{progress.n_done:,}/{progress.n_runs:,} runs",
+            "at": f"{progress.n_done:,} runs",
             "rate": f"{times(rate)} runs/s",
-            "left": "" if left is None else f"{clock(max(0.0, left))} left",
+            "left": "",
         }
+        if self._has_total:
+            fields["at"] = f"{progress.n_done:,}/{progress.n_runs:,} runs"
+            left = progress.n_runs - progress.n_done - progress.under_way
+            fields["left"] = f"{clock(max(0.0, left / rate))} left" if rate > 0.0 else ""
         result = self._result(progress)
         if self._is_bar:
+            total = progress.n_runs if self._has_total else None
             self._bar.update(
-                self._task, total=progress.n_runs, completed=progress.n_done + progress.under_way, **fields
+                self._task, total=total, completed=progress.n_done + progress.under_way, **fields
             )
             self._live.update(Group(self._bar, Text(result, style="dim")), refresh=True)
         else:

@@ -1,0 +1,228 @@
+"""A batch that is killed or stopped at any moment, and the same command again: what comes of it is what an undisturbed one gives."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+from cli_process import COMMAND, environment
+
+from tussle.batch import Batch, InProcess, load_batch
+from tussle.errors import BatchError
+
+PLUGINS = '''\
+"""Games that take a while."""
+
+import time
+
+import numpy as np
+
+from tussle.api import Interaction, Metric, State
+
+
+class Hits(Interaction):
+    """Each dies some time."""
+
+    grade = "portable"
+
+    def step(self, w):
+        w.kill(w.uniform_pairs("luck", w.world, w.id, w.id) < 0.1, "bad luck")
+        time.sleep(0.01)
+
+
+class Left(Metric):
+    """Those who are left."""
+
+    grade = "portable"
+    left = State(per="team")
+
+    def step(self, w):
+        self.left[:] = 0.0
+        np.add.at(self.left, (w.team_numbers(w.team), w.world), 1.0)
+
+    def result(self, w):
+        return {"score": self.left}
+'''
+MISSION = """\
+<?xml version="1.0"?>
+<runscript name="Games that take a while">
+  <run start="0" end="1" dt="0.1"/>
+  <entity_interaction>Hits</entity_interaction>
+  <metrics>Left</metrics>
+  <entity>
+    <name>reds</name> <team_id>1</team_id> <count>${n=4}</count> <motion_model>Still</motion_model>
+  </entity>
+  <entity>
+    <name>blues</name> <team_id>2</team_id> <count>4</count> <motion_model>Still</motion_model>
+  </entity>
+</runscript>
+"""
+RUNS = 60
+ARGUMENTS = (
+    "batch", "game.xml", "--runs", str(RUNS), "--vary", "n=3,4", "--plugin-path", "plugins.py", "--out", "out",
+    "--processes", "2", "--stack", "2",
+)  # fmt: skip
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "game.xml").write_text(MISSION)
+    (tmp_path / "plugins.py").write_text(PLUGINS)
+    return tmp_path
+
+
+def started(folder, *more):
+    """The command, in a process group of its own."""
+    return subprocess.Popen(
+        [*COMMAND, *ARGUMENTS, *more],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=folder, env=environment(), start_new_session=True,
+    )  # fmt: skip
+
+
+def wait_until(condition, process, seconds=60.0):
+    """Wait for a moment of the batch; false where the command has ended before it."""
+    limit = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < limit
+        if process.poll() is not None:
+            return False
+        time.sleep(0.005)
+    return True
+
+
+def bytes_of_parts(folder):
+    return sum(p.stat().st_size for p in (folder / "out" / "parts").glob("*.arrow"))
+
+
+def members(group):
+    """The processes of a group that are there and no zombies, which wait only to be counted."""
+    found = []
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            fields = (folder / "stat").read_text().rpartition(")")[2].split()
+        except OSError:  # it has ended meanwhile
+            continue
+        if fields[0] != "Z" and int(fields[2]) == group:
+            found.append(int(folder.name))
+    return found
+
+
+def workers(process):
+    """The processes that play."""
+    found = []
+    for number in members(process.pid):
+        try:
+            command = Path(f"/proc/{number}/cmdline").read_bytes()
+        except OSError:
+            continue
+        if b"spawn_main" in command:
+            found.append(number)
+    return found
+
+
+def all_gone(group):
+    limit = time.monotonic() + 10.0
+    while members(group) and time.monotonic() < limit:
+        time.sleep(0.02)
+    return not members(group)
+
+
+def kill_group(process):
+    os.killpg(process.pid, signal.SIGKILL)
+    process.communicate()
+    assert all_gone(process.pid)
+
+
+def end(process, seconds=90.0):
+    """Wait for the end: exit code, output, messages, but for those that say how far it is on a slow machine."""
+    try:
+        out, err = process.communicate(timeout=seconds)
+    finally:
+        if members(process.pid):
+            os.killpg(process.pid, signal.SIGKILL)
+    told = [line for line in err.splitlines(keepends=True) if "/120 runs, " not in line]
+    return process.returncode, out, "".join(told)
+
+
+def check_whole(folder):
+    """The directory holds what an undisturbed batch of one process gives."""
+    found = load_batch(folder / "out")
+    batch = Batch(folder / "game.xml", runs=RUNS, vary=["n=3,4"], plugin_files=[folder / "plugins.py"])
+    wanted = batch.play(executor=InProcess(64))
+    assert found.notes == []
+    assert found.info["is_complete"]
+    columns = ["cpu_s", "host"]
+    assert found.table.drop_columns(columns) == wanted.table.drop_columns(columns)
+    assert (found.alive, found.design) == (wanted.alive, wanted.design)
+    assert not (folder / "out" / "parts").exists()
+    assert pq.read_metadata(folder / "out" / "results.parquet").num_rows == wanted.table.num_rows
+
+
+def n_finished(folder):
+    """Runs that the directory has, which can be read at any moment."""
+    try:
+        return load_batch(folder / "out").n_runs
+    except BatchError:  # it was killed before its first run
+        return 0
+
+
+MOMENTS = {
+    "it begins": lambda folder: (folder / "out" / "batch.json").exists(),
+    "the first run": lambda folder: bytes_of_parts(folder) > 0,
+    "the middle": lambda folder: bytes_of_parts(folder) > 60_000,
+    "it ends": lambda folder: (folder / "out" / "alive.parquet.part").exists() or (folder / "out" / "alive.parquet").exists(),
+}  # fmt: skip
+
+
+def test_killed_again_and_again_with_all_its_processes(folder):
+    before = 0
+    for name, moment in MOMENTS.items():
+        process = started(folder)
+        reached = wait_until(lambda is_time=moment: is_time(folder), process)
+        kill_group(process)
+        n = n_finished(folder)
+        assert n >= before
+        if name == "the middle":
+            assert reached
+            assert 0 < n < 2 * RUNS
+        before = n
+    code, _, err = end(started(folder))
+    assert (code, err) == (0, f"note: {before} of 120 runs were there already, in out\n" if before else "")
+    check_whole(folder)
+
+
+def test_a_process_that_plays_is_killed_while_another_command_comes(folder):
+    process = started(folder)
+    assert wait_until(lambda: bytes_of_parts(folder) > 20_000, process)
+    os.kill(workers(process)[0], signal.SIGKILL)
+    code, out, err = end(started(folder))
+    assert (code, out, err) == (4, "", "error: out: another process is playing this batch\n")
+    code, _, err = end(process)
+    assert (code, err) == (0, "")
+    assert all_gone(process.pid)
+    check_whole(folder)
+
+
+def test_stopped_by_signals(folder):
+    n = 0
+    for number, code in ((signal.SIGINT, 130), (signal.SIGTERM, 143)):
+        process = started(folder)
+        size = bytes_of_parts(folder)
+        assert wait_until(lambda size=size: bytes_of_parts(folder) > size + 5000, process)
+        os.killpg(
+            process.pid, number
+        )  # as a terminal and a batch system do; the second ends the processes that play
+        found, out, err = end(process)
+        assert (found, out) == (code, "")
+        assert err == "interrupted: finished runs are kept in out; the same command goes on\n"
+        assert all_gone(process.pid)
+        n, before = n_finished(folder), n
+        assert n > before
+    code, _, err = end(started(folder))
+    assert (code, err) == (0, f"note: {n} of 120 runs were there already, in out\n")
+    check_whole(folder)
