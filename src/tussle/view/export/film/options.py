@@ -1,0 +1,83 @@
+"""What one may choose about a film."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from tussle.errors import ParameterError, listed, nearest_name
+from tussle.view.export.film.cameras import CAMERAS
+
+LEAST_SIZE, MOST_SIZE = 16, 7680
+MOST_FPS = 240.0
+
+
+@dataclass(frozen=True)
+class FilmOptions:
+    """How a film is made.
+
+    Args:
+        camera: "overview", "top" or "follow".
+        follow: Id of the entity that "follow" flies behind; by default the first.
+        start: Time at which the film begins [s]; by default that of the first record.
+        stop: Time at which it ends [s]; by default that of the last record.
+        speed: Simulated seconds per second of film; by default the least of 1, 2, 5, 10, ... with which it lasts half a minute.
+        fps: Pictures per second.
+        size: Width and height [pixels], even numbers.
+        at: Time of a single picture [s]; by default the middle of the film.
+        trails: How much of the past a trail shows [s], 0 for none; by default what suits the picture.
+        labels: Ids stand beside entities.
+        captions: The time, the teams and the size of the grid are written on it.
+        zoom: Factor by which the eye is nearer than it would be.
+        scale: Factor by which models are larger than they would be.
+
+    Raises:
+        ParameterError: A value is not allowed.
+    """
+
+    camera: str = "overview"
+    follow: int | None = None
+    start: float | None = None
+    stop: float | None = None
+    speed: float | None = None
+    fps: float = 25.0
+    size: tuple[int, int] = (1280, 720)
+    at: float | None = None
+    trails: float | None = None
+    labels: bool = False
+    captions: bool = True
+    zoom: float = 1.0
+    scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        if self.camera not in CAMERAS:
+            raise ParameterError(
+                f"camera = {self.camera!r} is not allowed{nearest_name(self.camera, CAMERAS)}; {listed(CAMERAS)}"
+            )
+        if self.follow is not None and self.camera != "follow":
+            raise ParameterError(
+                f"follow = {self.follow} means nothing to camera = {self.camera!r}; it takes 'follow'"
+            )
+        for name in ("speed", "fps", "zoom", "scale"):
+            value = getattr(self, name)
+            if value is not None and not 0.0 < value < math.inf:
+                raise ParameterError(f"{name} = {value!r} is not allowed; it takes a number > 0")
+        if self.fps > MOST_FPS:
+            raise ParameterError(f"fps = {self.fps:g} is not allowed; it takes up to {MOST_FPS:g}")
+        if self.trails is not None and not 0.0 <= self.trails < math.inf:
+            raise ParameterError(
+                f"trails = {self.trails!r} is not allowed; it takes a number of seconds >= 0"
+            )
+        for name in ("start", "stop", "at"):
+            value = getattr(self, name)
+            if value is not None and not math.isfinite(value):
+                raise ParameterError(f"{name} = {value!r} is not allowed; it takes a time in seconds")
+        if self.start is not None and self.stop is not None and not self.start <= self.stop:
+            raise ParameterError(
+                f"stop = {self.stop:g} s is not allowed; it takes a time after start = {self.start:g} s"
+            )
+        if not all(LEAST_SIZE <= n <= MOST_SIZE and n % 2 == 0 for n in self.size):
+            raise ParameterError(
+                f"size = {self.size[0]}x{self.size[1]} is not allowed; it takes even numbers of pixels "
+                f"from {LEAST_SIZE} to {MOST_SIZE}"
+            )

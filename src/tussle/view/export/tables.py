@@ -1,0 +1,153 @@
+"""The tables of a run as CSV or Parquet, batch by batch."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.csv
+import pyarrow.parquet
+
+from tussle.errors import ParameterError, RecordError, listed, nearest_name
+from tussle.record.schema import EVENTS, EVENTS_FILE, FILES, RUN_FILE, TRAJECTORY, TRAJECTORY_FILE
+from tussle.view.export.whole_file import whole_file
+
+KINDS = ("csv", "parquet")
+ROWS_OF_A_GROUP = 1 << 18
+"""Rows that Parquet keeps together, and so in memory: some 30 MB."""
+
+
+@dataclass
+class TablesReport:
+    """What was written.
+
+    Attributes:
+        paths: The files: states, events.
+        rows: Rows of each.
+        notes: What is missing, one line each.
+    """
+
+    paths: list[Path] = field(default_factory=list)
+    rows: list[int] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+
+def write_tables(
+    run: str | Path,
+    path: str | Path,
+    kind: str,
+    *,
+    world: int | None = None,
+    show: Callable[[int], None] | None = None,
+) -> TablesReport:
+    """Write the states of a run to a file and its events to one beside it: to `states.events.csv` for `states.csv`.
+
+    The tables have the columns of the recorded ones. One batch is in memory at a time, so the size of the run does not matter. Of a
+    run that was cut short, its whole batches are written.
+
+    Args:
+        run: The run directory.
+        path: The file of states, replaced where it is there.
+        kind: "csv" or "parquet".
+        world: Only this world; None for all of them.
+        show: Told after each batch how many rows of states have been read.
+
+    Raises:
+        ParameterError: There is no such kind.
+        RecordError: It is no run directory, or has no such world.
+        ViewError: A file cannot be written.
+    """
+    if kind not in KINDS:
+        raise ParameterError(f"kind = {kind!r} is not allowed{nearest_name(kind, KINDS)}; {listed(KINDS)}")
+    place, target = Path(run), Path(path)
+    report = TablesReport()
+    _check(place, world, report)
+    beside = target.with_name(f"{target.stem}.events{target.suffix or '.' + kind}")
+    tables = ((TRAJECTORY_FILE, TRAJECTORY, target, show), (EVENTS_FILE, EVENTS, beside, None))
+    for name, schema, file, told in tables:
+        batches = _batches(place / name, schema, report.notes)
+        report.rows.append(_write(batches, schema, file, kind, world, told))
+        report.paths.append(file)
+    return report
+
+
+def _check(place: Path, world: int | None, report: TablesReport) -> None:
+    """Whether there is such a run and world.
+
+    Raises:
+        RecordError: There is not.
+    """
+    if not any((place / name).exists() for name in FILES):
+        raise RecordError(f"{place}: no run has been recorded there; {listed(FILES)}")
+    try:
+        worlds = json.loads((place / RUN_FILE).read_text(encoding="utf-8"))["worlds"]
+    except (OSError, ValueError, KeyError):
+        report.notes.append(
+            f"{RUN_FILE} is not there: the run goes on, or was cut short; what had been written is exported"
+        )
+        return
+    if world is not None and not 0 <= world < len(worlds):
+        raise RecordError(f"{place}: there is no world {world}; there are worlds 0 to {len(worlds) - 1}")
+
+
+def _batches(path: Path, schema: pa.Schema, notes: list[str]) -> Iterator[pa.RecordBatch]:
+    """All whole batches of a recorded table."""
+    if not path.exists():
+        notes.append(f"{path.name} is not there")
+        return
+    n = 0
+    try:
+        with pa.OSFile(str(path), "rb") as file, pa.ipc.open_stream(file) as reader:
+            while True:
+                batch = reader.read_next_batch()
+                n += 1
+                yield batch
+    except StopIteration:
+        return
+    except (pa.ArrowInvalid, OSError) as error:
+        notes.append(f"{path.name} is cut after {n} whole batches ({error})")
+
+
+def _write(
+    batches: Iterator[pa.RecordBatch],
+    schema: pa.Schema,
+    path: Path,
+    kind: str,
+    world: int | None,
+    show: Callable[[int], None] | None,
+) -> int:
+    """Write batches to a file, whole or not at all; the number of rows written."""
+    plain = pa.schema(
+        [pa.field(f.name, pa.string() if pa.types.is_dictionary(f.type) else f.type) for f in schema]
+    )
+    n_read = n_written = 0
+    with whole_file(path) as part, pa.OSFile(str(part), "wb") as file:
+        writer = (
+            pa.csv.CSVWriter(file, plain, write_options=pa.csv.WriteOptions(quoting_style="needed"))
+            if kind == "csv"
+            else pa.parquet.ParquetWriter(file, plain, compression="zstd")
+        )
+        with writer:
+            for table in _grouped(batches, plain, 1 if kind == "csv" else ROWS_OF_A_GROUP):
+                kept = table if world is None else table.filter(pc.equal(table["world"], world))
+                writer.write_table(kept)
+                n_read, n_written = n_read + len(table), n_written + len(kept)
+                if show is not None:
+                    show(n_read)
+    return n_written
+
+
+def _grouped(batches: Iterator[pa.RecordBatch], schema: pa.Schema, n: int) -> Iterator[pa.Table]:
+    """Batches joined to tables of at least so many rows, with words in place of their numbers."""
+    waiting: list[pa.Table] = []
+    for batch in batches:
+        waiting.append(pa.table([batch[name].cast(schema.field(name).type) for name in schema.names], schema))
+        if sum(map(len, waiting)) >= n:
+            yield pa.concat_tables(waiting)
+            waiting = []
+    if waiting:
+        yield pa.concat_tables(waiting)
