@@ -1,0 +1,1 @@
+"""What can be made of a recorded run: a page that plays it, films and pictures, tables."""
