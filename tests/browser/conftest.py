@@ -1,0 +1,80 @@
+"""A real browser, which tells of everything that goes wrong on a page."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, ConsoleMessage, Page, Request, sync_playwright
+
+here = Path(__file__).parent
+for folder in (here, here.parent / "unit" / "record", here.parent / "unit" / "view"):
+    if str(folder) not in sys.path:
+        sys.path.insert(0, str(folder))
+
+PROGRAMS = ("chromium", "chromium-browser", "google-chrome")
+# Drawing without a graphics card; and nothing that the browser would ask of the network by itself.
+OPTIONS = (
+    *(
+        "--no-sandbox",
+        "--enable-unsafe-swiftshader",
+        "--use-angle=swiftshader",
+        "--disable-quic",
+        "--no-first-run",
+    ),
+    *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
+)
+NAMELESS = ("about:", "data:", "blob:")
+
+
+@pytest.fixture(scope="session")
+def chromium() -> Iterator[Browser]:
+    """Chromium of the system. Where checks are run in earnest, the variable CI is set and it must be there."""
+    program = next((found for name in PROGRAMS if (found := shutil.which(name))), None)
+    if program is None and not os.environ.get("CI"):
+        pytest.skip("no Chromium is installed here: apt-get install chromium")
+    assert program is not None, f"none of {', '.join(PROGRAMS)} is installed"
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=program, args=list(OPTIONS))
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def watched(chromium: Browser) -> Iterator[Callable[..., Page]]:
+    """Opens pages of the browser; at the end, the test fails where one of them complained or asked for anything else.
+
+    Called with the beginning of all addresses that may be asked for, and options of the page.
+    """
+    trouble: list[str] = []
+    pages: list[Page] = []
+
+    def listen(page: Page, allowed: str) -> None:
+        def hear(message: ConsoleMessage) -> None:
+            if message.type in {"error", "warning"} and "GPU stall" not in message.text:
+                trouble.append(f"console {message.type}: {message.text}")
+
+        def look(request: Request) -> None:
+            if not request.url.startswith((allowed, *NAMELESS)):
+                trouble.append(f"request: {request.url[:200]}")
+
+        page.on("console", hear)
+        page.on("pageerror", lambda error: trouble.append(f"error: {error}"))
+        page.on("requestfailed", lambda request: trouble.append(f"failed: {request.url[:200]}"))
+        page.on("request", look)
+        page.on("dialog", lambda dialog: (trouble.append(f"dialog: {dialog.message}"), dialog.dismiss()))
+
+    def new(allowed: str, **options: object) -> Page:
+        page = chromium.new_page(**{"viewport": {"width": 900, "height": 650}, **options})
+        listen(page, allowed)
+        pages.append(page)
+        return page
+
+    yield new
+    for page in pages:
+        page.close()
+    assert not trouble, "\n".join(trouble)
