@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from tussle.view.page.trails import Trails
     from tussle.view.page.visitor import Visitor
 
-PERIOD = 1.0 / 25.0
+PERIOD = 1.0 / 30.0
 """Time between two frames [s]."""
 SLOW_PERIOD = 0.25
 """Of numbers, trails and links, which nobody reads faster [s]."""
