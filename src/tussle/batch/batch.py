@@ -103,6 +103,7 @@ class Batch:
         self._options = {**options, "plugin_files": tuple(plugin_files)}
         self._ends_by_time = ends_by_time
         self._is_checked = False
+        self._rules: set[str] = set()  # that have been checked
         self.loaded = self._read()
         self.missions = list(self._missions(self.plan.points))
         self.treatments, self.package = group_points(self.missions, self.plugin_files)
@@ -163,21 +164,28 @@ class Batch:
             raise BatchError(f"there is no run {number}; the batch has runs 0 to {self.plan.n_runs - 1}")
         return Simulation(self.missions[self.plan.point(number)], self.plan.seed(number), on_error="record")
 
-    def check(self) -> None:
+    def check(self, until: Until | None = None) -> None:
         """Begin a game of each group, up to some number, and make its first step: what is wrong with it shows at once.
 
         What fails in a plugin is no matter of this: it may come from the seed, and is the result of its run.
 
+        Args:
+            until: When it is to be enough; games must have the result that this is about.
+
         Raises:
             TussleError: A mission cannot be played.
+            ParameterError: No game has that result.
         """
-        if self._is_checked:
-            return
         first = {t.group: point for point, t in reversed(list(enumerate(self.treatments)))}
-        for point in sorted(first.values())[:MOST_CHECKED]:
-            with suppress(PluginError), self.simulation(point) as simulation:
-                simulation.step()
-        self._is_checked = True
+        points = sorted(first.values())[:MOST_CHECKED]
+        if not self._is_checked:
+            for point in points:
+                with suppress(PluginError), self.simulation(point) as simulation:
+                    simulation.step()
+            self._is_checked = True
+        if until is not None and str(until) not in self._rules:
+            _check_rule(until, [self.missions[point] for point in points], self.plan.first_seed)
+            self._rules.add(str(until))
 
     @cached_property
     def fingerprint(self) -> str:
@@ -336,6 +344,28 @@ def _most_seeds(n_points: int) -> int:
     """Seeds of a batch that stops by what it finds."""
     seeds, runs = MOST_UNASKED
     return max(1, min(seeds, runs // n_points))
+
+
+def _check_rule(until: Until, missions: Sequence[Mission], seed: int) -> None:
+    """See that a game of one of the missions has the result that a rule is about: after its first step, else at its end.
+
+    Raises:
+        ParameterError: None has.
+    """
+    short = [m.replace(end=m.start + m.dt).ending_by_time() for m in missions]
+    error = None
+    for mission in (*short, *missions):
+        results = Batch(mission, runs=1, first_seed=seed).play(executor=InProcess(1))
+        if results.n_failed:
+            return  # it tells nothing
+        try:
+            until.is_met([{name: results.quantity(name) for name in results.quantities}])
+        except ParameterError as unknown:
+            error = unknown
+        else:
+            return
+    assert error is not None
+    raise error
 
 
 def _as_until(until: str | Until | None) -> Until | None:

@@ -98,7 +98,7 @@ class _Course:
         """
         self.tell(self.progress)
         for runs in () if self.is_enough else self._rounds(done):
-            self.batch.check()
+            self.batch.check(None if self.stop is None else self.stop.rule)
             who = executor or self.batch.executor(n_runs=self.plan.n_runs - len(done))
             with closing(who.play(self.batch.package, runs)) as messages:
                 for message in messages:
@@ -168,7 +168,7 @@ def play_in_directory(
     """
     timings = Timings()
     if not (path / files.BATCH_FILE).exists():
-        batch.check()  # before anything is written
+        batch.check(until)  # before anything is written
     store = Store(path)
     try:
         before = store.info

@@ -139,7 +139,7 @@ def play_batch(asked: Asked, command: Sequence[str]) -> int:
         executor = None
         if not batch.is_played_in(directory, until):
             with compiling():
-                batch.check()
+                batch.check(until)
             executor = stack.enter_context(asked.executor(batch))
         interrupt = stack.enter_context(Interrupt())
         try:

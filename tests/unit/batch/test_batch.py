@@ -493,9 +493,24 @@ def test_runs_that_fail_do_not_hold_up_the_end(mission):
 def test_a_rule_that_means_nothing_is_told(mission, tmp_path):
     with pytest.raises(ParameterError, match="there is no ±"):
         until_batch(mission).play(tmp_path / "out", until="score[1]")
+    for directory in (tmp_path / "out", None):
+        with pytest.raises(ParameterError, match=r"there is no 'score\[9\]'"):
+            until_batch(mission).play(directory, InProcess(), until="score[9]±0.5")
     assert not (tmp_path / "out").exists()
-    with pytest.raises(ParameterError, match=r"there is no 'score\[9\]'"):
-        until_batch(mission).play(tmp_path / "out", InProcess(), until="score[9]±0.5")
+    unscored = Batch(game().replace(metrics=[]), runs=None)
+    with pytest.raises(ParameterError, match="these games have no scores"):
+        unscored.play(until="±0.1")
+
+
+class Late(Metric):
+    def result(self, w):
+        return {"late": w.t} if (w.t > 0.5).all() else {}
+
+
+def test_a_rule_may_be_about_what_only_whole_games_have():
+    batch = Batch(game(odds=0.0).replace(metrics=[Late()]), runs=None)
+    results = batch.play(executor=InProcess(), until="Late.late±0.1")
+    assert results.info["n_seeds"] == 20
 
 
 def test_there_are_no_more_runs_than_can_be_kept(mission):
