@@ -81,7 +81,7 @@ class Allowance:
     """What may be spent beside the game: a share of its thread's CPU time and of its rest, saved up to a point.
 
     CPU time, since on a machine with much else to do a share of the wall's would be a larger share of the game's. It begins with
-    what a second brings.
+    what a quarter of a second brings.
 
     Args:
         share: Of that time.
@@ -90,7 +90,7 @@ class Allowance:
     def __init__(self, share: float) -> None:
         self.share = share
         self.cost = 0.0
-        self._saved = share
+        self._saved = 0.25 * share
         self._last = time.thread_time()
         self._look_at = 0.0
 

@@ -54,6 +54,7 @@ class Recording:
         table = self.run.trajectory_table
         self._batches = table.to_batches()
         self._starts = np.cumsum([0, *(b.num_rows for b in self._batches)])
+        self._arrays: dict[tuple[int, str], np.ndarray] = {}
         self._find_frames()
         self._name_blocks()
 
@@ -149,9 +150,11 @@ class Recording:
     def _teams_seen(self) -> set[tuple[int, int]]:
         """(block, team) of all entities."""
         found: set[tuple[int, int]] = set()
-        for batch in self._batches:
-            pairs = np.stack([batch["block"].indices.to_numpy(), batch["team"].to_numpy()])
-            found |= {(int(b), int(t)) for b, t in np.unique(pairs, axis=1).T}
+        for number in range(len(self._batches)):
+            block, team = (self._array(number, name) for name in ("block", "team"))
+            changes = np.flatnonzero((np.diff(block) != 0) | (np.diff(team) != 0)) + 1
+            first = np.concatenate([[0], changes]) if len(block) else changes
+            found |= set(zip(block[first].tolist(), team[first].tolist(), strict=True))
         return found
 
     # -- frames ---------------------------------------------------------------------------------------------------------------
@@ -194,10 +197,17 @@ class Recording:
         number = int(np.searchsorted(self._starts, first, side="right")) - 1
         while first < last:
             start, end = int(self._starts[number]), int(self._starts[number + 1])
-            part = self._batches[number][name][first - start : min(last, end) - start]
-            parts.append((part.indices if isinstance(part, pa.DictionaryArray) else part).to_numpy())
+            parts.append(self._array(number, name)[first - start : min(last, end) - start])
             first, number = min(last, end), number + 1
         return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
+    def _array(self, number: int, name: str) -> np.ndarray:
+        """A column of a batch, without a copy; of blocks their numbers."""
+        key = (number, name)
+        if key not in self._arrays:
+            column = self._batches[number][name]
+            self._arrays[key] = (column.indices if name == "block" else column).to_numpy()
+        return self._arrays[key]
 
     def _columns(self, first: int, last: int, names: tuple[str, ...]) -> np.ndarray:
         """Rows [first, last) of several columns, (rows, columns)."""

@@ -104,7 +104,7 @@ def test_rest_counts_and_the_clock_of_another_thread_does_not(clock):
     allowance.pay(0.02)
     clock.now -= 50.0
     assert not allowance.allows()
-    allowance.rest(0.9)
+    allowance.rest(1.7)
     assert not allowance.allows()
     allowance.rest(0.2)
     assert allowance.allows()

@@ -107,6 +107,7 @@ def test_frames_that_lie_across_batches_are_whole(tmp_path):
     for i, frame in enumerate(frames):
         assert_same(recording.frame(i), frame)
     several = Recording(tmp_path / "run")
+    several._arrays.clear()
     several._batches = several.run.trajectory_table.combine_chunks().to_batches(max_chunksize=7)
     several._starts = np.cumsum([0, *(b.num_rows for b in several._batches)])
     for i, frame in enumerate(frames):
