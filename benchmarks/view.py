@@ -7,8 +7,8 @@ without a graphics card does not take the machine from what is measured. Per siz
 
 * paced: the game at 30 steps a second. `page` is the CPU time of the threads that serve (all but the game's), and `frames` what was
   received, each second of the wall's time.
-* free: as fast as possible. `speed` is steps per CPU second of the whole process while somebody watches, as part of steps per CPU second
-  of the same simulation without page.
+* free: as fast as possible. `speed` is steps per CPU second of the game's thread while somebody watches, with all that is kept to wind it
+  back, as part of steps per CPU second of the same simulation alone.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """Every key of the page does what its table says."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -38,6 +39,11 @@ def test_the_help_names_each_key_that_means_something():
         table = help_table(is_live)
         assert all(key.label in table and key.text in table for key in keys_of(is_live))
     assert "pick a point" not in help_table(is_live=False)
+
+
+def test_the_page_of_the_guide_has_the_same_keys():
+    guide = (Path(__file__).parents[3] / "docs" / "view.md").read_text()
+    assert help_table(is_live=True) in guide
 
 
 def test_all_keys_are_set(game):

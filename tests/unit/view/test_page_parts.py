@@ -200,7 +200,7 @@ def test_marks_are_where_events_are_and_not_too_many():
         happenings = (event(0.0, "birth"), event(2.0), event(2.0), event(3.0))
 
     class Many(Some):
-        happenings = [event(0.1 * i) for i in range(1, 500)]
+        happenings = tuple(event(0.1 * i) for i in range(1, 500))
 
     assert marks(Some()) == (2.0, 3.0)
     assert 30 < len(marks(Many())) <= 60

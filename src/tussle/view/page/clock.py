@@ -51,7 +51,14 @@ class TimePanel:
 
         # Asynchronous, so that clicks are carried out in their order, each with the button of its own.
         async def told_run(_: Any) -> None:
-            {"Back": source.step_back, "Step": source.step}.get(self._run.value, source.toggle)()
+            # By its name, not a toggle: who pressed Pause meant it, whatever has happened meanwhile.
+            does = {
+                "Back": source.step_back,
+                "Step": source.step,
+                "Play": source.resume,
+                "Pause": source.pause,
+            }
+            does[self._run.value]()
 
         self._run.on_click(told_run)
 
@@ -98,7 +105,7 @@ class TimePanel:
         self._slider.max = max(self._slider.max, last)
         self._slider.value = min(max(frame.t, first), last)
         self._slider.max = min(self._slider.max, last)
-        standing = "Play" if self._source.is_paused else "Pause"
+        standing = "Play" if self._source.is_paused or self._source.is_over else "Pause"
         if self._run.options[1] != standing:
             self._run.options = ("Back", standing, "Step")
         happenings = self._source.happenings

@@ -1,0 +1,140 @@
+"""`tussle view` and `tussle replay`, as a user starts and ends them."""
+
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from cli_process import COMMAND, environment
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "unit" / "view"))
+
+from page_client import PageClient
+
+ADDRESS = re.compile(r"http://127\.0\.0\.1:\d+")
+
+
+BROKEN = """\
+from tussle.stock import Predator
+
+
+class Broken(Predator):
+    def step(self, g):
+        raise ValueError("no")
+"""
+
+
+class Watching:
+    """A command that serves a page."""
+
+    def __init__(self, folder, *arguments):
+        self.process = subprocess.Popen(
+            [*COMMAND, *arguments, "--no-browser"],
+            cwd=folder, env=environment(), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+        line = self.process.stdout.readline()
+        found = ADDRESS.search(line)
+        assert found, (line, self.process.communicate(timeout=60))
+        self.url = found[0]
+
+    def end(self, number=signal.SIGINT):
+        self.process.send_signal(number)
+        out, err = self.process.communicate(timeout=60)
+        return self.process.returncode, out, err
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.process.kill()
+        self.process.wait()
+
+
+@pytest.fixture
+def watching(folder):
+    def start(*arguments):
+        return Watching(folder, *arguments)
+
+    return start
+
+
+def test_a_game_is_served_steered_and_ended_with_its_summary(watching, folder):
+    with (
+        watching("view", "game.xml", "n=6", "--paused", "--record", "kept") as command,
+        PageClient(command.url) as client,
+    ):
+        client.wait(lambda: client.text("t = 0.00 s"))
+        client.set("Run", "Step")
+        client.wait(lambda: client.text("t = 0.10 s"))
+        code, out, err = command.end()
+    assert code == 0, "Ctrl-C is the way to end it"
+    assert "A small game" in out
+    assert "1 steps of 0.1 s" in out
+    assert "kept" in out
+    assert "Traceback" not in err
+    assert (folder / "kept" / "run.json").exists()
+
+
+def test_what_is_watched_has_the_hash_that_it_has_alone(tussle):
+    alone = re.search(r"hash\s+(\w{32})", tussle("run", "game.xml", "--no-log").stdout)[1]
+    seen = tussle("view", "game.xml", "--no-browser", "--exit-when-over", "--pace", "max").stdout
+    assert f"hash   {alone}" in seen
+    assert "its end time is reached" in seen
+
+
+def test_a_failing_plugin_is_the_exit_code(tussle, folder):
+    (folder / "broken.py").write_text(BROKEN)
+    done = tussle(
+        "view", "game.xml", "mind=Broken", "--plugin-path", "broken.py", "--no-browser", "--exit-when-over", code=3
+    )  # fmt: skip
+    assert "Broken" in done.stderr
+    assert "no" in done.stderr
+
+
+def test_sigterm_ends_it_too(watching):
+    with watching("view", "game.xml", "--paused") as command:
+        code, out, _ = command.end(signal.SIGTERM)
+    assert code == 143
+    assert "A small game" in out
+
+
+def test_other_hosts_are_warned_of(watching):
+    with watching("view", "game.xml", "--paused", "--host", "0.0.0.0") as command:
+        code, _, err = command.end()
+    assert code == 0
+    assert "warning: the page is served at 0.0.0.0: whoever reaches this machine" in err
+
+
+def test_a_run_is_replayed_and_two_are_compared(tussle, watching):
+    tussle("run", "game.xml", "--out", "a")
+    tussle("run", "game.xml", "--seed", "8", "--out", "b")
+    with watching("replay", "a", "--paused") as command, PageClient(command.url) as client:
+        client.wait(lambda: client.text("t = 0.00 s"))
+        assert command.end()[0] == 0
+    with watching("replay", "a", "b", "--over", "--paused") as command, PageClient(command.url) as client:
+        client.wait(lambda: client.text("they differ first at t = 0 s"))
+        code, _, err = command.end()
+    assert code == 0
+    assert "note: they differ first" in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "told"),
+    [
+        (
+            ("view", "game.xml", "--pace", "fast"),
+            2,
+            "--pace fast is not allowed; it takes a number > 0, or max",
+        ),
+        (("view", "game.xml", "--pace", "0"), 2, "--pace 0 is not allowed"),
+        (("view", "nosuch.xml"), 1, "nosuch.xml"),
+        (("view", "game.xml", "--host", "192.0.2.1"), 1, "cannot be served at 192.0.2.1"),
+        (("replay", "nowhere"), 4, "nowhere"),
+        (("replay", "nowhere", "--over"), 2, "there is only one"),
+    ],
+)
+def test_what_cannot_be_watched_is_told(tussle, arguments, code, told):
+    done = tussle(*arguments, code=code)
+    assert told in " ".join((done.stdout + done.stderr).split())
