@@ -47,7 +47,11 @@ function actionsOf(player) {
       const chosen = camera.undo();
       if (chosen !== null) player.chosen = chosen;
     }),
-    unchoose: change(() => player.choose(0)),
+    unchoose: change(() => {
+      const settings = document.getElementById('settings');
+      if (settings.hidden) player.choose(0);
+      settings.hidden = true;
+    }),
 
     larger: change(() => { drawn.scale = Math.min(12, drawn.scale + 1); }),
     smaller: change(() => { drawn.scale = Math.max(-6, drawn.scale - 1); }),

@@ -1,7 +1,7 @@
 // What happens: marks on the time line, what they say, and the last ones in a corner.
 
 /** Colours that are told apart with every kind of colour vision; the shapes tell them apart as well. */
-const KINDS = { capture: '#e8743b', collision: '#e3c341', birth: '#2fb38a', death: '#b59ad6', end: '#93a1b0' };
+const KINDS = { capture: '#e8743b', collision: '#d9ae1f', birth: '#2fb38a', death: '#b59ad6', end: '#93a1b0' };
 /** Captures, collisions and the end stand above a line, births and deaths below it. */
 const IS_ABOVE = { capture: true, collision: true, end: true };
 
@@ -55,22 +55,22 @@ class Happenings {
     pen.fillStyle = KINDS[kind] || KINDS.end;
     pen.beginPath();
     if (kind === 'collision') {
-      pen.moveTo(x, 18 - size - 3);
-      pen.lineTo(x + 3.5, 18 - size / 2);
+      pen.moveTo(x, 18 - size - 5);
+      pen.lineTo(x + 4.5, 18 - size / 2 - 2.5);
       pen.lineTo(x, 18);
-      pen.lineTo(x - 3.5, 18 - size / 2);
+      pen.lineTo(x - 4.5, 18 - size / 2 - 2.5);
     } else if (kind === 'birth') {
       pen.moveTo(x, 20);
-      pen.lineTo(x + 3, 20 + size / 2 + 3);
-      pen.lineTo(x - 3, 20 + size / 2 + 3);
+      pen.lineTo(x + 3.6, 20 + size / 2 + 4);
+      pen.lineTo(x - 3.6, 20 + size / 2 + 4);
     } else if (kind === 'death') {
-      pen.moveTo(x - 3, 20);
-      pen.lineTo(x + 3, 20);
-      pen.lineTo(x, 20 + size / 2 + 3);
+      pen.moveTo(x - 3.6, 20);
+      pen.lineTo(x + 3.6, 20);
+      pen.lineTo(x, 20 + size / 2 + 4);
     } else if (kind === 'end') {
       pen.rect(x - 1, 4, 2, 22);
     } else {
-      pen.arc(x, 18 - size, 2.6, 0, 2 * Math.PI);
+      pen.arc(x, 18 - size, 3.2, 0, 2 * Math.PI);
       pen.rect(x - 0.8, 18 - size, 1.6, size);
     }
     pen.fill();

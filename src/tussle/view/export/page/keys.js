@@ -11,7 +11,7 @@ const KEYS = [
   ]],
   ['Camera', [
     [['o'], 'all in view', 'overview'],
-    [['p'], 'from above', 'top'],
+    [['v'], 'from above', 'top'],
     [['a'], 'follow, behind, free', 'mode'],
     [['ArrowRight', 'ArrowLeft'], 'follow the next, the one before', 'nextEntity', 'lastEntity'],
     [['z', 'Z'], 'nearer, farther', 'nearer', 'farther'],
@@ -24,7 +24,7 @@ const KEYS = [
     [['0'], 'models in their size', 'usualSize'],
     [['t', 'T'], 'trails: longer, shorter', 'trails', 'shorterTrails'],
     [['l'], 'labels', 'labels'],
-    [['n', 'N'], 'smaller, larger labels', 'smallerText', 'largerText'],
+    [['n', 'N'], 'larger, smaller labels', 'largerText', 'smallerText'],
     [['w', 's'], 'wireframe, solid', 'wire', 'solid'],
     [['g'], 'grid and axes', 'grid'],
     [['k'], 'dark, light', 'theme'],
@@ -44,7 +44,7 @@ function bindings() {
     for (const [keys, , ...actions] of entries) keys.forEach((key, i) => found.set(key, actions[Math.min(i, actions.length - 1)]));
   }
   // Keys that lie beside those above, or are another way to write them.
-  return found.set('=', 'larger').set('_', 'smaller').set('A', 'reset').set('H', 'help');
+  return found.set('Backspace', 'back').set('=', 'larger').set('_', 'smaller').set('A', 'reset').set('H', 'help');
 }
 
 function fillHelp(box) {

@@ -139,8 +139,8 @@ class Entities {
     for (const model of Object.values(this.models)) model.hand();
   }
 
-  draw(view, { scale, least, isWire }) {
-    use(this.gl, this.program, { clip: view.clip, scale, least: least * view.perPixel, opacity: 1, flatness: isWire ? 1 : 0 });
+  draw(view, { scale, least, isWire, bright }) {
+    use(this.gl, this.program, { clip: view.clip, scale, least: least * view.perPixel, opacity: 1, flatness: isWire ? 1 : 0, bright });
     for (const model of Object.values(this.models)) if (model.n) model.draw(isWire);
   }
 }

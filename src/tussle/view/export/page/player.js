@@ -148,7 +148,8 @@ class Player {
     const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight];
     const bar = document.getElementById('bar').offsetHeight + 24;
     const isNarrow = width <= 720;
-    const side = isNarrow ? 0.06 : Math.min(0.25, 290 / width);
+    // Panels stand in the upper right corner only: half their width is enough.
+    const side = isNarrow ? 0.06 : Math.min(0.15, 145 / width);
     return { left: isNarrow ? 0.06 : 0.05, right: side, top: isNarrow ? Math.min(0.25, 130 / height) : 0.1, bottom: Math.min(0.4, bar / height) };
   }
 
@@ -224,6 +225,8 @@ class Player {
       camera.wish.zoom = Math.min(camera.wish.zoom, Math.log(near));
       camera.wish.pitch = between(camera.wish.pitch, 0.12, 0.6);
     }
+    // Behind it, its own turns are what is to be seen.
+    if (mode === 'behind') camera.wish.zoom = Math.min(camera.wish.zoom, Math.log(25 * this.scaleOf(layer.shown.track[slot])));
     this.look();
   }
 
@@ -294,7 +297,9 @@ class Player {
     const isLight = theme === 'mission' ? 0.3 * background[0] + 0.59 * background[1] + 0.11 * background[2] > 140 : theme === 'light';
     document.body.dataset.theme = isLight ? 'light' : 'dark';
     const own = theme === 'mission' ? background.map((c) => c / 255) : null;
-    this.colours = { sky: own || styled('--sky'), ground: own || styled('--ground'), grid: styled('--grid'), lightness: isLight ? 1.15 : 0.75 };
+    this.colours = { sky: own || styled('--sky'), ground: own || styled('--ground'), grid: styled('--grid') };
+    // Dark colours are to be seen on a dark ground, and a bright ground is not to blind on it.
+    Object.assign(this.colours, isLight ? { lightness: 1.15, bright: 1, trail: 0.7 } : { lightness: 0.75, bright: 1.25, trail: 0.9 });
     this.look();
   }
 
@@ -313,7 +318,7 @@ class Player {
     scenery.drawTerrain(view, this.colours, drawn.grid);
     this.entities.forEach((entities) => {
       entities.place(this.anchor, this.hidden, this.chosen);
-      entities.draw(view, { scale: this.scale, least: drawn.least ? LEAST_SIZE * this.ratio : 0, isWire: drawn.wire });
+      entities.draw(view, { scale: this.scale, least: drawn.least ? LEAST_SIZE * this.ratio : 0, isWire: drawn.wire, bright: this.colours.bright });
     });
     this.drawThrough(view);
     this.drawOver(view);
@@ -337,7 +342,7 @@ class Player {
     }
     this.trails.forEach((trails, i) => {
       trails.place(this.anchor, TRAIL_LENGTHS[drawn.trail], this.hidden, this.chosen, this.entities[i].colourOf);
-      trails.lines.draw(scenery.line, view, 1.4 * this.ratio, 0.7);
+      trails.lines.draw(scenery.line, view, 1.4 * this.ratio, this.colours.trail);
     });
     if (drawn.regions) scenery.drawRegions(view);
     gl.depthMask(true);

@@ -124,7 +124,7 @@ class Scenery {
     model.n = 0;
     model.add(...minus(place, view.anchor), [1, 0, 0, 0], 0, colour, size, 0);
     model.hand();
-    use(this.gl, this.solid, { clip: view.clip, scale: 1, least: 0, opacity, flatness: 0.5 });
+    use(this.gl, this.solid, { clip: view.clip, scale: 1, least: 0, opacity, flatness: 0.5, bright: 1 });
     model.draw(false);
   }
 }

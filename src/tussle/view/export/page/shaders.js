@@ -38,12 +38,13 @@ in vec3 towards;
 in vec4 paint;
 uniform float opacity;
 uniform float flatness;
+uniform float bright;
 out vec4 result;
 ${LIGHT}
 void main() {
   vec3 normal = normalize(gl_FrontFacing ? towards : -towards);
   vec3 colour = mix(paint.rgb, vec3(1.0), 0.45 * paint.a);
-  result = vec4(mix(lit(colour, normal), colour, flatness), 1.0) * opacity;
+  result = vec4(min(bright * mix(lit(colour, normal), colour, flatness), 1.0), 1.0) * opacity;
 }`;
 
 /** Lines of a width in pixels: each instance goes from a point to the next one, if that is joined to it (its opacity). */
