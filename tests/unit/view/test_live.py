@@ -8,11 +8,11 @@ import pytest
 from golden_runs import kept, simulation
 from missions import NAMES, STEPS
 from recorded_games import hunt
-from watched_plugins import clickable, failing
+from watched_plugins import FailsOnce, KillsAndMoves, clickable, failing
 
 from tussle import Simulation
 from tussle.errors import ParameterError, PluginError
-from tussle.messages import WorldPointClicked
+from tussle.messages import CustomKeyPress, WorldPointClicked
 from tussle.view import Live, frame_of
 
 
@@ -446,6 +446,26 @@ def test_a_plugin_that_fails_stops_the_game_and_it_can_be_wound_back_to_before()
         assert live.settle()
         assert live.error is None
         assert live.step_number == 0
+
+
+def test_a_step_that_was_broken_off_leaves_nothing_behind():
+    game = clickable(interactions=[KillsAndMoves(), FailsOnce()])
+    live = Live(Simulation(game), threaded=False)
+    live.step(10)
+    assert "nobody spoke" in str(live.error)
+    assert live.step_number == 5
+    live.step_back(2)
+    live.step(2)
+    assert live.error is None
+    reference = Simulation(game)
+    reference.step(5)
+    assert live.simulation.state_hash() == reference.state_hash()
+    live.publish_key("k")
+    reference.publish(CustomKeyPress, key="k")
+    live.step(3)
+    reference.step(3)
+    assert live.simulation.state_hash() == reference.state_hash()
+    assert len(live.frame()) == 2
 
 
 def test_a_failure_that_only_ends_the_world_is_told_too():

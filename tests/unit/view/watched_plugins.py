@@ -62,3 +62,20 @@ def failing() -> Mission:
     return Mission(
         blocks=[Block(name="late", team=1, count=2, autonomy=Fails(), motion=SingleIntegrator())], end=3.0
     )
+
+
+class KillsAndMoves(Interaction):
+    """Takes one out and puts another elsewhere, at a time."""
+
+    def step(self, w):
+        if 0.45 < w.t[0] < 0.55:
+            w.kill([0], "fate")
+            w.move([1], pos=w.pos[:, [1]] + 5.0)
+
+
+class FailsOnce(Interaction):
+    """Fails in the step of KillsAndMoves, as long as nobody says a key."""
+
+    def step(self, w):
+        if 0.45 < w.t[0] < 0.55 and not len(w.inbox(CustomKeyPress)):
+            raise ValueError("nobody spoke")
