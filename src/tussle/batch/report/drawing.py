@@ -70,6 +70,13 @@ STYLE: dict[str, Any] = {
     "svg.hashsalt": "tussle",
 }
 
+UNDATED: dict[str, dict[str, Any]] = {
+    "png": {"Software": None},
+    "svg": {"Date": None, "Creator": None},
+    "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
+}
+"""What files of each kind are not told, so that the same plot is the same bytes."""
+
 
 @dataclass(frozen=True)
 class Picture:
@@ -89,8 +96,12 @@ class Picture:
 
 
 @contextmanager
-def house_style() -> Iterator[None]:
+def house_style(whose: str = "the report", extra: str = "batch") -> Iterator[None]:
     """Plots are made and saved inside; settings of the user's own matplotlibrc do not reach them.
+
+    Args:
+        whose: Who draws, for the message.
+        extra: Which extra brings Matplotlib to it.
 
     Raises:
         MissingExtraError: Matplotlib is not installed.
@@ -99,7 +110,7 @@ def house_style() -> Iterator[None]:
         import matplotlib as mpl
     except ImportError as error:
         raise MissingExtraError(
-            "the report draws with matplotlib, which is not installed: pip install 'tussle[batch]' brings it"
+            f"{whose} draws with matplotlib, which is not installed: pip install 'tussle[{extra}]' brings it"
         ) from error
     with mpl.rc_context():
         mpl.rcdefaults()
@@ -192,22 +203,29 @@ def pictured(figure: Figure, name: str, title: str) -> Picture:
         name: Begins all its identifiers.
         title: What it shows, for those who have it read to them.
     """
+    svg, png = io.StringIO(), io.BytesIO()
+    with missing_letters() as missing:
+        figure.savefig(svg, format="svg", metadata=UNDATED["svg"])
+        figure.set_layout_engine("none")  # both have the same places, and finding them takes half of the time
+        figure.savefig(png, format="png", metadata=UNDATED["png"])
+    return Picture(
+        svg.getvalue(), inlined(svg.getvalue(), name, title), png.getvalue(), "".join(sorted(missing))
+    )
+
+
+@contextmanager
+def missing_letters() -> Iterator[set[str]]:
+    """Collects the letters that the font lacks while figures are saved inside; other warnings are given on."""
+    missing: set[str] = set()
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
-        svg, png = io.StringIO(), io.BytesIO()
-        figure.savefig(svg, format="svg", metadata={"Date": None, "Creator": None})
-        figure.set_layout_engine("none")  # both have the same places, and finding them takes half of the time
-        figure.savefig(png, format="png", metadata={"Software": None})
-    missing: set[str] = set()
+        yield missing
     for warning in said:
         glyph = re.match(r"Glyph (\d+) ", str(warning.message))
         if glyph is None:
             warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
         else:
             missing.add(chr(int(glyph[1])))
-    return Picture(
-        svg.getvalue(), inlined(svg.getvalue(), name, title), png.getvalue(), "".join(sorted(missing))
-    )
 
 
 def inlined(svg: str, name: str, title: str) -> str:

@@ -1,0 +1,101 @@
+"""`tussle plot RUN`: plots of a recorded run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tussle.cli.options import Debug, PluginFiles
+from tussle.cli.terminal import out, say_note, told
+
+PLOTS = "plots"
+"""Folder of a run directory that holds its plots."""
+
+RunName = Annotated[
+    Path, typer.Argument(metavar="RUN", help="A run directory, finished or not.", show_default=False)
+]
+Kinds = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--kind",
+        metavar="KIND",
+        help="trajectory, trajectory3d, speed, altitude, left, captures, density or distance; by default all that show "
+        "something. As often as needed.",
+        show_default=False,
+    ),
+]
+Between = Annotated[
+    tuple[int, int] | None,
+    typer.Option(metavar="ID ID", help="Plot the distance between these two entities.", show_default=False),
+]
+Teams = Annotated[
+    list[int] | None,
+    typer.Option("--team", metavar="N", help="Only this team. As often as needed.", show_default=False),
+]
+Entities = Annotated[
+    list[int] | None,
+    typer.Option("--entity", metavar="ID", help="Only this entity. As often as needed.", show_default=False),
+]
+Start = Annotated[
+    str | None,
+    typer.Option("--from", metavar="TIME", help="Begin at this time: 60, or '2 min'.", show_default=False),
+]
+End = Annotated[
+    str | None, typer.Option("--to", metavar="TIME", help="End at this time.", show_default=False)
+]
+Directory = Annotated[
+    Path | None,
+    typer.Option(
+        "--out", metavar="DIR", help="Where the plots are written; by default RUN/plots.", show_default=False
+    ),
+]
+
+
+def plot(
+    run: RunName,
+    kinds: Kinds = None,
+    between: Between = None,
+    teams: Teams = None,
+    entities: Entities = None,
+    start: Start = None,
+    end: End = None,
+    world: Annotated[int, typer.Option(metavar="N", min=0, help="World of a stack.")] = 0,
+    form: Annotated[str, typer.Option("--format", metavar="png|svg|pdf", help="Of the files.")] = "png",
+    directory: Directory = None,
+    plugin_files: PluginFiles = None,
+    debug: Debug = False,
+) -> None:
+    """Write plots of a recorded run: ways, speed, altitude, who is left, captures, where they were."""
+    with told(debug):
+        from tussle.cli.progress import home_short
+        from tussle.view.plots import Choice, write_plots
+        from tussle.view.recording import Recording
+
+        choice = Choice(
+            tuple(teams or ()), tuple(entities or ()), _time("--from", start, -1.0), _time("--to", end, 1.0)
+        )
+        recording = Recording(run, world, tuple(plugin_files or ()))
+        written = write_plots(recording, directory or run / PLOTS, kinds or (), choice, between, form)
+        for note in written.notes:
+            say_note(note)
+        for file in written.files:
+            out().print(home_short(file), soft_wrap=True, markup=False)
+
+
+def _time(option: str, text: str | None, sign: float) -> float:
+    """The time of an option [s]; without one, before or after all others.
+
+    Raises:
+        ParameterError: It is no time.
+    """
+    from tussle.errors import ParameterError
+    from tussle.units import parse
+
+    if text is None:
+        return sign * float("inf")
+    try:
+        return parse(text, "s")
+    except ParameterError as error:
+        raise ParameterError(f"{option}: {error}") from None

@@ -1,0 +1,30 @@
+"""Plots of a recorded run: ways, speed, altitude, distance, who is left, captures, where they were.
+
+Each is a function of the chosen part of a recording that gives a Matplotlib figure; `plot_style` is to be around it. `write_plots`
+writes several into files.
+"""
+
+from tussle.view.plots.choice import Choice, Tracks
+from tussle.view.plots.counts import captures, left
+from tussle.view.plots.curves import altitude, distance, speed
+from tussle.view.plots.files import KINDS, Plots, write_plots
+from tussle.view.plots.maps import density, trajectory, trajectory3d
+from tussle.view.plots.sheet import FORMATS, plot_style
+
+__all__ = [
+    "FORMATS",
+    "KINDS",
+    "Choice",
+    "Plots",
+    "Tracks",
+    "altitude",
+    "captures",
+    "density",
+    "distance",
+    "left",
+    "plot_style",
+    "speed",
+    "trajectory",
+    "trajectory3d",
+    "write_plots",
+]

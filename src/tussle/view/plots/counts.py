@@ -1,0 +1,161 @@
+"""Plots of counts over time: who is left of each team, captures and collisions so far."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tussle.batch.report.drawing import INK, MUTED, colour_of, rule_y
+from tussle.errors import ParameterError
+from tussle.view.plots.sheet import Handle, add_head, line_look, line_sign, mark_sign, sheet, time_axis
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from tussle.view.plots.choice import Tracks
+
+MOST_MARKS = 80
+"""Deaths of one team that are marked one by one."""
+CAUSE_MARKS = ("x", "+", "d", "1")
+"""Of why one died, in order of the alphabet; where there are more causes, the last stands for all the rest."""
+
+
+def left(tracks: Tracks) -> Figure:
+    """How many of each team are there over time, with a mark for each death and its cause."""
+    figure = sheet(2.5)
+    axes: Any = figure.subplots()
+    n_frames = len(tracks.frame_times)
+    team = np.repeat(tracks.team, np.diff(tracks.first))
+    signs: list[Handle] = []
+    causes: set[str] = set()
+    for number, name in tracks.teams.items():
+        n = np.bincount(tracks.frame[team == number], minlength=n_frames)
+        axes.step(tracks.frame_times, n, where="post", **line_look(number))
+        signs.append((line_sign(**line_look(number)), f"{name}: {n[0]}, then {n[-1]}"))
+        causes |= _mark_deaths(axes, tracks, number, n)
+    _whole_numbers(axes)
+    axes.set_ylabel("entities")
+    time_axis(axes, tracks.frame_times)
+    add_head(figure, tracks, "Who is left", [*signs, *_cause_signs(tracks, causes)])
+    return figure
+
+
+def captures(tracks: Tracks) -> Figure:
+    """Captures of each team and collisions so far, counted from the begin of the span.
+
+    Raises:
+        ParameterError: There are none.
+    """
+    caught, met = _captures(tracks), _collisions(tracks)
+    if not caught and not met:
+        raise ParameterError(
+            f"{tracks.recording.path}: there are no captures and no collisions to be plotted"
+        )
+    figure = sheet(0.5 + 1.9 * (bool(caught) + bool(met)))
+    panels = list(figure.subplots(bool(caught) + bool(met), 1, sharex=True, squeeze=False)[:, 0])
+    signs: list[Handle] = []
+    bottom = panels[-1]
+    if caught:
+        axes = panels.pop(0)
+        for team, times in sorted(caught.items()):
+            _staircase(axes, tracks, times, **line_look(team))
+            signs.append((line_sign(**line_look(team)), f"{tracks.recording.teams[team]}: {len(times)}"))
+        axes.set_ylabel("captures so far")
+        _whole_numbers(axes)
+    if met:
+        _staircase(panels[0], tracks, met, color=INK, linewidth=1.2)
+        panels[0].set_ylabel("collisions so far")
+        _whole_numbers(panels[0])
+    time_axis(bottom, tracks.frame_times)
+    what = " and ".join(word for word, found in (("captures", caught), ("collisions", met)) if found)
+    add_head(figure, tracks, what.capitalize(), signs)
+    return figure
+
+
+def has_captures(tracks: Tracks) -> bool:
+    """Whether there is anything to be seen in the plot of captures."""
+    return bool(_captures(tracks) or _collisions(tracks))
+
+
+def _is_chosen(tracks: Tracks, who: int) -> bool:
+    """Whether one is among the chosen teams and entities, there in the span or not."""
+    choice = tracks.choice
+    return (not choice.entities or who in choice.entities) and (
+        not choice.teams or tracks.team_of.get(who) in choice.teams
+    )
+
+
+def _captures(tracks: Tracks) -> dict[int, list[float]]:
+    """Times of the captures by each team [s]; of chosen captors."""
+    found: dict[int, list[float]] = {}
+    for h in tracks.happenings:
+        if h.kind == "capture" and h.id in tracks.team_of and _is_chosen(tracks, h.id):
+            found.setdefault(tracks.team_of[h.id], []).append(h.t)
+    return found
+
+
+def _collisions(tracks: Tracks) -> list[float]:
+    """Times of the collisions in which a chosen one took part [s]."""
+    return [
+        h.t
+        for h in tracks.happenings
+        if h.kind == "collision" and (_is_chosen(tracks, h.id) or _is_chosen(tracks, h.other))
+    ]
+
+
+def _staircase(axes: Axes, tracks: Tracks, times: list[float], **look: Any) -> None:
+    """The number of events so far, over the whole span."""
+    first, last = tracks.frame_times[0], tracks.frame_times[-1]
+    axes.step([first, *times, last], [*range(len(times) + 1), len(times)], where="post", **look)
+
+
+def _mark_deaths(axes: Axes, tracks: Tracks, team: int, n: np.ndarray) -> set[str]:
+    """Mark deaths of a team on its curve.
+
+    Args:
+        axes: Where the curve is.
+        tracks: What is plotted.
+        team: The team.
+        n: How many of it are there in each frame, (T,).
+
+    Returns:
+        Why they died.
+    """
+    of_team = set(tracks.who[tracks.team == team].tolist())
+    deaths = [h for who, h in tracks.deaths.items() if who in of_team]
+    if len(deaths) > MOST_MARKS:
+        return set()
+    causes = _causes(tracks)
+    for h in deaths:
+        at = int(np.searchsorted(tracks.frame_times, h.t + 1e-6 * tracks.recording.dt, side="right")) - 1
+        axes.plot(
+            h.t, n[at], causes[h.text], color=colour_of(team), markersize=3.8, markeredgewidth=0.9, zorder=3
+        )
+    return {h.text for h in deaths}
+
+
+def _causes(tracks: Tracks) -> dict[str, str]:
+    """Mark of each cause of death in the recording."""
+    texts = sorted({h.text for h in tracks.recording.happenings if h.kind == "death"})
+    last = len(CAUSE_MARKS) - 1
+    return {text: CAUSE_MARKS[min(i, last)] for i, text in enumerate(texts)}
+
+
+def _cause_signs(tracks: Tracks, seen: set[str]) -> list[Handle]:
+    """The marks that were drawn, each with all that it stands for."""
+    words: dict[str, list[str]] = {}
+    for text, mark in _causes(tracks).items():
+        if text in seen:
+            words.setdefault(mark, []).append(text or "died")
+    return [(mark_sign(mark, MUTED), ", ".join(texts)) for mark, texts in words.items()]
+
+
+def _whole_numbers(axes: Axes) -> None:
+    """Whole numbers from 0 on the y axis, when all is drawn."""
+    from matplotlib.ticker import MaxNLocator
+
+    axes.yaxis.set_major_locator(MaxNLocator(6, integer=True, steps=[1, 2, 5, 10]))
+    axes.set_ylim(0.0, max(1.0, axes.get_ylim()[1]))
+    rule_y(axes)

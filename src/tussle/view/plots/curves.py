@@ -1,0 +1,179 @@
+"""Plots over time: speed, altitude, the distance of two entities."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tussle.batch.report.drawing import INK, MUTED, PAPER, colour_of, mixed, rule_y, shortened
+from tussle.batch.report.drawing import PALETTE as COLOURS
+from tussle.errors import ParameterError
+from tussle.view.plots.choice import Choice, Tracks
+from tussle.view.plots.sheet import Handle, add_head, line_look, line_sign, mark_sign, sheet, time_axis
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from tussle.view.recording import Recording
+
+MANY = 12
+"""Entities of a team from which on its curve is a band: more lines cannot be followed."""
+MOST_TIMES = 400
+"""Points of a band: about one for two pixels."""
+
+
+def speed(tracks: Tracks) -> Figure:
+    """Speed over time: a line for each entity, a band of quantiles for a team of many."""
+    return _over_time(tracks, tracks.speed, "Speed", "speed [m/s]")
+
+
+def altitude(tracks: Tracks) -> Figure:
+    """Altitude over time: a line for each entity, a band of quantiles for a team of many."""
+    return _over_time(tracks, tracks.column("z"), "Altitude", "altitude [m]")
+
+
+def distance(recording: Recording, one: int, other: int, choice: Choice | None = None) -> Figure:
+    """Distance between two entities while both are there, with its least value.
+
+    Args:
+        recording: What was recorded.
+        one: Id of the first.
+        other: Id of the second.
+        choice: Its times say when; the rest of it means nothing here.
+
+    Raises:
+        ParameterError: One is not there, or not at any time when the other is, or they are one.
+    """
+    if one == other:
+        raise ParameterError(f"the distance from entity {one} to itself is 0; it takes two entities")
+    times = choice or Choice()
+    tracks = Tracks(recording, Choice(entities=(one, other), start=times.start, end=times.end))
+    frames, metres = _apart(tracks, one, other)
+    t = tracks.frame_times[frames]
+    figure = sheet(2.3)
+    axes: Any = figure.subplots()
+    breaks = np.flatnonzero(np.diff(frames) != 1) + 1
+    for part in np.split(np.arange(len(frames)), breaks):
+        axes.plot(t[part], metres[part], color=INK, linewidth=1.2)
+    signs: list[Handle] = []
+    i = int(np.argmin(metres))
+    axes.plot(t[i], metres[i], "o", color=COLOURS[1], markersize=4.0, zorder=3)
+    signs.append((mark_sign("o", COLOURS[1]), f"least: {metres[i]:.3g} m at {t[i]:g} s"))
+    for who in (one, other):
+        if who in tracks.deaths and frames[-1] == tracks.frame[tracks.last[tracks.who == who][0]]:
+            axes.plot(t[-1], metres[-1], "x", color=INK, markersize=6.0, markeredgewidth=1.4, zorder=4)
+            signs.append((mark_sign("x", INK), f"{who} died: {tracks.deaths[who].text}"))
+    axes.set_ylim(bottom=0.0)
+    axes.set_ylabel("distance [m]")
+    time_axis(axes, t)
+    rule_y(axes)
+    names = (f"{who} ({shortened(tracks.teams[tracks.team_of[who]], 12)})" for who in (one, other))
+    add_head(figure, tracks, "Between {} and {}".format(*names), signs)
+    return figure
+
+
+def _apart(tracks: Tracks, one: int, other: int) -> tuple[np.ndarray, np.ndarray]:
+    """Frames in which both are there, (T,), and their distance in these [m], (T,)."""
+    pos = tracks.pos()
+    first, second = (slice(*tracks.first[i : i + 2]) for i in np.searchsorted(tracks.who, (one, other)))
+    both, mine, its = np.intersect1d(
+        tracks.frame[first], tracks.frame[second], assume_unique=True, return_indices=True
+    )
+    if not len(both):
+        spans = (
+            f"{who} is there from {tracks.t[rows][0]:g} s to {tracks.t[rows][-1]:g} s"
+            for who, rows in ((one, first), (other, second))
+        )
+        raise ParameterError(
+            f"{tracks.recording.path}: entities {one} and {other} are never there together: {', '.join(spans)}"
+        )
+    return both, np.linalg.norm(pos[first][mine] - pos[second][its], axis=1)
+
+
+def _over_time(tracks: Tracks, values: np.ndarray, what: str, label: str) -> Figure:
+    figure = sheet(2.5)
+    axes: Any = figure.subplots()
+    if tracks.choice.entities and len(tracks) <= len(COLOURS):
+        signs = _named_lines(axes, tracks, values)
+    else:
+        signs = _teams_over_time(axes, tracks, values)
+    axes.set_ylabel(label)
+    axes.margins(y=0.08)
+    time_axis(axes, tracks.frame_times)
+    rule_y(axes)
+    add_head(figure, tracks, what, signs)
+    return figure
+
+
+def _named_lines(axes: Axes, tracks: Tracks, values: np.ndarray) -> list[Handle]:
+    """A line for each entity, in a colour of its own."""
+    signs = []
+    for i, (who, team, rows) in enumerate(tracks.each()):
+        colour = COLOURS[i]
+        _line(axes, tracks, values, rows, color=colour, linewidth=1.1)
+        _cross(axes, tracks, values, who, rows, colour)
+        signs.append((line_sign(colour), f"{who} ({tracks.teams[team]})"))
+    return signs + _death_sign(tracks)
+
+
+def _teams_over_time(axes: Axes, tracks: Tracks, values: np.ndarray) -> list[Handle]:
+    """Bands below, lines above them."""
+    count = {team: int((tracks.team == team).sum()) for team in tracks.teams}
+    many = [team for team in count if count[team] > MANY]
+    for team in many:
+        _band(axes, tracks, values, team)
+    for who, team, rows in tracks.each():
+        if team not in many:
+            _line(axes, tracks, values, rows, alpha=0.85, **line_look(team, 0.8))
+            _cross(axes, tracks, values, who, rows, colour_of(team))
+    signs = [(line_sign(**line_look(team)), name) for team, name in tracks.teams.items()]
+    if many:
+        shades = (mixed(MUTED, PAPER, 0.45), mixed(MUTED, PAPER, 0.75))
+        signs += [(line_sign(shades[0], 5.0), "half of a team"), (line_sign(shades[1], 5.0), "90 % of it")]
+    return signs + (_death_sign(tracks) if len(many) < len(count) else [])
+
+
+def _line(axes: Axes, tracks: Tracks, values: np.ndarray, rows: slice, **options: Any) -> None:
+    """Draw one entity's values; broken where it was not there."""
+    t, v = tracks.t[rows], values[rows]
+    breaks = np.flatnonzero(tracks.is_breaking[rows])[1:]
+    axes.plot(np.insert(t, breaks, np.nan), np.insert(v, breaks, np.nan), zorder=2.5, **options)
+
+
+def _cross(axes: Axes, tracks: Tracks, values: np.ndarray, who: int, rows: slice, colour: str) -> None:
+    """Mark the death of one, if it died."""
+    if who in tracks.deaths:
+        axes.plot(
+            tracks.t[rows][-1],
+            values[rows][-1],
+            "x",
+            color=colour,
+            markersize=4.5,
+            markeredgewidth=1.2,
+            zorder=3,
+        )
+
+
+def _death_sign(tracks: Tracks) -> list[Handle]:
+    return [(mark_sign("x", MUTED), "died")] if tracks.deaths else []
+
+
+def _band(axes: Axes, tracks: Tracks, values: np.ndarray, team: int) -> None:
+    """Median, middle half and middle nine tenths of a team over time."""
+    frames = np.unique(np.linspace(0, len(tracks.frame_times) - 1, MOST_TIMES).round().astype(int))
+    mine = np.repeat(tracks.team == team, np.diff(tracks.first)) & np.isin(tracks.frame, frames)
+    order = np.argsort(tracks.frame[mine], kind="stable")
+    frame, found = tracks.frame[mine][order], values[mine][order]
+    edges = np.searchsorted(frame, [*frames, len(tracks.frame_times)])
+    shares = [0.05, 0.25, 0.5, 0.75, 0.95]
+    bands = np.full((len(shares), len(frames)), np.nan)
+    for i, (begin, end) in enumerate(pairwise(edges)):
+        if end > begin:
+            bands[:, i] = np.quantile(found[begin:end], shares)
+    t, colour = tracks.frame_times[frames], colour_of(team)
+    axes.fill_between(t, bands[0], bands[4], color=colour, alpha=0.16, linewidth=0)
+    axes.fill_between(t, bands[1], bands[3], color=colour, alpha=0.3, linewidth=0)
+    axes.plot(t, bands[2], **line_look(team))
