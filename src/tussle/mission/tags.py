@@ -98,7 +98,7 @@ WORLD = {
     "enable_screenshots": _viewer("Attributes `min_period`, `start`, `end`.", "false", "truth"),
     "stream_ip": _viewer("Address of a viewer elsewhere.", "localhost"),
     "stream_port": _viewer("Its port.", "50051"),
-    "terrain": _viewer("Name of the ground's picture."),
+    "terrain": _viewer("Heights of the ground: an .asc grid beside the mission file."),
 }
 """Tags of <runscript>."""
 
