@@ -17,7 +17,7 @@ from tussle.batch.plan import Plan
 from tussle.batch.progress import Progress
 from tussle.batch.results import Results
 from tussle.batch.stopping import Stop
-from tussle.batch.store import PLAYED, Store, Stored
+from tussle.batch.store import Store, Stored
 from tussle.batch.tasks import Finished
 from tussle.batch.varied import said
 from tussle.errors import BatchError
@@ -141,12 +141,12 @@ def play_in_memory(
     on_progress: Callable[[Progress], None] | None,
 ) -> Results:
     """Play a batch and keep nothing on disk."""
-    timings, rows = Timings(), []
+    timings, kept = Timings(), files.Kept()
     stop = None if until is None else Stop(until, batch.plan)
-    course = _Course(batch, batch.plan, lambda f: rows.append(files.row(f)), stop, on_progress)
+    course = _Course(batch, batch.plan, kept.add, stop, on_progress)
     course.play(set(), executor)
     plan = course.final_plan
-    results, alive = files.tables(pa.Table.from_batches(rows, PLAYED), plan.table())
+    results, alive = files.tables(kept.played(), plan.table())
     info = _final_info(batch, course, timings, ["python"], None, results)
     return Results(Stored(None, info, plan.table(), results, alive))
 

@@ -31,6 +31,9 @@ BATCH_FILE, DESIGN_FILE, RESULTS_FILE, ALIVE_FILE = (
     "results.parquet",
     "alive.parquet",
 )
+MOST_IN_PART = 2000
+"""Runs in one file of parts: each is a batch of its own, which in memory takes ten times what the run does in a table."""
+
 PARTS, RUNS, MISSION, PLUGINS, LOCK = "parts", "runs", "mission", "plugins", "lock"
 
 _METRIC = pa.struct([("team", pa.int32()), ("metric", pa.string()), ("value", pa.float64())])
@@ -167,6 +170,29 @@ def _exploded(column: pa.ChunkedArray) -> tuple[pa.Array, pa.StructArray]:
     return pc.list_parent_indices(lists), pc.list_flatten(lists)
 
 
+class Kept:
+    """Finished runs in memory."""
+
+    def __init__(self) -> None:
+        self._parts = [PLAYED.empty_table()]
+        self._rows: list[pa.RecordBatch] = []
+
+    def add(self, finished: Finished) -> None:
+        """Append a finished run."""
+        self._rows.append(row(finished))
+        if len(self._rows) >= MOST_IN_PART:
+            self._compact()
+
+    def played(self) -> pa.Table:
+        """All runs that are finished, in the order in which they were."""
+        self._compact()
+        return pa.concat_tables(self._parts)
+
+    def _compact(self) -> None:
+        self._parts.append(pa.Table.from_batches(self._rows, PLAYED).combine_chunks())
+        self._rows = []
+
+
 class Store:
     """The directory of a batch that is being played; nobody else plays into it meanwhile.
 
@@ -227,14 +253,14 @@ class Store:
                 raise
 
     def write_folder(self, name: str, files: Mapping[str, bytes]) -> None:
-        """Put a folder in its place, unless it is there.
+        """Put a folder in its place, unless it is there or would be empty.
 
         Args:
             name: Of the folder.
             files: Path in it -> content.
         """
         target, draft = self.path / name, self.path / f"{name}.part"
-        if target.exists():
+        if target.exists() or not files:
             return
         with told(self.path):
             shutil.rmtree(draft, ignore_errors=True)
@@ -251,6 +277,8 @@ class Store:
 
     def add(self, finished: Finished) -> None:
         """Append a finished run."""
+        if self._stream is not None and self._stream.rows >= MOST_IN_PART:
+            self.close_part()
         if self._stream is None:
             with told(self.path):
                 (self.path / PARTS).mkdir(exist_ok=True)
@@ -322,7 +350,7 @@ def read_played(path: Path) -> tuple[pa.Table, list[str]]:
     for file in sorted((path / PARTS).glob("*.arrow")):
         table, note = read_stream(file, PLAYED)
         if table.schema.equals(PLAYED):
-            parts.append(table)
+            parts.append(table.combine_chunks())
         if note:
             notes.append(note)
     return pa.concat_tables(parts), notes

@@ -1,0 +1,50 @@
+"""Many runs take no more memory than a thousand."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from pathlib import Path
+
+import pytest
+from gambles import game
+
+from tussle.batch import Batch, InProcess, Processes
+
+MOST_GROWTH = 5.0  # [MB]; a leak of half a kilobyte a run would show
+
+
+def resident(process="self"):
+    """Resident memory of a process [MB]."""
+    pages = int(Path(f"/proc/{process}/statm").read_text().split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def grown(executor, directory, n_runs):
+    """Memory of this process, and of those that play, after a thousand runs and at the last [MB]."""
+    seen = []
+
+    def watch(progress):
+        if progress.n_done % 1000 == 0 and progress.n_done > 0:
+            children = [resident(c.pid) for c in multiprocessing.active_children()]
+            seen.append((resident(), max(children, default=0.0)))
+
+    Batch(game(), runs=n_runs).play(directory, executor, on_progress=watch)
+    return [last - first for first, last in zip(seen[0], seen[-1], strict=True)]
+
+
+def test_some_thousand_runs_in_this_process(tmp_path):
+    assert grown(InProcess(), tmp_path / "out", 4000)[0] < MOST_GROWTH
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("executor", [InProcess(), Processes(2)], ids=["in process", "processes"])
+def test_ten_thousand_runs(tmp_path, executor):
+    ours, theirs = grown(executor, tmp_path / "out", 10_000)
+    assert ours < MOST_GROWTH
+    assert theirs < MOST_GROWTH
+
+
+@pytest.mark.slow
+def test_ten_thousand_runs_in_memory_take_two_kilobytes_each():
+    assert grown(InProcess(), None, 10_000)[0] < 9 * 2.0 + 2 * MOST_GROWTH
