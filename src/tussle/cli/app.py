@@ -24,6 +24,7 @@ from tussle.cli.options import (
     Strict,
     mission_source,
 )
+from tussle.cli.plot import plot
 from tussle.cli.replay import replay
 from tussle.cli.report import report
 from tussle.cli.terminal import OK, out, run_guarded, told
@@ -262,7 +263,7 @@ def new(
         pages.show_written(written.files, written.next_steps)
 
 
-for command in (view, replay, batch, analyze, report, optimize):
+for command in (view, replay, plot, batch, analyze, report, optimize):
     app.command(epilog=EPILOG)(command)
 
 
