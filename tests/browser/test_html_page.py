@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import math
 from dataclasses import replace
 
@@ -93,7 +92,8 @@ def test_the_clock_goes_as_fast_as_is_said(page):
             return [(performance.now() - begin[0]) / 1000, player.t - begin[1]];
         }"""
     )
-    assert elapsed[1] / elapsed[0] == pytest.approx(0.5, abs=0.25)
+    # On a machine that is busy with other things, frames of more than a second are not made up for.
+    assert 0.1 < elapsed[1] / elapsed[0] < 0.75
 
 
 def test_a_step_goes_one_frame_on_or_back(page, hunted):
@@ -182,6 +182,7 @@ def test_keys_go_from_one_happening_to_the_next(page):
         wait_until(page, f"player.t === {t!r}")
     page.keyboard.press("PageUp")
     wait_until(page, f"player.t === {times[1]!r}")
+    wait_until(page, "player.isDrawn")
     assert page.locator("#ticker li").count() >= 1
 
 
@@ -200,7 +201,7 @@ def test_teams_are_counted_as_they_are(page, hunted):
 def test_a_click_chooses_and_a_second_one_follows(page, hunted):
     x, y = page.evaluate("() => player.pixelOf(player.ids[0])")
     page.mouse.click(x, y)
-    wait_until(page, "player.chosen > 0")
+    wait_until(page, "player.chosen > 0 && player.isDrawn")
     who = page.evaluate("() => player.chosen")
     assert math.dist(page.evaluate("(id) => player.pixelOf(id)", who), (x, y)) < 12
     assert page.locator("#chosen h2").inner_text().endswith(f" {who}")
@@ -289,12 +290,16 @@ def test_the_overview_has_everybody_in_view(page, hunted):
             assert 0 < y < 650
 
 
-def colours_in_the_middle(page):
-    """How many pixels of the picture, away from all panels, are blue and vermilion, as prey and hunters are."""
-    wait_until(page, "player.isDrawn")
-    picture = page.screenshot(clip={"x": 280, "y": 20, "width": 330, "height": 500})
-    pixels = matplotlib.image.imread(io.BytesIO(picture))[..., :3]
-    red, green, blue = pixels.reshape(-1, 3).T
+def picture(page):
+    """What is drawn, as it is saved by the page, (height, width, 3)."""
+    with page.expect_download() as download:
+        page.keyboard.press("c")
+    return matplotlib.image.imread(download.value.path(), "png")[..., :3]
+
+
+def n_blue_and_vermilion(page):
+    """How many pixels have the colours of prey and of hunters."""
+    red, green, blue = picture(page).reshape(-1, 3).T
     return int(((blue - red > 0.35) & (blue > green)).sum()), int(((red - blue > 0.35) & (red > green)).sum())
 
 
@@ -306,19 +311,27 @@ def test_entities_are_drawn_in_the_colours_of_their_teams(page, hunted):
         page.keyboard.press("l")
     page.locator("#trail").evaluate("(s) => { s.value = '0'; s.dispatchEvent(new Event('input')); }")
     page.keyboard.press("g")
-    prey, hunters = colours_in_the_middle(page)
+    prey, hunters = n_blue_and_vermilion(page)
     assert prey > 100
     assert hunters > 50
     for _ in range(6):
         page.keyboard.press("+")
     page.keyboard.press("w")
-    assert colours_in_the_middle(page) != (prey, hunters)
+    assert n_blue_and_vermilion(page) != (prey, hunters)
     page.keyboard.press("s")
-    assert colours_in_the_middle(page)[0] > 2 * prey
+    assert n_blue_and_vermilion(page)[0] > 2 * prey
     page.keyboard.press("0")
-    assert colours_in_the_middle(page) == (prey, hunters)
+    assert n_blue_and_vermilion(page) == (prey, hunters)
     page.locator("#teams .team").last.click()
-    assert colours_in_the_middle(page)[1] == 0
+    assert n_blue_and_vermilion(page)[1] == 0
+
+
+def test_the_saved_picture_has_the_name_of_the_game_and_the_time(page):
+    seek(page, 2.5)
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Save the picture").click()
+    assert download.value.suggested_filename == "hunt-2.5s.png"
+    assert matplotlib.image.imread(download.value.path(), "png").shape[:2] == (650, 900)
 
 
 def test_a_team_can_be_hidden(page):
@@ -405,12 +418,13 @@ def test_bases_boundaries_and_terrain_are_drawn(watched, tmp_path):
     page = opened(watched, write_html(recording, tmp_path / "page.html").path)
     # The mission's background is a light one, so the page is light.
     assert page.evaluate("() => [player.drawn.theme, document.body.dataset.theme]") == ["mission", "light"]
-    with_all = page.locator("#view").screenshot()
+    with_all = picture(page)
     page.locator("#tools [data-do=settings]").click()
     page.locator("#regions").uncheck()
     page.locator("#tools [data-do=settings]").click()
     wait_until(page, "!player.drawn.regions && player.isDrawn")
-    assert page.locator("#view").screenshot() != with_all
+    changed = np.abs(picture(page) - with_all).max(axis=2) > 0.05
+    assert 0.02 < changed.mean() < 0.98
 
 
 def test_two_fingers_come_nearer_on_a_narrow_screen(watched, hunted):

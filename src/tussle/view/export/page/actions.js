@@ -65,6 +65,7 @@ function actionsOf(player) {
     solid: change(() => { drawn.wire = false; }),
     grid: change(() => { drawn.grid = !drawn.grid; }),
     theme: () => player.nextTheme(),
+    save: () => player.savePicture(),
 
     help: dialog('help'),
     info: dialog('info'),

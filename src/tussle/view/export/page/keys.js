@@ -28,6 +28,7 @@ const KEYS = [
     [['w', 's'], 'wireframe, solid', 'wire', 'solid'],
     [['g'], 'grid and axes', 'grid'],
     [['k'], 'dark, light', 'theme'],
+    [['c'], 'save the picture', 'save'],
   ]],
   ['Page', [
     [['h', '?'], 'keys', 'help'],

@@ -61,6 +61,8 @@ class Layer {
     for (const name of ['id', 'team', 'block', 'first', 'last']) this[name] = reader.ints(this.nTracks);
     this.start = this.times[0];
     this.end = this.times[this.times.length - 1];
+    // A slider gives back times whose last digits differ from those it was given.
+    this.slack = 1e-6 * ((this.end - this.start) / Math.max(1, this.times.length - 1));
     this.tracksOf = new Map();
     for (let k = 0; k < this.nTracks; k++) {
       if (!this.tracksOf.has(this.id[k])) this.tracksOf.set(this.id[k], []);
@@ -121,13 +123,13 @@ class Layer {
     return isOfItsTeam ? block.colour : this.data.teams[this.teamIndex.get(this.team[track])].colour;
   }
 
-  /** Number of the last frame that is not after a time. */
+  /** Number of the last frame that is not after a time, within a millionth of a frame. */
   frameAt(t) {
     let low = 0;
     let high = this.times.length;
     while (high - low > 1) {
       const middle = (low + high) >> 1;
-      if (this.times[middle] <= t) low = middle;
+      if (this.times[middle] <= t + this.slack) low = middle;
       else high = middle;
     }
     return low;

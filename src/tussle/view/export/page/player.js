@@ -330,6 +330,25 @@ class Player {
     this.drawnTime = clock.t;
   }
 
+  /** Hand what is drawn, without the panels, to the reader as a PNG file. */
+  savePicture() {
+    const { canvas } = this;
+    const picture = document.createElement('canvas');
+    [picture.width, picture.height] = [canvas.width, canvas.height];
+    const pen = picture.getContext('2d');
+    // The canvas keeps what is drawn only until the browser has shown it.
+    this.draw();
+    pen.drawImage(canvas, 0, 0);
+    pen.drawImage(this.overlay.canvas, 0, 0);
+    picture.toBlob((blob) => {
+      const link = element('a');
+      link.href = URL.createObjectURL(blob);
+      link.download = `${this.page.title.replace(/[^\p{L}\p{N}]+/gu, '-').slice(0, 60)}-${this.clock.t.toFixed(this.clock.decimals)}s.png`;
+      link.click();
+      URL.revokeObjectURL(link.href);
+    });
+  }
+
   /** What is seen through. */
   drawThrough(view) {
     const { gl, scenery, drawn } = this;

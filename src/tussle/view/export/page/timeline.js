@@ -44,7 +44,7 @@ class Clock {
   stepFrames(n) {
     const { times } = this.layer;
     const { frame } = this;
-    const isBetween = n < 0 && this.t > times[frame];
+    const isBetween = n < 0 && this.t > times[frame] + this.layer.slack;
     this.isPlaying = false;
     this.t = times[between(frame + n + (isBetween ? 1 : 0), 0, times.length - 1)];
   }
