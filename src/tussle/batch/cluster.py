@@ -1,0 +1,124 @@
+"""A batch on several machines: who plays it on a Dask cluster, and how one is reached."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from tussle.batch.cluster_course import Course
+from tussle.errors import BatchError, MissingExtraError, ParameterError
+
+if TYPE_CHECKING:
+    from tussle.batch.executors import Executor
+    from tussle.batch.tasks import Beat, Finished, Package, Run
+
+Client = Any
+"""That of `distributed`, which annotates a part of itself."""
+
+
+def missing_extra(package: str) -> MissingExtraError:
+    """What to do where a package of the extra is not installed."""
+    return MissingExtraError(
+        f"several machines need {package}, which is not installed: pip install 'tussle[cluster]'"
+    )
+
+
+@contextmanager
+def executor_for(scheduler: str | None, slurm: str | None, stack: int | None) -> Iterator[Executor]:
+    """Who plays where the command line names another place; it is left when the context ends.
+
+    Args:
+        scheduler: Address of a Dask scheduler.
+        slurm: What to ask of Slurm, see `cluster_slurm.Jobs`.
+        stack: Worlds side by side; None chooses by the mission.
+
+    Raises:
+        ParameterError: Neither is named, or both are.
+        BatchError: Nobody answers there.
+        MissingExtraError: A package is not installed.
+    """
+    if (scheduler is None) == (slurm is None):
+        raise ParameterError("a batch is played by a scheduler or by Slurm; give one of the two")
+    if slurm is not None:
+        from tussle.batch.cluster_slurm import Jobs, on_slurm
+
+        with on_slurm(Jobs.parse(slurm), stack) as executor:
+            yield executor
+    else:
+        assert scheduler is not None
+        with connect(scheduler) as client:
+            yield OnDask(client, stack)
+
+
+@contextmanager
+def connect(address: str, timeout: float = 10.0) -> Iterator[Client]:
+    """A client of the Dask scheduler at an address, such as "tcp://node1:8786".
+
+    Args:
+        address: Where it listens.
+        timeout: How long to wait for it [s].
+
+    Raises:
+        BatchError: Nobody answers there.
+        MissingExtraError: Dask is not installed.
+    """
+    try:
+        import distributed
+    except ImportError:
+        raise missing_extra("distributed") from None
+    try:
+        client: Any = distributed.Client(address, timeout=timeout, set_as_default=False)  # type: ignore[no-untyped-call]
+    except (OSError, ValueError, TypeError) as error:
+        reason = f"within {timeout:g} s" if isinstance(error, TimeoutError | OSError) else f"({error})"
+        raise BatchError(
+            f"{address}: no Dask scheduler answers {reason}; `dask scheduler` starts one and says its address"
+        ) from None
+    try:
+        yield client
+    finally:
+        client.close()
+
+
+class OnDask:
+    """Plays on the workers of a Dask cluster, one stack at a time on each: start them with one thread.
+
+    The runs of a worker that is lost are played again elsewhere. Those over which workers die again and again are played one by one, and
+    one that goes on so is recorded as failed.
+
+    Args:
+        client: Of the cluster.
+        stack: Worlds side by side; None chooses by the mission.
+        n_workers: Workers that are expected, where they come one by one.
+        patience: How long to wait while there is no worker [s]; None is for ever.
+        look: Called now and then while there is no worker, with how long there has been none [s]; raises where none can come.
+
+    Raises:
+        ParameterError: The client is asynchronous.
+    """
+
+    def __init__(
+        self,
+        client: Client,
+        stack: int | None = None,
+        *,
+        n_workers: int = 0,
+        patience: float | None = 60.0,
+        look: Callable[[float], None] | None = None,
+    ) -> None:
+        if client.asynchronous:
+            raise ParameterError("the client is asynchronous; a batch takes Client(..., asynchronous=False)")
+        self.client, self.stack, self.n_workers = client, stack, n_workers
+        self.patience, self.look = patience, look
+
+    def play(self, package: Package, runs: Sequence[Run]) -> Generator[Finished | Beat, None, None]:
+        """What comes of the runs.
+
+        Raises:
+            BatchError: The scheduler or all workers are gone, or a worker cannot play this batch.
+        """
+        course = Course(self, package, runs)
+        try:
+            yield from course.play()
+        finally:
+            course.stop()
