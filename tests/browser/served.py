@@ -17,6 +17,8 @@ from tussle.view.page.server import Page
 # viser's page says these where everything is well: a note to its authors, and what drawing without a graphics card is.
 HARMLESS = ("THREE.Clock: This module has been deprecated", "GPU stall due to ReadPixels", "Software WebGL")
 SMALL = {"width": 820, "height": 520}
+UNHURRIED = {"gui_update_period": "300"}
+"""Time between frames [ms]: each takes a browser without a graphics card about as long, and it looks after the panel in between."""
 PATIENCE = 90.0
 """A browser that draws without a graphics card on a busy machine [s]."""
 
@@ -40,6 +42,7 @@ class Watched:
         self.tab.goto(page.url)
         self.visitor = self.wait(lambda: next((v for v in page.visitors() if id(v) not in known), None))
         self.tab.get_by_text("step ").first.wait_for()
+        self.await_drawing()
 
     def _listen(self) -> None:
         tab, url = self.tab, self.page.url
@@ -57,6 +60,14 @@ class Watched:
         tab.on("request", lambda request: look(request.url))
         tab.on("websocket", lambda socket: look(socket.url))
         tab.on("requestfailed", lambda request: self.trouble.append(f"failed: {request.url[:200]}"))
+
+    def await_drawing(self) -> None:
+        """Wait until the picture is there and the browser has time again: its first takes long without a graphics card."""
+        self.tab.evaluate(
+            "() => new Promise(done => {"
+            "  let n = 0; const count = () => ++n < 10 ? requestAnimationFrame(count) : done(n);"
+            "  requestAnimationFrame(count); })"
+        )
 
     def wait(self, condition, timeout: float = PATIENCE):
         """Wait until it holds, while the browser goes on; what it gave."""

@@ -2,7 +2,7 @@
 
 import pytest
 from recorded_games import hunt
-from served import Watched
+from served import UNHURRIED, Watched
 
 from tussle import Recorder, Simulation
 from tussle.view import Recording
@@ -19,7 +19,7 @@ def replayed(chromium, tmp_path_factory):
     ):
         simulation.step(200)
     replay = Replay(Recording(folder), is_paused=True)
-    with Page(replay, mission=replay.mission, viewer=replay.viewer) as page:
+    with Page(replay, mission=replay.mission, viewer=replay.viewer | UNHURRIED) as page:
         watched = Watched(chromium, page)
         yield replay, watched
         watched.close()

@@ -2,9 +2,11 @@
 
 import socket
 import sys
+import time
 
 import numpy as np
 import pytest
+from page_client import PageClient
 from recorded_games import hunt
 
 from tussle import Simulation
@@ -280,6 +282,18 @@ def test_a_page_for_others_says_so(live):
     with Page(live, host="0.0.0.0") as page:
         assert not page.is_local
         assert page.url.startswith("http://127.0.0.1:")
+
+
+def test_the_missions_time_between_frames_counts(live):
+    with Page(live, viewer={"gui_update_period": "200"}) as page, PageClient(page.url) as client:
+        client.wait(page.visitors)
+        live.resume()
+        client.wait(lambda: page.pusher.n_pushed >= 2)
+        began, pushed = time.monotonic(), page.pusher.n_pushed
+        client.wait(lambda: page.pusher.n_pushed >= pushed + 4)
+        assert time.monotonic() - began > 0.5
+    with Page(live, viewer={"gui_update_period": "soon"}) as page:
+        assert "gui_update_period 'soon' is no time in ms; frames are sent as fast as can be" in page.notes
 
 
 def test_without_viser_the_extra_and_the_other_way_are_named(live, monkeypatch):

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from tussle.view.page.visitor import Visitor
 
 PERIOD = 1.0 / 30.0
-"""Time between two frames [s]."""
+"""Least time between two frames [s]."""
 SLOW_PERIOD = 0.25
 """Of numbers, trails and links, which nobody reads faster [s]."""
 NAP = 0.1
@@ -41,6 +41,7 @@ class Pusher:
         display: What is shown.
         parts: Stage, labels, trails, overlays, drawn and panel, by name.
         visitors: Those who watch now.
+        period: Time between two frames [s], no less than `PERIOD`.
 
     Attributes:
         error: What ended the thread; None while it goes on.
@@ -54,9 +55,11 @@ class Pusher:
         display: Display,
         parts: Parts,
         visitors: Callable[[], list[Visitor]],
+        period: float = PERIOD,
     ) -> None:
         self._server, self._source, self._display = server, source, display
         self._parts, self._visitors = parts, visitors
+        self._period = max(period, PERIOD)
         self.error: BaseException | None = None
         self.n_pushed = 0
         self._moments: deque[float] = deque(maxlen=64)
@@ -79,7 +82,7 @@ class Pusher:
                 visitors = self._visitors()
                 if visitors:
                     self.push(visitors)
-                    due = max(due + PERIOD, time.monotonic())
+                    due = max(due + self._period, time.monotonic())
                     self._is_stopping.wait(due - time.monotonic())
                 else:
                     self._is_stopping.wait(NAP)

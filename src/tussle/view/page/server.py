@@ -33,6 +33,8 @@ LOOPBACK = "127.0.0.1"
 PORT = 8123
 """Where it is served when no port is asked for and this one is free; else at one of the next."""
 MOST_PORTS = 100
+MOST_PERIOD = 60.0
+"""Between two frames [s]: longer is no moving picture."""
 TEAL = (0, 110, 120)
 
 
@@ -74,13 +76,19 @@ class Page:
         self.display = Display.of(frame, source.looks, source.scenery, viewer, mission)
         self._visitors: dict[int, Visitor] = {}
         self._lock = threading.Lock()
+        self._own_notes: list[str] = []
+        self._period = self._read_period(viewer.get("gui_update_period"))
         port = _free_port(host, port)
         with _silence():
             self._server = _server_class(viser)(
                 host=host, port=port, label=f"tussle · {source.name}", verbose=False
             )
         self._is_stopped = False
-        self._set_scene(frame)
+        try:
+            self._set_scene(frame)
+        except BaseException:
+            self._stop_serving()
+            raise
         self._server.on_client_connect(self._welcome)
         self._server.on_client_disconnect(self._farewell)
 
@@ -108,7 +116,20 @@ class Page:
         )  # fmt: skip
         stage.show(frame)
         panel.show(frame, 0.0)
-        self.pusher = Pusher(server, source, display, parts, self.visitors)
+        self.pusher = Pusher(server, source, display, parts, self.visitors, self._period)
+
+    def _read_period(self, text: Any) -> float:
+        """Time between frames as the mission has it, in ms there [s]; 0 where it says nothing of use."""
+        try:
+            period = 0.0 if text is None else 1e-3 * float(text)
+        except ValueError:
+            period = -1.0
+        if not 0.0 <= period < MOST_PERIOD:
+            self._own_notes.append(
+                f"gui_update_period {text!r} is no time in ms; frames are sent as fast as can be"
+            )
+            return 0.0
+        return period
 
     def _set_first_view(self) -> None:
         view, camera, size = (
@@ -172,7 +193,7 @@ class Page:
     @property
     def notes(self) -> list[str]:
         """What the user should know, one line each."""
-        notes = [*self.source.looks.notes, *self.source.scenery.notes, *self.source.notes]
+        notes = [*self._own_notes, *self.source.looks.notes, *self.source.scenery.notes, *self.source.notes]
         return list(dict.fromkeys(notes))
 
     @property
@@ -189,8 +210,11 @@ class Page:
         if not self._is_stopped:
             self._is_stopped = True
             self.pusher.stop()
-            with _silence():
-                self._server.stop()
+            self._stop_serving()
+
+    def _stop_serving(self) -> None:
+        with _silence():
+            self._server.stop()
 
     def __enter__(self) -> Self:
         return self
