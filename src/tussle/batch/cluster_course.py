@@ -94,11 +94,15 @@ class Course:
         inbox = self.inbox  # the client keeps what it calls, and shall not keep the batch
         self.client.subscribe_topic(TOPIC, lambda event: inbox.put((BEAT, event[1])))
         while self.waiting or self.again or self.under_way:
-            self._look()
-            self._hand_out()
-            for kind, news in self._news():
-                deal_with[kind](*news)
-            self._hand_out()  # before the results are dealt with, for which no worker needs to wait
+            try:
+                self._look()
+                self._hand_out()
+                for kind, news in self._news():
+                    deal_with[kind](*news)
+                self._hand_out()  # before the results are dealt with, for which no worker needs to wait
+            except BatchError:
+                yield from self.finished  # what came before the trouble
+                raise
             finished, self.finished = self.finished, []
             yield from finished
             yield Beat(sum(chunk.part for chunk in self.under_way.values()))
