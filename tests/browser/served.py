@@ -30,9 +30,12 @@ class Watched:
         browser: The browser.
         page: The page that is served.
         size: Of the window.
+        is_awaited: Wait until the first picture is drawn.
     """
 
-    def __init__(self, browser: Browser, page: Page, size: dict[str, int] | None = None) -> None:
+    def __init__(
+        self, browser: Browser, page: Page, size: dict[str, int] | None = None, *, is_awaited: bool = True
+    ) -> None:
         self.page = page
         self.trouble: list[str] = []
         known = {id(v) for v in page.visitors()}
@@ -42,7 +45,8 @@ class Watched:
         self.tab.goto(page.url)
         self.visitor = self.wait(lambda: next((v for v in page.visitors() if id(v) not in known), None))
         self.tab.get_by_text("step ").first.wait_for()
-        self.await_drawing()
+        if is_awaited:
+            self.await_drawing()
 
     def _listen(self) -> None:
         tab, url = self.tab, self.page.url

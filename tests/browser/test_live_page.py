@@ -151,7 +151,7 @@ def test_a_click_on_an_entity_chooses_it_and_the_camera_follows_it(game):
 
 def test_two_browsers_watch_on_their_own_and_steer_together(chromium, game):
     live, page, watched = game
-    other = Watched(chromium, page, {"width": 600, "height": 400})
+    other = Watched(chromium, page, {"width": 500, "height": 360})
     try:
         other.visitor.choose(3)
         assert watched.visitor.chosen != 3
@@ -170,7 +170,7 @@ def test_a_browser_that_hangs_holds_up_neither_game_nor_page(chromium, game):
     live, page, watched = game
     flag = "--tussle-hangs"
     browser = another_browser(chromium, flag)
-    hanging = Watched(browser, page, SMALL)
+    hanging = Watched(browser, page, SMALL, is_awaited=False)
     family = family_of(flag)
     assert len(family) > 1
     live.seek(0.0)

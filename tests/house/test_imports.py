@@ -79,7 +79,9 @@ def test_declared_dependencies_are_the_imported_ones():
     extras = [name for name in project["optional-dependencies"] if name not in ("test", "frames")]
     used = {name.lower() for name in third_party("src")}
     declared = requirements(project, *extras)
-    assert used - {"llvmlite", "mpl_toolkits"} == declared, "llvmlite comes with numba, mpl_toolkits with matplotlib"
+    assert used - {"llvmlite", "mpl_toolkits"} == declared, (
+        "llvmlite comes with numba, mpl_toolkits with matplotlib"
+    )
 
 
 @pytest.mark.parametrize("path", python_files("src"), ids=relative)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import sys
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import cached_property
@@ -13,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tussle.batch.executors import FEW, Executor, InProcess, Processes
+from tussle.batch.executors import Executor, InProcess, Processes
 from tussle.batch.plan import Plan
 from tussle.batch.points import values_text, variables_of
 from tussle.batch.sampling import method_for
@@ -35,6 +37,9 @@ if TYPE_CHECKING:
 
 MOST_CHECKED = 16
 """Groups whose game is begun before the batch, to tell what is wrong with it at once."""
+
+WORTH_A_PROCESS = 4.0
+"""Seconds of games, as one alone takes them, that are worth a process: it starts in one, and games side by side take a third and less."""
 
 MOST_UNASKED = (100_000, 1_000_000)
 """Seeds and runs of a batch that stops by what it finds, where nobody says how many are too many."""
@@ -103,6 +108,7 @@ class Batch:
         self._options = {**options, "plugin_files": tuple(plugin_files)}
         self._ends_by_time = ends_by_time
         self._is_checked = False
+        self._game_s = 0.0  # that a game takes, by its second step
         self._rules: set[str] = set()  # that have been checked
         self.loaded = self._read()
         self.missions = list(self._missions(self.plan.points))
@@ -181,7 +187,11 @@ class Batch:
         if not self._is_checked:
             for point in points:
                 with suppress(PluginError), self.simulation(point) as simulation:
+                    simulation.step()  # loads or compiles what it needs
+                    began = time.perf_counter()
                     simulation.step()
+                    game_s = (time.perf_counter() - began) * self.missions[point].steps
+                    self._game_s = max(self._game_s, game_s)
             self._is_checked = True
         if until is not None and str(until) not in self._rules:
             _check_rule(until, [self.missions[point] for point in points], self.plan.first_seed)
@@ -297,11 +307,22 @@ class Batch:
     def executor(
         self, processes: int | None = None, stack: int | None = None, n_runs: int | None = None
     ) -> Executor:
-        """Who plays best on this machine: this process where there is little to do, else one process per core."""
-        n_runs = self.plan.n_runs if n_runs is None else n_runs
+        """Who plays best on this machine: this process where there is little to do, else one process per core.
+
+        Args:
+            processes: How many, whatever there is to do.
+            stack: Worlds side by side in each.
+            n_runs: How many there are to play; by default all.
+
+        Raises:
+            TussleError: The mission cannot be played.
+        """
         pool = Processes(processes, stack)
         if processes is None:
-            pool.n = max(1, min(pool.n, n_runs // FEW))
+            self.check()
+            n_runs = self.plan.n_runs if n_runs is None else n_runs
+            n_worth = math.ceil(n_runs * self._game_s / WORTH_A_PROCESS)
+            pool.n = max(1, min(pool.n, n_runs, n_worth))
         return InProcess(stack) if pool.n == 1 else pool
 
     def play(

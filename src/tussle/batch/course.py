@@ -99,7 +99,7 @@ class _Course:
         self.tell(self.progress)
         for runs in () if self.is_enough else self._rounds(done):
             self.batch.check(None if self.stop is None else self.stop.rule)
-            who = executor or self.batch.executor(n_runs=self.plan.n_runs - len(done))
+            who = executor or self.batch.executor(n_runs=len(runs))
             with closing(who.play(self.batch.package, runs)) as messages:
                 for message in messages:
                     if isinstance(message, Finished):

@@ -24,9 +24,6 @@ if TYPE_CHECKING:
 
     from tussle.mission import Mission
 
-FEW = 4
-"""Runs that are worth a process: fewer are played sooner than it has started."""
-
 
 class Executor(Protocol):
     """Plays runs, in any order."""

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import atexit
 import hashlib
 import math
 import pickle
 import platform
+import shutil
 import sys
 import tempfile
 from collections.abc import Iterable, Mapping
@@ -123,6 +125,7 @@ class PluginFile:
         if not path.is_file() or path.read_text(encoding="utf-8") != self.text:
             digest = hashlib.blake2b(self.text.encode(), digest_size=8).hexdigest()
             folder = Path(tempfile.mkdtemp(prefix=f"tussle-{digest}-"))
+            atexit.register(shutil.rmtree, folder, ignore_errors=True)
             path = folder / path.name
             path.write_text(self.text, encoding="utf-8")
         load_plugin_file(path, self.module)

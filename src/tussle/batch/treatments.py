@@ -198,6 +198,9 @@ def group_points(
 
     Returns:
         The treatment of each point, and what those who play need.
+
+    Raises:
+        MissionError: A mission cannot be handed to other processes.
     """
     groups: dict[Signature, list[int]] = {}
     values = []
@@ -213,8 +216,22 @@ def group_points(
             treatments[n] = Treatment(group, {path: values[n][path] for path in differing})
     bases = [missions[numbers[0]] for numbers in groups.values()]
     return [t for t in treatments if t is not None], Package(
-        tuple(pickle.dumps(m) for m in bases), tuple(plugin_files)
+        tuple(_pickled(m) for m in bases), tuple(plugin_files)
     )
+
+
+def _pickled(mission: Mission) -> bytes:
+    """A mission as it is handed to those who play.
+
+    Raises:
+        MissionError: It cannot be.
+    """
+    try:
+        return pickle.dumps(mission)
+    except (pickle.PicklingError, AttributeError, TypeError) as error:
+        raise MissionError(
+            f"the mission cannot be handed to those who play it: {error}; plugins are defined at the head of a module or in a plugin file"
+        ) from None
 
 
 def exactly(mission: Mission) -> str:

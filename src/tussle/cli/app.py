@@ -10,6 +10,7 @@ import typer
 import tussle
 from tussle.cli.analyze import analyze
 from tussle.cli.batch_commands import batch
+from tussle.cli.export import ExportCommand, export
 from tussle.cli.optimize import optimize
 from tussle.cli.options import (
     EPILOG,
@@ -263,6 +264,7 @@ def new(
         pages.show_written(written.files, written.next_steps)
 
 
+app.command(epilog=EPILOG, cls=ExportCommand)(export)
 for command in (view, replay, plot, batch, analyze, report, optimize):
     app.command(epilog=EPILOG)(command)
 

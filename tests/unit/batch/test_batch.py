@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 
 import gambles
 import numpy as np
@@ -234,12 +235,31 @@ def test_there_is_no_other_run():
             batch.simulation(number)
 
 
-def test_little_is_played_in_this_process():
-    batch = Batch(game(), runs=1000)
-    assert isinstance(batch.executor(n_runs=7), InProcess)
-    assert isinstance(batch.executor(processes=1), InProcess)
-    assert batch.executor(processes=3, stack=5).n == 3
-    assert batch.executor(stack=5, n_runs=3).stack == 5
+class Slow(Metric):
+    def step(self, w):
+        time.sleep(0.05)
+
+
+def test_little_is_played_in_this_process_and_much_in_several():
+    quick, slow = Batch(game(), runs=20), Batch(game().replace(metrics=[Slow()]), runs=20)
+    assert isinstance(quick.executor(), InProcess)
+    assert isinstance(slow.executor(n_runs=2), InProcess)  # a second
+    if Processes().n > 1:
+        assert 2 <= slow.executor().n <= Processes().n
+    assert isinstance(slow.executor(processes=1), InProcess)
+    assert (quick.executor(processes=3, stack=5).n, quick.executor(processes=3, stack=5).stack) == (3, 5)
+    assert quick.executor(stack=5).stack == 5
+
+
+def test_a_mission_that_cannot_be_handed_on_is_told():
+    class Local(Metric):
+        pass
+
+    with pytest.raises(
+        MissionError,
+        match=r"cannot be handed to those who play it: .*Local.*; plugins are defined at the head",
+    ):
+        Batch(game().replace(metrics=[Local()]))
 
 
 # -- directories ----------------------------------------------------------------------------------------------------------------
@@ -553,13 +573,6 @@ def test_progress_counts_runs_failures_and_wins(mission):
     assert [d[0] for d in done] == list(range(13))
     assert done[-1] == (12, 2, 10)
     assert results.n_failed == 2
-
-
-class Slow(Metric):
-    def step(self, w):
-        import time
-
-        time.sleep(0.05)
 
 
 def test_an_interrupt_keeps_what_is_finished(tmp_path):

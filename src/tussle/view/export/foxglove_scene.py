@@ -124,7 +124,7 @@ def standing(recording: Recording, ns: int) -> list[Json]:
         }
         found.append(entity(f"base {i}", WORLD, ns, notes=[("team", str(base.team))], spheres=[sphere]))
     for region in scenery.boundaries:
-        rgb = NOBODYS if region.team is None else looks.colour(region.team)
+        rgb = looks.colour(region.team) if region.team else NOBODYS  # team 0 is nobody's
         surface = triangles(region.mesh, rgb, 0.3 if region.is_wall else 0.06)
         found.append(entity(region.name, WORLD, ns, triangles=[surface], lines=[lines(region.outline, rgb)]))
     if scenery.terrain is not None:

@@ -24,7 +24,7 @@ import numpy as np
 
 from tussle.errors import MissingExtraError, ParameterError, ViewError
 from tussle.view.export import foxglove_schemas as schemas
-from tussle.view.export.film.survey import spacing_of
+from tussle.view.export.film.survey import crowd_of
 from tussle.view.export.foxglove_cast import Cast, Log
 from tussle.view.export.foxglove_scene import WORLD, as_json, stamp, standing
 from tussle.view.export.html import kept_frames
@@ -69,7 +69,7 @@ def write_mcap(
     path: str | Path,
     *,
     period: float | None = None,
-    scale: float | None = None,
+    scale: float = 1.0,
     show: Callable[[int, int], None] | None = None,
 ) -> McapReport:
     """Write a run as an MCAP file of JSON messages, compressed with Zstandard; of one that was cut short, what there is.
@@ -78,7 +78,7 @@ def write_mcap(
         recording: The run.
         path: The file, replaced where it is there.
         period: Time between moments that are kept [s]; None keeps all. Events are all kept.
-        scale: Factor by which models are larger than life; None for one with which they can be seen.
+        scale: Factor by which models are larger than they would be, which is so that they can be seen.
         show: Told after each moment how many are written, and of how many.
 
     Raises:
@@ -98,9 +98,7 @@ def write_mcap(
         part.open("wb") as file,
         Messages(file, recording, report) as messages,
     ):
-        cast = Cast(
-            recording, kept, messages.put, messages.ns, usual_scale(recording) if scale is None else scale
-        )
+        cast = Cast(recording, kept, messages.put, messages.ns, scale * usual_scale(recording))
         first = float(recording.t[0])
         messages.put("/scene", first, {"deletions": [], "entities": standing(recording, messages.ns(first))})
         log = Log(recording, messages.put, messages.ns, cast)
@@ -121,7 +119,7 @@ def write_mcap(
 def usual_scale(recording: Recording) -> float:
     """Factor by which models are larger than life so that they can be told from afar; 1 where they are near each other."""
     spacings = [
-        spacing_of(recording.frame(int(i)))[0]
+        crowd_of(recording.frame(int(i)))[0]
         for i in np.unique(np.linspace(0, recording.n_frames - 1, N_SPACINGS).round())
     ]
     known = [s for s in spacings if math.isfinite(s)]

@@ -163,7 +163,7 @@ class Comparison(Replay):
 
     @property
     def notes(self) -> list[str]:
-        said = f"A is {self.a.path}, B, paler, is {self.b.path}"
+        said = f"A is {self.a.path.name}; B, paler, is {self.b.path.name}"
         if self.difference is None:
             both = min(self.a.t[-1], self.b.t[-1])
             return [

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 ROOM = 1.6
 """How much wider the grid is than what is shown."""
 LINES_PER_SECTION = 5
+AMBIENT, SUN = 1.6, 2.0
+"""Of the lights; pi in all shows a surface in its colour (three.js, from r155 on: radiance is light over pi)."""
 SEEN_THROUGH = 0.06
 """Opacity of regions, which what is in them must be seen through."""
 
@@ -44,6 +46,14 @@ def draw_ground(scene: Any, scenery: Scenery, looks: Looks, root: str = "", *, h
     if scenery.terrain is not None:
         mesh = scenery.terrain.mesh()
         scene.add_mesh_simple(f"{root}/terrain", mesh.vertices, mesh.faces, color=TERRAIN, side="double")
+
+
+def light(scene: Any) -> None:
+    """Light that leaves the teams their colours: viser's own is so bright that what faces up is white."""
+    scene.configure_default_lights(enabled=False, cast_shadow=False)
+    scene.configure_environment_map(None)
+    scene.add_light_ambient("/light", intensity=AMBIENT)
+    scene.add_light_directional("/light/sun", intensity=SUN, position=(-1.0, -2.0, 3.0), cast_shadow=False)
 
 
 def background_image(scenery: Scenery) -> np.ndarray:

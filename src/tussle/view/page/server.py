@@ -14,7 +14,7 @@ from tussle.view.page.camera import FIELD_OF_VIEW, whole_view
 from tussle.view.page.comparing import Comparison
 from tussle.view.page.display import Display
 from tussle.view.page.drawn import Drawn
-from tussle.view.page.ground import background_image, draw_ground
+from tussle.view.page.ground import background_image, draw_ground, light
 from tussle.view.page.keyboard import Keyboard
 from tussle.view.page.labels import Labels
 from tussle.view.page.overlays import Overlays
@@ -99,7 +99,7 @@ class Page:
             show_share_button=False, show_logo=False, control_width="medium", brand_color=TEAL
         )
         gui.main_panel.dock_right()
-        scene.configure_default_lights(cast_shadow=False)
+        light(scene)
         if source.scenery.background is not None:
             scene.set_background_image(background_image(source.scenery))
         self._set_first_view()

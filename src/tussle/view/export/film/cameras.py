@@ -10,7 +10,7 @@ import numpy as np
 
 from tussle.errors import ViewError
 from tussle.view.export.film.moments import Moments
-from tussle.view.export.film.survey import box_of, calm_width, evened, pose_of, reached, spacing_of, survey
+from tussle.view.export.film.survey import box_of, calm_width, crowd_of, evened, pose_of, reached, survey
 from tussle.view.export.film.view import ANGLE, View
 
 ELEVATION = math.radians(33.0)
@@ -20,11 +20,14 @@ AZIMUTH = math.radians(-105.0)
 FOLLOW_ELEVATION = math.radians(11.0)
 MARGIN = 0.86
 """Share of the picture that what is to be seen may fill."""
-LARGEST, SMALLEST = 0.026, 0.011
-"""Bounds of a model's length as a share of the picture's width; between them it is the distance to the nearest other."""
+LARGEST, SMALLEST, LEGIBLE = 0.026, 0.0085, 10.0
+"""Bounds of a model's length as a share of the picture's width; the least it should have [pixels]."""
+CROWDING = 1.3
+"""Length of a model, where it lies between these bounds, as a share of the side of the square that each entity has of the picture; it
+is not longer than the distance to the nearest other either."""
 FOLLOWED = 0.075
 """Length of a followed model as a share of the picture's width."""
-N_SPACINGS = 200
+N_CROWDS = 200
 """Moments at which distances between entities are looked at."""
 UP, NORTH = np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0])
 
@@ -42,6 +45,7 @@ class Camera(ABC):
     def __init__(self, moments: Moments, size: tuple[int, int], zoom: float, scale: float) -> None:
         self.moments = moments
         self.aspect = size[0] / size[1]
+        self.smallest = min(LARGEST, max(SMALLEST, LEGIBLE / size[0]))
         self.zoom = zoom
         self.scale = scale
         looks, n = moments.recording.looks, len(moments.recording.blocks)
@@ -78,27 +82,35 @@ class Whole(Camera):
         low, high = boxes[:, :3], boxes[:, 3:]
         width = calm_width(moments, self._t)
         self._middle = evened(0.5 * (low + high), width)
-        needed = [self._half_height(*boxes) for boxes in zip(low, high, self._middle, strict=True)]
+        reaches = [self._reaches(*boxes) for boxes in zip(low, high, self._middle, strict=True)]
+        needed = [self._half_height(*reach) for reach in reaches]
         self._half = evened(reached(np.array(needed), width)[:, None], width)[:, 0] / zoom
-        self._length = self._lengths(2.0 * self._half * self.aspect)
+        area = np.array([np.ptp(right) * np.ptp(up) for right, up, _ in reaches])
+        self._length = self._lengths(2.0 * self._half * self.aspect, area)
 
-    def _half_height(self, low: np.ndarray, high: np.ndarray, middle: np.ndarray) -> float:
-        """Half of the height that has to be seen at the middle for a box to be in the picture [m]."""
+    def _reaches(self, low: np.ndarray, high: np.ndarray, middle: np.ndarray) -> np.ndarray:
+        """How far the corners of a box are to the right of the middle, above it and nearer than it [m], (3, 8)."""
+        sides = np.array([low, high])
         corners = np.array(
-            [[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])]
+            [[sides[i, 0], sides[j, 1], sides[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)]
         )
-        right, up, back = View(middle + self._back, middle, self._up, 1.0).axes() @ (corners - middle).T
+        reaches: np.ndarray = View(middle + self._back, middle, self._up, 1.0).axes() @ (corners - middle).T
+        return reaches
+
+    def _half_height(self, right: np.ndarray, up: np.ndarray, back: np.ndarray) -> float:
+        """Half of the height that has to be seen at the middle for corners to be in the picture [m]."""
         needed = np.maximum(np.abs(right) / self.aspect, np.abs(up)) / MARGIN
         # What is nearer than the middle looks larger.
         toward = 0.0 if self._is_parallel else back * math.tan(0.5 * ANGLE)
         # From nearer than this, models would look larger than LARGEST.
         return max(float((needed + toward).max()), 0.5 * self.longest / LARGEST / self.aspect)
 
-    def _lengths(self, seen: np.ndarray) -> np.ndarray:
-        """Length of models at each surveyed moment, of which this width is seen [m], (m,)."""
-        t, spacing = survey(self.moments, spacing_of, 1, N_SPACINGS)
-        between = np.interp(self._t, t, spacing[:, 0]) if np.isfinite(spacing).all() else LARGEST * seen
-        length = np.clip(between, SMALLEST * seen, LARGEST * seen)
+    def _lengths(self, seen: np.ndarray, area: np.ndarray) -> np.ndarray:
+        """Length of models at each surveyed moment, (m,), of which so much is seen across and in which all are in so large an area."""
+        t, crowds = survey(self.moments, crowd_of, 2, N_CROWDS)
+        spacing, count = (np.interp(self._t, t, column) for column in crowds.T)
+        length = np.fmin(spacing, CROWDING * np.sqrt(area / count))
+        length = np.clip(np.where(np.isfinite(length), length, np.inf), self.smallest * seen, LARGEST * seen)
         return self.scale * evened(length[:, None], calm_width(self.moments, self._t))[:, 0]
 
     def view(self, t: float) -> View:

@@ -121,7 +121,7 @@ class Encoder:
         if code != 0:
             self._part.unlink(missing_ok=True)
             said = self._said.decode(errors="replace").strip().splitlines()
-            raise unwritable(self.path, said[-1] if said else f"ffmpeg ended with code {code}")
+            raise unwritable(self.path, said[0] if said else f"ffmpeg ended with code {code}")
         try:
             self._part.replace(self.path)
         except OSError as error:
@@ -180,6 +180,8 @@ class GifEncoder(Encoder):
 
     def __init__(self, path: Path, drawn: tuple[int, int], size: tuple[int, int], fps: float) -> None:
         self._gif = path
+        if path.is_dir():
+            raise unwritable(path, "it is a directory")
         share = min(1.0, GIF_WIDTH / size[0])
         small = (round(share * size[0]), round(share * size[1]))
         try:
@@ -220,7 +222,7 @@ class GifEncoder(Encoder):
         done = subprocess.run(command, capture_output=True, check=False)  # noqa: S603 (words, and no shell)
         if done.returncode:
             said = done.stderr.decode(errors="replace").strip().splitlines()
-            raise unwritable(self._gif, said[-1] if said else f"ffmpeg ended with code {done.returncode}")
+            raise unwritable(self._gif, said[0] if said else f"ffmpeg ended with code {done.returncode}")
 
     def abandon(self) -> None:
         """Leave nothing behind."""

@@ -58,7 +58,6 @@ class Stage:
         self._line_width = line_width
         self._pyvista = pv
         plotter = self._plotter
-        plotter.background_color = [round(v) for v in self.tints.haze]
         plotter.disable_anti_aliasing()
         plotter.ren_win.SetMultiSamples(0)
         self._below = plotter.renderer
@@ -144,7 +143,7 @@ class Stage:
             circle[:, 2] = max(scenery.ground, 0.0) + low
             self._set_lines(self._add_lines(self._below, 2.0), *_inked(circle, (*rgb, 220.0)))
         for region in scenery.boundaries:
-            rgb = EDGE if region.team is None else looks.colour(region.team)
+            rgb = looks.colour(region.team) if region.team else EDGE  # team 0 is nobody's
             # A plane has no edges but those of the piece that is shown.
             self._add_surface(self._above, _tinted(region.mesh, (*rgb, 60.0 if region.is_wall else 12.0)))
             ends = region.outline.reshape(-1, 3).astype(float)
@@ -203,6 +202,10 @@ class Stage:
         width = ground.ground_width(view, z, self.size[0] / self.size[1])
         self._dome.position, self._dome.scale = view.eye, 0.5 * FAR * view.distance
         self._dome.visibility = ground.sees_sky(view, z, ground.REACH * width)
+        # Seen from straight above, ground has one colour, and painting it would take a quarter of the time.
+        self._disc.visibility = not view.is_parallel
+        behind = self.tints.ground if view.is_parallel else self.tints.haze
+        self._below.SetBackground([c / 255.0 for c in behind])
         # So much lower that what lies on it is not lost in the rounding of depths.
         self._disc.position = (view.target[0], view.target[1], z - 0.003 * view.distance)
         self._disc.scale = ground.REACH * width
@@ -211,7 +214,7 @@ class Stage:
     def _place_models(self, frame: Frame, view: View) -> None:
         names = [self.looks.model(b) for b in range(int(frame.block.max(initial=-1)) + 1)]
         model_of = np.array([*names, ""])[frame.block]
-        for name in {*names, *self._models}:
+        for name in sorted({*names, *self._models}):
             if name not in self._models:
                 self._models[name] = _Crowd(self, name)
             rows = np.flatnonzero(model_of == name)

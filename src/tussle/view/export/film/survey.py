@@ -56,12 +56,12 @@ def box_of(frame: Frame) -> np.ndarray:
     return np.concatenate([low, high])
 
 
-def spacing_of(frame: Frame) -> np.ndarray:
-    """Median of the distances to the nearest other [m], (1,); nan where nobody has one."""
+def crowd_of(frame: Frame) -> np.ndarray:
+    """Median of the distances to the nearest other [m], nan where nobody has one, and how many there are, (2,)."""
     if len(frame) < 2:
-        return np.array([np.nan])
+        return np.array([np.nan, len(frame)])
     distance, _ = cKDTree(frame.pos).query(frame.pos, k=2)
-    return np.array([np.median(distance[:, 1])])
+    return np.array([np.median(distance[:, 1]), len(frame)])
 
 
 def pose_of(frame: Frame, who: int) -> np.ndarray:

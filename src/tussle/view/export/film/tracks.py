@@ -13,7 +13,8 @@ from tussle.view.frame import Frame
 N_POINTS = 28
 """Points of a trail."""
 OPACITY = 0.75
-"""Of a trail where it begins; it fades to nothing."""
+"""Of a trail where it begins, of up to FEW entities; it fades to nothing."""
+FEW = 200
 RING_TIME = 0.8
 """How long a ring is seen [s of film]."""
 N_CIRCLE = 20
@@ -66,7 +67,8 @@ class Tracks:
         fade = np.clip(1.0 - np.array(ages) / self._length, 0.0, 1.0) ** 1.5
         colours = np.empty((*ends.shape[:3], 4))
         colours[..., :3] = self._colours[frame.block][:, None, None]
-        colours[..., 3] = 255.0 * OPACITY * np.stack([fade[:-1], fade[1:]], axis=1)
+        opacity = OPACITY * min(1.0, (FEW / len(frame)) ** 0.35)
+        colours[..., 3] = 255.0 * opacity * np.stack([fade[:-1], fade[1:]], axis=1)
         is_there = np.isfinite(ends).all(axis=(2, 3))
         far = np.linalg.norm(ends[:, :, 0] - ends[:, :, 1], axis=-1) > self._moments.leap
         kept = is_there & ~far
