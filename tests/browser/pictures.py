@@ -19,7 +19,7 @@ from tussle.view.page.comparing import Comparison
 from tussle.view.page.server import Page
 
 IMAGES = Path(__file__).resolve().parents[2] / "docs" / "images"
-SIZE = {"width": 940, "height": 520}
+SIZE = {"width": 900, "height": 480}
 GAME = "predator_prey"
 
 
