@@ -16,7 +16,7 @@ from tussle.view import Live, Looks, scenery_of
 from tussle.view.entity import EntityState, Letter, Reading
 from tussle.view.frame import Frame, Happening
 from tussle.view.page import overlays, words
-from tussle.view.page.camera import FIELD_OF_VIEW, view_from_above, whole_view
+from tussle.view.page.camera import FIELD_OF_VIEW, opening, view_from_above, whole_view
 from tussle.view.page.clock import chosen_events, event_text, marks
 from tussle.view.page.display import Display, reach_of
 from tussle.view.page.server import Page
@@ -94,6 +94,48 @@ def test_a_ray_meets_the_ground_or_not():
     assert on_ground((1.0, 2.0, 10.0), (0.0, 1.0, -1.0), 4.0).tolist() == [1.0, 8.0, 4.0]
     assert on_ground((0.0, 0.0, 10.0), (1.0, 0.0, 0.0), 0.0) is None
     assert on_ground((0.0, 0.0, 10.0), (1.0, 0.0, 0.5), 0.0) is None
+
+
+def test_the_missions_camera_is_where_one_begins():
+    scene = scenery_of(None)
+    said = {"mode": "offset", "follow_id": "2", "pos": "0,-100,50", "focal_point": "0 0 10"}
+    told = opening(scene, said)
+    assert told.view.position.tolist() == [0.0, -100.0, 50.0]
+    assert told.view.target.tolist() == [0.0, 0.0, 10.0]
+    assert (told.mode, told.follow, told.notes) == ("behind", 2, ())
+    usual = opening(scene, None)
+    assert np.array_equal(usual.view.position, whole_view(scene).position)
+    assert (usual.mode, usual.follow) == ("free", None)
+
+
+@pytest.mark.parametrize(
+    ("said", "told"),
+    [
+        ({"pos": "1,2"}, "camera pos '1,2' is not x, y, z in m"),
+        ({"focal_point": "a b c"}, "camera focal_point 'a b c' is not x, y, z"),
+        ({"mode": "fly"}, "camera mode 'fly' is none of free, follow, offset"),
+        ({"follow_id": "all"}, "camera follow_id 'all' is no id"),
+    ],
+)
+def test_a_camera_that_makes_no_sense_is_told_and_is_the_usual_one(said, told):
+    scene = scenery_of(None)
+    made = opening(scene, said)
+    assert told in made.notes[0]
+    assert np.array_equal(made.view.position, whole_view(scene).position)
+    assert (made.mode, made.follow) == ("free", None)
+
+
+def test_who_comes_follows_whom_the_mission_says(live):
+    with (
+        Page(live, viewer={"camera": {"mode": "follow", "follow_id": "2"}}) as page,
+        PageClient(page.url) as client,
+    ):
+        client.wait(page.visitors)
+        frame = live.frame()
+        client.wait(
+            lambda: np.allclose(client.camera.get("target", np.nan), frame.pos[frame.row_of(2)], atol=1e-2)
+        )
+        client.wait(lambda: client.value("Mode") == "follow")
 
 
 # -- trails -----------------------------------------------------------------------------------------------------------------------

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import threading
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -59,6 +60,58 @@ def view_from_above(scenery: Scenery) -> View:
     distance = 1.1 * FITTING * scenery.size / math.sin(0.5 * FIELD_OF_VIEW)
     # A hair to the south: from exactly above, north could be anywhere.
     return View(middle + np.array([0.0, -1e-3 * distance, distance]), middle)
+
+
+@dataclass(frozen=True)
+class Opening:
+    """How one who comes sees the game at first.
+
+    Attributes:
+        view: Where the camera is and looks.
+        mode: One of `MODES`.
+        follow: Id of the entity that is chosen; None for nobody.
+        notes: What the mission asks for and does not get, one line each.
+    """
+
+    view: View
+    mode: str = "free"
+    follow: int | None = None
+    notes: tuple[str, ...] = ()
+
+
+def opening(scenery: Scenery, said: Mapping[str, Any] | None) -> Opening:
+    """As the mission's `<camera>` says; what it leaves out, or says wrongly, is as usual.
+
+    Args:
+        scenery: What stands still.
+        said: The attributes of the tag; None without one.
+    """
+    said, notes = said or {}, []
+    usual = whole_view(scenery)
+
+    def vector(name: str, default: np.ndarray) -> np.ndarray:
+        try:
+            found = np.array([float(part) for part in str(said[name]).replace(",", " ").split()])
+        except ValueError:
+            found = np.zeros(0)
+        if found.shape == (3,) and np.isfinite(found).all():
+            return found
+        notes.append(f"camera {name} {said[name]!r} is not x, y, z in m; it is left out")
+        return default
+
+    target = vector("focal_point", usual.target) if "focal_point" in said else usual.target
+    position = vector("pos", usual.position) if "pos" in said else usual.position
+    if np.array_equal(target, position):
+        target = position + np.array([1.0, 0.0, 0.0])
+    mode = {"follow": "follow", "offset": "behind", "free": "free"}.get(str(said.get("mode", "free")).lower())
+    if mode is None:
+        notes.append(f"camera mode {said['mode']!r} is none of free, follow, offset; it is free")
+    follow = str(said.get("follow_id", ""))
+    if follow and not follow.isdigit():
+        notes.append(f"camera follow_id {follow!r} is no id; nobody is followed")
+    return Opening(
+        View(position, target), mode or "free", int(follow) if follow.isdigit() else None, tuple(notes)
+    )
 
 
 class Camera:

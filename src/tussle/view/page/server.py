@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from tussle.errors import MissingExtraError, ViewError
 from tussle.view.live import Live
-from tussle.view.page.camera import FIELD_OF_VIEW, whole_view
+from tussle.view.page.camera import FIELD_OF_VIEW, opening
 from tussle.view.page.comparing import Comparison
 from tussle.view.page.display import Display
 from tussle.view.page.drawn import Drawn
@@ -78,6 +78,8 @@ class Page:
         self._lock = threading.Lock()
         self._own_notes: list[str] = []
         self._period = self._read_period(viewer.get("gui_update_period"))
+        self._opening = opening(source.scenery, viewer.get("camera"))
+        self._own_notes += self._opening.notes
         port = _free_port(host, port)
         with _silence():
             self._server = _server_class(viser)(
@@ -132,11 +134,8 @@ class Page:
         return period
 
     def _set_first_view(self) -> None:
-        view, camera, size = (
-            whole_view(self.source.scenery),
-            self._server.initial_camera,
-            self.source.scenery.size,
-        )
+        view, camera = self._opening.view, self._server.initial_camera
+        size = self.source.scenery.size
         camera.position, camera.look_at = tuple(view.position), tuple(view.target)
         camera.fov = FIELD_OF_VIEW
         camera.near, camera.far = 1e-4 * size, 100.0 * size
@@ -145,6 +144,9 @@ class Page:
 
     def _welcome(self, client: Any) -> None:
         visitor = Visitor(client, self.source, self.display, self.name_of)
+        if self._opening.follow is not None:
+            visitor.choose(self._opening.follow)
+        visitor.set_mode(self._opening.mode)
         with self._lock:
             self._visitors[client.client_id] = visitor
 
