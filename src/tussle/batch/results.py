@@ -30,6 +30,7 @@ from tussle.batch.statistics import (
 )
 from tussle.batch.survival import N_TIMES, Survival, survival_of
 from tussle.batch.variables import Choice, Range, Variable
+from tussle.batch.variables import written as text_of
 from tussle.errors import MissingExtraError, ParameterError, listed, nearest_name
 
 if TYPE_CHECKING:
@@ -393,7 +394,7 @@ def _variable(said: dict[str, Any]) -> Variable:
 def _original(value: Any, variable: Variable) -> Any:
     """A value as it was given: a column of texts holds numbers and truth values as texts where others are texts."""
     if isinstance(value, str) and isinstance(variable, Choice):
-        return next((given for given in variable.values if str(given) == value), value)
+        return next((given for given in variable.values if text_of(given) == value), value)
     return value
 
 

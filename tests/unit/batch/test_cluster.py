@@ -243,6 +243,9 @@ def test_workers_that_come_later_play():
 
 
 def test_closing_it_ends_what_is_under_way(cluster, client, tmp_path):
+    def executing(dask_worker):  # in here, since a worker cannot import this file
+        return dask_worker.state.executing_count
+
     batch = walk(tmp_path, "time.sleep(0.001)", runs=8, settings={"run.end": "1e5"})
     runs = [batch.run(i) for i in range(batch.plan.n_runs)]
     with closing(OnDask(client).play(batch.package, runs)) as messages:
@@ -252,11 +255,6 @@ def test_closing_it_ends_what_is_under_way(cluster, client, tmp_path):
         time.sleep(0.05)
     assert not any(client.run(executing).values())
     assert not [key for key in cluster.scheduler.tasks if str(key).startswith("tussle")]
-
-
-def executing(dask_worker):
-    """What a worker is at."""
-    return dask_worker.state.executing_count
 
 
 # -- what travels -----------------------------------------------------------------------------------------------------------

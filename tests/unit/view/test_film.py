@@ -421,7 +421,7 @@ def test_the_film_goes_on_while_the_game_does(hunted, tmp_path):
 
 def test_a_gif_is_small_and_has_half_the_pictures(flown, tmp_path):
     report = write_film(
-        flown, gif=tmp_path / "a.gif", options=FilmOptions(stop=2.0, speed=1.0, size=(960, 540))
+        flown, gif=tmp_path / "a.gif", options=FilmOptions(stop=0.8, speed=1.0, size=(960, 540))
     )
     assert report.n_pictures == 21
     seen = pictures(tmp_path / "a.gif", (640, 360))
