@@ -20,6 +20,8 @@ ALIASES = {"queue": "partition", "mem": "memory", "time": "walltime"}
 TAKES = "it takes JOBS[,NAME=VALUE...], such as 20,cores=8,walltime=8:00:00,partition=short"
 ASK_EVERY = 10.0
 """Time between two questions to Slurm [s]."""
+ANSWERED_WITHIN = 60.0
+"""Time in which Slurm answers, however busy it is [s]."""
 REPLACED_WITHIN = 30.0
 """Time without workers after which jobs are looked for [s]: Dask replaces one 15 s after it has seen its worker go."""
 
@@ -156,7 +158,13 @@ def _check(script: str) -> None:
 
 
 def _slurm(*command: str, text: str = "") -> subprocess.CompletedProcess[str]:
-    return subprocess.run(command, input=text, capture_output=True, text=True, check=False)  # noqa: S603 - Slurm's own commands
+    """What one of Slurm's own commands says."""
+    try:
+        return subprocess.run(  # noqa: S603
+            command, input=text, capture_output=True, text=True, check=False, timeout=ANSWERED_WITHIN
+        )
+    except subprocess.TimeoutExpired:
+        return subprocess.CompletedProcess(command, 1, "", f"it does not answer within {ANSWERED_WITHIN:g} s")
 
 
 def _said(text: str) -> str:
