@@ -9,11 +9,14 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
 from playwright.sync_api import Browser, sync_playwright
 from served import Watched
 
-from tussle import Recorder, Simulation
+from tussle import Block, Mission, Recorder, Simulation
+from tussle.api import Autonomy, Output
 from tussle.mission import read_mission
+from tussle.stock import SingleIntegrator
 from tussle.view import Live, Recording
 from tussle.view.page.comparing import Comparison
 from tussle.view.page.server import Page
@@ -83,7 +86,49 @@ def two_runs(browser: Browser) -> None:
     shutil.rmtree(folder)
 
 
-PICTURES: dict[str, Callable[[Browser], None]] = {"chase": chase, "two-runs": two_runs}
+class Hesitant(Autonomy):
+    """The plugin of docs/view.md, with more places to think about."""
+
+    velocity = Output("velocity_x velocity_y velocity_z", unit="m/s")
+
+    def step(self, g):
+        angle = np.linspace(0.0, 2.0 * np.pi, 32, endpoint=False)
+        around = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle])
+        circles = np.concatenate([radius * around for radius in (6.0, 12.0, 18.0)], axis=1)
+        places = g.pos[:, :, None] + circles[:, None, :]
+        cost = np.hypot(places[0] - 100.0, places[1])
+        best = cost.argmin(axis=1)
+        self.velocity[:] = 0.3 * circles[:, best]
+        g.draw.cloud(pos=places.reshape(3, -1), value=cost.ravel(), size=2.0)
+        g.draw.vectors(pos=g.pos, direction=2.0 * self.velocity, colour=(200, 0, 0))
+        g.draw.sphere(pos=(100.0, 0.0, 0.0), radius=6.0, colour=(0, 150, 90), opacity=0.4)
+        g.draw.text(pos=(100.0, 0.0, 10.0), text="goal")
+
+
+def shapes(browser: Browser) -> None:
+    """What a plugin thinks of the places around."""
+    drones = Block(
+        name="drone", team=2, count=5, position=(0, 0, 5), placement="uniform", half_width=(60, 60, 0), autonomy=Hesitant(),
+        motion=SingleIntegrator(),
+    )  # fmt: skip
+    mission = Mission(blocks=[drones], end=60, name="Five drones on their way")
+    camera = {"pos": "-70,-90,80", "focal_point": "45,5,5"}
+    viewer = {
+        "entities": {"drone": {"visual_model": "iris"}},
+        "camera": camera,
+        "grid_spacing": 10.0,
+        "scale": 2.0,
+    }
+    with Simulation(mission, 1) as simulation, Live(simulation, is_paused=True, viewer=viewer) as live:
+        page = Page(live, viewer=viewer)
+        with shown(browser, page) as watched:
+            watched.wait(lambda: live._sketchbook.is_open)
+            live.step(30)
+            watched.wait(lambda: watched.reads("step 30"))
+            shoot(watched, "shapes")
+
+
+PICTURES: dict[str, Callable[[Browser], None]] = {"chase": chase, "two-runs": two_runs, "shapes": shapes}
 
 
 def main() -> None:

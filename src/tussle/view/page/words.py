@@ -60,7 +60,7 @@ def numbers_html(source: Source, frame: Frame, pushed: float, notes: Sequence[st
         f"<div>wanted {speed(source.warp)}, {reached} · {pushed:.0f} frames/s</div>",
         _teams(source.teams, frame, source.looks),
         _result(source.result()),
-        _counts(source.happenings, frame.t),
+        _counts(source.happenings, source.span[0], frame.t),
     ]
     if source.error is not None:
         parts.append(f'<div style="color:#b00020">{escape(str(source.error))}</div>')
@@ -100,8 +100,9 @@ def _by_team(values: Mapping[Any, Any]) -> str:
     return ", ".join(f"{team}: {number(value)}" for team, value in values.items()) or "–"
 
 
-def _counts(happenings: Iterable[Happening], t: float) -> str:
-    counts = Counter(h.kind for h in happenings if h.t < t)
+def _counts(happenings: Iterable[Happening], first: float, t: float) -> str:
+    """What has happened before a time [s]; those who were there at the beginning were not born."""
+    counts = Counter(h.kind for h in happenings if h.t < t and not (h.kind == "birth" and h.t <= first))
     words = [
         f"{counts[k]:,} {k}{'' if counts[k] == 1 else 's'}"
         for k in ("birth", "death", "capture", "collision")
