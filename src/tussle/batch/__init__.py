@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from tussle.batch.batch import Batch
+    from tussle.batch.cluster import OnDask
+    from tussle.batch.cluster_slurm import on_slurm
     from tussle.batch.executors import InProcess, Processes
     from tussle.batch.reload import load_batch
     from tussle.batch.results import Results
@@ -17,12 +19,14 @@ __all__ = [
     "Batch",
     "Choice",
     "InProcess",
+    "OnDask",
     "Processes",
     "Range",
     "Results",
     "Study",
     "load_batch",
     "load_study",
+    "on_slurm",
     "optimize",
 ]
 
@@ -30,12 +34,14 @@ _LAZY = {
     "Batch": "batch",
     "Choice": "variables",
     "InProcess": "executors",
+    "OnDask": "cluster",
     "Processes": "executors",
     "Range": "variables",
     "Results": "results",
     "Study": "search.study",
     "load_batch": "reload",
     "load_study": "search.study_store",
+    "on_slurm": "cluster_slurm",
     "optimize": "search.optimization",
 }
 
