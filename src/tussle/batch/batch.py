@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import re
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -292,7 +293,8 @@ class Batch:
 
     def default_directory(self) -> Path:
         """Where the batch goes unless told otherwise: the same for the same batch, so that the same command goes on with it."""
-        return Path("batches") / f"{self.name}-{self.fingerprint[:8]}"
+        plain = re.sub(r"[^A-Za-z0-9_.-]+", "_", self.name).strip("._") or "mission"
+        return Path("batches") / f"{plain[:80]}-{self.fingerprint[:8]}"
 
     def is_played_in(self, directory: str | Path, until: Until | None = None) -> bool:
         """All of it is in a directory already.
@@ -323,7 +325,7 @@ class Batch:
             n_runs = self.plan.n_runs if n_runs is None else n_runs
             n_worth = math.ceil(n_runs * self._game_s / WORTH_A_PROCESS)
             pool.n = max(1, min(pool.n, n_runs, n_worth))
-        return InProcess(stack) if pool.n == 1 else pool
+        return InProcess(stack, is_replaceable=processes is None) if pool.n == 1 else pool
 
     def play(
         self,
