@@ -5,8 +5,10 @@ from __future__ import annotations
 import pyarrow as pa
 import pytest
 
+from tussle.batch import Batch
 from tussle.batch.plan import MOST_RUNS, Plan
 from tussle.errors import ParameterError
+from tussle.mission import read_mission
 
 THREE = [{"speed": 1.0}, {"speed": 2.0}, {"speed": 3.0}]
 
@@ -85,3 +87,10 @@ def test_what_is_no_plan_is_refused(options, words):
 def test_a_plan_has_points():
     with pytest.raises(ParameterError, match="at least one point"):
         Plan([], 1)
+
+
+def test_a_title_with_slashes_names_one_directory():
+    mission = read_mission("predator_prey", {"prey": "2", "run.end": "1"}).mission
+    directory = Batch(mission.replace(name="a/b ../c"), runs=1).default_directory()
+    assert directory.parent.name == "batches"
+    assert directory.name.startswith("a_b_.._c-")
