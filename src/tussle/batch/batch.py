@@ -187,7 +187,7 @@ class Batch:
         points = sorted(first.values())[:MOST_CHECKED]
         if not self._is_checked:
             for point in points:
-                with suppress(PluginError), self.simulation(point) as simulation:
+                with suppress(PluginError, SystemExit), self.simulation(point) as simulation:
                     simulation.step()  # loads or compiles what it needs
                     began = time.perf_counter()
                     simulation.step()

@@ -13,6 +13,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from tussle.batch import store as files
+from tussle.batch.executors import InProcess, Processes
 from tussle.batch.plan import Plan
 from tussle.batch.progress import Progress
 from tussle.batch.results import Results
@@ -50,6 +51,7 @@ class _Course:
         keep: Receives each finished run.
         stop: Says when it is enough.
         on_progress: Told how far it is.
+        is_dangerous: A plugin may have killed who played before, so this process does not play itself unless it is told to.
     """
 
     def __init__(
@@ -59,7 +61,9 @@ class _Course:
         keep: Callable[[Finished], None],
         stop: Stop | None,
         on_progress: Callable[[Progress], None] | None,
+        is_dangerous: bool = False,
     ) -> None:
+        self.is_dangerous = is_dangerous
         self.batch, self.plan, self.keep, self.stop = batch, plan, keep, stop
         self.progress = Progress(plan.n_runs)
         self.tell = on_progress or (lambda _: None)
@@ -100,6 +104,8 @@ class _Course:
         for runs in () if self.is_enough else self._rounds(done):
             self.batch.check(None if self.stop is None else self.stop.rule)
             who = executor or self.batch.executor(n_runs=len(runs))
+            if self.is_dangerous and isinstance(who, InProcess) and who.is_replaceable:
+                who = Processes(1, who.stack)
             with closing(who.play(self.batch.package, runs)) as messages:
                 for message in messages:
                     if isinstance(message, Finished):
@@ -183,7 +189,7 @@ def play_in_directory(
         plan = dataclasses.replace(batch.plan, n_seeds=max(batch.plan.n_seeds, n_kept))
         _begin(store, batch, plan, n_kept, before, until, command)
         stop = None if until is None else Stop(until, plan, n_kept)
-        course = _Course(batch, plan, store.add, stop, on_progress)
+        course = _Course(batch, plan, store.add, stop, on_progress, store.was_killed)
         known, _ = files.merged(path, played, plan.table())
         done = course.take_over(files.finished_in(known))
         try:

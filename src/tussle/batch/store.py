@@ -202,6 +202,9 @@ class Store:
     Args:
         path: The directory; made if need be.
 
+    Attributes:
+        was_killed: Who played before was killed, or ended otherwise without a word.
+
     Raises:
         BatchError: Another process plays into it, or it holds something else.
         RecordError: It cannot be written.
@@ -218,7 +221,7 @@ class Store:
                 raise BatchError(
                     f"{path}: holds something that is no batch ({min(foreign)}); choose another directory"
                 )
-            self._lock: IO[str] = (path / LOCK).open("a")
+            self._lock: IO[str] = (path / LOCK).open("a+")
         try:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
@@ -230,6 +233,10 @@ class Store:
                 RuntimeWarning,
                 stacklevel=2,
             )
+        with told(path):
+            self.was_killed = (path / LOCK).stat().st_size > 0
+            self._lock.write(f"{os.getpid()}\n")
+            self._lock.flush()
 
     @property
     def info(self) -> dict[str, Any] | None:
@@ -305,6 +312,7 @@ class Store:
         try:
             self.close_part()
         finally:
+            self._lock.truncate(0)
             self._lock.close()
 
 

@@ -6,6 +6,7 @@ import os
 import pty
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import termios
@@ -306,6 +307,21 @@ def test_runs_that_fail_are_counted_and_if_all_fail_it_is_an_error(here):
         assert last.startswith("error: all runs failed; the first: Trouble, step 2: plugins.py:")
         assert last.endswith("RuntimeError: this seed goes wrong")
         assert len(err.splitlines()) == 1 + again
+
+
+def test_a_plugin_that_kills_the_command_kills_it_only_once(tussle, folder):
+    command = ("batch", "chance.xml", "how=crash", "--runs", 4, "--stack", 1, "--out", "out", *PLUGINS)
+    tussle(*command, code=-signal.SIGSEGV)  # so few are played in the process itself
+    assert load_batch(folder / "out").runs["seed"].to_pylist() == [1, 2]
+    done = tussle(*command)
+    assert told(done.stderr).splitlines() == [
+        "note: 2 of 4 runs were there already, in out",
+        "note: 1 of 4 runs failed and are left out above; tussle analyze tells which",
+    ]
+    failed = load_batch(folder / "out").failed().to_pylist()
+    assert [(row["seed"], row["error"]) for row in failed] == [
+        (3, "the process that played it died: signal 11, Segmentation fault")
+    ]
 
 
 # -- on a terminal --------------------------------------------------------------------------------------------------------------

@@ -131,7 +131,7 @@ MISSION = """\
 """
 
 
-def game(how="never", mood="never", reds=4, end=1.0, **odds):
+def game(how="never", mood="never", reds=4, end=1.0, at=2, **odds):
     """The same, made in Python."""
     blocks = [
         Block(name="reds", team=1, count=reds, health=2.0, autonomy=Nervous(how=mood), motion=Still()),
@@ -139,5 +139,5 @@ def game(how="never", mood="never", reds=4, end=1.0, **odds):
     ]
     return Mission(
         blocks=blocks, dt=0.1, end=end, end_conditions=("time", "one_team"), name="A game of chance",
-        interactions=[Roulette(**odds), Trouble(how=how)], metrics=[Chips()],
+        interactions=[Roulette(**odds), Trouble(how=how, at=at)], metrics=[Chips()],
     )  # fmt: skip

@@ -208,8 +208,9 @@ def test_a_mission_that_cannot_be_played_is_told_before_anything_is_written(tmp_
     assert not (tmp_path / "out").exists()
 
 
-def test_what_fails_with_a_seed_does_not_keep_the_batch_from_being_played():
-    batch = Batch(game(how="start"), runs=3, first_seed=3)
+@pytest.mark.parametrize("trouble", [{"how": "start"}, {"how": "leave", "at": 0}], ids=["start", "leave"])
+def test_what_fails_with_a_seed_does_not_keep_the_batch_from_being_played(trouble):
+    batch = Batch(game(**trouble), runs=3, first_seed=3)
     batch.check()
     assert batch.play(executor=InProcess()).n_failed == 1
 
