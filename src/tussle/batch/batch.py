@@ -325,7 +325,7 @@ class Batch:
             n_runs = self.plan.n_runs if n_runs is None else n_runs
             n_worth = math.ceil(n_runs * self._game_s / WORTH_A_PROCESS)
             pool.n = max(1, min(pool.n, n_runs, n_worth))
-        return InProcess(stack) if pool.n == 1 else pool
+        return InProcess(stack, is_replaceable=processes is None) if pool.n == 1 else pool
 
     def play(
         self,

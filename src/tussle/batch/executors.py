@@ -79,10 +79,12 @@ class InProcess:
 
     Args:
         stack: Worlds side by side; None chooses by the mission.
+        is_replaceable: Nobody has asked for this very process, so that another one may play where that is safer.
     """
 
-    def __init__(self, stack: int | None = None) -> None:
+    def __init__(self, stack: int | None = None, is_replaceable: bool = False) -> None:
         self.stack = _whole("stack", stack)
+        self.is_replaceable = is_replaceable
 
     def play(self, package: Package, runs: Sequence[Run]) -> Generator[Finished | Beat, None, None]:
         """What comes of the runs."""
