@@ -12,6 +12,7 @@ import numpy as np
 
 from tussle import Block, Mission
 from tussle.api import Autonomy, Interaction, Metric, Param, State
+from tussle.batch import InProcess
 from tussle.stock import Still
 
 THIS = Path(__file__)
@@ -141,3 +142,20 @@ def game(how="never", mood="never", reds=4, end=1.0, at=2, **odds):
         blocks=blocks, dt=0.1, end=end, end_conditions=("time", "one_team"), name="A game of chance",
         interactions=[Roulette(**odds), Trouble(how=how, at=at)], metrics=[Chips()],
     )  # fmt: skip
+
+
+def rows(results):
+    """All that came of a batch, but for what it cost."""
+    return results.table.drop_columns(["cpu_s", "host"]).to_pylist(), results.alive.to_pylist()
+
+
+def counted(batch, path, until=None, executor=None):
+    """Play, and say how many runs were played now."""
+    numbers = []
+    results = batch.play(
+        path,
+        executor or InProcess(5),
+        until=until,
+        on_progress=lambda p: numbers.append((p.n_before, p.n_done)),
+    )
+    return results, numbers[-1][1] - numbers[-1][0]

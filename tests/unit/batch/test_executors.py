@@ -13,7 +13,7 @@ from types import ModuleType
 
 import gambles
 import pytest
-from gambles import game, is_bad
+from gambles import game, is_bad, rows
 
 from tussle.api import Metric
 from tussle.batch import Batch, InProcess, Processes
@@ -22,11 +22,6 @@ from tussle.batch.tasks import Beat, Run
 from tussle.errors import BatchError, ParameterError
 
 POINTS = [{"reds.count": n, "Roulette.odds": odds} for n in (4, 2) for odds in (0.1, 0.4)]
-
-
-def rows(results):
-    """All that came of a batch, but for what it cost."""
-    return results.table.drop_columns(["cpu_s", "host"]).to_pylist(), results.alive.to_pylist()
 
 
 # -- runs that wait -----------------------------------------------------------------------------------------------------------
