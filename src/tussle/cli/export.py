@@ -179,6 +179,8 @@ def export(
     _refuse_idle({"--at": at}, ("png",), files)
     _refuse_idle({"--scale": scale}, (*FILMS, "mcap"), files)
     _refuse_idle({"--period": period}, ("html", "mcap"), files)
+    if period is not None and not 0.0 < period < float("inf"):
+        raise typer.BadParameter(f"--period {period:g} is not allowed; it takes a number > 0")
     with told(debug):
         from tussle.cli.exporting import Source, film_options, write_outputs
 

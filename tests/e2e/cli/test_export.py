@@ -111,6 +111,7 @@ def test_a_run_that_was_killed_is_exported_as_far_as_it_goes(tussle, played, fol
         (("--png", "--size", "95x64"), "it takes even numbers of pixels"),
         (("--mp4", "--from", "noon"), "--from: 'noon'"),
         (("--mp4", "--speed", "0"), "speed = 0.0 is not allowed"),
+        (("--mcap", "--period", "0"), "--period 0 is not allowed; it takes a number > 0"),
     ],
 )
 def test_what_means_nothing_is_refused(tussle, folder, arguments, message):

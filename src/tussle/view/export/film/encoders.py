@@ -209,7 +209,7 @@ class GifEncoder(Encoder):
             palette = self.path.with_name("palette.png")
             self._run("-i", self.path, "-vf", f"palettegen=max_colors={GIF_COLOURS}:stats_mode=full", palette)
             beside = self.path.with_name("film.gif")
-            mapping = "[0][1]paletteuse=dither=bayer:bayer_scale=5:diff_mode=rectangle"
+            mapping = "[0][1]paletteuse=dither=none:diff_mode=rectangle"
             self._run("-i", self.path, "-i", palette, "-lavfi", mapping, beside)
             beside.replace(self._gif)
         except OSError as error:
