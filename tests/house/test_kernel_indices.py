@@ -10,7 +10,7 @@ import ast
 import textwrap
 
 import pytest
-from tree import ROOT, parsed, python_files, relative
+from tree import parsed, python_files, relative
 
 ENGINE_INDICES = {
     *("order", "place", "places", "queries", "index"),

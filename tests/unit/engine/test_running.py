@@ -561,7 +561,7 @@ def hunt():
     hunter = block(
         "hunter", team=2, count=2, autonomy=Predator(allow_prey_switching=False), motion=Unicycle()
     )
-    prey = block("prey", count=3, position=(500, 0, 0), variance=(100, 100, 0))
+    prey = block("prey", team=1, count=3, position=(500, 0, 0), variance=(100, 100, 0))
     return mission(hunter, prey, interactions=[SimpleCapture()])
 
 
