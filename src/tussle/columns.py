@@ -330,7 +330,16 @@ class Ragged(Numbers):
 
 
 class Handle(Column):
-    """An opaque object per row: a process, a socket, a flight model (see `Plugin.open_one`)."""
+    """An opaque object per row: a process, a socket, a flight model (see `Plugin.open_one`).
+
+    Args:
+        max_worlds: Largest stack of worlds that the objects allow; None is any.
+        doc: One line that says what it is.
+    """
+
+    def __init__(self, max_worlds: int | None = None, doc: str = "") -> None:
+        super().__init__(doc=doc)
+        self.max_worlds = max_worlds
 
 
 class Children(Column):

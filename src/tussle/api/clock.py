@@ -21,6 +21,10 @@ class Clock:
         self.step = np.zeros(n_worlds, np.int64)
         self.common = 0
 
+    def at(self, phase: float) -> np.ndarray:
+        """Time of each world after a part of its step [s], (n_worlds,); phase 1 is exactly the beginning of the next."""
+        return self.start + (self.step + phase) * self.dt
+
     @property
     def t(self) -> np.ndarray:
         """Time of each world [s], (n_worlds,)."""

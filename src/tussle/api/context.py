@@ -13,7 +13,7 @@ import numpy as np
 
 from tussle.api.clock import Clock
 from tussle.api.draw import Draw
-from tussle.errors import TussleError, listed, nearest_name
+from tussle.errors import PluginError, TussleError, listed, nearest_name
 from tussle.rng import stream_key
 from tussle.scene import Scene
 
@@ -32,6 +32,7 @@ class Context:
         topic: Gives the topic of (network, name, type).
         threads: Number of threads that a kernel over blocks may use.
         draw: Where shapes go.
+        fail: Ends a world with an error; the others go on.
     """
 
     clock: Clock
@@ -43,6 +44,7 @@ class Context:
     topic: Callable[..., Any] | None = None
     threads: int = 1
     draw: Draw = field(default_factory=Draw)
+    fail: Callable[[int, PluginError], None] | None = None
     _pool: ThreadPoolExecutor | None = None
 
     def __post_init__(self) -> None:

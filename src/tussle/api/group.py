@@ -20,7 +20,7 @@ from tussle.api.pairs import (
     find_nearest_row,
     find_pairs,
 )
-from tussle.errors import listed, nearest_name
+from tussle.errors import PluginError, listed, nearest_name
 from tussle.neighbors.index import Index
 from tussle.scene import Scene
 
@@ -35,7 +35,7 @@ class GroupView:
     Attributes:
         n: Number of rows.
         first: Row of this view's row 0 in the body table.
-        dt: Time that this call covers [s].
+        dt: Time since this plugin's last call in these worlds [s]; before the first, the period of its calls.
         pos: Position [m], (3, n), world frame. Likewise vel [m/s], quat (w, x, y, z), omega [rad/s], force, torque, health, radius,
             mass, and the whole numbers id, team, world, block, place_in_block. For autonomies and controllers pos, vel and quat are the
             entity's belief where a sensor writes one.
@@ -44,13 +44,15 @@ class GroupView:
     """
 
     is_subset = False
+    failing_row: int | None
 
     def __init__(self, bodies: Bodies, first: int, last: int, context: Context, dt: float) -> None:
         self.context = context
         self.dt = dt
         self.substep = 0
+        self.phase = 0.0
         self.caller: Any = None
-        self.failing_row: int | None = None
+        self.failing_row = None
         self.motion_state: np.ndarray = np.empty((0, 0))
         self._seen: list[str] = []
         self.services: dict[str, Callable[..., Any]] = {}
@@ -127,8 +129,8 @@ class GroupView:
 
     @property
     def t(self) -> np.ndarray:
-        """Time at the beginning of this call [s], (n,)."""
-        return np.asarray(self.context.clock.t[self.world] + self.substep * self.dt)
+        """Time of the states that are seen [s], (n,): after motion, that of the step's end."""
+        return self.context.clock.at(self.phase)[self.world]
 
     @property
     def step_count(self) -> np.ndarray:
@@ -147,6 +149,17 @@ class GroupView:
     def bodies(self) -> BodyView:
         """All rows of all groups: what is true of everybody."""
         return self._bodies.view
+
+    def fail(self, row: int, why: str) -> None:
+        """End the world of a row with an error at the end of this step; the others go on. For what handles stand for."""
+        world = int(self.world[row])
+        step, plugin = int(self.context.clock.step[world]), self.caller.instance_name
+        name = self.context.block_names[int(self.block[row])]
+        assert self.context.fail is not None
+        self.context.fail(
+            world,
+            PluginError(why, where=f"{name} {int(self.id[row])}", step=step, world=world, plugin=plugin),
+        )
 
     def who(self, row: int) -> str:
         """Block, id and world of a row, for messages."""

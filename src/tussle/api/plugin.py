@@ -54,10 +54,6 @@ class Plugin:
 
     grade: ClassVar[str] = "machine"
     """What is promised of its bits: "portable", "machine" or "external"."""
-    atomic: ClassVar[bool] = False
-    """Promise that a call which raises has written nothing, which saves a copy of its columns per call."""
-    max_worlds: ClassVar[int | None] = None
-    """Largest stack of worlds it can take part in; None is any."""
 
     columns: ClassVar[dict[str, Column]] = {}
     services: ClassVar[tuple[str, ...]] = ()
@@ -115,6 +111,11 @@ class Plugin:
             for plugin in resolved[key]:
                 if not isinstance(plugin, child.kind):
                     raise ParameterError(f"{cls.__name__}.{key}: {plugin!r} is no {child.kind.__name__}")
+                if plugin.rate is not None:
+                    raise ParameterError(
+                        f"{cls.__name__}.{key}: {plugin.instance_name} has a rate of its own, but is called by {cls.__name__}; "
+                        f"give {cls.__name__} the rate"
+                    )
             names = [plugin.instance_name for plugin in resolved[key]]
             for twice in names:
                 if names.count(twice) > 1:
@@ -165,6 +166,11 @@ class Plugin:
     @classmethod
     def handles(cls) -> dict[str, Handle]:
         return cls.declared(Handle)
+
+    @classmethod
+    def most_worlds(cls) -> int | None:
+        """The largest stack of worlds that its handles allow; None is any."""
+        return min((h.max_worlds for h in cls.handles().values() if h.max_worlds is not None), default=None)
 
     @classmethod
     def ragged(cls) -> dict[str, Ragged]:
@@ -274,7 +280,7 @@ class Plugin:
         return self.open_one(row)
 
     def ready(self, g: Any) -> bool:
-        """Whether the outside is ready for the next step; asked in lockstep until true or until `ready_timeout`."""
+        """Whether what the handles stand for is ready for the next step; asked until true or until `ready_timeout`."""
         return True
 
     ready_timeout: ClassVar[float] = 10.0

@@ -39,8 +39,8 @@ class WorldView(GroupView):
 
     Attributes:
         n_worlds: Number of worlds, ended ones included; these have no rows.
-        t: Time of each world at the beginning of the step [s], (n_worlds,).
-        dt: Length of a step [s].
+        t: Time of the states that are seen [s], (n_worlds,): in `step` that of the step's end, in `start` that of its beginning.
+        dt: Time since this plugin's last call in these worlds [s].
         bodies: The table; health, force and torque are writable.
         teams: Team numbers of the mission, ascending, (n_teams,).
         seeds: Seed of each world, (n_worlds,).
@@ -67,7 +67,7 @@ class WorldView(GroupView):
 
     @property
     def t(self) -> np.ndarray:
-        return self.context.clock.t
+        return self.context.clock.at(self.phase)
 
     @property
     def step_count(self) -> np.ndarray:

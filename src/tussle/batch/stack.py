@@ -36,7 +36,7 @@ def stack_size(mission: Mission) -> int:
 def most_worlds(mission: Mission) -> int:
     """The largest stack that all plugins of a mission take part in."""
     plugins = [*mission.world_plugins, *(p for block in mission.blocks for p in block.plugins)]
-    return min([MOST, *(int(type(p).max_worlds) for p in plugins if type(p).max_worlds is not None)])
+    return min([MOST, *(n for p in plugins if (n := type(p).most_worlds()) is not None)])
 
 
 def play(mission: Mission, take: Take, size: int) -> Iterator[Finished | Beat]:

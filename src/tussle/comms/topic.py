@@ -73,12 +73,6 @@ class TopicBuffer:
         self.sent.clear()
         self._joined = None
 
-    def truncate(self, mark: int) -> None:
-        """Forget what was added after `mark` batches: the call that sent it has failed."""
-        if len(self.sent) > mark:
-            del self.sent[mark:]
-            self._joined = None
-
     def post(self, batch: Batch, to: Any, due: np.ndarray) -> None:
         """Queue messages for delivery."""
         self.queue.append(Parcel(batch, due, to))

@@ -112,15 +112,18 @@ class Births:
                 continue
             parts = []
             for slot in range(block.slots):
-                is_due = running & (self.next_time[i][:, slot] <= t + 1e-9) & (self.n_left[i] > 0)
-                worlds = np.flatnonzero(is_due)
-                if len(worlds):
+                again = 0  # a rate above that of the steps: several births of a slot in one step
+                while True:
+                    is_due = running & (self.next_time[i][:, slot] <= t + 1e-9) & (self.n_left[i] > 0)
+                    worlds = np.flatnonzero(is_due)
+                    if not len(worlds):
+                        break
                     parts.append(worlds)
                     self.n_left[i, worlds] -= 1
                     wait = 1.0 / block.rate
-                    jitter = self._normal(
-                        i, "birth", worlds, np.full(len(worlds), slot), self.n_born[i, worlds], 0, 1
-                    )[0]
+                    number = self.n_born[i, worlds] + again
+                    again += 1
+                    jitter = self._normal(i, "birth", worlds, np.full(len(worlds), slot), number, 0, 1)[0]
                     # From the time it was due at, not that of the step, else a rate that does not divide the steps' would lag.
                     base = np.maximum(self.next_time[i][worlds, slot], t[worlds] - self.overrides.mission.dt)
                     later = base + wait + block.interval_sd * jitter

@@ -38,7 +38,7 @@ def check_limits(game: Game) -> None:
     """
     cls = type(game.plugin)
     cases = [Case("", None, "with the default parameters"), *_cases(game)]
-    most = cls.max_worlds or len(cases)
+    most = cls.most_worlds() or len(cases)
     for first in range(0, len(cases), most):
         some = cases[first : first + most]
         try:

@@ -33,7 +33,7 @@ def check_stacks(game: Game, traces: Traces) -> None:
     Raises:
         ConformanceError: It is not.
     """
-    most = type(game.plugin).max_worlds
+    most = type(game.plugin).most_worlds()
     for n, threads in STACKS:
         if most is not None and n > most:
             continue
@@ -51,7 +51,7 @@ def check_reset(game: Game, traces: Traces) -> None:
     Raises:
         ConformanceError: They do not, or do.
     """
-    if type(game.plugin).max_worlds is not None and type(game.plugin).max_worlds < 4:
+    if type(game.plugin).most_worlds() is not None and type(game.plugin).most_worlds() < 4:
         return
     seeds = list(SEEDS[:4])
     with game.play(seeds) as sim:
@@ -83,7 +83,7 @@ def check_snapshot(game: Game, traces: Traces) -> None:
     cls = type(game.plugin)
     if any(isinstance(c, Handle) for c in cls.columns.values()) and cls.save_one is Plugin.save_one:
         return  # it holds objects outside the arrays and refuses, which is allowed
-    n = 3 if cls.max_worlds is None else min(3, cls.max_worlds)
+    n = 3 if cls.most_worlds() is None else min(3, cls.most_worlds())
     seeds = list(SEEDS[:n])
     with game.play(seeds) as sim:
         sim.step(7)

@@ -9,6 +9,7 @@ import numpy as np
 
 from tussle.columns import RaggedColumn
 from tussle.comms import EVERYONE, SAME_ENTITY, TopicBuffer
+from tussle.engine import failure
 from tussle.engine.referees import Referee
 from tussle.errors import MissionError, PluginError, WiringError, listed, nearest_name
 from tussle.messages import Batch, Message, SpawnEntity
@@ -104,18 +105,13 @@ class Mail:
             self._route(topic, network, batch)
         except Exception as error:
             worlds = np.unique(batch.world)
-            for world in worlds:
-                mine = batch.take(np.flatnonzero(batch.world == world))
-                try:
-                    if len(worlds) == 1:
-                        raise error
-                    self._route(topic, network, mine)
-                except Exception as caught:
-                    self.sim.fail(int(world), network.plugin, caught, f"topic {topic.name!r}")
+            world, step = int(worlds[0]) if len(worlds) == 1 else None, int(self.sim.steps[worlds].max())
+            where = f"topic {topic.name!r}"
+            raise failure.raised(error, network.plugin, where=where, step=step, world=world) from error
 
     def _route(self, topic: TopicBuffer, network: Referee, batch: Batch) -> None:
         sim, clock, view = self.sim, self.sim.context.clock, network.view
-        view.caller = network.plugin
+        view.caller, view.phase, view.dt = network.plugin, 1.0, clock.dt
         to = network.plugin.route(view, batch)
         if not isinstance(to, str):
             number, rows = to

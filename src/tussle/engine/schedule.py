@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from tussle.api.plugin import Plugin
-from tussle.columns import Publish, Subscribe
+from tussle.columns import Subscribe
+from tussle.engine import failure
+from tussle.mission.cadence import Cadence
 from tussle.engine.group import Binding, Group
 from tussle.engine.referees import Referee
 from tussle.engine.subset import call_group, call_referee
+from tussle.errors import PluginError
 
 if TYPE_CHECKING:
     from tussle.engine.simulation import Simulation
@@ -27,34 +30,17 @@ class Call:
     run: Callable[[], None]
 
 
-def _rate(plugin: Any, dt: float) -> Fraction | None:
-    """Calls per step as an exact fraction of the decimal numbers that were written; None for every step."""
-    rate = plugin.rate
-    if rate is None:
-        return None
-    per_step = Fraction(str(rate)) * Fraction(str(dt))
-    return None if per_step >= 1 else per_step
-
-
-def is_due(step: np.ndarray, per_step: Fraction) -> np.ndarray:
-    """Whether floor(k p / q) changes from step k - 1 to k, for each world's step."""
-    p, q = per_step.numerator, per_step.denominator
-    return np.asarray((step * p) // q != ((step - 1) * p) // q)
-
-
-def _is_outside(binding: Binding) -> bool:
-    """Whether a plugin, or one inside it, holds objects that it opens itself, or waits for something."""
-    kinds = [type(b.spec) for b in binding.walk()]
-    return any(
-        k.handles() and (k.open_one is not Plugin.open_one or k.ready is not Plugin.ready) for k in kinds
-    )
-
-
 class Schedule:
-    """Composes and guards the calls of one simulation's step.
+    """Composes the calls of one simulation's step.
+
+    A plugin's call is made once for all rows of its group, or once for all worlds. Where worlds' clocks differ, a plugin with a rate is
+    called for the worlds in which it is due. An exception ends the stack with a `PluginError`.
 
     Args:
         sim: The simulation.
+
+    Raises:
+        MissionError: A plugin has a rate that cannot be honoured.
     """
 
     def __init__(self, sim: Simulation) -> None:
@@ -107,288 +93,156 @@ class Schedule:
             calls += [self._advance_call(g, dt / m, 1) for g in steered]
         return calls
 
-    # -- guarded calls --------------------------------------------------------------------------------------------------------
+    def _due(self, cadence: Cadence, substep: int = 0) -> Iterator[tuple[int, np.ndarray | None]]:
+        """Grid points since the last call, and the worlds, (n_worlds,), in which a plugin is due; None for all that run."""
+        clock, running = self.sim.context.clock, self.sim.running
+        if clock.common >= 0:
+            if since := cadence.since(clock.common, substep):
+                yield since, None
+            return
+        found: dict[int, np.ndarray] = {}
+        for step in np.unique(clock.step[running]):
+            if since := cadence.since(int(step), substep):
+                found.setdefault(since, np.zeros(len(running), bool))[running & (clock.step == step)] = True
+        yield from sorted(found.items())
+
+    # -- plugins of entities ----------------------------------------------------------------------------------------------
 
     def _advance_call(self, group: Group, dt: float, substeps: int) -> Call:
-
-        def action(some: Group) -> None:
-            some.moving.caller = some.motion.plugin
-            some.advance(dt, substeps)
+        view, plugin, await_ready = group.moving, group.motion.plugin, self._waits_for(group, group.motion)
 
         def run() -> None:
             if group.n:
-                state = (
-                    None
-                    if group.motion.plugin.atomic
-                    else (group.x.copy(), group.bodies.floats[:, group.first : group.last].copy())
-                )
+                if await_ready:
+                    await_ready()
+                view.caller = plugin
                 try:
-                    action(group)
+                    group.advance(dt, substeps)
                 except Exception as error:
-                    if state is not None:
-                        group.x[:], group.bodies.floats[:, group.first : group.last] = state
-                    self._isolate(group, group.motion, error, action)
+                    raise _raised(error, plugin, view, group) from error
 
-        if _is_outside(group.motion):
-            return Call(
-                self._label("motion", group, group.motion),
-                lambda: self._world_by_world(group, group.motion, action),
-            )
         return Call(self._label("motion", group, group.motion), run)
 
     def _entity_call(self, kind: str, group: Group, binding: Binding, substep: int = 0) -> Call:
-        sim, path = self.sim, binding.path
-        clock, dead = sim.context.clock, sim.failed
-        per_step = _rate(binding.spec, clock.dt)
-        topics = [
-            b.plugin.__dict__[k].topic
-            for b in binding.walk()
-            for k, c in type(b.spec).columns.items()
-            if isinstance(c, Publish)
-        ]
+        mission, path = self.sim.mission, binding.path
+        m = mission.motion_multiplier if kind == "controller" else 1
+        grid_dt = mission.dt / m
+        phase = substep / m if kind == "controller" else float(kind == "sensor")
+        cadence = Cadence.of(binding.spec, m / mission.dt, m, f"block {group.names[0]!r}")
         inboxes = [
             b.plugin.__dict__[k]
             for b in binding.walk()
             for k, c in type(b.spec).columns.items()
             if isinstance(c, Subscribe)
         ]
-        is_outside = _is_outside(binding)
-        atomic, linked = binding.plugin.atomic, any(b.links for b in binding.walk())
-        view, plugin, table = binding.view, binding.plugin, group.table
-        writable = [b.places[k] for b in binding.walk() for k in sorted(b.writable)]
+        is_linked = any(b.links for b in binding.walk())
+        await_ready = self._waits_for(group, binding)
 
-        def action(some: Group) -> None:
-            own = next(b for b in some.bindings if b.path == path)
-            some_view = own.view
-            some_view.caller, some_view.substep = own.plugin, substep
-            own.pull(some.table)
-            own.plugin.step(some_view)
-            own.push(some.table)
-
-        def whole() -> None:
-            saved = [] if atomic else [(place, table.array(place).copy()) for place in writable]
-            marks = [len(t.sent) for t in topics]
+        def call(some: Group, own: Binding, dt: float) -> None:
+            view = own.view
+            view.caller, view.substep, view.phase, view.dt = own.plugin, substep, phase, dt
             try:
-                view.caller, view.substep = plugin, substep
-                if linked:
-                    binding.pull(table)
-                plugin.step(view)
-                if linked:
-                    binding.push(table)
+                if is_linked:
+                    own.pull(some.table)
+                own.plugin.step(view)
+                if is_linked:
+                    own.push(some.table)
             except Exception as error:
-                for place, array in saved:
-                    table.array(place)[:] = array
-                for topic, mark in zip(topics, marks, strict=True):
-                    topic.truncate(mark)
-                self._isolate(group, binding, error, action)
+                raise _raised(error, own.plugin, view, some) from error
+
+        def call_part(dt: float) -> Callable[[Group], None]:
+            return lambda some: call(some, next(b for b in some.bindings if b.path == path), dt)
 
         def run() -> None:
-            due = None if per_step is None else is_due(clock.step, per_step) & ~dead
-            if group.n:
-                if is_outside:
-                    self._world_by_world(group, binding, action, due)
-                elif due is None or due.all():
-                    whole()
-                elif due.any():
-                    self._part(group, binding, due, action)
-            # Of a group without rows too: who comes later has not heard what was said before
-            for inbox in inboxes:
-                inbox.clear(due)
+            for since, worlds in [(1, None)] if cadence is None else self._due(cadence, substep):
+                if group.n:
+                    if await_ready:
+                        await_ready()
+                    if worlds is None:
+                        call(group, binding, since * grid_dt)
+                    else:
+                        call_group(self.sim.population, group, worlds, call_part(since * grid_dt))
+                # Of a group without rows too: who comes later has not heard what was said before
+                for inbox in inboxes:
+                    inbox.clear(worlds)
 
         def lean() -> None:
             if group.n:
-                view.caller, view.substep = plugin, substep
-                try:
-                    plugin.step(view)
-                except Exception as error:
-                    self._isolate(group, binding, error, action)
+                call(group, binding, grid_dt)
 
-        is_plain = atomic and per_step is None and not (linked or inboxes or is_outside or topics)
+        is_plain = cadence is None and not (inboxes or await_ready)
         return Call(self._label(kind, group, binding, substep), lean if is_plain else run)
 
-    def _part(self, group: Group, binding: Binding, due: np.ndarray, action: Callable[[Group], None]) -> None:
-        sim = self.sim
-        rows = sim.population.bodies.world[group.first : group.last]
-        if not due[rows].any():
-            return
-        marks = self._marks()
-        try:
-            call_group(sim.population, group, due, action)
-        except Exception as error:
-            self._forget_messages(marks)
-            self._isolate(group, binding, error, action, due)
+    def _waits_for(self, group: Group, binding: Binding) -> Callable[[], None] | None:
+        """What waits until all that a plugin's handles stand for is ready; None where it never waits."""
+        waiting = [b for b in binding.walk() if b.handles and type(b.spec).ready is not Plugin.ready]
 
-    def _world_by_world(
-        self, group: Group, binding: Binding, action: Callable[[Group], None], due: np.ndarray | None = None
-    ) -> None:
-        """Call a plugin that holds something outside: what it did there in a call that failed could not be undone and done again."""
-        sim = self.sim
+        def wait() -> None:
+            for each in waiting:
+                limit = time.monotonic() + each.plugin.ready_timeout
+                while not each.plugin.ready(each.view):
+                    if time.monotonic() > limit:
+                        text, step = (
+                            f"was not ready within {each.plugin.ready_timeout:g} s",
+                            self.sim.steps.max(),
+                        )
+                        raise PluginError(
+                            text, where=group.name, step=int(step), plugin=each.spec.instance_name
+                        )
+                    time.sleep(0.001)
 
-        def when_ready(some: Group) -> None:
-            sim.await_ready(some, next(b for b in some.bindings if b.path == binding.path))
-            action(some)
+        return wait if waiting else None
 
-        for world in np.unique(sim.population.bodies.world[group.first : group.last]):
-            if not sim.failed[world] and (due is None or due[world]):
-                self._part(group, binding, np.arange(len(sim.running)) == world, when_ready)
-
-    def _isolate(
-        self,
-        group: Group,
-        binding: Binding,
-        error: Exception,
-        action: Callable[[Group], None],
-        due: np.ndarray | None = None,
-    ) -> None:
-        """A call has failed: find the worlds in which it does, and make it in the others."""
-        sim = self.sim
-        bodies = sim.population.bodies
-        present = [int(w) for w in np.unique(bodies.world[group.first : group.last])]
-        if due is not None:
-            present = [w for w in present if due[w]]
-        worlds = [
-            w for w in present if not sim.failed[w]
-        ]  # those that have failed in this step are still in the table
-        is_only, failed = len(present) == 1, 0
-        for world in worlds:
-            only = np.zeros(bodies.n_worlds, bool)
-            only[world] = True
-            row = binding.view.failing_row if is_only else None
-            caught: Exception | None = error if is_only else None
-            found: list[int | None] = [row]
-            if caught is None:
-                caught = self._try_alone(group, binding, only, action, found)
-            if caught is not None:
-                failed += 1
-                sim.fail(world, binding.plugin, caught, self._who(group, binding, world, found[0], is_only))
-        binding.view.failing_row = None
-        if not failed and len(worlds) == len(present):
-            raise sim.as_plugin_error(
-                error, binding.plugin, "fails in the stack but in none of its worlds alone"
-            )
-
-    def _try_alone(
-        self,
-        group: Group,
-        binding: Binding,
-        only: np.ndarray,
-        action: Callable[[Group], None],
-        found: list[int | None],
-    ) -> Exception | None:
-        def watched(some: Group) -> None:
-            own = next(b for b in some.bindings if b.path == binding.path)
-            own.view.failing_row = None
-            try:
-                action(some)
-            except Exception:
-                found[0] = own.view.failing_row
-                raise
-
-        marks = self._marks()
-        try:
-            call_group(self.sim.population, group, only, watched)
-        except Exception as error:
-            self._forget_messages(marks)
-            return error
-        return None
-
-    def _who(self, group: Group, binding: Binding, world: int, row: int | None, is_alone: bool) -> str:
-        if row is None:
-            return group.name
-        bodies = self.sim.population.bodies
-        rows = np.flatnonzero(bodies.world[group.first : group.last] == world)
-        at = row if is_alone else int(rows[row])
-        return f"{group.block_of(at)} {int(bodies.id[group.first + at])}"
-
-    # -- world plugins ----------------------------------------------------------------------------------------------------------
+    # -- world plugins ----------------------------------------------------------------------------------------------------
 
     def _world_call(self, kind: str, referee: Referee) -> Call:
-        sim = self.sim
-        clock, view, plugin = sim.context.clock, referee.view, referee.plugin
-        per_step = _rate(referee.spec, clock.dt)
+        sim, dt = self.sim, self.sim.mission.dt
+        cadence = Cadence.of(referee.spec, 1.0 / dt, 1, "mission")
 
-        def action(some: Referee, w: Any) -> None:
-            w.caller = some.plugin
-            some.plugin.step(w)
+        def call(some: Referee, w: Any, dt: float) -> None:
+            w.caller, w.phase, w.dt = some.plugin, 1.0, dt
+            try:
+                some.plugin.step(w)
+            except Exception as error:
+                raise _raised(error, some.plugin, w, None) from error
+
+        def call_part(dt: float) -> Callable[[Referee, Any], None]:
+            return lambda some, w: call(some, w, dt)
 
         def run() -> None:
-            due = None if per_step is None else is_due(clock.step, per_step) & sim.running
-            if due is not None and not due.any():
-                return
-            saved = None if plugin.atomic else referee.copy()
-            floats = None if plugin.atomic else sim.population.bodies.floats.copy()
-            marks = self._marks()
-            counts = len(view.deaths), len(view.moved), len(view.births)
-            try:
-                if due is None or due[sim.running].all():
-                    view.caller = plugin
-                    plugin.step(view)
+            for since, worlds in [(1, None)] if cadence is None else self._due(cadence):
+                if worlds is None:
+                    call(referee, referee.view, since * dt)
                 else:
-                    call_referee(sim.population, referee, due, action)
-            except Exception as error:
-                if saved is not None and floats is not None:
-                    referee.restore(saved)
-                    sim.population.bodies.floats[:] = floats
-                    sim.population.bodies.touch(0, sim.population.bodies.n)
-                self._forget_messages(marks)
-                del view.deaths[counts[0] :], view.moved[counts[1] :], view.births[counts[2] :]
-                self._isolate_referee(referee, error, action, due)
+                    call_referee(sim.population, referee, worlds, call_part(since * dt))
 
-        def lean() -> None:
-            try:
-                view.caller = plugin
-                plugin.step(view)
-            except Exception as error:
-                self._isolate_referee(referee, error, action, None)
+        label = f"{kind:<12} {referee.spec.instance_name}{_rate_text(referee.spec)}"
+        return Call(label, run)
 
-        is_plain = plugin.atomic and per_step is None
-        label = f"{kind:<12} {referee.spec.instance_name}{self._rate_text(referee.spec)}"
-        return Call(label, lean if is_plain else run)
-
-    def _marks(self) -> dict[int, int]:
-        return {id(topic): len(topic.sent) for topic in self.sim.topics.values()}
-
-    def _forget_messages(self, marks: dict[int, int]) -> None:
-        for topic in self.sim.topics.values():
-            topic.truncate(marks.get(id(topic), 0))
-
-    def _isolate_referee(
-        self,
-        referee: Referee,
-        error: Exception,
-        action: Callable[[Referee, Any], None],
-        due: np.ndarray | None,
-    ) -> None:
-        sim = self.sim
-        present = np.flatnonzero(sim.running if due is None else due)
-        worlds = [
-            int(w) for w in present if not sim.failed[w]
-        ]  # those that have failed in this step are still in the table
-        failed = 0
-        for world in worlds:
-            only = np.zeros(len(sim.running), bool)
-            only[world] = True
-            marks = self._marks()
-            try:
-                if len(present) == 1:
-                    raise error
-                call_referee(sim.population, referee, only, action)
-            except Exception as caught:
-                self._forget_messages(marks)
-                failed += 1
-                sim.fail(world, referee.plugin, caught, "")
-        if not failed and len(worlds) == len(present):
-            raise sim.as_plugin_error(
-                error, referee.plugin, "fails in the stack but in none of its worlds alone"
-            )
-
-    # -- words ----------------------------------------------------------------------------------------------------------------
-
-    def _rate_text(self, plugin: Any) -> str:
-        return f" at {plugin.rate:g} Hz" if plugin.rate is not None else ""
+    # -- words ------------------------------------------------------------------------------------------------------------
 
     def _label(self, kind: str, group: Group, binding: Binding, substep: int = 0) -> str:
         m = self.sim.mission.motion_multiplier
         part = f" ({substep + 1}/{m})" if kind == "controller" and m > 1 else ""
         place = f" {group.place}" if self.sim.mission.update == "sequential" else ""
-        return f"{kind:<12} {group.name}{place}: {binding.spec.instance_name}{self._rate_text(binding.spec)}{part}"
+        return f"{kind:<12} {group.name}{place}: {binding.spec.instance_name}{_rate_text(binding.spec)}{part}"
+
+
+def _rate_text(plugin: Any) -> str:
+    return f" at {plugin.rate:g} Hz" if plugin.rate is not None else ""
+
+
+def _raised(error: Exception, plugin: Any, view: Any, group: Group | None) -> PluginError:
+    """A plugin's exception as an error that names plugin, step and, as far as it is known, entity and world."""
+    if isinstance(error, PluginError):  # of `fail`
+        return error
+    row, view.failing_row = view.failing_row, None
+    where, world = ("" if group is None else group.name), None
+    rows = slice(None) if row is None else slice(row, row + 1)
+    worlds = np.unique(view.world[rows])
+    if row is not None and group is not None:
+        where = f"{group.block_of(row)} {int(view.id[row])}"
+    if len(worlds) == 1:
+        world = int(worlds[0])
+    step = int(view.context.clock.step[worlds].max(initial=0))
+    return failure.raised(error, plugin, where=where, step=step, world=world)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Self
 
@@ -17,7 +16,6 @@ from tussle.api.world import WorldView
 from tussle.engine import access, failure
 from tussle.engine.births import Births, Newborn
 from tussle.engine.events import Herald
-from tussle.engine.group import Binding, Group
 from tussle.engine.mail import Mail
 from tussle.engine.params import Overrides
 from tussle.engine.population import Population
@@ -46,8 +44,10 @@ class Simulation:
         seeds: Seed of each world; a single number is a stack of one.
         params: Parameters by path ("prey.Boids.gain", "prey.speed", "SimpleCapture.capture_range"); one value, or one per world.
         threads: Threads that a step may use; the result is the same with any number.
-        on_error: "raise" stops at the first plugin that fails; "record" ends the world with the error in its result, and the others
-            go on. By default "raise" for one world and "record" for several, but for the error that ends the last of them all.
+        on_error: What an error does that belongs to one world, such as a state that is not finite: "raise" raises it, "record" ends
+            the world with the error in its result, and the others go on. By default "raise" for one world and "record" for several.
+            An exception in a plugin ends the whole stack: with an explicit "record" in the results of all running worlds, else it is
+            raised.
         start_from: Ids, times of birth and first states, in all worlds, instead of the blocks' placement; see `tussle.read_table`.
 
     Raises:
@@ -112,7 +112,7 @@ class Simulation:
         if on_error not in (None, "raise", "record"):
             raise ParameterError(f"on_error = {on_error!r} is not allowed; it is 'raise' or 'record'")
         for plugin in [*mission.world_plugins, *(p for b in mission.blocks for p in b.plugins)]:
-            most = type(plugin).max_worlds
+            most = type(plugin).most_worlds()
             if most is not None and len(seeds) > most:
                 raise MissionError(
                     f"{plugin.instance_name} takes part in at most {most} worlds of one stack, not {len(seeds)}"
@@ -149,7 +149,7 @@ class Simulation:
         self.mail.networks = {r.spec.instance_name: r for r in self.networks}
         self.interactions, self.metrics = bind(mission.interactions), bind(mission.metrics)
         self.population.on_new_group = self.forget_schedule
-        self.population.on_failure = self.record_failure
+        self.population.on_failure = self.context.fail = self.record_failure
         self.population.prepare()
 
     def forget_schedule(self) -> None:
@@ -204,8 +204,18 @@ class Simulation:
             for call in self.schedule:
                 call.run()
         except PluginError as error:
-            # From here on, so that what is printed is the plugin's own lines and not the way through the engine.
-            raise error.with_traceback(None) from error.cause
+            self._stop(error)
+
+    def _stop(self, error: PluginError) -> None:
+        """An exception ends the stack."""
+        if self.on_error == "record" and not self._raises_when_all_fail:
+            for world in np.flatnonzero(self.running & ~self.failed):
+                self.record_failure(int(world), error)
+            self.context.clock.step += self.running
+            self.step_end.take_out_dead()
+            return
+        # From here on, so that what is printed is the plugin's own lines and not the way through the engine.
+        raise error.with_traceback(None) from error.cause
 
     def run(self, until: float | None = None) -> list[WorldResult]:
         """Step until all worlds have ended, or have reached the time `until` [s]; waits while paused.
@@ -299,7 +309,7 @@ class Simulation:
         self.take_over_moves()
 
     def _start(self, referee: Referee, view: WorldView) -> None:
-        view.caller = referee.plugin
+        view.caller, view.phase = referee.plugin, 0.0
         try:
             referee.plugin.start(view)
         except Exception as error:
@@ -387,19 +397,6 @@ class Simulation:
 
     # -- failures -------------------------------------------------------------------------------------------------------------
 
-    def as_plugin_error(self, error: Exception, plugin: Any, text: str = "") -> PluginError:
-        """The error with place and cause; `text` says more."""
-        return failure.raised(error, plugin, where=text, step=int(self.context.clock.step.max()), world=None)
-
-    def fail(self, world: int, plugin: Any, error: Exception, where: str) -> None:
-        """A plugin has failed in a world: it will end with this step."""
-        step = int(self.context.clock.step[world])
-        if isinstance(error, PluginError):  # the engine's own words, such as those of `await_ready`
-            error.where, error.step, error.world = where or error.where, step, world
-            self.record_failure(world, error)
-            return
-        self.record_failure(world, failure.raised(error, plugin, where=where, step=step, world=world))
-
     def record_failure(self, world: int, error: PluginError) -> None:
         if self.on_error == "raise":
             raise error
@@ -409,21 +406,6 @@ class Simulation:
         )
         if self.failed.all() and self._raises_when_all_fail:
             raise error
-
-    def await_ready(self, group: Group, binding: Binding) -> None:
-        """Wait until what is outside the arrays is ready for a step.
-
-        Raises:
-            PluginError: It is not within the plugin's `ready_timeout`.
-        """
-        limit = time.monotonic() + binding.plugin.ready_timeout
-        while not binding.plugin.ready(binding.view):
-            if time.monotonic() > limit:
-                raise PluginError(
-                    f"was not ready within {binding.plugin.ready_timeout:g} s",
-                    where=group.name, step=int(self.context.clock.step.max()), plugin=binding.spec.instance_name,
-                )  # fmt: skip
-            time.sleep(0.001)
 
     # -- from outside -----------------------------------------------------------------------------------------------------------
 

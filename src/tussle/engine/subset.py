@@ -1,4 +1,4 @@
-"""Some worlds of a stack on their own: for plugins that are due in a part of them, and to find the one in which a plugin fails."""
+"""Some worlds of a stack on their own: for plugins with a rate, and where worlds begin, while the clocks of a stack differ."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def _merge_ragged(whole: RaggedColumn, part: RaggedColumn, rows: np.ndarray) -> 
 def call_group(
     population: Population, group: Group, worlds: np.ndarray, action: Callable[[Group], None]
 ) -> None:
-    """Do something to one group in some worlds only; worlds, (n_worlds,), says which. Nothing is written when it raises."""
+    """Do something to one group in some worlds only; worlds, (n_worlds,), says which."""
     bodies = population.bodies
     rows = np.flatnonzero(worlds[bodies.world])
     mine = rows[(rows >= group.first) & (rows < group.last)]
@@ -112,7 +112,7 @@ def call_group(
 def call_referee(
     population: Population, referee: Referee, worlds: np.ndarray, action: Callable[[Referee, WorldView], None]
 ) -> None:
-    """Do something with a world plugin in some worlds only. Nothing is written when it raises, messages excepted."""
+    """Do something with a world plugin in some worlds only."""
     bodies, view = population.bodies, referee.view
     rows = np.flatnonzero(worlds[bodies.world])
     sub_bodies = _sub_bodies(bodies, rows)

@@ -14,6 +14,7 @@ import numpy as np
 from tussle import stock, units
 from tussle.api import Autonomy, Controller, Interaction, Metric, MotionModel, Network, Sensor
 from tussle.errors import MissionError, listed, nearest_name
+from tussle.mission.cadence import Cadence
 from tussle.scene import Scene
 
 T = TypeVar("T")
@@ -71,6 +72,13 @@ def _plugins(where: str, value: Any, kind: type) -> tuple[Any, ...]:
                 f"{where}: two plugins are called {name!r}; give one of them another name with name=..."
             )
     return plugins
+
+
+def _refuse_rate(where: str, plugin: Any, why: str) -> None:
+    if plugin.rate is not None:
+        raise MissionError(
+            f"{where}: {plugin.instance_name} has rate = {plugin.rate!r}, but it {why}; leave the rate out"
+        )
 
 
 def _set(frozen: Any, name: str, value: Any) -> None:
@@ -180,6 +188,7 @@ class Block:
                 f"{where}: motion = {self.motion!r} is not a motion model; each block has exactly one, such as motion=Unicycle()"
             )
         _plugins(where, self.plugins, object)
+        _refuse_rate(where, self.motion, "is integrated over every step")
 
     def _check_bounds(self, where: str) -> None:
         for name in ("count", "slots", "team"):
@@ -314,12 +323,23 @@ class Mission:
                 raise MissionError(
                     f"mission: {plugin.instance_name!r} is the name of a block and of a plugin; paths need them to differ"
                 )
+        self._check_rates()
         if not isinstance(self.scene, Scene):
             raise MissionError(f"mission: scene = {self.scene!r} is not a Scene")
 
+    def _check_rates(self) -> None:
+        for network in self.networks:
+            _refuse_rate("mission", network, "carries messages in every step")
+        for block in self.blocks:
+            for plugin in block.plugins:
+                m = self.motion_multiplier if isinstance(plugin, Controller) else 1
+                Cadence.of(plugin, m / self.dt, m, f"block {block.name!r}")
+        for plugin in (*self.interactions, *self.metrics):
+            Cadence.of(plugin, 1.0 / self.dt, 1, "mission")
+
     @property
     def steps(self) -> int:
-        """Number of steps until the end time."""
+        """Number of steps until the end time: the step nearest to it is the last."""
         return max(0, math.ceil((self.end - self.start) / self.dt - 0.5))
 
     @property

@@ -79,10 +79,10 @@ class Outside(MotionModel):
     """x' = u, integrated by a child process."""
 
     grade = "external"
-    max_worlds = 4
+
     crash_at = Param(10**9, doc="Step in which the child is told to crash.")
     x = State("x y z", unit="m")
-    link = Handle(doc="Pipe to the child.")
+    link = Handle(max_worlds=4, doc="Pipe to the child.")
     velocity = Input(VELOCITY, unit="m/s")
 
     @staticmethod

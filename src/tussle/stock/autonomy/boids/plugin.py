@@ -25,7 +25,6 @@ class Boids(Autonomy):
     """
 
     grade = "portable"
-    atomic = True
 
     max_speed = Param(30.0, unit="m/s", ge=0.0, doc="Wanted speed.")
     comms_range = Param(200.0, unit="m", ge=0.0, doc="Distance up to which others count.")

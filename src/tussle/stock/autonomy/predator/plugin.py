@@ -17,7 +17,6 @@ class Predator(Autonomy):
     """
 
     grade = "portable"
-    atomic = True
 
     max_speed = Param(30.0, unit="m/s", ge=0.0, doc="Wanted speed.")
     capture_range = Param(5.0, unit="m", ge=0.0, doc="Distance below which others are claimed.")

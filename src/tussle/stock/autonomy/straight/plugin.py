@@ -68,8 +68,10 @@ class Straight(Autonomy):
                 self.goal[:2, row : row + 1] = (pos + AHEAD * unit(centre - pos))[:2]
 
     def _ask_for_another(self, g: GroupView) -> None:
-        every = max(1, round(SPAWN_PERIOD / g.dt))
-        rows = np.flatnonzero((g.step_count > 0) & (g.step_count % every == 0))
+        elapsed = g.t - g.context.clock.start + 1e-6 * g.dt
+        rows = np.flatnonzero(
+            np.floor(elapsed / SPAWN_PERIOD) > np.maximum(0.0, np.floor((elapsed - g.dt) / SPAWN_PERIOD))
+        )
         if len(rows):
             east, north, _ = g.forward[:, rows]
             left = np.array([-north, east, np.zeros(len(rows))])

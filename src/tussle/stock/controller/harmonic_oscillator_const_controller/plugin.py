@@ -9,7 +9,6 @@ class HarmonicOscillatorConstController(Controller):
     """Writes a constant `acceleration_z`; an oscillator settles at that over its natural frequency squared."""
 
     grade = "portable"
-    atomic = True
 
     acceleration_z = Param(0.0, unit="m/s^2", doc="Push upwards, per mass.")
     push = Output("acceleration_z", unit="m/s^2", doc="The same at every call.")

@@ -25,7 +25,6 @@ class SimpleAircraftControllerPID(Controller):
     """
 
     grade = "portable"
-    atomic = True
 
     heading_pid = Param(
         (1.0, 0.01, 2.0, math.radians(9.0)),

@@ -23,7 +23,6 @@ class UnicyclePID(Controller):
     """
 
     grade = "portable"
-    atomic = True
 
     heading_pid = Param(
         (1.0, 0.1, 0.1, math.radians(45.0)),

@@ -20,7 +20,6 @@ class GroundCollision(Interaction):
     """
 
     grade = "portable"
-    atomic = True
 
     ground_collision_z = Param(0.0, unit="m", doc="Level of the ground above the origin's tangent plane.")
     ground_collision_altitude = Param(

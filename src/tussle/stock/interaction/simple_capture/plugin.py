@@ -17,7 +17,6 @@ class SimpleCapture(Interaction):
     """
 
     grade = "portable"
-    atomic = True
 
     capture_range = Param(5.0, unit="m", ge=0.0, doc="Largest distance at which a claim holds.")
     enable_team_captures = Param(True, doc="Team mates can be captured.")

@@ -15,7 +15,6 @@ class SimpleCollision(Interaction):
     """
 
     grade = "portable"
-    atomic = True
 
     collision_range = Param(2.0, unit="m", ge=0.0, doc="Distance below which two collide.")
     startup_collision_range = Param(2.0, unit="m", ge=0.0, doc="Room around each entity when it is placed.")

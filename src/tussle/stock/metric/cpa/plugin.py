@@ -33,7 +33,7 @@ class CPA(Metric):
     when = State(unit="s", per="entity", doc="When.")
 
     def step(self, w: WorldView) -> None:
-        t = w.t + w.dt
+        t = w.t
         slack = 1e-6 * w.dt
         is_due = (t >= self.min_time_s - slack) & ((self.max_time_s <= 0.0) | (t <= self.max_time_s + slack))
         if not is_due.any():

@@ -12,7 +12,6 @@ class SimpleCaptureMetrics(Metric):
     """Captures of team mates and of others, credited to the captor's team; the score is their weighted sum."""
 
     grade = "portable"
-    atomic = True
 
     TeamCapture_weight = Param(1.0, doc="Score for capturing a team mate.")
     NonTeamCapture_weight = Param(1.0, doc="Score for capturing another.")

@@ -19,7 +19,6 @@ class SimpleCollisionMetrics(Metric):
     """
 
     grade = "portable"
-    atomic = True
 
     flight_time_w = Param(0.0, doc="Score per flight_time_norm.")
     team_collisions_w = Param(-1.0, doc="Score per collision with a team mate.")
@@ -39,7 +38,8 @@ class SimpleCollisionMetrics(Metric):
 
     def step(self, w: WorldView) -> None:
         self._count(w)
-        np.add.at(self.n_steps, (w.team_numbers(w.team), w.world), 1)
+        n_since = round(w.dt / w.context.clock.dt)
+        np.add.at(self.n_steps, (w.team_numbers(w.team), w.world), n_since)
         met = w.inbox(EntityCollided)
         if met.n:
             is_team = met.first_team == met.second_team
@@ -61,8 +61,9 @@ class SimpleCollisionMetrics(Metric):
             self.is_known[rows] = True
 
     def result(self, w: WorldView) -> dict[str, np.ndarray]:
-        flight_time = self.n_steps * w.dt
-        played = np.where(self.first_step < 0, 0, w.step_count - self.first_step) * w.dt
+        dt = w.context.clock.dt
+        flight_time = self.n_steps * dt
+        played = np.where(self.first_step < 0, 0, w.step_count - self.first_step) * dt
         norm = np.where(played > 0.0, flight_time / np.where(played > 0.0, played, 1.0), 0.0)
         score = (
             self.flight_time_w * norm

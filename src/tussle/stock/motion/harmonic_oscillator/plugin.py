@@ -15,7 +15,6 @@ class HarmonicOscillator(MotionModel):
     """
 
     grade = "portable"
-    atomic = True
 
     damping_ratio = Param(0.707, ge=0.0, doc="d: 1 is critical damping.")
     natural_frequency = Param(1.0, unit="rad/s", ge=0.0, doc="w: angular frequency without damping.")

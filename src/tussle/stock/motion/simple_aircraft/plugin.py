@@ -25,7 +25,6 @@ class SimpleAircraft(MotionModel):
     """
 
     grade = "portable"
-    atomic = True
 
     turning_radius = Param(
         13.0, unit="m", gt=0.0, doc="Radius of a turn at 45 degrees of bank and speed_target."

@@ -20,7 +20,6 @@ class SingleIntegrator(MotionModel):
     """
 
     grade = "portable"
-    atomic = True
 
     max_speed = Param(
         -1.0, unit="m/s", doc="Speed of every command that is not zero; negative: as commanded."

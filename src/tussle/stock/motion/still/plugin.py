@@ -14,7 +14,6 @@ class Still(MotionModel):
     """
 
     grade = "portable"
-    atomic = True
 
     x = State("x y z", unit="m", doc="Position, world frame.")
 

@@ -27,7 +27,6 @@ class Unicycle(MotionModel):
     """
 
     grade = "portable"
-    atomic = True
 
     vel_max = Param(1.0, unit="m/s", ge=0.0, doc="Limit of the speed, forwards and backwards.")
     turn_rate_max = Param(1.0, unit="rad/s", ge=0.0, doc="Limit of the turn rate.")

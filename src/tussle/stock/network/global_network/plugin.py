@@ -9,7 +9,6 @@ class GlobalNetwork(Network):
     """Each message reaches every subscriber of its world, the sender's own plugins among them; nothing is lost."""
 
     grade = "portable"
-    atomic = True
 
     def route(self, w: WorldView, messages: Batch) -> str:
         return EVERYONE

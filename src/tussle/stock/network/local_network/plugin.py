@@ -9,7 +9,6 @@ class LocalNetwork(Network):
     """Each message reaches the subscribers of the entity that sent it, and nobody else."""
 
     grade = "portable"
-    atomic = True
 
     def route(self, w: WorldView, messages: Batch) -> str:
         return SAME_ENTITY

@@ -15,7 +15,6 @@ class SphereNetwork(Network):
     """
 
     grade = "portable"
-    atomic = True
 
     range = Param(100.0, unit="m", ge=0.0, doc="Distance below which others hear.")
     prob_transmit = Param(1.0, ge=0.0, le=1.0, doc="Probability that one receiver gets one message.")

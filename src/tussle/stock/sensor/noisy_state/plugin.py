@@ -19,7 +19,6 @@ class NoisyState(Sensor):
     """
 
     grade = "portable"
-    atomic = True
 
     pos_noise_0 = Param((0.0, 5.0), fields=PAIR, unit="m", doc="Error of x: mean and standard deviation.")
     pos_noise_1 = Param((0.0, 5.0), fields=PAIR, unit="m", doc="Error of y.")
