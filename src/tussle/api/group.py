@@ -130,7 +130,7 @@ class GroupView:
     @property
     def t(self) -> np.ndarray:
         """Time of the states that are seen [s], (n,): after motion, that of the step's end."""
-        return self.context.clock.at(self.phase)[self.world]
+        return np.asarray(self.context.clock.at(self.phase)[self.world])
 
     @property
     def step_count(self) -> np.ndarray:

@@ -15,6 +15,7 @@ from tussle.engine.simulation import Simulation
 from tussle.errors import PluginError, TussleError
 
 if TYPE_CHECKING:
+    from tussle.api import Plugin
     from tussle.engine.result import WorldResult
     from tussle.mission import Mission
 
@@ -35,8 +36,8 @@ def stack_size(mission: Mission) -> int:
 
 def most_worlds(mission: Mission) -> int:
     """The largest stack that all plugins of a mission take part in."""
-    plugins = [*mission.world_plugins, *(p for block in mission.blocks for p in block.plugins)]
-    return min([MOST, *(n for p in plugins if (n := type(p).most_worlds()) is not None)])
+    plugins: list[Plugin] = [*mission.world_plugins, *(p for block in mission.blocks for p in block.plugins)]
+    return min([MOST, *(type(p).most_worlds() or MOST for p in plugins)])
 
 
 def play(mission: Mission, take: Take, size: int) -> Iterator[Finished | Beat]:

@@ -12,11 +12,11 @@ import numpy as np
 from tussle.api.plugin import Plugin
 from tussle.columns import Subscribe
 from tussle.engine import failure
-from tussle.mission.cadence import Cadence
 from tussle.engine.group import Binding, Group
 from tussle.engine.referees import Referee
 from tussle.engine.subset import call_group, call_referee
 from tussle.errors import PluginError
+from tussle.mission.cadence import Cadence
 
 if TYPE_CHECKING:
     from tussle.engine.simulation import Simulation
