@@ -12,8 +12,11 @@ from tussle.columns import Column, EntityRef, Handle, Output, Publish, State, Su
 from tussle.errors import listed, nearest_name
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from tussle.api.bodies import BodyView
     from tussle.api.group import GroupView
+    from tussle.messages import Batch
 
 VECTORS = ("pos", "vel", "quat", "omega", "force", "torque", "forward")
 NUMBERS = ("yaw", "climb", "roll", "health", "radius", "mass", "id", "team")
@@ -35,8 +38,8 @@ class EasyAutonomy(Autonomy):
                 g.failing_row = row
                 raise
 
-    def _messages(self) -> dict[str, tuple[np.ndarray, Any]]:
-        return {k: self.__dict__[k].pairs() for k, c in self.columns.items() if isinstance(c, Subscribe)}
+    def _messages(self) -> dict[str, Callable[[int], list[tuple[Batch, int]]]]:
+        return {k: self.__dict__[k].by_row() for k, c in self.columns.items() if isinstance(c, Subscribe)}
 
 
 class Other:
@@ -81,7 +84,11 @@ class Me:
     __slots__ = ("_g", "_heard", "_plugin", "_row")
 
     def __init__(
-        self, plugin: EasyAutonomy, g: GroupView, row: int, heard: dict[str, tuple[np.ndarray, Any]]
+        self,
+        plugin: EasyAutonomy,
+        g: GroupView,
+        row: int,
+        heard: dict[str, Callable[[int], list[tuple[Batch, int]]]],
     ) -> None:
         set_ = object.__setattr__
         set_(self, "_plugin", plugin)
@@ -111,9 +118,7 @@ class Me:
             found = self._body_row(int(plugin.__dict__[name][row]))
             return None if found < 0 else Other(g.bodies, found)
         if isinstance(column, Subscribe):
-            rows, batch = self._heard[name]
-            first, last = np.searchsorted(rows, [row, row + 1])
-            return [Heard(batch, i) for i in range(first, last)]
+            return [Heard(batch, i) for batch, i in self._heard[name](row)]
         if isinstance(column, Handle):
             return plugin.__dict__[name][row]
         value = plugin.__dict__.get(name)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -134,48 +135,90 @@ class Inbox:
         )
 
     def pairs(self) -> tuple[np.ndarray, Batch]:
-        """(row, messages): one item per receiving row of the group and message, by row, then arrival, then sender."""
-        view = self.view
+        """(row, messages): one item per receiving row of the group and message, by row, then arrival, then sender.
+
+        Messages to everyone make rows x messages items; `latest` and `by_row` make none of these.
+        """
         rows, batches = [], []
         for parcel in self.parcels:
-            batch = parcel.batch
-            if isinstance(parcel.to, str) and parcel.to == EVERYONE:
-                row, number = _everyone(batch.world, view.world)
-                was_born = view.born[row] <= parcel.due[number]  # who comes later has not heard it
-                row, number = row[was_born], number[was_born]
-            else:
-                if isinstance(parcel.to, str):
-                    number, ids = np.arange(batch.n), batch.sender
-                else:
-                    number, ids = parcel.to
-                row = view.bodies_rows(batch.world[number], ids) - view.first
-                here = (row >= 0) & (row < view.n)
-                row, number = row[here], number[here]
+            row, number = self._receivers(parcel) if parcel.to != EVERYONE else self._everyone(parcel)
             rows.append(row)
-            batches.append(batch.take(number))
+            batches.append(parcel.batch.take(number))
         if not rows:
             return np.zeros(0, np.int64), Batch.empty(self.topic.type)
         row = np.concatenate(rows)
-        batch = Batch.join(batches)
         order = np.argsort(row, kind="stable")
-        return row[order], batch.take(order)
+        return row[order], Batch.join(batches).take(order)
 
     def latest(self) -> tuple[np.ndarray, Batch]:
         """(row, messages): the last message of each row that has heard one."""
-        row, batch = self.pairs()
-        is_last = np.ones(len(row), bool)
-        is_last[:-1] = row[1:] != row[:-1]
-        return row[is_last], batch.take(np.flatnonzero(is_last))
+        view = self.view
+        found_in, number = np.full(view.n, -1), np.zeros(view.n, np.int64)
+        for k in range(len(self.parcels) - 1, -1, -1):
+            parcel = self.parcels[k]
+            if parcel.to == EVERYONE:
+                first, last = self._heard_by_all(parcel)
+                rows, numbers = np.flatnonzero(last > first), last[last > first] - 1
+            else:
+                rows, numbers = self._receivers(parcel)
+            is_new = found_in[rows] < 0
+            found_in[rows[is_new]] = k
+            number[rows[is_new]] = numbers[is_new]  # of several for one row, the last is written last
+        rows = np.flatnonzero(found_in >= 0)
+        parts = [(rows[found_in[rows] == k], p.batch) for k, p in enumerate(self.parcels)]
+        parts = [(mine, batch) for mine, batch in parts if len(mine)]
+        if not parts:
+            return rows, Batch.empty(self.topic.type)
+        together = Batch.join([batch.take(number[mine]) for mine, batch in parts])
+        return rows, together.take(np.argsort(np.concatenate([mine for mine, _ in parts])))
+
+    def by_row(self) -> Callable[[int], list[tuple[Batch, int]]]:
+        """What gives the messages of one row, by arrival, then sender, each as (messages, number)."""
+        parts: list[tuple[Batch, np.ndarray, np.ndarray, np.ndarray | None]] = []
+        for parcel in self.parcels:
+            if parcel.to == EVERYONE:
+                parts.append((parcel.batch, *self._heard_by_all(parcel), None))
+            else:
+                row, number = self._receivers(parcel)
+                edges = np.searchsorted(row, np.arange(self.view.n + 1))
+                parts.append((parcel.batch, edges[:-1], edges[1:], number))
+
+        def of(row: int) -> list[tuple[Batch, int]]:
+            return [
+                (batch, i if number is None else int(number[i]))
+                for batch, first, last, number in parts
+                for i in range(first[row], last[row])
+            ]
+
+        return of
+
+    def _heard_by_all(self, parcel: Parcel) -> tuple[np.ndarray, np.ndarray]:
+        """First and last of the messages to everyone that each row hears, (n,): those of its world, if it was born by then."""
+        view, sent = self.view, parcel.batch.world
+        first, last = np.searchsorted(sent, view.world), np.searchsorted(sent, view.world, side="right")
+        # Those of one world in one parcel were delivered together.
+        was_born = (last > first) & (view.born <= parcel.due[np.minimum(first, len(sent) - 1)])
+        return first, np.where(was_born, last, first)
+
+    def _everyone(self, parcel: Parcel) -> tuple[np.ndarray, np.ndarray]:
+        """(row, message number) of all rows that hear a message to everyone."""
+        first, last = self._heard_by_all(parcel)
+        n = last - first
+        row = np.repeat(np.arange(len(n)), n)
+        return row, np.arange(len(row)) - np.repeat(np.cumsum(n) - n - first, n)
+
+    def _receivers(self, parcel: Parcel) -> tuple[np.ndarray, np.ndarray]:
+        """(row, message number) of messages with receivers of their own, by row."""
+        view, batch = self.view, parcel.batch
+        number, ids = (np.arange(batch.n), batch.sender) if isinstance(parcel.to, str) else parcel.to
+        row = view.bodies_rows(batch.world[number], ids) - view.first
+        here = np.flatnonzero((row >= 0) & (row < view.n))
+        here = here[np.argsort(row[here], kind="stable")]
+        return row[here], number[here]
 
     def clear(self, heard: np.ndarray | None = None) -> None:
         """Forget what was read; `heard`, (n_worlds,), names the worlds whose call has been made, all of them by default."""
         self.parcels = [] if heard is None or heard.all() else _without(self.parcels, heard)
-
-
-def _everyone(sent: np.ndarray, world: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(row, message number) of all rows that share a message's world."""
-    row, number = np.nonzero(world[:, None] == sent[None, :])
-    return row, number
 
 
 class Publisher:

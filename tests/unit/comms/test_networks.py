@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from small_worlds import (
@@ -19,7 +21,6 @@ from small_worlds import (
 
 from tussle import Simulation
 from tussle.api import (
-    EVERYONE,
     Autonomy,
     Interaction,
     Network,
@@ -231,9 +232,9 @@ def test_an_entity_hears_nothing_said_before_it_came_whatever_happens_in_other_w
     late = still("b", Listener(), rate=0.01, first_birth=0.5)
     early = still("c", Listener(), rate=0.01, first_birth=0.0)
     sim = alone(mission(still("a", Talker()), late), 1)
-    assert heard(sim, "b.Listener", "n_heard")[0, 0] == 5  # those of step 4, just delivered, to step 8
+    assert heard(sim, "b.Listener", "n_heard")[0, 0] == 4  # those of steps 5 to 8
     both = alone(mission(still("a", Talker()), late, early), 1)
-    assert heard(both, "b.Listener", "n_heard")[0, 0] == 5
+    assert heard(both, "b.Listener", "n_heard")[0, 0] == 4
 
 
 def test_topic_and_network_can_be_parameters():
@@ -277,26 +278,70 @@ def test_a_network_that_answers_nonsense_is_told_so_and_named():
         Simulation(game).step()
 
 
-def test_a_network_that_raises_ends_only_the_world_it_raises_in():
+def test_a_network_that_raises_is_named():
     class Jammed(Network):
-        at = Param(1_000_000)
-
         def route(self, w, messages):
-            if (w.step_count[messages.world] >= self.at[messages.world]).any():
-                raise OSError("jammed")
-            return EVERYONE
+            raise OSError("jammed")
 
     game = mission(
         still("a", Talker(network="Jammed")), still("b", Listener(network="Jammed")), networks=[Jammed()]
     )
-    sim = Simulation(game, seeds=[1, 2, 3], params={"Jammed.at": [99, 4, 99]})
-    results = sim.run()
-    assert [r.end for r in results] == ["time", "error", "time"]
-    assert "Jammed" in str(results[1].error)
-    assert "jammed" in str(results[1].error)
-    assert "test_networks.py:" in str(results[1].error)
-    assert heard(sim, "b.Listener").tolist() == [[9], [4], [9]]
-    assert results[0].state_hash == alone(game, 1).state_hash()
+    with pytest.raises(PluginError, match=r"test_networks.py:\d+: OSError: jammed") as caught:
+        Simulation(game, seeds=[1, 2]).run()
+    assert caught.value.plugin == "Jammed"
+    assert caught.value.where == "topic 'Note'"
+
+
+def test_messages_to_everyone_are_not_expanded():
+    """2,000 senders and as many receivers would make four million pairs, 64 MB."""
+
+    class Crowd(Autonomy):
+        x = State(unit="m")
+        said, told = Publish(Note), Subscribe(Note)
+
+        def step(self, g):
+            rows, notes = self.told.latest()
+            self.x[rows] = notes.value
+            self.said.publish(np.arange(g.n), value=g.id)
+
+    sim = Simulation(mission(still("a", Crowd(), count=2000)))
+    sim.step(2)
+    tracemalloc.start()
+    sim.step()
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 4e6
+    assert (sim.read("a.Crowd.x")[0] == 2000).all()
+
+
+@pytest.mark.parametrize("network", ["GlobalNetwork", "LocalNetwork", "SphereNetwork"])
+def test_the_last_of_all_pairs_is_the_latest(network):
+    class Check(Autonomy):
+        n = State(dtype=int)
+        told = Subscribe(Note, network_param="network")
+        network = Param("GlobalNetwork")
+
+        def step(self, g):
+            rows, notes = self.told.pairs()
+            last = np.flatnonzero(np.append(rows[1:] != rows[:-1], True)) if len(rows) else rows
+            latest_rows, latest = self.told.latest()
+            assert latest_rows.tolist() == rows[last].tolist()
+            assert latest.value.tolist() == notes.value[last].tolist()
+            by_row = self.told.by_row()
+            one_by_one = [batch.value[i] for row in range(g.n) for batch, i in by_row(row)]
+            assert one_by_one == notes.value.tolist()
+            self.n[:] += len(rows)
+
+    talkers = still(
+        "a", Talker(network=network), Check(network=network, rate=4.0), count=5, variance=(900.0, 900.0, 0.0)
+    )
+    late = still(
+        "b", Talker(network=network), Check(network=network), count=3, rate=5.0, variance=(400.0, 400.0, 0.0)
+    )
+    networks = [SphereNetwork(range=30.0)] if network == "SphereNetwork" else []
+    sim = Simulation(mission(talkers, late, networks=networks), seeds=[1, 2, 3])
+    sim.run()
+    assert (sim.read("a.Check.n")[0] > 0).all()
 
 
 def test_a_network_without_a_route_is_told_so():
