@@ -76,6 +76,8 @@ class MotionModel(EntityPlugin):
     derivative: ClassVar[Any] = None
     advance: ClassVar[Any] = None
     abstract: ClassVar[bool] = True
+    reads_all: ClassVar[bool] = False
+    """All channels that reach it are made, since they are read from outside."""
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)

@@ -96,9 +96,10 @@ def _parse(sim: Simulation, path: str) -> tuple[int, tuple[str, ...], str]:
         raise ParameterError(
             f"{path!r}: {head} has no plugin {'.'.join(key)!r}{nearest_name('.'.join(key), known)}; {listed(sorted(known))}"
         )
-    if column not in matching[0].places:
+    columns = {**matching[0].places, **matching[0].ragged}
+    if column not in columns:
         raise ParameterError(
-            f"{path!r}: {key[-1]} has no column {column!r}{nearest_name(column, matching[0].places)}; {listed(matching[0].places)}"
+            f"{path!r}: {key[-1]} has no column {column!r}{nearest_name(column, known)}; {listed(known)}"
         )
     return number, key, column
 
@@ -112,6 +113,15 @@ def _body_column(bodies: Bodies, name: str, rows: np.ndarray) -> np.ndarray:
     return np.asarray(getattr(bodies, name)[..., rows])
 
 
+MISSING: dict[str, Any] = {"f": np.nan, "i": -1, "b": False}
+"""What `read` gives for who is dead or unborn, by kind of number."""
+
+
+def capacity(sim: Simulation, number: int) -> int:
+    """Entities that a block has room for in what `read` gives: those of the mission, and more only where plugins ask for births."""
+    return max(sim.mission.blocks[number].count, int(sim.births.n_born[number].max(initial=0)))
+
+
 def read(sim: Simulation, path: str) -> tuple[np.ndarray, np.ndarray]:
     """See `Simulation.read`."""
     world_plugin = _world_column(sim, path)
@@ -119,29 +129,45 @@ def read(sim: Simulation, path: str) -> tuple[np.ndarray, np.ndarray]:
         values = np.moveaxis(world_plugin, -1, 0).copy()
         return values, np.ones(len(values), bool)
     number, key, column = _parse(sim, path)
-    n_agents = int(sim.births.n_born[number].max(initial=0))
-    alive = np.zeros((sim.n_worlds, n_agents), bool)
-    out: np.ndarray | None = None
+    shape = sim.n_worlds, capacity(sim, number)
+    alive = np.zeros(shape, bool)
+    out = _empty(sim, shape, number, key, column)
     for bodies, groups in _sources(sim):
         for group, rows, arrays in groups:
             mine = np.flatnonzero(bodies.block[rows] == number)
             binding = _binding(group, key) if key else None
             if not len(mine) or (key and binding is None):
                 continue
+            at = bodies.world[rows[mine]], bodies.place_in_block[rows[mine]]
+            alive[at] = True
             if binding is None:
-                values = _body_column(bodies, column, rows[mine])
+                out[at] = np.moveaxis(_body_column(bodies, column, rows[mine]), -1, 0)
+            elif column in binding.ragged:
+                if bodies is sim.population.bodies:  # lists are not kept of worlds that have ended
+                    for world, place, row in zip(*at, mine, strict=True):
+                        out[world, place] = binding.plugin.__dict__[column][row].copy()
             else:
                 place = binding.places[column]
                 data = arrays[place.dtype]
-                values = (data[place.first : place.first + place.k] if place.k else data[place.first])[
-                    ..., mine
-                ]
-            if out is None:
-                out = np.zeros((sim.n_worlds, n_agents, *values.shape[:-1]), values.dtype)
-            at = bodies.world[rows[mine]], bodies.place_in_block[rows[mine]]
-            out[at] = np.moveaxis(values, -1, 0)
-            alive[at] = True
-    return (np.zeros((sim.n_worlds, n_agents)) if out is None else out), alive
+                values = data[place.first : place.first + place.k] if place.k else data[place.first]
+                out[at] = np.moveaxis(values[..., mine], -1, 0)
+    return out, alive
+
+
+def _empty(
+    sim: Simulation, shape: tuple[int, int], number: int, key: tuple[str, ...], column: str
+) -> np.ndarray:
+    """What is read where nobody lives: NaN, -1 of whole numbers, None of lists."""
+    if not key:
+        k = DERIVED.get(column) or FLOATS.get(column, 1)
+        dtype = np.dtype(np.int64 if column in INTS else float)
+    else:
+        binding = next(b for g in sim.population.groups for b in g.walk() if b.path == key)
+        if column in binding.ragged:
+            return np.full(shape, None, object)
+        k, dtype = binding.places[column].k or 1, np.dtype(binding.places[column].dtype)
+        return np.full((*shape, k) if binding.places[column].k else shape, MISSING[dtype.kind], dtype)
+    return np.full((*shape, k) if k > 1 else shape, MISSING[dtype.kind], dtype)
 
 
 def _world_column(sim: Simulation, path: str) -> np.ndarray | None:
@@ -171,13 +197,15 @@ def write(sim: Simulation, path: str, values: Any) -> None:
     if not key and (column in INTS or column in DERIVED):
         raise ParameterError(f"{path!r} cannot be written; {listed(FLOATS)}")
     bodies = sim.population.bodies
-    n_agents = int(sim.births.n_born[number].max(initial=0))
+    n_agents = capacity(sim, number)
     for group in sim.population.groups:
         rows = np.arange(group.first, group.last)
         mine = np.flatnonzero(bodies.block[rows] == number)
         binding = _binding(group, key) if key else None
         if not len(mine) or (key and binding is None):
             continue
+        if binding is not None and column in binding.ragged:
+            raise ParameterError(f"{path!r} is a list per entity, which a plugin makes; it cannot be written")
         target = getattr(bodies, column) if binding is None else group.table.array(binding.places[column])
         shape = (sim.n_worlds, n_agents, *target.shape[:-1])
         try:

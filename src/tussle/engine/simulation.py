@@ -410,7 +410,10 @@ class Simulation:
     # -- from outside -----------------------------------------------------------------------------------------------------------
 
     def read(self, path: str) -> tuple[np.ndarray, np.ndarray]:
-        """A column by path: ("predator.pos") -> values (n_worlds, n_agents, 3) and who lives (n_worlds, n_agents), by place in block.
+        """A column by path: "predator.pos" -> values (n_worlds, capacity, 3) and who lives (n_worlds, capacity), by place in block.
+
+        The capacity is the block's count, and more only where plugins ask for births beyond it. Who is dead or unborn reads NaN, -1 in
+        whole numbers, false in truth values. Of a ragged column each item is the entity's list, (k, m) or (m,), None where nobody lives.
 
         Paths: "block.pos", "block.Plugin.column", and for world plugins "SimpleCaptureMetrics.captures" -> (n_worlds, ...), all true.
         """

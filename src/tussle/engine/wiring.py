@@ -139,6 +139,8 @@ class Wiring:
                 self.links[id(plugin), name] = self._link(column, bus)
         for plugin in consumers:
             self._read(plugin, bus, also, required=True)
+            if getattr(plugin, "reads_all", False):
+                bus.read.update(bus.writers)
         for channel, names in bus.writers.items():
             if len(names) > 1:
                 self.writers.append((self.where, channel, names))
