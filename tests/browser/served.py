@@ -56,7 +56,9 @@ class Watched:
                 self.trouble.append(f"console {message.type}: {message.text[:300]}")
 
         def look(address: str) -> None:
-            if not address.startswith((url, url.replace("http", "ws"), "data:", f"blob:{url}")):
+            if not address.startswith(
+                (url, url.replace("http", "ws"), "data:", f"blob:{url.rpartition('/')[0]}/")
+            ):
                 self.trouble.append(f"request: {address[:200]}")
 
         tab.on("console", hear)

@@ -119,7 +119,10 @@ def play_live(
         if record is not None:
             from tussle.record import Recorder
 
-            recorder = Recorder(simulation, record, mission_text=loaded.text, parameters=source.given)
+            # Closed last, and whatever ends the game.
+            recorder = stack.enter_context(
+                Recorder(simulation, record, mission_text=loaded.text, parameters=source.given)
+            )
         live = Live(
             simulation, pace=_warp_of(viewer) if pace == 0.0 else pace, viewer=viewer,
             is_paused=is_paused or bool(viewer.get("start_paused", False)),

@@ -24,7 +24,7 @@ Host = Annotated[
     str,
     typer.Option(
         metavar="ADDRESS",
-        help="Serve the page at this address of the machine; any but 127.0.0.1 lets others watch and steer.",
+        help="Serve the page at this address of the machine; any but 127.0.0.1 lets others watch and steer who have its whole URL.",
     ),
 ]
 Port = Annotated[
@@ -68,7 +68,8 @@ def announce(page: Page, is_opened: bool) -> None:
     if not page.is_local:
         say(
             "warning",
-            f"the page is served at {page.host}: whoever reaches this machine there can watch and steer the game",
+            f"the page is served at {page.host}: whoever reaches this machine there and has the whole address can watch and"
+            " steer the game, and what they send is not encrypted",
             "bold yellow",
         )
     if is_opened and has_screen():
@@ -85,15 +86,14 @@ def watch(page: Page, interrupt: Interrupt, is_done: Callable[[], bool]) -> int:
     """Wait until Ctrl-C, or until it is done.
 
     Returns:
-        The exit code: Ctrl-C is the way to end it, and no failure.
-
-    Raises:
-        BaseException: What stopped the page from being drawn.
+        The exit code: Ctrl-C is the way to end it, and no failure. What fails on the page itself is said, and ends nothing.
     """
     told: BaseException | None = None
+    n_said = 0
     while not interrupt.code and not is_done():
-        if page.error is not None:
-            raise page.error
+        for text in page.errors[n_said:]:
+            n_said += 1
+            say_error(text)
         if page.source.error is not None and page.source.error is not told:
             told = page.source.error
             say_error(str(told))

@@ -226,9 +226,10 @@ class Live:
         return float(self._clock.start + step * self._clock.dt)
 
     def _step_at(self, t: float) -> int:
-        if not math.isfinite(t):
-            raise ParameterError(f"t = {t!r} is not allowed; it takes a time in s")
-        return math.floor((t - self._clock.start) / self._clock.dt + 1e-6)
+        try:
+            return math.floor((t - self._clock.start) / self._clock.dt + 1e-6)
+        except (OverflowError, ValueError):
+            raise ParameterError(f"t = {t!r} is not allowed; it takes a time in s") from None
 
     @property
     def step_number(self) -> int:
@@ -345,15 +346,17 @@ class Live:
         conductor, version = self._conductor, self._conductor.version
         if conductor.is_seeking:
             return
-        self._frame.renew(version, is_still=is_still, always=is_still)
-        self._result.renew(version, is_still=is_still)
-        self._shapes.renew(version, is_still=is_still)
+        offers: list[Offer[Any]] = [self._frame, self._result, self._shapes, *list(self._entities.values())]
+        for offer in offers:
+            try:
+                offer.renew(version, is_still=is_still, always=is_still and offer is self._frame)
+            except Exception as error:  # noqa: BLE001 - the game goes on, whatever cannot be seen of it
+                self._player.note(f"not all can be seen: {type(error).__name__}: {error}")
         if self._shapes.idle_for < 4.0 * LINGER:
             self._sketchbook.open()
         else:
             self._sketchbook.close()
         for who, offer in list(self._entities.items()):
-            offer.renew(version, is_still=is_still)
             if offer.idle_for > FORGET_AFTER:
                 self._entities.pop(who, None)
 

@@ -1,9 +1,13 @@
 """`tussle view` and `tussle replay`, as a user starts and ends them."""
 
+import json
+import math
 import re
 import signal
+import socket
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -13,7 +17,9 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "unit" / "view"))
 
 from page_client import PageClient
 
-ADDRESS = re.compile(r"http://127\.0\.0\.1:\d+")
+from tussle.view import Recording
+
+ADDRESS = re.compile(r"http://127\.0\.0\.1:\d+/\w{32}")
 
 
 BROKEN = """\
@@ -23,6 +29,23 @@ from tussle.stock import Predator
 class Broken(Predator):
     def step(self, g):
         raise ValueError("no")
+"""
+
+
+FAILING = """\
+from tussle.stock import Predator
+from tussle.view.page.trails import Trails
+
+
+def broken(self, frame):
+    raise RuntimeError("trails are broken")
+
+
+Trails.show = broken
+
+
+class Hunter(Predator):
+    pass
 """
 
 
@@ -138,3 +161,71 @@ def test_a_run_is_replayed_and_two_are_compared(tussle, watching):
 def test_what_cannot_be_watched_is_told(tussle, arguments, code, told):
     done = tussle(*arguments, code=code)
     assert told in " ".join((done.stdout + done.stderr).split())
+
+
+def recorded(folder):
+    """What the run file in a directory says, which is there only when its recording was closed."""
+    return json.loads((folder / "run.json").read_text())
+
+
+def steps_shown(client):
+    """The number of the step that is shown."""
+    found = re.search(r"step ([\d,]+) ", client.text("frames/s"))
+    return int(found[1].replace(",", "")) if found else 0
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_closes_the_recording(watching, folder, tussle, number):
+    with (
+        watching("view", "game.xml", "--record", "kept") as command,
+        PageClient(command.url) as client,
+    ):
+        client.wait(lambda: steps_shown(client) > 5)
+        command.end(number)
+    assert recorded(folder / "kept")
+    assert Recording(folder / "kept").n_frames > 5
+
+
+def test_what_fails_before_the_game_begins_closes_the_recording(tussle, folder):
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        port = str(other.getsockname()[1])
+        done = tussle("view", "game.xml", "--record", "kept", "--port", port, "--no-browser", code=1)
+    assert "cannot be served" in done.stderr
+    assert "cannot be served" in str(recorded(folder / "kept"))
+
+
+@pytest.mark.parametrize("label", ["Trails [s]", "Radius [m]", "Time [s]", "Run"])
+def test_what_a_page_sends_ends_no_game(watching, folder, label):
+    with (
+        watching("view", "game.xml", "--paused", "--record", "kept") as command,
+        PageClient(command.url) as client,
+    ):
+        client.set("Trails", True)
+        client.set("Rings", True)
+        for value in (0, math.nan, -1.0, "x", 1e308):
+            client.set(label, value)
+        client.set("Run", "Step")
+        client.wait(lambda: client.text("t = 0.10 s"))
+        time.sleep(0.6)
+        client.set("Run", "Step")
+        client.wait(lambda: client.text("t = 0.20 s"))
+        code, _, err = command.end()
+    assert code == 0
+    assert "Traceback" not in err
+    assert recorded(folder / "kept")
+
+
+def test_an_error_of_the_page_is_said_in_the_terminal_and_the_game_goes_on(watching, folder):
+    (folder / "failing.py").write_text(FAILING)
+    with (
+        watching("view", "game.xml", "--plugin-path", "failing.py", "--record", "kept") as command,
+        PageClient(command.url) as client,
+    ):
+        client.wait(lambda: client.text("trails are broken"))
+        client.wait(lambda: steps_shown(client) > 20)
+        code, _, err = command.end()
+    assert code == 0
+    assert err.count("RuntimeError: trails are broken") == 1
+    assert recorded(folder / "kept")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from collections import Counter
 from importlib import import_module
 
 import numpy as np
@@ -28,6 +29,7 @@ class PageClient:
         camera: Last position and target that the server has asked for.
         n_frames: Batches in which entities were moved.
         n_bytes: All that was received.
+        kinds: Type of a message -> how many were received.
     """
 
     def __init__(self, url: str, *, is_reading: bool = True) -> None:
@@ -38,9 +40,10 @@ class PageClient:
         self.camera: dict[str, tuple] = {}
         self.notifications: list[dict] = []
         self.n_frames = self.n_bytes = 0
+        self.kinds: Counter[str] = Counter()
         self.error: Exception | None = None
         self._socket = connect(
-            url.replace("http", "ws"), subprotocols=[f"viser-v{viser.__version__}"], max_size=None,
+            url.replace("http", "ws", 1), subprotocols=[f"viser-v{viser.__version__}"], max_size=None,
             compression=None, open_timeout=60, max_queue=16,
         )  # fmt: skip
         self.send_camera((0.0, -100.0, 50.0), (0.0, 0.0, 0.0))
@@ -92,6 +95,7 @@ class PageClient:
 
     def _note(self, message: dict) -> bool:
         kind, name = message["type"], message.get("name", "")
+        self.kinds[kind] += 1
         if kind == "SceneNodeUpdateMessage":
             self.nodes.setdefault(name, {}).update(message["updates"])
             return name.startswith("/entities") and "batched_positions" in message["updates"]

@@ -29,6 +29,8 @@ NOTICED = 0.02
 ECHO = 0.7
 """How long after a command the browser may still tell of the view before it [s]."""
 MOST_UNDOS = 50
+NEAREST, FARTHEST = 1e-6, 1e3
+"""From what is followed, in sizes of the scene."""
 
 
 @dataclass(frozen=True)
@@ -162,7 +164,8 @@ class Camera:
     def zoom(self, factor: float) -> None:
         """Nearer to what is followed, or farther."""
         with self._lock:
-            self._distance *= factor
+            size = self._scenery.size
+            self._distance = min(max(self._distance * factor, NEAREST * size), FARTHEST * size)
             if self.mode == "free":
                 self._keep()
                 view = self._view()

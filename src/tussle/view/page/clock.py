@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from tussle.view.frame import Frame, Happening
+    from tussle.view.page.failures import Safe
     from tussle.view.page.source import Source
 
 MARKED = ("capture", "collision", "death", "birth", "difference", "end")
@@ -19,6 +20,8 @@ MOST_MARKS = 60
 """On the time line, which is a few hundred pixels long."""
 NO_EVENT = "–"
 TRANSPORT_ORDER = 1.0
+TICK = 0.01
+"""Of the time line [s]."""
 
 
 class TimePanel:
@@ -27,15 +30,16 @@ class TimePanel:
     Args:
         gui: The server's panel.
         source: The game.
+        safe: Makes callbacks whose errors are told.
     """
 
-    def __init__(self, gui: Any, source: Source) -> None:
-        self._source = source
+    def __init__(self, gui: Any, source: Source, safe: Safe) -> None:
+        self._source, self._safe = source, safe
         self._run = gui.add_button_group("Run", ("Back", "Pause", "Step"), order=TRANSPORT_ORDER)
         speed = gui.add_button_group("Speed", ("Slower", "1 ×", "Faster", "Max"), order=TRANSPORT_ORDER + 0.1)
-        first, last = source.span
+        first, last = self._ends()
         self._slider = gui.add_slider(
-            "Time [s]", float(first), max(float(last), float(first) + 1e-3), 0.01, float(first), marks=marks(source),
+            "Time [s]", first, last, TICK, float(source.span[0]), marks=marks(source),
             order=TRANSPORT_ORDER + 0.2,
         )  # fmt: skip
         self._list = gui.add_dropdown(
@@ -49,8 +53,7 @@ class TimePanel:
     def _wired(self, speed: Any, leap: Any) -> None:
         source = self._source
 
-        # Asynchronous, so that clicks are carried out in their order, each with the button of its own.
-        async def told_run(_: Any) -> None:
+        def told_run(_: Any) -> None:
             # By its name, not a toggle: who pressed Pause meant it, whatever has happened meanwhile.
             does = {
                 "Back": source.step_back,
@@ -60,32 +63,33 @@ class TimePanel:
             }
             does[self._run.value]()
 
-        self._run.on_click(told_run)
+        self._run.on_click(self._safe(told_run))
 
-        async def told_speed(_: Any) -> None:
+        def told_speed(_: Any) -> None:
             if speed.value in ("1 ×", "Max"):
                 source.warp = 1.0 if speed.value == "1 ×" else None
             else:
                 (source.faster if speed.value == "Faster" else source.slower)()
 
-        speed.on_click(told_speed)
+        speed.on_click(self._safe(told_speed))
 
         def told_slider(event: Any) -> None:
             if event.client is not None:
-                source.seek(float(self._slider.value))
+                first, last = source.span
+                source.seek(min(max(float(self._slider.value), first), last))
 
-        self._slider.on_update(told_slider)
+        self._slider.on_update(self._safe(told_slider))
 
         def told_list(event: Any) -> None:
             if event.client is not None and self._list.value in self._listed:
                 source.seek(self._listed[self._list.value])
 
-        self._list.on_update(told_list)
+        self._list.on_update(self._safe(told_list))
 
-        async def told_leap(_: Any) -> None:
+        def told_leap(_: Any) -> None:
             self.to_event(is_next=leap.value == "Next event")
 
-        leap.on_click(told_leap)
+        leap.on_click(self._safe(told_leap))
 
     def to_event(self, is_next: bool) -> None:
         """Go to the next event of the time line, or the one before."""
@@ -97,13 +101,19 @@ class TimePanel:
         if 0 <= place < len(times):
             self._source.seek(times[place])
 
+    def _ends(self) -> tuple[float, float]:
+        """Ends of the slider [s]: of the game, rounded to the outside, as a browser rounds what it sends."""
+        first, last = self._source.span
+        low = math.floor(first / TICK + 1e-6) * TICK
+        return low, max(math.ceil(last / TICK - 1e-6) * TICK, low + TICK)
+
     def show(self, frame: Frame) -> None:
         """The time of a frame, and the events there are by now."""
-        first, last = self._source.span
-        last = max(last, first + 1e-3)
+        first = self._source.span[0]
+        low, last = self._ends()
         # Never a value outside the range, whichever message comes first.
         self._slider.max = max(self._slider.max, last)
-        self._slider.value = min(max(frame.t, first), last)
+        self._slider.value = min(max(frame.t, low), last)
         self._slider.max = min(self._slider.max, last)
         standing = "Play" if self._source.is_paused or self._source.is_over else "Pause"
         if self._run.options[1] != standing:

@@ -11,6 +11,7 @@ from tussle.view.page.keys import help_table, keys_of
 from tussle.view.page.panel import CUSTOM_KEY
 
 if TYPE_CHECKING:
+    from tussle.view.page.failures import Safe
     from tussle.view.page.panel import Panel
     from tussle.view.page.source import Source
     from tussle.view.page.visitor import Visitor
@@ -28,12 +29,18 @@ class Keyboard:
         source: The game.
         panel: The controls that keys move too.
         visitor: Gives the visitor by the number of its client.
+        safe: Makes callbacks whose errors are told.
     """
 
     def __init__(
-        self, gui: Any, source: Source, panel: Panel, visitor: Callable[[int], Visitor | None]
+        self,
+        gui: Any,
+        source: Source,
+        panel: Panel,
+        visitor: Callable[[int], Visitor | None],
+        safe: Safe,
     ) -> None:
-        self._source, self._panel, self._visitor = source, panel, visitor
+        self._source, self._panel, self._visitor, self._safe = source, panel, visitor, safe
         commands = {**self._of_time(), **self._of_display(), **self._of_visitors()}
         is_live = isinstance(source, Live)
         for key in keys_of(is_live):
@@ -43,13 +50,12 @@ class Keyboard:
             self._bind(handle, commands[key.does])
 
     def _bind(self, handle: Any, command: Callable[[Visitor], None]) -> None:
-        # Asynchronous, so that keys act in the order in which they were pressed.
-        async def told_handle(event: Any) -> None:
+        def told_handle(event: Any) -> None:
             visitor = self._visitor(event.client_id)
             if visitor is not None:
                 command(visitor)
 
-        handle.on_trigger(told_handle)
+        handle.on_trigger(self._safe(told_handle))
 
     def _of_time(self) -> dict[str, Callable[[Visitor], None]]:
         source, time = self._source, self._panel.time

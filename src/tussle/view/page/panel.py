@@ -14,12 +14,15 @@ from tussle.view.page.keys import help_table
 if TYPE_CHECKING:
     from tussle.view.frame import Frame
     from tussle.view.page.display import Display
+    from tussle.view.page.failures import Safe
     from tussle.view.page.source import Source
     from tussle.view.page.visitor import Visitor
 
 NUMBERS_ORDER, SHOW_ORDER, REACH_ORDER, GAME_ORDER, KEYS_ORDER = 0.0, 20.0, 21.0, 30.0, 40.0
 LARGEST_SEED = 2**31 - 1
 """That the page takes; the command line takes larger ones."""
+LONGEST = 1e9
+"""Of any length [m] and time [s] that is shown."""
 CUSTOM_KEY = ";"
 """The key that is kept for the plugins, as in SCRIMMAGE."""
 
@@ -32,14 +35,21 @@ class Panel:
         source: The game.
         display: What is shown.
         visitor: Gives the visitor by the number of its client.
+        safe: Makes callbacks whose errors are told.
     """
 
     def __init__(
-        self, gui: Any, source: Source, display: Display, visitor: Callable[[int], Visitor | None]
+        self,
+        gui: Any,
+        source: Source,
+        display: Display,
+        visitor: Callable[[int], Visitor | None],
+        safe: Safe,
     ) -> None:
-        self._gui, self._source, self._display, self._visitor = gui, source, display, visitor
+        self._gui, self._source, self._display = gui, source, display
+        self._visitor, self._safe = visitor, safe
         self._numbers = gui.add_html("", order=NUMBERS_ORDER)
-        self.time = TimePanel(gui, source)
+        self.time = TimePanel(gui, source, safe)
         self.switches: dict[str, Any] = {}
         self._show_folder()
         self._reach_folder()
@@ -90,7 +100,7 @@ class Panel:
         def told_angle(_: Any) -> None:
             self._display.cone_angle = math.radians(angle.value)
 
-        angle.on_update(told_angle)
+        angle.on_update(self._safe(told_angle))
 
     def _switch(self, attribute: str, label: str) -> None:
         box = self.switches[attribute] = self._gui.add_checkbox(label, getattr(self._display, attribute))
@@ -98,7 +108,7 @@ class Panel:
         def told_box(_: Any) -> None:
             self._set(attribute, box.value)
 
-        box.on_update(told_box)
+        box.on_update(self._safe(told_box))
 
     def _factor(self, attribute: str, label: str) -> Any:
         slider = self._gui.add_slider(label, 0.1, 10.0, 0.1, getattr(self._display, attribute))
@@ -106,18 +116,18 @@ class Panel:
         def told_slider(_: Any) -> None:
             self._set(attribute, slider.value)
 
-        slider.on_update(told_slider)
+        slider.on_update(self._safe(told_slider))
 
         return slider
 
     def _length(self, attribute: str, label: str) -> None:
         value = float(f"{getattr(self._display, attribute):.3g}")
-        field = self._gui.add_number(label, value, min=1e-3, step=1.0)
+        field = self._gui.add_number(label, value, min=0.0, max=LONGEST, step=1.0)
 
         def told_field(_: Any) -> None:
             self._set(attribute, float(field.value))
 
-        field.on_update(told_field)
+        field.on_update(self._safe(told_field))
 
     def _set(self, attribute: str, value: Any) -> None:
         setattr(self._display, attribute, value)
@@ -137,14 +147,14 @@ class Panel:
             if visitor is not None:
                 visitor.pick_point()
 
-        pick.on_click(told_pick)
+        pick.on_click(self._safe(told_pick))
 
         def told_key(_: Any) -> None:
             live.publish_key(CUSTOM_KEY)
 
-        key.on_click(told_key)
+        key.on_click(self._safe(told_key))
 
         def told_anew(_: Any) -> None:
             live.reset(int(seed.value))
 
-        anew.on_click(told_anew)
+        anew.on_click(self._safe(told_anew))

@@ -6,12 +6,14 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from tussle.view.frame import Frame
     from tussle.view.page.display import Display
     from tussle.view.page.drawn import Drawn
+    from tussle.view.page.failures import Failures
     from tussle.view.page.labels import Labels
     from tussle.view.page.overlays import Overlays
     from tussle.view.page.panel import Panel
@@ -41,10 +43,10 @@ class Pusher:
         display: What is shown.
         parts: Stage, labels, trails, overlays, drawn and panel, by name.
         visitors: Those who watch now.
+        failures: Told of what cannot be drawn; the rest is.
         period: Time between two frames [s], no less than `PERIOD`.
 
     Attributes:
-        error: What ended the thread; None while it goes on.
         n_pushed: Frames that were sent.
     """
 
@@ -55,12 +57,12 @@ class Pusher:
         display: Display,
         parts: Parts,
         visitors: Callable[[], list[Visitor]],
+        failures: Failures,
         period: float = PERIOD,
     ) -> None:
         self._server, self._source, self._display = server, source, display
-        self._parts, self._visitors = parts, visitors
+        self._parts, self._visitors, self._failures = parts, visitors, failures
         self._period = max(period, PERIOD)
-        self.error: BaseException | None = None
         self.n_pushed = 0
         self._moments: deque[float] = deque(maxlen=64)
         self._seen: Frame | None = None
@@ -75,19 +77,21 @@ class Pusher:
         self._is_stopping.set()
         self._thread.join(5.0)
 
+    @property
+    def is_alive(self) -> bool:
+        return self._thread.is_alive()
+
     def _work(self) -> None:
         due = time.monotonic()
-        try:
-            while not self._is_stopping.is_set():
-                visitors = self._visitors()
-                if visitors:
+        while not self._is_stopping.is_set():
+            visitors = self._visitors()
+            if visitors:
+                with self._failures.caught():
                     self.push(visitors)
-                    due = max(due + self._period, time.monotonic())
-                    self._is_stopping.wait(due - time.monotonic())
-                else:
-                    self._is_stopping.wait(NAP)
-        except BaseException as error:  # noqa: BLE001 - the thread's owner tells it
-            self.error = error
+                due = max(due + self._period, time.monotonic())
+                self._is_stopping.wait(due - time.monotonic())
+            else:
+                self._is_stopping.wait(NAP)
 
     def push(self, visitors: list[Visitor]) -> None:
         """Send what is to be seen now."""
@@ -103,24 +107,33 @@ class Pusher:
             self._draw(frame, visitors)
         # Asked for each time: what was drawn in a step can come a moment after its frame.
         shapes = self._source.shapes() if self._display.has_drawn else ()
-        self._parts.drawn.show(shapes, SHARE_OF_MODEL * self._display.size)
-        for visitor in visitors:
-            visitor.camera.follow(frame, visitor.chosen)
+        self._each(partial(self._parts.drawn.show, shapes, SHARE_OF_MODEL * self._display.size))
+        self._each(*(partial(visitor.camera.follow, frame, visitor.chosen) for visitor in visitors))
         if is_slow:
-            self._parts.trails.show(frame)
-            self._parts.overlays.show_links(frame)
-            self._parts.panel.show(frame, self.rate(), self._parts.drawn.notes)
-            for visitor in visitors:
-                visitor.show(frame)
+            parts, notes = self._parts, [*self._parts.drawn.notes, *self._failures.texts]
+            self._each(
+                partial(parts.trails.show, frame),
+                partial(parts.overlays.show_links, frame),
+                partial(parts.panel.show, frame, self.rate(), notes),
+                *(partial(visitor.show, frame) for visitor in visitors),
+            )
 
     def _draw(self, frame: Frame, visitors: list[Visitor]) -> None:
-        parts = self._parts
+        parts, chosen = self._parts, {v.chosen for v in visitors if v.chosen is not None}
         with self._server.atomic():
-            parts.stage.show(frame)
-            parts.overlays.show(frame)
-            parts.labels.show(frame, {v.chosen for v in visitors if v.chosen is not None})
+            self._each(
+                partial(parts.stage.show, frame),
+                partial(parts.overlays.show, frame),
+                partial(parts.labels.show, frame, chosen),
+            )
         self.n_pushed += 1
         self._moments.append(time.monotonic())
+
+    def _each(self, *draws: Callable[[], None]) -> None:
+        """Draw one after the other, whichever of them fails."""
+        for draw in draws:
+            with self._failures.caught():
+                draw()
 
     def rate(self) -> float:
         """Frames that were sent in the last second."""

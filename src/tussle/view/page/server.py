@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import contextlib
-import socket
+import ipaddress
 import threading
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Self
 
 from tussle.errors import MissingExtraError, ViewError
 from tussle.view.live import Live
+from tussle.view.page.access import Access
 from tussle.view.page.camera import FIELD_OF_VIEW, opening
 from tussle.view.page.comparing import Comparison
 from tussle.view.page.display import Display
 from tussle.view.page.drawn import Drawn
+from tussle.view.page.failures import Failures
 from tussle.view.page.ground import background_image, draw_ground, light
+from tussle.view.page.guard import Guard, bound_socket
 from tussle.view.page.keyboard import Keyboard
 from tussle.view.page.labels import Labels
 from tussle.view.page.overlays import Overlays
@@ -30,9 +33,6 @@ if TYPE_CHECKING:
     from tussle.view.page.source import Source
 
 LOOPBACK = "127.0.0.1"
-PORT = 8123
-"""Where it is served when no port is asked for and this one is free; else at one of the next."""
-MOST_PORTS = 100
 MOST_PERIOD = 60.0
 """Between two frames [s]: longer is no moving picture."""
 TEAL = (0, 110, 120)
@@ -41,8 +41,9 @@ TEAL = (0, 110, 120)
 class Page:
     """A game on a page in the browser, from when this is made until `stop`.
 
-    Nothing on the page reads files or runs code, and it asks no other server for anything. Closing all browsers leaves the game going;
-    a browser that is slow sees fewer frames and holds nothing up.
+    Nothing on the page reads files or runs code, and it asks no other server for anything. Only who has the whole address opens it,
+    and what a browser sends is checked before anything is done (`tussle.view.page.access`, `tussle.view.page.incoming`). Closing all
+    browsers leaves the game going; a browser that is slow sees fewer frames and holds nothing up.
 
     Args:
         source: The game. The page does not stop it when it is stopped itself.
@@ -54,10 +55,12 @@ class Page:
     Attributes:
         host: Where it is served.
         display: What is shown.
+        url: Its whole address, as typed on this machine.
+        is_local: Only this machine can reach it.
 
     Raises:
         MissingExtraError: viser is not installed.
-        ViewError: It cannot be served there.
+        ViewError: It cannot be served there, or not by this version of viser.
     """
 
     def __init__(
@@ -70,29 +73,49 @@ class Page:
         viewer: Mapping[str, Any] | None = None,
     ) -> None:
         viser = _viser()
-        self.source, self.host = source, host
+        self.source, self.host = source, host or LOOPBACK
         viewer = viewer or {}
         frame = source.frame()
         self.display = Display.of(frame, source.looks, source.scenery, viewer, mission)
         self._visitors: dict[int, Visitor] = {}
         self._lock = threading.Lock()
+        self._failures = Failures()
         self._own_notes: list[str] = []
         self._period = self._read_period(viewer.get("gui_update_period"))
         self._opening = opening(source.scenery, viewer.get("camera"))
         self._own_notes += self._opening.notes
-        port = _free_port(host, port)
-        with _silence():
-            self._server = _server_class(viser)(
-                host=host, port=port, label=f"tussle · {source.name}", verbose=False
-            )
+        self._server = self._start(viser, port)
         self._is_stopped = False
         try:
             self._set_scene(frame)
         except BaseException:
             self._stop_serving()
             raise
-        self._server.on_client_connect(self._welcome)
-        self._server.on_client_disconnect(self._farewell)
+        self._server.on_client_connect(self._failures.safe(self._welcome))
+        self._server.on_client_disconnect(self._failures.safe(self._farewell))
+
+    def _start(self, viser: Any, port: int | None) -> Any:
+        """Viser's server, behind a guard."""
+        bound = bound_socket(self.host, port)
+        address, self.port = bound.getsockname()[:2]
+        self.is_local = ipaddress.ip_address(address).is_loopback
+        access = Access(self.host, self.port)
+        self.url = access.url
+        guard = Guard(bound, access, self._find, self._refuse, self._failures.tell)
+        try:
+            with guard.in_place(), _silence():
+                server = _server_class(viser)(
+                    host=self.host, port=self.port, label=f"tussle · {self.source.name}", verbose=False
+                )
+                if not guard.is_in_place:
+                    server.stop()
+        except BaseException:
+            bound.close()
+            raise
+        if not guard.is_in_place:
+            bound.close()
+            raise ViewError("viser did not start its server as expected; without its guard nothing is served")
+        return server
 
     def _set_scene(self, frame: Frame) -> None:
         server, source, display = self._server, self.source, self.display
@@ -109,16 +132,17 @@ class Page:
         if isinstance(source, Comparison) and source.shift.any():
             scene.add_frame("/beside", show_axes=False, position=tuple(source.shift))
             draw_ground(scene, source.b.scenery, looks, "/beside", has_grid=False)
-        panel = Panel(gui, source, display, self.visitor)
-        Keyboard(gui, source, panel, self.visitor)
-        stage = Stage(scene, blocks, looks, display, self._clicked)
+        safe = self._failures.safe
+        panel = Panel(gui, source, display, self.visitor, safe)
+        Keyboard(gui, source, panel, self.visitor, safe)
+        stage = Stage(scene, blocks, looks, display, self._clicked, safe)
         parts = Parts(
             stage, Labels(scene, display, self.name_of), Trails(scene, source, looks, blocks, display),
             Overlays(scene, looks, blocks, display), Drawn(scene), panel,
         )  # fmt: skip
         stage.show(frame)
         panel.show(frame, 0.0)
-        self.pusher = Pusher(server, source, display, parts, self.visitors, self._period)
+        self.pusher = Pusher(server, source, display, parts, self.visitors, self._failures, self._period)
 
     def _read_period(self, text: Any) -> float:
         """Time between frames as the mission has it, in ms there [s]; 0 where it says nothing of use."""
@@ -143,7 +167,7 @@ class Page:
     # -- who watches --------------------------------------------------------------------------------------------------------------
 
     def _welcome(self, client: Any) -> None:
-        visitor = Visitor(client, self.source, self.display, self.name_of)
+        visitor = Visitor(client, self.source, self.display, self.name_of, self._failures.safe)
         if self._opening.follow is not None:
             visitor.choose(self._opening.follow)
         visitor.set_mode(self._opening.mode)
@@ -175,22 +199,25 @@ class Page:
             return self.source.name_of(frame, row)
         return f"{self.source.blocks[int(frame.block[row])]} {int(frame.id[row])}"
 
+    # -- what they send -----------------------------------------------------------------------------------------------------------
+
+    def _visitor_on(self, connection: Any) -> Visitor | None:
+        connections = self._server._websock_server._live_connections
+        return self.visitor(next((n for n, other in list(connections.items()) if other is connection), -1))
+
+    def _find(self, connection: Any, uuid: str) -> Any:
+        """The control with an id, of the shared panel or of a browser's own; None where there is none."""
+        visitor = self._visitor_on(connection)
+        panels = [self._server.gui] if visitor is None else [self._server.gui, visitor.gui]
+        found = (panel._gui_input_handle_from_uuid.get(uuid) for panel in panels)
+        return next((control for control in found if control is not None), None)
+
+    def _refuse(self, connection: Any, label: str, reason: str) -> None:
+        visitor = self._visitor_on(connection)
+        if visitor is not None:
+            visitor.refuse(label, reason)
+
     # -- the server ---------------------------------------------------------------------------------------------------------------
-
-    @property
-    def port(self) -> int:
-        return int(self._server.get_port())
-
-    @property
-    def url(self) -> str:
-        """Address of the page, as typed on this machine."""
-        host = LOOPBACK if self.host in ("", "0.0.0.0", "::") else self.host  # noqa: S104 - it is compared, not bound
-        return f"http://{f'[{host}]' if ':' in host else host}:{self.port}"
-
-    @property
-    def is_local(self) -> bool:
-        """Only this machine can reach it."""
-        return self.host in (LOOPBACK, "localhost", "::1") or self.host.startswith("127.")
 
     @property
     def notes(self) -> list[str]:
@@ -200,8 +227,13 @@ class Page:
 
     @property
     def error(self) -> BaseException | None:
-        """What stopped the page from being drawn; None while nothing has."""
-        return self.pusher.error
+        """The last thing that failed on the page itself, which goes on; None while nothing has."""
+        return self._failures.last
+
+    @property
+    def errors(self) -> list[str]:
+        """What has failed on the page itself, one line each; they are on the page too."""
+        return self._failures.texts
 
     @property
     def is_live(self) -> bool:
@@ -258,29 +290,3 @@ def _silence() -> Iterator[None]:
         yield
     finally:
         console.quiet = before
-
-
-def _free_port(host: str, wanted: int | None) -> int:
-    """A port that can be served at.
-
-    Raises:
-        ViewError: There is none, the one that is wanted is taken, or the host is not this machine's.
-    """
-    ports = [wanted] if wanted is not None else list(range(PORT, PORT + MOST_PORTS))
-    refusal: OSError | None = None
-    for port in ports:
-        try:
-            family, kind, protocol, _, address = socket.getaddrinfo(
-                host or None, port, type=socket.SOCK_STREAM
-            )[0]
-            with socket.socket(family, kind, protocol) as probe:
-                probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-                probe.bind(address)
-        except OSError as error:
-            refusal = error
-            if isinstance(error, socket.gaierror):
-                break
-        else:
-            return port
-    where = f"port {wanted}" if wanted is not None else f"ports {PORT} to {PORT + MOST_PORTS - 1}"
-    raise ViewError(f"the page cannot be served at {host}, {where}: {refusal}")

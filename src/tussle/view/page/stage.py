@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from tussle.view.frame import Frame
     from tussle.view.looks import Looks
     from tussle.view.page.display import Display
+    from tussle.view.page.failures import Safe
 
 Clicked = Callable[[int, int], None]
 """Called with the number of a client and the id of the entity that it has clicked."""
@@ -46,10 +47,13 @@ class Stage:
         looks: Colours and models.
         display: What is shown.
         on_click: Told which entity is clicked.
+        safe: Makes callbacks whose errors are told.
     """
 
-    def __init__(self, scene: Any, blocks: int, looks: Looks, display: Display, on_click: Clicked) -> None:
-        self._scene, self._display, self._on_click = scene, display, on_click
+    def __init__(
+        self, scene: Any, blocks: int, looks: Looks, display: Display, on_click: Clicked, safe: Safe
+    ) -> None:
+        self._scene, self._display, self._on_click, self._safe = scene, display, on_click, safe
         self._names = sorted({looks.model(b) for b in range(blocks)} or {"sphere"})
         self._model = np.array([self._names.index(looks.model(b)) for b in range(blocks)], np.intp)
         self._colours = np.array([looks.block_colour(b) for b in range(blocks)], np.uint8).reshape(-1, 3)
@@ -106,7 +110,7 @@ class Stage:
             if who is not None and index is not None and index < len(who):
                 self._on_click(event.client_id, int(who[index]))
 
-        handle.on_click(told_handle)
+        handle.on_click(self._safe(told_handle))
 
         return handle
 

@@ -46,7 +46,7 @@ class Trails:
 
     def show(self, frame: Frame) -> None:
         """Draw the trails that lead to a moment."""
-        if not self._display.has_trails:
+        if not self._display.has_trails or not self._display.trail_time:
             self.hide()
             return
         lines, colours = self.lines(frame)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -9,11 +10,12 @@ import numpy as np
 
 from tussle.view.live import Live
 from tussle.view.page import words
-from tussle.view.page.camera import MODES, Camera
+from tussle.view.page.camera import FARTHEST, MODES, Camera
 
 if TYPE_CHECKING:
     from tussle.view.frame import Frame
     from tussle.view.page.display import Display
+    from tussle.view.page.failures import Safe
     from tussle.view.page.source import Source
 
 CAMERA_ORDER, ENTITY_ORDER = 10.0, 11.0
@@ -21,6 +23,9 @@ CAMERA_ORDER, ENTITY_ORDER = 10.0, 11.0
 NOBODY = 0
 """No entity has this id."""
 NEARER = 0.8
+LARGEST_ID = 2**31 - 1
+REFUSAL_PERIOD = 1.0
+"""Least time between two words about refused values [s]."""
 
 
 class Visitor:
@@ -31,6 +36,7 @@ class Visitor:
         source: The game.
         display: What is shown.
         name: What to call the entity in a row of a frame.
+        safe: Makes callbacks whose errors are told.
 
     Attributes:
         camera: Its camera.
@@ -38,22 +44,25 @@ class Visitor:
     """
 
     def __init__(
-        self, client: Any, source: Source, display: Display, name: Callable[[Frame, int], str]
+        self, client: Any, source: Source, display: Display, name: Callable[[Frame, int], str], safe: Safe
     ) -> None:
-        self._client, self._source, self._name = client, source, name
+        self._client, self._source, self._name, self._safe = client, source, name, safe
+        self.gui = client.gui
         self.camera = Camera(client, source.scenery, display.size)
         self.chosen: int | None = None
         self._called = ""
         self._shown = ""
         self._stop_picking: Callable[[], None] | None = None
-        client.camera.max_orbit_distance = 1e3 * source.scenery.size
-        self._build(client.gui)
+        self._help: Any = None
+        self._refused_at = -REFUSAL_PERIOD
+        client.camera.max_orbit_distance = FARTHEST * source.scenery.size
+        self._build(self.gui)
 
     def _build(self, gui: Any) -> None:
         with gui.add_folder("Camera", order=CAMERA_ORDER):
             self._mode = gui.add_dropdown("Mode", MODES, initial_value="free", hint="A changes it")
             self._follow = gui.add_number(
-                "Entity", NOBODY, min=0, step=1, hint="Id of whom to follow; ← → change it"
+                "Entity", NOBODY, min=0, max=LARGEST_ID, step=1, hint="Id of whom to follow; ← → change it"
             )
             moves = gui.add_button_group("View", ("Whole", "Above", "Undo"))
         with gui.add_folder("Entity", order=ENTITY_ORDER):
@@ -63,18 +72,18 @@ class Visitor:
             if event.client is not None:
                 self.set_mode(self._mode.value)
 
-        self._mode.on_update(told_mode)
+        self._mode.on_update(self._safe(told_mode))
 
         def told_follow(event: Any) -> None:
             if event.client is not None:
                 self.choose(int(self._follow.value) or None)
 
-        self._follow.on_update(told_follow)
+        self._follow.on_update(self._safe(told_follow))
 
-        async def told_moves(_: Any) -> None:
+        def told_moves(_: Any) -> None:
             {"Whole": self.see_whole, "Above": self.see_from_above, "Undo": self.undo_view}[moves.value]()
 
-        moves.on_click(told_moves)
+        moves.on_click(self._safe(told_moves))
 
     # -- camera -------------------------------------------------------------------------------------------------------------------
 
@@ -159,7 +168,7 @@ class Visitor:
         def told(event: Any) -> None:
             stop()
             point = on_ground(event.ray_origin, event.ray_direction, source.scenery.ground)
-            if point is None:
+            if point is None or np.abs(point).max() > FARTHEST * source.scenery.size:
                 self._tell("No point", "There is no ground there.")
                 return
             source.publish_click(point)
@@ -170,24 +179,35 @@ class Visitor:
 
         def stop() -> None:
             self._stop_picking = None
-            scene.remove_click_callback(told)
+            scene.remove_click_callback(picked)
 
-        scene.on_click()(told)
+        picked = self._safe(told)
+        scene.on_click()(picked)
         self._stop_picking = stop
         self._tell("Pick a point", "Click on the ground. Plugins are told of it in the next step.")
 
     def read_help(self, table: str) -> None:
         """Show the keys in a window of its own."""
-        gui = self._client.gui
-        modal = gui.add_modal("Keys")
+        gui = self.gui
+        if self._help is not None:
+            self._help.close()
+        modal = self._help = gui.add_modal("Keys")
         with modal:
             gui.add_markdown(table)
             close = gui.add_button("Close")
 
         def told_close(_: Any) -> None:
             modal.close()
+            self._help = None
 
-        close.on_click(told_close)
+        close.on_click(self._safe(told_close))
+
+    def refuse(self, label: str, reason: str) -> None:
+        """Say that a value was not taken; of many in a row, the first."""
+        now = time.monotonic()
+        if now - self._refused_at >= REFUSAL_PERIOD:
+            self._refused_at = now
+            self._tell(label, reason)
 
     def _tell(self, title: str, text: str) -> None:
         self._client.add_notification(title, text, auto_close_seconds=4.0)

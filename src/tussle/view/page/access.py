@@ -1,0 +1,82 @@
+"""Who may open a page: whoever has its whole address, at a name that is served, and not from another page."""
+
+from __future__ import annotations
+
+import hmac
+import ipaddress
+import secrets
+import socket
+from collections.abc import Sequence
+
+LOOPBACK_NAMES = ("127.0.0.1", "localhost", "[::1]")
+EVERYWHERE = ("0.0.0.0", "::")  # noqa: S104 - they are compared, not bound
+TOKEN_BYTES = 16
+MOST_BROWSERS = 32
+"""That are connected at once."""
+MOST_BYTES = 16 * 1024
+"""Of one message from a browser; the longest that a control sends has some hundred."""
+MOST_MESSAGES = 200
+"""From one browser in a second, and at once: it sends 50 while the view is turned. More wait."""
+HEADERS = {
+    "Referrer-Policy": "no-referrer",
+    "Content-Security-Policy": "frame-ancestors 'none'",
+    "X-Content-Type-Options": "nosniff",
+    "Cache-Control": "no-store",
+}
+"""Of each answer: nobody else learns the address, and no other page shows this one inside itself."""
+
+
+class Access:
+    """The rule by which requests for a page, and for its socket, are answered.
+
+    Args:
+        host: Address that the page is served at.
+        port: Its port.
+
+    Attributes:
+        token: The part of the address that only those know who have been told.
+    """
+
+    def __init__(self, host: str, port: int) -> None:
+        self.token = secrets.token_hex(TOKEN_BYTES)
+        self._port = port
+        self._is_everywhere = host in EVERYWHERE
+        name = "127.0.0.1" if self._is_everywhere else f"[{host}]" if ":" in host else host.lower()
+        self._names = {*LOOPBACK_NAMES, name}
+        self.url = f"http://{name}:{port}/{self.token}"
+
+    def refusal(self, path: str, hosts: Sequence[str], origins: Sequence[str]) -> str:
+        """Why a request is refused; "" for one that is answered.
+
+        Args:
+            path: The path that is asked for.
+            hosts: Values of all its Host headers. A name that somebody else has bound to this machine's address is not served.
+            origins: Values of all its Origin headers. Browsers name the page there that asks; without one it is no other page.
+        """
+        if len(hosts) != 1 or not self._is_served(hosts[0]):
+            return f"This page is served at port {self._port} of this machine's own addresses only.\n"
+        if list(origins) not in ([], [f"http://{hosts[0]}"]):
+            return "This page is not open to other pages.\n"
+        token = path.removeprefix("/").partition("?")[0].partition("/")[0]
+        if not hmac.compare_digest(token.encode(errors="replace"), self.token.encode()):
+            return "The address is not complete: take all of it from where tussle was started.\n"
+        return ""
+
+    def path_within(self, path: str) -> str:
+        """The part of a path behind the token."""
+        return "/" + path.removeprefix(f"/{self.token}").removeprefix("/")
+
+    def _is_served(self, host: str) -> bool:
+        name, _, port = host.lower().rpartition(":")
+        if port != str(self._port):
+            return False
+        return name in self._names or (self._is_everywhere and _is_own(name))
+
+
+def _is_own(name: str) -> bool:
+    """Whether it is an address, which no name server can redirect, or this machine's own name."""
+    try:
+        ipaddress.ip_address(name.removeprefix("[").removesuffix("]"))
+    except ValueError:
+        return name == socket.gethostname().lower()
+    return True
