@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from rich.console import Group
 from rich.live import Live
-from rich.progress import BarColumn, Progress, TextColumn
+from rich.progress import BarColumn, Progress
 from rich.text import Text
 
 from tussle.batch import store
@@ -26,7 +26,7 @@ from tussle.batch.variables import parse_variable
 from tussle.cli.batch_summary import compare_hash, show_batch
 from tussle.cli.interrupt import Interrupt
 from tussle.cli.play import FOR_VIEWER, Source, simulate
-from tussle.cli.progress import BAR_EVERY, LINE_EVERY, clock, compiling, times
+from tussle.cli.progress import BAR_EVERY, LINE_EVERY, clock, compiling, text_column, times
 from tussle.cli.settings import ending_by_time, read_end
 from tussle.cli.terminal import err, say, say_note
 from tussle.errors import BatchError, ParameterError, RecordError
@@ -244,11 +244,11 @@ class BatchMeter:
         self._is_bar = err().is_terminal
         self._due = self._began + (0.0 if self._is_bar else LINE_EVERY)
         self._bar = Progress(
-            TextColumn("{task.description}", style="bold"),
+            text_column("{task.description}", style="bold"),
             BarColumn(bar_width=None, complete_style="cyan", finished_style="cyan", pulse_style="cyan"),
-            TextColumn("{task.fields[at]}"),
-            TextColumn("{task.fields[rate]}", style="cyan"),
-            TextColumn("{task.fields[left]}", style="dim"),
+            text_column("{task.fields[at]}"),
+            text_column("{task.fields[rate]}", style="cyan"),
+            text_column("{task.fields[left]}", style="dim"),
             auto_refresh=False, expand=True,
         )  # fmt: skip
         total = batch.plan.n_runs if has_total else None
