@@ -151,7 +151,7 @@ def play_batch(asked: Asked, command: Sequence[str]) -> int:
                 n = min(meter.n_before, results.n_runs)
                 say_note(f"{n:,} of {results.n_runs:,} runs were there already, in {directory}")
             for number in logged:
-                record_run(directory, number, interrupt)
+                record_run(batch, asked.source, directory, number, interrupt)
         except (Interrupted, BatchError):
             if not interrupt.code:
                 raise
@@ -187,7 +187,7 @@ def _numbers(text: str | None, n_runs: int) -> list[int]:
     return list(dict.fromkeys(found))
 
 
-def record_run(directory: Path, number: int, interrupt: Interrupt) -> None:
+def record_run(batch: Batch, source: Source, directory: Path, number: int, interrupt: Interrupt) -> None:
     """Play a run again and record all of it, unless that has been done.
 
     Raises:
@@ -198,7 +198,13 @@ def record_run(directory: Path, number: int, interrupt: Interrupt) -> None:
     if _is_recorded(target):
         return
     shutil.rmtree(target, ignore_errors=True)  # cut short
-    run = planned_run(directory, number)
+    own = batch.plugin_contents
+    run = planned_run(
+        directory,
+        number,
+        may_run=lambda code: [f.data for f in code.files] == own,
+        allow_large=source.allow_large,
+    )
     with (
         simulate(run.loaded, run.mission, run.seed) as simulation,
         Recorder(simulation, target, mission_text=run.loaded.text, parameters=run.settings) as recorder,
