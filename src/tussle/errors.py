@@ -1,8 +1,9 @@
-"""The errors of tussle, and the two phrases that nearly all of them end with."""
+"""The errors of tussle, and how names and texts from outside stand in what is said."""
 
 from __future__ import annotations
 
 import difflib
+import unicodedata
 from collections.abc import Iterable
 
 
@@ -125,3 +126,20 @@ def listed(names: Iterable[str]) -> str:
     """All that there is, in the given order: "there are: a, b, c", or "there are none"."""
     text = ", ".join(names)
     return f"there are: {text}" if text else "there are none"
+
+
+def visible(text: str) -> str:
+    r"""A text in which what steers a terminal or turns the order of letters is shown as an escape: "\x1b", "\u202e".
+
+    Line ends and tabs stay, and so do the joiners that some scripts are written with.
+    """
+    return text if text.isprintable() else "".join(map(_shown, text))
+
+
+def _shown(character: str) -> str:
+    is_hidden = (
+        unicodedata.category(character) in ("Cc", "Cf", "Cs", "Zl", "Zp") or character in "\ufffe\uffff"
+    )
+    if is_hidden and character not in "\n\t\u200c\u200d":
+        return character.encode("unicode_escape").decode("ascii")
+    return character

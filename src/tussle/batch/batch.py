@@ -230,9 +230,14 @@ class Batch:
             str(file.relative_to(home)): data for file, data in inside.items() if file.is_relative_to(home)
         }
         return found | {
-            f"{PLUGINS}/{name}": file.text.encode()
-            for name, file in zip(self._plugin_names(), self.plugin_files, strict=True)
+            f"{PLUGINS}/{name}": content
+            for name, content in zip(self._plugin_names(), self.plugin_contents, strict=True)
         }
+
+    @property
+    def plugin_contents(self) -> list[bytes]:
+        """The plugin files as the batch directory holds them."""
+        return [file.text.encode() for file in self.plugin_files]
 
     def _plugin_names(self) -> list[str]:
         """Each plugin file in a folder of its own, since two may be called alike."""

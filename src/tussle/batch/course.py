@@ -20,6 +20,7 @@ from tussle.batch.results import Results
 from tussle.batch.stopping import Stop
 from tussle.batch.store import Store, Stored
 from tussle.batch.tasks import Finished
+from tussle.batch.trust import remember
 from tussle.batch.varied import said
 from tussle.errors import BatchError
 from tussle.record.run_file import Timings, plain, versions
@@ -173,6 +174,8 @@ def play_in_directory(
         RecordError: It cannot be written.
     """
     timings = Timings()
+    if batch.plugin_files:
+        remember(batch.plugin_contents)
     if not (path / files.BATCH_FILE).exists():
         batch.check(until)  # before anything is written
     store = Store(path)

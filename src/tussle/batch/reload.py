@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,8 +12,13 @@ import pyarrow.compute as pc
 from tussle.batch import store
 from tussle.batch.points import values_text
 from tussle.batch.results import Results
+from tussle.batch.trust import DirectoryCode
 from tussle.errors import BatchError
 from tussle.mission import Loaded, Mission, read_mission
+from tussle.mission.catalogue import PluginSource
+
+OF_FILE = {"file": str, "settings": dict, "plugin_files": list, "options": dict, "ends_by_time": bool}
+"""What `batch.json` says of a mission that was read from a file."""
 
 
 def load_batch(path: str | Path) -> Results:
@@ -43,16 +49,32 @@ class PlannedRun:
     state_hash: str
 
 
-def planned_run(path: str | Path, number: int) -> PlannedRun:
-    """A run of a batch that was made from a mission file.
+def planned_run(
+    path: str | Path,
+    number: int,
+    *,
+    may_run: Callable[[DirectoryCode], bool] = lambda code: code.is_own,
+    allow_large: bool = False,
+    search: Sequence[str | Path] = (),
+) -> PlannedRun:
+    """A run of a batch that was made from a mission file. Plugins come from the batch directory and from nowhere else.
+
+    Args:
+        path: The batch directory.
+        number: The run.
+        may_run: Says whether the plugin files of the directory may be run; by default those of the user's own batches.
+        allow_large: As of `read_mission`: a directory cannot grant it to itself.
+        search: The same.
 
     Raises:
-        BatchError: There is no such batch or run, or its mission was made in Python.
+        BatchError: There is no such batch or run, its mission was made in Python, its plugin files may not be run, or it asks for
+            what a directory cannot grant.
         MissionError: Its files can no longer be read.
     """
+    path = Path(path)
     results = load_batch(path)
     about: dict[str, Any] = results.info["mission"]
-    if about["made_in"] != "file":
+    if about.get("made_in") != "file":
         raise BatchError(
             f"{path}: the mission of this batch was made in Python; there, `Batch(...).simulation({number})` is the game of this run"
         )
@@ -60,12 +82,48 @@ def planned_run(path: str | Path, number: int) -> PlannedRun:
         raise BatchError(
             f"{path}: there is no run {number}; the batch has runs 0 to {results.design.num_rows - 1}"
         )
-    folder = Path(path) / store.MISSION
+    wrong = [name for name, kind in OF_FILE.items() if not isinstance(about.get(name), kind)]
+    if wrong:
+        raise BatchError(f"{path / store.BATCH_FILE}: what it says of {', '.join(wrong)} cannot be read")
+    is_strict = _is_strict(path, about["options"], {"allow_large": allow_large, "search": bool(search)})
+    file = _inside(path, about["file"])
+    plugins = (_inside(path, f"{store.PLUGINS}/{name}") for name in about["plugin_files"])
+    code = DirectoryCode(path, tuple(map(PluginSource.read, plugins)))
+    if not may_run(code):
+        raise BatchError(
+            f"{path}: not played, since its plugin code is not known to be yours: {code}; --trust runs it, with all your rights"
+        )
     planned = results.design.slice(number, 1).to_pylist()[0]
     point = {v.name: planned[v.name] for v in results.variables}
     settings = {**about["settings"], **values_text(point, results.variables)}
-    plugin_files = tuple(folder / store.PLUGINS / name for name in about["plugin_files"])
-    loaded = read_mission(folder / about["file"], settings, plugin_files=plugin_files, **about["options"])
+    loaded = read_mission(
+        file, settings, strict=is_strict, plugin_files=code.files, search=search, allow_large=allow_large
+    )
     mission = loaded.mission.ending_by_time() if about["ends_by_time"] else loaded.mission
     found = results.table.filter(pc.equal(results.table["run"], number))["state_hash"]
     return PlannedRun(loaded, mission, planned["seed"], settings, found[0].as_py() if len(found) else "")
+
+
+def _inside(path: Path, name: str) -> Path:
+    """A file of the folder in which a batch keeps its mission.
+
+    Raises:
+        BatchError: It lies elsewhere, or a link leads elsewhere.
+    """
+    file = path / store.MISSION / name.replace("\0", "")
+    if not file.resolve().is_relative_to(path.resolve() / store.MISSION):
+        raise BatchError(f"{path}: {name} lies outside of the batch directory, so it is not read")
+    return file
+
+
+def _is_strict(path: Path, said: Mapping[str, Any], granted: Mapping[str, bool]) -> bool:
+    """What `batch.json` may say of how the mission is read: that, and nothing that lifts a limit.
+
+    Raises:
+        BatchError: It says more.
+    """
+    for name, value in said.items():
+        if name != "strict" and value and not granted.get(name):
+            known = "as this batch was made with it, give it again" if name in granted else "it is unknown"
+            raise BatchError(f"{path}: a batch directory cannot set the option {name!r}; {known}")
+    return bool(said.get("strict"))

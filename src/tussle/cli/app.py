@@ -55,6 +55,10 @@ FromRun = Annotated[
         show_default=False,
     ),
 ]
+Trust = Annotated[
+    bool,
+    typer.Option("--trust", help="With --from: run the plugin code of the batch directory, whoever made it."),
+]
 RunDirectory = Annotated[
     Path | None,
     typer.Option(
@@ -108,6 +112,7 @@ def run(
     mission: MissionOrNone = None,
     more: More = None,
     from_batch: FromRun = None,
+    trust: Trust = False,
     seed: Seed = None,
     settings: Set = None,
     end: End = None,
@@ -132,6 +137,8 @@ def run(
         raise typer.BadParameter(
             "--from says all of what is played, so no mission, setting, seed or end goes beside it"
         )
+    if from_batch is None and trust:
+        raise typer.BadParameter("--trust is about the batch directory of --from, and there is none")
     if from_batch is None and mission is None:
         raise typer.BadParameter("a mission is needed, or --from BATCH:RUN")
     with told(debug):
@@ -140,7 +147,7 @@ def run(
         if from_batch is not None:
             from tussle.cli.from_batch import FromBatch
 
-            source: Game = FromBatch(from_batch)
+            source: Game = FromBatch(from_batch, trust, allow_large)
         else:
             source = mission_source(
                 mission or "", settings, more, seed, end, strict, plugin_files, allow_large

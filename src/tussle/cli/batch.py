@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from rich.console import Group
 from rich.live import Live
-from rich.progress import BarColumn, Progress, TextColumn
+from rich.progress import BarColumn, Progress
 from rich.text import Text
 
 from tussle.batch import store
@@ -26,7 +26,7 @@ from tussle.batch.variables import parse_variable
 from tussle.cli.batch_summary import compare_hash, show_batch
 from tussle.cli.interrupt import Interrupt
 from tussle.cli.play import FOR_VIEWER, Source, simulate
-from tussle.cli.progress import BAR_EVERY, LINE_EVERY, clock, compiling, times
+from tussle.cli.progress import BAR_EVERY, LINE_EVERY, clock, compiling, text_column, times
 from tussle.cli.settings import ending_by_time, read_end
 from tussle.cli.terminal import err, say, say_note
 from tussle.errors import BatchError, ParameterError, RecordError
@@ -151,7 +151,7 @@ def play_batch(asked: Asked, command: Sequence[str]) -> int:
                 n = min(meter.n_before, results.n_runs)
                 say_note(f"{n:,} of {results.n_runs:,} runs were there already, in {directory}")
             for number in logged:
-                record_run(directory, number, interrupt)
+                record_run(batch, asked.source, directory, number, interrupt)
         except (Interrupted, BatchError):
             if not interrupt.code:
                 raise
@@ -187,7 +187,7 @@ def _numbers(text: str | None, n_runs: int) -> list[int]:
     return list(dict.fromkeys(found))
 
 
-def record_run(directory: Path, number: int, interrupt: Interrupt) -> None:
+def record_run(batch: Batch, source: Source, directory: Path, number: int, interrupt: Interrupt) -> None:
     """Play a run again and record all of it, unless that has been done.
 
     Raises:
@@ -198,7 +198,13 @@ def record_run(directory: Path, number: int, interrupt: Interrupt) -> None:
     if _is_recorded(target):
         return
     shutil.rmtree(target, ignore_errors=True)  # cut short
-    run = planned_run(directory, number)
+    own = batch.plugin_contents
+    run = planned_run(
+        directory,
+        number,
+        may_run=lambda code: [f.data for f in code.files] == own,
+        allow_large=source.allow_large,
+    )
     with (
         simulate(run.loaded, run.mission, run.seed) as simulation,
         Recorder(simulation, target, mission_text=run.loaded.text, parameters=run.settings) as recorder,
@@ -244,11 +250,11 @@ class BatchMeter:
         self._is_bar = err().is_terminal
         self._due = self._began + (0.0 if self._is_bar else LINE_EVERY)
         self._bar = Progress(
-            TextColumn("{task.description}", style="bold"),
+            text_column("{task.description}", style="bold"),
             BarColumn(bar_width=None, complete_style="cyan", finished_style="cyan", pulse_style="cyan"),
-            TextColumn("{task.fields[at]}"),
-            TextColumn("{task.fields[rate]}", style="cyan"),
-            TextColumn("{task.fields[left]}", style="dim"),
+            text_column("{task.fields[at]}"),
+            text_column("{task.fields[rate]}", style="cyan"),
+            text_column("{task.fields[left]}", style="dim"),
             auto_refresh=False, expand=True,
         )  # fmt: skip
         total = batch.plan.n_runs if has_total else None

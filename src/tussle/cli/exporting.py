@@ -114,7 +114,7 @@ def write_outputs(
 
 
 def _tell(path: Path, text: str) -> None:
-    out().print(f"{home_short(path)}: {text}, {size_of(path)}", soft_wrap=True, markup=False)
+    out().print(f"{home_short(path)}: {text}, {size_of(path)}", soft_wrap=True)
 
 
 def size_of(path: Path) -> str:

@@ -11,7 +11,7 @@ from typing import Self
 
 from rich.console import Group
 from rich.live import Live
-from rich.progress import BarColumn, Progress, TextColumn
+from rich.progress import BarColumn, Progress
 from rich.text import Text
 
 from tussle.batch.points import values_text
@@ -20,7 +20,7 @@ from tussle.cli.batch import Interrupted
 from tussle.cli.interrupt import Interrupt
 from tussle.cli.optimize_summary import interval, play_again, show_study
 from tussle.cli.play import FOR_VIEWER, Source
-from tussle.cli.progress import BAR_EVERY, LINE_EVERY, clock, compiling
+from tussle.cli.progress import BAR_EVERY, LINE_EVERY, clock, compiling, text_column
 from tussle.cli.settings import read_end
 from tussle.cli.terminal import err, say, say_note
 
@@ -136,10 +136,10 @@ class SearchMeter:
         self._is_bar = err().is_terminal
         self._due = self._began + (0.0 if self._is_bar else LINE_EVERY)
         self._bar = Progress(
-            TextColumn("{task.description}", style="bold"),
+            text_column("{task.description}", style="bold"),
             BarColumn(bar_width=None, complete_style="cyan", finished_style="cyan", pulse_style="cyan"),
-            TextColumn("{task.fields[at]}"),
-            TextColumn("{task.fields[left]}", style="dim"),
+            text_column("{task.fields[at]}"),
+            text_column("{task.fields[left]}", style="dim"),
             auto_refresh=False, expand=True,
         )  # fmt: skip
         self._task = self._bar.add_task(optimization.name, total=None, at="", left="")
@@ -176,7 +176,7 @@ class SearchMeter:
             self._bar.update(self._task, total=progress.n_trials, completed=completed, at=at, left=left)
             self._live.update(Group(self._bar, Text(best, style="dim")), refresh=True)
         else:
-            err().print(", ".join(text for text in (at, left, best) if text), soft_wrap=True, markup=False)
+            err().print(", ".join(text for text in (at, left, best) if text), soft_wrap=True)
 
     def _best(self, progress: SearchProgress) -> str:
         parts = []

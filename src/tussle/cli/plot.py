@@ -81,7 +81,7 @@ def plot(
         for note in written.notes:
             say_note(note)
         for file in written.files:
-            out().print(home_short(file), soft_wrap=True, markup=False)
+            out().print(home_short(file), soft_wrap=True)
 
 
 def _time(option: str, text: str | None, sign: float) -> float:

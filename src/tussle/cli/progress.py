@@ -10,12 +10,18 @@ from typing import Self
 
 from rich.progress import BarColumn, Progress, TextColumn
 from rich.status import Status
+from rich.text import Text
 
 from tussle.cli.terminal import err
 from tussle.numeric import kernel, store
 
 BAR_EVERY = 0.1  # [s] faster is not seen
 LINE_EVERY = 10.0  # [s] of a log that somebody reads later
+
+
+def text_column(template: str, style: str = "none") -> TextColumn:
+    """A column of a bar, in which names of files and missions are no markup."""
+    return TextColumn(template, style, markup=False)
 
 
 class Meter:
@@ -33,11 +39,11 @@ class Meter:
         self._is_bar = err().is_terminal
         self._due = self._began + (0.0 if self._is_bar else LINE_EVERY)
         self._bar = Progress(
-            TextColumn("{task.description}", style="bold"),
+            text_column("{task.description}", style="bold"),
             BarColumn(bar_width=None, complete_style="cyan", finished_style="cyan", pulse_style="cyan"),
-            TextColumn("{task.fields[at]}"),
-            TextColumn("{task.fields[speed]}", style="cyan"),
-            TextColumn("{task.fields[left]}", style="dim"),
+            text_column("{task.fields[at]}"),
+            text_column("{task.fields[speed]}", style="cyan"),
+            text_column("{task.fields[left]}", style="dim"),
             console=err(), auto_refresh=False, transient=True, expand=True,
         )  # fmt: skip
         total = None if end is None else end - start
@@ -97,7 +103,7 @@ def compiling() -> Iterator[None]:
             )
         if console.is_terminal:
             status.start()
-            status.update(f"{len(names)}  {name.removeprefix('tussle.').removeprefix('stock.')}")
+            status.update(Text(f"{len(names)}  {name.removeprefix('tussle.').removeprefix('stock.')}"))
 
     before, kernel.stats.on_compile = kernel.stats.on_compile, tell
     try:

@@ -52,5 +52,4 @@ def report(
         out().print(
             f"{home_short(written.index)} ({plots}, each beside it as SVG and PNG)",
             soft_wrap=True,
-            markup=False,
         )

@@ -5,9 +5,9 @@ from __future__ import annotations
 import time
 from typing import Self
 
-from rich.progress import BarColumn, Progress, TextColumn
+from rich.progress import BarColumn, Progress
 
-from tussle.cli.progress import BAR_EVERY, LINE_EVERY, clock
+from tussle.cli.progress import BAR_EVERY, LINE_EVERY, clock, text_column
 from tussle.cli.terminal import err
 
 
@@ -25,10 +25,10 @@ class Tally:
         self._is_bar = err().is_terminal
         self._due = self._began + (0.0 if self._is_bar else LINE_EVERY)
         self._bar = Progress(
-            TextColumn("{task.description}", style="bold"),
+            text_column("{task.description}", style="bold"),
             BarColumn(bar_width=None, complete_style="cyan", finished_style="cyan", pulse_style="cyan"),
-            TextColumn("{task.fields[at]}"),
-            TextColumn("{task.fields[left]}", style="dim"),
+            text_column("{task.fields[at]}"),
+            text_column("{task.fields[left]}", style="dim"),
             console=err(), auto_refresh=False, transient=True, expand=True,
         )  # fmt: skip
         self._task = self._bar.add_task(name, total=None, at="", left="")

@@ -5,16 +5,17 @@ from __future__ import annotations
 import sys
 import traceback
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from typing import Any
 
 import typer
-from rich.console import Console, RenderableType
+from rich.console import Console, ConsoleOptions, RenderableType
+from rich.segment import Segment
 from rich.text import Text
 
-from tussle.errors import BatchError, PluginError, RecordError, TussleError
+from tussle.errors import BatchError, PluginError, RecordError, TussleError, visible
 
 WIDEST = 100
 """Tables and bars grow no wider than this, on the widest of screens."""
@@ -46,8 +47,25 @@ def err() -> Console:
     return _console(stderr=True)
 
 
+class PlainConsole(Console):
+    """A console to which every text is data: nothing in it is markup, and what would steer the terminal is shown as an escape."""
+
+    def __init__(self, stderr: bool) -> None:
+        super().__init__(stderr=stderr, highlight=False, emoji=False, markup=False)
+
+    def render_str(self, text: str, **options: Any) -> Text:
+        """A string as it is shown."""
+        return super().render_str(visible(text), **options)
+
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
+        """All that is printed comes through here, what is in tables and bars too."""
+        if isinstance(renderable, Text) and (shown := visible(renderable.plain)) != renderable.plain:
+            renderable = renderable.blank_copy(shown)
+        return super().render(renderable, options)
+
+
 def _console(stderr: bool) -> Console:
-    console = Console(stderr=stderr, highlight=False, emoji=False)
+    console = PlainConsole(stderr)
     console.width = min(console.width, WIDEST)
     return console
 
@@ -63,7 +81,7 @@ def put(*parts: RenderableType) -> None:
         for part in parts:
             console.print(part)
     for line in captured.get().splitlines():
-        console.print(line.rstrip(), soft_wrap=True, markup=False)
+        console.print(line.rstrip(), soft_wrap=True)
 
 
 def say(label: str, text: str, style: str = "") -> None:
@@ -116,7 +134,7 @@ def told(is_debugging: bool) -> Iterator[None]:
             if isinstance(error, SystemExit):
                 raise
             if is_debugging:
-                traceback.print_exc()
+                err().print(traceback.format_exc(), soft_wrap=True)
             _tell(error)
             raise typer.Exit(code_of(error)) from None
 

@@ -64,7 +64,7 @@ def announce(page: Page, is_opened: bool) -> None:
     """Say where the page is, and open it where there is a browser to do so."""
     for note in page.notes:
         say_note(note)
-    out().print(f"{page.source.name}: {page.url}  (Ctrl-C ends it)", soft_wrap=True, markup=False)
+    out().print(f"{page.source.name}: {page.url}  (Ctrl-C ends it)", soft_wrap=True)
     if not page.is_local:
         say(
             "warning",

@@ -8,8 +8,11 @@ import sys
 import tomllib
 import traceback
 from collections.abc import Iterable
+from dataclasses import dataclass
 from functools import cache
+from importlib.machinery import SourceFileLoader
 from pathlib import Path
+from types import CodeType
 from typing import Any
 
 from tussle import stock
@@ -62,7 +65,7 @@ class Catalogue:
         MissionError: A file cannot be imported, or holds no plugin.
     """
 
-    def __init__(self, plugin_files: Iterable[str | Path] = ()) -> None:
+    def __init__(self, plugin_files: Iterable[str | Path | PluginSource] = ()) -> None:
         self.own: dict[str, type[Plugin]] = {}
         for path in plugin_files:
             self.own.update(load_plugin_file(path))
@@ -101,36 +104,75 @@ def module_of_plugin_file(path: str | Path) -> str:
     return f"tussle_plugin_file_{digest}_{file.stem if file.stem.isidentifier() else 'plugin'}"
 
 
-def load_plugin_file(path: str | Path, module_name: str = "") -> dict[str, type[Plugin]]:
+@dataclass(frozen=True)
+class PluginSource:
+    """A plugin file as it was when it was read: this is what is run, whatever has become of the file.
+
+    Attributes:
+        path: The file.
+        data: Its content.
+    """
+
+    path: Path
+    data: bytes
+
+    @staticmethod
+    def read(path: str | Path) -> PluginSource:
+        """The file as it is now.
+
+        Raises:
+            MissionError: It cannot be read.
+        """
+        file = Path(path).expanduser()
+        if not file.is_file():
+            raise MissionError(f"{path}: there is no such plugin file")
+        try:
+            return PluginSource(file, file.read_bytes())
+        except OSError as error:
+            raise MissionError(f"{path}: it cannot be read: {error.strerror or error}") from error
+
+
+class _SourceLoader(SourceFileLoader):
+    """Runs a text that has been read, and never the bytecode that lies beside a file and may be of another text."""
+
+    def __init__(self, name: str, source: PluginSource) -> None:
+        super().__init__(name, str(source.path.resolve()))
+        self._data = source.data
+
+    def get_code(self, fullname: str) -> CodeType:
+        """The compiled text."""
+        code: CodeType = self.source_to_code(self._data, self.path)
+        return code
+
+
+def load_plugin_file(source: str | Path | PluginSource, module_name: str = "") -> dict[str, type[Plugin]]:
     """The plugins that a Python file defines, by the names of their classes. The file is run, as an import does.
 
     A file that has not changed since it was loaded is not run again: its classes stay the same ones.
 
     Args:
-        path: The file.
+        source: The file.
         module_name: Instead of the name that follows from the path.
 
     Raises:
         MissionError: It cannot be read or imported, or defines no plugin; the message has the file's own line.
     """
-    file = Path(path).expanduser()
-    if not file.is_file():
-        raise MissionError(f"{path}: there is no such plugin file")
-    name = module_name or module_of_plugin_file(path)
-    spec = importlib.util.spec_from_file_location(name, file.resolve())
-    if spec is None or spec.loader is None:
-        raise MissionError(f"{path}: this is not a Python file (its name ends with .py)")
-    try:
-        content = hashlib.blake2b(file.read_bytes(), digest_size=16).hexdigest()
-    except OSError as error:
-        raise MissionError(f"{path}: it cannot be read: {error.strerror or error}") from error
+    source = source if isinstance(source, PluginSource) else PluginSource.read(source)
+    file = source.path
+    if file.suffix != ".py":
+        raise MissionError(f"{file}: this is not a Python file (its name ends with .py)")
+    name = module_name or module_of_plugin_file(file)
+    content = hashlib.blake2b(source.data, digest_size=16).hexdigest()
     module = sys.modules.get(name)
     if module is None or vars(module).get(CONTENT) != content:
+        loader = _SourceLoader(name, source)
+        spec = importlib.util.spec_from_file_location(name, loader.path, loader=loader)
+        assert spec is not None
         module = importlib.util.module_from_spec(spec)
         vars(module)[CONTENT] = content
         sys.modules[name] = module
         try:
-            spec.loader.exec_module(module)
+            loader.exec_module(module)
         except (Exception, SystemExit) as error:
             sys.modules.pop(name, None)
             raise MissionError(
@@ -142,7 +184,7 @@ def load_plugin_file(path: str | Path, module_name: str = "") -> dict[str, type[
         if isinstance(value, type) and issubclass(value, Plugin) and value.__module__ == name
     }
     if not found:
-        raise MissionError(f"{path}: it defines no plugin (a class derived from Autonomy, MotionModel, ...)")
+        raise MissionError(f"{file}: it defines no plugin (a class derived from Autonomy, MotionModel, ...)")
     return found
 
 

@@ -11,7 +11,7 @@ from typing import Any
 from tussle.errors import MissionError, TussleError
 from tussle.geodesy import Origin
 from tussle.mission import codecs
-from tussle.mission.catalogue import KINDS, Catalogue
+from tussle.mission.catalogue import KINDS, Catalogue, PluginSource
 from tussle.mission.entities import EntityReader, Fields, block_names, expanded
 from tussle.mission.limits import Limits
 from tussle.mission.node import Node
@@ -63,7 +63,7 @@ def read_mission(
     overrides: Mapping[str, str] | None = None,
     *,
     strict: bool = False,
-    plugin_files: Sequence[str | Path] = (),
+    plugin_files: Sequence[str | Path | PluginSource] = (),
     search: Sequence[str | Path] = (),
     allow_large: bool = False,
 ) -> Loaded:

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import atexit
 import hashlib
 import os
 import pickle
 import re
+import shutil
 import tempfile
 import time
 import warnings
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
+
+from tussle.folders import is_private, read_own, user_folder
 
 KEEP = 8  # files per name: a few variants of the code, and of the processor settings that tests use
 TOUCH_AFTER = (
@@ -20,14 +25,42 @@ TOUCH_AFTER = (
 
 
 def directory() -> Path:
-    """Where compiled kernels are kept: $TUSSLE_CACHE_DIR, else a folder in $NUMBA_CACHE_DIR, else in the user's cache folder."""
-    if chosen := os.environ.get("TUSSLE_CACHE_DIR"):
-        return Path(chosen)
-    if shared := os.environ.get("NUMBA_CACHE_DIR"):
-        return Path(shared) / "tussle"
-    from numba.misc.appdirs import AppDirs
+    """Where compiled kernels are kept: $TUSSLE_CACHE_DIR, else a folder in $NUMBA_CACHE_DIR, else in the user's cache folder.
 
-    return Path(AppDirs(appname="tussle", appauthor=False).user_cache_dir) / "kernels"
+    What is kept is machine code, so the folder is the user's own and nobody else writes into it: otherwise, and without an absolute
+    path, a folder for temporary files takes its place.
+    """
+    chosen = _chosen()
+    if chosen is not None and (is_private(chosen) or not os.path.lexists(chosen)):
+        return chosen
+    warn_once(
+        f"compiled kernels are not kept in {chosen or 'the home of this user'}: the folder must belong to you, and nobody else may "
+        "write into it; a temporary one is used instead, and TUSSLE_CACHE_DIR chooses another"
+    )
+    shared = (
+        Path(tempfile.gettempdir()) / f"tussle-{os.geteuid()}"
+    )  # the workers of a batch have it in common
+    with suppress(OSError):
+        shared.mkdir(mode=0o700)
+    return shared if is_private(shared) and not shared.is_symlink() else _only_now()
+
+
+def _chosen() -> Path | None:
+    for variable, inner in (("TUSSLE_CACHE_DIR", ""), ("NUMBA_CACHE_DIR", "tussle")):
+        if (path := Path(os.environ.get(variable, ""))).is_absolute():
+            return path / inner
+        if path.parts:
+            warn_once(f"{variable}={path} is ignored: it takes an absolute path")
+    caches = user_folder("XDG_CACHE_HOME", ".cache")
+    return None if caches is None else caches / "tussle" / "kernels"
+
+
+@cache
+def _only_now() -> Path:
+    """A folder for this process, removed at its end."""
+    folder = tempfile.mkdtemp(prefix="tussle-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return Path(folder)
 
 
 def file_stem(name: str) -> str:
@@ -44,15 +77,15 @@ def load(name: str, key: str) -> Any:
     """What was saved under the name and key; None where there is nothing, or nothing readable."""
     path = directory() / f"{file_stem(name)}-{key}.kernel"
     try:
-        content = path.read_bytes()
-        if time.time() - path.stat().st_mtime > TOUCH_AFTER:
+        content, written = read_own(path)
+        if time.time() - written > TOUCH_AFTER:
             os.utime(path)
     except OSError:
         return None
     digest, data = content[:32], content[32:]
     if hashlib.sha256(data).digest() != digest:  # a damaged file: running its machine code could do anything
         return None
-    return pickle.loads(data)  # noqa: S301 - the folder is the user's own, and holds machine code anyway
+    return pickle.loads(data)  # noqa: S301 - the user's own file in a folder of the user's own
 
 
 def save(name: str, key: str, data: bytes) -> None:
@@ -70,7 +103,10 @@ def save(name: str, key: str, data: bytes) -> None:
             Path(temporary).unlink()
             raise
     except OSError as error:
-        warn_unwritable(str(folder), str(error))
+        warn_once(
+            f"compiled kernels cannot be kept in {folder} ({error}): they compile anew in every process; "
+            "set TUSSLE_CACHE_DIR to a writable folder"
+        )
         return
     remove_old(folder, stem)
 
@@ -90,11 +126,6 @@ def remove_old(folder: Path, stem: str) -> None:
 
 
 @cache
-def warn_unwritable(folder: str, why: str) -> None:
-    """Say once per folder that nothing is kept."""
-    warnings.warn(
-        f"compiled kernels cannot be kept in {folder} ({why}): they compile anew in every process; "
-        "set TUSSLE_CACHE_DIR to a writable folder",
-        RuntimeWarning,
-        stacklevel=2,
-    )
+def warn_once(text: str) -> None:
+    """Say what the user should know of where kernels are kept."""
+    warnings.warn(text, RuntimeWarning, stacklevel=3)

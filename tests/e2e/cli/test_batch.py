@@ -199,8 +199,10 @@ def test_a_run_that_comes_out_otherwise_is_told(here, folder):
     assert here("batch", "chance.xml", "--runs", 3, "--out", "out", *PLUGINS)[0] == 0
     copy = folder / "out" / "mission" / "plugins" / "0" / "plugins.py"
     copy.write_text(copy.read_text().replace("luck < self.odds", "luck > self.odds"))
-    code, _, err = here("run", "--from", "out:1", "--no-log")
+    code, _, err = here("run", "--from", "out:1", "--no-log", "--trust")
     assert code == 4
+    note, _, err = err.partition("\n")
+    assert "out/mission/plugins/0/plugins.py" in note
     assert err.startswith("error: run 1 came out otherwise than in its batch: state hash ")
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import pickle
 import subprocess
 import sys
+import warnings
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -341,6 +343,121 @@ def test_folder_is_chosen_by_the_environment(monkeypatch, tmp_path):
     monkeypatch.delenv("NUMBA_CACHE_DIR")
     assert "tussle" in str(store.directory())
     assert store.directory().is_absolute()
+
+
+def dangerous(path):
+    """Pickled data that makes a file when it is loaded, as `store.save` writes it."""
+
+    class Evil:
+        def __reduce__(self):
+            return (Path.touch, (path,))
+
+    data = pickle.dumps(Evil())
+    return hashlib.sha256(data).digest() + data
+
+
+KEY = f"{0:032x}"
+
+
+def nothing_is_loaded(folder, tmp_path):
+    """A file in the folder is not loaded under its name."""
+    (folder / f"module.law-{KEY}.kernel").write_bytes(dangerous(tmp_path / "ran"))
+    assert store.load("module.law", KEY) is None
+    assert not (tmp_path / "ran").exists()
+
+
+@pytest.fixture
+def temporary(tmp_path, monkeypatch):
+    """Where temporary folders are made."""
+    (tmp_path / "temporary").mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "temporary"))
+    store._only_now.cache_clear()
+    return tmp_path / "temporary"
+
+
+@pytest.mark.parametrize("mode", [0o1777, 0o770, 0o702])
+def test_a_folder_that_others_may_write_is_not_used(tmp_path, monkeypatch, temporary, mode):
+    folder = tmp_path / "shared"
+    folder.mkdir()
+    folder.chmod(mode)
+    monkeypatch.setenv("TUSSLE_CACHE_DIR", str(folder))
+    with pytest.warns(RuntimeWarning, match=r"not kept in .*shared: .*temporary one is used instead"):
+        nothing_is_loaded(folder, tmp_path)
+    store.save("module.law", KEY, pickle.dumps("sound"))  # a second warning would be an error
+    assert store.load("module.law", KEY) == "sound"
+    used = store.directory()
+    assert used.parent == temporary
+    assert used.stat().st_mode & 0o777 == 0o700
+    assert store.directory() == used
+
+
+def test_a_folder_of_somebody_else_is_not_used(tmp_path, monkeypatch, temporary):
+    folder = tmp_path / "theirs"
+    folder.mkdir(mode=0o700)
+    (tmp_path / "link").symlink_to(folder)
+    (temporary / f"tussle-{os.geteuid()}").mkdir(mode=0o777)  # taken already
+    (temporary / f"tussle-{os.geteuid()}").chmod(0o777)
+    is_theirs = os.stat_result((0o40700, *folder.stat()[1:4], os.geteuid() + 1, *folder.stat()[5:]))
+    before = Path.stat
+    monkeypatch.setattr(
+        Path,
+        "stat",
+        lambda self, **more: is_theirs if os.path.realpath(self) == str(folder) else before(self, **more),
+    )
+    monkeypatch.setenv("TUSSLE_CACHE_DIR", str(tmp_path / "link"))
+    with pytest.warns(RuntimeWarning, match="not kept in"):
+        nothing_is_loaded(folder, tmp_path)
+    assert store.directory().parent == temporary
+    assert store.directory().name != f"tussle-{os.geteuid()}"
+
+
+def test_a_file_that_somebody_else_may_have_written_is_not_loaded(own_cache, tmp_path, monkeypatch):
+    store.save("module.law", KEY, pickle.dumps("sound"))
+    (path,) = own_cache.glob("*.kernel")
+    assert store.load("module.law", KEY) == "sound"
+    path.chmod(0o622)
+    nothing_is_loaded(own_cache, tmp_path)
+    path.unlink()
+    (tmp_path / "elsewhere").write_bytes(dangerous(tmp_path / "ran"))
+    path.symlink_to(tmp_path / "elsewhere")
+    assert store.load("module.law", KEY) is None
+    path.unlink()
+    os.mkfifo(path)
+    assert store.load("module.law", KEY) is None
+    path.unlink()
+    path.write_bytes(dangerous(tmp_path / "ran"))
+    other = os.geteuid() + 1
+    monkeypatch.setattr("os.geteuid", lambda: other)
+    monkeypatch.setattr(store, "directory", lambda: own_cache)
+    assert store.load("module.law", KEY) is None
+    assert not (tmp_path / "ran").exists()
+
+
+@pytest.mark.parametrize("value", ["", "caches", "../caches"])
+def test_an_empty_or_relative_cache_folder_is_ignored(tmp_path, monkeypatch, temporary, value):
+    for name in ("TUSSLE_CACHE_DIR", "NUMBA_CACHE_DIR"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", value)
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert store.directory() == tmp_path / ".cache" / "tussle" / "kernels"
+    monkeypatch.setenv("NUMBA_CACHE_DIR", value)
+    if value:
+        with pytest.warns(RuntimeWarning, match=f"NUMBA_CACHE_DIR={value} is ignored"):
+            store.directory()
+    assert store.directory() == tmp_path / ".cache" / "tussle" / "kernels"
+
+
+@pytest.mark.parametrize("home", ["", "somewhere", None])
+def test_without_a_home_kernels_are_kept_in_no_relative_path(monkeypatch, temporary, home):
+    for name in ("TUSSLE_CACHE_DIR", "NUMBA_CACHE_DIR", "XDG_CACHE_HOME", "HOME"):
+        monkeypatch.delenv(name, raising=False)
+    if home is not None:
+        monkeypatch.setenv("HOME", home)
+    store.warn_once.cache_clear()
+    monkeypatch.setitem(sys.modules, "pwd", None)  # a user whom nobody knows
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        assert store.directory().is_absolute()
 
 
 # Across processes ------------------------------------------------------------------------------------------

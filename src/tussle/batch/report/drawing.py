@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree as ET
 
-from tussle.errors import MissingExtraError
+from tussle.errors import MissingExtraError, visible
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -170,11 +170,7 @@ def legend_above(figure: Figure, handles: Sequence[tuple[Any, str]]) -> None:
 
 def printable(text: str) -> str:
     """A text in one line, without characters that no XML file may hold."""
-    kept = (
-        "\ufffd" if unicodedata.category(c) in ("Cc", "Cs") or c in "\ufffe\uffff" else c
-        for c in " ".join(text.split())
-    )
-    return "".join(kept)
+    return visible(" ".join(text.split()))
 
 
 def shortened(text: str, most: int = 24) -> str:
@@ -204,7 +200,7 @@ def pictured(figure: Figure, name: str, title: str) -> Picture:
         title: What it shows, for those who have it read to them.
     """
     svg, png = io.StringIO(), io.BytesIO()
-    with missing_letters() as missing:
+    with lettering(figure) as missing:
         figure.savefig(svg, format="svg", metadata=UNDATED["svg"])
         figure.set_layout_engine("none")  # both have the same places, and finding them takes half of the time
         figure.savefig(png, format="png", metadata=UNDATED["png"])
@@ -214,9 +210,16 @@ def pictured(figure: Figure, name: str, title: str) -> Picture:
 
 
 @contextmanager
-def missing_letters() -> Iterator[set[str]]:
-    """Collects the letters that the font lacks while figures are saved inside; other warnings are given on."""
+def lettering(figure: Figure) -> Iterator[set[str]]:
+    """Collects the letters that the font lacks while a figure is saved inside; other warnings are given on.
+
+    What no picture may hold, or would turn the order of its letters, is written as an escape in all of its texts.
+    """
+    from matplotlib.text import Text
+
     missing: set[str] = set()
+    for words in figure.findobj(Text):
+        words.set_text(visible(words.get_text()))
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
         yield missing

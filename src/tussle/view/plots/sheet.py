@@ -16,7 +16,7 @@ from tussle.batch.report.drawing import (
     WIDTH,
     colour_of,
     house_style,
-    missing_letters,
+    lettering,
     shortened,
 )
 from tussle.errors import ParameterError, ViewError, listed, nearest_name
@@ -121,7 +121,7 @@ def save(figure: Figure, path: Path, form: str) -> str:
         ViewError: It cannot be written.
     """
     try:
-        with missing_letters() as missing:
+        with lettering(figure) as missing:
             figure.savefig(path, format=form, metadata=UNDATED[form])
     except OSError as error:
         raise ViewError(f"{path}: the plot cannot be written: {error.strerror or error}") from error

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tussle.errors import MissingExtraError
+from tussle.errors import MissingExtraError, visible
 
 MOST_KEPT = 4096
 """Words whose pictures are kept; a film shows the same ones again and again."""
@@ -45,7 +45,7 @@ class Lettering:
     def _mask(self, text: str, height: float, is_bold: bool) -> tuple[np.ndarray, int]:
         """How much of each pixel a word covers, 0 to 1, (rows, columns), and how many rows are above its base line."""
         font = self._font(height, is_bold)
-        font.set_text(text, 0.0)
+        font.set_text(visible(" ".join(text.split())), 0.0)
         font.draw_glyphs_to_bitmap(antialiased=True)
         mask = np.asarray(font.get_image(), np.float32) / 255.0
         return mask, mask.shape[0] - round(font.get_descent() / 64.0)

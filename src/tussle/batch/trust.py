@@ -1,0 +1,74 @@
+"""Whose code a batch directory holds: that of the user's own batches is known by its hash, kept in the user's state folder."""
+
+from __future__ import annotations
+
+import hashlib
+import warnings
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from tussle.folders import is_private, read_own, user_folder
+from tussle.mission.catalogue import PluginSource
+
+
+@dataclass(frozen=True)
+class DirectoryCode:
+    """The plugin files that a batch directory holds, as they were when they were read.
+
+    Attributes:
+        path: The batch directory.
+        files: The files.
+    """
+
+    path: Path
+    files: tuple[PluginSource, ...]
+
+    @property
+    def is_own(self) -> bool:
+        """There is no code, or all of it was once given to a batch by this user."""
+        return not self.files or _is_known(digest(file.data for file in self.files))
+
+    def __str__(self) -> str:
+        return ", ".join(f"{file.path} ({len(file.data):,} bytes)" for file in self.files)
+
+
+def digest(contents: Iterable[bytes]) -> str:
+    """Hash of plugin files in their order."""
+    return hashlib.blake2b(
+        b"".join(hashlib.blake2b(c).digest() for c in contents), digest_size=32
+    ).hexdigest()
+
+
+def remember(contents: Iterable[bytes]) -> None:
+    """Note that the user has given these plugin files to a batch."""
+    file = _file(digest(contents))
+    try:
+        if file is None:
+            raise OSError("this user has no home")
+        file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        if not is_private(file.parent):
+            raise PermissionError(f"{file.parent} must belong to you, and nobody else may write into it")
+        file.touch(mode=0o600)
+    except OSError as error:
+        warnings.warn(
+            f"it cannot be noted that these plugin files are yours ({error}): to play a run of this batch again takes --trust",
+            RuntimeWarning,
+            stacklevel=2,
+        )
+
+
+def _is_known(code: str) -> bool:
+    file = _file(code)
+    if file is None or not is_private(file.parent):
+        return False
+    try:
+        read_own(file)
+    except OSError:
+        return False
+    return True
+
+
+def _file(code: str) -> Path | None:
+    folder = user_folder("XDG_STATE_HOME", ".local/state")
+    return None if folder is None else folder / "tussle" / f"code-{code}"
