@@ -45,4 +45,5 @@ for _ in range(400):
     (speed,), (turn_rate,) = (simulation.read(f"robot.Boids.{name}")[0] for name in ("speed", "turn_rate"))
     for robot, *command in zip(robots, speed, turn_rate, strict=True):
         robot.drive(*command)
-print("positions after 20 s [m]:", *(np.round(robot.pos[:2], 1).tolist() for robot in robots))
+for number, robot in enumerate(robots, 1):
+    print(f"robot {number} is at {robot.pos[0]:6.1f} m east, {robot.pos[1]:6.1f} m north")

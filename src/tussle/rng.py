@@ -165,7 +165,7 @@ def uniform(
     """
     words, indices, steps = columns(seeds, index, step, substep, k)
     out = np.empty((k, words.size))
-    fill_uniform(words, stream, indices, steps, substep, k, out)
+    fill_uniform(words, np.uint64(stream), indices, steps, substep, k, out)
     return out
 
 
@@ -175,7 +175,7 @@ def normal(
     """Standard normal random numbers, (k, n); arguments and errors as `uniform`."""
     words, indices, steps = columns(seeds, index, step, substep, k)
     out = np.empty((k, words.size))
-    fill_normal(words, stream, indices, steps, substep, k, out)
+    fill_normal(words, np.uint64(stream), indices, steps, substep, k, out)
     return out
 
 

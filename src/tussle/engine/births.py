@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -18,6 +18,25 @@ from tussle.rng import stream_key
 
 MOST_TRIES = 10_000
 """Attempts to find a free place for one entity before the mission is called too crowded."""
+
+
+@dataclass
+class Room:
+    """Who stands where, for those that are born at one moment.
+
+    Attributes:
+        rejects: (world, pos, taken) -> whether a place is not free.
+        standing: World -> positions of those that are there [m], (3, j).
+        fail: Called with a world that has no place for one of them.
+        tries: World -> places drawn anew so far.
+        full: Worlds that have no place for one of them.
+    """
+
+    rejects: Callable[[int, np.ndarray, np.ndarray], bool]
+    standing: Callable[[int], np.ndarray]
+    fail: Callable[[int, MissionError], None]
+    tries: dict[int, int] = field(default_factory=lambda: defaultdict(int))
+    full: set[int] = field(default_factory=set)
 
 
 @dataclass
@@ -132,6 +151,20 @@ class Births:
                 found[i] = np.sort(np.concatenate(parts), kind="stable")
         return found
 
+    def space(self, n_alive: np.ndarray) -> np.ndarray:
+        """Entities that may be born beside those of the blocks, (n_worlds,).
+
+        Args:
+            n_alive: Entities of each world, (n_worlds,).
+        """
+        mission = self.overrides.mission
+        n_own = sum(b.count for b in mission.blocks)
+        n_to_come = self.n_left.sum(axis=0)
+        space = max(mission.limits.rows, n_own) - n_alive - n_to_come
+        if mission.update == "sequential":  # whose groups and calls outlive the entities
+            space = np.minimum(space, max(mission.limits.sequential, n_own) - self.next_id + 1 - n_to_come)
+        return np.asarray(space)
+
     def is_over(self, world: int) -> bool:
         """No birth is to come in this world."""
         return not (self.n_left[:, world] > 0).any()
@@ -168,17 +201,19 @@ class Births:
         return np.asarray(draws * np.sqrt(np.array(spec.variance))[:, None])
 
     def create(
-        self, block: int, worlds: np.ndarray, where: dict[str, np.ndarray] | None = None, rejects: Callable[..., bool] | None = None,
-        taken: Callable[[int], np.ndarray] | None = None,
-    ) -> Newborn:  # fmt: skip
+        self,
+        block: int,
+        worlds: np.ndarray,
+        where: dict[str, np.ndarray] | None = None,
+        room: Room | None = None,
+    ) -> Newborn:
         """Entities of one block, one per item of `worlds` (sorted).
 
         Args:
             block: Number of the block.
             worlds: World of each, (m,).
             where: pos, vel, quat, team that were asked for.
-            rejects: (world, pos, taken) -> whether a place is not free.
-            taken: Positions of a world's entities so far, (3, j).
+            room: Where they may stand; None is everywhere.
         """
         m, where = len(worlds), where or {}
         spec = self.overrides.mission.blocks[block]
@@ -193,9 +228,8 @@ class Births:
         )
         if "pos" in where:
             pos = np.array(where["pos"], float).reshape(3, -1) + np.zeros((3, m))
-        elif rejects is not None:
-            assert taken is not None
-            self._separate(block, spec, worlds, places, pos, rejects, taken)
+        elif room is not None:
+            self._separate(block, worlds, places, pos, room)
 
         def value(name: str) -> np.ndarray:
             return self.overrides.block_values(spec, name, worlds)
@@ -215,37 +249,42 @@ class Births:
         return Newborn(worlds, np.full(m, block), places, ids, team, pos, vel, quat, values)
 
     def _separate(
-        self,
-        block: int,
-        spec: Block,
-        worlds: np.ndarray,
-        places: np.ndarray,
-        pos: np.ndarray,
-        rejects: Any,
-        taken: Any,
+        self, block: int, worlds: np.ndarray, places: np.ndarray, pos: np.ndarray, room: Room
     ) -> None:
         """Draw again where a referee finds a place not free; one entity after the other, as each takes up room."""
-        for world in np.unique(worlds):
-            mine = np.flatnonzero(worlds == world)
-            before = taken(int(world))
-            room = np.empty((3, before.shape[1] + len(mine)))
-            room[:, : before.shape[1]] = before
-            n = before.shape[1]
-            for i in mine:
-                attempt = 0
-                while rejects(int(world), pos[:, i], room[:, :n]):
-                    attempt += 1
-                    if attempt > MOST_TRIES:
-                        raise MissionError(
-                            f"block {spec.name!r}: no free place for entity {int(places[i]) + 1} of {spec.count} after {MOST_TRIES} tries; "
-                            f"give the block more room (placement {spec.placement!r}) or fewer entities"
-                        )
-                    one = slice(i, i + 1)
-                    pos[:, one] = np.array(spec.position)[:, None] + self._scatter(
-                        block, spec, worlds[one], places[one], attempt
+        for world in map(int, np.unique(worlds)):
+            if world not in room.full:
+                try:
+                    self._separate_world(block, world, np.flatnonzero(worlds == world), places, pos, room)
+                except MissionError as error:
+                    room.full.add(world)
+                    room.fail(world, error)
+
+    def _separate_world(
+        self, block: int, world: int, mine: np.ndarray, places: np.ndarray, pos: np.ndarray, room: Room
+    ) -> None:
+        spec, most = self.overrides.mission.blocks[block], self.overrides.mission.limits.tries
+        before = room.standing(world)
+        n = before.shape[1]
+        taken = np.empty((3, n + len(mine)))
+        taken[:, :n] = before
+        for i in mine:
+            attempt = 0
+            while room.rejects(world, pos[:, i], taken[:, :n]):
+                attempt += 1
+                room.tries[world] += 1
+                if attempt > MOST_TRIES or room.tries[world] > most:
+                    others = f", and {most:,} in all" if room.tries[world] > most else ""
+                    raise MissionError(
+                        f"block {spec.name!r}: no free place for entity {int(places[i]) + 1} of {spec.count} "
+                        f"after {attempt - 1} tries{others}; give the block more room (placement {spec.placement!r}) or fewer entities"
                     )
-                room[:, n] = pos[:, i]
-                n += 1
+                one = slice(i, i + 1)
+                pos[:, one] = np.array(spec.position)[:, None] + self._scatter(
+                    block, spec, np.array([world]), places[one], attempt
+                )
+            taken[:, n] = pos[:, i]
+            n += 1
 
 
 def _run_numbers(worlds: np.ndarray) -> np.ndarray:

@@ -73,19 +73,17 @@ class Mail:
         """Turn `SpawnEntity` messages into births at the beginning of the next step, block by block in the mission's order."""
         view = self.sim.world_view
         has_attitude = (batch.quat != 0.0).any(axis=0)
-        for block in view.templates:
-            for turned in (False, True):
-                index = np.array(
-                    [i for i, b in enumerate(batch.block) if b == block and has_attitude[i] == turned],
-                    np.int64,
-                )
-                attitude = {"quat": batch.quat[:, index]} if turned else {}
-                view.spawn(
-                    block, batch.world[index], pos=batch.pos[:, index], vel=batch.vel[:, index], **attitude
-                )
-        for i, block in enumerate(batch.block):
-            world = int(batch.world[i])
-            if block not in view.templates and not self.sim.failed[world]:
+        known = {name: k for k, name in enumerate(view.templates)}
+        number = np.array([known.get(str(block), -1) for block in batch.block], np.int64)
+        for k, turned in sorted(set(zip(number.tolist(), has_attitude.tolist(), strict=True))):
+            index = np.flatnonzero((number == k) & (has_attitude == turned))
+            attitude = {"quat": batch.quat[:, index]} if turned else {}
+            if k >= 0:
+                where = {"pos": batch.pos[:, index], "vel": batch.vel[:, index], **attitude}
+                view.spawn(view.templates[k], batch.world[index], **where)
+        for i in np.flatnonzero(number < 0):
+            block, world = batch.block[i], int(batch.world[i])
+            if not self.sim.failed[world]:
                 error = MissionError(
                     f"SpawnEntity: there is no block {block!r}{nearest_name(str(block), view.templates)}; {listed(view.templates)}"
                 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from bisect import insort
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -98,10 +99,11 @@ class Population:
             )
             self._by_key[key] = group
             group.key = key
-            self.groups.append(group)
             if self.is_sequential:
                 group.place = place
-                self.groups.sort(key=lambda g: g.place)
+                insort(self.groups, group, key=lambda g: g.place)
+            else:
+                self.groups.append(group)
             self.on_new_group()
         group = self._by_key[key]
         if block.name not in group.names:

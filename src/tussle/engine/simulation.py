@@ -14,7 +14,7 @@ from tussle.api.kinds import Interaction
 from tussle.api.plugin import GRADES
 from tussle.api.world import WorldView
 from tussle.engine import access, failure
-from tussle.engine.births import Births, Newborn
+from tussle.engine.births import Births, Newborn, Room
 from tussle.engine.events import Herald
 from tussle.engine.mail import Mail
 from tussle.engine.params import Overrides
@@ -319,7 +319,7 @@ class Simulation:
         rejecting = [r for r in self.interactions if type(r.plugin).rejects is not Interaction.rejects]
         placed: dict[int, list[np.ndarray]] = {}
 
-        def taken(world: int) -> np.ndarray:
+        def standing(world: int) -> np.ndarray:
             bodies = self.population.bodies
             here = (
                 [] if at_start else [bodies.pos[:, bodies.world == world]]
@@ -329,9 +329,15 @@ class Simulation:
         def rejects(world: int, pos: np.ndarray, others: np.ndarray) -> bool:
             return any(r.plugin.rejects(r.view, world, pos, others) for r in rejecting)
 
+        def fail(world: int, error: MissionError) -> None:
+            if at_start and self.n_worlds == 1:
+                raise error
+            self.record_failure(world, self._own_error(world, str(error)))
+
+        room = Room(rejects, standing, fail) if rejecting else None
         parts = []
         for block, worlds in due.items():
-            part = self.births.create(block, worlds, rejects=rejects if rejecting else None, taken=taken)
+            part = self.births.create(block, worlds, room=room)
             parts.append(part)
             if rejecting:
                 for world in np.unique(worlds):
@@ -341,12 +347,15 @@ class Simulation:
     def _give_birth(self) -> None:
         parts = []
         asked, self.world_view.births = self.world_view.births, []
+        if asked:
+            self._check_space(np.concatenate([wish["world"] for wish in asked]))
+        is_open = self.running & ~self.failed
         names = self.context.block_names
         for wish in asked:
             where = {k: v for k, v in wish.items() if k not in ("block", "world")}
             worlds = wish["world"]
             order = np.argsort(worlds, kind="stable")
-            kept = order[self.running[worlds[order]]]
+            kept = order[is_open[worlds[order]]]
             if len(kept):
                 where = {
                     k: v[..., kept] if np.ndim(v) and v.shape[-1] == len(worlds) else v
@@ -358,6 +367,22 @@ class Simulation:
         parts += [born] if born is not None else []
         if parts:
             self.repack(None, Newborn.join(parts))
+
+    def _check_space(self, worlds: np.ndarray) -> None:
+        """End the worlds that the births asked for in `worlds`, (m,), would make larger than they may be."""
+        n_asked = np.bincount(worlds, minlength=self.n_worlds)
+        space = self.births.space(np.bincount(self.population.bodies.world, minlength=self.n_worlds))
+        limits, update = self.mission.limits, self.mission.update
+        for world in map(int, np.flatnonzero(self.running & (n_asked > space))):
+            text = (
+                f"plugins ask for {n_asked[world]:,} more entities, and there is room for {max(0, space[world]):,}: with "
+                f"update={update!r} a world holds {limits.most_rows(update):,}; for a mission you trust there is allow_large"
+            )
+            self.record_failure(world, self._own_error(world, text))
+
+    def _own_error(self, world: int, text: str) -> PluginError:
+        """What ends a world although no plugin has raised."""
+        return PluginError(text, step=int(self.context.clock.step[world]), world=world)
 
     def repack(self, gone: np.ndarray | None, new: Newborn | None) -> None:
         """Remove rows (gone, (n,), true) and add newborn ones."""

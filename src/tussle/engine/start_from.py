@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tussle.engine.births import Births, Newborn
+from tussle.engine.births import Births, Newborn, Room
 from tussle.engine.params import Overrides
 from tussle.errors import MissionError, listed, nearest_name
 from tussle.mission import Block
@@ -63,11 +63,14 @@ class RecordedBirths(Births):
         return found
 
     def create(
-        self, block: int, worlds: np.ndarray, where: dict[str, np.ndarray] | None = None, rejects: Callable[..., bool] | None = None,
-        taken: Callable[[int], np.ndarray] | None = None,
-    ) -> Newborn:  # fmt: skip
+        self,
+        block: int,
+        worlds: np.ndarray,
+        where: dict[str, np.ndarray] | None = None,
+        room: Room | None = None,
+    ) -> Newborn:
         if where is not None:
-            return super().create(block, worlds, where, rejects, taken)
+            return super().create(block, worlds, where, room)
         rows, table = self.rows[block], self.table
         # Those who are due have been taken off n_left before: the last of them is the last that has entered.
         n_entered = len(rows) - self.n_left[block, worlds]

@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from tussle.errors import MissionError, TussleError, listed, nearest_name
+from tussle.errors import MissionError, TussleError
 from tussle.mission import codecs
-from tussle.mission.node import Node
+from tussle.mission.limits import Limits
+from tussle.mission.node import Budget, Node
 from tussle.mission.plugin_tags import PluginReader, Written
 from tussle.mission.problems import Place, Problems, shown
 from tussle.mission.spec import PLACEMENTS, Block
@@ -21,8 +22,12 @@ from tussle.scene import Base, Origin
 MOST_TEAM = 2**31 - 1
 
 
-def expanded(root: Node, problems: Problems) -> None:
-    """Give each <entity> of a mission the tags of its <entity_common>, which then goes away."""
+def expanded(root: Node, problems: Problems, budget: Budget) -> None:
+    """Give each <entity> of a mission the tags of its <entity_common>, which then goes away.
+
+    Raises:
+        MissionError: With what is given to each there is too much.
+    """
     shared: dict[str, Node] = {}
     for node in root.find_all("entity_common"):
         name = node.attributes.get("name", "")
@@ -34,21 +39,26 @@ def expanded(root: Node, problems: Problems) -> None:
         if wanted is None:
             continue
         if wanted not in shared:
-            text = f"there is no entity_common {shown(wanted)}{nearest_name(wanted[:80], shared)}; {listed(shared)}"
-            problems.error(node.where("entity_common"), text)
+            problems.absent(node.where("entity_common"), "entity_common", wanted, shared)
             continue
-        node.children = _merged(shared[wanted].children, node.children)
+        node.children = _merged(shared[wanted].children, node.children, budget)
     root.children = [child for child in root.children if child.tag != "entity_common"]
 
 
-def _merged(common: Iterable[Node], own: list[Node]) -> list[Node]:
+def _merged(common: Iterable[Node], own: list[Node], budget: Budget) -> list[Node]:
     """The shared tags but for those that the entity has itself, then its own; plugins of both act, the shared ones first."""
+    by_tag: dict[str, list[Node]] = {}
+    for mine in own:
+        by_tag.setdefault(mine.tag, []).append(mine)
     taken = []
     for node in common:
-        same = [n for n in own if n.tag == node.tag]
+        budget.spend_copy(node)
+        same = by_tag.get(node.tag, [])
         if node.tag == "name" or (same and node.tag not in MANY):
+            budget.spend_nodes(len(same), node.place)
             for mine in same:
                 if mine.text == node.text:
+                    budget.spend_copy(node)
                     mine.attributes = {**node.attributes, **mine.attributes}
             continue
         taken.append(node.copied())
@@ -170,7 +180,8 @@ class EntityReader:
         plugins: Makes the plugins.
         problems: Receives what is wrong.
         origin: Where the mission lies.
-        most_rows: Entities that there may be.
+        limits: How many entities there may be.
+        update: The mission's; "sequential" bears fewer.
         rows: Entities so far.
         bases: Homes of the teams so far.
         drawn: Block name -> settings kept for the viewer.
@@ -180,7 +191,8 @@ class EntityReader:
     plugins: PluginReader
     problems: Problems
     origin: Origin
-    most_rows: int
+    limits: Limits
+    update: str
     rows: int = 0
     bases: list[Base] = field(default_factory=list)
     drawn: dict[str, dict[str, str]] = field(default_factory=dict)
@@ -242,13 +254,15 @@ class EntityReader:
     def _count(self, fields: Fields) -> int:
         count: int = fields.read("count", lambda text: codecs.whole(text, 0))
         self.rows += count
-        if self.rows > self.most_rows >= self.rows - count:
+        most = self.limits.most_rows(self.update)
+        if self.rows > most >= self.rows - count:
+            how = f" with update={self.update!r}" if most < self.limits.rows else ""
             self.problems.error(
                 fields.place("count"),
-                f"count: with these there are {self.rows:,} entities, more than {self.most_rows:,}; "
+                f"count: with these there are {self.rows:,} entities, more than {most:,}{how}; "
                 f"for a file you trust there is allow_large",
             )
-        return min(count, self.most_rows)
+        return min(count, most)
 
     def _body(self, fields: Fields) -> dict[str, Any]:
         """Where the entities are and how they move at first."""
@@ -276,7 +290,9 @@ class EntityReader:
             return {}
         rate = fields.read("generate_rate", lambda text: codecs.fraction(text, "1/s")) or 0.0
         slots = (
-            fields.read("generate_count", lambda text: codecs.whole(text, -self.most_rows, self.most_rows))
+            fields.read(
+                "generate_count", lambda text: codecs.whole(text, -self.limits.rows, self.limits.rows)
+            )
             or 0
         )
         if not (rate > 0.0 and slots > 0):

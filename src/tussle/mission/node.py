@@ -81,7 +81,31 @@ class Budget:
     limits: Limits
     nodes: int = 0
     text: int = 0
-    files: int = 0
+
+    def spend_nodes(self, amount: int, place: Place) -> None:
+        """Count tags.
+
+        Raises:
+            MissionError: There are too many.
+        """
+        self.nodes += amount
+        if self.nodes > self.limits.nodes:
+            raise MissionError(
+                f"{place}: there are more than {self.limits.nodes:,} tags, counted again wherever they are taken from; "
+                f"for a file you trust there is allow_large"
+            )
+
+    def spend_copy(self, node: Node) -> None:
+        """Count a tag, with all in it, that is taken from elsewhere in the file.
+
+        Raises:
+            MissionError: There is too much by now.
+        """
+        self.spend_nodes(1, node.place)
+        size = len(node.tag) + len(node.text) + sum(len(k) + len(v) for k, v in node.attributes.items())
+        self.spend_text(size, str(node.place))
+        for child in node.children:
+            self.spend_copy(child)
 
     def spend_text(self, amount: int, file: str) -> None:
         """Count characters.
@@ -120,19 +144,13 @@ class _Builder:
         )
 
     def start(self, tag: str, flat: list[str]) -> None:
-        limits = self.budget.limits
-        self.budget.nodes += 1
-        if self.budget.nodes > limits.nodes:
-            raise self.refuse(
-                f"there are more than {limits.nodes:,} tags; for a file you trust there is allow_large"
-            )
-        if len(self.stack) >= limits.depth:
-            raise self.refuse(f"tags stand in one another more than {limits.depth} deep")
-        names = flat[::2]
         line = self.parser.CurrentLineNumber
-        node = Node(
-            tag, dict(zip(names, flat[1::2], strict=True)), "", [], Place(self.file, self.line_of(line))
-        )
+        place = Place(self.file, self.line_of(line))
+        self.budget.spend_nodes(1, place)
+        if len(self.stack) >= self.budget.limits.depth:
+            raise self.refuse(f"tags stand in one another more than {self.budget.limits.depth} deep")
+        names = flat[::2]
+        node = Node(tag, dict(zip(names, flat[1::2], strict=True)), "", [], place)
         if names:
             node.lines = self.lines_of_attributes(line)
         if self.stack:

@@ -77,7 +77,7 @@ def replace_placeholders(
             value = match[0] if is_comment else ""
             if not is_comment:
                 problems.error(
-                    Place(file, text.count("\n", 0, match.start()) + 1),
+                    Place(file, line + text.count("\n", at, match.start())),
                     f"${{{name}}} has no default and is not set; write ${{{name}=default}} or set {name}",
                 )
         parts += [text[done : match.start()], value]
@@ -87,11 +87,12 @@ def replace_placeholders(
                 f"{file}: the mission is longer than {budget.limits.text:,} characters with its placeholders replaced"
             )
         done = match.end()
+        line, at = line + text.count("\n", at, done), done
         change = match[0].count("\n") - value.count("\n")
         if change:
-            line += text.count("\n", at, done)
-            at, shift = done, shift + change
+            shift += change
             out.ends.append(line - shift)
             out.shifts.append(shift)
     out.text = "".join([*parts, text[done:]])
+    budget.spend_text(max(0, len(out.text) - len(text)), file)
     return out

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from tussle.api.plugin import Plugin
-from tussle.errors import MissionError, TussleError, listed, nearest_name
+from tussle.errors import MissionError, TussleError
 from tussle.mission import codecs
 from tussle.mission.catalogue import KINDS, AbsentPluginError, Catalogue, historic
-from tussle.mission.node import Node
+from tussle.mission.node import Budget, Node
 from tussle.mission.problems import Place, Problems, shown
 from tussle.mission.tags import PLUGIN
 
@@ -47,6 +47,7 @@ class PluginReader:
     Attributes:
         catalogue: Finds the classes.
         problems: Receives what is wrong.
+        budget: Limits that it shares with the mission's files.
         shared: <param_common> name -> attributes.
         from_geodetic: Latitude, longitude [rad], altitude [m], (3,), to world positions [m].
         drawn: Receives attributes that are kept for the viewer: "plugin@attribute" -> text.
@@ -54,6 +55,7 @@ class PluginReader:
 
     catalogue: Catalogue
     problems: Problems
+    budget: Budget
     shared: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     from_geodetic: Callable[..., Any] | None = None
     drawn: dict[str, str] = field(default_factory=dict)
@@ -127,10 +129,12 @@ class PluginReader:
         if name is None:
             return
         if name not in self.shared:
-            text = f"there is no param_common {shown(name)}{nearest_name(name[:80], self.shared)}; {listed(self.shared)}"
-            self.problems.error(written.where("param_common"), text)
+            self.problems.absent(written.where("param_common"), "param_common", name, self.shared)
             return
-        for key, text in self.shared[name].items():
+        place, shared = written.where("param_common"), self.shared[name]
+        self.budget.spend_nodes(len(shared), place)
+        self.budget.spend_text(sum(map(len, shared.values())), str(place))
+        for key, text in shared.items():
             written.attributes.setdefault(key, text)
 
     def _name(self, written: Written, taken: set[str]) -> str:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
+from itertools import islice
 from typing import NamedTuple
 
 from tussle.errors import MissionError, listed, nearest_name
@@ -10,6 +11,9 @@ from tussle.errors import MissionError, listed, nearest_name
 LONGEST_SHOWN = 80
 MOST_LINES = 100
 """Errors told at once, and notes; a file with more is most likely not a mission."""
+
+MOST_GUESSED = 1000
+"""Names of a file among which the right one is looked for."""
 
 
 class Place(NamedTuple):
@@ -40,6 +44,7 @@ class Problems:
         self._errors: dict[str, list[Place]] = {}
         self._notes: dict[str, list[Place]] = {}
         self._n_unsaid = 0
+        self._absent: dict[tuple[str, str], str] = {}
 
     def error(self, place: Place, text: str) -> None:
         """Something that keeps the mission from being played.
@@ -51,6 +56,15 @@ class Problems:
         if len(self._errors) >= MOST_LINES:
             self._errors["there may be more: reading stopped here"] = [place]
             self.check()
+
+    def absent(self, place: Place, what: str, name: str, known: Collection[str]) -> None:
+        """A name that the file does not explain; the guess at the right one, which takes a while, is made once for each name."""
+        if (what, name) not in self._absent:
+            some = list(islice(known, MOST_GUESSED))
+            more = ", ..." if len(known) > len(some) else ""
+            guess = nearest_name(name[:LONGEST_SHOWN], some)
+            self._absent[what, name] = f"there is no {what} {shown(name)}{guess}; {listed(some)}{more}"
+        self.error(place, self._absent[what, name])
 
     def note(self, place: Place, text: str) -> None:
         """Something that the reader of the file should know."""

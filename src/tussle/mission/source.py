@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from tussle.errors import MissionError, listed, nearest_name
-from tussle.mission.limits import Limits
 from tussle.mission.node import Budget, Node, parse
 from tussle.mission.placeholders import replace_placeholders
 from tussle.mission.problems import Place, Problems, shown
@@ -127,7 +126,7 @@ class Reader:
     Args:
         overrides: Values of placeholders.
         problems: Receives what is wrong but does not end the reading.
-        limits: How much it may be.
+        budget: Limits on how much it may be.
         search: Folders from which files may be included, besides the mission's own.
     """
 
@@ -135,12 +134,12 @@ class Reader:
         self,
         overrides: Mapping[str, str],
         problems: Problems,
-        limits: Limits,
+        budget: Budget,
         search: Sequence[str | Path] = (),
     ) -> None:
         self.overrides = overrides
         self.problems = problems
-        self.budget = Budget(limits)
+        self.budget = budget
         self.search = [_expanded(s) for s in search]
         self.placeholders: dict[str, str] = {}
         self.files: list[Path] = []

@@ -15,6 +15,7 @@ from tussle import stock, units
 from tussle.api import Autonomy, Controller, Interaction, Metric, MotionModel, Network, Sensor
 from tussle.errors import MissionError, listed, nearest_name
 from tussle.mission.cadence import Cadence
+from tussle.mission.limits import Limits
 from tussle.scene import Scene
 
 T = TypeVar("T")
@@ -257,6 +258,8 @@ class Mission:
         networks: What carries messages; GlobalNetwork and LocalNetwork are always there.
         scene: Origin, ground, boundaries, bases.
         name: Title.
+        limits: How many entities a world may come to hold, and how often their places are drawn. The blocks' own are always let in;
+            `Limits.large()` is for plugins that ask for very many more.
     """
 
     blocks: Sequence[Block]
@@ -271,6 +274,7 @@ class Mission:
     networks: Any = ()
     scene: Scene = field(default_factory=Scene)
     name: str = ""
+    limits: Limits = field(default=Limits(), repr=False)  # no part of the game, and so not of its text
 
     def __post_init__(self) -> None:
         _set(self, "blocks", _items("mission: blocks", self.blocks, "a list of Block"))
@@ -326,6 +330,8 @@ class Mission:
         self._check_rates()
         if not isinstance(self.scene, Scene):
             raise MissionError(f"mission: scene = {self.scene!r} is not a Scene")
+        if not isinstance(self.limits, Limits):
+            raise MissionError(f"mission: limits = {self.limits!r} is not a Limits")
 
     def _check_rates(self) -> None:
         for network in self.networks:

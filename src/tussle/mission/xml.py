@@ -14,7 +14,7 @@ from tussle.mission import codecs
 from tussle.mission.catalogue import KINDS, Catalogue, PluginSource
 from tussle.mission.entities import EntityReader, Fields, block_names, expanded
 from tussle.mission.limits import Limits
-from tussle.mission.node import Node
+from tussle.mission.node import Budget, Node
 from tussle.mission.overrides import apply_path, split_overrides
 from tussle.mission.plugin_tags import PluginReader
 from tussle.mission.problems import Place, Problems, shown
@@ -77,38 +77,38 @@ def read_mission(
         strict: Tags and attributes that mean nothing are errors instead of notes.
         plugin_files: Python files whose plugins the mission may name.
         search: Folders in which missions and included files are looked for, besides the mission's own.
-        allow_large: Lift the limits that keep a hostile file from taking all memory.
+        allow_large: Lift the limits that keep a hostile file from taking all memory, while it is read and while it is played.
 
     Raises:
         MissionError: It cannot be read or played. One line for each thing that is wrong, beginning with file and line.
     """
-    limits = Limits.large() if allow_large else Limits()
+    budget = Budget(Limits.large() if allow_large else Limits())
     settings = {str(name): str(value) for name, value in (overrides or {}).items()}
     catalogue = Catalogue(plugin_files)
     problems = Problems(strict=strict)
     path = find_mission(source, search)
-    read = Reader(settings, problems, limits, search).read(path)
+    read = Reader(settings, problems, budget, search).read(path)
     if read.root.tag != "runscript":
         raise MissionError(
             f"{read.root.place}: the outermost tag is <{read.root.tag[:80]}>; a mission's is <runscript>"
         )
     _, paths = split_overrides(settings, read.placeholders)
-    expanded(read.root, problems)
+    expanded(read.root, problems, budget)
     for name, value in paths.items():
         apply_path(read.root, name, value)
     if paths:
         read.text = read.root.to_text()
-    return _WorldReader(read, catalogue, problems, limits).loaded()
+    return _WorldReader(read, catalogue, problems, budget).loaded()
 
 
 class _WorldReader:
     """Reads the tags of <runscript>."""
 
-    def __init__(self, source: Source, catalogue: Catalogue, problems: Problems, limits: Limits) -> None:
+    def __init__(self, source: Source, catalogue: Catalogue, problems: Problems, budget: Budget) -> None:
         self.source = source
         self.catalogue = catalogue
         self.problems = problems
-        self.limits = limits
+        self.budget, self.limits = budget, budget.limits
         self.root = source.root
         self.viewer: dict[str, Any] = {}
         self.log: dict[str, Any] = {}
@@ -125,9 +125,9 @@ class _WorldReader:
             problems.error(root.place, "the mission has no <entity>")
         times = self._run()
         origin = self._origin()
-        plugins = PluginReader(self.catalogue, problems, self._shared(), origin.from_geodetic)
+        plugins = PluginReader(self.catalogue, problems, self.budget, self._shared(), origin.from_geodetic)
         world = self._world_plugins(plugins)
-        entities = EntityReader(plugins, problems, origin, self.limits.rows)
+        entities = EntityReader(plugins, problems, origin, self.limits, times["update"])
         nodes = list(root.find_all("entity"))
         self._count_tags(nodes)
         blocks = [entities.block(node, name) for node, name in zip(nodes, block_names(nodes), strict=True)]
@@ -147,6 +147,7 @@ class _WorldReader:
                 end_conditions=conditions,
                 scene=Scene(origin=origin, bases=tuple(entities.bases)),
                 name=name,
+                limits=self.limits,
                 **settings,
             )
         except TussleError as error:

@@ -84,6 +84,16 @@ def environment() -> str:
     return repr((FORMAT, versions, cpu_target.target_context.codegen().magic_tuple(), settings))
 
 
+@cache
+def built() -> dict[tuple[str, str], tuple[Any, Any]]:
+    """By name and key, what this process has loaded or compiled; a second kernel of the same content is given the same.
+
+    The compiler never frees machine code, so kernels that are made again and again, as that of a motion model's derivative
+    is for every simulation, would take memory for ever.
+    """
+    return {}
+
+
 def renamed(function: Any, key: str) -> types.FunctionType:
     """A copy whose name holds the key.
 
@@ -247,26 +257,33 @@ class Kernel(Device):
                 return
             reached = Fingerprint(self.py_func)
             key = self._key(reached)
-            main = self._new_dispatcher(key)
-            result = None if reached.opaque else load(self.name, key, main.targetctx)
-            if result is not None:
-                main.add_overload(result)
-                stats.loaded += 1
-            else:
-                if stats.on_compile is not None:
-                    stats.on_compile(self.name)
-                for holder in reached.holders:
-                    if isinstance(holder, Device):
-                        holder.refresh()
-                main.compile(self.types)
-                result = next(iter(main.overloads.values()))
-                stats.compiled += 1
-                if not reached.opaque:
-                    save(self.name, key, result)
-            main._compile_for_args = self._accept
+            main, result = built().get((self.name, key)) or self._made(key, reached)
+            if not reached.opaque:
+                built()[self.name, key] = main, result
             self._main = main
             self._compiled = result
             type(self).__call__ = staticmethod(main)  # type: ignore[method-assign]
+
+    def _made(self, key: str, reached: Fingerprint) -> tuple[Any, Any]:
+        """Numba's dispatcher and its compile result, from disk or compiled."""
+        main = self._new_dispatcher(key)
+        result = None if reached.opaque else load(self.name, key, main.targetctx)
+        if result is not None:
+            main.add_overload(result)
+            stats.loaded += 1
+        else:
+            if stats.on_compile is not None:
+                stats.on_compile(self.name)
+            for holder in reached.holders:
+                if isinstance(holder, Device):
+                    holder.refresh()
+            main.compile(self.types)
+            result = next(iter(main.overloads.values()))
+            stats.compiled += 1
+            if not reached.opaque:
+                save(self.name, key, result)
+        main._compile_for_args = self._accept
+        return main, result
 
     def _accept(self, *args: Any) -> Any:
         """Called by the dispatcher for types it has not met: register them if they fit the one signature, and never compile."""

@@ -8,7 +8,7 @@ import time
 import pytest
 
 from tussle.errors import MissionError
-from tussle.mission import read_mission
+from tussle.mission import Limits, read_mission
 
 BOMB = (
     "<!DOCTYPE r [<!ENTITY a0 'ha'>"
@@ -122,6 +122,65 @@ def test_large_files_are_read_when_allowed(files):
     loaded = files.read(text, allow_large=True)
     assert loaded.mission.blocks[0].count == 300_000
     assert len(loaded.notes) <= 102
+
+
+TAKES = "<entity entity_common='c'/>" * 4000
+NAMES, ATTRIBUTES = "<name/>" * 40_000, " ".join(f"a{i}='1'" for i in range(50_000))
+LEARNS = "<entity>" + "<autonomy param_common='c'>Boids</autonomy>" * 900 + "</entity>"
+
+
+def common(kind, inside):
+    return f"<{kind}_common name='c'>{inside}</{kind}_common>"
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (common("entity", "<base/>" * 1000) + TAKES, "100,000 tags"),
+        (common("entity", NAMES) + f"<entity entity_common='c'>{NAMES}</entity>", "100,000 tags"),
+        (common("entity", f"<x>{'1' * 1_000_000}</x>") + TAKES, "longer than 4,000,000"),
+        (common("entity", f"<x {ATTRIBUTES}/>") + TAKES, "longer than 4,000,000"),
+        (common("param", "".join(f"<u{i}/>" for i in range(1000))) + LEARNS, "100,000 tags"),
+        (common("param", f"<goal>{'1 ' * 50_000}</goal>") + LEARNS, "longer than 4,000,000"),
+        ("".join(f"<entity_common name='d{i}'/>" for i in range(20_000)) + TAKES, "there is no entity_common 'c'"),
+    ],
+    ids=["tags", "names", "text", "attributes", "parameters", "values", "guesses"],
+)  # fmt: skip
+def test_what_many_take_from_one_place_is_counted(files, text, said):
+    with pytest.raises(MissionError, match=said):
+        files.read(f"<runscript>{text}</runscript>")
+
+
+def test_as_much_may_be_taken_as_may_be_written(files):
+    shared = common("entity", "<team_id>3</team_id><motion_model>Still</motion_model>")
+    loaded = files.read(f"<runscript>{shared}{TAKES}</runscript>")
+    assert {b.team for b in loaded.mission.blocks} == {3}
+
+
+def test_placeholders_without_a_value_are_told_soon_with_their_lines(files):
+    with pytest.raises(MissionError, match=r"m\.xml:2, 3, 4, 5, 6, 7 \.\.\.: \$\{a\} has no default"):
+        files.read("<runscript>\n" + "${a}\n" * 300_000 + "</runscript>")
+
+
+def test_includes_cannot_grow_beyond_the_limit(files):
+    files.write("<entity><name>${a=1}${a=1}${a=1}</name></entity>", "part.xml")
+    text = (
+        "<runscript xmlns:xi='http://www.w3.org/2001/XInclude'>"
+        + "<xi:include href='part.xml'/>" * 9
+        + "</runscript>"
+    )
+    with pytest.raises(MissionError, match="longer than 4,000,000 characters"):
+        files.read(text, {"a": "x" * 300_000})
+
+
+def test_update_sequential_bears_fewer_entities(files):
+    said = r"20,000 entities, more than 10,000 with update='sequential'; for a file you trust there is allow_large"
+    for inside, settings in (("<run update='sequential'/>", {}), ("", {"run.update": "sequential"})):
+        with pytest.raises(MissionError, match=said):
+            files.world(inside, "<count>20000</count>", settings)
+    loaded = files.world("<run update='sequential'/>", "<count>20000</count>", allow_large=True)
+    assert loaded.mission.limits == Limits.large()
+    assert files.world("", "<count>20000</count>").mission.limits == Limits()
 
 
 def test_placeholders_cannot_grow_beyond_the_limit(files):

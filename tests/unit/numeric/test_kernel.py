@@ -16,7 +16,7 @@ import pytest
 
 from tussle.numeric import atan2, store
 from tussle.numeric.fingerprint import Fingerprint, libm_names
-from tussle.numeric.kernel import device, kernel, stats
+from tussle.numeric.kernel import built, device, kernel, stats
 
 GAIN = 2.0
 
@@ -42,6 +42,13 @@ def all_codes(table, integers, flags, words, n, flag, word):
 def own_cache(tmp_path, monkeypatch):
     monkeypatch.setenv("TUSSLE_CACHE_DIR", str(tmp_path / "cache"))
     return tmp_path / "cache"
+
+
+@pytest.fixture
+def forget_kernels():
+    """Forgets the kernels of this process, as if it had just begun."""
+    built.cache_clear()
+    return built.cache_clear
 
 
 def test_kernel_computes_in_place():
@@ -298,29 +305,43 @@ def test_global_redefined_at_the_prompt_is_seen_by_new_kernels(own_cache):
 # Files -----------------------------------------------------------------------------------------------------
 
 
-def test_damaged_file_is_compiled_anew(own_cache):
+def test_damaged_file_is_compiled_anew(own_cache, forget_kernels):
     kernel("F f8 Fw")(scale_rows.py_func)(np.ones(1), 0.0, np.empty(1))
     (path,) = own_cache.glob("*.kernel")
     content = path.read_bytes()
     path.write_bytes(content[:-9])
     before = stats.compiled
+    forget_kernels()
     kernel("F f8 Fw")(scale_rows.py_func)(np.ones(1), 0.0, np.empty(1))
     assert stats.compiled == before + 1
     # A sound file is there again: the next one is loaded. (Its size is no measure: pickles of the same thing differ by a few bytes.)
     loaded = stats.loaded
+    forget_kernels()
     kernel("F f8 Fw")(scale_rows.py_func)(np.ones(1), 0.0, np.empty(1))
     assert (stats.compiled, stats.loaded) == (before + 1, loaded + 1)
 
 
-def test_directory_that_cannot_be_written_warns_once_and_works(tmp_path, monkeypatch):
+def test_directory_that_cannot_be_written_warns_once_and_works(tmp_path, monkeypatch, forget_kernels):
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("TUSSLE_CACHE_DIR", str(tmp_path / "file" / "cache"))
     out = np.empty(1)
     with pytest.warns(RuntimeWarning, match=r"cannot be kept in .*TUSSLE_CACHE_DIR"):
         kernel("F f8 Fw")(scale_rows.py_func)(np.ones(1), 1.0, out)
     assert out[0] == 3.0
+    forget_kernels()
     kernel("F f8 Fw")(scale_rows.py_func)(np.ones(1), 2.0, out)  # a second warning would be an error
     assert out[0] == 4.0
+
+
+def test_kernels_of_the_same_content_share_their_machine_code(own_cache, forget_kernels):
+    first, second = kernel("F f8 Fw")(scale_rows.py_func), kernel("F f8 Fw")(scale_rows.py_func)
+    out = np.empty(1)
+    first(np.ones(1), 1.0, out)
+    before = stats.compiled, stats.loaded
+    second(np.ones(1), 2.0, out)
+    assert out[0] == 4.0
+    assert second.address == first.address
+    assert (stats.compiled, stats.loaded) == before
 
 
 def test_old_files_of_one_name_are_removed_and_others_stay(own_cache):

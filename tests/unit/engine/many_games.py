@@ -1,0 +1,70 @@
+"""Play many games of some motion models, one model after the other, and print by how much the process has grown in each [MB]."""
+
+from __future__ import annotations
+
+import gc
+import os
+import sys
+from pathlib import Path
+
+from tussle import Block, Mission, Simulation, stock
+from tussle.api import Autonomy, Input, MotionModel, Output, Param, State
+
+N_WARM = 40
+
+
+def own_model():
+    """A motion model as an author writes it; each call makes the class anew."""
+
+    class Lagging(MotionModel):
+        """Along a line, with a first-order lag."""
+
+        lag = Param(0.5, unit="s", gt=0.0)
+        x = State("east v", unit="m m/s")
+        speed = Input(unit="m/s")
+
+        @staticmethod
+        def derivative(v, speed, lag):
+            return v, (speed - v) / lag
+
+        def from_body(self, body, rows):
+            self.x[:, rows] = 0.0
+
+        def to_body(self, body):
+            body.pos[0] = self.x[0]
+
+    return Lagging
+
+
+def mission(model):
+    """A mission of two robots that are told nothing."""
+    told = {name: Output(" ".join(c.channels), unit=" ".join(c.units)) for name, c in model.inputs().items()}
+    silent = type("Silent", (Autonomy,), {**told, "step": lambda self, g: None, "__doc__": "Say nothing."})
+    return Mission(blocks=[Block(name="a", count=2, autonomy=silent(), motion=model())])
+
+
+def resident():
+    """Resident memory of this process [MB]."""
+    gc.collect()
+    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def grown(name, n_games):
+    """Growth over n games of a model [MB]."""
+    if name == "classes made on the fly":
+        games = (mission(own_model()) for _ in range(N_WARM + n_games))
+    else:
+        model = own_model() if name == "an author's own" else getattr(stock, name)
+        games = (game for game in [mission(model)] for _ in range(N_WARM + n_games))
+    before = 0.0
+    for number, game in enumerate(games):
+        if number == N_WARM:
+            before = resident()
+        with Simulation(game) as sim:
+            sim.step(2)
+    return resident() - before
+
+
+if __name__ == "__main__":
+    for name in sys.argv[2:]:
+        print(name, round(grown(name, int(sys.argv[1])), 3), flush=True)
