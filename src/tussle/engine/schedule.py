@@ -14,6 +14,7 @@ from tussle.columns import Publish, Subscribe
 from tussle.engine.group import Binding, Group
 from tussle.engine.referees import Referee
 from tussle.engine.subset import call_group, call_referee
+from tussle.errors import ParameterError
 
 if TYPE_CHECKING:
     from tussle.engine.simulation import Simulation
@@ -27,13 +28,26 @@ class Call:
     run: Callable[[], None]
 
 
+MOST = 10**9
+"""Largest denominator of a rate per step: a mission has no more steps, and its product with their number stays within 64 bits."""
+
+
 def _rate(plugin: Any, dt: float) -> Fraction | None:
-    """Calls per step as an exact fraction of the decimal numbers that were written; None for every step."""
+    """Calls per step as an exact fraction of the decimal numbers that were written; None for every step.
+
+    Raises:
+        ParameterError: It is never called.
+    """
     rate = plugin.rate
     if rate is None:
         return None
     per_step = Fraction(str(rate)) * Fraction(str(dt))
-    return None if per_step >= 1 else per_step
+    if per_step * MOST < 1:
+        least = 1.0 / (MOST * dt)
+        raise ParameterError(
+            f"{plugin.instance_name}: rate = {rate:g} is not allowed with dt = {dt:g}; it takes at least {least:g} calls per second"
+        )
+    return None if per_step >= 1 else per_step.limit_denominator(MOST)
 
 
 def is_due(step: np.ndarray, per_step: Fraction) -> np.ndarray:
