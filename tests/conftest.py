@@ -1,10 +1,14 @@
-"""For all tests: what is kept for the user lies in a folder of the tests' own."""
+"""For all tests: none is timed, since a machine may be slow or busy; what is kept for the user lies in a folder of the tests' own."""
 
 from __future__ import annotations
 
 import os
 
 import pytest
+from hypothesis import HealthCheck, settings
+
+settings.register_profile("untimed", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("untimed")
 
 
 @pytest.fixture(scope="session", autouse=True)

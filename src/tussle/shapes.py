@@ -34,6 +34,10 @@ class Boundary(ABC):
         """Whether positions [m], (3, n), lie inside, (n,); NaN lies outside."""
 
     @abstractmethod
+    def inward(self, pos: np.ndarray) -> np.ndarray:
+        """Directions of any length, (3, n), that lead positions [m], (3, n), from outside to the inside."""
+
+    @abstractmethod
     def ray(self, origin: np.ndarray, direction: np.ndarray) -> np.ndarray:
         """Distance along rays to the first point of the surface, met from outside or from inside.
 
@@ -62,6 +66,13 @@ class Convex(Boundary):
         for normal, offset in self._faces:
             inside &= _along(normal, pos) < offset
         return inside
+
+    def inward(self, pos: np.ndarray) -> np.ndarray:
+        """Against the normals of the faces that positions are beyond."""
+        way = np.zeros(np.shape(pos))
+        for normal, offset in self._faces:
+            way -= np.array(normal)[:, None] * (_along(normal, pos) >= offset)
+        return way
 
     def ray(self, origin: np.ndarray, direction: np.ndarray) -> np.ndarray:
         # T. L. Kay and J. T. Kajiya, Ray tracing complex scenes, SIGGRAPH 1986: a line is inside between the last face that it
@@ -161,6 +172,11 @@ class Cuboid(Convex):
             faces += [(axis, middle + 0.5 * length), (back, 0.5 * length - middle)]
         return tuple(faces)
 
+    def inward(self, pos: np.ndarray) -> np.ndarray:
+        """Towards the centre."""
+        way: np.ndarray = np.array(self.center)[:, None] - pos
+        return way
+
 
 @dataclass(frozen=True)
 class Polyhedron(Convex):
@@ -239,6 +255,11 @@ class Sphere(Boundary):
         x, y, z = (p - c for p, c in zip(pos, self.center, strict=True))
         inside: np.ndarray = np.sqrt(x * x + y * y + z * z) < self.radius
         return inside
+
+    def inward(self, pos: np.ndarray) -> np.ndarray:
+        """Towards the centre."""
+        way: np.ndarray = np.array(self.center)[:, None] - pos
+        return way
 
     def ray(self, origin: np.ndarray, direction: np.ndarray) -> np.ndarray:
         direction = _unit(direction)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import pickle
 
@@ -182,6 +183,20 @@ def test_surface_is_outside() -> None:
     assert Sphere((0.0, 0.0, 0.0), 1.0).contains(
         columns((1, 0, 0), (0, np.nextafter(1.0, 0.0), 0))
     ).tolist() == [False, True]
+
+
+@pytest.mark.parametrize(
+    ("shape", "way"),
+    [
+        (Plane((1.0, 0.0, 0.0), (2.0, 0.0, 0.0)), (-1.0, 0.0, 0.0)),
+        (FlatGround(2.0), (0.0, 0.0, -1.0)),
+        (Polyhedron(tuple(itertools.product((-1.0, 1.0), repeat=3))), (-1.0, -1.0, -1.0)),
+        (Cuboid((1.0, 2.0, 3.0)), (-8.0, -7.0, -6.0)),
+        (Sphere((1.0, 2.0, 3.0)), (-8.0, -7.0, -6.0)),
+    ],
+)
+def test_a_way_leads_inside(shape: Boundary, way: tuple[float, float, float]) -> None:
+    assert shape.inward(columns((9.0, 9.0, 9.0)))[:, 0] == pytest.approx(way)
 
 
 def test_rays_at_a_box() -> None:

@@ -10,19 +10,20 @@ import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tussle.batch.executors import Executor, InProcess, Processes
+from tussle.batch.executors import OVERDUE, Executor, InProcess, Processes
 from tussle.batch.plan import Plan
 from tussle.batch.points import values_text, variables_of
 from tussle.batch.sampling import method_for
 from tussle.batch.sampling import sample as sample_points
 from tussle.batch.store import PLUGINS
-from tussle.batch.tasks import PluginFile, Run
+from tussle.batch.tasks import Finished, PluginFile, Run
 from tussle.batch.treatments import Treatment, build_points, exactly, group_points, read_points
 from tussle.batch.variables import Range, Variable, written
 from tussle.batch.varied import about, as_variables
@@ -41,6 +42,9 @@ MOST_CHECKED = 16
 
 WORTH_A_PROCESS = 4.0
 """Seconds of games, as one alone takes them, that are worth a process: it starts in one, and games side by side take a third and less."""
+
+STARTS_WITHIN = 120.0
+"""Time that the first steps of a game may take beside that of a run [s]: kernels may have to be compiled."""
 
 MOST_UNASKED = (100_000, 1_000_000)
 """Seeds and runs of a batch that stops by what it finds, where nobody says how many are too many."""
@@ -63,6 +67,8 @@ class Batch:
         settings: Values that are set in all points, as for `read_mission` or by path.
         plugin_files: Python files whose plugins the mission file may name.
         ends_by_time: The game ends at its end time whatever the mission says.
+        run_timeout: Wall time that a game may take [s]; one that takes longer is given up, and recorded as failed. Worlds of a stack share
+            its time. It holds on this machine only, and all games are played in processes of their own.
         options: Further options of `read_mission`.
 
     Raises:
@@ -85,8 +91,13 @@ class Batch:
         settings: Mapping[str, Any] | None = None,
         plugin_files: Sequence[str | Path] = (),
         ends_by_time: bool = False,
+        run_timeout: float | None = None,
         **options: Any,
     ) -> None:
+        if run_timeout is not None and not 0.0 < run_timeout < math.inf:
+            raise ParameterError(
+                f"run_timeout = {run_timeout!r} is not allowed; it takes a number of seconds > 0"
+            )
         self.source = mission
         self.settings = dict(settings or {})
         self.plugin_files = tuple(PluginFile.of(Path(p)) for p in plugin_files)
@@ -113,7 +124,8 @@ class Batch:
         self._rules: set[str] = set()  # that have been checked
         self.loaded = self._read()
         self.missions = list(self._missions(self.plan.points))
-        self.treatments, self.package = group_points(self.missions, self.plugin_files)
+        self.treatments, package = group_points(self.missions, self.plugin_files)
+        self.package = replace(package, run_timeout=run_timeout)
 
     def _read(self) -> Loaded | None:
         """The mission file as it stands without any varied value; None for a mission made in Python."""
@@ -186,7 +198,7 @@ class Batch:
         first = {t.group: point for point, t in reversed(list(enumerate(self.treatments)))}
         points = sorted(first.values())[:MOST_CHECKED]
         if not self._is_checked:
-            for point in points:
+            for point in self._that_begin(points):
                 with suppress(PluginError, SystemExit), self.simulation(point) as simulation:
                     simulation.step()  # loads or compiles what it needs
                     began = time.perf_counter()
@@ -195,8 +207,28 @@ class Batch:
                     self._game_s = max(self._game_s, game_s)
             self._is_checked = True
         if until is not None and str(until) not in self._rules:
-            _check_rule(until, [self.missions[point] for point in points], self.plan.first_seed)
+            _check_rule(
+                until, [self.missions[point] for point in points], self.plan.first_seed, self.patience
+            )
             self._rules.add(str(until))
+
+    @property
+    def patience(self) -> float | None:
+        """Wall time that a game may take before the batch [s]."""
+        limit = self.package.run_timeout
+        return None if limit is None else STARTS_WITHIN + limit
+
+    def _that_begin(self, points: Sequence[int]) -> list[int]:
+        """Those points whose game makes its first steps in time: where there is a limit, others are not begun in this process."""
+        if self.patience is None:
+            return list(points)
+        short = [(m := self.missions[point]).replace(end=m.start + 2.0 * m.dt) for point in points]
+        treatments, package = group_points([m.ending_by_time() for m in short], self.plugin_files)
+        seed = self.plan.first_seed
+        runs = [Run(point, t.group, seed, t.params) for point, t in zip(points, treatments, strict=True)]
+        played = Processes(1, 1).play(replace(package, run_timeout=self.patience), runs)
+        late = {f.number for f in played if isinstance(f, Finished) and f.error.startswith(OVERDUE)}
+        return [point for point in points if point not in late]
 
     @cached_property
     def fingerprint(self) -> str:
@@ -374,7 +406,7 @@ def _most_seeds(n_points: int) -> int:
     return max(1, min(seeds, runs // n_points))
 
 
-def _check_rule(until: Until, missions: Sequence[Mission], seed: int) -> None:
+def _check_rule(until: Until, missions: Sequence[Mission], seed: int, patience: float | None) -> None:
     """See that a game of one of the missions has the result that a rule is about: after its first step, else at its end.
 
     Raises:
@@ -383,7 +415,7 @@ def _check_rule(until: Until, missions: Sequence[Mission], seed: int) -> None:
     short = [m.replace(end=m.start + m.dt).ending_by_time() for m in missions]
     error = None
     for mission in (*short, *missions):
-        results = Batch(mission, runs=1, first_seed=seed).play(executor=InProcess(1))
+        results = Batch(mission, runs=1, first_seed=seed, run_timeout=patience).play(executor=InProcess(1))
         if results.n_failed:
             return  # it tells nothing
         try:

@@ -115,8 +115,13 @@ class OnDask:
         """What comes of the runs.
 
         Raises:
+            ParameterError: Runs are to take only so long.
             BatchError: The scheduler or all workers are gone, or a worker cannot play this batch.
         """
+        if package.run_timeout is not None:
+            raise ParameterError(
+                "run_timeout is for processes of this machine; on a cluster, limit the time of the jobs"
+            )
         course = Course(self, package, runs)
         try:
             yield from course.play()

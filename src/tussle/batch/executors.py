@@ -6,6 +6,7 @@ import os
 import signal
 import sys
 import threading
+import time
 from collections import deque
 from collections.abc import Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -23,6 +24,10 @@ if TYPE_CHECKING:
     from multiprocessing.context import SpawnProcess
 
     from tussle.mission import Mission
+
+
+OVERDUE = "it took longer"
+"""How the error of a run begins that was given up."""
 
 
 class Executor(Protocol):
@@ -75,7 +80,7 @@ def _whole(name: str, value: Any) -> Any:
 
 
 class InProcess:
-    """Plays in this process.
+    """Plays in this process, or in another where runs may take only so long: nobody could stop one here.
 
     Args:
         stack: Worlds side by side; None chooses by the mission.
@@ -88,6 +93,9 @@ class InProcess:
 
     def play(self, package: Package, runs: Sequence[Run]) -> Generator[Finished | Beat, None, None]:
         """What comes of the runs."""
+        if package.run_timeout is not None:
+            yield from Processes(1, self.stack).play(package, runs)
+            return
         waiting = Waiting(runs)
         while (group := waiting.largest()) is not None:
             mission = package.mission(group)
@@ -99,7 +107,7 @@ class Processes:
     """Plays in several processes of this machine.
 
     A process that dies takes nothing with it: its runs are played again, each alone, and one that kills its process again is recorded as
-    failed.
+    failed. One that is overdue is killed.
 
     Args:
         n: How many; None is one per core.
@@ -127,6 +135,9 @@ class Processes:
                 ready = connection.wait([p.pipe for p in players], BEAT_EVERY)
                 if not ready:
                     yield Beat(sum(p.under_way_part for p in players))
+                for player in players:
+                    if player.pipe not in ready and player.is_overdue():
+                        player.process.kill()  # its pipe ends, which is dealt with in the next round
                 for player in [p for p in players if p.pipe in ready]:
                     try:
                         for message in player.answer(waiting):
@@ -142,6 +153,11 @@ class Processes:
         finally:
             for player in players:
                 player.stop()
+
+
+@dataclass(frozen=True)
+class _Loaded:
+    """What a process says before it begins with a stack: from now on the time of its runs counts."""
 
 
 @dataclass(frozen=True)
@@ -162,6 +178,10 @@ class _Player:
         self.pipe, theirs = context.Pipe()
         self.under_way: dict[int, Run] = {}
         self.under_way_part = 0.0
+        self.began: dict[int, float] = {}  # when runs did, by number, once their mission is loaded
+        self.heard_at = 0.0
+        self.n_worlds = 0  # most runs side by side since there was none
+        self.was_overdue = False
         self.is_done = self.has_asked = False
         self.process: SpawnProcess = context.Process(
             target=_work, args=(theirs, package, stack, n_processes), daemon=True, name="tussle-batch"
@@ -180,9 +200,15 @@ class _Player:
             BatchError: The process cannot play.
         """
         message = self.pipe.recv()
+        self.heard_at = time.monotonic()
         if isinstance(message, Finished):
             self.under_way.pop(message.number)
+            self.began.pop(message.number)
             yield message
+            return
+        if isinstance(message, _Loaded):
+            self.began = dict.fromkeys(self.under_way, self.heard_at)
+            self.n_worlds = len(self.began)
             return
         if isinstance(message, Beat):
             self.under_way_part = message.under_way
@@ -204,7 +230,18 @@ class _Player:
         elif not self.under_way:
             self.is_done = True
         self.under_way |= {run.number: run for run in runs}
+        if group is not None:  # else it has yet to load what these play
+            self.began |= {run.number: self.heard_at for run in runs}
+            self.n_worlds = max(self.n_worlds, len(self.began))
         self.pipe.send((runs, n_left))
+
+    def is_overdue(self) -> bool:
+        """Whether a run has taken longer than it may, the time of a stack shared by its worlds, or a step longer than a run may."""
+        limit, now = self.package.run_timeout, time.monotonic()
+        if limit is not None and self.began and not self.was_overdue:
+            longest = now - min(self.began.values())
+            self.was_overdue = now - self.heard_at > limit or longest > limit * self.n_worlds
+        return self.was_overdue
 
     def bury(self, waiting: Waiting) -> Iterator[Finished]:
         """The process has died: what it was at is played again, each run alone; one that was alone has failed.
@@ -228,10 +265,12 @@ class _Player:
                 else '; a script that plays a batch needs `if __name__ == "__main__":` around what it does'
             )
             raise BatchError(f"a process that was to play ended as it started ({why}){hint}")
+        error = f"the process that played it died: {why}"
+        if self.was_overdue:
+            error = f"{OVERDUE} than the {self.package.run_timeout} s that a run may"
         for run in self.under_way.values():
-            if run.is_alone:
-                teams = self.package.mission(run.group).teams
-                yield Finished.failed(run, f"the process that played it died: {why}", teams)
+            if run.is_alone or (self.was_overdue and self.n_worlds == 1):
+                yield Finished.failed(run, error, self.package.mission(run.group).teams)
             else:
                 waiting.alone.append(Run(run.number, run.group, run.seed, run.params, is_alone=True))
 
@@ -310,6 +349,7 @@ def _work(pipe: Connection, package: Package, stack: int | None, n_processes: in
         group, is_alone = first[0].group, first[0].is_alone
         if group not in missions:
             missions = {group: _loaded(package, group, pipe)}
+        _say(pipe, _Loaded())
         size = 1 if is_alone else even_size(stack or stack_size(missions[group]), n_left, n_processes)
 
         def take(n: int, held: list[Run] = first, group: int = group, is_alone: bool = is_alone) -> list[Run]:

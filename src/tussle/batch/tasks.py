@@ -138,10 +138,12 @@ class Package:
     Attributes:
         missions: One per group, pickled: classes of plugin files can be found only once these are loaded.
         plugin_files: The files.
+        run_timeout: Wall time that a run may take [s]; None sets no limit.
     """
 
     missions: tuple[bytes, ...]
     plugin_files: tuple[PluginFile, ...] = ()
+    run_timeout: float | None = None
 
     def mission(self, group: int) -> Mission:
         """The mission of a group."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import time
 from collections.abc import Sequence
@@ -53,6 +54,7 @@ class Asked:
         directory: Where it goes.
         processes: How many.
         stack: Worlds side by side.
+        run_timeout: Wall time that a run may take [s].
         scheduler: Address of a Dask scheduler.
         slurm: What to ask of Slurm.
         log: Runs that are recorded in full.
@@ -70,6 +72,7 @@ class Asked:
     directory: Path | None = None
     processes: int | None = None
     stack: int | None = None
+    run_timeout: float | None = None
     scheduler: str | None = None
     slurm: str | None = None
     log: str | None = None
@@ -103,6 +106,7 @@ class Asked:
             settings={**self.source.settings, **end},
             plugin_files=tuple(self.source.plugin_files),
             ends_by_time=bool(end),
+            run_timeout=self.run_timeout,
             strict=self.source.strict,
             allow_large=self.source.allow_large,
         )
@@ -174,7 +178,7 @@ def _numbers(text: str | None, n_runs: int) -> list[int]:
     found: list[int] = []
     for part in (text or "").split(",") if text is not None else ():
         low, colon, high = (item.strip() for item in part.partition(":"))
-        if not low.isdigit() or (colon and not high.isdigit()):
+        if not re.fullmatch(r"[0-9]{1,18}", low) or (colon and not re.fullmatch(r"[0-9]{1,18}", high)):
             raise ParameterError(
                 f"--log {text!r} is not allowed; it takes numbers of runs, such as 417,3,10:20"
             )

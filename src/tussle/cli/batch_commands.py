@@ -68,6 +68,14 @@ Stack = Annotated[
         show_default=False,
     ),
 ]
+RunTimeout = Annotated[
+    float | None,
+    typer.Option(
+        metavar="S",
+        help="Give up a game that takes longer than S seconds, and record it as failed; by default none is given up.",
+        show_default=False,
+    ),
+]
 
 
 SweepFile = Annotated[
@@ -149,6 +157,7 @@ def batch(
     log: LogRuns = None,
     processes: Workers = None,
     stack: Stack = None,
+    run_timeout: RunTimeout = None,
     scheduler: Scheduler = None,
     slurm: Slurm = None,
     strict: Strict = False,
@@ -161,6 +170,10 @@ def batch(
         raise typer.BadParameter(
             "--processes counts those of this machine; it means nothing beside --scheduler and --slurm"
         )
+    if (scheduler is not None or slurm is not None) and run_timeout is not None:
+        raise typer.BadParameter(
+            "--run-timeout is for processes of this machine; beside --scheduler and --slurm, limit the time of the jobs"
+        )
     if scheduler is not None and slurm is not None:
         raise typer.BadParameter("--scheduler and --slurm are two places to play; give one of them")
     with told(debug):
@@ -169,7 +182,7 @@ def batch(
         source = mission_source(mission, settings, more, seed, end, strict, plugin_files, allow_large)
         asked = Asked(
             source, runs, tuple(vary or ()), sweep, sample, samples, sample_seed, independent, until, directory,
-            processes, stack, scheduler, slurm, log,
+            processes, stack, run_timeout, scheduler, slurm, log,
         )  # fmt: skip
         code = play_batch(asked, [Path(sys.argv[0]).name, *sys.argv[1:]])
     raise typer.Exit(code)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from tussle.batch.reload import PlannedRun
 from tussle.batch.results import Results
 from tussle.batch.statistics import Share
 from tussle.cli.progress import clock, times
-from tussle.cli.terminal import OK, PLUGIN_FAILED, put, say_error, say_note
+from tussle.cli.terminal import OK, PLUGIN_FAILED, RUNS_FAILED, put, say_error, say_note
 from tussle.errors import BatchError
 
 MOST_POINTS = 12
@@ -38,7 +39,7 @@ def show_batch(results: Results, directory: Path, wall: float, n_new: int) -> in
     """Print what came of a batch.
 
     Returns:
-        The exit code: that of a failed plugin where no run came to its end.
+        The exit code: that of a failed plugin where no run came to its end, another where only some failed.
     """
     info = results.info
     title = Text.assemble(" ", (info["name"], "bold"), (f"\n {_facts(results)}", "dim"))
@@ -54,6 +55,7 @@ def show_batch(results: Results, directory: Path, wall: float, n_new: int) -> in
         say_note(
             f"{results.n_failed:,} of {results.n_runs:,} runs failed and are left out above; tussle analyze tells which"
         )
+        return RUNS_FAILED
     return OK
 
 
@@ -141,7 +143,7 @@ def _ending(results: Results, directory: Path, wall: float, n_new: int) -> Table
             f"{n_new:,} runs in {clock(wall)} ({times(n_new / wall)} runs/s), {cpu:,.1f} CPU s in all",
         )
     grid.add_row(" batch", str(directory))
-    grid.add_row(" next", f"tussle analyze {directory}")
-    grid.add_row("", f"tussle report {directory}")
-    grid.add_row("", f"tussle run --from {directory}:0")
+    grid.add_row(" next", Text(shlex.join(["tussle", "analyze", str(directory)])))
+    grid.add_row("", Text(shlex.join(["tussle", "report", str(directory)])))
+    grid.add_row("", Text(shlex.join(["tussle", "run", "--from", f"{directory}:0"])))
     return grid

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from tussle.cli.batch_commands import FirstSeed, Stack, Vary, Workers
+from tussle.cli.batch_commands import FirstSeed, RunTimeout, Stack, Vary, Workers
 from tussle.cli.options import (
     Debug,
     End,
@@ -69,6 +69,7 @@ def optimize(
     directory: StudyDirectory = None,
     processes: Workers = None,
     stack: Stack = None,
+    run_timeout: RunTimeout = None,
     strict: Strict = False,
     plugin_files: PluginFiles = None,
     allow_large: Large = False,
@@ -89,7 +90,7 @@ def optimize(
         source = mission_source(mission, settings, more, seed, end, strict, plugin_files, allow_large)
         asked = Asked(
             source, objective, tuple(vary), minimize, trials, runs, per_round, sampler, sample_seed, directory, processes,
-            stack,
+            stack, run_timeout,
         )  # fmt: skip
         code = search(asked, [Path(sys.argv[0]).name, *sys.argv[1:]])
     raise typer.Exit(code)

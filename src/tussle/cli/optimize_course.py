@@ -42,6 +42,7 @@ class Asked:
         directory: Where trials are kept.
         processes: How many.
         stack: Worlds side by side.
+        run_timeout: Wall time that a run may take [s].
     """
 
     source: Source
@@ -56,6 +57,7 @@ class Asked:
     directory: Path | None
     processes: int | None
     stack: int | None
+    run_timeout: float | None
 
     def optimization(self) -> Optimization:
         """The search that is meant.
@@ -77,6 +79,7 @@ class Asked:
             settings={**self.source.settings, **end},
             plugin_files=tuple(self.source.plugin_files),
             ends_by_time=bool(end),
+            run_timeout=self.run_timeout,
             strict=self.source.strict,
             allow_large=self.source.allow_large,
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
+import itertools
 import re
 import time
 from collections.abc import Sequence
@@ -17,7 +18,7 @@ from tussle.cli.settings import ending_by_time, read_end
 from tussle.cli.summary import Speed, show_summary
 from tussle.cli.terminal import say, say_note
 from tussle.engine.simulation import Simulation
-from tussle.errors import MissionError, ParameterError, WiringError
+from tussle.errors import MissionError, ParameterError, RecordError, WiringError
 from tussle.mission import Loaded, Mission, read_mission
 
 if TYPE_CHECKING:
@@ -189,12 +190,21 @@ def _recorder(
 
 
 def _new_directory(name: str, seed: int) -> Path:
-    """runs/NAME-SEED-TIMESTAMP, with a number behind it where that is taken."""
+    """A new runs/NAME-SEED-TIMESTAMP, with a number behind it where that is taken; made here, since others may begin in this second.
+
+    Raises:
+        RecordError: It cannot be made.
+    """
     stamp = dt.datetime.now().strftime("%Y%m%d-%H%M%S")  # noqa: DTZ005 - the user's own clock
     plain = re.sub(r"[^A-Za-z0-9_.-]+", "_", name).strip("._") or "mission"
     base = Path("runs") / f"{plain[:80]}-{seed}-{stamp}"
-    number, path = 1, base
-    while path.exists():
-        number += 1
-        path = base.with_name(f"{base.name}-{number}")
-    return path
+    for number in itertools.count(1):
+        path = base if number == 1 else base.with_name(f"{base.name}-{number}")
+        try:
+            path.mkdir(parents=True)
+        except FileExistsError:
+            continue
+        except OSError as error:
+            raise RecordError(f"{path}: no run can be recorded there: {error.strerror or error}") from error
+        return path
+    raise AssertionError

@@ -20,7 +20,7 @@ from tussle.errors import BatchError, PluginError, RecordError, TussleError, vis
 WIDEST = 100
 """Tables and bars grow no wider than this, on the widest of screens."""
 
-OK, WRONG_INPUT, USAGE, PLUGIN_FAILED, NOT_WRITTEN, OWN_FAULT = 0, 1, 2, 3, 4, 70
+OK, WRONG_INPUT, USAGE, PLUGIN_FAILED, NOT_WRITTEN, RUNS_FAILED, OWN_FAULT = 0, 1, 2, 3, 4, 5, 70
 INTERRUPTED, TERMINATED = 130, 143
 
 EXIT_CODES = {
@@ -29,6 +29,7 @@ EXIT_CODES = {
     USAGE: "the command line is wrong",
     PLUGIN_FAILED: "a plugin failed while the game was played",
     NOT_WRITTEN: "a run or batch directory cannot be written or read",
+    RUNS_FAILED: "some runs of a batch failed; its tables hold the others",
     OWN_FAULT: "tussle itself failed: a bug, please report it",
     INTERRUPTED: "interrupted by Ctrl-C; what was played is kept",
     TERMINATED: "the same, by SIGTERM",

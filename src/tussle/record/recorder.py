@@ -79,7 +79,9 @@ class Recorder:
         self._timings = run_file.Timings()
         clock, mission = sim.context.clock, sim.mission
         per_step = 1 if period is None else Fraction(str(mission.dt)) / Fraction(str(period))
-        self._per_step = None if per_step >= 1 else Fraction(per_step)
+        # Steps are 64 bits wide, and so is their product with what stands in the fraction.
+        least = Fraction(1, 10**9)
+        self._per_step = None if per_step >= 1 else max(Fraction(per_step).limit_denominator(10**9), least)
         self._buffer = RowBuffer([b.name for b in mission.blocks], clock.start, clock.dt)
         self._events: list[Happenings] = []
         self._seen: np.ndarray | None = None

@@ -16,6 +16,8 @@ from tussle.view.drawn import Sketchbook
 from tussle.view.pacing import Pace, Speedometer
 from tussle.view.player import Player
 
+LONGEST_WAIT = 60.0
+"""Time for which it sleeps at once [s]: no clock of the system counts to the next step of a game that is all but stopped."""
 BURST = 0.004
 """Time for which steps are made before anything else is looked after [s]: short against the 33 ms between two frames."""
 
@@ -117,7 +119,7 @@ class Conductor:
 
     def _sleep(self) -> None:
         began = time.perf_counter()
-        self._bell.wait(self._wait)
+        self._bell.wait(None if self._wait is None else min(self._wait, LONGEST_WAIT))
         self.player.rest(time.perf_counter() - began)
 
     def drain(self) -> None:

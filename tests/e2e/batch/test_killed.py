@@ -85,7 +85,7 @@ def started(folder, *more):
     )  # fmt: skip
 
 
-def wait_until(condition, process, seconds=60.0):
+def wait_until(condition, process, seconds=300.0):
     """Wait for a moment of the batch; false where the command has ended before it."""
     limit = time.monotonic() + seconds
     while not condition():
@@ -127,7 +127,7 @@ def workers(process):
 
 
 def all_gone(group):
-    limit = time.monotonic() + 10.0
+    limit = time.monotonic() + 300.0
     while members(group) and time.monotonic() < limit:
         time.sleep(0.02)
     return not members(group)
@@ -139,7 +139,7 @@ def kill_group(process):
     assert all_gone(process.pid)
 
 
-def end(process, seconds=90.0):
+def end(process, seconds=600.0):
     """Wait for the end: exit code, output, and messages, but for what a slow machine says besides."""
     try:
         out, err = process.communicate(timeout=seconds)

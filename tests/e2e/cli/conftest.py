@@ -48,7 +48,9 @@ def folder(tmp_path: Path) -> Path:
 def tussle(folder: Path) -> Tussle:
     """Runs the command in the folder; `code` is the exit code that it must end with."""
 
-    def run(*arguments: str | Path, code: int = 0, timeout: float = 60.0) -> subprocess.CompletedProcess[str]:
+    def run(
+        *arguments: str | Path, code: int = 0, timeout: float = 600.0
+    ) -> subprocess.CompletedProcess[str]:
         done = subprocess.run(
             [*COMMAND, *map(str, arguments)],
             check=False, capture_output=True, text=True, timeout=timeout, cwd=folder, env=environment(),

@@ -146,7 +146,7 @@ def test_what_is_not_there_is_told_in_one_line(tussle, arguments, words, code):
 
 
 def test_a_played_batch_is_analysed(tussle):
-    tussle("batch", "game.xml", "--runs", "3", "--vary", "n=10,5", "--out", "played", timeout=300.0)
+    tussle("batch", "game.xml", "--runs", "3", "--vary", "n=10,5", "--out", "played")
     found = json.loads(tussle("analyze", "played", "--json").stdout)
     assert (found["n_runs"], found["n_points"], found["n_failed"]) == (6, 2, 0)
     assert [c["b"] for c in found["comparisons"]] in (["n=5"], [])

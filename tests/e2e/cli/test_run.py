@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import datetime as dt
 import json
 import re
 import shlex
 import subprocess
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import pytest
 from cli_process import COMMAND, environment
 
+from tussle.cli.play import _new_directory
 from tussle.record import load_run
 
 
@@ -218,7 +222,7 @@ def test_a_full_disk_is_told(folder):
     with open("/dev/full", "w") as full:  # noqa: PTH123 - a device
         done = subprocess.run(
             [*COMMAND, "run", "game.xml", "--no-log"],
-            check=False, stdout=full, stderr=subprocess.PIPE, text=True, cwd=folder, env=environment(), timeout=60,
+            check=False, stdout=full, stderr=subprocess.PIPE, text=True, cwd=folder, env=environment(), timeout=600,
         )  # fmt: skip
     assert done.returncode == 4
     assert done.stderr.startswith("error: [Errno 28] No space left on device")
@@ -233,7 +237,7 @@ def test_output_that_nobody_reads_is_no_error(folder):
         text=True,
         cwd=folder,
         env=environment(),
-        timeout=60,
+        timeout=600,
     )
     assert done.stdout == "\n Boids\n\n"
     assert not done.stderr
@@ -244,3 +248,21 @@ def test_a_directory_that_holds_a_run_is_left_alone(tussle, folder):
     before = {p: p.read_bytes() for p in (folder / "out").iterdir()}
     assert "holds a run already" in tussle("run", "game.xml", "--out", "out", "--seed", "9", code=4).stderr
     assert {p: p.read_bytes() for p in (folder / "out").iterdir()} == before
+
+
+def test_runs_that_begin_in_one_second_have_a_directory_each(folder, monkeypatch):
+    class Clock(dt.datetime):
+        @classmethod
+        def now(cls, tz=None):
+            return cls(2026, 1, 2, 3, 4, 5)
+
+    monkeypatch.chdir(folder)
+    monkeypatch.setattr("tussle.cli.play.dt.datetime", Clock)
+    # All have looked before one has made it: nobody is told that it is there.
+    monkeypatch.setattr(Path, "exists", lambda path: False)
+    with ThreadPoolExecutor(4) as pool:
+        made = list(pool.map(lambda _: _new_directory("game", 7), range(4)))
+    assert sorted(path.name for path in made) == [
+        f"game-7-20260102-030405{n}" for n in ("", "-2", "-3", "-4")
+    ]
+    assert all(path.is_dir() for path in made)

@@ -31,7 +31,7 @@ def seen(folder, *arguments):
             break
         chunks.append(chunk)
     os.close(ours)
-    return b"".join(chunks).decode(), process.wait(timeout=30)
+    return b"".join(chunks).decode(), process.wait(timeout=300)
 
 
 def test_a_bar_with_the_speed_is_shown_while_it_plays_and_gone_after(folder):

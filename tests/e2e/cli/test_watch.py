@@ -59,12 +59,12 @@ class Watching:
         )  # fmt: skip
         line = self.process.stdout.readline()
         found = ADDRESS.search(line)
-        assert found, (line, self.process.communicate(timeout=60))
+        assert found, (line, self.process.communicate(timeout=300))
         self.url = found[0]
 
     def end(self, number=signal.SIGINT):
         self.process.send_signal(number)
-        out, err = self.process.communicate(timeout=60)
+        out, err = self.process.communicate(timeout=300)
         return self.process.returncode, out, err
 
     def __enter__(self):

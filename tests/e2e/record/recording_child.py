@@ -3,6 +3,7 @@
 import resource
 import signal
 import sys
+import time
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "unit" / "record"))
@@ -21,7 +22,7 @@ try:
         print("begun", flush=True)
         while True:
             sim.step(20)
-            print(int(sim.steps[0]), flush=True)
+            print(time.monotonic(), int(sim.steps[0]), flush=True)
 except RecordError as error:
     print(error)
     sys.exit(3)

@@ -21,28 +21,27 @@ def start(*arguments):
 
 
 def kill_after(seconds, directory):
-    """Kill a recorded game some time after its first step; returns the (time, step) that it told."""
+    """Kill a recorded game some time after its first step; returns the (time there, step) that it told."""
     child = start(directory)
     assert child.stdout.readline() == "begun\n"
-    told = [(time.monotonic(), 0)]
+    told = []
 
     def listen():
-        told.extend((time.monotonic(), int(line)) for line in child.stdout)
+        told.extend((float(t), int(step)) for t, step in map(str.split, child.stdout))
 
     listener = threading.Thread(target=listen)
     listener.start()
     time.sleep(seconds)
-    killed = time.monotonic()
     child.kill()
     child.wait()
     listener.join()
     child.stdout.close()
-    return killed, told
+    return told
 
 
 @pytest.mark.parametrize("case", range(20))
 def test_a_killed_run_loads_and_is_at_most_one_flush_behind(tmp_path, case):
-    killed, told = kill_after(random.Random(case).uniform(0.0, 1.0), tmp_path / "run")
+    told = kill_after(random.Random(case).uniform(0.0, 1.0), tmp_path / "run")
     run = load_run(tmp_path / "run")
     assert not run.is_complete
     assert any("run.json is not there" in note for note in run.notes)
@@ -54,8 +53,8 @@ def test_a_killed_run_loads_and_is_at_most_one_flush_behind(tmp_path, case):
     if len(states):
         ends = states.groupby("world")["step"].max()
         assert ends.nunique() == 1
-    # A loaded machine may stop the game between flush and kill, hence the room.
-    behind = [step for t, step in told if t < killed - 5 * FLUSH_EVERY]
+    # By the clock of the game, which a busy machine may stop anywhere: steps were made between the last but one line and the last.
+    behind = [step for t, step in told if t <= told[-2:][0][0] - FLUSH_EVERY]
     if behind:
         assert len(steps) > behind[-1]
     deaths = run.events[run.events["kind"] == "death"]
@@ -65,7 +64,7 @@ def test_a_killed_run_loads_and_is_at_most_one_flush_behind(tmp_path, case):
 @pytest.mark.parametrize("limit", [100_000, 400_003])
 def test_a_full_disk_ends_the_game_with_one_line_and_whole_steps(tmp_path, limit):
     child = start(tmp_path / "run", limit)
-    said, _ = child.communicate(timeout=120)
+    said, _ = child.communicate(timeout=600)
     assert child.returncode == 3
     line = said.splitlines()[-1]
     assert line.startswith(str(tmp_path / "run" / "trajectory.arrow"))
@@ -82,7 +81,7 @@ def test_a_full_disk_ends_the_game_with_one_line_and_whole_steps(tmp_path, limit
 
 
 def test_a_disk_that_is_full_before_the_start_is_told_before_the_start(tmp_path):
-    said, _ = (child := start(tmp_path / "run", 100)).communicate(timeout=120)
+    said, _ = (child := start(tmp_path / "run", 100)).communicate(timeout=600)
     assert child.returncode == 3
     assert said.count("\n") == 1
     assert "cannot be written: File too large" in said
@@ -91,7 +90,7 @@ def test_a_disk_that_is_full_before_the_start_is_told_before_the_start(tmp_path)
 @pytest.mark.skipif(os.geteuid() == 0, reason="nothing is unwritable to the superuser")
 def test_a_directory_that_cannot_be_written_is_told_before_the_start(tmp_path):
     tmp_path.chmod(0o500)
-    said, _ = (child := start(tmp_path / "run")).communicate(timeout=120)
+    said, _ = (child := start(tmp_path / "run")).communicate(timeout=600)
     tmp_path.chmod(0o700)
     assert child.returncode == 3
     assert said.count("\n") == 1

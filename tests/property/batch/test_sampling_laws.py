@@ -20,8 +20,7 @@ SEEDS = st.integers(0, 2**32)
 N = st.integers(1, 40) | st.integers(101, 130)
 """Latin hypercubes of up to 100 points are improved by exchanges, which takes a while."""
 
-law = settings(deadline=None)
-slow_law = settings(deadline=None, max_examples=40)
+slow_law = settings(max_examples=40)
 
 
 @st.composite
@@ -42,7 +41,6 @@ def choices(name):
     return values.map(lambda found: Choice(name, tuple(found)))
 
 
-@law
 @given(variable=ranges(), share=st.floats(0, 1), n=st.integers(2, 9))
 def test_values_lie_within_their_bounds(variable, share, n):
     for value in (variable.value_at(share), *variable.spread(n)):
@@ -50,7 +48,6 @@ def test_values_lie_within_their_bounds(variable, share, n):
         assert type(value) is (int if variable.is_int else float)
 
 
-@law
 @given(variable=ranges(), shares=st.tuples(st.floats(0, 1), st.floats(0, 1)))
 def test_more_of_the_way_is_no_smaller_value(variable, shares):
     a, b = sorted(shares)
@@ -62,7 +59,6 @@ def test_more_of_the_way_is_no_smaller_value(variable, shares):
     assert variable.value_at(a) <= variable.value_at(b) + slack
 
 
-@law
 @given(variable=ranges(), share=st.floats(0, 1))
 def test_the_text_of_a_value_is_that_value(variable, share):
     value = variable.value_at(share)
@@ -135,7 +131,6 @@ def test_rows_of_saltelli_come_from_two_points(n, k, seed):
             assert mixed[j] == {**a, name: b[name]}
 
 
-@law
 @given(text=st.text(st.sampled_from("x=:,.-+e019 ktinolgf"), max_size=25) | st.text(max_size=40))
 def test_any_text_is_a_variable_or_one_of_our_errors(text):
     try:
@@ -145,7 +140,6 @@ def test_any_text_is_a_variable_or_one_of_our_errors(text):
     assert len(sample([variable], "lhs", 3)) == 3
 
 
-@law
 @given(variable=ranges())
 def test_a_range_that_is_written_is_the_range_that_is_read(variable):
     ending = ("int" * variable.is_int, "log" * variable.is_log)

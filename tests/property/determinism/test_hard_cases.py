@@ -93,7 +93,7 @@ places = st.lists(st.tuples(coordinate, coordinate, coordinate), min_size=10, ma
 
 
 @pytest.mark.parametrize("name", ["chase_synchronous", "two_flocks", "narrow_view", "cars"])
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(both=st.tuples(places, places))
 def test_entities_in_one_place_and_far_away(name, both):
     """The wildest placement of one world leaves the others, and its own future in a stack, as they are alone."""

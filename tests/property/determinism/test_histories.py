@@ -103,7 +103,7 @@ class History:
 
 
 @pytest.mark.parametrize("name", NAMES)
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     seeds=st.lists(seed, min_size=1, max_size=5),
     threads=st.sampled_from([1, 2]),

@@ -5,16 +5,18 @@ from __future__ import annotations
 from fractions import Fraction
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_worlds import Drift, Listener, Talker, block, mission
 
 from tussle import Simulation
 from tussle.api import Interaction, Param
-from tussle.engine.schedule import is_due
+from tussle.engine.schedule import _rate, is_due
+from tussle.errors import ParameterError
 from tussle.stock import GlobalNetwork
 
-few = settings(max_examples=25, deadline=None)
+few = settings(max_examples=25)
 
 
 @given(
@@ -28,6 +30,21 @@ def test_calls_up_to_a_step_are_the_floor_of_its_time_times_the_rate(rate, dt, n
     assert (
         int(is_due(np.arange(n + 1), per_step).sum()) == 1 + (n * per_step.numerator) // per_step.denominator
     )
+
+
+@pytest.mark.parametrize(("rate", "dt", "every"), [(1.0 / 3.0, 0.1, 30), (1e-7 / 3.0, 0.1, 300_000_000)])
+def test_a_rate_of_many_digits_holds_to_the_last_step(rate, dt, every):
+    """Products of its digits and the number of the step stay within 64 bits."""
+    per_step = _rate(Drift(rate=rate), dt)
+    for near in (every, 10**9 // every * every):
+        steps = np.arange(near - 5, near + 5)
+        assert steps[is_due(steps, per_step)].tolist() == [near]
+
+
+def test_a_rate_that_no_game_lives_to_see_is_refused():
+    message = r"Drift: rate = 1e-320 is not allowed with dt = 0.1; it takes at least 1e-08 calls per second"
+    with pytest.raises(ParameterError, match=message.replace("1e-320", "9.99989e-321")):
+        Simulation(mission(block(autonomy=Drift(rate=1e-320))))
 
 
 @few

@@ -88,9 +88,7 @@ def check(folder: Path, text: str, *, plays: bool) -> None:
             Simulation(mission, seeds=loaded.seed or 1).step()
 
 
-@settings(
-    max_examples=EXAMPLES, deadline=None, derandomize=EXAMPLES <= 300, suppress_health_check=list(HealthCheck)
-)
+@settings(max_examples=EXAMPLES, derandomize=EXAMPLES <= 300, suppress_health_check=list(HealthCheck))
 @given(name=st.sampled_from(sorted(TEXTS)), damages=st.lists(damage, min_size=1, max_size=4))
 def test_damaged_missions_end_in_one_message_or_load(folder, name, damages):
     text = TEXTS[name]
@@ -99,9 +97,7 @@ def test_damaged_missions_end_in_one_message_or_load(folder, name, damages):
     check(folder, text, plays=name == "predator_prey")
 
 
-@settings(
-    max_examples=EXAMPLES, deadline=None, derandomize=EXAMPLES <= 300, suppress_health_check=list(HealthCheck)
-)
+@settings(max_examples=EXAMPLES, derandomize=EXAMPLES <= 300, suppress_health_check=list(HealthCheck))
 @given(st.lists(st.one_of(st.sampled_from(PIECES), st.text(max_size=5)), max_size=30))
 def test_any_text_ends_in_one_message(folder, pieces):
     check(folder, "".join(pieces) or " ", plays=False)
@@ -114,9 +110,7 @@ VALUES = [
 NUMBERS = re.compile(r"(?<=>)[^<>\n$]+(?=</)|(?<=\")[^\"<>\n]*(?=\")")
 
 
-@settings(
-    max_examples=EXAMPLES, deadline=None, derandomize=EXAMPLES <= 300, suppress_health_check=list(HealthCheck)
-)
+@settings(max_examples=EXAMPLES, derandomize=EXAMPLES <= 300, suppress_health_check=list(HealthCheck))
 @given(st.sampled_from(sorted(TEXTS)), st.integers(0, 10**6), st.sampled_from(VALUES))
 def test_any_value_anywhere_ends_in_one_message_or_plays(folder, name, at, value):
     places = list(NUMBERS.finditer(TEXTS[name]))

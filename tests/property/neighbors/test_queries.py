@@ -10,7 +10,7 @@ from tussle.neighbors import nearest, pairs, search
 from tussle.neighbors.search import segment_first_min, segment_mean, segment_min, segment_sum
 
 RADIUS = 5.0
-QUICK = settings(max_examples=40, deadline=None, derandomize=True)
+QUICK = settings(max_examples=40, derandomize=True)
 
 
 @st.composite

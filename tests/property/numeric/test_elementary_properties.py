@@ -15,7 +15,7 @@ from tussle.numeric import acos, asin, atan2, cos, exp, log, sin, sincos, tan, w
 UNARY = [sin, cos, tan, asin, acos, exp, log, wrap]
 ANYTHING = arrays.arrays(np.float64, st.integers(1, 40), elements=st.floats(width=64))
 MODERATE = st.floats(-1e5, 1e5)
-relaxed = settings(deadline=None, max_examples=100)
+relaxed = settings(max_examples=100)
 
 
 def same_bits(a, b):

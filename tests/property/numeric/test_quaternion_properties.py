@@ -22,7 +22,7 @@ from tussle.numeric.quaternion import (
     quat_to_yaw,
 )
 
-relaxed = settings(deadline=None, max_examples=60)
+relaxed = settings(max_examples=60)
 angle = st.floats(-3.1, 3.1)
 steepness = st.floats(-1.57, 1.57)
 quaternions = st.builds(quat_from_euler, angle, steepness, angle)

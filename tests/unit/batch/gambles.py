@@ -88,7 +88,7 @@ class Trouble(Interaction):
         elif self.how == "crash":
             os.kill(os.getpid(), signal.SIGSEGV)
         elif self.how == "sleep":
-            time.sleep(60)
+            time.sleep(600)
 
     def result(self, w):
         if self.how == "result" and is_bad(w.seeds).any():

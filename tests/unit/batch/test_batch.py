@@ -233,7 +233,7 @@ class Slow(Metric):
 
 
 def test_little_is_played_in_this_process_and_much_in_several():
-    quick, slow = Batch(game(), runs=20), Batch(game().replace(metrics=[Slow()]), runs=20)
+    quick, slow = Batch(game(), runs=2), Batch(game().replace(metrics=[Slow()]), runs=20)
     assert isinstance(quick.executor(), InProcess)
     assert isinstance(slow.executor(n_runs=2), InProcess)  # a second
     if Processes().n > 1:

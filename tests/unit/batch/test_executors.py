@@ -109,7 +109,7 @@ def test_what_watches_is_heard_while_a_plugin_takes_its_time():
     children = multiprocessing.active_children()
     assert len(children) == 1
     messages.close()
-    assert time.monotonic() - began < 30.0
+    assert time.monotonic() - began < 300.0
     assert not children[0].is_alive()
 
 
@@ -147,7 +147,7 @@ def test_a_script_with_a_plugin_of_its_own_needs_a_main_guard(tmp_path):
     play = "print(Batch(game().replace(metrics=[Own()]), runs=4).play(executor=Processes(1)).n_failed)"
     script = run_script(tmp_path, OWN + play)
     try:
-        out, err = script.communicate(timeout=60)
+        out, err = script.communicate(timeout=600)
     finally:
         script.kill()
     assert script.returncode == 1
@@ -162,7 +162,7 @@ def test_a_script_with_a_plugin_of_its_own_needs_a_main_guard(tmp_path):
 def test_a_script_without_plugins_of_its_own_needs_none(tmp_path):
     script = run_script(tmp_path, "print(Batch(game(), runs=4).play(executor=Processes(1)).n_failed)")
     try:
-        out, err = script.communicate(timeout=60)
+        out, err = script.communicate(timeout=600)
     finally:
         script.kill()
     assert (script.returncode, out, err) == (0, "here\n0\n", "")
@@ -184,10 +184,10 @@ def test_processes_end_with_their_parent_whatever_they_are_at(tmp_path):
     try:
         assert script.stdout.readline() == "here\n"
         child = int(script.stdout.readline())
-        time.sleep(2.0)  # by now its plugin sleeps, for a minute
+        time.sleep(2.0)  # by now its plugin sleeps, for ten
         script.send_signal(signal.SIGKILL)
-        script.wait(10)
-        limit = time.monotonic() + 10.0
+        script.wait(300)
+        limit = time.monotonic() + 300.0
         while is_running(child) and time.monotonic() < limit:
             time.sleep(0.05)
         assert not is_running(child)

@@ -558,7 +558,9 @@ def test_a_variable_is_a_range_or_a_choice_too():
 def test_time_of_many_trials():
     """Looking at all trials before each round stays small beside playing them."""
     optimization = Optimization(bowl.mission(), "t", vary=PLACE, runs=1)
+    began = time.process_time()
     done = list(search(trials=400, sampler="random", per_round=400, runs=1).trials)
-    began = time.perf_counter()
+    played = time.process_time() - began
+    began = time.process_time()
     optimization.proposer.propose(50, 8, done)
-    assert time.perf_counter() - began < 5.0
+    assert time.process_time() - began < played

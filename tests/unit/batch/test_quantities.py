@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from tussle.batch.quantities import LONGEST_TEXT, Quantity, column_name
@@ -119,7 +119,6 @@ EXPRESSIONS = st.recursive(
 )
 
 
-@settings(deadline=None)
 @given(EXPRESSIONS.filter(lambda text: any(c in text for c in "abc") and len(text) <= LONGEST_TEXT))
 def test_arithmetic_is_that_of_python(text):
     columns = {"a": np.array([1.5, -2.0]), "b[1]": np.array([3.0, 0.25]), "c.d[2]": np.array([-7.0, 8.0])}

@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import binomtest, bootstrap
 
@@ -30,7 +29,6 @@ from tussle.batch.statistics import (
 # -- shares ---------------------------------------------------------------------------------------------------------------
 
 
-@settings(deadline=None)
 @given(
     st.integers(1, 5000).flatmap(lambda n: st.tuples(st.integers(0, n), st.just(n))),
     st.sampled_from([0.9, 0.95, 0.99]),
@@ -107,10 +105,8 @@ def test_few_values_have_students_interval_and_many_the_normal_one():
     half = 2.7764451 * few.std(ddof=1) / math.sqrt(5)  # t of 4 degrees of freedom, from a table
     assert mean_interval(few) == pytest.approx((few.mean() - half, few.mean() + half), rel=1e-7)
     many = rng.exponential(size=100_000)
-    began = time.perf_counter()
     half = 1.959964 * many.std(ddof=1) / math.sqrt(100_000)
     assert mean_interval(many) == pytest.approx((many.mean() - half, many.mean() + half), rel=1e-6)
-    assert time.perf_counter() - began < 1.0
 
 
 @pytest.mark.parametrize("n", [2, 19, 20, 500, 3000])
@@ -166,7 +162,6 @@ def test_intervals_of_means_hold_as_often_as_they_say():
 # -- blocks ---------------------------------------------------------------------------------------------------------------
 
 
-@settings(deadline=None)
 @given(st.lists(st.tuples(st.floats(-1e3, 1e3), st.integers(0, 6)), min_size=1, max_size=50))
 def test_values_of_blocks_have_the_mean_of_all(pairs):
     values, blocks = np.array([v for v, _ in pairs]), np.array([b for _, b in pairs])

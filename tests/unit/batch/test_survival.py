@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from made_batches import made_batch
 
@@ -26,7 +26,6 @@ def looked_up(runs: list[list[tuple[float, int]]]) -> np.ndarray:
     return table
 
 
-@settings(deadline=None)
 @given(st.lists(Steps, min_size=2, max_size=6))
 def test_the_mean_is_that_of_the_step_functions(drawn):
     runs = [[(0.25 * k, n) for k, n in sorted(dict(rows).items())] for rows in drawn]

@@ -97,7 +97,7 @@ class Outside(MotionModel):
         with contextlib.suppress(BrokenPipeError):  # of a child that has crashed
             handle.process.stdin.close()
         handle.process.stdout.close()
-        handle.process.wait(timeout=10)
+        handle.process.wait(timeout=300)
 
     def save_one(self, handle):
         return handle.ask("save")
@@ -248,7 +248,7 @@ class Slow(Autonomy):
     """Lets a step wait for the outside; counts how often it was asked."""
 
     grade = "external"
-    ready_timeout = 0.2
+    ready_timeout = 300.0
     patience = Param(3)
     asked = State(dtype=int)
     link = Handle()
@@ -265,6 +265,10 @@ class Slow(Autonomy):
         self.asked[:] = [held[0] for held in self.link]
 
 
+class Hasty(Slow):
+    ready_timeout = 0.2
+
+
 def test_a_step_waits_until_the_outside_is_ready():
     sim = Simulation(game(SingleIntegrator(), autonomy=[Drift(), Slow()], count=1))
     sim.step()
@@ -274,10 +278,10 @@ def test_a_step_waits_until_the_outside_is_ready():
 
 
 def test_nobody_waits_for_ever():
-    stuck = game(SingleIntegrator(), autonomy=[Drift(), Slow(patience=10**9)], count=1)
-    with pytest.raises(PluginError, match=r"Slow, a, world 0, step 0: was not ready within 0.2 s"):
+    stuck = game(SingleIntegrator(), autonomy=[Drift(), Hasty(patience=10**9)], count=1)
+    with pytest.raises(PluginError, match=r"Hasty, a, world 0, step 0: was not ready within 0.2 s"):
         Simulation(stuck).step()
-    sim = Simulation(stuck, seeds=[1, 2], params={"a.Slow.patience": [1, 10**9]})
+    sim = Simulation(stuck, seeds=[1, 2], params={"a.Hasty.patience": [1, 10**9]})
     results = sim.run()
     assert [r.end for r in results] == ["time", "error"]
     assert "was not ready within 0.2 s" in str(results[1].error)

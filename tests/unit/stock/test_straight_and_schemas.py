@@ -76,6 +76,22 @@ def test_straight_turns_back_at_a_boundary_and_keeps_its_height():
     assert wants(free)[0] == pytest.approx(np.pi / 6, abs=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("normal", "heading"),
+    [((1.0, 0.0, 0.0), np.pi), ((0.0, -2.0, 2.0), np.pi / 2), ((0.0, 0.0, 1.0), np.pi / 6)],
+)
+def test_straight_turns_straight_back_across_a_plane_unless_that_is_level(normal, heading):
+    fence = Boundary(shape="plane", center=(0.0, 0.0, -100.0), normal=normal)
+    sim = Simulation(
+        mission(straight(enable_boundary_control=True, speed=0.0), interactions=[fence], end=9.0)
+    )
+    sim.step(2)
+    sim.write("a.pos", (50.0, -60.0, 77.0))
+    sim.step()
+    assert abs(wants(sim)[0]) == pytest.approx(heading, abs=1e-3)
+    assert wants(sim)[1] == 30.0
+
+
 def test_straight_asks_for_company_every_two_seconds():
     child = block(
         "gen_straight",

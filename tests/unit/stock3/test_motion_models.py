@@ -45,6 +45,24 @@ def test_the_oscillator_follows_its_closed_form():
     assert math.log2(errors[0] / errors[1]) == pytest.approx(4.0, abs=0.5)
 
 
+@pytest.mark.parametrize(("damping", "frequency"), [(2.0, 10.0), (0.05, 200.0), (1e3, 1e3)])
+def test_no_step_is_too_long_for_a_stiff_oscillator(damping, frequency):
+    """Under a push it comes to rest where the spring balances that, whatever the step."""
+    spring = HarmonicOscillator(damping_ratio=damping, natural_frequency=frequency)
+    path = spring.rollout([3.0, -2.0], np.full((200, 1), 8.0), dt=50.0)
+    assert np.abs(path).max() <= 3.0
+    assert path[-1] == pytest.approx([8.0 / frequency**2, 0.0], abs=1e-9)
+
+
+def test_an_undamped_oscillator_keeps_its_energy_in_long_steps():
+    path = HarmonicOscillator(damping_ratio=0.0, natural_frequency=10.0).rollout(
+        [3.0, 0.0], np.zeros((20, 1)), dt=1.0
+    )
+    # A Runge-Kutta step of x rad loses x^6 / 144 of the amplitude; here 64 steps make one of 1 s.
+    lost = 20 * 64 * (10.0 / 64) ** 6 / 144
+    assert np.hypot(path[:, 0], path[:, 1] / 10.0) == pytest.approx(3.0, rel=1.01 * lost)
+
+
 def test_the_oscillator_moves_along_the_vertical_only():
     sim, _ = released(0.02)
     assert sim.read("a.pos")[0][0, 0, :2].tolist() == [3.0, -2.0]

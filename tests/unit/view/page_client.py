@@ -44,7 +44,7 @@ class PageClient:
         self.error: Exception | None = None
         self._socket = connect(
             url.replace("http", "ws", 1), subprotocols=[f"viser-v{viser.__version__}"], max_size=None,
-            compression=None, open_timeout=60, max_queue=16,
+            compression=None, open_timeout=300, max_queue=16,
         )  # fmt: skip
         self.send_camera((0.0, -100.0, 50.0), (0.0, 0.0, 0.0))
         self._thread = threading.Thread(target=self._read, daemon=True)
@@ -123,7 +123,7 @@ class PageClient:
 
     # -- what somebody does -----------------------------------------------------------------------------------------------------------
 
-    def wait(self, condition, timeout: float = 60.0):
+    def wait(self, condition, timeout: float = 300.0):
         """Wait until it holds, and return what it gave."""
         until = time.monotonic() + timeout
         while not (given := condition()):

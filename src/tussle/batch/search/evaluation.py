@@ -104,7 +104,8 @@ class Evaluator:
         short = mission.replace(end=mission.start + mission.dt).ending_by_time()
         unknown = None
         for game in (short, mission):
-            results = Batch(game, runs=1, first_seed=self.mission.first_seed).play(executor=InProcess(1))
+            one = Batch(game, runs=1, first_seed=self.mission.first_seed, run_timeout=batch.patience)
+            results = one.play(executor=InProcess(1))
             if results.n_failed:
                 return  # what failed is told with the trials
             try:

@@ -72,6 +72,7 @@ class Optimization:
         settings: Values that are set in all trials, as for `read_mission` or by path.
         plugin_files: Python files whose plugins the mission file may name.
         ends_by_time: The game ends at its end time whatever the mission says.
+        run_timeout: Wall time that a game may take [s], as for `Batch`.
         options: Further options of `read_mission`.
 
     Raises:
@@ -95,15 +96,16 @@ class Optimization:
         settings: Mapping[str, Any] | None = None,
         plugin_files: Sequence[str | Path] = (),
         ends_by_time: bool = False,
+        run_timeout: float | None = None,
         **options: Any,
     ) -> None:
-        for name, value, least in (
+        for name, value, *bounds in (
             ("runs", runs, 1),
-            ("per_round", per_round, 1),
+            ("per_round", per_round, 1, MOST_TRIALS),
             ("sample_seed", sample_seed, 0),
             ("first_seed", first_seed, 0),
         ):
-            _check_whole(name, value, least)
+            _check_whole(name, value, *bounds)
         settings = dict(settings or {})
         variables = tuple(as_variables(vary))
         if not variables:
@@ -115,7 +117,15 @@ class Optimization:
         self.quantity = Quantity.parse(objective)
         self.proposer = Proposer(variables, sampler, sample_seed, per_round, minimize)
         self.mission = SearchedMission(
-            mission, variables, runs, first_seed, settings, tuple(plugin_files), ends_by_time, options
+            mission,
+            variables,
+            runs,
+            first_seed,
+            settings,
+            tuple(plugin_files),
+            ends_by_time,
+            run_timeout,
+            options,
         )
         self.content = self.mission.read()
         self.evaluator = Evaluator(self.mission, self.quantity)

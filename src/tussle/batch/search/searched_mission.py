@@ -31,6 +31,7 @@ class SearchedMission:
         settings: Values that are set in all of them.
         plugin_files: Python files whose plugins the mission file may name.
         ends_by_time: The game ends at its end time whatever the mission says.
+        run_timeout: Wall time that a game may take [s]; None sets no limit.
         options: Further options of `read_mission`.
     """
 
@@ -41,6 +42,7 @@ class SearchedMission:
     settings: Mapping[str, Any]
     plugin_files: tuple[str | Path, ...]
     ends_by_time: bool
+    run_timeout: float | None
     options: Mapping[str, Any]
 
     def read(self) -> Content:
@@ -101,6 +103,7 @@ class SearchedMission:
             settings=self.settings,
             plugin_files=self.plugin_files,
             ends_by_time=self.ends_by_time,
+            run_timeout=self.run_timeout,
             **self.options,
         )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import keyword
 import re
+import shlex
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -77,7 +78,11 @@ def write_plugin(kind: str, name: str, origin: str | None, directory: Path) -> W
     }
     _write({path: text for path, (text, _) in texts.items()})
     at = directory / module
-    steps = f"tussle run {at}.xml --plugin-path {at}.py\npytest {directory / f'test_{module}.py'}"
+    commands = (
+        ["tussle", "run", f"{at}.xml", "--plugin-path", f"{at}.py"],
+        ["pytest", str(directory / f"test_{module}.py")],
+    )
+    steps = "\n".join(shlex.join(command) for command in commands)
     return Written({path: what for path, (_, what) in texts.items()}, steps)
 
 

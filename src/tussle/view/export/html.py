@@ -131,7 +131,7 @@ def kept_frames(t: np.ndarray, period: float | None) -> np.ndarray:
     """
     if period is None or not len(t):
         return np.arange(len(t))
-    number = np.floor((t - t[0]) / period + 1e-6)
+    number = np.floor((t - t[0]) / max(period, 1e-9 * float(t[-1] - t[0])) + 1e-6)
     is_kept = np.diff(number, prepend=-1.0) > 0.0
     is_kept[-1] = True
     return np.flatnonzero(is_kept)

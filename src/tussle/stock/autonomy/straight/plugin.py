@@ -18,7 +18,8 @@ SPAWN_PERIOD = 2.0  # [s]
 class Straight(Autonomy):
     """Hold the initial heading, altitude and speed, on the state that the entity believes itself in.
 
-    With `enable_boundary_control` an entity outside the boundary it has last heard of turns back to its centre.
+    With `enable_boundary_control` an entity outside the boundary it has last heard of turns back: to its centre, or straight back
+    across a plane. It keeps its altitude, so where no heading leads back, as at a level plane, it flies on.
     """
 
     grade = "portable"
@@ -64,8 +65,10 @@ class Straight(Autonomy):
             shape: Any = self.fence[row]
             pos = g.pos[:, row : row + 1]
             if not shape.contains(pos)[0]:
-                centre = np.array([[shape.center[0]], [shape.center[1]], [pos[2, 0]]])
-                self.goal[:2, row : row + 1] = (pos + AHEAD * unit(centre - pos))[:2]
+                way = shape.inward(pos)
+                way[2] = 0.0
+                if way.any():
+                    self.goal[:2, row : row + 1] = (pos + AHEAD * unit(way))[:2]
 
     def _ask_for_another(self, g: GroupView) -> None:
         elapsed = g.t - g.context.clock.start + 1e-6 * g.dt

@@ -5,13 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from tussle.api import Input, MotionBody, MotionModel, Param, State
+from tussle.stock.motion.harmonic_oscillator import kernels
 
 
 class HarmonicOscillator(MotionModel):
     """A mass on a damped spring between it and the ground plane: z'' = -w^2 z - 2 d w z' + acceleration_z.
 
     w is `natural_frequency`, d `damping_ratio`. It moves along the vertical only; position and attitude stay as they were placed
-    otherwise. Its solution is known in closed form, which makes it the test of integrators and of wiring.
+    otherwise. Its solution is known in closed form, which makes it the test of integrators and of wiring. However stiff it is, no
+    step is too long for it.
     """
 
     grade = "portable"
@@ -20,6 +22,8 @@ class HarmonicOscillator(MotionModel):
     natural_frequency = Param(1.0, unit="rad/s", ge=0.0, doc="w: angular frequency without damping.")
     x = State("z z_rate", unit="m m/s", doc="Height above the origin's tangent plane and its rate.")
     acceleration_z = Input(unit="m/s^2", doc="Push upwards, per mass.")
+
+    advance = kernels.advance
 
     @staticmethod
     def derivative(

@@ -6,9 +6,12 @@ from functools import lru_cache
 
 import numpy as np
 
+from tussle.errors import ParameterError
 from tussle.view.frame import Frame
 from tussle.view.recording import Recording
 
+MOST_PICTURES = 1_000_000
+"""More than eleven hours of film at 25 pictures per second."""
 LEAP_OF_EXTENT = 0.25
 """Share of the diagonal of all positions above which a move between two records is a jump, as across a closed world, and is not
 flown."""
@@ -28,6 +31,9 @@ class Moments:
         t: Time of each picture [s], (k,).
         pace: Simulated time between two pictures [s].
         leap: Distance that nobody moves between two records but by a jump [m].
+
+    Raises:
+        ParameterError: There are too many pictures.
     """
 
     def __init__(self, recording: Recording, start: float, stop: float, speed: float, fps: float) -> None:
@@ -36,6 +42,11 @@ class Moments:
         self.fps = fps
         self.pace = speed / fps
         n_intervals = max(0, round((stop - start) / self.pace))
+        if n_intervals >= MOST_PICTURES:
+            raise ParameterError(
+                f"speed = {speed:g} is not allowed here: a film from {start:g} to {stop:g} s has {n_intervals:,} pictures at {fps:g} per "
+                f"second; it takes up to {MOST_PICTURES:,}"
+            )
         self.t = np.minimum(start + self.pace * np.arange(n_intervals + 1), stop)
         self.leap = LEAP_OF_EXTENT * float(np.linalg.norm(np.subtract(*recording.extent)))
         # Neighbouring pictures lie between the same two records, and a trail asks for older ones.

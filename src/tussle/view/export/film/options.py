@@ -10,6 +10,7 @@ from tussle.view.export.film.cameras import CAMERAS
 
 LEAST_SIZE, MOST_SIZE = 16, 7680
 MOST_FPS = 240.0
+LEAST_FACTOR, MOST_FACTOR = 1e-6, 1e6
 
 
 @dataclass(frozen=True)
@@ -60,13 +61,15 @@ class FilmOptions:
             )
         for name in ("speed", "fps", "zoom", "scale"):
             value = getattr(self, name)
-            if value is not None and not 0.0 < value < math.inf:
-                raise ParameterError(f"{name} = {value!r} is not allowed; it takes a number > 0")
+            if value is not None and not LEAST_FACTOR <= value <= MOST_FACTOR:
+                raise ParameterError(
+                    f"{name} = {value!r} is not allowed; it takes a number from {LEAST_FACTOR:g} to {MOST_FACTOR:g}"
+                )
         if self.fps > MOST_FPS:
             raise ParameterError(f"fps = {self.fps:g} is not allowed; it takes up to {MOST_FPS:g}")
-        if self.trails is not None and not 0.0 <= self.trails < math.inf:
+        if self.trails is not None and self.trails != 0.0 and not LEAST_FACTOR <= self.trails < math.inf:
             raise ParameterError(
-                f"trails = {self.trails!r} is not allowed; it takes a number of seconds >= 0"
+                f"trails = {self.trails!r} is not allowed; it takes 0 or a number of seconds >= {LEAST_FACTOR:g}"
             )
         for name in ("start", "stop", "at"):
             value = getattr(self, name)
