@@ -175,7 +175,7 @@ def play_in_directory(
     """
     timings = Timings()
     if batch.plugin_files:
-        remember(batch.plugin_contents)
+        remember(batch.plugin_files)
     if not (path / files.BATCH_FILE).exists():
         batch.check(until)  # before anything is written
     store = Store(path)

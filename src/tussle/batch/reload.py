@@ -14,8 +14,7 @@ from tussle.batch.points import values_text
 from tussle.batch.results import Results
 from tussle.batch.trust import DirectoryCode
 from tussle.errors import BatchError
-from tussle.mission import Loaded, Mission, read_mission
-from tussle.mission.catalogue import PluginSource
+from tussle.mission import Loaded, Mission, PluginFile, read_mission
 
 OF_FILE = {"file": str, "settings": dict, "plugin_files": list, "options": dict, "ends_by_time": bool}
 """What `batch.json` says of a mission that was read from a file."""
@@ -87,8 +86,11 @@ def planned_run(
         raise BatchError(f"{path / store.BATCH_FILE}: what it says of {', '.join(wrong)} cannot be read")
     is_strict = _is_strict(path, about["options"], {"allow_large": allow_large, "search": bool(search)})
     file = _inside(path, about["file"])
-    plugins = (_inside(path, f"{store.PLUGINS}/{name}") for name in about["plugin_files"])
-    code = DirectoryCode(path, tuple(map(PluginSource.read, plugins)))
+    plugins = [_inside(path, f"{store.PLUGINS}/{name}") for name in about["plugin_files"]]
+    code = DirectoryCode(path, tuple(map(PluginFile.of, plugins)))
+    for plugin, read in zip(plugins, code.files, strict=True):
+        for name in read.texts:  # a neighbour may be a link
+            _inside(path, str((plugin.parent / name).relative_to(path / store.MISSION)))
     if not may_run(code):
         raise BatchError(
             f"{path}: not played, since its plugin code is not known to be yours: {code}; --trust runs it, with all your rights"

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tussle.folders import is_private, read_own, user_folder
-from tussle.mission.catalogue import PluginSource
+from tussle.mission import PluginFile
 
 
 @dataclass(frozen=True)
@@ -18,31 +18,31 @@ class DirectoryCode:
 
     Attributes:
         path: The batch directory.
-        files: The files.
+        files: The files, each with the neighbours that it imports.
     """
 
     path: Path
-    files: tuple[PluginSource, ...]
+    files: tuple[PluginFile, ...]
 
     @property
     def is_own(self) -> bool:
         """There is no code, or all of it was once given to a batch by this user."""
-        return not self.files or _is_known(digest(file.data for file in self.files))
+        return not self.files or _is_known(digest(self.files))
 
     def __str__(self) -> str:
-        return ", ".join(f"{file.path} ({len(file.data):,} bytes)" for file in self.files)
+        texts = {Path(file.folder, name): text for file in self.files for name, text in file.texts.items()}
+        return ", ".join(f"{path} ({len(text):,} characters)" for path, text in texts.items())
 
 
-def digest(contents: Iterable[bytes]) -> str:
-    """Hash of plugin files in their order."""
-    return hashlib.blake2b(
-        b"".join(hashlib.blake2b(c).digest() for c in contents), digest_size=32
-    ).hexdigest()
+def digest(files: Iterable[PluginFile]) -> str:
+    """Hash of plugin files in their order, wherever they lie."""
+    contents = [(file.name, sorted(file.texts.items())) for file in files]
+    return hashlib.blake2b(repr(contents).encode(), digest_size=32).hexdigest()
 
 
-def remember(contents: Iterable[bytes]) -> None:
+def remember(files: Iterable[PluginFile]) -> None:
     """Note that the user has given these plugin files to a batch."""
-    file = _file(digest(contents))
+    file = _file(digest(files))
     try:
         if file is None:
             raise OSError("this user has no home")

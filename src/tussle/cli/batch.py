@@ -22,6 +22,7 @@ from tussle.batch.progress import Progress as BatchProgress
 from tussle.batch.reload import planned_run
 from tussle.batch.statistics import running_result
 from tussle.batch.sweep_file import Sweep, read_sweep
+from tussle.batch.trust import digest
 from tussle.batch.until import Until
 from tussle.batch.variables import parse_variable
 from tussle.cli.batch_summary import compare_hash, show_batch
@@ -202,11 +203,10 @@ def record_run(batch: Batch, source: Source, directory: Path, number: int, inter
     if _is_recorded(target):
         return
     shutil.rmtree(target, ignore_errors=True)  # cut short
-    own = batch.plugin_contents
     run = planned_run(
         directory,
         number,
-        may_run=lambda code: [f.data for f in code.files] == own,
+        may_run=lambda code: digest(code.files) == digest(batch.plugin_files),
         allow_large=source.allow_large,
     )
     with (

@@ -11,11 +11,12 @@ from typing import Any
 from tussle.errors import MissionError, TussleError
 from tussle.geodesy import Origin
 from tussle.mission import codecs
-from tussle.mission.catalogue import KINDS, Catalogue, PluginSource
+from tussle.mission.catalogue import KINDS, Catalogue
 from tussle.mission.entities import EntityReader, Fields, block_names, expanded
 from tussle.mission.limits import Limits
 from tussle.mission.node import Budget, Node
 from tussle.mission.overrides import apply_path, split_overrides
+from tussle.mission.plugin_files import PluginFile
 from tussle.mission.plugin_tags import PluginReader
 from tussle.mission.problems import Place, Problems, shown
 from tussle.mission.source import Reader, Source, find_mission
@@ -63,7 +64,7 @@ def read_mission(
     overrides: Mapping[str, str] | None = None,
     *,
     strict: bool = False,
-    plugin_files: Sequence[str | Path | PluginSource] = (),
+    plugin_files: Sequence[str | Path | PluginFile] = (),
     search: Sequence[str | Path] = (),
     allow_large: bool = False,
 ) -> Loaded:
