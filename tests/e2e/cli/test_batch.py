@@ -175,7 +175,7 @@ def test_a_run_of_a_batch_is_played_again_whatever_became_of_its_files(here, fol
         "--runs",
         3,
     )
-    assert here(*command, "--end", "0.7", "--out", "out", *PLUGINS)[0] == 0
+    assert here(*command, "--end", "0.7", "--out", "out", *PLUGINS)[0] == 5  # of those that cannot decide
     for changed in (True, False):
         for name in ("chance.xml", "plugins.py", "parts/metrics.xml"):
             if changed:
@@ -320,6 +320,31 @@ def test_runs_that_fail_are_counted_and_if_all_fail_it_is_an_error(here):
         assert last.startswith("error: all runs failed; the first: Trouble, step 2: plugins.py:")
         assert last.endswith("RuntimeError: this seed goes wrong")
         assert len(err.splitlines()) == 1 + again
+
+
+def test_a_game_that_takes_longer_than_it_may_is_given_up(here):
+    code, _, err = here(
+        "batch",
+        "chance.xml",
+        "how=sleep",
+        "--runs",
+        1,
+        "--seed",
+        3,
+        "--run-timeout",
+        1,
+        "--out",
+        "out",
+        *PLUGINS,
+    )
+    assert (code, err) == (
+        3,
+        "error: all runs failed; the first: it took longer than the 1.0 s that a run may\n",
+    )
+    code, _, err = here(
+        "batch", "chance.xml", "--run-timeout", 1, "--scheduler", "tcp://127.0.0.1:9", *PLUGINS
+    )
+    assert code == 2
 
 
 def test_a_plugin_that_kills_the_command_kills_it_only_once(tussle, folder):
