@@ -30,8 +30,11 @@ class DirectoryCode:
         return not self.files or _is_known(digest(self.files))
 
     def __str__(self) -> str:
+        home = self.path.resolve()
         texts = {Path(file.folder, name): text for file in self.files for name, text in file.texts.items()}
-        return ", ".join(f"{path} ({len(text):,} characters)" for path, text in texts.items())
+        return ", ".join(
+            f"{self.path / path.relative_to(home)} ({len(text):,} characters)" for path, text in texts.items()
+        )
 
 
 def digest(files: Iterable[PluginFile]) -> str:

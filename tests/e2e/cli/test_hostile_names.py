@@ -205,7 +205,7 @@ def test_on_a_terminal_nothing_but_the_program_steers(folder, hostile):
 @example("[/]")
 @example("\\[")
 @example("[link=x]\x1b]8;;y\x1b\\")
-@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_whatever_is_printed_steers_nothing(text):
     """Any text, in any thing that is printed."""
     console = terminal.PlainConsole(stderr=False)
