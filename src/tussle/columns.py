@@ -203,7 +203,7 @@ class Param(Numbers):
             number = float(value)
         if math.isnan(number):
             raise self._error(where, value, self.allowed())
-        if not self._is_within(number):
+        if not self.is_within(number):
             raise self._error(where, value, self.allowed())
         return number
 
@@ -224,7 +224,8 @@ class Param(Numbers):
             return bool(value)
         raise self._error(where, value, self.allowed())
 
-    def _is_within(self, number: float) -> bool:
+    def is_within(self, number: float) -> bool:
+        """Whether a number is within the bounds."""
         return (
             (self.ge is None or number >= self.ge)
             and (self.gt is None or number > self.gt)

@@ -28,12 +28,12 @@ from tussle.api import (
     Sensor,
     State,
     Subscribe,
-    check_plugin,
 )
 from tussle.errors import ConformanceError, TussleError
 from tussle.messages import CaptureEntity
 from tussle.numeric import cos, sin
 from tussle.numeric.kernel import kernel
+from tussle.testing import check_plugin
 
 # -- sound plugins of each kind: what every broken one below would be without its fault -------------------------------------------
 
@@ -112,6 +112,84 @@ class SoundMotion(MotionModel):
         body.vel[2] = 0.0
 
 
+class SoundRigidBody(MotionModel):
+    """Six degrees of freedom: thrust along the body's own axes, moments, drag, gravity; it may slip in any direction."""
+
+    grade = "portable"
+    weight = Param(2.0, unit="kg", gt=0.0)
+    drag = Param(0.4, unit="1/s", ge=0.0)
+    x = State(
+        "east north up vx vy vz qw qx qy qz wx wy wz", unit="m m m m/s m/s m/s 1 1 1 1 rad/s rad/s rad/s"
+    )
+    thrust = Input("thrust_x thrust_y thrust_z", unit="N")
+    moment = Input("moment_x moment_y moment_z", unit="N*m")
+
+    @staticmethod
+    def derivative(
+        vx, vy, vz, qw, qx, qy, qz, wx, wy, wz,
+        thrust_x, thrust_y, thrust_z, moment_x, moment_y, moment_z, force_x, force_y, force_z, weight, drag,
+    ):  # fmt: skip
+        tx = 2.0 * (qy * thrust_z - qz * thrust_y)
+        ty = 2.0 * (qz * thrust_x - qx * thrust_z)
+        tz = 2.0 * (qx * thrust_y - qy * thrust_x)
+        ax = thrust_x + qw * tx + qy * tz - qz * ty
+        ay = thrust_y + qw * ty + qz * tx - qx * tz
+        az = thrust_z + qw * tz + qx * ty - qy * tx
+        return (
+            *(vx, vy, vz),
+            *((ax + force_x) / weight - drag * vx, (ay + force_y) / weight - drag * vy),
+            (az + force_z) / weight - drag * vz - 9.81,
+            *(-0.5 * (wx * qx + wy * qy + wz * qz), 0.5 * (wx * qw + wy * qz - wz * qy)),
+            *(0.5 * (wy * qw + wz * qx - wx * qz), 0.5 * (wz * qw + wx * qy - wy * qx)),
+            *(moment_x - wx, moment_y - wy, moment_z - wz),
+        )
+
+    def from_body(self, body, rows) -> None:
+        parts = (body.pos, body.vel, body.quat, body.omega)
+        self.x[:, rows] = np.concatenate([part[:, rows] for part in parts])
+
+    def to_body(self, body) -> None:
+        body.pos[:], body.vel[:], body.omega[:] = self.x[:3], self.x[3:6], self.x[10:]
+        w, x, y, z = self.x[6:10]
+        body.quat[:] = self.x[6:10] / np.sqrt(w * w + x * x + y * y + z * z)
+
+
+class SoundBouncer(MotionModel):
+    """Falls, and comes up from the ground again: its velocity jumps."""
+
+    grade = "portable"
+    x = State("east north up vx vy vz", unit="m m m m/s m/s m/s")
+
+    def integrator(self):
+        return bounce
+
+    def from_body(self, body, rows) -> None:
+        self.x[:3, rows], self.x[3:, rows] = body.pos[:, rows], body.vel[:, rows]
+
+    def to_body(self, body) -> None:
+        body.pos[:], body.vel[:] = self.x[:3], self.x[3:]
+
+
+@kernel("F2w F2 F2 f8 i8")
+def bounce(x, u, p, dt, substeps):
+    """Semi-implicit Euler under gravity; below the ground all speed is upwards."""
+    h = dt / substeps
+    for _ in range(substeps):
+        for i in range(x.shape[1]):
+            x[5, i] -= 9.81 * h
+            if x[2, i] < 0.0:
+                x[5, i] = abs(x[5, i])
+            for k in range(3):
+                x[k, i] += h * x[3 + k, i]
+
+
+class SoundCounts(SoundAutonomy):
+    """Has whole numbers for parameters."""
+
+    n_legs = Param(4, ge=1, le=8)
+    n_wheels = Param(3, gt=1)
+
+
 class SoundSensor(Sensor):
     """Measures its height with noise."""
 
@@ -178,6 +256,10 @@ def test_a_sound_plugin_passes(cls) -> None:
 
 def test_a_plugin_can_come_with_companions_and_parameters() -> None:
     check_plugin(SoundAutonomy, companions=[SoundController(lag=0.2), SoundMotionOfSpeed()], gain=0.1)
+
+
+def test_a_controller_may_work_between_the_substeps_of_a_motion_model() -> None:
+    check_plugin(SoundMotionOfSpeed, companions=[SoundController()])
 
 
 class SoundMotionOfSpeed(SoundMotion):
@@ -263,32 +345,11 @@ def wobble(x: float) -> float:
     return math.sin(x)
 
 
-class UsesMatrixProduct(SoundAutonomy):
-    """Products of matrices add in an order of their own."""
-
-    def step(self, g: GroupView) -> None:
-        self.speed[:] = (np.eye(3) @ g.vel)[0]
-
-
 class UsesPower(SoundAutonomy):
     """Powers are not correctly rounded."""
 
     def step(self, g: GroupView) -> None:
         self.speed[:] = np.abs(g.pos[0]) ** 0.3
-
-
-class UsesSum(SoundAutonomy):
-    """Sums over rows depend on their number."""
-
-    def step(self, g: GroupView) -> None:
-        self.speed[:] = g.vel.sum() * 0.0 + g.vel[0]
-
-
-class UsesMean(SoundAutonomy):
-    """So do means."""
-
-    def step(self, g: GroupView) -> None:
-        self.speed[:] = g.vel[0] + 0.0 * np.mean(g.vel[1])
 
 
 class UsesLibmInDerivative(SoundMotion):
@@ -484,6 +545,101 @@ class RolloutOfItsOwn(SoundMotion):
         SoundMotion.to_body(self, body)
 
 
+class NoVelocity(SoundMotion):
+    """Leaves vel as it was at birth."""
+
+    def to_body(self, body) -> None:
+        body.pos[:] = self.x[:3]
+        body.set_attitude(yaw=self.x[3])
+
+
+class VelocityOfBody(SoundMotion):
+    """Publishes the velocity along its own axes."""
+
+    def to_body(self, body) -> None:
+        SoundMotion.to_body(self, body)
+        body.vel[:] = 0.0
+        body.vel[0] = self.x[4]
+
+
+class VelocityOfCommand(SoundMotion):
+    """Publishes the speed that it is to have."""
+
+    def to_body(self, body) -> None:
+        SoundMotion.to_body(self, body)
+        body.vel[:2] = self.speed * cos(self.x[3]), self.speed * sin(self.x[3])
+
+
+class WrongRate(SoundMotion):
+    """Moves at twice its speed."""
+
+    @staticmethod
+    def derivative(yaw, v, speed, turn_rate, lag):
+        return 2.0 * v * cos(yaw), 2.0 * v * sin(yaw), 0.0, turn_rate, (speed - v) / lag
+
+
+class ForgetsClimb(SoundRigidBody):
+    """Its vertical velocity is missing."""
+
+    def to_body(self, body) -> None:
+        SoundRigidBody.to_body(self, body)
+        body.vel[2] = 0.0
+
+
+class DeclaresPos(MotionModel):
+    """Has a column of the body's name, so that self.pos is not where the entity is."""
+
+    pos = State("east north up", unit="m")
+
+    @staticmethod
+    def derivative():
+        return 0.0, 0.0, 0.0
+
+    def from_body(self, body, rows) -> None:
+        self.pos[:, rows] = body.pos[:, rows]
+
+    def to_body(self, body) -> None:
+        body.pos[:], body.vel[:] = self.pos, 0.0
+
+
+class DrawsTwice(SoundAutonomy):
+    """Takes one draw for two."""
+
+    def step(self, g: GroupView) -> None:
+        self.speed[:], self.turn_rate[:] = g.normal("gust"), g.normal("gust", 2)[1]
+
+
+class DrawsByBothLaws(SoundSensor):
+    """Takes the bits of one draw for two."""
+
+    def step(self, g: GroupView) -> None:
+        self.height[:] = g.normal("height") + g.uniform("height")
+
+
+class DrawsAtBirthAndAfter(SoundAutonomy):
+    """Newborns draw the same number for two things."""
+
+    def spawn(self, g: GroupView, rows) -> None:
+        self.turns[rows] = g.uniform("start")[rows]
+
+    def step(self, g: GroupView) -> None:
+        self.speed[:] = g.uniform("start")
+
+
+class DrawsTwiceForOne(SoundEasy):
+    """The same in easy mode."""
+
+    def step_one(self, me) -> None:
+        me.speed, me.turn_rate = me.normal("gust"), me.normal("gust")
+
+
+class DrawsTwiceForWorlds(SoundReferee):
+    """The same for worlds."""
+
+    def step(self, w) -> None:
+        self.claims[:] = (w.uniform("luck") + w.uniform("luck")).astype(int)
+
+
 class JumpyDerivative(SoundMotion):
     """A state equation with steps in it."""
 
@@ -558,25 +714,24 @@ BROKEN = {
         ListOnClass,
         NotAHook,
         OwnInit,
-        NoStep,
-        WrongStep,
         NotSI,
-        HalfBelief,
         NothingToDo,
+        DeclaresPos,
     ],
     "grade": [
-        *(UsesSine, UsesMathInAnotherFunction, UsesMatrixProduct, UsesPower, UsesSum, UsesMean),
-        *(UsesLibmInDerivative, UsesLibmInKernel, UsesChance),
+        *(UsesSine, UsesMathInAnotherFunction, UsesPower, UsesLibmInDerivative, UsesLibmInKernel),
     ],
-    "stack invariance": [CountsRows, KnowsItsRow, CountsCalls, RemembersById],
+    "stack invariance": [CountsRows, KnowsItsRow, CountsCalls, RemembersById, UsesChance],
     "snapshot": [MissesSnapshot],
     "reset": [ForgetsToReset],
-    "runs": [SetsAttribute, WritesView, Raises],
+    "runs": [NoStep, WrongStep, HalfBelief, SetsAttribute, WritesView, Raises],
     "memory in columns": [HidesAttribute, ChangesClass],
     "own columns": [WritesAroundView, WritesParameter, WritesWrongColumn],
     "idle": [SaysIdle],
     "finite": [NanAtBound, NanInReferee, RaisesAtBound],
     "rollout": [RolloutOfItsOwn],
+    "velocity": [NoVelocity, VelocityOfBody, VelocityOfCommand, WrongRate, ForgetsClimb],
+    "draws": [DrawsTwice, DrawsByBothLaws, DrawsAtBirthAndAfter, DrawsTwiceForOne, DrawsTwiceForWorlds],
     "order of convergence": [JumpyDerivative],
     "advance": [EulerKernel],
     "rows": [RowsDiffer],
@@ -610,7 +765,7 @@ def test_evidence_says_seed_step_and_column() -> None:
         check_plugin(CountsRows)
     with pytest.raises(ConformanceError, match=r"with gain = 0\.0, "):
         check_plugin(NanAtBound)
-    with pytest.raises(ConformanceError, match=r"test_kit\.py:\d+ uses np\.sin"):
+    with pytest.raises(ConformanceError, match=r"step uses numpy\.sin,"):
         check_plugin(UsesSine)
     with pytest.raises(ConformanceError, match=r"step has written into vel, which is not its own"):
         check_plugin(WritesAroundView)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tussle import stock
-from tussle.api import check_plugin
+from tussle.testing import check_plugin
 
 COMPANIONS = {
     # Those that hear of something only when somebody tells them; the kit cannot make up a shape.
@@ -15,6 +15,9 @@ COMPANIONS = {
     "SimpleCollisionMetrics": ["SimpleCollision", "GroundCollision"],
     "WaypointDispatcher": ["WaypointGenerator"],
     "MoveToGoalMS": ["WaypointDispatcher"],
+    # Those that are flown by a controller, which works between the substeps.
+    "SimpleAircraft": ["SimpleAircraftControllerPID"],
+    "Unicycle": ["UnicyclePID"],
 }
 
 

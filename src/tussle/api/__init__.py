@@ -69,17 +69,7 @@ __all__ = [
     "Subscribe",
     "WorldPlugin",
     "WorldView",
-    "check_plugin",
     "service",
     "unit",
     "wrap",
 ]
-
-
-def __getattr__(name: str) -> object:
-    # The conformance kit stands above the engine that it drives; only its name lives here.
-    if name == "check_plugin":
-        import importlib
-
-        return importlib.import_module("tussle.engine.conformance").check_plugin
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

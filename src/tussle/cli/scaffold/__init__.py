@@ -24,7 +24,7 @@ from pathlib import Path
 from {module} import {name}
 
 from tussle import Simulation
-from tussle.api import check_plugin
+from tussle.testing import check_plugin
 from tussle.mission import read_mission
 
 HERE = Path(__file__).parent

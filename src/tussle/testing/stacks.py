@@ -6,9 +6,9 @@ from typing import Any
 
 from tussle.api import Plugin
 from tussle.columns import Handle
-from tussle.engine.conformance_game import SEEDS, STEPS, Game
-from tussle.engine.conformance_traces import Traces
 from tussle.engine.simulation import Simulation
+from tussle.testing.game import SEEDS, STEPS, Game
+from tussle.testing.traces import Traces
 
 STACKS: tuple[tuple[int, int], ...] = ((1, 2), (2, 1), (7, 1), (64, 2))
 """Number of worlds, threads."""

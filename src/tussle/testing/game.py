@@ -20,11 +20,13 @@ from tussle.api import (
     WorldPlugin,
 )
 from tussle.columns import Channel, Topic
-from tussle.engine.conformance_partners import (
+from tussle.engine.simulation import Simulation
+from tussle.engine.wiring import BELIEF, read_channels, written_channels
+from tussle.mission import Block, Mission
+from tussle.stock import GlobalNetwork, MotorSchemas
+from tussle.testing.partners import (
     Driver,
-    Parent,
     Reaper,
-    Wire,
     Wisher,
     Word,
     can_say,
@@ -32,14 +34,10 @@ from tussle.engine.conformance_partners import (
     feeler,
     sink,
 )
-from tussle.engine.simulation import Simulation
-from tussle.engine.wiring import BELIEF, read_channels, written_channels
-from tussle.mission import Block, Mission
 
 SEEDS = (11, 12, 13, 14, 15)
 """Worlds that are followed. 13 dies out early (see `Reaper`)."""
 STEPS = 20
-WORLD_KINDS = (Interaction, Metric, Network)
 
 
 @dataclass(frozen=True)
@@ -79,18 +77,7 @@ def scaled(plugin: Any, name: str, factor: float) -> Any:
         return value
     changed = tuple(v * factor for v in value) if column.fields else value * factor
     parts = changed if column.fields else (changed,)
-    return changed if all(is_within(column, v) for v in parts) else value
-
-
-def is_within(column: Any, value: float) -> bool:
-    """Whether a number is within a parameter's bounds."""
-    bounds = (
-        (column.ge, value.__ge__),
-        (column.gt, value.__gt__),
-        (column.le, value.__le__),
-        (column.lt, value.__lt__),
-    )
-    return all(bound is None or bool(compare(float(bound))) for bound, compare in bounds)
+    return changed if all(map(column.is_within, parts)) else value
 
 
 # -- the mission ------------------------------------------------------------------------------------------------------------------
@@ -178,7 +165,7 @@ def _missions(plugin: Any, companions: Sequence[Any], says: Iterable[Any], hears
     all_: list[Any] = [plugin, *companions]
     networks: list[Any] = [p for p in all_ if isinstance(p, Network)]
     there = {"GlobalNetwork", *(n.instance_name for n in networks)}
-    networks += [Wire(name=name) for name in sorted({t[2] for t in (*said, *heard)} - there)]
+    networks += [GlobalNetwork(name=name) for name in sorted({t[2] for t in (*said, *heard)} - there)]
     varied = plugin.replace(**{name: scaled(plugin, name, 0.9) for name in plugin.params()})
     # Partners are made once, so that all blocks have the same: then their entities are rows of one group.
     slots = _slots(plugin, companions, said, heard)
@@ -186,7 +173,7 @@ def _missions(plugin: Any, companions: Sequence[Any], says: Iterable[Any], hears
     blocks = [_block("red", 1, slots), _block("blue", 2, mixed), _block("late", 1, slots)]
     path = plugin.instance_name
     if isinstance(plugin, Behavior):
-        path = f"Parent.{path}"
+        path = f"MotorSchemas.{path}"
     paths = (path,) if isinstance(plugin, WorldPlugin) else tuple(f"{b.name}.{path}" for b in blocks)
     mission = Mission(
         blocks=blocks,
@@ -221,7 +208,7 @@ def _slots(
     plugin: Any, companions: Sequence[Any], says: Sequence[Any], hears: Sequence[Any]
 ) -> dict[str, Any]:
     """Plugins of a block, by their place in it."""
-    holder = Parent(behaviors=[plugin]) if isinstance(plugin, Behavior) else plugin
+    holder = MotorSchemas(behaviors=[plugin]) if isinstance(plugin, Behavior) else plugin
     kinds = (Autonomy, Controller, Sensor, MotionModel)
     given: list[Any] = [holder, *companions]
     places: list[list[Any]] = [[p for p in given if isinstance(p, kind)] for kind in kinds]
@@ -250,7 +237,13 @@ def _swapped(value: Any, old: Any, new: Any) -> Any:
     """The plugins of a slot with another one in the place of `old`."""
     if isinstance(value, list):
         return [_swapped(v, old, new) for v in value]
-    return value.replace(behaviors=[new]) if isinstance(value, Parent) else new if value is old else value
+    if value is old:
+        return new
+    return (
+        value.replace(behaviors=[new])
+        if isinstance(old, Behavior) and isinstance(value, MotorSchemas)
+        else value
+    )
 
 
 def _without(columns: Iterable[Channel], others: Iterable[Channel]) -> list[Channel]:

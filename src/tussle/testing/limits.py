@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from tussle.columns import Output, Param, State
-from tussle.engine.conformance_game import Game, is_within
+from tussle.columns import Param
 from tussle.engine.simulation import Simulation
 from tussle.errors import ConformanceError, MissionError, PluginError
+from tussle.testing.game import Game
+from tussle.testing.lines import lines_of
 
 RULE = "finite"
 STEPS = 8
@@ -76,7 +77,7 @@ def _values(column: Param, default: Any) -> Iterator[Any]:
         if math.isfinite(default):
             tried += [0.1 * default, 10.0 * default]
     for value in dict.fromkeys(column.dtype(v) for v in tried):
-        if value != default and is_within(column, value):
+        if value != default and column.is_within(value):
             yield value
 
 
@@ -108,49 +109,17 @@ def _play(game: Game, cases: list[Case]) -> None:
 
 def _not_finite(sim: Simulation) -> tuple[int, str]:
     """World and words of the first number that is not finite; "" when all are."""
-    bodies = sim.population.bodies
-    for name in ("pos", "vel", "quat", "omega", "health", "force", "torque"):
-        bad = ~np.isfinite(np.atleast_2d(getattr(bodies, name))).all(axis=0)
-        if bad.any():
-            row = int(np.flatnonzero(bad)[0])
-            return int(
-                bodies.world[row]
-            ), f"{name} of entity {int(bodies.id[row])} is {getattr(bodies, name)[..., row]}"
+    for line in lines_of(sim).values():
+        bad = np.flatnonzero(~np.isfinite(line.values))
+        if line.is_made and len(bad):
+            return int(line.world[bad[0]]), f"{line.name} is {line.values[bad[0]]}"
     for group in sim.population.groups:
-        world = bodies.world[group.first : group.last]
         for binding in group.walk():
-            for name, column in type(binding.spec).columns.items():
-                if isinstance(column, (State, Output)) and _begins_finite(column):
-                    found = _first(group.table.array(binding.places[name]))
-                    if found is not None:
-                        return int(world[found[0]]), f"{'.'.join(binding.path)}.{name} is {found[1]}"
             for name in binding.ragged:
-                items = np.atleast_2d(binding.plugin.__dict__[name].data)
-                if not isinstance(type(binding.spec).columns[name], Param) and not np.isfinite(items).all():
-                    item = int(np.flatnonzero(~np.isfinite(items).all(axis=0))[0])
-                    row = int(np.searchsorted(binding.plugin.__dict__[name].start, item, side="right")) - 1
-                    return int(world[row]), f"an item of {'.'.join(binding.path)}.{name} is {items[:, item]}"
-    return _not_finite_referee(sim)
-
-
-def _not_finite_referee(sim: Simulation) -> tuple[int, str]:
-    for referee in sim.referees:
-        for name, column in type(referee.spec).states().items():
-            per, place = referee.places[name]
-            found = _first(referee.tables[per].array(place)) if _begins_finite(column) else None
-            if found is not None:
-                world = found[0] if per != "entity" else int(sim.population.bodies.world[found[0]])
-                return world, f"{referee.spec.instance_name}.{name} is {found[1]}"
+                items: Any = binding.plugin.__dict__[name]
+                bad = np.flatnonzero(~np.isfinite(np.atleast_2d(items.data)).all(axis=0))
+                if len(bad) and not isinstance(type(binding.spec).columns[name], Param):
+                    row = group.first + int(np.searchsorted(items.start, bad[0], side="right")) - 1
+                    where = f"an item of {'.'.join(binding.path)}.{name}"
+                    return int(sim.population.bodies.world[row]), f"{where} is {items.data[..., bad[0]]}"
     return 0, ""
-
-
-def _begins_finite(column: Any) -> bool:
-    return bool(np.isfinite(column.default).all())
-
-
-def _first(values: np.ndarray) -> tuple[int, Any] | None:
-    """Row and value of the first number that is not finite."""
-    if values.dtype != float or np.isfinite(values).all():
-        return None
-    row = int(np.flatnonzero(~np.isfinite(np.atleast_2d(values)).all(axis=0))[0])
-    return row, values[..., row]

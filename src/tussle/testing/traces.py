@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from tussle.engine import access
-from tussle.engine.conformance_game import SEEDS, STEPS, Game
 from tussle.engine.simulation import Simulation
 from tussle.errors import ConformanceError
+from tussle.testing.game import SEEDS, STEPS, Game
 
 Columns = list[tuple[str, Any]]
 

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from tussle.api import MotionModel
-from tussle.engine.conformance_game import Game
 from tussle.engine.group import Group
 from tussle.engine.simulation import Simulation
 from tussle.errors import ConformanceError
 from tussle.numeric.rk4 import compile_derivative, rk4
+from tussle.testing.game import Game
 
 EPS = float(np.finfo(float).eps)
 STEPS = 10
@@ -22,6 +22,11 @@ SLACK = 0.5
 """How far below its order a method may seem to be at a step where higher terms are not yet small."""
 WORST_ANGLE = 64.0 * EPS
 """Error of an attitude that went through three angles and back: each of a dozen functions and products errs by up to 2 ulp of pi."""
+
+VELOCITY = 1e-4
+"""Part of the largest speed by which vel may be beside the rate of pos; what counts is whether that vanishes with the step."""
+FEW = 0.1
+"""Part of rows and steps in which vel may jump, as on the ground or at a limit."""
 
 Integrator = Callable[..., None]
 
@@ -35,6 +40,8 @@ class Flight:
         x: States before each step and after the last, (steps + 1, m, n).
         u: Inputs in each step, (steps, k, n).
         p: Parameters, (q, n).
+        dt: Length of a step [s]; where a controller works between the substeps, these are the steps.
+        substeps: Of each step.
     """
 
     def __init__(self, game: Game) -> None:
@@ -44,6 +51,7 @@ class Flight:
         integrate = self.group.integrate
 
         def recorded(x: np.ndarray, u: np.ndarray, p: np.ndarray, dt: float, substeps: int) -> None:
+            self.dt, self.substeps = dt, substeps  # of a substep each, where a controller works between them
             inputs.append(np.array(u))
             integrate(x, u, p, dt, substeps)
             states.append(np.array(x))
@@ -52,7 +60,6 @@ class Flight:
         sim.step(STEPS)
         self.group.integrate = integrate
         self.x, self.u, self.p = np.array(states), np.array(inputs), np.array(self.group.p)
-        self.dt, self.substeps = sim.mission.dt, sim.mission.motion_multiplier
 
 
 def check_motion(game: Game, is_default: bool) -> None:
@@ -77,6 +84,7 @@ def check_motion(game: Game, is_default: bool) -> None:
             _check_kernel(model, flight, equation)
         else:
             _check_convergence(model, flight)
+        _check_velocity(model, flight)
 
 
 def _check_rollout(model: Any, flight: Flight) -> None:
@@ -194,6 +202,44 @@ def _check_convergence(model: Any, flight: Flight) -> None:
 
 
 # -- in and out of the body table -------------------------------------------------------------------------------------------------
+
+
+def _check_velocity(model: MotionModel, flight: Flight) -> None:
+    """`to_body` writes vel, which is the rate of pos: over shorter and shorter steps, the mean of vel becomes that of the way.
+
+    A smooth path halves the gap four times for half the step, one with kinks twice, a jump in vel shows in few rows. What
+    stays is a wrong vel, or a derivative that moves pos otherwise.
+    """
+    far, near = (_velocity_gap(model, flight, flight.dt / parts) for parts in (8, 512))
+    fastest = max(1e-3, float(np.abs(flight.group.moving.vel).max()))
+    stays = (near > 0.5 * far) & (near > VELOCITY * fastest)
+    step, axis, row = (int(i) for i in np.unravel_index(np.argmax(np.where(stays, near, 0.0)), near.shape))
+    if stays.any(axis=1).mean() > FEW:
+        text = f"pos changes at another rate than vel says: by {near[step, axis, row]:.3g} m/s along {'xyz'[axis]}"
+        raise ConformanceError(type(model).__name__, "velocity", text)
+
+
+def _velocity_gap(model: MotionModel, flight: Flight, h: float) -> np.ndarray:
+    """How far the rate of pos over h [s] is from the mean of vel, after each step of a flight with its inputs held, (steps, 3, n)."""
+    group, body = flight.group, flight.group.moving
+    bound: Any = group.motion.plugin
+    columns = group.table.arrays[float]
+    gaps, kept, body.dt = [], columns.copy(), h
+    for x, u in zip(flight.x[1:], flight.u, strict=True):
+        group.x[:], columns[group.u_rows] = x, u[: len(group.u_rows)]
+        at = []
+        for _ in range(2):
+            body.vel[:] = np.nan
+            bound.to_body(body)
+            at.append((body.pos.copy(), body.vel.copy()))
+            group.integrate(group.x, u, flight.p, h, 1)
+        (before, first), (after, second) = at
+        if not np.isfinite(first).all():
+            raise ConformanceError(type(model).__name__, "velocity", "to_body does not write vel of all rows")
+        gaps.append(np.abs((after - before) / h - 0.5 * (first + second)))
+    columns[:] = kept
+    bound.to_body(body)
+    return np.array(gaps)
 
 
 def _check_bodies(model: MotionModel, flight: Flight) -> None:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import inspect
 import math
 import pickle
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from tussle import units
-from tussle.api import Controller, EasyAutonomy, Interaction, Metric, MotionModel, Network, Plugin
+from tussle.api import Interaction, Metric, MotionModel, Plugin
+from tussle.api.motion import WRITABLE
 from tussle.columns import Column, Input, Numbers, Output, Param, State
 from tussle.engine.wiring import BELIEF
 from tussle.errors import ConformanceError, TussleError, listed
@@ -57,6 +57,8 @@ def _problems(cls: type[Plugin]) -> Iterator[str]:
     yield from _hooks(cls)
     for name, column in cls.columns.items():
         yield from _column(name, column)
+        if issubclass(cls, MotionModel) and name in WRITABLE:
+            yield f"{name} is a column of the body table, which to_body writes as body.{name}; call the model's own otherwise"
     yield from _beliefs(cls)
     yield from _as_data(cls)
 
@@ -78,40 +80,14 @@ def _attributes(cls: type[Plugin]) -> Iterator[str]:
 
 
 def _hooks(cls: type[Plugin]) -> Iterator[str]:
-    for hook, arguments in _needed(cls).items():
-        function = getattr(cls, hook)
-        if (getattr(function, "__module__", None) or "").startswith("tussle.api."):
-            yield f"it has no {hook}({', '.join(('self', *arguments))})"
-        elif inspect.isfunction(function):
-            given = list(inspect.signature(function).parameters.values())
-            required = [
-                p
-                for p in given
-                if p.default is p.empty and p.kind in {p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD}
-            ]
-            if len(required) != len(arguments) + 1:
-                yield f"{hook} takes ({', '.join(p.name for p in given)}); it is called as {hook}({', '.join(('self', *arguments))})"
-    if (
-        issubclass(cls, MotionModel)
-        and cls.derivative is None
-        and cls.advance is None
-        and cls.integrator is MotionModel.integrator
-    ):
-        yield "it has neither derivative nor advance"
-    if issubclass(cls, (Interaction, Metric)) and all(
+    """Who has nothing to do; what the engine calls it asks for itself, when the kit's game is built."""
+    if issubclass(cls, MotionModel):
+        if not (cls.derivative or cls.advance) and cls.integrator is MotionModel.integrator:
+            yield "it has neither derivative nor advance"
+    elif issubclass(cls, (Interaction, Metric)) and all(
         getattr(cls, k).__module__.startswith("tussle.api.") for k in ("start", "step", "result")
     ):
         yield "it has neither start nor step nor result"
-
-
-def _needed(cls: type[Plugin]) -> dict[str, tuple[str, ...]]:
-    if issubclass(cls, MotionModel):
-        return {"from_body": ("body", "rows"), "to_body": ("body",)}
-    if issubclass(cls, Network):
-        return {"route": ("w", "messages")}
-    if issubclass(cls, (Interaction, Metric)) or (issubclass(cls, Controller) and cls.passthrough):
-        return {}
-    return {"step_one": ("me",)} if issubclass(cls, EasyAutonomy) else {"step": ("g",)}
 
 
 def _column(name: str, column: Column) -> Iterator[str]:
@@ -124,7 +100,6 @@ def _column(name: str, column: Column) -> Iterator[str]:
         for unit, text_unit in zip(column.units, column.text_units, strict=True):
             if units.unit_of(unit).dimension != units.unit_of(text_unit).dimension:
                 yield f"{name} is in {unit!r} but in mission files in {text_unit!r}, which measures something else"
-        yield from _refuses(name, lambda: column.convert(column.default))
     elif isinstance(column, (State, Input, Output)):
         default: Any = column.default
         parts = default if isinstance(default, tuple) else (default,)
@@ -134,19 +109,10 @@ def _column(name: str, column: Column) -> Iterator[str]:
             yield f"{name} begins as NaN, which no rule can tell from a mistake"
 
 
-def _refuses(name: str, action: Callable[[], Any]) -> Iterator[str]:
-    try:
-        action()
-    except TussleError as error:
-        yield f"{name}: {error}"
-
-
 def _beliefs(cls: type[Plugin]) -> Iterator[str]:
     for name, (body, k, unit) in BELIEF.items():
         column = cls.outputs().get(name)
-        if column is not None and (
-            len(column.fields) != k or any(not units.compatible(u, unit) for u in column.units)
-        ):
+        if column is not None and not all(units.compatible(u, unit) for u in column.units):
             yield f"{name} is what the entity believes its {body} is: {k} channels in {unit or 'no unit'}"
 
 

@@ -8,11 +8,9 @@ from typing import Any
 import numpy as np
 
 from tussle.api import (
-    EVERYONE,
     Autonomy,
     Batch,
     Behavior,
-    Children,
     EntityRef,
     Field,
     GroupView,
@@ -22,7 +20,6 @@ from tussle.api import (
     Message,
     MotionBody,
     MotionModel,
-    Network,
     Output,
     Param,
     Publish,
@@ -32,7 +29,6 @@ from tussle.api import (
     State,
     Subscribe,
     WorldView,
-    service,
 )
 from tussle.columns import Channel, Numbers
 from tussle.numeric.quaternion import quat_from_euler
@@ -190,37 +186,6 @@ class Wisher(Behavior):
 
     def step(self, g: GroupView) -> None:
         self.wish[:] = [6.0 * signal(g.id, g.step_count, k) for k in range(3)]
-
-
-class Parent(Autonomy):
-    """Holds a behaviour; offers the service `longest_wish`, as who holds behaviours does."""
-
-    grade = "portable"
-    behaviors = Children(Behavior)
-    velocity = Output("velocity_x velocity_y velocity_z", unit="m/s")
-
-    def step(self, g: GroupView) -> None:
-        total = np.zeros((3, g.n))
-        for behavior in self.behaviors:
-            g.caller = behavior
-            behavior.step(g)
-            total += behavior.gain * behavior.wish
-        g.caller = self
-        self.velocity[:] = total
-
-    @service
-    def longest_wish(self, g: GroupView) -> np.ndarray:
-        """Length that a wish should not exceed [m/s], (n,)."""
-        return np.full(g.n, 20.0)
-
-
-class Wire(Network):
-    """Carries topics of a network that the mission does not have."""
-
-    grade = "portable"
-
-    def route(self, w: WorldView, messages: Batch) -> str:
-        return EVERYONE
 
 
 class Reaper(Interaction):
