@@ -22,13 +22,13 @@ from tussle.batch.points import values_text, variables_of
 from tussle.batch.sampling import method_for
 from tussle.batch.sampling import sample as sample_points
 from tussle.batch.store import PLUGINS
-from tussle.batch.tasks import PluginFile, Run
+from tussle.batch.tasks import Run
 from tussle.batch.treatments import Treatment, build_points, exactly, group_points, read_points
 from tussle.batch.variables import Range, Variable, written
 from tussle.batch.varied import about, as_variables
 from tussle.engine.simulation import Simulation
 from tussle.errors import BatchError, ParameterError, PluginError
-from tussle.mission import Loaded, Mission, read_mission
+from tussle.mission import Loaded, Mission, PluginFile, read_mission
 from tussle.record.run_file import versions
 
 if TYPE_CHECKING:
@@ -89,7 +89,9 @@ class Batch:
     ) -> None:
         self.source = mission
         self.settings = dict(settings or {})
-        self.plugin_files = tuple(PluginFile.of(Path(p)) for p in plugin_files)
+        self.plugin_files = tuple(PluginFile.of(p) for p in plugin_files)
+        for file in self.plugin_files:
+            file.load()
         self.variables = as_variables(vary)
         self.sample, self.sample_seed = sample, sample_seed
         if points is not None and self.variables:
@@ -211,7 +213,7 @@ class Batch:
             ]
         parts = [
             *sources,
-            *(file.text for file in self.plugin_files),
+            *(text for file in self.plugin_files for text in file.texts.values()),
             json.dumps([dict(p) for p in self.plan.points], default=str),
             repr((self.plan.first_seed, self.plan.independent, self._ends_by_time, versions()["tussle"])),
         ]
@@ -230,13 +232,14 @@ class Batch:
             str(file.relative_to(home)): data for file, data in inside.items() if file.is_relative_to(home)
         }
         return found | {
-            f"{PLUGINS}/{name}": file.text.encode()
-            for name, file in zip(self._plugin_names(), self.plugin_files, strict=True)
+            f"{PLUGINS}/{i}/{name}": text.encode()
+            for i, file in enumerate(self.plugin_files)
+            for name, text in file.texts.items()
         }
 
     def _plugin_names(self) -> list[str]:
-        """Each plugin file in a folder of its own, since two may be called alike."""
-        return [f"{i}/{Path(file.path).name}" for i, file in enumerate(self.plugin_files)]
+        """Each plugin file with its neighbours in a folder of its own, since two may be called alike."""
+        return [f"{i}/{file.name}" for i, file in enumerate(self.plugin_files)]
 
     @property
     def name(self) -> str:

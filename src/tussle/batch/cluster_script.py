@@ -11,9 +11,9 @@ from pathlib import Path
 from types import FunctionType
 from typing import Any
 
-from tussle.batch.tasks import Package, PluginFile
+from tussle.batch.tasks import Package
 from tussle.errors import BatchError
-from tussle.mission.catalogue import module_of_plugin_file
+from tussle.mission import PluginFile
 
 MAIN = "__main__"
 
@@ -30,32 +30,33 @@ def travelling(package: Package) -> Package:
     spec: Any = getattr(main, "__spec__", None)  # of what `python -m` runs
     path = Path(getattr(main, "__file__", None) or "?")
     is_script = spec is None
-    module = module_of_plugin_file(path) if is_script else spec.name
+    file = PluginFile.of(path) if is_script and path.suffix == ".py" and path.is_file() else None
+    module = file.module if file else getattr(spec, "name", "")
     found: dict[str, None] = {}
     missions = tuple(_renamed(package.mission(i), module, found) for i in range(len(package.missions)))
     if not found:  # some text says "__main__"
         return package
-    files = package.plugin_files
     if is_script:
-        files += (PluginFile(str(path.resolve()), module, _text_of(path, next(iter(found)))),)
-    return Package(missions, files)
+        _check_script(file, next(iter(found)))
+    return Package(missions, (*package.plugin_files, *((file,) if file else ())))
 
 
-def _text_of(path: Path, name: str) -> str:
-    """The script, which can be loaded without doing what it is for."""
-    try:
-        text = path.read_text(encoding="utf-8")
-        statements = ast.parse(text).body
-    except (OSError, SyntaxError, ValueError):
+def _check_script(file: PluginFile | None, name: str) -> None:
+    """A script can be loaded without doing what it is for.
+
+    Raises:
+        BatchError: It cannot, or there is none.
+    """
+    if file is None:
         raise BatchError(
             f"{name} is defined at a prompt, which workers do not have; put it into a file and give that as plugin_files"
-        ) from None
+        )
+    statements = ast.parse(file.texts[file.name]).body
     if not any(isinstance(node, ast.If) and _names_itself(node.test) for node in statements):
         raise BatchError(
-            f"{name} is defined in {path.name}, which workers load to have it; what the script does must stand under "
+            f"{name} is defined in {file.name}, which workers load to have it; what the script does must stand under "
             f'`if __name__ == "__main__":`, or {name} in a file that is given as plugin_files'
         )
-    return text
 
 
 def _names_itself(test: ast.expr) -> bool:

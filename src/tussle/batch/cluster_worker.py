@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import platform
-import sys
 import threading
 import time
 from collections.abc import Sequence
@@ -14,8 +13,8 @@ from importlib import import_module
 from pathlib import Path
 
 from tussle.batch.stack import play
-from tussle.batch.tasks import Finished, Package, PluginFile, Run
-from tussle.mission.catalogue import CONTENT
+from tussle.batch.tasks import Finished, Package, Run
+from tussle.mission.plugin_files import PREFIX
 from tussle.record.run_file import versions
 
 TOPIC = "tussle-batch"
@@ -46,8 +45,9 @@ def packages_of(package: Package) -> tuple[str, ...]:
     plugins = [
         p for m in missions for p in (*m.world_plugins, *(p for block in m.blocks for p in block.plugins))
     ]
-    modules = {type(plugin).__module__ for plugin in plugins} - {file.module for file in package.plugin_files}
-    return tuple(sorted({module.split(".")[0] for module in modules} - {"tussle", "__main__"}))
+    modules = {type(plugin).__module__ for plugin in plugins}
+    found = {module.split(".")[0] for module in modules} - {"tussle", "__main__"}
+    return tuple(sorted(name for name in found if not name.startswith(PREFIX)))
 
 
 @cache
@@ -90,7 +90,6 @@ def play_chunk(package: Package, runs: Sequence[Run], key: str) -> list[Finished
         return taken
 
     with _playing:
-        forget_changed(package.plugin_files)
         beat_at = time.monotonic() + BEAT_EVERY
         with closing(play(package.mission(0), take, len(runs))) as messages:  # type: ignore[type-var]
             for message in messages:
@@ -103,12 +102,3 @@ def play_chunk(package: Package, runs: Sequence[Run], key: str) -> list[Finished
                     beat_at = time.monotonic() + BEAT_EVERY
                     worker.log_event(TOPIC, [key, len(finished) + message.under_way])
     return finished
-
-
-def forget_changed(files: Sequence[PluginFile]) -> None:
-    """Have plugin files that have changed since an earlier batch loaded anew."""
-    for file in files:
-        module = sys.modules.get(file.module)
-        content = hashlib.blake2b(file.text.encode(), digest_size=16).hexdigest()
-        if module is not None and vars(module).get(CONTENT) != content:
-            del sys.modules[file.module]

@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-import atexit
-import hashlib
 import math
 import pickle
 import platform
-import shutil
-import sys
-import tempfile
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tussle.mission import load_plugin_file
-from tussle.mission.catalogue import module_of_plugin_file
+from tussle.mission import PluginFile
 
 if TYPE_CHECKING:
     from tussle.mission import Mission
@@ -95,40 +88,6 @@ class Beat:
     """
 
     under_way: float
-
-
-@dataclass(frozen=True)
-class PluginFile:
-    """A Python file with plugins, as it was when the batch was made."""
-
-    path: str
-    module: str
-    text: str
-
-    @staticmethod
-    def of(path: Path) -> PluginFile:
-        """The file as it is now; its plugins are loaded.
-
-        Raises:
-            MissionError: It cannot be read or imported.
-        """
-        load_plugin_file(path)
-        return PluginFile(
-            str(path), module_of_plugin_file(path), path.expanduser().read_text(encoding="utf-8")
-        )
-
-    def load(self) -> None:
-        """Have the module here under the name that pickles use, whether or not the file is on this machine."""
-        if self.module in sys.modules:
-            return
-        path = Path(self.path).expanduser()
-        if not path.is_file() or path.read_text(encoding="utf-8") != self.text:
-            digest = hashlib.blake2b(self.text.encode(), digest_size=8).hexdigest()
-            folder = Path(tempfile.mkdtemp(prefix=f"tussle-{digest}-"))
-            atexit.register(shutil.rmtree, folder, ignore_errors=True)
-            path = folder / path.name
-            path.write_text(self.text, encoding="utf-8")
-        load_plugin_file(path, self.module)
 
 
 @dataclass(frozen=True)

@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from tussle.batch.tasks import Package, PluginFile
+from tussle.batch.tasks import Package
 from tussle.engine.params import BLOCK_VALUES
 from tussle.errors import MissionError, ParameterError, TussleError, listed, nearest_name
-from tussle.mission import Block, Loaded, Mission, read_mission
+from tussle.mission import Block, Loaded, Mission, PluginFile, read_mission
 
 Point = Mapping[str, Any]
 Signature = tuple[Any, ...]

@@ -215,9 +215,17 @@ def plugins(plugin_files: PluginFiles = None, debug: Debug = False) -> None:
     """List all plugins: those that ship, those of other packages, those of your files."""
     with told(debug):
         from tussle.cli import pages
-        from tussle.cli.lookup import plugins_of
+        from tussle.cli.lookup import all_plugins
+        from tussle.cli.terminal import WRONG_INPUT, say_error, say_note
 
-        pages.show_plugins(plugins_of(plugin_files or ()))
+        found, wrong, hidden = all_plugins(plugin_files or ())
+        pages.show_plugins(found)
+        for text in hidden:
+            say_note(text)
+        for text in wrong:
+            say_error(text)
+        if wrong:
+            raise typer.Exit(WRONG_INPUT)
 
 
 @app.command(epilog=EPILOG)

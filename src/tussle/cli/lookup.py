@@ -6,21 +6,32 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tussle.cli.terminal import say_note
 from tussle.errors import MissionError, nearest_name
-from tussle.mission import shipped_missions
-from tussle.mission.catalogue import Catalogue
+from tussle.mission import Catalogue, PluginFile, shipped_missions
 
 if TYPE_CHECKING:
     from tussle.api import Plugin
 
 
-def plugins_of(files: Iterable[Path]) -> dict[str, type[Plugin]]:
-    """The plugins that some Python files define.
-
-    Raises:
-        MissionError: A file cannot be imported.
-    """
-    return Catalogue(files).own
+def all_plugins(files: Iterable[Path]) -> tuple[dict[str, type[Plugin]], list[str], list[str]]:
+    """All plugins by name, what is wrong with those that cannot be loaded, and which names hide others."""
+    found: dict[str, type[Plugin]] = {}
+    good, wrong = list[PluginFile](), list[str]()
+    for path in files:
+        try:
+            file = PluginFile.of(path)
+            file.load()
+            good.append(file)
+        except MissionError as error:
+            wrong.append(str(error))
+    catalogue = Catalogue(good)
+    for name in catalogue.names:
+        try:
+            found[name] = catalogue.load(name)
+        except MissionError as error:
+            wrong.append(str(error))
+    return found, wrong, [text for name in found if (text := catalogue.hides(name))]
 
 
 def plugin_named(name: str, files: Iterable[Path]) -> type[Plugin] | None:
@@ -31,6 +42,8 @@ def plugin_named(name: str, files: Iterable[Path]) -> type[Plugin] | None:
     """
     catalogue = Catalogue(files)
     if name in catalogue.names:
+        if hides := catalogue.hides(name):
+            say_note(hides)
         return catalogue.load(name)
     if name in shipped_missions() or Path(name).exists() or Path(name).suffix == ".xml":
         return None

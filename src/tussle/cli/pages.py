@@ -15,7 +15,6 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from tussle import stock
 from tussle.api import Plugin
 from tussle.cli.terminal import out, put
 from tussle.columns import Numbers, Param, Publish
@@ -55,12 +54,11 @@ def first_sentence(cls: type[Any]) -> str:
 # -- lists ------------------------------------------------------------------------------------------------------------------
 
 
-def show_plugins(loaded: dict[str, type[Plugin]]) -> None:
-    """All plugins by kind, those of other packages and of plugin files too."""
-    found = {name: stock.load(name) for name in (*stock.manifest(), *stock.others())} | loaded
+def show_plugins(found: dict[str, type[Plugin]]) -> None:
+    """Plugins by kind."""
     by_kind: dict[str, list[str]] = {}
     for name, cls in sorted(found.items()):
-        by_kind.setdefault(cls.kind, []).append(name)
+        by_kind.setdefault(getattr(cls, "kind", "plugin"), []).append(name)
     lines = Text()
     for kind in sorted(by_kind, key=lambda k: KINDS.index(k) if k in KINDS else len(KINDS)):
         lines.append(f"\n{kind}\n", "bold cyan")

@@ -1,8 +1,18 @@
 """What is played: a mission as data, and the files it is read from."""
 
-from tussle.mission.catalogue import Catalogue, load_plugin_file
+from tussle.mission.catalogue import Catalogue
+from tussle.mission.plugin_files import PluginFile, load_plugin_file
 from tussle.mission.source import shipped_missions
 from tussle.mission.spec import Block, Mission
 from tussle.mission.xml import Loaded, read_mission
 
-__all__ = ["Block", "Catalogue", "Loaded", "Mission", "load_plugin_file", "read_mission", "shipped_missions"]
+__all__ = [
+    "Block",
+    "Catalogue",
+    "Loaded",
+    "Mission",
+    "PluginFile",
+    "load_plugin_file",
+    "read_mission",
+    "shipped_missions",
+]

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
-import importlib.util
 import sys
 import tomllib
-import traceback
-from collections.abc import Iterable
-from functools import cache
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import cache, partial
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,7 @@ from tussle import stock
 from tussle.api import Autonomy, Behavior, Controller, Interaction, Metric, MotionModel, Network, Sensor
 from tussle.api.plugin import Plugin
 from tussle.errors import MissionError, listed, nearest_name
+from tussle.mission.plugin_files import PluginFile
 
 KINDS: dict[str, type] = {
     "autonomy": Autonomy,
@@ -28,9 +28,6 @@ KINDS: dict[str, type] = {
     "behaviors": Behavior,
 }
 """What each tag names."""
-
-CONTENT = "__plugin_file_content__"
-"""In the module of a plugin file: hash of the text that it was made from."""
 
 
 @cache
@@ -48,25 +45,47 @@ class AbsentPluginError(MissionError):
     """A plugin of the existing system that tussle does not have yet."""
 
 
-class Catalogue:
-    """Finds plugin classes by name.
-
-    Args:
-        plugin_files: Python files whose plugins can be named too; they win over others of the same name.
+@dataclass(frozen=True)
+class Offer:
+    """Where a plugin is to be had.
 
     Attributes:
-        own: The plugins of these files.
+        place: In words.
+        load: Gives the class.
+    """
+
+    place: str
+    load: Callable[[], Any]
+
+
+class Catalogue:
+    """Finds plugin classes by name. Plugins of files win over those of installed packages, and these over those that ship.
+
+    Args:
+        plugin_files: Python files whose plugins can be named too; of two with the same name the later file's wins.
+
+    Attributes:
         names: All that can be named.
 
     Raises:
         MissionError: A file cannot be imported, or holds no plugin.
     """
 
-    def __init__(self, plugin_files: Iterable[str | Path] = ()) -> None:
-        self.own: dict[str, type[Plugin]] = {}
-        for path in plugin_files:
-            self.own.update(load_plugin_file(path))
-        self.names = sorted({*self.own, *stock.manifest(), *stock.others()})
+    def __init__(self, plugin_files: Iterable[str | Path | PluginFile] = ()) -> None:
+        self._offers: dict[str, list[Offer]] = {
+            name: [Offer("that ships", partial(stock.load, name))] for name in stock.manifest()
+        }
+        for point in installed():
+            place = f"of the package {point.dist.name if point.dist else '?'} ({point.value})"
+            self._offers.setdefault(point.name, []).append(Offer(place, point.load))
+        for given in plugin_files:
+            file = given if isinstance(given, PluginFile) else PluginFile.of(given)
+            found = file.load()
+            for name in found:
+                offer = Offer(f"of {file.path}", partial(found.__getitem__, name))
+                others = [o for o in self._offers.get(name, ()) if o.place != offer.place]
+                self._offers[name] = [*others, offer]
+        self.names = sorted(self._offers)
 
     def load(self, name: str) -> type[Plugin]:
         """The class of this name.
@@ -75,80 +94,34 @@ class Catalogue:
             AbsentPluginError: The existing system has it, tussle not yet.
             MissionError: There is none, or its module cannot be imported.
         """
-        if name in self.own:
-            return self.own[name]
-        if name not in self.names:
+        if name not in self._offers:
             if name in historic_names():
                 raise AbsentPluginError(f"{name} is not in tussle yet")
             raise MissionError(
                 f"there is no plugin {name[:80]!r}{nearest_name(name[:80], self.names)}; {listed(self.names)}"
             )
+        offer = self._offers[name][-1]
         try:
-            found = stock.load(name)
-        except Exception as error:
-            raise MissionError(
-                f"plugin {name!r} cannot be imported: {type(error).__name__}: {error}"
-            ) from error
+            found = offer.load()
+        except (Exception, SystemExit) as error:
+            text = f"{type(error).__name__}: {' '.join(str(error).split())}"
+            raise MissionError(f"plugin {name!r} {offer.place} cannot be imported: {text}") from error
         if not (isinstance(found, type) and issubclass(found, Plugin)):
-            raise MissionError(f"plugin {name!r} is {found!r}, which is no plugin class")
+            raise MissionError(f"plugin {name!r} {offer.place} is {found!r}, which is no plugin class")
         return found
 
-
-def module_of_plugin_file(path: str | Path) -> str:
-    """Name of the module that a plugin file becomes: one of its own, so that plugins of two files called alike pickle."""
-    file = Path(path).expanduser()
-    digest = hashlib.blake2b(str(file.resolve()).encode(), digest_size=4).hexdigest()
-    return f"tussle_plugin_file_{digest}_{file.stem if file.stem.isidentifier() else 'plugin'}"
+    def hides(self, name: str) -> str:
+        """Which plugin a name means that several have, in words; "" where there is one only."""
+        *others, winner = (f"the one {offer.place}" for offer in self._offers[name])
+        return f"{name} is {winner}; it hides {' and '.join(others)}" if others else ""
 
 
-def load_plugin_file(path: str | Path, module_name: str = "") -> dict[str, type[Plugin]]:
-    """The plugins that a Python file defines, by the names of their classes. The file is run, as an import does.
-
-    A file that has not changed since it was loaded is not run again: its classes stay the same ones.
-
-    Args:
-        path: The file.
-        module_name: Instead of the name that follows from the path.
-
-    Raises:
-        MissionError: It cannot be read or imported, or defines no plugin; the message has the file's own line.
-    """
-    file = Path(path).expanduser()
-    if not file.is_file():
-        raise MissionError(f"{path}: there is no such plugin file")
-    name = module_name or module_of_plugin_file(path)
-    spec = importlib.util.spec_from_file_location(name, file.resolve())
-    if spec is None or spec.loader is None:
-        raise MissionError(f"{path}: this is not a Python file (its name ends with .py)")
-    try:
-        content = hashlib.blake2b(file.read_bytes(), digest_size=16).hexdigest()
-    except OSError as error:
-        raise MissionError(f"{path}: it cannot be read: {error.strerror or error}") from error
-    module = sys.modules.get(name)
-    if module is None or vars(module).get(CONTENT) != content:
-        module = importlib.util.module_from_spec(spec)
-        vars(module)[CONTENT] = content
-        sys.modules[name] = module
-        try:
-            spec.loader.exec_module(module)
-        except (Exception, SystemExit) as error:
-            sys.modules.pop(name, None)
-            raise MissionError(
-                f"{_line(error, file)}: it cannot be imported: {type(error).__name__}: {error}"
-            ) from error
-    found = {
-        key: value
-        for key, value in vars(module).items()
-        if isinstance(value, type) and issubclass(value, Plugin) and value.__module__ == name
-    }
-    if not found:
-        raise MissionError(f"{path}: it defines no plugin (a class derived from Autonomy, MotionModel, ...)")
-    return found
+def installed() -> tuple[EntryPoint, ...]:
+    """What other installed packages offer under the entry point `tussle.plugins`; who is first on the import path comes last."""
+    return _installed(tuple(sys.path))
 
 
-def _line(error: BaseException, file: Path) -> str:
-    """The last line of the file that the error passed through."""
-    if isinstance(error, SyntaxError) and error.lineno:
-        return f"{error.filename or file}:{error.lineno}"
-    own = [f for f in traceback.extract_tb(error.__traceback__) if Path(f.filename) == file.resolve()]
-    return f"{file}:{own[-1].lineno}" if own else str(file)
+@cache
+def _installed(_path: tuple[str, ...]) -> tuple[EntryPoint, ...]:
+    """What the packages on an import path offer: looking through them takes longer than reading a mission."""
+    return tuple(reversed(tuple(entry_points(group="tussle.plugins"))))

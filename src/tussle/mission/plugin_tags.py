@@ -114,6 +114,8 @@ class PluginReader:
         except MissionError as error:
             self.problems.error(place, f"{tag}: {error}")
             return None
+        if hides := self.catalogue.hides(written.plugin):
+            self.problems.note(place, hides)
         if not issubclass(cls, KINDS[written.tag]):
             its = next(
                 (t for t, kind in KINDS.items() if issubclass(cls, kind) and t != "behaviors"), "no tag"

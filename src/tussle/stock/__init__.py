@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import importlib.metadata
-import sys
 import tomllib
 from collections.abc import Iterable
 from functools import cache
@@ -21,28 +19,17 @@ def manifest() -> dict[str, str]:
     return dict(tomllib.loads(text)["plugins"])
 
 
-def others() -> dict[str, str]:
-    """Name -> "module:class" of the plugins that other installed packages offer under the entry point `tussle.plugins`."""
-    return _offered(tuple(sys.path))
-
-
-@cache
-def _offered(_path: tuple[str, ...]) -> dict[str, str]:
-    """What the packages on an import path offer: looking through them takes longer than reading a mission."""
-    return {point.name: point.value for point in importlib.metadata.entry_points(group="tussle.plugins")}
-
-
 def load(name: str) -> Any:
-    """A plugin class by its name: one that ships, else one of another installed package.
+    """A plugin class that ships, by its name.
 
     Raises:
         ParameterError: There is none of this name.
     """
-    path = manifest().get(name) or others().get(name)
-    if path is None:
-        known = sorted({*manifest(), *others()})
-        raise ParameterError(f"there is no plugin {name!r}{nearest_name(name, known)}; {listed(known)}")
-    module, _, attribute = path.partition(":")
+    if name not in manifest():
+        raise ParameterError(
+            f"there is no plugin {name!r}{nearest_name(name, manifest())}; {listed(manifest())}"
+        )
+    module, _, attribute = manifest()[name].partition(":")
     return getattr(importlib.import_module(module), attribute)
 
 

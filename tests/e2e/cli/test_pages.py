@@ -41,6 +41,37 @@ def test_plugins_are_listed_by_kind_and_own_ones_too(tussle, folder):
     assert max(map(len, lines)) <= 80
 
 
+def test_a_broken_plugin_is_one_line_and_the_others_are_listed(tussle, folder, monkeypatch):
+    info = folder / "site/broken-1.0.dist-info"
+    info.mkdir(parents=True)
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: broken\nVersion: 1.0\n")
+    points = "Boids = my_boids:Boids\nGone = no_such_package:Gone\nLoud = loud:Loud\nNone = math:pi\n"
+    (info / "entry_points.txt").write_text(f"[tussle.plugins]\n{points}")
+    (folder / "site/loud.py").write_text("raise RuntimeError('two\\nlines')")
+    boids = 'from tussle.stock import Boids as Old\n\n\nclass Boids(Old):\n    """Woolly."""\n'
+    (folder / "site/my_boids.py").write_text(boids)
+    (folder / "wrong.py").write_text("1 / 0")
+    (folder / "mine.py").write_text(boids.replace("Boids(Old)", "Predator(Old)"))
+    monkeypatch.syspath_prepend(folder / "site")
+    done = tussle("plugins", "--plugin-path", "wrong.py", "--plugin-path", "mine.py", code=1)
+    lines = [line.split() for line in done.stdout.splitlines()]
+    assert ["Boids", "Woolly"] in lines
+    assert ["Predator", "Woolly"] in lines
+    assert "Unicycle" in [line[0] for line in lines if line]
+    mine, lacks = folder.resolve() / "mine.py", "ModuleNotFoundError: No module named 'no_such_package'"
+    assert sorted(done.stderr.splitlines()) == [
+        f"error: {folder.resolve()}/wrong.py:1: it cannot be imported: ZeroDivisionError: division by zero",
+        f"error: plugin 'Gone' of the package broken (no_such_package:Gone) cannot be imported: {lacks}",
+        "error: plugin 'Loud' of the package broken (loud:Loud) cannot be imported: RuntimeError: two lines",
+        "error: plugin 'None' of the package broken (math:pi) is 3.141592653589793, which is no plugin class",
+        "note: Boids is the one of the package broken (my_boids:Boids); it hides the one that ships",
+        f"note: Predator is the one of {mine}; it hides the one that ships",
+    ]
+    done = tussle("describe", "Boids", "--plugin-path", "mine.py")
+    assert done.stderr == f"{done.stderr.splitlines()[0]}\n"
+    assert "Boids is the one of the package broken" in done.stderr
+
+
 def test_missions_are_listed_with_their_titles(tussle):
     text = tussle("missions").stdout
     for name, (_, title) in shipped_missions().items():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import time
 
 import gambles
@@ -343,6 +344,44 @@ def test_files_that_only_some_points_include_belong_to_the_batch(mission, tmp_pa
         run = planned_run(tmp_path / "out", number)
         with Simulation(run.mission, run.seed) as simulation:
             assert simulation.run()[0].state_hash == run.state_hash == state_hash
+
+
+SIDE = """
+import numpy as np
+import geometry
+from tussle.api import Metric, State
+
+class {name}(Metric):
+    side = State(per="world")
+
+    def step(self, w):
+        self.side[:] = geometry.SIDE
+
+    def result(self, w):
+        return {{"{name}": self.side}}
+"""
+
+
+def test_neighbours_of_plugin_files_go_where_the_batch_goes(tmp_path):
+    game, plugins = tmp_path / "game.xml", [tmp_path / side / "plugin.py" for side in ("left", "right")]
+    for number, plugin in enumerate(plugins):
+        plugin.parent.mkdir()
+        plugin.write_text(SIDE.format(name=plugin.parent.name.title()))
+        (plugin.parent / "geometry.py").write_text(f"SIDE = {number + 1.0}")
+    game.write_text(
+        "<runscript><run dt='0.1' end='0.3'/><metrics>Left</metrics><metrics>Right</metrics>"
+        "<entity><autonomy>Boids</autonomy><motion_model>Unicycle</motion_model></entity></runscript>"
+    )
+    batch = Batch(game, runs=4, plugin_files=plugins)
+    results = batch.play(tmp_path / "out", Processes(2, 2))
+    assert hashes(batch.play(executor=InProcess())) == hashes(results)
+    for metric, side in (("Left", 1.0), ("Right", 2.0)):
+        assert set(results.quantity(f"{metric}.{metric}")) == {side}
+    for plugin in plugins:
+        shutil.rmtree(plugin.parent)
+    run = planned_run(tmp_path / "out", 3)
+    with Simulation(run.mission, run.seed) as simulation:
+        assert simulation.run()[0].state_hash == run.state_hash
 
 
 def test_what_batch_json_says(mission, tmp_path):

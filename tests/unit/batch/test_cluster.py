@@ -261,12 +261,16 @@ def test_closing_it_ends_what_is_under_way(cluster, client, tmp_path):
 
 
 def test_a_plugin_file_travels_and_one_that_has_changed_is_loaded_anew(client, tmp_path):
-    batch = walk(tmp_path)
+    line, pace = "import pace; me.speed = pace.PACE * me.fast", tmp_path / "pace.py"
+    pace.write_text("PACE = 9.0")
+    batch = walk(tmp_path, line)
     first = rows(batch.play(None, OnDask(client)))
     assert first == rows(batch.play(None, InProcess()))
-    shutil.move(tmp_path / "walker.py", tmp_path / "elsewhere.py")  # as on a machine that does not have it
+    for name in ("walker.py", "pace.py"):
+        shutil.move(tmp_path / name, tmp_path / f"{name}.moved")  # as on a machine that does not have it
     assert rows(batch.play(None, OnDask(client))) == first
-    changed = walk(tmp_path, "me.speed = 3.0")
+    pace.write_text("PACE = 3.0")
+    changed = walk(tmp_path, line)
     second = rows(changed.play(None, OnDask(client)))
     assert second == rows(changed.play(None, InProcess()))
     assert second != first

@@ -11,9 +11,9 @@ from gambles import game
 
 from tussle import Block, Mission, Simulation
 from tussle.api import Autonomy, Param, Ragged
-from tussle.batch.tasks import PluginFile
 from tussle.batch.treatments import build_points, exactly, group_points, read_points, split, with_value
 from tussle.errors import MissionError, ParameterError, TussleError
+from tussle.mission import PluginFile
 from tussle.stock import AvoidEntityMS, Boundary, MotorSchemas, MoveToGoalMS, SingleIntegrator, Still
 
 
@@ -285,6 +285,7 @@ def test_a_plugin_file_is_there_as_it_was_when_it_has_changed_or_gone(tmp_path, 
     path = tmp_path / "own.py"
     path.write_text("from tussle.api import Metric, Param\n\n\nclass Own(Metric):\n    x = Param(1.0)\n")
     file = PluginFile.of(path)
+    file.load()
     kept = pickle.dumps(vars(sys.modules[file.module])["Own"](x=3.0))
     for text in ("from tussle.api import Metric\n\n\nclass Other(Metric):\n    pass\n", None):
         path.unlink(missing_ok=True)

@@ -10,11 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from tussle.batch.batch import Batch
-from tussle.batch.tasks import PluginFile
 from tussle.batch.treatments import build_points
 from tussle.batch.variables import Choice, Value, Variable
 from tussle.errors import BatchError, TussleError
-from tussle.mission import Loaded, Mission, read_mission
+from tussle.mission import Loaded, Mission, PluginFile, read_mission
 
 Point = Mapping[str, Value]
 
@@ -57,7 +56,7 @@ class SearchedMission:
         else:
             missions = self._corners(self.source)
             name, texts = missions[0].name, [repr(m) for m in missions]
-        texts += [PluginFile.of(Path(p)).text for p in self.plugin_files]
+        texts += [text for p in self.plugin_files for text in PluginFile.of(p).texts.values()]
         plain = re.sub(r"[^A-Za-z0-9_.-]+", "_", name).strip("._") or "mission"
         return Content(
             loaded, plain[:80], hashlib.blake2b("\0".join(texts).encode(), digest_size=16).hexdigest()
