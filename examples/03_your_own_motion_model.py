@@ -43,10 +43,11 @@ class Planner(Autonomy):
     def step(self, g):
         now = np.array([*g.pos, g.yaw, g.climb, np.sqrt(np.square(g.vel).sum(axis=0))])  # (6 states, n)
         path = PLANE.rollout(now.repeat(35, axis=1), np.tile(WAYS, (10, 1, g.n)), dt=0.3)  # (11, 6, n * 35)
-        prey = g.nearest(teams=1).other[0]  # (n,) rows in the table of all bodies
+        prey = g.nearest(teams=1).other[0]  # (n,) rows in the table of all bodies; -1 where no prey is left
         goal = g.bodies.pos[:, prey] + SECONDS * g.bodies.vel[:, prey]  # (11, 3, n)
         miss = path.reshape(11, 6, g.n, 35)[:, :3] - goal[..., None]
-        self.commands[:] = WAYS[:, np.square(miss).sum(axis=1).min(axis=0).argmin(axis=1)]
+        best = np.square(miss).sum(axis=1).min(axis=0).argmin(axis=1)
+        self.commands[:, prey >= 0] = WAYS[:, best[prey >= 0]]
 
 
 # Of two that write a channel the last wins: the predator's part is to claim what is within its reach.

@@ -76,6 +76,12 @@ class Numbers(Column):
         self.fields = _fields(fields, type(self).__name__)
         self.unit = unit
         self.units = units.split_units(unit, max(1, len(self.fields)))
+        for each in self.units:
+            if not units.is_si(each):
+                raise DeclarationError(
+                    f"{type(self).__name__}: unit {each!r} is not SI, and numbers inside a simulation are; declare the SI unit"
+                    + (" and text_unit for mission files" if isinstance(self, Param) else "")
+                )
         if dtype not in (float, int, bool):
             raise DeclarationError(f"{type(self).__name__}: dtype {dtype!r} is not one of float, int, bool")
         self.dtype = dtype
@@ -155,7 +161,7 @@ class Param(Numbers):
         """Value in SI units as plain Python, checked.
 
         Args:
-            value: A number (SI), a text with unit ("40 kt"), or for several fields a sequence of them.
+            value: A number (SI), a text as in a mission file ("40 kt", or "40" in `text_unit`), or for several fields a sequence.
             where: Place for the message.
 
         Raises:
@@ -209,7 +215,7 @@ class Param(Numbers):
 
     def _parsed(self, text: str, component: int, where: str) -> float:
         try:
-            return units.parse(text, self.units[component])
+            return units.parse(text, self.units[component], self.text_units[component])
         except UnitError as error:
             raise ParameterError(f"{self._place(where)} = {text!r}: {error}") from None
         except ValueError:

@@ -311,12 +311,6 @@ class WrongStep(SoundAutonomy):
         pass
 
 
-class NotSI(SoundAutonomy):
-    """Thinks in knots."""
-
-    fast = Param(10.0, unit="kt")
-
-
 class HalfBelief(SoundSensor):
     """Believes in a place on the map only."""
 
@@ -714,7 +708,6 @@ BROKEN = {
         ListOnClass,
         NotAHook,
         OwnInit,
-        NotSI,
         NothingToDo,
         DeclaresPos,
     ],

@@ -13,9 +13,9 @@ from tussle.errors import MissionError, ParameterError, listed, nearest_name
 from tussle.mission import Block, Mission
 
 BLOCK_VALUES = {
-    "heading": Param(0.0, unit="rad"),
-    "climb": Param(0.0, unit="rad"),
-    "roll": Param(0.0, unit="rad"),
+    "heading": Param(0.0, unit="rad", text_unit="deg"),
+    "climb": Param(0.0, unit="rad", text_unit="deg"),
+    "roll": Param(0.0, unit="rad", text_unit="deg"),
     "speed": Param(0.0, unit="m/s", ge=0.0),
     "health": Param(1.0, gt=0.0),
     "radius": Param(1.0, unit="m", gt=0.0),

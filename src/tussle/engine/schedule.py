@@ -61,10 +61,8 @@ class Schedule:
         for group in groups:
             for binding in group.sensors:
                 calls.append(self._entity_call("sensor", group, binding))
-        if sim.interactions and any(g.body_inputs for g in groups):
-            calls.append(
-                Call("forces back to zero: the motion models have consumed them", self._clear_forces)
-            )
+        if sim.interactions:
+            calls.append(Call("forces back to zero: they have acted", self._clear_forces))
         calls += [self._world_call("interaction", r) for r in sim.interactions if not r.plugin.is_idle]
         if sim.interactions:
             calls.append(Call("take over what was moved", sim.take_over_moves))

@@ -36,7 +36,12 @@ def _numbers(where: str, value: Any, unit: str, n: int) -> tuple[float, ...]:
 
 def _number(where: str, value: Any, unit: str) -> float:
     try:
-        number = units.parse(value, unit) if isinstance(value, str) else float(value)
+        # A text is read as in a mission file, where angles without a unit are in degrees.
+        number = (
+            units.parse(value, unit, "deg" if unit == "rad" else unit)
+            if isinstance(value, str)
+            else float(value)
+        )
     except (TypeError, ValueError) as error:
         raise MissionError(f"{where} = {value!r} is not allowed: {error}") from None
     if not math.isfinite(number):

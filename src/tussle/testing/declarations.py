@@ -93,9 +93,6 @@ def _hooks(cls: type[Plugin]) -> Iterator[str]:
 def _column(name: str, column: Column) -> Iterator[str]:
     if not isinstance(column, Numbers):
         return
-    for unit in column.units:
-        if not units.is_si(unit):
-            yield f"{name} is in {unit!r}; inside a simulation all numbers are SI (Param takes text_unit for mission files)"
     if isinstance(column, Param):
         for unit, text_unit in zip(column.units, column.text_units, strict=True):
             if units.unit_of(unit).dimension != units.unit_of(text_unit).dimension:

@@ -10,6 +10,7 @@ import pytest
 from design_plugins import Chaser
 from small_worlds import Note, Parcel
 
+from tussle import Block, Mission, Simulation
 from tussle.api import (
     Autonomy,
     Batch,
@@ -283,3 +284,23 @@ def test_messages_keep_the_order_of_saying():
     second = Batch.make(Note, np.zeros(1, int), np.array([5]), {"value": 3})
     assert Batch.concatenate([first, second]).value.tolist() == [1, 2, 3]
     assert Batch.concatenate([second, first]).value.tolist() == [3, 1, 2]
+
+
+@pytest.mark.parametrize("unit", ["deg", "kt", "m deg"])
+def test_a_unit_that_is_not_si_is_refused(unit):
+    with pytest.raises(DeclarationError, match=r"is not SI"):
+        Param((0.0, 0.0) if " " in unit else 0.0, unit=unit, fields="a b" if " " in unit else "")
+
+
+def test_a_text_means_the_same_through_every_door():
+    """A number is SI, a text is read as a mission file reads it."""
+    right_angle = math.pi / 2
+    assert Boids(fov_az="90").values["fov_az"] == right_angle
+    assert Boids(fov_az=right_angle).values["fov_az"] == right_angle
+    block = Block(name="b", heading="90", autonomy=Boids(), motion=Unicycle())
+    assert block.heading == right_angle
+    game = Mission(blocks=[block])
+    for value in ("90", "90 deg", right_angle):
+        with Simulation(game, params={"b.Boids.fov_az": value, "b.heading": value}) as sim:
+            assert sim.read("b.Boids.fov_az")[0] == right_angle
+            assert sim.read("b.yaw")[0] == pytest.approx(right_angle)
