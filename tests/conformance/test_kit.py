@@ -29,6 +29,7 @@ from tussle.api import (
     State,
     Subscribe,
     check_plugin,
+    neighbors,
 )
 from tussle.errors import ConformanceError, TussleError
 from tussle.messages import CaptureEntity
@@ -311,6 +312,18 @@ class UsesLibmInKernel(SoundAutonomy):
         self.speed[:] = [compiled_exp(-abs(x)) for x in g.vel[0]]
 
 
+class UsesLibmInLaw(SoundAutonomy):
+    """A cosine of the C library in a neighbour law."""
+
+    @neighbors(10.0, ahead="sum")
+    @staticmethod
+    def law(other_yaw):
+        return math.cos(other_yaw)
+
+    def step(self, g: GroupView) -> None:
+        self.speed[:] = self.law(g).ahead
+
+
 class UsesChance(SoundAutonomy):
     """Draws from one generator for all."""
 
@@ -566,7 +579,7 @@ BROKEN = {
     ],
     "grade": [
         *(UsesSine, UsesMathInAnotherFunction, UsesMatrixProduct, UsesPower, UsesSum, UsesMean),
-        *(UsesLibmInDerivative, UsesLibmInKernel, UsesChance),
+        *(UsesLibmInDerivative, UsesLibmInKernel, UsesLibmInLaw, UsesChance),
     ],
     "stack invariance": [CountsRows, KnowsItsRow, CountsCalls, RemembersById],
     "snapshot": [MissesSnapshot],

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from tussle.api import Plugin
+from tussle.api.laws import NeighborLaw
 from tussle.engine.conformance_declarations import own_classes
 from tussle.engine.conformance_source import Reader
 from tussle.errors import ConformanceError
@@ -65,7 +66,10 @@ class Scan:
         self._seen: set[int] = set()
         for base in own_classes(cls):
             for name, value in vars(base).items():
-                if name == "derivative":
+                if isinstance(value, NeighborLaw):
+                    for law in (*value.laws, *([value.where] if value.where else [])):
+                        self._compiled(law.function, f"{base.__name__}.{law.function.__name__}")
+                elif name == "derivative":
                     self._compiled(getattr(base, name), f"{base.__name__}.derivative")
                 else:
                     self._object(value, f"{base.__name__}.{name}")
