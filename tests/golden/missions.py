@@ -30,6 +30,8 @@ from tussle.stock import (
     Straight,
     Unicycle,
     UnicyclePID,
+    WaypointDispatcher,
+    WaypointGenerator,
 )
 
 SEEDS = (1, 2, 3)
@@ -167,6 +169,66 @@ def cars() -> Mission:
     return Mission(blocks=[car], motion_multiplier=5, end=5.0)
 
 
+def hunters_first() -> Mission:
+    """Hunters with the lowest ids keep to prey whose ids are above all that are left once it is captured."""
+    hunter = Block(
+        name="hunter", team=2, count=3, autonomy=Predator(max_speed=35.0, capture_range=8.0, allow_prey_switching=False),
+        motion=Unicycle(vel_max=35.0, turn_rate_max=2.0),
+    )  # fmt: skip
+    prey = Block(
+        name="prey", team=1, count=4, position=(30.0, 0.0, 0.0), variance=(400.0, 400.0, 0.0), autonomy=Boids(),
+        motion=Unicycle(vel_max=20.0),
+    )  # fmt: skip
+    return Mission(blocks=[hunter, prey], interactions=[SimpleCapture(capture_range=8.0)], end=8.0)
+
+
+def last_captured_first() -> Mission:
+    """The entity with the last id starts next to a hunter and is captured first."""
+    prey = _prey(6)
+    hunter = _hunters("keepers", 2, 1, 0.0, switches=False)
+    last = Block(
+        name="last",
+        team=1,
+        count=1,
+        position=(40.0, 3.0, 200.0),
+        autonomy=Boids(),
+        motion=Unicycle(vel_max=20.0),
+    )
+    return Mission(
+        blocks=[prey, hunter, last],
+        interactions=[SimpleCapture(capture_range=20.0)],
+        update="sequential",
+        end=5.0,
+    )
+
+
+def _nursery(update: str) -> Mission:
+    """Births two at a time, and messages in the very steps of the births."""
+    block = Block(
+        name="newborn", team=1, count=12, variance=(100.0, 100.0, 0.0), rate=2.0, slots=2, interval_sd=0.05,
+        autonomy=[WaypointGenerator(), WaypointDispatcher(), MotorSchemas(behaviors=[MoveToGoalMS()])],
+        controller=UnicyclePID(), motion=Unicycle(),
+    )  # fmt: skip
+    slow = Block(
+        name="slow",
+        team=2,
+        count=4,
+        autonomy=Beacon(rate=2.0, network="GlobalNetwork"),
+        motion=SingleIntegrator(),
+    )
+    return Mission(blocks=[slow, block], update=update, end=5.0)
+
+
+def births_synchronous() -> Mission:
+    """Births and messages, all at once."""
+    return _nursery("synchronous")
+
+
+def births_sequential() -> Mission:
+    """Births and messages, one after another: each newborn brings a group of its own."""
+    return _nursery("sequential")
+
+
 STEPS: dict[str, int] = {
     "chase_synchronous": 24,
     "chase_sequential": 24,
@@ -177,6 +239,10 @@ STEPS: dict[str, int] = {
     "narrow_view": 24,
     "slow_clocks": 24,
     "cars": 24,
+    "hunters_first": 80,
+    "last_captured_first": 24,
+    "births_synchronous": 40,
+    "births_sequential": 40,
 }
 """Steps after which a mission's hashes are taken."""
 

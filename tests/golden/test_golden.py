@@ -204,6 +204,10 @@ STATES = {
     "narrow_view": ("narrow.Boids.target", 2),
     "slow_clocks": ("prey.UnicyclePID.memory", 2),
     "cars": ("car.Wanderer.wish", None),
+    "hunters_first": ("prey.Boids.target", 0),
+    "last_captured_first": ("prey.Boids.target", 0),
+    "births_synchronous": ("slow.Beacon.rumour", 0),
+    "births_sequential": ("slow.Beacon.rumour", 0),
 }
 
 

@@ -23,6 +23,7 @@ FLOATS = {
     "mass": 1,
 }
 INTS = ("id", "team", "world", "block", "place_in_block")
+STORED_INTS = (*INTS, "born")
 DERIVED = {"yaw": 1, "climb": 1, "roll": 1, "forward": 3, "level_forward": 2}
 N_FLOATS = sum(FLOATS.values())
 EVERYWHERE = np.inf
@@ -59,11 +60,12 @@ class Bodies:
 
     Attributes:
         floats: Storage of the real columns, (22, n).
-        ints: Storage of the whole-number columns, (5, n).
+        ints: Storage of the whole-number columns, (6, n).
         n_worlds: Number of worlds; world numbers in the table are below it.
         n: Number of rows.
         pos: Position [m], (3, n), world frame; likewise vel [m/s], quat (w, x, y, z), omega [rad/s], force [N], torque [N m],
             health, radius [m], mass [kg], and id, team, world, block, place_in_block.
+        born: Step of its world in which each entity was born, (n,); 0 for those that are there from the start.
     """
 
     pos: np.ndarray
@@ -80,6 +82,7 @@ class Bodies:
     world: np.ndarray
     block: np.ndarray
     place_in_block: np.ndarray
+    born: np.ndarray
 
     def __init__(self, floats: np.ndarray, ints: np.ndarray, n_worlds: int) -> None:
         self.n_worlds = n_worlds
@@ -93,7 +96,7 @@ class Bodies:
         for name in ("health", "radius", "mass"):
             floats[OFFSETS[name]] = 1.0
         floats[OFFSETS["quat"]] = 1.0
-        return cls(floats, np.zeros((len(INTS), n), np.int64), n_worlds)
+        return cls(floats, np.zeros((len(STORED_INTS), n), np.int64), n_worlds)
 
     def replace(self, floats: np.ndarray, ints: np.ndarray) -> None:
         """Take other rows; everything that was derived from the old ones is dropped."""
@@ -103,7 +106,7 @@ class Bodies:
         for name, k in FLOATS.items():
             first = OFFSETS[name]
             own[name] = floats[first : first + k] if k > 1 else floats[first]
-        for i, name in enumerate(INTS):
+        for i, name in enumerate(STORED_INTS):
             own[name] = ints[i]
         self.version = self._oldest = 0
         self._touched: list[tuple[int, int]] = []

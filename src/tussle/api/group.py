@@ -159,6 +159,11 @@ class GroupView:
 
     # -- others -----------------------------------------------------------------------------------------------------------
 
+    @property
+    def born(self) -> np.ndarray:
+        """Step of its world in which each entity was born, (n,); for inboxes."""
+        return self._bodies.born[self.first : self.last]
+
     def bodies_rows(self, world: np.ndarray, ids: np.ndarray) -> np.ndarray:
         return self._bodies.rows_of(world, ids)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from tussle.neighbors.kernels import row_of
 from tussle.numeric import atan2
 from tussle.numeric.kernel import device, kernel
 
@@ -116,10 +117,7 @@ def lay_out(world, ids, id_start, id_row, members, world_start):
 def find_rows(world, ids, id_row, id_start, rows):
     """rows[i] is the row of (world[i], ids[i]); -1 for id 0 and for those that are gone."""
     for i in range(world.shape[0]):
-        w = world[i]
-        rows[i] = -1
-        if ids[i] > 0 and ids[i] < id_start[w + 1] - id_start[w]:
-            rows[i] = id_row[id_start[w] + ids[i]]
+        rows[i] = row_of(world[i], ids[i], id_row, id_start)
 
 
 @kernel("F I Fw -> f8")

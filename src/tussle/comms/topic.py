@@ -147,6 +147,8 @@ class Inbox:
             batch = parcel.batch
             if isinstance(parcel.to, str) and parcel.to == EVERYONE:
                 row, number = _everyone(batch.world, view.world)
+                was_born = view.born[row] <= parcel.due[number]  # who comes later has not heard it
+                row, number = row[was_born], number[was_born]
             else:
                 if isinstance(parcel.to, str):
                     number, ids = np.arange(batch.n), batch.sender

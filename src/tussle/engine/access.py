@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tussle.api.bodies import DERIVED, FLOATS, INTS, Bodies, derive
-from tussle.columns import EntityRef, Handle, Output, Param, State
+from tussle.columns import EntityRef, Handle, Numbers, Output, Param, State
 from tussle.engine import failure
 from tussle.engine.group import Binding, Group
 from tussle.engine.result import WorldResult
@@ -206,6 +206,10 @@ def _check_written(path: str, values: np.ndarray, column: Any) -> None:
         raise ParameterError(f"{path!r}: values hold NaN")
     if column is None and not path.endswith(".health") and not np.isfinite(values).all():
         raise ParameterError(f"{path!r}: values must be finite")
+    if isinstance(column, Numbers) and column.dtype is int:
+        with np.errstate(invalid="ignore"):
+            if (np.asarray(values).astype(np.int64) != values).any():
+                raise ParameterError(f"{path!r}: values must be whole numbers of 64 bits")
     if isinstance(column, Param):
         for value in np.unique(values, axis=-1).T if column.fields else np.unique(values):
             column.convert(value, path)

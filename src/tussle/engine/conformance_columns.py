@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tussle.api import Interaction, MotionModel, Plugin
-from tussle.api.bodies import FLOATS, INTS
+from tussle.api.bodies import FLOATS, STORED_INTS
 from tussle.engine.conformance_declarations import MACHINERY, own_classes
 from tussle.engine.conformance_game import SEEDS, STEPS, Game
 from tussle.engine.conformance_traces import columns_of, first_difference
@@ -149,7 +149,7 @@ def _compared(
 def _everything(sim: Simulation) -> Arrays:
     """All arrays of a simulation: name -> (array, names of its lines)."""
     bodies = sim.population.bodies
-    found: Arrays = {"bodies": (bodies.floats, BODY_ROWS), "who is who": (bodies.ints, list(INTS))}
+    found: Arrays = {"bodies": (bodies.floats, BODY_ROWS), "who is who": (bodies.ints, list(STORED_INTS))}
     for number, group in enumerate(sim.population.groups):
         for dtype, array in group.table.arrays.items():
             found[f"group {number} {dtype.__name__}"] = array, _labels(group, dtype, len(array))

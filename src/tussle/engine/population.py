@@ -188,6 +188,7 @@ class Population:
                 getattr(b, name)[rows] = values[who]
             b.id[rows], b.team[rows], b.world[rows] = new.id[who], new.team[who], new.world[who]
             b.block[rows], b.place_in_block[rows] = new.block[who], new.place[who]
+            b.born[rows] = self.context.clock.step[new.world[who]]
 
     def _start_rows(self, source: np.ndarray) -> None:
         """Parameters, beliefs, motion states, handles and `spawn` hooks of the newborn rows."""

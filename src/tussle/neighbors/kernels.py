@@ -27,6 +27,13 @@ def rank_bits(n: int) -> int:
 
 
 @device
+def row_of(world, entity, id_row, id_start):
+    """Row of the table of an entity by its id; -1 for every number that is not the id of a living entity of its world."""
+    first = id_start[world]
+    return id_row[first + entity] if 0 < entity < id_start[world + 1] - first else -1
+
+
+@device
 def cell_of(position, inverse_cell, limit):
     """Cell number in [0, 2 limit]; NaN goes to cell 0. Never decreasing in position."""
     cell = math.floor(position * inverse_cell)

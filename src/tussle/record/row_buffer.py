@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pyarrow as pa
 
-from tussle.api.bodies import FLOATS, INTS
+from tussle.api.bodies import FLOATS, STORED_INTS
 from tussle.record.schema import FLOAT_COLUMNS, INT_COLUMNS, TRAJECTORY
 
 CAPACITY = 32_768
@@ -22,7 +22,7 @@ class Rows:
     """Who is in a body table, as long as nobody comes or goes.
 
     Args:
-        ints: Whole-number columns of the table, (5, n).
+        ints: Whole-number columns of the table, (6, n).
         worlds: Worlds whose rows are wanted, (n_worlds,); None for all.
 
     Attributes:
@@ -32,7 +32,7 @@ class Rows:
     """
 
     def __init__(self, ints: np.ndarray, worlds: np.ndarray | None = None) -> None:
-        by_name = dict(zip(INTS, ints, strict=True))
+        by_name = dict(zip(STORED_INTS, ints, strict=True))
         world, ids = by_name["world"], by_name["id"]
         order = np.lexsort((ids, world))
         if worlds is not None:

@@ -24,7 +24,7 @@ from small_worlds import (
 from tussle import Simulation
 from tussle.api import Autonomy, Interaction, Metric, Output, Param, State
 from tussle.errors import MissionError, ParameterError, SnapshotError
-from tussle.stock import NoisyContacts, SimpleCollision, Unicycle
+from tussle.stock import NoisyContacts, Predator, SimpleCapture, SimpleCollision, Unicycle
 
 
 class Counter(Autonomy):
@@ -554,6 +554,35 @@ def test_write_reaches_the_plugins_and_the_motion():
     sim.step()
     assert sim.read("a.pos")[0][..., 0].tolist() == [pytest.approx([0.1, 0.2]), pytest.approx([0.3, 0.4])]
     assert sim.read("b.pos")[0][..., 0].tolist() == [[100.1], [100.1]]
+
+
+def hunt():
+    """Two hunters, who come first, and three prey."""
+    hunter = block(
+        "hunter", team=2, count=2, autonomy=Predator(allow_prey_switching=False), motion=Unicycle()
+    )
+    prey = block("prey", team=1, count=3, position=(500, 0, 0), variance=(100, 100, 0))
+    return mission(hunter, prey, interactions=[SimpleCapture()])
+
+
+@pytest.mark.parametrize("target", [-1, 6, 10**6, 2**62, -(2**63)])
+def test_a_reference_that_names_nobody_is_nobody(target):
+    sim = Simulation(hunt(), seeds=[1, 2])
+    untouched = Simulation(hunt(), seeds=[1, 2])
+    for each in (sim, untouched):
+        each.step(2)
+    assert sim.read("hunter.Predator.target")[0].min() >= 3
+    sim.write("hunter.Predator.target", target)
+    sim.step()
+    untouched.write("hunter.Predator.target", 0)
+    untouched.step()
+    assert [sim.state_hash(w) for w in (0, 1)] == [untouched.state_hash(w) for w in (0, 1)]
+
+
+@pytest.mark.parametrize("target", [0.5, 1e300])
+def test_a_reference_is_a_whole_number(target):
+    with pytest.raises(ParameterError, match=r"'hunter.Predator.target': values must be whole numbers"):
+        Simulation(hunt()).write("hunter.Predator.target", target)
 
 
 def test_world_columns_are_read_and_written_by_world():

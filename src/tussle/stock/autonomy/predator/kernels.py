@@ -6,15 +6,10 @@ import math
 
 import numpy as np
 
+from tussle.neighbors.kernels import row_of
 from tussle.neighbors.search import DIFFERENT, SAME, in_range, nearest_places
 from tussle.numeric import atan2, wrap
-from tussle.numeric.kernel import device, kernel
-
-
-@device
-def row_of(target, w, id_start, id_row):
-    """Row of the table of entity `target` of world w; -1 of none (0) or of one that is gone."""
-    return id_row[id_start[w] + target] if target != 0 else -1
+from tussle.numeric.kernel import kernel
 
 
 @kernel("F F F I I F B Iw Iw Iw Iw I I I I I i8 I I I I F F F F F I -> i8")
@@ -41,7 +36,7 @@ def hunt(
         row = first + i
         w = row_world[row]
         me = place[row]
-        found = row_of(target[i], w, id_start, id_row)
+        found = row_of(w, target[i], id_row, id_start)
         if found < 0 or allow_switching[i]:
             nearest_places(w, me, x[i], y[i], z[i], SAME, float(prey_team[i]), table, best, ranks, places, 1)
             found = order[places[0]] if places[0] >= 0 else -1

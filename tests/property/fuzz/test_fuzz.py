@@ -1,0 +1,45 @@
+"""Random missions: each world of a stack with a past is what it is alone, and nothing but a TussleError comes out.
+
+TUSSLE_FUZZ=20000 plays as many missions by hand.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from histories import difference
+
+N_MISSIONS = int(os.environ.get("TUSSLE_FUZZ", "200"))
+N_CHECKED = 24
+CHUNK = 10
+
+
+@pytest.mark.parametrize("first", range(0, N_MISSIONS, CHUNK))
+def test_worlds_of_random_missions_are_as_alone(first):
+    found = [difference(number) for number in range(first, min(first + CHUNK, N_MISSIONS))]
+    assert [text for text in found if text] == []
+    assert None in found or "" in found
+
+
+def test_most_random_missions_play():
+    """Otherwise the test above would look at nothing."""
+    assert sum(difference(number) == "" for number in range(10)) >= 6
+
+
+@pytest.mark.slow
+def test_no_kernel_leaves_its_arrays():
+    """The same with bounds checks compiled in, in a process of its own: Numba reads the setting when it is imported."""
+    program = (
+        "import sys, histories\n"
+        "found = [text for text in map(histories.difference, range(int(sys.argv[1]))) if text]\n"
+        "sys.exit('\\n'.join(found) or 0)\n"
+    )
+    path = os.pathsep.join([str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")])
+    env = dict(os.environ, NUMBA_BOUNDSCHECK="1", PYTHONPATH=path)
+    command = [sys.executable, "-c", program, str(N_CHECKED)]
+    done = subprocess.run(command, env=env, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
