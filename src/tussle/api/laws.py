@@ -13,7 +13,8 @@ import numpy as np
 from tussle.api.bodies import DERIVED, FLOATS, INTS
 from tussle.columns import Channel, Numbers, Param, Ragged
 from tussle.errors import DeclarationError, listed, nearest_name
-from tussle.neighbors.walk import OTHER, PAIR, Law, Walk, make_walk
+from tussle.neighbors.walk import OTHER, PAIR, Law, make_walk
+from tussle.numeric.kernel import Kernel
 from tussle.numeric.rk4 import label
 
 if TYPE_CHECKING:
@@ -115,7 +116,7 @@ class NeighborLaw:
         plan = self._plans.get(type(plugin))
         if plan is None:
             plan = self._plans[type(plugin)] = make_plan(g, plugin, self.laws, self.where)
-        return Contributions(self.names, plan.walk_over(g, plugin))
+        return Contributions(self.names, plan.walk(g, plugin))
 
     def check(self, cls: type, name: str) -> None:
         """Refuse a law whose arguments mean nothing to a plugin.
@@ -159,113 +160,89 @@ class Contributions:
         return iter(self.values)
 
 
-@dataclass(frozen=True)
-class Source:
-    """Where a law finds one of the entity's columns.
-
-    Attributes:
-        name: Attribute of the plugin, or column of the body table.
-        place: Component; -1 of a column that is one number a row.
-        is_body: It is a column of the body table.
-        is_world: It is one value per world.
-    """
-
-    name: str
-    place: int = -1
-    is_body: bool = False
-    is_world: bool = False
-
-    def array(self, g: GroupView, plugin: Any) -> Any:
-        """The column, (n,)."""
-        array = g.column(self.name) if self.is_body else plugin.__dict__[self.name]
-        if self.place >= 0:
-            array = array[self.place]
-        return array[g.world] if self.is_world else array
-
-
 @lru_cache(maxsize=256)
-def own_columns(cls: Any) -> dict[str, Source]:
-    """Where the names come from that the entity's columns go by in the laws of a plugin."""
+def own_columns(cls: Any) -> dict[str, str]:
+    """Expression, over a view `g` and a plugin's attributes `own`, of each column of the entity that its laws may name."""
     found = {}
     for part, (name, place) in BODY.items():
-        found[part] = Source(name, place if part != name else -1, is_body=True)
-    is_world = hasattr(cls, "is_idle")
-    for name, column in cls.declared(Numbers).items():
-        if isinstance(column, Ragged) or (isinstance(column, Param) and not column.is_row_data):
+        column = f"g.column({name!r})" if name in DERIVED else f"g.{name}"
+        found[part] = column if part == name else f"{column}[{place}]"
+    is_world = hasattr(cls, "is_idle")  # a world plugin; its class is above this module
+    for name, declared in cls.declared(Numbers).items():
+        per = getattr(declared, "per", "world" if is_world else "entity")
+        if (
+            isinstance(declared, Ragged)
+            or per == "team"
+            or (isinstance(declared, Param) and not declared.is_row_data)
+        ):
             continue
-        per_world = is_world and (isinstance(column, Param) or getattr(column, "per", "") == "world")
-        channels = (
-            column.fields if isinstance(column, Channel) else [f"{name}_{field}" for field in column.fields]
+        fields = (
+            declared.fields
+            if isinstance(declared, Channel)
+            else [f"{name}_{field}" for field in declared.fields]
         )
-        if not column.fields:
-            found[name] = Source(name, is_world=per_world)
-        for place, part in enumerate(channels):
-            found[part] = Source(name, place, is_world=per_world)
+        parts = {part: f"own[{name!r}][{place}]" for place, part in enumerate(fields)} or {
+            name: f"own[{name!r}]"
+        }
+        found |= {part: f"{text}[g.world]" if per == "world" else text for part, text in parts.items()}
     return found
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Plan:
     """What one walk over the neighbours takes of a plugin.
 
     Attributes:
-        walk: The walk.
-        own: Where its columns by row come from.
+        run: The walk's kernel.
+        n_out: Number of contributions.
+        columns: Gives, of a view and a plugin's attributes, how far to look [m] and the columns by row.
         other: Its columns by place: of the body table, and which components.
-        radii: Radii that together reach as far as every law: columns, or numbers [m].
     """
 
-    walk: Walk
-    own: tuple[Source, ...]
+    run: Kernel
+    n_out: int
+    columns: Callable[[GroupView, dict[str, Any]], tuple[Any, tuple[np.ndarray, ...]]]
     other: tuple[tuple[str, tuple[int, ...]], ...]
-    radii: tuple[Source | float, ...]
 
-    def reach(self, g: GroupView, plugin: Any) -> float | np.ndarray:
-        """How far the walk looks: one number, or one a row [m]."""
-        far = [radius if isinstance(radius, float) else radius.array(g, plugin) for radius in self.radii]
-        return far[0] if len(far) == 1 else np.maximum.reduce(np.broadcast_arrays(*far))
-
-    def walk_over(self, g: GroupView, plugin: Any) -> np.ndarray:
+    def walk(self, g: GroupView, plugin: Any) -> np.ndarray:
         """What the neighbours of each row contribute, (k, n)."""
-        index = g.index(self.reach(g, plugin))
+        reach, own = self.columns(g, plugin.__dict__)
+        index = g.index(reach)
         blocks = index.blocks(g.first, g.last)
         longs = (
-            blocks.queries,
-            blocks.block_first,
-            blocks.span_first,
-            blocks.span_start,
-            blocks.span_end,
-            index.order,
-        )
-        floats = [blocks.x, blocks.y, blocks.z, index.sx, index.sy, index.sz]
+            blocks.queries, blocks.block_first, blocks.span_first, blocks.span_start, blocks.span_end, index.order
+        )  # fmt: skip
+        floats: tuple[np.ndarray, ...] = (blocks.x, blocks.y, blocks.z, index.sx, index.sy, index.sz)
         for name, places in self.other:
             columns = g.by_place(index, name)
-            floats += columns if len(columns) == len(places) else [columns[place] for place in places]
-        own = tuple([source.array(g, plugin) for source in self.own])
-        out = np.empty((self.walk.n_out, g.n))
-        run, first, most = self.walk.run, g.first, blocks.most
+            floats += columns if len(columns) == len(places) else tuple([columns[place] for place in places])
+        out = np.empty((self.n_out, g.n))
+        run, first, most = self.run, g.first, blocks.most
         if g.context.threads == 1:
-            run(longs, tuple(floats), own, out, first, 0, blocks.n_blocks, most)
+            run(longs, floats, own, out, first, 0, blocks.n_blocks, most)
         else:
-            by_place = tuple(floats)
-            g.context.split(blocks.n_blocks, lambda a, b: run(longs, by_place, own, out, first, a, b, most))
+            g.context.split(blocks.n_blocks, lambda a, b: run(longs, floats, own, out, first, a, b, most))
         return out
 
 
 def make_plan(g: GroupView, plugin: Any, laws: tuple[Law, ...], where: Law | None) -> Plan:
     """The plan for the laws of a plugin; g and plugin show of which types the columns are."""
     cls: Any = type(plugin)
-    columns = own_columns(cls)
-    made = make_walk(laws, where, lambda name: CODES[columns[name].array(g, plugin).dtype.kind])
+    columns, scope = own_columns(cls), {"np": np}
+
+    def evaluated(text: str) -> Any:
+        return eval(f"lambda g, own: {text}", scope)  # noqa: S307 - made of declared names
+
+    made = make_walk(laws, where, lambda name: CODES[evaluated(columns[name])(g, plugin.__dict__).dtype.kind])
     common = set.intersection(*[set(law.radii) for law in laws])
     radii = [min(common, key=str)] if common else list(dict.fromkeys(law.radii[0] for law in laws))
+    reach = [
+        columns[radius] if isinstance(radius, str) else f"float({str(float(radius))!r})" for radius in radii
+    ]
+    farthest = reach[0] if len(reach) == 1 else f"np.maximum.reduce(np.broadcast_arrays({', '.join(reach)}))"
     other: dict[str, tuple[int, ...]] = {}
     for part in made.other:
         name, place = BODY[part.removeprefix(OTHER)]
         other[name] = (*other.get(name, ()), place)
-    return Plan(
-        made,
-        tuple(columns[name] for name in made.own),
-        tuple(other.items()),
-        tuple(columns[radius] if isinstance(radius, str) else float(radius) for radius in radii),
-    )
+    by_row = "".join(f"{columns[name]}, " for name in made.own)
+    return Plan(made.run, made.n_out, evaluated(f"({farthest}, ({by_row}))"), tuple(other.items()))
