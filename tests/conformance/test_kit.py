@@ -28,6 +28,7 @@ from tussle.api import (
     Sensor,
     State,
     Subscribe,
+    neighbors,
 )
 from tussle.errors import ConformanceError, TussleError
 from tussle.messages import CaptureEntity
@@ -364,6 +365,18 @@ class UsesLibmInKernel(SoundAutonomy):
 
     def step(self, g: GroupView) -> None:
         self.speed[:] = [compiled_exp(-abs(x)) for x in g.vel[0]]
+
+
+class UsesLibmInLaw(SoundAutonomy):
+    """A cosine of the C library in a neighbour law."""
+
+    @neighbors(10.0, ahead="sum")
+    @staticmethod
+    def law(other_yaw):
+        return math.cos(other_yaw)
+
+    def step(self, g: GroupView) -> None:
+        self.speed[:] = self.law(g).ahead
 
 
 class UsesChance(SoundAutonomy):
@@ -712,7 +725,14 @@ BROKEN = {
         DeclaresPos,
     ],
     "grade": [
-        *(UsesSine, UsesMathInAnotherFunction, UsesPower, UsesLibmInDerivative, UsesLibmInKernel),
+        *(
+            UsesSine,
+            UsesMathInAnotherFunction,
+            UsesPower,
+            UsesLibmInDerivative,
+            UsesLibmInKernel,
+            UsesLibmInLaw,
+        ),
     ],
     "stack invariance": [CountsRows, KnowsItsRow, CountsCalls, RemembersById, UsesChance],
     "snapshot": [MissesSnapshot],

@@ -13,6 +13,7 @@ from tussle.api.kinds import (
     Sensor,
     WorldPlugin,
 )
+from tussle.api.laws import neighbors, together
 from tussle.api.motion import MotionBody, MotionModel
 from tussle.api.plugin import Plugin, service
 from tussle.api.world import WorldView
@@ -69,7 +70,9 @@ __all__ = [
     "Subscribe",
     "WorldPlugin",
     "WorldView",
+    "neighbors",
     "service",
+    "together",
     "unit",
     "wrap",
 ]

@@ -105,6 +105,10 @@ class GroupView:
             kept.version = bodies.version
         return kept.columns[1]  # type: ignore[no-any-return]
 
+    def column(self, name: str) -> np.ndarray:
+        """A body column or what is derived from it, by name: what the entity believes, where it believes something."""
+        return self._derive(name) if name in DERIVED else getattr(self, name)
+
     @property
     def yaw(self) -> np.ndarray:
         """Heading, counter-clockwise from East [rad], (n,)."""

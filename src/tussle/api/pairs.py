@@ -11,6 +11,7 @@ from tussle.neighbors import queries, search
 
 if TYPE_CHECKING:
     from tussle.api.group import GroupView
+    from tussle.neighbors.index import Index
 
 
 class Pairs:
@@ -111,10 +112,7 @@ def find_nearest(g: GroupView, k: int, teams: Any) -> Nearest:
     x, y, z = g.pos
     if isinstance(teams, np.ndarray):
         other, square = np.empty((k, g.n), np.int64), np.empty((k, g.n))
-        search.nearest_rows(
-            x, y, z, k, search.SAME, teams.astype(float), index.row_world, index.place, g.first, *index.table,
-            g.by_place(index, "team")[0], index.order, other, square, 0, g.n,
-        )  # fmt: skip
+        _search(g, index, (x, y, z, teams.astype(float)), k, search.SAME, g.first, other, square)
         distance = np.sqrt(square)
     else:
         other, distance = queries.nearest(index, g.first, g.last, x, y, z, k, g.bodies.team, _checked(teams))
@@ -123,16 +121,22 @@ def find_nearest(g: GroupView, k: int, teams: Any) -> Nearest:
     return Nearest(other, distance, offset)
 
 
+def _search(
+    g: GroupView, index: Index, queries: tuple[np.ndarray, ...], k: int, mode: int, first: int, other: np.ndarray, square: np.ndarray
+) -> None:  # fmt: skip
+    table = (*index.table, g.by_place(index, "team")[0])
+    search.nearest_rows(
+        queries, k, mode, (index.row_world, index.place, index.order), first, table, other, square
+    )
+
+
 def find_nearest_row(g: GroupView, row: int, team: int | None) -> int:
     """Body row of the nearest other entity of one row, (of a team); -1 when there is none."""
     index = g.table_bodies.any_index()
     x, y, z = g.pos[:, row : row + 1]
     other, square = np.empty((1, 1), np.int64), np.empty((1, 1))
     mode, wanted = (search.ANY, 0.0) if team is None else (search.SAME, float(team))
-    search.nearest_rows(
-        x, y, z, 1, mode, np.array([wanted]), index.row_world, index.place, g.first + row, *index.table,
-        g.by_place(index, "team")[0], index.order, other, square, 0, 1,
-    )  # fmt: skip
+    _search(g, index, (x, y, z, np.array([wanted])), 1, mode, g.first + row, other, square)
     return int(other[0, 0])
 
 

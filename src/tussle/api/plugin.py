@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 
+from tussle.api.laws import NeighborLaw
 from tussle.columns import (
     Channel,
     Children,
@@ -75,6 +76,9 @@ class Plugin:
                 raise DeclarationError(
                     f"{cls.__name__}.{name}: the name is reserved; choose another for this {type(column).__name__}"
                 )
+        for name, law in vars(cls).items():
+            if isinstance(law, NeighborLaw):
+                law.check(cls, name)
         params = [
             inspect.Parameter(k, inspect.Parameter.KEYWORD_ONLY, default=c.default)
             for k, c in cls.params().items()

@@ -109,9 +109,10 @@ class Index:
         self.members = np.zeros(n, np.int64)
         fresh, new_ids, self._scratch = (np.zeros(n, np.int64) for _ in range(3))
         sequence = np.zeros(max(n, len(self._keys), n_worlds), np.int64)
+        rows = np.ascontiguousarray(world, np.int64), np.ascontiguousarray(ids, np.int64)
         kernels.arrange(
-            np.ascontiguousarray(world, np.int64), np.ascontiguousarray(ids, np.int64), old_start, self._ids, self._keys,
-            self.world_start, self.members, new_ids, fresh, self._scratch, sequence, n_worlds,
+            rows, (old_start, self._ids, self._keys), (self.world_start, self.members, new_ids, fresh),
+            (self._scratch, sequence), n_worlds,
         )  # fmt: skip
         self._keys, self._ids = fresh, new_ids
         self.row_world = np.array(world, np.int64)
@@ -154,8 +155,8 @@ class Index:
             self._fixed = bool(np.isinf(self.reach).all())
         self.built += 1
         kernels.build(
-            x, y, z, self.inverse_cell, self.world_start, self.members, self._keys, self._scratch, self.order, self.place,
-            self.sx, self.sy, self.sz, self._strip_start, self._strip_world, self._world_strip,
+            (x, y, z), self.inverse_cell, (self.world_start, self.members), (self._keys, self._scratch),
+            (self.order, self.place), (self.sx, self.sy, self.sz), (self._strip_start, self._strip_world, self._world_strip),
         )  # fmt: skip
 
     def update(self, rows: Longs, x: Floats, y: Floats, z: Floats) -> None:
@@ -176,7 +177,8 @@ class Index:
         if pos is None:
             fixed, built, blocks = self._cache.get((first, last), (False, -1, None))
             if blocks is not None and fixed:
-                self._query_positions(first, blocks.queries, None, blocks.x, blocks.y, blocks.z)
+                by_place, points = (self.sx, self.sy, self.sz), (blocks.x, blocks.y, blocks.z)
+                kernels.query_positions(blocks.queries, self.order, by_place, first, False, points)
                 return blocks
             if blocks is not None and built == self.built:
                 return blocks
@@ -186,12 +188,16 @@ class Index:
             if pos is None:
                 self._rooms[first, last] = room
         own = pos is not None
-        east, north, up = pos if pos is not None else (self.sx, self.sy, self.sz)
+        strips = (
+            self.order, self._strip_start, self._strip_world, self._world_strip, self.world_start, self._keys
+        )  # fmt: skip
         while True:
             needed = kernels.cut_blocks(
-                self.order, self._strip_start, self._world_strip, first, last, room.queries, room.block_first, room.block_strip,
-                east, north, up, own, room.x, room.y, room.z, self.inverse_cell, self.world_start, self._keys,
-                self._strip_world, self.reach, room.span_first, room.span_start, room.span_end, self._cursor, self._size,
+                strips, (first, last), pos or (self.sx, self.sy, self.sz), own, (self.inverse_cell, self.reach),
+                (
+                    room.queries, room.block_first, room.block_strip, room.span_first, room.span_start, room.span_end, self._cursor
+                ),
+                (room.x, room.y, room.z), self._size,
             )  # fmt: skip
             if needed <= len(room.span_start):
                 break
@@ -203,16 +209,3 @@ class Index:
         if pos is None:
             self._cache[first, last] = (self._fixed, self.built, blocks)
         return blocks
-
-    def _query_positions(
-        self,
-        first: int,
-        queries: Longs,
-        pos: tuple[Floats, Floats, Floats] | None,
-        x: Floats,
-        y: Floats,
-        z: Floats,
-    ) -> None:
-        own = pos is not None
-        east, north, up = pos if pos is not None else (self.sx, self.sy, self.sz)
-        kernels.query_positions(queries, self.order, east, north, up, first, own, x, y, z)

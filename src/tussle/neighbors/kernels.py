@@ -42,16 +42,18 @@ def cell_of(position, inverse_cell, limit):
     return int(cell + limit)
 
 
-@kernel("I I I I Iw Iw Iw Iw Iw Iw Iw i8")
-def arrange(
-    row_world, row_id, old_start, old_ids, keys, world_start, members, ids, fresh, scratch, sequence, n_worlds
-):
+@kernel("(I I) (I I Iw) (Iw Iw Iw Iw) (Iw Iw) i8")
+def arrange(rows, old, new, work, n_worlds):
     """New lists of the rows of each world by id, and the last sorted order carried over to them.
 
-    In: row_world, row_id (N,) of the new table; old_start (n_worlds + 1,), old_ids (old N,) by rank; keys (old N,) sorted.
-    Out: world_start (n_worlds + 1,), members (N,) rows by rank, ids (N,) by rank, fresh (N,) keys that hold only the rank, in
-    the old order, newcomers last. scratch (N,), sequence (max(N, old N),) are work space.
+    rows: world and id of each row of the new table, (N,). old: old_start (n_worlds + 1,), old_ids (old N,) by rank, keys (old N,)
+    sorted. new, written: world_start (n_worlds + 1,), members (N,) rows by rank, ids (N,) by rank, fresh (N,) keys that hold only
+    the rank, in the old order, newcomers last. work: scratch (N,), sequence (max(N, old N),).
     """
+    row_world, row_id = rows
+    old_start, old_ids, keys = old
+    world_start, members, ids, fresh = new
+    scratch, sequence = work
     n = row_world.shape[0]
     world_start[:] = 0
     for row in range(n):
@@ -95,16 +97,21 @@ def arrange(
                 done += 1
 
 
-@kernel("F F F F I I Iw Iw Iw Iw Fw Fw Fw Iw Iw Iw")
-def build(
-    x, y, z, inverse_cell, world_start, members, keys, scratch, order, place, sx, sy, sz, strip_start, strip_world, world_strip,
-):  # fmt: skip
+@kernel("(F F F) F (I I) (Iw Iw) (Iw Iw) (Fw Fw Fw) (Iw Iw Iw)")
+def build(pos, inverse_cell, worlds, work, placed, by_place, strips):
     """Sort the rows of every world by (cell row, cell, id) and note where each cell row (strip) begins.
 
-    x, y, z (N,) positions [m]; inverse_cell (n_worlds,) [1/m], 0 for one cell per world. keys (N,) hold ranks in their low bits
-    on entry, in any order, the last one for speed. strip_start (N + 1,), strip_world (N + 1,): first place and world of
-    each strip; world_strip (n_worlds + 1,): first strip of each world.
+    pos: x, y, z (N,) [m]; inverse_cell (n_worlds,) [1/m], 0 for one cell per world; worlds: world_start, members. work: keys (N,)
+    hold ranks in their low bits on entry, in any order, the last one for speed; scratch (N,). Written: placed, order and place
+    (N,); by_place, the positions; strips, strip_start (N + 1,) and strip_world (N + 1,), first place and world of each strip,
+    and world_strip (n_worlds + 1,), first strip of each world.
     """
+    x, y, z = pos
+    world_start, members = worlds
+    keys, scratch = work
+    order, place = placed
+    sx, sy, sz = by_place
+    strip_start, strip_world, world_strip = strips
     n_worlds = world_start.shape[0] - 1
     n_strips = 0
     for w in range(n_worlds):
@@ -162,9 +169,11 @@ def gather(column, order, out):
         out[p] = column[order[p]]
 
 
-@kernel("I I F F F i8 b1 Fw Fw Fw")
-def query_positions(queries, order, x, y, z, first, own, qx, qy, qz):
-    """Positions [m] by query from x, y, z: those of rows first ... (own), or by place."""
+@kernel("I I (F F F) i8 b1 (Fw Fw Fw)")
+def query_positions(queries, order, pos, first, own, out):
+    """Positions [m] by query from pos: those of rows first ... (own), or by place."""
+    x, y, z = pos
+    qx, qy, qz = out
     for k in range(queries.shape[0]):
         p = queries[k]
         i = order[p] - first if own else p
@@ -229,18 +238,16 @@ def rectangle(x, y, start, end):
     return west, east, south, north
 
 
-@kernel("F I I I I F F I I I i8 F Iw Iw Iw Iw Iw -> i8")
-def find_spans(
-    inverse_cell, world_start, keys, strip_start, world_strip, x, y, block_first, block_strip, strip_world, n_blocks,
-    reach, span_first, span_start, span_end, cursor, size,
-):  # fmt: skip
+@device
+def find_spans(cells, strips, x, y, room, size, n_blocks):
     """Candidate runs of every block: all entities of its world within `reach` of a query, and more.
 
-    x, y (n,) positions [m] of the queries in query order; reach (n_worlds,) [m]; strip_world (n_strips,). cursor (3 n_strips,)
-    work
-    space. Returns the number of spans, which may exceed the room in span_start (then call again with more). size[0] becomes the
-    largest number of candidates of one block.
+    x, y (n,) positions [m] of the queries in query order; for the rest see `cut_blocks`. Returns the number of spans, which may
+    exceed the room in span_start (then call again with more). size[0] becomes the largest number of candidates of one block.
     """
+    inverse_cell, reach = cells
+    _, strip_start, strip_world, world_strip, world_start, keys = strips
+    _, block_first, block_strip, span_first, span_start, span_end, cursor = room
     room = span_start.shape[0]
     n_strips = world_strip[world_strip.shape[0] - 1]
     n_spans = 0
@@ -308,19 +315,18 @@ def find_spans(
     return n_spans
 
 
-@kernel("I I I i8 i8 Iw Iw Iw F F F b1 Fw Fw Fw F I I I F Iw Iw Iw Iw Iw -> i8")
-def cut_blocks(
-    order, strip_start, world_strip, first, last, queries, block_first, block_strip, x, y, z, own, qx, qy, qz,
-    inverse_cell, world_start, keys, strip_world, reach, span_first, span_start, span_end, cursor, size,
-):  # fmt: skip
-    """group_queries, query_positions and find_spans in one call; size becomes (most candidates of a block, number of blocks).
+@kernel("(I I I I I I) (i8 i8) (F F F) b1 (F F) (Iw Iw Iw Iw Iw Iw Iw) (Fw Fw Fw) Iw -> i8")
+def cut_blocks(strips, rows, pos, own, cells, room, out, size):
+    """The queries of rows [first, last) in blocks, where they stand, and the candidate runs of every block.
 
+    strips: order, strip_start, strip_world, world_strip, world_start, keys. rows: first, last. pos, own: see `query_positions`.
+    cells: inverse_cell [1/m], reach [m], (n_worlds,). Written: room (queries, block_first, block_strip, span_first, span_start,
+    span_end; cursor (3 n_strips,) is work space), out (positions by query), size (most candidates of a block, number of blocks).
     Returns the number of spans, which may exceed the room for them.
     """
-    n_blocks = group_queries(order, strip_start, world_strip, first, last, queries, block_first, block_strip)
-    query_positions(queries, order, x, y, z, first, own, qx, qy, qz)
+    first, last = rows
+    queries, block_first, block_strip = room[0], room[1], room[2]
+    n_blocks = group_queries(strips[0], strips[1], strips[3], first, last, queries, block_first, block_strip)
+    query_positions(queries, strips[0], pos, first, own, out)
     size[1] = n_blocks
-    return find_spans(
-        inverse_cell, world_start, keys, strip_start, world_strip, qx, qy, block_first, block_strip, strip_world, n_blocks,
-        reach, span_first, span_start, span_end, cursor, size,
-    )  # fmt: skip
+    return find_spans(cells, strips, out[0], out[1], room, size, n_blocks)

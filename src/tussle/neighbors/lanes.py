@@ -98,6 +98,24 @@ def choose(mask: Any, yes: Any, no: Any) -> Any:
 
 
 @LaneFunction
+def truth(lanes: Any) -> Any:
+    """Per lane whether the number is not 0; NaN is not."""
+    return lanes != 0.0
+
+
+@LaneFunction
+def number(mask: Any) -> Any:
+    """Per lane 1 where the mask holds, else 0."""
+    return mask.astype(np.float64)
+
+
+@LaneFunction
+def joined(a: Any, b: Any, c: Any, d: Any, e: Any, f: Any, g: Any, h: Any) -> Any:
+    """Lanes of eight numbers."""
+    return np.array([a, b, c, d, e, f, g, h])
+
+
+@LaneFunction
 def bits(mask: Any) -> int:
     """The mask as an integer, lane 0 in the lowest bit."""
     return int(np.packbits(mask, bitorder="little")[0])
@@ -131,6 +149,12 @@ def ones(hits: int) -> int:
 def lanes_sqrt(lanes: Any) -> Any:
     """Correctly rounded square root per lane."""
     return np.sqrt(lanes)
+
+
+@LaneFunction
+def lanes_abs(lanes: Any) -> Any:
+    """Absolute value per lane."""
+    return np.abs(lanes)
 
 
 @LaneFunction

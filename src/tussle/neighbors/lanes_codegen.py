@@ -99,6 +99,11 @@ def _pointer(context: Any, builder: Any, array_type: Any, array: Any, start: Any
     return builder.bitcast(builder.gep(data, [start]), _DOUBLES.as_pointer())
 
 
+def _call_llvm(builder: Any, name: str, result: Any, arguments: list[Any]) -> Any:
+    function_type = ir.FunctionType(result, [a.type for a in arguments])
+    return builder.call(cgutils.get_or_insert_function(builder.module, function_type, name), arguments)
+
+
 def _register_arithmetic() -> None:
     for function, name in (
         (operator.add, "fadd"),
@@ -152,6 +157,40 @@ def _mask_or(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return builder.or_(*args)
 
 
+@_implement(operator.invert, MASK_TYPE, MASK_TYPE)
+def _mask_invert(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return builder.not_(args[0])
+
+
+@_implement(operator.neg, LANES_TYPE, LANES_TYPE)
+def _negative(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return builder.fneg(args[0])
+
+
+@_implement(lanes.truth.py_func, MASK_TYPE, LANES_TYPE)
+def _generate_truth(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return builder.fcmp_unordered("!=", args[0], ir.Constant(_DOUBLES, [0.0] * LANES))
+
+
+@_implement(lanes.number.py_func, LANES_TYPE, MASK_TYPE)
+def _generate_number(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    one, zero = ir.Constant(_DOUBLES, [1.0] * LANES), ir.Constant(_DOUBLES, [0.0] * LANES)
+    return builder.select(args[0], one, zero)
+
+
+@_implement(lanes.joined.py_func, LANES_TYPE, *[types.float64] * LANES)
+def _generate_joined(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    lanes = ir.Constant(_DOUBLES, ir.Undefined)
+    for k, value in enumerate(args):
+        lanes = builder.insert_element(lanes, value, ir.Constant(ir.IntType(32), k))
+    return lanes
+
+
+@_implement(lanes.lanes_abs.py_func, LANES_TYPE, LANES_TYPE)
+def _generate_abs(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return _call_llvm(builder, f"llvm.fabs.v{LANES}f64", _DOUBLES, [args[0]])
+
+
 @_implement(lanes.splat.py_func, LANES_TYPE, types.float64)
 def _generate_splat(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return _splat(builder, args[0])
@@ -177,11 +216,6 @@ def _first_lanes(builder: Any, count: Any) -> Any:
     return builder.icmp_signed(
         "<", numbers, builder.shuffle_vector(one, ir.Constant(_LONGS, ir.Undefined), places)
     )
-
-
-def _call_llvm(builder: Any, name: str, result: Any, arguments: list[Any]) -> Any:
-    function_type = ir.FunctionType(result, [a.type for a in arguments])
-    return builder.call(cgutils.get_or_insert_function(builder.module, function_type, name), arguments)
 
 
 @_implement(lanes.load_some.py_func, LANES_TYPE, types.Array, types.int64, types.int64)
@@ -213,6 +247,11 @@ for _yes, _no in (
     (types.float64, types.float64),
 ):
     _implement(lanes.choose.py_func, LANES_TYPE, MASK_TYPE, _yes, _no)(_generate_choose)
+
+
+@_implement(lanes.choose.py_func, MASK_TYPE, MASK_TYPE, MASK_TYPE, MASK_TYPE)
+def _choose_mask(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return builder.select(*args)
 
 
 @_implement(lanes.bits.py_func, types.int64, MASK_TYPE)

@@ -67,33 +67,18 @@ def pairs(
     """
     n = last - first
     mode, by_place, wanted = team_filter(index, team, teams, first, last)
-    table = index.table
     start, count = np.zeros(n + 1, np.int64), np.zeros(n, np.int64)
-    query = (x, y, z, radius, mode, wanted, index.row_world, index.place, first, *table, by_place)
-    search.pair_places(*query, start, count, np.zeros(0, np.int64), 0, n)
+    query = (
+        (x, y, z, radius, wanted), mode, (index.row_world, index.place), first, (*index.table, by_place), start
+    )  # fmt: skip
+    m = search.pair_places(*query, (count, np.zeros(0, np.int64)))
     np.cumsum(count, out=start[1:])
-    m = int(start[n])
     found, row, other = np.empty(m, np.int64), np.empty(m, np.int64), np.empty(m, np.int64)
     offset, distance = np.empty((3, m)), np.empty(m)
     if m:
-        search.pair_places(*query, start, count, found, 0, n)
-        search.pair_columns(
-            x,
-            y,
-            z,
-            start,
-            found,
-            index.sx,
-            index.sy,
-            index.sz,
-            index.order,
-            row,
-            other,
-            offset,
-            distance,
-            0,
-            n,
-        )
+        search.pair_places(*query, (count, found))
+        points = index.sx, index.sy, index.sz
+        search.pair_columns((x, y, z), start, found, points, index.order, (row, other), offset, distance)
     return Pairs(row, other, offset, distance, count, start)
 
 
@@ -116,21 +101,6 @@ def nearest(
     mode, by_place, wanted = team_filter(index, team, teams, first, last)
     other, square = np.empty((k, n), np.int64), np.empty((k, n))
     search.nearest_rows(
-        x,
-        y,
-        z,
-        k,
-        mode,
-        wanted,
-        index.row_world,
-        index.place,
-        first,
-        *index.table,
-        by_place,
-        index.order,
-        other,
-        square,
-        0,
-        n,
-    )
+        (x, y, z, wanted), k, mode, (index.row_world, index.place, index.order), first, (*index.table, by_place), other, square
+    )  # fmt: skip
     return other, np.sqrt(square)

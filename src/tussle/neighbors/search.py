@@ -16,6 +16,9 @@ from tussle.numeric.kernel import device, kernel
 
 ANY, SAME, DIFFERENT = 0, 1, 2
 
+TABLE = "(I I I I F F F F F)"
+"""Kernel code of a table."""
+
 SMALL_WORLD = 3000
 """Up to this many entities the nearest is sought by looking at all: 8 at a time that costs 0.25 ns each."""
 
@@ -264,28 +267,33 @@ def nearest_places(w, me, x, y, z, mode, wanted, table, best, ranks, places, k):
             down -= 1
 
 
-@kernel("F F F F i8 F I I i8 I I I I F F F F F I Iw Iw i8 i8")
-def pair_places(
-    x, y, z, radius, mode, wanted, row_world, place, first, world_start, keys, strip_start, world_strip, inverse_cell, sx, sy, sz,
-    team, start, count, found, begin, stop,
-):  # fmt: skip
-    """Places near each of the rows begin ... stop - 1 of a group that begins at row `first` of the table.
+@kernel(f"(F F F F F) i8 (I I) i8 {TABLE} I (Iw Iw) -> i8")
+def pair_places(queries, mode, places, first, table, start, out):
+    """Places near each of the rows of a group that begins at row `first` of the table. Returns how many.
 
-    x, y, z (n,) positions [m], radius (n,) [m], wanted (n,) teams. Writes count (n,); with room in `found` also the places,
-    those of row i from start[i] on.
+    queries: x, y, z, radius [m], wanted team, (n,) each; places: row_world, place (N,). Writes out: count (n,), and with room in
+    `found` also the places, those of row i from start[i] on.
     """
-    table = (world_start, keys, strip_start, world_strip, inverse_cell, sx, sy, sz, team)
-    for i in range(begin, stop):
+    x, y, z, radius, wanted = queries
+    row_world, place = places
+    count, found = out
+    total = 0
+    for i in range(x.shape[0]):
         row = first + i
         w = row_world[row]
         into = found[start[i] :] if found.shape[0] > 0 else found
         count[i] = in_range(w, place[row], x[i], y[i], z[i], radius[i], mode, wanted[i], table, into, 0)
+        total += count[i]
+    return total
 
 
-@kernel("F F F I I F F F I Iw Iw F2w Fw i8 i8")
-def pair_columns(x, y, z, start, found, sx, sy, sz, order, row, other, offset, distance, begin, stop):
-    """What pairs are asked for, by pair: row of the group, row of the table, offset (3, m) [m], distance [m]."""
-    for i in range(begin, stop):
+@kernel("(F F F) I I (F F F) I (Iw Iw) F2w Fw")
+def pair_columns(pos, start, found, by_place, order, rows, offset, distance):
+    """What pairs are asked for, by pair: rows of the group and of the table, offset (3, m) [m], distance [m]."""
+    x, y, z = pos
+    sx, sy, sz = by_place
+    row, other = rows
+    for i in range(x.shape[0]):
         for k in range(start[i], start[i + 1]):
             p = found[k]
             dx, dy, dz = sx[p] - x[i], sy[p] - y[i], sz[p] - z[i]
@@ -297,24 +305,23 @@ def pair_columns(x, y, z, start, found, sx, sy, sz, order, row, other, offset, d
             distance[k] = math.sqrt(dx * dx + dy * dy + dz * dz)
 
 
-@kernel("F F F i8 i8 F I I i8 I I I I F F F F F I I2w F2w i8 i8")
-def nearest_rows(
-    x, y, z, k, mode, wanted, row_world, place, first, world_start, keys, strip_start, world_strip, inverse_cell, sx, sy, sz,
-    team, order, other, square, begin, stop,
-):  # fmt: skip
+@kernel(f"(F F F F) i8 i8 (I I I) i8 {TABLE} I2w F2w")
+def nearest_rows(queries, k, mode, places, first, table, other, square):
     """The k nearest rows of the table, other (k, n) or -1, and their squared distances [m^2], (k, n).
 
-    For rows begin ... stop - 1 of the group.
+    queries: x, y, z [m], wanted team, (n,) each, of the rows of a group that begins at row `first` of the table; places: row_world,
+    place, order (N,).
     """
-    table = (world_start, keys, strip_start, world_strip, inverse_cell, sx, sy, sz, team)
-    best, ranks, places = np.empty(k), np.empty(k, np.int64), np.empty(k, np.int64)
-    for i in range(begin, stop):
+    x, y, z, wanted = queries
+    row_world, place, order = places
+    best, ranks, found = np.empty(k), np.empty(k, np.int64), np.empty(k, np.int64)
+    for i in range(x.shape[0]):
         row = first + i
         nearest_places(
-            row_world[row], place[row], x[i], y[i], z[i], mode, wanted[i], table, best, ranks, places, k
+            row_world[row], place[row], x[i], y[i], z[i], mode, wanted[i], table, best, ranks, found, k
         )
         for j in range(k):
-            other[j, i] = order[places[j]] if places[j] >= 0 else -1
+            other[j, i] = order[found[j]] if found[j] >= 0 else -1
             square[j, i] = best[j]
 
 

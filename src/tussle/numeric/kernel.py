@@ -1,13 +1,15 @@
 """Kernel decorators: one explicit signature, strict IEEE arithmetic, nothing compiled at import, kept on disk by content.
 
 Codes of a signature: f8 i8 b1 u8 numbers; F I B U read-only 1-D contiguous arrays of float64, int64, bool, uint64; Fw
-Iw Bw Uw writable ones; F2 F2w ... 2-D C-contiguous. A result follows "->"; several results make a tuple.
+Iw Bw Uw writable ones; F2 F2w ... 2-D C-contiguous. (F F I) is one argument, a tuple of these: what belongs together comes
+together, and costs 0.03 us an array more than by itself. A result follows "->"; several results make a tuple.
 """
 
 from __future__ import annotations
 
 import hashlib
 import platform
+import re
 import sys
 import threading
 import types
@@ -21,6 +23,7 @@ import numpy as np
 from tussle.numeric import store
 from tussle.numeric.fingerprint import Fingerprint
 
+Code = str | tuple[str, ...]
 FORMAT = 1  # of the files; part of every key
 LETTERS = {"F": np.float64, "I": np.int64, "B": np.bool_, "U": np.uint64}
 NUMBERS: dict[str, tuple[type, ...]] = {
@@ -46,6 +49,7 @@ class Stats:
     on_compile: Callable[[str], None] | None = None
 
 
+WORD = re.compile(r"[^\s()]+")
 stats = Stats()
 _lock = threading.RLock()
 
@@ -183,10 +187,10 @@ class Kernel(Device):
         super().__init__(function)
         arguments, arrow, results = signature.partition("->")
         self.signature = signature
-        self.arguments = tuple(arguments.split())
+        self.arguments = grouped(arguments)
         self.results = tuple(results.split())
         known = set(NUMBERS) | {letter + rest for letter in LETTERS for rest in ("", "w", "2", "2w")}
-        wrong = [code for code in self.arguments + self.results if code not in known]
+        wrong = [code for code in (*WORD.findall(arguments), *self.results) if code not in known]
         if wrong or (arrow and not self.results):
             raise ValueError(
                 f"kernel {self.name}: unknown code {wrong} in signature {signature!r}; there are: {', '.join(sorted(known))}"
@@ -212,7 +216,11 @@ class Kernel(Device):
         table = codes()
         results = [table[code] for code in self.results]
         returned = void if not results else results[0] if len(results) == 1 else Tuple(results)
-        return returned(*[table[code] for code in self.arguments])
+        arguments = [
+            table[code] if isinstance(code, str) else Tuple([table[each] for each in code])
+            for code in self.arguments
+        ]
+        return returned(*arguments)
 
     @property
     def compiled(self) -> Any:
@@ -307,21 +315,35 @@ class Kernel(Device):
         return self.__qualname__  # pickled by name, as a function is
 
 
+def grouped(arguments: str) -> tuple[Code, ...]:
+    """The codes of a signature's arguments; those in parentheses as a tuple."""
+    return tuple(
+        code or tuple(group.split()) for group, code in re.findall(r"\(([^()]*)\)|([^\s()]+)", arguments)
+    )
+
+
 def kernel(signature: str) -> Callable[[Callable[..., Any]], Kernel]:
     """Compile a function with one explicit signature, on its first call, and keep it on disk."""
     return lambda function: Kernel(function, signature)
 
 
-def expected(code: str) -> str:
+def expected(code: Code) -> str:
     """A code in words."""
+    if isinstance(code, tuple):
+        return f"a tuple of {len(code)}: {', '.join(expected(each) for each in code)}"
     if code in NUMBERS:
         return {"f8": "a number", "i8": "an integer", "u8": "an unsigned integer", "b1": "a bool"}[code]
     ndim = "2-D C-contiguous" if "2" in code else "1-D contiguous"
     return f"a {'writable ' if code.endswith('w') else ''}{ndim} {np.dtype(LETTERS[code[0]])} array"
 
 
-def mismatch(code: str, value: Any) -> str:
+def mismatch(code: Code, value: Any) -> str:
     """What a value is instead of what the code asks for; "" where it fits."""
+    if isinstance(code, tuple):
+        if not isinstance(value, tuple) or len(value) != len(code):
+            return f"{type(value).__name__} of {len(value) if isinstance(value, tuple) else 1}"
+        wrong = [mismatch(each, item) for each, item in zip(code, value, strict=True)]
+        return next((f"{text} at place {place}" for place, text in enumerate(wrong) if text), "")
     if code in NUMBERS:
         return "" if isinstance(value, NUMBERS[code]) else f"{type(value).__name__} {value!r:.60}"
     if not isinstance(value, np.ndarray):

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from tussle.api import Plugin
+from tussle.api.laws import NeighborLaw
 from tussle.errors import ConformanceError
 from tussle.numeric.fingerprint import libm_names
 from tussle.testing.declarations import own_classes
@@ -31,6 +32,10 @@ def check_grade(cls: type[Plugin]) -> None:
 def _functions(cls: type[Plugin]) -> Iterator[tuple[str, Callable[..., Any]]]:
     for base in own_classes(cls):
         for name, value in vars(base).items():
+            if isinstance(value, NeighborLaw):
+                for law in (*value.laws, *([value.where] if value.where else [])):
+                    yield f"{name}: {law.function.__name__}", law.function
+                continue
             function = getattr(value, "fget", None) or getattr(value, "__func__", value)
             function = getattr(function, "py_func", function)
             if hasattr(function, "__code__"):

@@ -66,7 +66,8 @@ def test_contacts_are_the_others_with_the_noise_of_the_one_who_measures():
     noise = [np.array([[0.0, 1.0], [0.0, 2.0]])] * 9
     draws = np.random.default_rng(9).normal(size=(3, 3, 3))
     data = np.full((12, 3), np.nan)
-    contacts.blur(row, other, pos, vel, quat, ids, teams, *noise, *draws, data)
+    columns = (row, other, ids, teams), (pos, vel, quat)
+    contacts.blur(*columns, tuple(noise[:3]), tuple(noise[3:6]), tuple(noise[6:]), tuple(draws), data)
     assert data[0].tolist() == [14, 15, 10]
     assert data[1].tolist() == [3, 3, 1]
     assert np.array_equal(data[2:5, :2], pos[:, [4, 5]])

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from neighbor_stacks import stack
 
+from tussle.neighbors.walk import make_walk
+from tussle.stock import Boids
 from tussle.stock.autonomy.boids import kernels
 
 REACH, SPHERE, TEAM_RANGE, OTHER_RANGE = 60.0, 30.0, 2.0, 8.0
@@ -16,21 +18,26 @@ def sums_of(s, yaw, team, quat=None, fov=(7.0, 7.0), split=None, first=0, last=N
     n = last - first
     index = s.index(REACH)
     b = index.blocks(first, last)
-    reach = REACH - spread * (s.source[first:last] % 3)
-    by_row = [reach, *(np.full(n, v) for v in (SPHERE, TEAM_RANGE, OTHER_RANGE))]
-    sums = np.full((kernels.N_SUMS, n), np.nan)
-    head = (
-        b.queries, b.block_first, b.span_first, b.span_start, b.span_end, index.order, b.x, b.y, b.z,
-        index.sx, index.sy, index.sz, index.gather(np.cos(yaw)), index.gather(np.sin(yaw)), index.gather(team.astype(float)),
-        team[first:last], *by_row,
+    law = Boids.seen if quat is None else Boids.seen_in_view
+    walk = make_walk(law.laws, law.where, lambda name: "I" if name == "team" else "F")
+    own = {
+        "comms_range": REACH - spread * (s.source[first:last] % 3), "sphere_of_influence": np.full(n, SPHERE),
+        "minimum_team_range": np.full(n, TEAM_RANGE), "minimum_nonteam_range": np.full(n, OTHER_RANGE),
+        "team": team[first:last], "fov_az": np.full(n, fov[0]), "fov_el": np.full(n, fov[1]),
+    }  # fmt: skip
+    if quat is not None:
+        own |= {f"quat_{axis}": quat[k, first:last].copy() for k, axis in enumerate("wxyz")}
+    other = {
+        "other_level_forward_x": np.cos(yaw), "other_level_forward_y": np.sin(yaw), "other_team": team.astype(float)
+    }  # fmt: skip
+    longs = b.queries, b.block_first, b.span_first, b.span_start, b.span_end, index.order
+    floats = (
+        b.x, b.y, b.z, index.sx, index.sy, index.sz, *(index.gather(other[name]) for name in walk.other)
     )  # fmt: skip
+    sums = np.full((walk.n_out, n), np.nan)
     cuts = [0, b.n_blocks] if split is None else [0, b.n_blocks // 2, b.n_blocks]
     for begin, stop in itertools.pairwise(cuts):
-        if quat is None:
-            kernels.neighbor_sums(*head, sums, first, begin, stop, b.most)
-        else:
-            view = (quat[:, first:last].copy(), np.full(n, fov[0]), np.full(n, fov[1]))
-            kernels.neighbor_sums_in_view(*head, *view, sums, first, begin, stop, b.most)
+        walk.run(longs, floats, tuple(own[name] for name in walk.own), sums, first, begin, stop, b.most)
     return sums
 
 
@@ -45,7 +52,7 @@ def expected_sums(s, yaw, team, row, reach, seen=None):
     amount = np.where(r > SPHERE, 0.0, np.where(r <= least, 1e10, (SPHERE - r) / (SPHERE - least)))
     push = -amount * np.divide(offset, r, out=np.zeros_like(offset), where=r > 0.0)
     return np.concatenate([
-        offset[:, same].sum(1), [np.cos(yaw[near[same]]).sum(), np.sin(yaw[near[same]]).sum(), same.sum(), len(near)],
+        offset[:, same].sum(1), [np.cos(yaw[near[same]]).sum(), np.sin(yaw[near[same]]).sum(), same.sum(), (~same).sum()],
         push[:, same].sum(1), push[:, ~same].sum(1),
     ])  # fmt: skip
 
@@ -132,13 +139,15 @@ WEIGHTS = {"goal": 0.1, "team": 1.0, "other": 10.0, "centroid": 1.0, "align": 0.
 def run_law(s, sums, goal):
     n = sums.shape[1]
     wanted = np.full((3, n), np.nan)
-    kernels.law(*s.pos, goal, sums, np.full(n, 30.0), *(np.full(n, w) for w in WEIGHTS.values()), wanted)
+    kernels.law(
+        tuple(s.pos), goal, sums, (np.full(n, 30.0), *(np.full(n, w) for w in WEIGHTS.values())), wanted
+    )
     return wanted
 
 
 def expected_law(pos, goal, sums, align):
     toward = unit(goal - pos)
-    if sums[kernels.N_ALL] == 0:
+    if sums[kernels.N_TEAM] + sums[kernels.N_OTHERS] == 0:
         return toward
     terms = [toward, sums[7:10], sums[10:13], unit(sums[0:3]), align]
     weighted = [w * t for w, t in zip(WEIGHTS.values(), terms, strict=True)]
@@ -152,7 +161,7 @@ def test_law_is_the_weighted_mean_and_the_goal_when_alone():
     sums = sums_of(s, yaw, team)
     goal = s.pos + np.array([[1e6], [2e5], [0.0]])
     wanted = run_law(s, sums, goal)
-    assert sums[kernels.N_ALL, 0] == 0
+    assert sums[kernels.N_TEAM, 0] + sums[kernels.N_OTHERS, 0] == 0
     for i in range(203):
         align = unit(np.array([*sums[3:5, i], 0.0]))
         np.testing.assert_allclose(
@@ -168,9 +177,10 @@ def test_historic_means_count_everyone_and_average_yaw_as_a_number():
         near, _ = s.near(i, REACH)
         sums[kernels.HEADING, i] = yaw[near[team[near] == team[i]]].sum()
     yaw_sums = sums[kernels.HEADING].copy()
-    kernels.historic_means(*s.pos, sums)
-    for i in np.flatnonzero(plain[kernels.N_ALL] > 0):
-        count = plain[kernels.N_ALL, i]
+    kernels.historic_means(tuple(s.pos), sums)
+    counts = plain[kernels.N_TEAM] + plain[kernels.N_OTHERS]
+    for i in np.flatnonzero(counts > 0):
+        count = counts[i]
         centroid = (plain[:3, i] + plain[kernels.N_TEAM, i] * s.pos[:, i]) / count
         np.testing.assert_allclose(sums[:3, i], centroid - s.pos[:, i], rtol=1e-9, atol=1e-9)
         heading = yaw_sums[i] / count

@@ -26,7 +26,7 @@ def run(s, team, first, target, switching, capture_range=4.0, room=5000):
     index = s.index(20.0)
     n = len(s.ids) - first
     span = int(s.ids.max()) + 1
-    id_start = np.arange(N_WORLDS) * span
+    id_start = np.arange(N_WORLDS + 1) * span
     id_row = np.full(N_WORLDS * span, -1)
     id_row[id_start[s.world] + s.ids] = np.arange(len(s.ids))
     target_row, claim_row, claim_other = (
@@ -36,9 +36,9 @@ def run(s, team, first, target, switching, capture_range=4.0, room=5000):
     )
     own = [axis[first:].copy() for axis in s.pos]
     n_claims = kernels.hunt(
-        *own, team[first:], np.ones(n, np.int64), np.full(n, capture_range), np.full(n, switching), target, target_row,
-        claim_row, claim_other, s.ids, s.world, id_start, id_row, index.place, first, *index.table,
-        index.gather(team.astype(float)), index.order,
+        (*own, np.full(n, capture_range)), (team[first:], np.ones(n, np.int64)), np.full(n, switching),
+        (target, target_row, claim_row, claim_other), (s.ids, s.world, index.place, id_row, id_start, index.order), first,
+        (*index.table, index.gather(team.astype(float))),
     )  # fmt: skip
     return target_row, n_claims, claim_row, claim_other, index
 
@@ -79,7 +79,7 @@ def test_without_prey_there_is_no_target_and_commands_persist():
     own = [axis[first:].copy() for axis in s.pos]
     outputs = [np.full(n, 5.0) for _ in range(3)]
     level = np.array([np.ones(n), np.zeros(n), np.zeros(n), np.zeros(n)])
-    kernels.pursue(*own, *level, np.full(n, 35.0), rows, *s.pos, *outputs)
+    kernels.pursue(tuple(own), tuple(level), np.full(n, 35.0), rows, tuple(s.pos), tuple(outputs))
     kernels.point(*own[:2], np.full(n, 35.0), rows, *s.pos[:2], *outputs[:2])
     assert all((o == 5.0).all() for o in outputs)
 
@@ -107,9 +107,8 @@ def test_pursuit_points_at_the_target():
     own = [axis[first:].copy() for axis in s.pos]
     yaw, climb = np.linspace(-3, 3, n), np.linspace(-1, 1, n)
     speed, turn, pitch, heading, fast = (np.zeros(n) for _ in range(5))
-    kernels.pursue(
-        *own, *quat_from_euler(np.zeros(n), -climb, yaw), np.full(n, 35.0), rows, *s.pos, speed, turn, pitch
-    )
+    quat = tuple(quat_from_euler(np.zeros(n), -climb, yaw))
+    kernels.pursue(tuple(own), quat, np.full(n, 35.0), rows, tuple(s.pos), (speed, turn, pitch))
     kernels.point(*own[:2], np.full(n, 35.0), rows, *s.pos[:2], heading, fast)
     d = s.pos[:, rows] - np.array(own)
     np.testing.assert_allclose(heading, np.arctan2(d[1], d[0]), atol=1e-14)

@@ -578,3 +578,28 @@ def test_same_names_from_files_of_different_processes_do_not_meet(project):
     assert project("import law\nprint(law.make(2.0)(1.0))") == [2.0]
     assert project("import law\nprint(law.make(3.0)(1.0))") == [3.0]
     assert project("import law\nprint(law.make(3.0)(1.0), law.make(2.0)(1.0))") == [3.0, 2.0]
+
+
+def test_a_tuple_of_arrays_is_one_argument():
+    @kernel("(F I) (Fw Fw) i8 -> f8")
+    def shared(own, out, k):
+        values, numbers = own
+        out[0][k] = values[k] + numbers[k]
+        out[1][k] = values[k] * numbers[k]
+        return out[0][k]
+
+    own = np.array([1.0, 2.0]), np.array([3, 4])
+    out = np.zeros(2), np.zeros(2)
+    assert shared(own, out, 1) == 6.0
+    assert out[1][1] == 8.0
+    own[0].flags.writeable = False
+    assert shared(own, out, 0) == 4.0
+    with pytest.raises(TypeError, match=r"argument 'own' must be a tuple of 2: .*, not tuple of 1"):
+        shared(own[:1], out, 0)
+    with pytest.raises(
+        TypeError,
+        match=r"argument 'out' must be a tuple .*read-only float64 array of shape \(2,\) at place 1",
+    ):
+        shared(own, (out[0], own[0]), 0)
+    with pytest.raises(TypeError, match=r"argument 'own' must be a tuple of 2: .*, not ndarray"):
+        shared(own[0], out, 0)

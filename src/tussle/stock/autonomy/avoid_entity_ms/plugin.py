@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
+from tussle.api import Behavior, GroupView, Param, neighbors
 
-from tussle.api import Behavior, GroupView, Param
+TOUCHING = 1e10
+"""Magnitude at or below the minimum range: stands for infinity (the existing system's number)."""
 
 
 class AvoidEntityMS(Behavior):
@@ -19,12 +20,19 @@ class AvoidEntityMS(Behavior):
     minimum_range = Param(5.0, unit="m", ge=0.0, doc="m: distance below which nothing else counts.")
     avoid_non_team = Param(True, doc="Avoid entities of other teams too.")
 
+    @neighbors("sphere_of_influence", x="sum", y="sum", z="sum")
+    @staticmethod
+    def push(
+        offset_x: float, offset_y: float, offset_z: float, distance: float, team: int, other_team: int,
+        sphere_of_influence: float, minimum_range: float, avoid_non_team: bool,
+    ) -> tuple[float, float, float] | None:  # fmt: skip
+        if distance == 0.0 or not (team == other_team or avoid_non_team):
+            return None
+        magnitude = (sphere_of_influence - distance) / (sphere_of_influence - minimum_range)
+        if distance <= minimum_range:
+            magnitude = TOUCHING
+        away = -magnitude / distance
+        return away * offset_x, away * offset_y, away * offset_z
+
     def step(self, g: GroupView) -> None:
-        near = g.near(self.sphere_of_influence)
-        row, distance = near.row, near.distance
-        reach, least = self.sphere_of_influence[row], self.minimum_range[row]
-        span = np.where(reach > least, reach - least, 1.0)
-        magnitude = np.where(distance <= least, 1e10, (reach - distance) / span)
-        counts = (near.team == g.team[row]) | self.avoid_non_team[row]
-        away = np.where(counts & (distance > 0.0), -magnitude / np.where(distance > 0.0, distance, 1.0), 0.0)
-        self.wish[:] = near.sum(away * near.offset) * g.call("longest_wish")
+        self.wish[:] = self.push(g).values * g.call("longest_wish")

@@ -6,10 +6,13 @@ import math
 
 import numpy as np
 
-from tussle.api import Autonomy, GroupView, Output, Param, State
+from tussle.api import Autonomy, GroupView, Output, Param, State, neighbors, together
+from tussle.numeric import cos
 from tussle.stock.autonomy.boids import kernels
+from tussle.stock.autonomy.boids.kernels import push
 
 AHEAD = 1e6  # [m]
+Contributed = tuple[float, ...]
 
 
 class Boids(Autonomy):
@@ -62,20 +65,92 @@ class Boids(Autonomy):
     desired_altitude = Output(unit="m")
     velocity = Output("velocity_x velocity_y velocity_z", unit="m/s")
 
+    @neighbors("comms_range", teams="own", x="sum", y="sum", z="sum", east="sum", north="sum", n="count")
+    @staticmethod
+    def mates(
+        offset_x: float, offset_y: float, offset_z: float, other_level_forward_x: float, other_level_forward_y: float
+    ) -> Contributed:  # fmt: skip
+        return offset_x, offset_y, offset_z, other_level_forward_x, other_level_forward_y, True
+
+    @neighbors("comms_range", teams="own", x="sum", y="sum", z="sum", yaw="sum", no="sum", n="count")
+    @staticmethod
+    def historic_mates(offset_x: float, offset_y: float, offset_z: float, other_yaw: float) -> Contributed:
+        return offset_x, offset_y, offset_z, other_yaw, 0.0, True
+
+    @neighbors("comms_range", teams="other", n="count")
+    @staticmethod
+    def others() -> bool:
+        return True
+
+    @neighbors("comms_range", "sphere_of_influence", teams="own", x="sum", y="sum", z="sum")
+    @staticmethod
+    def team_push(
+        offset_x: float, offset_y: float, offset_z: float, distance_squared: float, inverse_distance: float,
+        sphere_of_influence: float, minimum_team_range: float,
+    ) -> Contributed:  # fmt: skip
+        return push(
+            offset_x, offset_y, offset_z, distance_squared, inverse_distance, sphere_of_influence, minimum_team_range
+        )  # fmt: skip
+
+    @neighbors("comms_range", "sphere_of_influence", teams="other", x="sum", y="sum", z="sum")
+    @staticmethod
+    def other_push(
+        offset_x: float, offset_y: float, offset_z: float, distance_squared: float, inverse_distance: float,
+        sphere_of_influence: float, minimum_nonteam_range: float,
+    ) -> Contributed:  # fmt: skip
+        return push(
+            offset_x, offset_y, offset_z, distance_squared, inverse_distance, sphere_of_influence, minimum_nonteam_range
+        )  # fmt: skip
+
+    @staticmethod
+    def in_view(
+        offset_x: float, offset_y: float, offset_z: float, distance: float,
+        quat_w: float, quat_x: float, quat_y: float, quat_z: float, fov_az: float, fov_el: float,
+    ) -> bool:  # fmt: skip
+        """Whether azimuth and elevation of an offset [m] in body axes are inside the fields of view [rad].
+
+        |angle| < half is cos(angle) > cos(half) up to pi, and a full circle has no edge: someone exactly astern is seen.
+        """
+        w, i, j, k = quat_w, quat_x, quat_y, quat_z
+        ahead = (
+            (1 - 2 * (j * j + k * k)) * offset_x
+            + 2 * (i * j + w * k) * offset_y
+            + 2 * (i * k - w * j) * offset_z
+        )
+        left = (
+            2 * (i * j - w * k) * offset_x
+            + (1 - 2 * (i * i + k * k)) * offset_y
+            + 2 * (j * k + w * i) * offset_z
+        )
+        level = np.sqrt(ahead * ahead + left * left)
+        in_azimuth = (
+            ahead > cos(0.5 * min(fov_az, 2.0 * np.pi)) * level or fov_az >= 2.0 * np.pi or level == 0.0
+        )
+        in_elevation = level > cos(0.5 * min(fov_el, np.pi)) * distance or fov_el > np.pi
+        return (in_azimuth and in_elevation) or distance == 0.0
+
+    seen = together(mates, others, team_push, other_push)
+    seen_in_view = together(mates, others, team_push, other_push, where=in_view)
+    historic = together(historic_mates, others, team_push, other_push)
+    historic_in_view = together(historic_mates, others, team_push, other_push, where=in_view)
+
     def spawn(self, g: GroupView, rows: np.ndarray) -> None:
         ahead = g.pos + self.goal_distance * g.forward
         self.target[:, rows] = np.where(self.use_initial_heading, ahead, self.goal)[:, rows]
 
     def step(self, g: GroupView) -> None:
         wanted = np.empty((3, g.n))
-        x, y, z = g.pos
-        sums = self._sums(g)
+        pos = _, _, z = tuple(g.pos)
         if self.means == "historic":
-            kernels.historic_means(x, y, z, sums)
-        kernels.law(
-            x, y, z, self.target, sums, self.max_speed, self.goal_weight, self.avoid_team_weight, self.avoid_nonteam_weight,
-            self.centroid_weight, self.align_weight, wanted,
+            seen = (self.historic_in_view if self.limits_view else self.historic)(g).values
+            kernels.historic_means(pos, seen)
+        else:
+            seen = (self.seen_in_view if self.limits_view else self.seen)(g).values
+        weights = (
+            self.max_speed, self.goal_weight, self.avoid_team_weight, self.avoid_nonteam_weight, self.centroid_weight,
+            self.align_weight,
         )  # fmt: skip
+        kernels.law(pos, self.target, seen, weights, wanted)
         wired = self.wired
         if "turn_rate" in wired or "pitch_rate" in wired or "speed" in wired:
             kernels.rates(wanted, g.yaw, g.climb, self.max_speed, self.speed, self.turn_rate, self.pitch_rate)
@@ -85,29 +160,3 @@ class Boids(Autonomy):
             kernels.desired(
                 wanted, z, self.max_speed, self.desired_heading, self.desired_speed, self.desired_altitude
             )
-
-    def _sums(self, g: GroupView) -> np.ndarray:
-        index = g.index(self.comms_range)
-        blocks = index.blocks(g.first, g.last)
-        if self.means == "historic":
-            heading_x = heading_y = g.by_place(index, "yaw")[0]
-        else:
-            heading_x, heading_y = g.by_place(index, "level_forward")
-        sums = np.empty((kernels.N_SUMS, g.n))
-        places = (
-            blocks.queries, blocks.block_first, blocks.span_first, blocks.span_start, blocks.span_end, index.order,
-            blocks.x, blocks.y, blocks.z, index.sx, index.sy, index.sz, heading_x, heading_y, g.by_place(index, "team")[0],
-            g.team, self.comms_range, self.sphere_of_influence, self.minimum_team_range, self.minimum_nonteam_range,
-        )  # fmt: skip
-        if self.limits_view:
-            quat = np.ascontiguousarray(g.quat)
-            run = lambda a, b: kernels.neighbor_sums_in_view(  # noqa: E731
-                *places, quat, self.fov_az, self.fov_el, sums, g.first, a, b, blocks.most
-            )
-        else:
-            if g.context.threads == 1:
-                kernels.neighbor_sums(*places, sums, g.first, 0, blocks.n_blocks, blocks.most)
-                return sums
-            run = lambda a, b: kernels.neighbor_sums(*places, sums, g.first, a, b, blocks.most)  # noqa: E731
-        g.context.split(blocks.n_blocks, run)
-        return sums

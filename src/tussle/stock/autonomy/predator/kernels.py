@@ -7,28 +7,25 @@ import math
 import numpy as np
 
 from tussle.neighbors.kernels import row_of
-from tussle.neighbors.search import DIFFERENT, SAME, in_range, nearest_places
+from tussle.neighbors.search import DIFFERENT, SAME, TABLE, in_range, nearest_places
 from tussle.numeric import atan2, wrap
 from tussle.numeric.kernel import kernel
 
 
-@kernel("F F F I I F B Iw Iw Iw Iw I I I I I i8 I I I I F F F F F I -> i8")
-def hunt(
-    x, y, z, own_team, prey_team, capture_range, allow_switching, target, target_row, claim_row, claim_place,
-    row_id, row_world, id_start, id_row, place, first, world_start, keys, strip_start, world_strip, inverse_cell, sx, sy, sz,
-    team, order,
-):  # fmt: skip
+@kernel(f"(F F F F) (I I) B (Iw Iw Iw Iw) (I I I I I I) i8 {TABLE} -> i8")
+def hunt(points, teams, allow_switching, out, rows, first, table):
     """Choose targets and collect claims for the rows of a group that begins at row `first` of the table.
 
-    By row of the group (n,): x, y, z [m], own_team, prey_team, capture_range [m], allow_switching; target, the id hunted or 0,
-    is kept
-    while it lives and switching is not allowed, else becomes the nearest of prey_team (of equals the smaller id); target_row is
-    its
-    row of the table or -1. By row of the table: row_id, row_world, place. id_row[id_start[w] + i] is the row of id i of world w.
-    Claims, everyone of another team nearer than capture_range: claim_row (row of the group) and claim_place, which becomes the
-    row of the table, as far as there is room. Returns how many claims there are.
+    By row of the group (n,): points x, y, z and capture_range [m]; own team and prey_team; allow_switching; target, the id hunted
+    or 0, is kept while it lives and switching is not allowed, else becomes the nearest of prey_team (of equals the smaller id);
+    target_row is its row of the table or -1. rows: by row of the table id, world and place; id_row[id_start[w] + i] is the row of
+    id i of world w; order. Claims, everyone of another team nearer than capture_range: claim_row (row of the group) and
+    claim_place, which becomes the row of the table, as far as there is room. Returns how many claims there are.
     """
-    table = (world_start, keys, strip_start, world_strip, inverse_cell, sx, sy, sz, team)
+    x, y, z, capture_range = points
+    own_team, prey_team = teams
+    target, target_row, claim_row, claim_place = out
+    row_id, row_world, place, id_row, id_start, order = rows
     best, ranks, places = np.empty(1), np.empty(1, np.int64), np.empty(1, np.int64)
     n_claims = 0
     room = claim_row.shape[0]
@@ -62,14 +59,16 @@ def hunt(
     return n_claims
 
 
-@kernel("F F F F F F F F I F F F Fw Fw Fw")
-def pursue(
-    x, y, z, qw, qx, qy, qz, max_speed, target_row, table_x, table_y, table_z, speed, turn_rate, pitch_rate
-):
+@kernel("(F F F) (F F F F) F I (F F F) (Fw Fw Fw)")
+def pursue(pos, quat, max_speed, target_row, table_pos, commands):
     """Speed [m/s] and rates [rad/s] towards the target's position; rows without a target keep their last commands.
 
-    x, y, z [m], quaternion (qw ... qz), max_speed [m/s], target_row (n,) of the rows; table_x, table_y, table_z (N,) [m].
+    pos [m], quat (w, x, y, z), max_speed [m/s], target_row (n,) of the rows; table_pos (N,) [m].
     """
+    x, y, z = pos
+    qw, qx, qy, qz = quat
+    table_x, table_y, table_z = table_pos
+    speed, turn_rate, pitch_rate = commands
     for i in range(x.shape[0]):
         row = target_row[i]
         if row >= 0:

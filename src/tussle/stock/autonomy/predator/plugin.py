@@ -34,7 +34,9 @@ class Predator(Autonomy):
         index = g.any_index()
         bodies = g.bodies
         _, _, id_row, id_start = g.table_bodies.layout()
-        x, y, z = g.pos
+        pos = x, y, z = tuple(g.pos)
+        rows = bodies.id, index.row_world, index.place, id_row, id_start, index.order
+        table = (*index.table, g.by_place(index, "team")[0])
         target_row = np.empty(g.n, np.int64)
         room, n_claims = 0, 16 * g.n + 64
         while (
@@ -43,16 +45,13 @@ class Predator(Autonomy):
             room = n_claims
             claim_row, claimed = np.empty(room, np.int64), np.empty(room, np.int64)
             n_claims = kernels.hunt(
-                x, y, z, g.team, self.prey_team_id, self.capture_range, self.allow_prey_switching, self.target, target_row,
-                claim_row, claimed, bodies.id, index.row_world, id_start, id_row, index.place, g.first, *index.table,
-                g.by_place(index, "team")[0], index.order,
+                (x, y, z, self.capture_range), (g.team, self.prey_team_id), self.allow_prey_switching,
+                (self.target, target_row, claim_row, claimed), rows, g.first, table,
             )  # fmt: skip
-        table_x, table_y, table_z = bodies.pos
+        table_x, table_y, _ = table_pos = tuple(bodies.pos)
         if not self.wired.isdisjoint(("speed", "turn_rate", "pitch_rate")):
-            kernels.pursue(
-                x, y, z, *g.quat, self.max_speed, target_row, table_x, table_y, table_z, self.speed, self.turn_rate,
-                self.pitch_rate,
-            )  # fmt: skip
+            commands = self.speed, self.turn_rate, self.pitch_rate
+            kernels.pursue(pos, tuple(g.quat), self.max_speed, target_row, table_pos, commands)
         if not self.wired.isdisjoint(("desired_heading", "desired_speed")):
             kernels.point(
                 x, y, self.max_speed, target_row, table_x, table_y, self.desired_heading, self.desired_speed

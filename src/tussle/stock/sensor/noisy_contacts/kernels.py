@@ -6,29 +6,26 @@ from tussle.numeric.kernel import kernel
 from tussle.numeric.quaternion import quat_conjugate, quat_from_euler, quat_multiply
 
 
-@kernel("I I F2 F2 F2 I I F2 F2 F2 F2 F2 F2 F2 F2 F2 F2 F2 F2 F2w")
-def blur(
-    row, other, true_pos, true_vel, true_quat, ids, teams,
-    pos_0, pos_1, pos_2, vel_0, vel_1, vel_2, orient_0, orient_1, orient_2,
-    pos_draw, vel_draw, orient_draw, contacts,
-):  # fmt: skip
+@kernel("(I I I I) (F2 F2 F2) (F2 F2 F2) (F2 F2 F2) (F2 F2 F2) (F2 F2 F2) F2w")
+def blur(rows, truth, pos_noise, vel_noise, orient_noise, draws, contacts):
     """Fill the contact lists.
 
     Args:
-        row: Row of the group that measures, (m,).
-        other: Row of the body table that is measured, (m,).
-        true_pos: True positions of the body table [m], (3, N), world frame.
-        true_vel: True velocities [m/s], (3, N), world frame.
-        true_quat: True quaternions body to world, (4, N).
-        ids: Ids of the body table, (N,).
-        teams: Teams of the body table, (N,).
-        pos_0, pos_1, pos_2: Mean and standard deviation of x, y, z [m], (2, n) each, n rows of the group.
-        vel_0, vel_1, vel_2: Those of the velocity [m/s], (2, n) each.
-        orient_0, orient_1, orient_2: Those of the turns about the body x, y and z axes, in this order [rad], (2, n)
-            each.
-        pos_draw, vel_draw, orient_draw: Standard normal draws, (3, m) each.
+        rows: Row of the group that measures and row of the body table that is measured, (m,) each; ids and teams of the body table,
+            (N,) each.
+        truth: Positions [m] and velocities [m/s] of the body table, (3, N), world frame, and quaternions body to world, (4, N).
+        pos_noise: Mean and standard deviation of x, y and z [m], (2, n) each, n rows of the group.
+        vel_noise: Those of the velocity [m/s].
+        orient_noise: Those of the turns about the body x, y and z axes, in this order [rad].
+        draws: Standard normal draws for position, velocity and turns, (3, m) each.
         contacts: id, team, x y z [m], vx vy vz [m/s], qw qx qy qz, (12, m), written.
     """
+    row, other, ids, teams = rows
+    true_pos, true_vel, true_quat = truth
+    pos_0, pos_1, pos_2 = pos_noise
+    vel_0, vel_1, vel_2 = vel_noise
+    orient_0, orient_1, orient_2 = orient_noise
+    pos_draw, vel_draw, orient_draw = draws
     for k in range(row.shape[0]):
         i = row[k]
         j = other[k]

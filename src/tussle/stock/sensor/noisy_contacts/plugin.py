@@ -46,10 +46,10 @@ class NoisyContacts(Sensor):
         row, ids, bodies = near.row, near.id, g.bodies
         data = np.empty((len(FIELDS.split()), len(near)))
         kernels.blur(
-            row, near.other, bodies.pos, bodies.vel, bodies.quat, bodies.id, bodies.team,
-            self.pos_noise_0, self.pos_noise_1, self.pos_noise_2, self.vel_noise_0, self.vel_noise_1, self.vel_noise_2,
-            self.orient_noise_0, self.orient_noise_1, self.orient_noise_2,
-            g.normal_pairs("pos", row, ids, 3), g.normal_pairs("vel", row, ids, 3), g.normal_pairs("orient", row, ids, 3), data,
+            (row, near.other, bodies.id, bodies.team), (bodies.pos, bodies.vel, bodies.quat),
+            (self.pos_noise_0, self.pos_noise_1, self.pos_noise_2), (self.vel_noise_0, self.vel_noise_1, self.vel_noise_2),
+            (self.orient_noise_0, self.orient_noise_1, self.orient_noise_2),
+            tuple([g.normal_pairs(label, row, ids, 3) for label in ("pos", "vel", "orient")]), data,
         )  # fmt: skip
         start = np.zeros(g.n + 1, np.int64)
         np.cumsum(near.count, out=start[1:])

@@ -1,0 +1,248 @@
+"""Neighbour laws: what an entity makes of each neighbour, as one function of a pair."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tussle.api.bodies import DERIVED, FLOATS, INTS
+from tussle.columns import Channel, Numbers, Param, Ragged
+from tussle.errors import DeclarationError, listed, nearest_name
+from tussle.neighbors.walk import OTHER, PAIR, Law, make_walk
+from tussle.numeric.kernel import Kernel
+from tussle.numeric.rk4 import label
+
+if TYPE_CHECKING:
+    from tussle.api.group import GroupView
+
+COMPONENTS = {3: "xyz", 4: "wxyz", 2: "xy"}
+CODES = {"f": "F", "i": "I", "b": "B"}
+
+
+def components(name: str, k: int) -> tuple[str, ...]:
+    """Names of the components of a body column."""
+    return tuple(f"{name}_{axis}" for axis in COMPONENTS[k]) if k > 1 else (name,)
+
+
+BODY = {
+    part: (name, place)
+    for name, k in {**FLOATS, **dict.fromkeys(INTS, 1), **DERIVED}.items()
+    for place, part in enumerate(components(name, k))
+}
+"""Column of the body table and component of each name that a law may take, vel_x, team, forward_z ..."""
+
+
+def neighbors(
+    *radius: str | float, teams: str | None = None, **reductions: str
+) -> Callable[[Callable[..., Any]], NeighborLaw]:
+    """Declare a function of a pair as a neighbour law.
+
+    Its arguments are matched by name: of the pair offset_x, offset_y, offset_z [m], distance [m], distance_squared, inverse_distance;
+    columns of the entity (vel_x, team, quat_w, yaw ..., and the plugin's own, goal_x of a column goal with a field x); body columns
+    of the other with "other_" before their name. It returns the contributions in the order of `reductions`, or None where the pair
+    does not count. In the plugin `self.law(g)` gives them reduced, by name, (n,) each.
+
+    Args:
+        radius: Name of a parameter or state, or a number [m]; neighbours are nearer. Of several, nearer than each.
+        teams: "own", "other", or None for all.
+        **reductions: Name of each contribution and how it is reduced: "sum"; "mean", 0 without neighbours; "min" and "max", inf and
+            -inf without; "count" of those that are true; "nearest", that of the nearest neighbour (the smaller id of equals), NaN
+            without.
+
+    Raises:
+        DeclarationError: A reduction is unknown, or there is none, or no radius.
+    """
+
+    def declare(function: Callable[..., Any]) -> NeighborLaw:
+        law = law_of(function, radius, teams, reductions)
+        if not radius or not reductions:
+            raise DeclarationError(
+                f"{label(law.function)}: name the radius and the contributions, such as @neighbors('sight', n='count')"
+            )
+        return NeighborLaw((law,), None, tuple(reductions))
+
+    return declare
+
+
+def together(*laws: NeighborLaw, where: Callable[..., Any] | None = None) -> NeighborLaw:
+    """Several neighbour laws of a plugin in one walk over the neighbours; contribution n of a law `mates` is then `mates_n`.
+
+    Args:
+        laws: The laws.
+        where: A function of a pair like a law's, with one result: whether the pair counts for any of them.
+    """
+    condition = law_of(where, (), None, {"counts": "count"}) if where is not None else None
+    every = tuple(law for each in laws for law in each.laws)
+    return NeighborLaw(
+        every, condition, tuple(f"{law.function.__name__}_{name}" for law in every for name in law.reductions)
+    )
+
+
+def law_of(
+    function: Callable[..., Any],
+    radii: tuple[str | float, ...],
+    teams: str | None,
+    reductions: dict[str, str],
+) -> Law:
+    """The law that a function of a pair states; the function may be declared static."""
+    function = getattr(function, "__func__", function)
+    return Law(function, tuple(inspect.signature(function).parameters), radii, teams, reductions)
+
+
+class NeighborLaw:
+    """Neighbour laws as an attribute of a plugin: called on a bound one with its view, they give what the neighbours contribute.
+
+    Attributes:
+        laws: The laws that share a walk.
+        where: A condition of all of them.
+        names: Names of their contributions.
+    """
+
+    def __init__(self, laws: tuple[Law, ...], where: Law | None, names: tuple[str, ...]) -> None:
+        self.laws, self.where, self.names = laws, where, names
+        self.__doc__ = laws[0].function.__doc__
+        self._plans: dict[type, Plan] = {}
+
+    def __get__(self, plugin: Any, owner: type) -> Any:
+        return self if plugin is None else partial(self.contributions, plugin)
+
+    def contributions(self, plugin: Any, g: GroupView) -> Contributions:
+        """What the neighbours of each row contribute."""
+        plan = self._plans.get(type(plugin))
+        if plan is None:
+            plan = self._plans[type(plugin)] = make_plan(g, plugin, self.laws, self.where)
+        return Contributions(self.names, plan.walk(g, plugin))
+
+    def check(self, cls: type, name: str) -> None:
+        """Refuse a law whose arguments mean nothing to a plugin.
+
+        Raises:
+            DeclarationError: An argument or radius is no name of a pair or a column.
+        """
+        own = [*PAIR, *own_columns(cls)]
+        allowed = [*own, *(OTHER + part for part in BODY)]
+        for law in (*self.laws, *([self.where] if self.where else [])):
+            for column in law.columns:
+                if column not in allowed:
+                    raise DeclarationError(
+                        f"{label(law.function)}: {cls.__name__}.{name}: {column!r} is no name of a pair or a column"
+                        f"{nearest_name(column, allowed)}; {listed(own)}; and body columns of the other with {OTHER!r} before the name"
+                    )
+
+
+class Contributions:
+    """Contributions of the neighbours, by name, (n,) each.
+
+    Attributes:
+        values: All of them in the order of the declaration, (k, n).
+    """
+
+    __slots__ = ("_names", "values")
+
+    def __init__(self, names: tuple[str, ...], values: np.ndarray) -> None:
+        self._names, self.values = names, values
+
+    def __getattr__(self, name: str) -> np.ndarray:
+        try:
+            place = self._names.index(name)
+        except ValueError:
+            raise AttributeError(
+                f"the law has no contribution {name!r}{nearest_name(name, self._names)}; {listed(self._names)}"
+            ) from None
+        return self.values[place, :]
+
+    def __iter__(self) -> Iterator[np.ndarray]:
+        return iter(self.values)
+
+
+@lru_cache(maxsize=256)
+def own_columns(cls: Any) -> dict[str, str]:
+    """Expression, over a view `g` and a plugin's attributes `own`, of each column of the entity that its laws may name."""
+    found = {}
+    for part, (name, place) in BODY.items():
+        column = f"g.column({name!r})" if name in DERIVED else f"g.{name}"
+        found[part] = column if part == name else f"{column}[{place}]"
+    is_world = hasattr(cls, "is_idle")  # a world plugin; its class is above this module
+    for name, declared in cls.declared(Numbers).items():
+        per = getattr(declared, "per", "world" if is_world else "entity")
+        if (
+            isinstance(declared, Ragged)
+            or per == "team"
+            or (isinstance(declared, Param) and not declared.is_row_data)
+        ):
+            continue
+        fields = (
+            declared.fields
+            if isinstance(declared, Channel)
+            else [f"{name}_{field}" for field in declared.fields]
+        )
+        parts = {part: f"own[{name!r}][{place}]" for place, part in enumerate(fields)} or {
+            name: f"own[{name!r}]"
+        }
+        found |= {part: f"{text}[g.world]" if per == "world" else text for part, text in parts.items()}
+    return found
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What one walk over the neighbours takes of a plugin.
+
+    Attributes:
+        run: The walk's kernel.
+        n_out: Number of contributions.
+        columns: Gives, of a view and a plugin's attributes, how far to look [m] and the columns by row.
+        other: Its columns by place: of the body table, and which components.
+    """
+
+    run: Kernel
+    n_out: int
+    columns: Callable[[GroupView, dict[str, Any]], tuple[Any, tuple[np.ndarray, ...]]]
+    other: tuple[tuple[str, tuple[int, ...]], ...]
+
+    def walk(self, g: GroupView, plugin: Any) -> np.ndarray:
+        """What the neighbours of each row contribute, (k, n)."""
+        reach, own = self.columns(g, plugin.__dict__)
+        index = g.index(reach)
+        blocks = index.blocks(g.first, g.last)
+        longs = (
+            blocks.queries, blocks.block_first, blocks.span_first, blocks.span_start, blocks.span_end, index.order
+        )  # fmt: skip
+        floats: tuple[np.ndarray, ...] = (blocks.x, blocks.y, blocks.z, index.sx, index.sy, index.sz)
+        for name, places in self.other:
+            columns = g.by_place(index, name)
+            floats += columns if len(columns) == len(places) else tuple([columns[place] for place in places])
+        out = np.empty((self.n_out, g.n))
+        run, first, most = self.run, g.first, blocks.most
+        if g.context.threads == 1:
+            run(longs, floats, own, out, first, 0, blocks.n_blocks, most)
+        else:
+            g.context.split(blocks.n_blocks, lambda a, b: run(longs, floats, own, out, first, a, b, most))
+        return out
+
+
+def make_plan(g: GroupView, plugin: Any, laws: tuple[Law, ...], where: Law | None) -> Plan:
+    """The plan for the laws of a plugin; g and plugin show of which types the columns are."""
+    cls: Any = type(plugin)
+    columns, scope = own_columns(cls), {"np": np}
+
+    def evaluated(text: str) -> Any:
+        return eval(f"lambda g, own: {text}", scope)  # noqa: S307 - made of declared names
+
+    made = make_walk(laws, where, lambda name: CODES[evaluated(columns[name])(g, plugin.__dict__).dtype.kind])
+    common = set.intersection(*[set(law.radii) for law in laws])
+    radii = [min(common, key=str)] if common else list(dict.fromkeys(law.radii[0] for law in laws))
+    reach = [
+        columns[radius] if isinstance(radius, str) else f"float({str(float(radius))!r})" for radius in radii
+    ]
+    farthest = reach[0] if len(reach) == 1 else f"np.maximum.reduce(np.broadcast_arrays({', '.join(reach)}))"
+    other: dict[str, tuple[int, ...]] = {}
+    for part in made.other:
+        name, place = BODY[part.removeprefix(OTHER)]
+        other[name] = (*other.get(name, ()), place)
+    by_row = "".join(f"{columns[name]}, " for name in made.own)
+    return Plan(made.run, made.n_out, evaluated(f"({farthest}, ({by_row}))"), tuple(other.items()))

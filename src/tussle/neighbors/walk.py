@@ -1,0 +1,445 @@
+"""The pair loop around neighbour laws: blocks of eight agents walk their candidates, each agent a lane.
+
+The loop is written for the laws that it runs, as text: their columns become arguments, their contributions accumulators in
+registers. Several laws share one walk: the candidates near a block are found once, and the first loop over them notes which
+are near enough for laws that look less far.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tussle.errors import DeclarationError, listed, nearest_name
+from tussle.neighbors import lanes
+from tussle.neighbors.lane_code import lane_code
+from tussle.neighbors.lanes import LANES, bits, choose, load
+from tussle.numeric.kernel import Kernel, device, kernel
+from tussle.numeric.rk4 import label
+
+REDUCTIONS = ("sum", "mean", "min", "max", "count", "nearest")
+PAIR = ("offset_x", "offset_y", "offset_z", "distance", "distance_squared", "inverse_distance")
+"""Arguments that belong to a pair; the others are columns, of the other one with the prefix OTHER."""
+OTHER = "other_"
+TEAMS = (None, "own", "other")
+
+
+@dataclass(frozen=True, eq=False)
+class Law:
+    """What an entity makes of each neighbour, and how that is reduced to one number a row.
+
+    Attributes:
+        function: Takes the names of a pair, returns the contributions in order, or None where the pair does not count.
+        arguments: Names of its arguments.
+        radii: Columns or numbers [m]; a neighbour is nearer than every one of them.
+        teams: None for all, "own" or "other".
+        reductions: Name -> reduction of each contribution.
+    """
+
+    function: Callable[..., Any]
+    arguments: tuple[str, ...]
+    radii: tuple[str | float, ...]
+    teams: str | None
+    reductions: dict[str, str]
+
+    def __post_init__(self) -> None:
+        for name, reduction in self.reductions.items():
+            if reduction not in REDUCTIONS:
+                raise DeclarationError(
+                    f"{label(self.function)}: {name}={reduction!r} is no reduction{nearest_name(str(reduction), REDUCTIONS)}; "
+                    f"{listed(REDUCTIONS)}"
+                )
+        if self.teams not in TEAMS:
+            raise DeclarationError(
+                f"{label(self.function)}: teams={self.teams!r} is not None, 'own' or 'other'"
+            )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What it reads of each pair: its arguments, and what its reductions need."""
+        return (*self.arguments, *(["other_id"] if "nearest" in self.reductions.values() else []))
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the columns that it reads, those of the other one with their prefix."""
+        radii = [radius for radius in self.radii if isinstance(radius, str)]
+        return tuple(dict.fromkeys(name for name in (*self.names, *radii) if name not in PAIR))
+
+
+@dataclass(frozen=True)
+class Walk:
+    """One walk over the neighbours for several laws.
+
+    Attributes:
+        own: Columns by row that its kernel takes, in order; "team" among them where laws tell teams apart.
+        other: Columns by place.
+        run: The kernel.
+        n_out: Number of contributions in all.
+    """
+
+    own: tuple[str, ...]
+    other: tuple[str, ...]
+    run: Kernel
+    n_out: int
+
+
+@device
+def squared_gap(x, y, z, box):  # type: ignore[no-untyped-def]
+    """Squared distance of eight points from a box (west, east, south, north, low, high), 0 inside."""
+    west, east, south, north, low, high = box
+    dx = choose(x < west, west - x, choose(x > east, x - east, 0.0))
+    dy = choose(y < south, south - y, choose(y > north, y - north, 0.0))
+    dz = choose(z < low, low - z, choose(z > high, z - high, 0.0))
+    return dx * dx + dy * dy + dz * dz
+
+
+@device
+def find_near(begin, end, span_start, span_end, places, box, reach2, found):  # type: ignore[no-untyped-def]
+    """Places of the spans [begin, end) within reach of the box, into `found`; no branch on a single place. Returns how many."""
+    sx, sy, sz = places
+    n = 0
+    for s in range(begin, end):
+        for p in range(span_start[s], span_end[s], LANES):
+            hit = bits(squared_gap(load(sx, p), load(sy, p), load(sz, p), box) < reach2)
+            hit &= (1 << min(LANES, span_end[s] - p)) - 1
+            for k in range(LANES):
+                found[n] = p + k
+                n += (hit >> k) & 1
+    return n
+
+
+@device
+def find_teams(begin, end, span_start, span_end, places, team, wanted, box, reach2, mates, others):  # type: ignore[no-untyped-def]
+    """As find_near, those of team `wanted` into `mates` and the rest into `others`. Returns how many of each."""
+    sx, sy, sz = places
+    n_mates, n_others = 0, 0
+    for s in range(begin, end):
+        for p in range(span_start[s], span_end[s], LANES):
+            hit = bits(squared_gap(load(sx, p), load(sy, p), load(sz, p), box) < reach2)
+            hit &= (1 << min(LANES, span_end[s] - p)) - 1
+            if hit == 0:
+                continue
+            mine = hit & bits(load(team, p) == wanted)
+            for k in range(LANES):
+                mates[n_mates] = p + k
+                n_mates += (mine >> k) & 1
+            hit ^= mine
+            if hit != 0:
+                for k in range(LANES):
+                    others[n_others] = p + k
+                    n_others += (hit >> k) & 1
+    return n_mates, n_others
+
+
+@device
+def square_of(radius):  # type: ignore[no-untyped-def]
+    """Squared radius; of one that is not above 0 nobody is within."""
+    return radius * radius if radius > 0.0 else -1.0
+
+
+LONGS = ["queries", "block_first", "span_first", "span_start", "span_end", "order"]
+POINTS = ["qx", "qy", "qz", "sx", "sy", "sz"]
+
+
+FROM_LANES = ["bits", "choose", "inverse_sqrt", "lanes_sqrt", "load", "number", "splat", "store", "truth"]
+
+
+@dataclass(frozen=True)
+class Part:
+    """One law of a walk, ready to be written: contribution k of all is v_k for one pair and a_k over them.
+
+    Attributes:
+        law: The law.
+        at: Number of its first contribution, and of its function.
+        masks: Which of its contributions are masks.
+        can_skip: It returns None for some.
+    """
+
+    law: Law
+    at: int
+    masks: tuple[bool, ...]
+    can_skip: bool
+
+    @property
+    def reductions(self) -> list[tuple[int, str]]:
+        """Number and reduction of each contribution."""
+        return list(enumerate(self.law.reductions.values(), self.at))
+
+    @property
+    def counted(self) -> str:
+        """Mask of the lanes for which the pair counts."""
+        return f"inside & counts_{self.at}" if self.can_skip else "inside"
+
+    def begin(self) -> Iterator[str]:
+        """What stands before the loop over the candidates."""
+        start = {"min": "np.inf", "max": "-np.inf", "nearest": "np.nan"}
+        for k, reduction in self.reductions:
+            yield f"a_{k} = splat({start.get(reduction, '0.0')})"
+        if "mean" in self.law.reductions.values():
+            yield f"n_{self.at} = splat(0.0)"
+        if "nearest" in self.law.reductions.values():
+            yield f"best_{self.at}, best_id_{self.at} = splat(np.inf), splat(np.inf)"
+
+    def contributions(self) -> Iterator[str]:
+        """The call of the law."""
+        names = [f"v_{k}" for k, _ in self.reductions] + ([f"counts_{self.at}"] if self.can_skip else [])
+        yield f"{', '.join(names)}, = law_{self.at}({', '.join(f'{name}_' for name in self.law.arguments)})"
+        for (k, reduction), is_mask in zip(self.reductions, self.masks, strict=True):
+            if reduction == "count" and not is_mask:
+                yield f"v_{k} = truth(v_{k})"
+            if reduction != "count" and is_mask:
+                yield f"v_{k} = number(v_{k})"
+
+    def step(self) -> Iterator[str]:
+        """One candidate."""
+        at = self.at
+        yield from self.contributions()
+        yield f"ok = {self.counted}"
+        if "nearest" in self.law.reductions.values():
+            nearer = f"(distance_squared_ == best_{at}) & (other_id_ < best_id_{at})"
+            yield f"closer = ok & ((distance_squared_ < best_{at}) | ({nearer}))"
+            yield f"best_{at} = choose(closer, distance_squared_, best_{at})"
+            yield f"best_id_{at} = choose(closer, other_id_, best_id_{at})"
+        if "mean" in self.law.reductions.values():
+            yield f"n_{at} = choose(ok, n_{at} + 1.0, n_{at})"
+        for k, reduction in self.reductions:
+            mask, value = "ok", f"a_{k} + v_{k}"
+            if reduction == "count":
+                mask, value = f"ok & v_{k}", f"a_{k} + 1.0"
+            elif reduction in ("min", "max"):
+                mask, value = f"ok & (v_{k} {'<' if reduction == 'min' else '>'} a_{k})", f"v_{k}"
+            elif reduction == "nearest":
+                mask, value = "closer", f"v_{k}"
+            yield f"a_{k} = choose({mask}, {value}, a_{k})"
+
+    def end(self) -> Iterator[str]:
+        """What stands behind the loop."""
+        for k, reduction in self.reductions:
+            if reduction == "mean":
+                yield f"a_{k} = choose(n_{self.at} > 0.0, a_{k} / n_{self.at}, 0.0)"
+
+
+def make_walk(laws: Sequence[Law], where: Law | None, code_of: Callable[[str], str]) -> Walk:
+    """The walk of some laws.
+
+    Args:
+        laws: Their order is that of the results.
+        where: A law whose one contribution says whether a pair counts for any of them.
+        code_of: Gives the kernel code (F, I, B) of an own column.
+
+    Raises:
+        DeclarationError: A law is not what can be done for eight lanes at once, or returns another number of contributions.
+    """
+    scope: dict[str, Any] = {name: getattr(lanes, name) for name in FROM_LANES}
+    scope |= {
+        "np": np,
+        "LANES": LANES,
+        "square_of": square_of,
+        "find_near": find_near,
+        "find_teams": find_teams,
+    }
+    parts, at = [], 0
+    for law in laws:
+        parts.append(part_of(law, at, scope))
+        at += len(law.reductions)
+    text = WalkText(parts, part_of(where, at, scope) if where else None, at)
+    exec("\n".join(text.lines()) + "\n", scope)  # noqa: S102 - written here; what authors wrote is in functions of its own
+    made = scope["walk"]
+    made.__module__ = laws[0].function.__module__
+    made.__qualname__ = "+".join(law.function.__qualname__ for law in (*laws, *([where] if where else [])))
+    signature = (
+        f"({' '.join('I' * len(LONGS))}) ({' '.join('F' * (len(POINTS) + len(text.other)))}) "
+        f"({' '.join(code_of(name) for name in text.own)}) F2w i8 i8 i8 i8"
+    )
+    return Walk(text.own, text.other, kernel(signature)(made), at)
+
+
+def part_of(law: Law, at: int, scope: dict[str, Any]) -> Part:
+    """A law's function for lanes, put into the walk's scope."""
+    code = lane_code(law.function)
+    if len(code.masks) != len(law.reductions):
+        raise DeclarationError(
+            f"{label(law.function)}: it returns {len(code.masks)} contributions; declared are {len(law.reductions)}: "
+            f"{', '.join(law.reductions)}"
+        )
+    scope[f"law_{at}"] = code.function
+    return Part(law, at, code.masks, code.can_skip)
+
+
+class WalkText:
+    """The text of a walk's kernel.
+
+    Scratch `lane` holds groups of LANES numbers: the place of each lane, its own columns, its squared radii, then the results.
+
+    Args:
+        parts: The laws.
+        where: A condition of all of them.
+        n_out: Number of contributions.
+    """
+
+    def __init__(self, parts: Sequence[Part], where: Part | None, n_out: int) -> None:
+        self.parts, self.where, self.n_out = parts, where, n_out
+        every = [*parts, *([where] if where else [])]
+        names = dict.fromkeys(name for part in every for name in part.law.columns)
+        self.by_team = any(part.law.teams for part in parts)
+        names |= dict.fromkeys(("team", "other_team") if self.by_team else ())
+        self.own = tuple(name for name in names if not name.startswith(OTHER)) or ("team",)
+        self.other = tuple(
+            sorted(name for name in names if name.startswith(OTHER))
+        )  # components stand together
+        self.taken = [name for name in self.own if any(name in part.law.arguments for part in every)]
+        self.limits = list(dict.fromkeys(part.law.radii for part in parts))
+        self.lists = list(dict.fromkeys(part.law.teams for part in parts))
+        self.limits_at = 1 + len(self.taken)
+        self.results_at = self.limits_at + len(self.limits)
+
+    def lines(self) -> Iterator[str]:
+        """The kernel."""
+        yield "def walk(longs, floats, own, out, first, begin, stop, most):"
+        yield f"    {', '.join(LONGS)} = longs"
+        yield f"    {', '.join([*POINTS, *(f'by_place_{name}' for name in self.other)])} = floats"
+        yield f"    {' '.join(f'by_row_{name},' for name in self.own)} = own"
+        yield f"    lane = np.empty({self.results_at + self.n_out} * LANES)"
+        kept = [*(["all"] if None in self.lists else []), *(["own", "other"] if self.by_team else [])]
+        for name in [*(f"places_{each}" for each in kept), *(f"near_{n}" for n in range(len(self.limits)))]:
+            yield f"    {name} = np.empty(most + LANES, np.int64)"
+        yield "    for b in range(begin, stop):"
+        yield "        q0 = block_first[b]"
+        yield "        width = block_first[b + 1] - q0"
+        yield "        x, y, z = load(qx, q0), load(qy, q0), load(qz, q0)"
+        yield "        done = 0"
+        yield "        while done != (1 << width) - 1:"
+        yield from indented(3, self.take_lanes())
+        yield from indented(3, self.find_places())
+        yield from indented(3, self.load_lanes())
+        for teams in self.lists:
+            yield from indented(3, self.over(teams))
+        yield from indented(3, self.put())
+        yield "            done |= taken"
+
+    def take_lanes(self) -> Iterator[str]:
+        """Columns of the lanes into `lane`; lanes that are not taken get a reach that nothing is within."""
+        active = "k < width"
+        if self.by_team:  # a block of several teams is walked once for each
+            yield "k = 0"
+            yield "while (done >> k) & 1:"
+            yield "    k += 1"
+            yield "wanted = by_row_team[order[queries[q0 + k]] - first]"
+            active = "(k < width) & (by_row_team[i] == wanted)"
+        yield "taken = 0"
+        yield "reach2 = 0.0"
+        yield "west, east, south, north, low, high = np.inf, -np.inf, np.inf, -np.inf, np.inf, -np.inf"
+        yield "for k in range(LANES):"
+        yield "    q = q0 + min(k, width - 1)"
+        yield "    i = order[queries[q]] - first"
+        yield f"    active = {active}"
+        yield "    lane[k] = queries[q]"
+        for at, name in enumerate(self.taken, 1):
+            yield f"    lane[{at} * LANES + k] = by_row_{name}[i]"
+        for at, radii in enumerate(self.limits):
+            square = f"square_of({column(radii[0])})"
+            for radius in radii[1:]:
+                square = f"min({square}, square_of({column(radius)}))"
+            yield f"    limit_{at} = {square} if active else -1.0"
+            yield f"    lane[{self.limits_at + at} * LANES + k] = limit_{at}"
+        yield "    if active:"
+        yield "        taken |= 1 << k"
+        for at in range(len(self.limits)):
+            yield f"        reach2 = max(reach2, limit_{at})"
+        yield "        west, east = min(west, qx[q]), max(east, qx[q])"
+        yield "        south, north = min(south, qy[q]), max(north, qy[q])"
+        yield "        low, high = min(low, qz[q]), max(high, qz[q])"
+
+    def find_places(self) -> Iterator[str]:
+        """Places near the lanes, of all, of their team, of other teams."""
+        spans = "span_first[b], span_first[b + 1], span_start, span_end, (sx, sy, sz)"
+        box = "(west, east, south, north, low, high), reach2"
+        if None in self.lists:
+            yield f"n_all = find_near({spans}, {box}, places_all)"
+        if self.by_team:
+            team = "by_place_other_team, float(wanted)"
+            yield f"n_own, n_other = find_teams({spans}, {team}, {box}, places_own, places_other)"
+
+    def load_lanes(self) -> Iterator[str]:
+        """What stays the same over the candidates."""
+        yield "me = load(lane, 0)"
+        for at, name in enumerate(self.taken, 1):
+            yield f"{name}_ = load(lane, {at} * LANES)"
+        for at in range(len(self.limits)):
+            yield f"limit2_{at} = load(lane, {self.limits_at + at} * LANES)"
+
+    def over(self, teams: str | None) -> Iterator[str]:
+        """Loops over the candidates of some teams, one for each radius; the first notes which are near enough for the others."""
+        parts = [part for part in self.parts if part.law.teams == teams]
+        limits = [n for n, radii in enumerate(self.limits) if any(part.law.radii == radii for part in parts)]
+        for number in limits:
+            inside = [part for part in parts if part.law.radii == self.limits[number]]
+            for part in inside:
+                yield from part.begin()
+            is_first = number == limits[0]
+            list_name = teams or "all"
+            places, count = f"near_{number}", f"n_near_{number}"
+            if is_first:
+                places, count = f"places_{list_name}", f"n_{list_name}"
+            rest = limits[1:] if is_first else []
+            for other in rest:
+                yield f"n_near_{other} = 0"
+            yield f"for c in range({count}):"
+            yield from indented(1, self.pair(places, number, teams, inside, rest))
+            for part in inside:
+                yield from part.end()
+
+    def pair(
+        self, places: str, number: int, teams: str | None, parts: list[Part], rest: list[int]
+    ) -> Iterator[str]:
+        """One candidate against eight agents."""
+        yield f"p = {places}[c]"
+        for axis in "xyz":
+            yield f"offset_{axis}_ = s{axis}[p] - {axis}"
+        yield "distance_squared_ = offset_x_ * offset_x_ + offset_y_ * offset_y_ + offset_z_ * offset_z_"
+        for other in rest:
+            yield f"near_{other}[n_near_{other}] = p"
+            yield f"n_near_{other} += bits(distance_squared_ < limit2_{other}) != 0"
+        taken = {name for part in [*parts, *([self.where] if self.where else [])] for name in part.law.names}
+        if "distance" in taken:
+            yield "distance_ = lanes_sqrt(distance_squared_)"
+        if "inverse_distance" in taken:
+            yield "inverse_distance_ = inverse_sqrt(distance_squared_)"
+        for name in sorted(taken):
+            if name.startswith(OTHER):
+                yield f"{name}_ = splat(by_place_{name}[p])"
+        me = "" if teams == "other" else " & (me != float(p))"
+        yield f"inside = (distance_squared_ < limit2_{number}){me}"
+        if self.where:
+            yield from self.where.contributions()
+            yield f"inside = {self.where.counted} & v_{self.where.at}"
+        for part in parts:
+            yield from part.step()
+
+    def put(self) -> Iterator[str]:
+        """Contributions of the lanes taken to their rows."""
+        for at in range(self.n_out):
+            yield f"store(lane, {self.results_at + at} * LANES, a_{at})"
+        yield "for k in range(LANES):"
+        yield "    if (taken >> k) & 1:"
+        yield "        i = order[queries[q0 + k]] - first"
+        yield f"        for at in range({self.n_out}):"
+        yield f"            out[at, i] = lane[({self.results_at} + at) * LANES + k]"
+
+
+def column(radius: str | float) -> str:
+    """A radius of the row i."""
+    return (
+        f"by_row_{radius}[i]"
+        if isinstance(radius, str)
+        else ("np.inf" if radius == math.inf else repr(radius))
+    )
+
+
+def indented(depth: int, lines: Iterable[str]) -> Iterator[str]:
+    """The lines further in."""
+    return ("    " * depth + line for line in lines)
