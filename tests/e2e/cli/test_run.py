@@ -266,3 +266,21 @@ def test_runs_that_begin_in_one_second_have_a_directory_each(folder, monkeypatch
         f"game-7-20260102-030405{n}" for n in ("", "-2", "-3", "-4")
     ]
     assert all(path.is_dir() for path in made)
+
+
+GROWING = """\
+<runscript>
+  <run start="0" end="8" dt="2"/>
+  <entity><name>crowd</name><team_id>1</team_id><count>199998</count></entity>
+  <entity><name>one</name><team_id>1</team_id>
+    <autonomy generate_entities="true" template="one">Straight</autonomy>
+    <controller>UnicyclePID</controller><motion_model>Unicycle</motion_model></entity>
+</runscript>
+"""
+
+
+def test_a_mission_that_outgrows_its_limit_in_play_needs_allow_large(tussle, folder):
+    (folder / "growing.xml").write_text(GROWING)
+    ended = tussle("run", "growing.xml", "--no-log", code=3)
+    assert "plugins ask for 2 more entities, and there is room for 0: " in ended.stderr
+    tussle("run", "growing.xml", "--no-log", "--allow-large")
