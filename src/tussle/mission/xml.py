@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -201,6 +202,12 @@ class _WorldReader:
                 f"from {start:g} to {end:g} s in steps of {dt:g} s are more than {self.limits.steps:,} steps"
             )
             self.problems.error(fields.place("end"), text)
+        elif abs((n := max(0.0, (end - start) / dt)) - round(n)) > 0.01:
+            last = start + math.ceil(n - 0.5) * dt
+            self.problems.note(
+                fields.place("end"),
+                f"end {end:g} s is not a whole number of steps of {dt:g} s; the last ends at {last:g} s",
+            )
         update = fields.read("update", lambda text: codecs.chosen(text, UPDATES))
         return {"dt": dt, "start": start, "end": end, "motion_multiplier": substeps, "update": update}
 

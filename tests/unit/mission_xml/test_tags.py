@@ -43,6 +43,16 @@ def test_times_and_steps_and_their_defaults(files):
     assert mission.scene.origin == Origin()
 
 
+def test_an_end_between_two_steps_is_noted(files):
+    loaded = files.world('<run end="1" dt="0.3"/>')
+    assert loaded.mission.steps == 3
+    assert any(
+        "end 1 s is not a whole number of steps of 0.3 s; the last ends at 0.9 s" in n for n in loaded.notes
+    )
+    assert not any("whole number of steps" in n for n in files.world('<run end="1" dt="0.1"/>').notes)
+    assert not any("whole number of steps" in n for n in files.world().notes)
+
+
 def test_end_conditions_are_words_of_a_list(files):
     assert files.world("<end_condition>time, all_dead one_team</end_condition>").mission.end_conditions == (
         "time",
