@@ -15,8 +15,10 @@ import pytest
 from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
 
 import tussle
+from tussle.neighbors.walk import make_walk
 from tussle.numeric.kernel import Kernel, kernel
 from tussle.numeric.rk4 import driver
+from tussle.stock import Boids
 
 PROGRAM = Path(__file__).with_name("portable_values.py")
 PACKAGE = Path(tussle.__file__).parent
@@ -105,6 +107,12 @@ def kernels_of(module: str) -> list[Kernel]:
 def test_no_kernel_of_the_package_calls_the_mathematical_library(module):
     for each in kernels_of(module):
         assert not suspicious(each.assembly()), each.name
+
+
+def test_the_walk_of_a_neighbour_law_neither_fuses_nor_calls_the_library():
+    for law in (Boids.seen, Boids.historic_in_view):
+        walk = make_walk(law.laws, law.where, lambda name: "I" if name == "team" else "F")
+        assert not suspicious(walk.run.assembly())
 
 
 def test_nor_does_the_integrator():
