@@ -111,11 +111,11 @@ class Plugin:
             for plugin in resolved[key]:
                 if not isinstance(plugin, child.kind):
                     raise ParameterError(f"{cls.__name__}.{key}: {plugin!r} is no {child.kind.__name__}")
-                if plugin.rate is not None:
-                    raise ParameterError(
-                        f"{cls.__name__}.{key}: {plugin.instance_name} has a rate of its own, but is called by {cls.__name__}; "
-                        f"give {cls.__name__} the rate"
-                    )
+            for rated in (plugin for plugin in resolved[key] if plugin.rate is not None):
+                raise ParameterError(
+                    f"{cls.__name__}.{key}: {rated.instance_name} has a rate of its own, but is called by {cls.__name__}; "
+                    f"give {cls.__name__} the rate"
+                )
             names = [plugin.instance_name for plugin in resolved[key]]
             for twice in names:
                 if names.count(twice) > 1:
