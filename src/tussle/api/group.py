@@ -48,9 +48,8 @@ class GroupView:
 
     def __init__(self, bodies: Bodies, first: int, last: int, context: Context, dt: float) -> None:
         self.context = context
-        self.dt = dt
-        self.substep = 0
-        self.phase = 0.0
+        self._period = dt
+        self.begin()
         self.caller: Any = None
         self.failing_row = None
         self.motion_state: np.ndarray = np.empty((0, 0))
@@ -153,6 +152,10 @@ class GroupView:
     def bodies(self) -> BodyView:
         """All rows of all groups: what is true of everybody."""
         return self._bodies.view
+
+    def begin(self) -> None:
+        """At the beginning of a step, as if nothing had been called yet: what hooks of newborn rows see."""
+        self.dt, self.substep, self.phase = self._period, 0, 0.0
 
     def fail(self, row: int, why: str) -> None:
         """End the world of a row with an error at the end of this step; the others go on. For what handles stand for."""

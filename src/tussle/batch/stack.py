@@ -5,7 +5,7 @@ from __future__ import annotations
 import platform
 import time
 import warnings
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -43,9 +43,7 @@ def most_worlds(mission: Mission) -> int:
 def play(mission: Mission, take: Take, size: int) -> Iterator[Finished | Beat]:
     """Play all runs that `take` gives.
 
-    A run that fails beside others is played again alone before its error is told, since that may have come from a neighbour in its
-    stack. Where a stack cannot go on at all, as when a plugin raises as a game begins, its runs begin anew; from then on each run shows
-    alone that it can be begun before it joins others.
+    Where a stack raises, each of its runs that is not finished is played again alone: the error is that of the run that raises alone.
 
     Args:
         mission: What all of them play, but for their own params and seeds.
@@ -53,42 +51,25 @@ def play(mission: Mission, take: Take, size: int) -> Iterator[Finished | Beat]:
         size: How many are played side by side; fewer where a plugin takes part in fewer worlds.
     """
     size = min(size, most_worlds(mission))
-    runs, is_wary = list(take(size)), False
-    while runs:
-        stack = _Stack(mission, take, is_wary)
+    while runs := list(take(size)):
+        stack = _Stack(mission, take, runs)
         lost, told = [], ""
         try:
-            yield from stack.play(runs)
+            yield from stack.play()
         except (Exception, SystemExit) as error:  # noqa: BLE001 - whatever a plugin raises is the error of its run
             lost, told = stack.under_way(), _told(error)
         finally:
             stack.close()
-        if len(lost) == 1 == stack.size:
-            yield Finished.failed(lost.pop(), told, mission.teams)
-        elif is_wary:
-            for run in lost:
-                yield from play_alone(mission, run)
-            lost = []
-        is_wary = is_wary or bool(lost)
-        runs = lost or list(take(size))
+        for run in lost:
+            if stack.size == 1:
+                yield Finished.failed(run, told, mission.teams)
+            else:
+                yield from play(mission, _only(run), 1)
 
 
-def play_alone(mission: Mission, run: Run) -> Iterator[Finished | Beat]:
-    """Play one run in a simulation of its own."""
+def _only(run: Run) -> Take:
     waiting = [run]
-
-    def take(n: int) -> Sequence[Run]:
-        return [waiting.pop()] if waiting and n else []
-
-    return play(mission, take, 1)
-
-
-def _can_begin(mission: Mission, run: Run) -> bool:
-    try:
-        Simulation(mission, run.seed, run.params, on_error="record").close()
-    except (Exception, SystemExit):  # noqa: BLE001 - it is told where the run is played
-        return False
-    return True
+    return lambda n: [waiting.pop()] if waiting else []
 
 
 def _told(error: BaseException) -> str:
@@ -123,12 +104,12 @@ class _Stack:
     Args:
         mission: What is played.
         take: Where further runs come from.
-        is_wary: Begin each run alone before it joins others.
+        runs: The first ones, a slot each.
     """
 
-    def __init__(self, mission: Mission, take: Take, is_wary: bool) -> None:
-        self.mission, self.take, self.is_wary = mission, take, is_wary
-        self.slots: list[Run | None] = []
+    def __init__(self, mission: Mission, take: Take, runs: Sequence[Run]) -> None:
+        self.mission, self.take = mission, take
+        self.slots: list[Run | None] = list(runs)
         self.sim: Simulation | None = None
         self._host = platform.node()
 
@@ -146,17 +127,19 @@ class _Stack:
         if self.sim is not None:
             self.sim.close()
 
-    def play(self, runs: Sequence[Run]) -> Iterator[Finished | Beat]:
+    def play(self) -> Iterator[Finished | Beat]:
         """Play runs side by side, and all that follow them."""
-        runs = yield from self._able(runs)
-        if not runs:
-            return
-        self.slots = list(runs)
-        sim, teams = self._begin(runs)
-        rows, counts, n_before = sim.population.bodies.ints, self._count(), sim.n_running
+        sim, teams = self._begin(self.under_way())
+        rows, counts, n_before = sim.population.bodies.ints, self._count(), self.size
         n_steps, beat_at = max(1, self.mission.steps), time.monotonic() + BEAT_EVERY
         has_end = "time" in self.mission.end_conditions
-        while sim.n_running:
+        while True:
+            while sim.n_running < n_before:  # again after a refill: a run may fail before its first step
+                self._cpu.spent_by(n_before)
+                yield from self._refill(teams)
+                rows, counts, n_before = sim.population.bodies.ints, self._count(), len(self.under_way())
+            if not n_before:
+                return
             sim.step()
             now = sim.population.bodies.ints
             if now is not rows:
@@ -164,10 +147,6 @@ class _Stack:
                 changed = np.flatnonzero((left != counts).any(axis=1) & sim.running)
                 self._note_alive(changed, left, teams, counts)
                 counts = left
-            if sim.n_running < n_before:
-                self._cpu.spent_by(n_before)
-                yield from self._refill(teams)
-                rows, counts, n_before = sim.population.bodies.ints, self._count(), sim.n_running
             if time.monotonic() >= beat_at:
                 beat_at = time.monotonic() + BEAT_EVERY
                 yield Beat(float(sim.steps[sim.running].sum()) / n_steps if has_end else 0.0)
@@ -177,21 +156,12 @@ class _Stack:
         self._cpu = _CpuShare()
         self._cpu_begun = np.zeros(self.size)
         self._alive: list[list[tuple[int, float, int]]] = [[] for _ in runs]
-        self.sim = Simulation(self.mission, [r.seed for r in runs], _by_path(runs), on_error="record")
+        on_error = "record" if len(runs) == 1 else None  # by default, what raises ends the stack
+        self.sim = Simulation(self.mission, [r.seed for r in runs], _by_path(runs), on_error=on_error)
         teams = [int(team) for team in self.sim.context.teams]
         self._start = self._count()
         self._note_alive(range(self.size), self._start, teams)
         return self.sim, teams
-
-    def _able(self, runs: Sequence[Run]) -> Generator[Finished | Beat, None, list[Run]]:
-        """The runs that can join others; those of which a wary stack sees that they cannot be begun are told."""
-        able = []
-        for run in runs:
-            if not self.is_wary or _can_begin(self.mission, run):
-                able.append(run)
-            else:
-                yield from play_alone(self.mission, run)
-        return able
 
     def _count(self) -> np.ndarray:
         """Entities by world and team, (n_worlds, n_teams)."""
@@ -217,17 +187,11 @@ class _Stack:
         for world, run in enumerate(self.slots):
             if run is None or self.sim.running[world]:
                 continue
-            if self.sim.failed[world] and self.size > 1:
-                self.slots[world] = None
-                yield from play_alone(self.mission, run)
-            else:
-                finished = self._finished(world, run, teams)
-                self.slots[world] = None
-                yield finished
+            finished = self._finished(world, run, teams)
+            self.slots[world] = None
+            yield finished
             free.append(world)
-        runs: list[Run] = []
-        while len(runs) < len(free) and (more := self.take(len(free) - len(runs))):
-            runs += yield from self._able(more)
+        runs = self.take(len(free))
         self._cpu.spent_by(0)
         if not runs:
             return

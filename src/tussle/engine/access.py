@@ -222,6 +222,7 @@ def write(sim: Simulation, path: str, values: Any) -> None:
             target[..., rows[mine]] = part
             bodies.touch(group.first, group.last)
             if column in ("pos", "vel", "quat") and differs.any():
+                group.moving.begin()
                 group.motion.plugin.from_body(group.moving, mine[differs])
         else:
             target[..., mine] = part
@@ -350,6 +351,7 @@ def _no_rows(group: Group, first: int) -> tuple[Any, ...]:
 
 def _load_handles(sim: Simulation, group: Group, outside: list[dict[str, list[bytes]]]) -> None:
     for binding, handles in zip(group.walk(), outside, strict=True):
+        binding.view.begin()
         for name, held in handles.items():
             for row, data in enumerate(held):
                 about = sim.population.handle_row(group, binding, row)
@@ -430,11 +432,14 @@ def world_result(sim: Simulation, world: int, reason: str, is_hashed: bool = Tru
     steps = int(clock.step[world])
     result = WorldResult(world, int(sim.context.seeds[world]), reason, steps, float(clock.t[world]), alive)
     scores: dict[int, float] = {}
+    sim.world_view.begin()
     for referee in [*sim.interactions, *sim.metrics]:
         referee.view.caller = referee.plugin
         try:
             found = _of_world(sim, referee.plugin.result(referee.view), world)
         except Exception as error:
+            if reason == "error":  # something has failed already, and this may come of it
+                continue
             raise failure.raised(error, referee.plugin, where="result", step=steps, world=world) from error
         if found:
             result.metrics[referee.spec.instance_name] = found

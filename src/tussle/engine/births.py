@@ -118,7 +118,7 @@ class Births:
         for i, block in enumerate(self.overrides.mission.blocks):
             if block.rate:
                 self.n_left[i, worlds] = block.count
-                self.next_time[i][worlds] = block.first_birth
+                self.next_time[i][worlds] = max(block.first_birth, self.start)
             else:
                 due[i] = np.repeat(worlds, block.count)
         return due
@@ -144,9 +144,9 @@ class Births:
                     again += 1
                     jitter = self._normal(i, "birth", worlds, np.full(len(worlds), slot), number, 0, 1)[0]
                     # From the time it was due at, not that of the step, else a rate that does not divide the steps' would lag.
-                    base = np.maximum(self.next_time[i][worlds, slot], t[worlds] - self.overrides.mission.dt)
-                    later = base + wait + block.interval_sd * jitter
-                    self.next_time[i][worlds, slot] = np.where(later > base, later, base + wait)
+                    due_at = self.next_time[i][worlds, slot]
+                    later = due_at + wait + block.interval_sd * jitter
+                    self.next_time[i][worlds, slot] = np.where(later > due_at, later, due_at + wait)
             if parts:
                 found[i] = np.sort(np.concatenate(parts), kind="stable")
         return found

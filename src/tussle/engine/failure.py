@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from tussle.api.bodies import Bodies
+from tussle.api.group import GroupView
 from tussle.engine.group import Binding, Group
 from tussle.errors import PluginError
 
@@ -42,6 +43,24 @@ def raised(error: BaseException, plugin: Any, *, where: str, step: int, world: i
         error = error.with_traceback(place)
     text = f"{_place_of(error, plugin)}: {type(error).__name__}: {error}"
     return PluginError(text, where=where, step=step, world=world, plugin=plugin.instance_name, cause=error)
+
+
+def in_call(error: Exception, plugin: Any, view: GroupView, group: Group | None = None) -> PluginError:
+    """The error of a call that has raised: it names plugin and step, and entity and world as far as they are known."""
+    if isinstance(error, PluginError) and error.step is not None:  # of `fail`
+        return error
+    row, view.failing_row = view.failing_row, None
+    rows = slice(None) if row is None else slice(row, row + 1)
+    clock = view.context.clock
+    worlds = np.unique(view.world[rows]) if view.n else np.arange(len(clock.step))
+    where = "" if group is None else group.name
+    if row is not None and group is not None:
+        where = f"{group.block_of(row)} {int(view.id[row])}"
+    step, world = int(clock.step[worlds].max()), int(worlds[0]) if len(worlds) == 1 else None
+    if isinstance(error, PluginError):
+        error.where, error.step, error.world, error.plugin = where, step, world, plugin.instance_name
+        return error
+    return raised(error, plugin, where=where, step=step, world=world)
 
 
 def not_finite(group: Group, bodies: Bodies, row: int, step: int) -> PluginError:

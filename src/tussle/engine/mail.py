@@ -102,10 +102,7 @@ class Mail:
         try:
             self._route(topic, network, batch)
         except Exception as error:
-            worlds = np.unique(batch.world)
-            world, step = int(worlds[0]) if len(worlds) == 1 else None, int(self.sim.steps[worlds].max())
-            where = f"topic {topic.name!r}"
-            raise failure.raised(error, network.plugin, where=where, step=step, world=world) from error
+            raise failure.in_call(error, network.plugin, network.view) from error
 
     def _route(self, topic: TopicBuffer, network: Referee, batch: Batch) -> None:
         sim, clock, view = self.sim, self.sim.context.clock, network.view

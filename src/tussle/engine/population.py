@@ -164,8 +164,6 @@ class Population:
             else:
                 group.shift(self.bodies, first)
             first += group.n
-        if new is not None and len(new):
-            self._start_rows(source)
         self.changed += 1
         return np.where(source >= 0, source, -1)
 
@@ -192,8 +190,8 @@ class Population:
             b.block[rows], b.place_in_block[rows] = new.block[who], new.place[who]
             b.born[rows] = self.context.clock.step[new.world[who]]
 
-    def _start_rows(self, source: np.ndarray) -> None:
-        """Parameters, beliefs, motion states, handles and `spawn` hooks of the newborn rows."""
+    def begin_rows(self, source: np.ndarray) -> None:
+        """Parameters, beliefs, motion states, handles and `spawn` hooks of the newborn rows, those whose `source` is -1."""
         for group in self.groups:
             rows = np.flatnonzero(source[group.first : group.last] < 0)
             if not len(rows):
@@ -205,14 +203,16 @@ class Population:
                 binding.attach(group.table)
             for name, place in group.belief.items():
                 group.table.array(place)[..., rows] = getattr(self.bodies, name)[..., group.first + rows]
+            for view in group.views:
+                view.begin()
             group.moving.caller = group.motion.plugin
             with self._blaming(group, group.motion, rows):
                 group.motion.plugin.from_body(group.moving, rows)
             for binding in group.walk():
-                self._open_handles(group, binding, rows)
+                opened = self._open_handles(group, binding, rows)
                 binding.view.caller = binding.plugin
                 with self._blaming(group, binding, rows):
-                    binding.plugin.spawn(binding.view, rows)
+                    binding.plugin.spawn(binding.view, opened)
 
     @contextmanager
     def _blaming(self, group: Group, binding: Binding, rows: np.ndarray) -> Iterator[None]:
@@ -220,6 +220,8 @@ class Population:
         try:
             yield
         except Exception as error:
+            if isinstance(error, PluginError):  # of `fail`
+                raise
             worlds = np.unique(self.bodies.world[group.first + rows])
             step = int(self.context.clock.step[worlds[0]])
             world = int(worlds[0]) if len(worlds) == 1 else None
@@ -260,7 +262,9 @@ class Population:
         seed, pos = int(self.context.seeds[world]), b.pos[:, i].copy()
         return HandleRow(world, int(b.id[i]), int(b.team[i]), seed, pos, binding.view.dt, binding.spec)
 
-    def _open_handles(self, group: Group, binding: Binding, rows: np.ndarray) -> None:
+    def _open_handles(self, group: Group, binding: Binding, rows: np.ndarray) -> np.ndarray:
+        """Open what newborn rows hold outside the arrays; returns the rows with which that went well."""
+        failed = []
         for name, column in type(binding.spec).columns.items():
             if isinstance(column, Handle):
                 for row in rows:
@@ -268,11 +272,13 @@ class Population:
                     try:
                         binding.handles[name][row] = binding.plugin.open_one(about)
                     except Exception as error:
+                        failed.append(row)
                         where, step = f"{group.name} {about.id}", int(self.context.clock.step[about.world])
                         self.on_failure(
                             about.world,
                             failure.raised(error, binding.plugin, where=where, step=step, world=about.world),
                         )
+        return np.setdiff1d(rows, failed) if failed else rows
 
     def _close_handles(self, gone: np.ndarray) -> None:
         for group in self.groups:

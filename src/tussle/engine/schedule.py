@@ -83,12 +83,12 @@ class Schedule:
     def _motion(self, groups: list[Group]) -> list[Call]:
         sim = self.sim
         dt, m = sim.mission.dt, sim.mission.motion_multiplier
-        calls = [self._advance_call(g, dt, m) for g in groups if not g.controllers]
+        calls = [self._advance_call(g, dt, m, 0.0) for g in groups if not g.controllers]
         steered = [g for g in groups if g.controllers]
         for s in range(m if steered else 0):
             for group in steered:
                 calls += [self._entity_call("controller", group, b, s) for b in group.controllers]
-            calls += [self._advance_call(g, dt / m, 1) for g in steered]
+            calls += [self._advance_call(g, dt / m, 1, s / m) for g in steered]
         return calls
 
     def _due(self, cadence: Cadence, substep: int = 0) -> Iterator[tuple[int, np.ndarray | None]]:
@@ -106,18 +106,18 @@ class Schedule:
 
     # -- plugins of entities ----------------------------------------------------------------------------------------------
 
-    def _advance_call(self, group: Group, dt: float, substeps: int) -> Call:
+    def _advance_call(self, group: Group, dt: float, substeps: int, phase: float) -> Call:
         view, plugin, await_ready = group.moving, group.motion.plugin, self._waits_for(group, group.motion)
 
         def run() -> None:
             if group.n:
                 if await_ready:
                     await_ready()
-                view.caller = plugin
+                view.caller, view.phase = plugin, phase
                 try:
                     group.advance(dt, substeps)
                 except Exception as error:
-                    raise _raised(error, plugin, view, group) from error
+                    raise failure.in_call(error, plugin, view, group) from error
 
         return Call(self._label("motion", group, group.motion), run)
 
@@ -146,16 +146,17 @@ class Schedule:
                 if is_linked:
                     own.push(some.table)
             except Exception as error:
-                raise _raised(error, own.plugin, view, some) from error
+                raise failure.in_call(error, own.plugin, view, some) from error
 
         def call_part(dt: float) -> Callable[[Group], None]:
             return lambda some: call(some, next(b for b in some.bindings if b.path == path), dt)
 
         def run() -> None:
-            for since, worlds in [(1, None)] if cadence is None else self._due(cadence, substep):
+            calls = [(1, None)] if cadence is None else list(self._due(cadence, substep))
+            if await_ready and group.n and calls:
+                await_ready()
+            for since, worlds in calls:
                 if group.n:
-                    if await_ready:
-                        await_ready()
                     if worlds is None:
                         call(group, binding, since * grid_dt)
                     else:
@@ -178,16 +179,13 @@ class Schedule:
         def wait() -> None:
             for each in waiting:
                 limit = time.monotonic() + each.plugin.ready_timeout
-                while not each.plugin.ready(each.view):
-                    if time.monotonic() > limit:
-                        text, step = (
-                            f"was not ready within {each.plugin.ready_timeout:g} s",
-                            self.sim.steps.max(),
-                        )
-                        raise PluginError(
-                            text, where=group.name, step=int(step), plugin=each.spec.instance_name
-                        )
-                    time.sleep(0.001)
+                try:
+                    while not each.plugin.ready(each.view):
+                        if time.monotonic() > limit:
+                            raise PluginError(f"was not ready within {each.plugin.ready_timeout:g} s")
+                        time.sleep(0.001)
+                except Exception as error:
+                    raise failure.in_call(error, each.plugin, each.view, group) from error
 
         return wait if waiting else None
 
@@ -202,7 +200,7 @@ class Schedule:
             try:
                 some.plugin.step(w)
             except Exception as error:
-                raise _raised(error, some.plugin, w, None) from error
+                raise failure.in_call(error, some.plugin, w, None) from error
 
         def call_part(dt: float) -> Callable[[Referee, Any], None]:
             return lambda some, w: call(some, w, dt)
@@ -228,19 +226,3 @@ class Schedule:
 
 def _rate_text(plugin: Any) -> str:
     return f" at {plugin.rate:g} Hz" if plugin.rate is not None else ""
-
-
-def _raised(error: Exception, plugin: Any, view: Any, group: Group | None) -> PluginError:
-    """A plugin's exception as an error that names plugin, step and, as far as it is known, entity and world."""
-    if isinstance(error, PluginError):  # of `fail`
-        return error
-    row, view.failing_row = view.failing_row, None
-    where, world = ("" if group is None else group.name), None
-    rows = slice(None) if row is None else slice(row, row + 1)
-    worlds = np.unique(view.world[rows])
-    if row is not None and group is not None:
-        where = f"{group.block_of(row)} {int(view.id[row])}"
-    if len(worlds) == 1:
-        world = int(worlds[0])
-    step = int(view.context.clock.step[worlds].max(initial=0))
-    return failure.raised(error, plugin, where=where, step=step, world=world)

@@ -209,9 +209,9 @@ class Simulation:
     def _stop(self, error: PluginError) -> None:
         """An exception ends the stack."""
         if self.on_error == "record" and not self._raises_when_all_fail:
-            for world in np.flatnonzero(self.running & ~self.failed):
+            for world in np.flatnonzero(self.running):
                 self.record_failure(int(world), error)
-            self.context.clock.step += self.running
+            self.world_view.moved = []
             self.step_end.take_out_dead()
             return
         # From here on, so that what is printed is the plugin's own lines and not the way through the engine.
@@ -306,14 +306,15 @@ class Simulation:
                 self._start(referee, referee.view)
             else:
                 call_referee(self.population, referee, mask, self._start)
-        self.take_over_moves()
+        self.take_over_moves(0.0)
 
     def _start(self, referee: Referee, view: WorldView) -> None:
-        view.caller, view.phase = referee.plugin, 0.0
+        view.begin()
+        view.caller = referee.plugin
         try:
             referee.plugin.start(view)
         except Exception as error:
-            raise failure.raised(error, referee.plugin, where="", step=0, world=None) from error
+            raise failure.in_call(error, referee.plugin, view) from error
 
     def _create(self, due: Mapping[int, np.ndarray], at_start: bool = False) -> Newborn | None:
         rejecting = [r for r in self.interactions if type(r.plugin).rejects is not Interaction.rejects]
@@ -335,6 +336,7 @@ class Simulation:
             self.record_failure(world, self._own_error(world, str(error)))
 
         room = Room(rejects, standing, fail) if rejecting else None
+        self.world_view.begin()
         parts = []
         for block, worlds in due.items():
             part = self.births.create(block, worlds, room=room)
@@ -367,6 +369,7 @@ class Simulation:
         parts += [born] if born is not None else []
         if parts:
             self.repack(None, Newborn.join(parts))
+            self.step_end.take_out_dead()  # what an entity holds outside the arrays could not be opened
 
     def _check_space(self, worlds: np.ndarray) -> None:
         """End the worlds that the births asked for in `worlds`, (m,), would make larger than they may be."""
@@ -392,8 +395,10 @@ class Simulation:
         for referee in self.referees:
             referee.rearrange(index)
         self.step_end.rows_changed()
-        if self.events and new is not None:
-            self.events.births(new)
+        if new is not None:
+            self.population.begin_rows(index)
+            if self.events:
+                self.events.births(new)
 
     def after_restore(self) -> None:
         """The table has been put back: views and checks look at it."""
@@ -404,7 +409,7 @@ class Simulation:
 
     # -- the end of a step ----------------------------------------------------------------------------------------------------
 
-    def take_over_moves(self) -> None:
+    def take_over_moves(self, phase: float = 1.0) -> None:
         """Motion models take over the rows that world plugins have moved; beliefs follow with the next reading of their sensor."""
         view = self.world_view
         if not view.moved:
@@ -414,7 +419,11 @@ class Simulation:
         for group in self.population.groups:
             mine = rows[(rows >= group.first) & (rows < group.last)] - group.first
             if len(mine):
-                group.motion.plugin.from_body(group.moving, mine)
+                plugin, group.moving.phase = group.motion.plugin, phase
+                try:
+                    plugin.from_body(group.moving, mine)
+                except Exception as error:
+                    raise failure.in_call(error, plugin, group.moving, group) from error
 
     def _set_common_step(self) -> None:
         steps = np.unique(self.context.clock.step[self.running])
@@ -425,6 +434,8 @@ class Simulation:
     def record_failure(self, world: int, error: PluginError) -> None:
         if self.on_error == "raise":
             raise error
+        if self.failed[world]:
+            return
         self.failed[world] = self.step_end.has_failures = True
         self.results[world] = WorldResult(
             world, int(self.context.seeds[world]), "error", 0, 0.0, {}, error=error

@@ -39,11 +39,12 @@ class Cadence:
         """
         if plugin.rate is None:
             return None
-        per_point = Fraction(plugin.rate / most).limit_denominator(FINEST)
+        per_point = Fraction(min(plugin.rate / most, 2.0)).limit_denominator(FINEST)
         name = f"{where}: {plugin.instance_name}: rate = {plugin.rate!r} Hz"
         if per_point > 1:
             raise MissionError(
-                f"{name} cannot be honoured; the largest that can is {most:g} Hz, one call in every step"
+                f"{name} cannot be honoured; the largest that can is {most:g} Hz, one call in every "
+                + ("step" if n_substeps == 1 else "substep")
             )
         if per_point == 0:
             raise MissionError(f"{name} cannot be honoured; the smallest that can is {most / FINEST:g} Hz")

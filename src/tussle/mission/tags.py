@@ -185,7 +185,11 @@ PLUGIN = {
         "the plugin's",
         reads="text",
     ),
-    "loop_rate": Known("Calls per second of an autonomy, controller or sensor; 0 is every step.", "0", "1/s"),
+    "loop_rate": Known(
+        "Calls per second of an autonomy, controller or sensor, at most one in each step (for a controller, each substep); 0 is every one.",
+        "0",
+        "1/s",
+    ),
     "param_common": Known("Name of a <param_common>; the tag's own attributes win.", "none", reads="text"),
 }
 """Attributes that every plugin's tag takes besides the plugin's parameters."""

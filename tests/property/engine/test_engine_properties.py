@@ -2,49 +2,50 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
-
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_worlds import Drift, Listener, Talker, block, mission
 
 from tussle import Simulation
 from tussle.api import Interaction, Param
-from tussle.engine.schedule import _rate, is_due
-from tussle.errors import ParameterError
+from tussle.mission.cadence import Cadence
 from tussle.stock import GlobalNetwork
 
 few = settings(max_examples=25)
 
 
+class Rated:
+    """What a cadence asks of a plugin."""
+
+    instance_name = "Rated"
+
+    def __init__(self, rate):
+        self.rate = rate
+
+
+@few
 @given(
-    rate=st.decimals("0.01", "9.99", places=2),
-    dt=st.sampled_from(["0.1", "0.025", "0.01"]),
-    n=st.integers(1, 5000),
+    rate=st.fractions("1/100", "9.99", max_denominator=100),
+    per_second=st.sampled_from([10, 40, 60, 120, 1000]),
+    n_substeps=st.integers(1, 5),
+    days=st.integers(0, 100),
 )
-def test_calls_up_to_a_step_are_the_floor_of_its_time_times_the_rate(rate, dt, n):
-    """The first call is in step 0; after it, as many as whole periods have passed."""
-    per_step = Fraction(str(rate)) * Fraction(dt)
-    assert (
-        int(is_due(np.arange(n + 1), per_step).sum()) == 1 + (n * per_step.numerator) // per_step.denominator
-    )
-
-
-@pytest.mark.parametrize(("rate", "dt", "every"), [(1.0 / 3.0, 0.1, 30), (1e-7 / 3.0, 0.1, 300_000_000)])
-def test_a_rate_of_many_digits_holds_to_the_last_step(rate, dt, every):
-    """Products of its digits and the number of the step stay within 64 bits."""
-    per_step = _rate(Drift(rate=rate), dt)
-    for near in (every, 10**9 // every * every):
-        steps = np.arange(near - 5, near + 5)
-        assert steps[is_due(steps, per_step)].tolist() == [near]
-
-
-def test_a_rate_that_no_game_lives_to_see_is_refused():
-    message = r"Drift: rate = 1e-320 is not allowed with dt = 0.1; it takes at least 1e-08 calls per second"
-    with pytest.raises(ParameterError, match=message.replace("1e-320", "9.99989e-321")):
-        Simulation(mission(block(autonomy=Drift(rate=1e-320))))
+def test_calls_are_the_floor_of_the_time_times_the_rate_and_their_dt_is_the_time_between_them(
+    rate, per_second, n_substeps, days
+):
+    """Whatever numbers of floating point stand for the rate and the grid, and after any number of days."""
+    grid = n_substeps * per_second
+    cadence = Cadence.of(Rated(float(rate)), 1.0 / (1.0 / grid), n_substeps, "here")
+    begin = days * 86400 * per_second
+    last = None
+    for k in range(begin * n_substeps, begin * n_substeps + 3000):
+        n_calls = 1 + k * rate // grid  # up to this point
+        since = cadence.since(*divmod(k, n_substeps))
+        assert bool(since) == (k == 0 or n_calls > 1 + (k - 1) * rate // grid)
+        if since:
+            assert since == k - last if last is not None else since > 0
+            last = k
 
 
 @few

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from tussle import Block, Mission
-from tussle.api import Autonomy, Interaction, Metric, Param, State
+from tussle.api import Autonomy, Handle, Interaction, Metric, Param, State
 from tussle.batch import InProcess
 from tussle.stock import Still
 
@@ -97,9 +97,15 @@ class Trouble(Interaction):
 
 
 class Nervous(Autonomy):
-    """Fails as it is placed, or as it decides."""
+    """Fails as it is placed, as it decides, or as what it talks to does not answer."""
 
     how = Param("never")
+    link = Handle()
+
+    def open_one(self, row):
+        if self.how == "open" and is_bad(np.uint64(row.seed)):
+            raise RuntimeError("nobody answers")
+        return row.id
 
     def spawn(self, g, rows):
         if self.how == "spawn" and is_bad(g.context.seeds[g.world[rows]]).any():
@@ -109,6 +115,8 @@ class Nervous(Autonomy):
         bad = is_bad(g.context.seeds[g.world]) & (g.step_count == 1)
         if self.how == "decide" and bad.any():
             raise RuntimeError("it cannot decide")
+        for row in np.flatnonzero(bad) if self.how == "part" else ():
+            g.fail(row, "it parts from itself")
 
 
 MISSION = """\

@@ -10,7 +10,7 @@ import pytest
 from gambles import game
 
 from tussle import Block, Mission, Simulation
-from tussle.api import Metric
+from tussle.api import Autonomy, Handle, Metric
 from tussle.batch.stack import MOST, ROWS, play, stack_size
 from tussle.batch.tasks import Beat, Finished, Run
 from tussle.stock import Still
@@ -106,6 +106,8 @@ def test_values_of_their_own_make_runs_differ(alone):
         ({"how": "nan"}, "the entity's state is not finite: pos = [nan nan nan]"),
         ({"how": "leave"}, "SystemExit: this seed leaves"),
         ({"mood": "spawn"}, "Nervous, reds, step 0: gambles.py:{line}: RuntimeError: it does not want to"),
+        ({"mood": "open"}, "Nervous, reds 1, step 0: gambles.py:{line}: RuntimeError: nobody answers"),
+        ({"mood": "part"}, "Nervous, reds 1, step 1: it parts from itself"),
         ({"mood": "decide"}, "Nervous, reds, step 1: gambles.py:{line}: RuntimeError: it cannot decide"),
     ],
     ids=lambda v: "-".join(f"{k}-{w}" for k, w in v.items()) if isinstance(v, dict) else "",
@@ -142,19 +144,28 @@ def test_a_run_that_fails_is_told_at_once_and_not_when_its_stack_is_over():
     assert order.index(2) < 6
 
 
-def test_a_start_that_fails_does_not_cost_the_others_their_stack(monkeypatch):
-    sizes = []
+@pytest.mark.parametrize(
+    ("trouble", "sizes"),
+    [
+        ({"how": "nan"}, [4]),  # ends its own world only
+        ({"mood": "part"}, [4]),
+        ({"mood": "open"}, [4]),
+        ({"how": "step"}, [4, 1, 1, 1, 1, 2]),  # each run of its stack is played alone
+        ({"how": "start"}, [4, 1, 1, 1, 1, 2]),
+    ],
+)
+def test_what_raises_costs_its_stack_and_what_belongs_to_a_run_costs_nobody(monkeypatch, trouble, sizes):
+    seen = []
 
     class Watched(Simulation):
-        def __init__(self, mission, seeds=1, *args, **kwargs):
-            sizes.append(len(seeds) if isinstance(seeds, list) else 0)
+        def __init__(self, mission, seeds, *args, **kwargs):
+            seen.append(len(seeds))
             super().__init__(mission, seeds, *args, **kwargs)
 
     monkeypatch.setattr("tussle.batch.stack.Simulation", Watched)
-    assert len(finished(game(mood="spawn"), n=40, size=8)) == 40
-    # One stack that falls, one of those that are left, and each bad run alone; all else (0) are looks whether a run can begin.
-    assert [n for n in sizes if n > 1] == [8, 6]
-    assert sizes.count(1) == 8
+    runs = finished(game(**trouble, odds=0.0), n=6, size=4)
+    assert [number for number, run in runs.items() if run[5]] == [2]
+    assert seen == sizes
 
 
 def test_a_game_that_is_over_at_once_is_kept():
@@ -176,12 +187,20 @@ def test_what_is_no_number_is_said_and_left_out():
     assert run[6] == finished(game(), n=1)[0][6]
 
 
-class Lonely(Metric):
-    max_worlds = 2
+class Lonely(Autonomy):
+    link = Handle(max_worlds=2)
+    other = Handle(max_worlds=9)
+
+    def open_one(self, row):
+        return row.id
+
+    def step(self, g):
+        pass
 
 
 def test_a_stack_is_no_larger_than_its_plugins_allow():
-    mission = game().replace(metrics=[Lonely()])
+    mission = game()
+    mission = mission.replace(blocks=[mission.blocks[0].replace(autonomy=Lonely()), mission.blocks[1]])
     assert stack_size(mission) == 2
     assert all(run[0] != "error" for run in finished(mission, n=5, size=64).values())
 

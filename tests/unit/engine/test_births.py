@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from small_worlds import Drift, Reaper, Wander, alone, block, mission
+from small_worlds import Drift, Reaper, Wander, alone, block, hashes, mission
 
 from tussle import Simulation
 from tussle.api import Autonomy, Interaction, Metric, Param, Publish, State
@@ -42,7 +42,8 @@ def test_count_without_rate_is_there_from_the_start():
         ({"rate": 5.0, "count": 4, "slots": 3}, [0, 0, 0, 2]),
         ({"rate": "5 Hz", "count": 2}, [0, 2]),
         ({"rate": 10.0, "count": 3}, [0, 1, 2]),
-        ({"rate": 1000.0, "count": 3}, [0, 1, 2]),
+        ({"rate": 50.0, "count": 12}, [0, *[1] * 5, *[2] * 5, 3]),  # five a step
+        ({"rate": 50.0, "count": 6, "slots": 2}, [0, 0, 1, 1, 1, 1]),
         # 4 a second at 10 steps a second: on the average the rate that was asked for, each birth in the first step at or after its time
         ({"rate": 4.0, "count": 4}, [0, 3, 5, 8]),
         ({"rate": 0.1, "count": 4, "first_birth": 5.0}, []),
@@ -50,6 +51,28 @@ def test_count_without_rate_is_there_from_the_start():
 )
 def test_births_come_at_their_rate(values, steps):
     assert births_of(mission(block(**values))) == steps
+
+
+def test_a_rate_above_that_of_the_steps_holds_for_long_and_in_each_world():
+    game = mission(block(rate=50.0, count=5001), end=1e3)
+    sim = Simulation(game, seeds=[1, 2])
+    sim.step(300)
+    sim.reset([1])
+    sim.step(701)
+    assert sim.read("a.pos")[1].sum(axis=1).tolist() == [5001, 3501]
+
+
+def test_births_that_were_due_before_the_start_begin_with_it():
+    game = mission(block(rate=5.0, count=4), start=5.0, end=6.0)
+    assert births_of(game) == [0, 2, 4, 6]
+    assert births_of(game.replace(blocks=[block(rate=50.0, count=6)])) == [0, *[1] * 5]
+
+
+def test_times_of_several_births_in_a_step_vary_too_and_are_as_alone():
+    game = mission(block(rate=50.0, interval_sd=0.02, count=200), end=5.0)
+    first = births_of(game)
+    assert len(set(np.bincount(first))) > 3
+    assert hashes(game, [1, 2]) == [alone(game, 1).state_hash(), alone(game, 2).state_hash()]
 
 
 def test_times_between_births_vary_with_interval_sd_and_by_seed_only():

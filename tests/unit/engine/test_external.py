@@ -9,6 +9,7 @@ import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -112,7 +113,10 @@ class Outside(MotionModel):
         for row in range(body.n):
             if body.step_count[row] == self.crash_at[row]:
                 self.link[row].process.stdin.write("crash\n")
-            self.x[:, row] = self.link[row].ask("step", body.dt, *self.velocity[:, row])
+            try:
+                self.x[:, row] = self.link[row].ask("step", body.dt, *self.velocity[:, row])
+            except ConnectionError as error:
+                body.fail(row, str(error))
         body.pos[:] = self.x
         body.vel[:] = self.velocity
 
@@ -229,9 +233,8 @@ def test_a_crash_of_a_child_ends_its_world_and_no_other():
     assert [r.end for r in results] == ["time", "error", "time"]
     assert results[1].steps == 5
     text = str(results[1].error)
-    assert text.startswith("Outside, a, world 1, step 4: test_external.py:")
-    assert "ConnectionError: child" in text
-    assert "has ended with status 3" in text
+    assert text.startswith("Outside, a 1, world 1, step 4: child ")
+    assert text.endswith(" has ended with status 3")
     with Simulation(game(), seeds=[1, 2, 3]) as whole:
         whole.run()
         assert np.array_equal(found[[0, 2]], whole.read("a.pos")[0][[0, 2]])
@@ -239,19 +242,20 @@ def test_a_crash_of_a_child_ends_its_world_and_no_other():
 
 
 def test_a_crash_alone_is_raised():
-    message = r"Outside, a, world 0, step 2: .*ConnectionError"
+    message = r"Outside, a 1, world 0, step 2: child \d+ has ended with status 3"
     with Simulation(game(Outside(crash_at=2))) as sim, pytest.raises(PluginError, match=message):
         sim.run()
 
 
 class Slow(Autonomy):
-    """Lets a step wait for the outside; counts how often it was asked."""
+    """Lets a step wait for the outside; counts how often it was asked, and its calls."""
 
     grade = "external"
     ready_timeout = 300.0
     patience = Param(3)
     asked = State(dtype=int)
     link = Handle()
+    calls: ClassVar[list[int]] = []
 
     def open_one(self, row):
         return [0]
@@ -259,9 +263,10 @@ class Slow(Autonomy):
     def ready(self, g):
         for held in self.link:
             held[0] += 1
-        return self.link[0][0] >= self.patience[0]
+        return all(held[0] >= patience for held, patience in zip(self.link, self.patience, strict=True))
 
     def step(self, g):
+        self.calls.append(g.n)
         self.asked[:] = [held[0] for held in self.link]
 
 
@@ -269,22 +274,33 @@ class Hasty(Slow):
     ready_timeout = 0.2
 
 
-def test_a_step_waits_until_the_outside_is_ready():
-    sim = Simulation(game(SingleIntegrator(), autonomy=[Drift(), Slow()], count=1))
+def waiting(count=1, **values):
+    return game(SingleIntegrator(), autonomy=[Drift(), Slow(**values)], count=count)
+
+
+def test_a_step_waits_until_all_that_is_outside_is_ready():
+    sim = Simulation(waiting(), seeds=[1, 2], params={"a.Slow.patience": [1, 3]})
     sim.step()
-    assert sim.read("a.Slow.asked")[0].tolist() == [[3]]
+    assert sim.read("a.Slow.asked")[0].tolist() == [[3], [3]]
     sim.step()
-    assert sim.read("a.Slow.asked")[0].tolist() == [[4]]
+    assert sim.read("a.Slow.asked")[0].tolist() == [[4], [4]]
 
 
 def test_nobody_waits_for_ever():
     stuck = game(SingleIntegrator(), autonomy=[Drift(), Hasty(patience=10**9)], count=1)
-    with pytest.raises(PluginError, match=r"Hasty, a, world 0, step 0: was not ready within 0.2 s"):
+    with pytest.raises(PluginError, match=r"^Hasty, a, world 0, step 0: was not ready within 0.2 s"):
         Simulation(stuck).step()
-    sim = Simulation(stuck, seeds=[1, 2], params={"a.Hasty.patience": [1, 10**9]})
-    results = sim.run()
-    assert [r.end for r in results] == ["time", "error"]
-    assert "was not ready within 0.2 s" in str(results[1].error)
+    sim = Simulation(stuck, seeds=[1, 2], params={"a.Hasty.patience": [1, 10**9]}, on_error="record")
+    assert [str(r.error) for r in sim.run()] == ["Hasty, a, step 0: was not ready within 0.2 s"] * 2
+
+
+@pytest.mark.parametrize("rate", [None, 5.0])
+def test_one_call_serves_all_worlds(rate):
+    Slow.calls.clear()
+    sim = Simulation(waiting(count=3, patience=1, rate=rate), seeds=range(8))
+    sim.step(4)
+    assert Slow.calls == [24] * (4 if rate is None else 2)
+    assert sim.read("a.Slow.asked")[0].tolist() == [[len(Slow.calls)] * 3] * 8  # nor is it asked more often
 
 
 def test_a_child_that_does_not_start_says_whose_it_was():
@@ -321,6 +337,25 @@ def test_a_child_that_does_not_start_ends_its_world_only():
         results = sim.run()
     assert [r.end for r in results] == ["time", "error", "time"]
     assert "Second, a 1, world 1, step 0" in str(results[1].error)
+
+
+def test_a_child_that_does_not_start_in_the_middle_ends_its_world_before_its_plugin_is_called():
+    class Second(Outside):
+        def open_one(self, row):
+            if (row.world, row.id) == (1, 2):
+                raise OSError("no more")
+            return start(row.pos)
+
+        def spawn(self, g, rows):
+            assert all(self.link[row].process.poll() is None for row in rows)
+
+    block = Block(name="a", count=2, rate=5.0, autonomy=Drift(), motion=Second())
+    with Simulation(mission(block), seeds=[1, 2, 3]) as sim:
+        results = sim.run()
+    assert [(r.end, r.steps) for r in results] == [("time", 10), ("error", 2), ("time", 10)]
+    assert "Second, a 2, world 1, step 2" in str(results[1].error)
+    with Simulation(mission(block), seeds=3) as alone:
+        assert alone.run()[0].state_hash == results[2].state_hash
 
 
 def test_one_that_cannot_be_closed_is_told_and_the_others_are_closed():

@@ -1,4 +1,4 @@
-"""What goes wrong while a simulation runs: who is told, in which words, and that nobody else notices."""
+"""What goes wrong while a simulation runs: what is said, who ends, and that a world's own failure is noticed by no other."""
 
 from __future__ import annotations
 
@@ -6,21 +6,23 @@ import traceback
 
 import numpy as np
 import pytest
-from small_worlds import Drift, Listener, NoteMetric, Talker, Wander, block, mission
+from small_worlds import Drift, Listener, Note, NoteMetric, Talker, Wander, alone, block, mission
 
 from tussle import Simulation
 from tussle.api import (
+    EVERYONE,
     Autonomy,
     Controller,
     EasyAutonomy,
+    Handle,
     Input,
     Interaction,
     Metric,
     MotionModel,
+    Network,
     Output,
     Param,
     Publish,
-    Sensor,
     State,
 )
 from tussle.errors import DeclarationError, MissionError, ParameterError, PluginError
@@ -30,57 +32,124 @@ NEVER = 10**9
 STEP, WORLD, STACK = 1234, 17, 20
 
 
+def fail(plugin, view, rows=slice(None)):
+    """Raise in the step that the plugin is told."""
+    if (view.step_count[rows] == plugin.at[rows]).any():
+        raise ZeroDivisionError("the author's mistake")
+
+
 class Faulty(Autonomy):
-    """Wander, but in one step raise, or write a value that is no number."""
+    """Wander, but in one step raise, fail, or write a value that is no number."""
 
     at = Param(NEVER)
-    how = Param("raise")
-    only_id = Param(0)
+    how = Param("step", choices=("step", "spawn", "ready", "fail", "nan"), structural=True)
+    link = Handle()
     pull = State("x y z")
-    n_calls = State(dtype=int)
     velocity = Output("velocity_x velocity_y velocity_z", unit="m/s")
 
+    def open_one(self, row):
+        return row.id
+
+    def _raise(self, how, g, rows=slice(None)):
+        if how == self.how:
+            fail(self, g, rows)
+
+    def spawn(self, g, rows):
+        self._raise("spawn", g, rows)
+
+    def ready(self, g):
+        self._raise("ready", g)
+        return True
+
     def step(self, g):
-        self.n_calls[:] += 1
         self.pull[:] = 0.5 * self.pull + g.normal("pull", 3)
         self.velocity[:] = self.pull
-        fails = (g.step_count == self.at) & ((self.only_id == 0) | (g.id == self.only_id))
-        if self.how == "raise" and fails.any():
-            raise ZeroDivisionError("the author's mistake")
-        self.velocity[1, fails] = np.nan
+        self._raise("step", g)
+        for row in np.flatnonzero(g.step_count == self.at):
+            if self.how == "fail":
+                g.fail(row, "its link is down")
+            elif self.how == "nan":
+                self.velocity[1, row] = np.nan
 
 
 class EasyFaulty(EasyAutonomy):
     at = Param(NEVER)
-    n_calls = State(dtype=int)
 
     def step_one(self, me):
-        me.n_calls = me.n_calls + 1
         if round(me.t / 0.1) == me.at and me.id == 2:
-            raise ZeroDivisionError("the author's easy mistake")
+            raise ZeroDivisionError("the author's mistake")
+
+
+class FaultyMotion(MotionModel):
+    at = Param(NEVER)
+    hook = Param("to_body", structural=True)
+    x = State("x y z", unit="m")
+    velocity = Input("velocity_x velocity_y velocity_z", unit="m/s")
+
+    @staticmethod
+    def derivative(velocity_x, velocity_y, velocity_z):
+        return velocity_x, velocity_y, velocity_z
+
+    def from_body(self, body, rows):
+        self.x[:, rows] = body.pos[:, rows]
+        if self.hook == "from_body":
+            fail(self, body, rows)
+
+    def to_body(self, body):
+        body.pos[:] = self.x
+        if self.hook == "to_body":
+            fail(self, body)
 
 
 class FaultyReferee(Interaction):
+    """Does all that a referee can before it raises."""
+
     at = Param(NEVER)
-    n_calls = State(dtype=int, per="world")
     seen = State(per="entity")
-    notes = Publish(CaptureEntity)
 
     def step(self, w):
-        self.n_calls[:] += 1
         self.seen[:] += 1.0
         w.bodies.health[:] = w.bodies.health + 1.0
-        w.publish(
-            CaptureEntity, np.arange(w.n_worlds)[np.bincount(w.world, minlength=w.n_worlds) > 0], target=0
-        )
-        w.kill(w.id == 99, "never")
-        if (w.step_count[w.world] == self.at[w.world]).any():
-            raise ZeroDivisionError("the referee's mistake")
+        w.publish(Note, np.unique(w.world), value=1)
+        w.move(w.id == 1, pos=w.pos[:, w.id == 1] + 1.0)
+        w.kill(w.id == 5, "at once")
+        w.spawn("b", np.unique(w.world))
+        fail(self, w)
+
+
+class FaultyNetwork(Network):
+    at = Param(NEVER)
+
+    def route(self, w, messages):
+        fail(self, w)
+        return EVERYONE
+
+
+def broken(*autonomies, network=None, **parts):
+    """A mission of two blocks with a faulty plugin or none but the referee; the second block is born by and by."""
+    talk = {"network": network.instance_name if network else "GlobalNetwork"}
+    autonomy = [Wander(), Talker(**talk), Listener(**talk), *autonomies]
+    one = block(count=2, variance=(9, 9, 9), autonomy=autonomy, **parts)
+    world = {"interactions": [FaultyReferee()], "metrics": [NoteMetric()]}
+    return mission(
+        one, one.replace(name="b", rate=10.0, count=20), networks=[network] if network else [], **world
+    )
+
+
+BROKEN = {
+    "a.Faulty": lambda: broken(Faulty()),
+    "b.Spawn": lambda: broken(Faulty(how="spawn", name="Spawn")),
+    "a.Ready": lambda: broken(Faulty(how="ready", name="Ready")),
+    "a.EasyFaulty": lambda: broken(EasyFaulty()),
+    "a.FaultyMotion": lambda: broken(motion=FaultyMotion()),
+    "b.FaultyMotion": lambda: broken(motion=FaultyMotion(hook="from_body")),
+    "FaultyReferee": broken,
+    "FaultyNetwork": lambda: broken(network=FaultyNetwork()),
+}
 
 
 def crowd(autonomy, **values):
-    extra = values.pop("autonomies", ())
-    return mission(block(count=2, variance=(9, 9, 9), autonomy=[autonomy, *extra]), **values)
+    return mission(block(count=2, variance=(9, 9, 9), autonomy=autonomy), **values)
 
 
 def line_of(function, text):
@@ -90,195 +159,144 @@ def line_of(function, text):
     return first + next(i for i, line in enumerate(lines) if text in line)
 
 
-@pytest.mark.parametrize("how", ["raise", "nan"])
-def test_step_1234_of_world_17_of_20(how):
-    game = crowd(Faulty(how=how), end=130.0, metrics=[NoteMetric()])
-    sim = Simulation(
-        game,
-        seeds=range(STACK),
-        params={"a.Faulty.at": [STEP if w == WORLD else NEVER for w in range(STACK)]},
+# -- exceptions -----------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("path", BROKEN)
+def test_an_exception_ends_the_stack(path):
+    """Nothing else is left of the step that was broken off: after a reset, all is as in a simulation that is new."""
+    game, plugin, at = BROKEN[path](), path.rpartition(".")[2], {f"{path}.at": [NEVER, 4, NEVER]}
+    text = rf"{plugin}, .*step 4: test_failures.py:\d+: ZeroDivisionError: the author's mistake"
+    with (
+        Simulation(game, seeds=[1, 2, 3], params=at) as sim,
+        pytest.raises(PluginError, match=f"^{text}") as caught,
+    ):
+        sim.run()
+    assert isinstance(caught.value.cause, ZeroDivisionError)
+    with (
+        Simulation(game, params={f"{path}.at": 4}) as sim,
+        pytest.raises(PluginError, match=", world 0, step 4"),
+    ):
+        sim.run()
+    with (
+        Simulation(game, seeds=[1, 2, 3], params=at, on_error="record") as sim,
+        Simulation(game, seeds=[1, 2, 3]) as undisturbed,
+    ):
+        results = sim.run()
+        assert [(r.end, r.steps, str(r.error)) for r in results] == [("error", 4, str(caught.value))] * 3
+        sim.reset([0, 1, 2], params={f"{path}.at": NEVER})
+        assert [r.state_hash for r in sim.run()] == [r.state_hash for r in undisturbed.run()]
+
+
+def test_entity_and_world_are_named_where_they_are_known():
+    game = mission(block(count=2, autonomy=[Drift(), EasyFaulty()]))
+    line = line_of(EasyFaulty.step_one, "raise Zero")
+    text = (
+        f"EasyFaulty, a 2, world 1, step 4: test_failures.py:{line}: ZeroDivisionError: the author's mistake"
     )
-    results = sim.run()
+    with pytest.raises(PluginError) as caught:
+        Simulation(game, seeds=[1, 2, 3], params={"a.EasyFaulty.at": [NEVER, 4, NEVER]}).run()
+    assert str(caught.value) == text
+    with pytest.raises(PluginError, match=r"^FaultyReferee, world 0, step 4: "):  # a world without anybody
+        Simulation(mission(block("b", count=0), interactions=[FaultyReferee(at=4)])).run()
+    sim = Simulation(crowd(Faulty()), seeds=[1, 2], params={"a.Faulty.at": [NEVER, 4]})
+    sim.step(2)
+    sim.reset([1])
+    with pytest.raises(PluginError, match=r"^Faulty, a, step 6"):  # as far as any clock is
+        sim.run()
+
+
+@pytest.mark.parametrize("worlds", [1, 3])
+def test_a_result_that_raises_ends_the_stack(worlds):
+    class Reporter(Metric):
+        def result(self, w):
+            raise ValueError("no result")
+
+    game, seeds = crowd(Drift(), metrics=[NoteMetric(), Reporter()]), range(worlds)
+    text = r"Reporter, result, world 0, step 10: test_failures.py:\d+: ValueError: no result"
+    with pytest.raises(PluginError, match=text):
+        Simulation(game, seeds=seeds).run()
+    results = Simulation(game, seeds=seeds, on_error="record").run()
+    assert [(r.end, r.steps, r.metrics) for r in results] == [
+        ("error", 10, {"NoteMetric": {"n_notes": 0, "total": 0}})
+    ] * worlds
+
+
+def test_a_start_that_raises_is_named():
+    class Starter(Metric):
+        def start(self, w):
+            raise ValueError("hooked")
+
+    with pytest.raises(
+        PluginError, match=r"^Starter, world 0, step 0: test_failures.py:\d+: ValueError: hooked"
+    ):
+        Simulation(mission(metrics=[Starter()]))
+
+
+# -- failures of one world --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("how", "text"),
+    [("fail", "its link is down"), ("nan", "output 'velocity_y' = nan is not a finite number")],
+)
+def test_step_1234_of_world_17_of_20(how, text):
+    game = crowd(Faulty(how=how), end=130.0, metrics=[NoteMetric()])
+    at = {"a.Faulty.at": [STEP if w == WORLD else NEVER for w in range(STACK)]}
+    results = Simulation(game, seeds=range(STACK), params=at).run()
     assert [r.end for r in results] == ["error" if w == WORLD else "time" for w in range(STACK)]
     bad = results[WORLD]
     assert bad.steps == STEP + 1
     assert isinstance(bad.error, PluginError)
     assert (bad.error.plugin, bad.error.world, bad.error.step) == ("Faulty", WORLD, STEP)
-    if how == "raise":
-        place = f"test_failures.py:{line_of(Faulty.step, 'raise Zero')}"
-        assert (
-            str(bad.error)
-            == f"Faulty, a, world 17, step 1234: {place}: ZeroDivisionError: the author's mistake"
-        )
-        assert isinstance(bad.error.__cause__, ZeroDivisionError)
-    else:
-        assert (
-            str(bad.error)
-            == "Faulty, a 1, world 17, step 1234: output 'velocity_y' = nan is not a finite number"
-        )
+    assert str(bad.error) == f"Faulty, a 1, world 17, step 1234: {text}"  # of the first that failed
     whole = Simulation(game, seeds=range(STACK)).run()
-    assert [r.state_hash for r in results if r is not bad] == [
-        r.state_hash for w, r in enumerate(whole) if w != WORLD
-    ]
+    others = [w for w in range(STACK) if w != WORLD]
+    assert [results[w].state_hash for w in others] == [whole[w].state_hash for w in others]
 
 
-def test_the_entity_is_named_where_it_is_known():
-    game = crowd(Drift(), autonomies=[EasyFaulty()])
-    results = Simulation(game, seeds=[1, 2, 3], params={"a.EasyFaulty.at": [NEVER, 4, NEVER]}).run()
-    line = line_of(EasyFaulty.step_one, "raise Zero")
-    assert (
-        str(results[1].error)
-        == f"EasyFaulty, a 2, world 1, step 4: test_failures.py:{line}: ZeroDivisionError: the author's easy mistake"
-    )
-    with pytest.raises(PluginError, match=r"^EasyFaulty, a 2, world 0, step 4: test_failures.py"):
-        Simulation(game, params={"a.EasyFaulty.at": 4}).run()
-
-
-def test_a_call_that_failed_is_made_again_for_the_others_as_if_it_had_not():
-    game = crowd(Drift(), autonomies=[EasyFaulty()])
-    sim = Simulation(game, seeds=[1, 2, 3], params={"a.EasyFaulty.at": [NEVER, 4, NEVER]})
-    sim.run()
-    assert sim.read("a.EasyFaulty.n_calls")[0][[0, 2]].tolist() == [[10, 10], [10, 10]]
-    assert sim.read("a.EasyFaulty.n_calls")[0][1].tolist() == [4, 4]
-
-
-def test_alone_the_first_error_is_raised_and_recorded_only_if_asked():
-    game = crowd(Faulty(at=3))
-    with pytest.raises(PluginError, match="Faulty, a, world 0, step 3"):
-        Simulation(game).run()
-    results = Simulation(game, on_error="record").run()
-    assert results[0].end == "error"
-    assert results[0].steps == 4
-
-
-def test_a_stack_can_be_told_to_raise():
-    sim = Simulation(crowd(Faulty()), seeds=[1, 2], params={"a.Faulty.at": [NEVER, 3]}, on_error="raise")
-    with pytest.raises(PluginError, match="world 1, step 3"):
-        sim.run()
-
-
-def test_when_the_last_of_all_worlds_fails_it_is_raised_unless_records_are_asked_for():
-    game, at = crowd(Faulty()), {"a.Faulty.at": [3, 5]}
-    sim = Simulation(game, seeds=[1, 2], params=at)
+@pytest.mark.parametrize("how", ["fail", "nan"])
+def test_a_failure_is_raised_alone_or_if_asked_and_when_no_world_is_left(how):
+    game, at = crowd(Faulty(how=how)), {"a.Faulty.at": [3, 5]}
+    with pytest.raises(PluginError, match="world 0, step 3"):
+        Simulation(game, params={"a.Faulty.at": 3}).run()
+    assert Simulation(game, params={"a.Faulty.at": 3}, on_error="record").run()[0].steps == 4
+    with pytest.raises(PluginError, match="world 0, step 3"):
+        Simulation(game, seeds=[1, 2], params=at, on_error="raise").run()
     with pytest.raises(PluginError, match="world 1, step 5"):
-        sim.run()
+        Simulation(game, seeds=[1, 2], params=at).run()
     results = Simulation(game, seeds=[1, 2], params=at, on_error="record").run()
     assert [(r.end, r.steps) for r in results] == [("error", 4), ("error", 6)]
 
 
 def test_several_worlds_fail_each_in_its_step():
-    results = Simulation(crowd(Faulty()), seeds=[1, 2, 3, 4], params={"a.Faulty.at": [2, NEVER, 2, 7]}).run()
+    at = {"a.Faulty.at": [2, NEVER, 2, 7]}
+    results = Simulation(crowd(Faulty(how="fail")), seeds=[1, 2, 3, 4], params=at).run()
     assert [(r.end, r.steps) for r in results] == [("error", 3), ("time", 10), ("error", 3), ("error", 8)]
     assert "world 2, step 2" in str(results[2].error)
 
 
-def test_the_plugins_behind_a_failed_one_do_not_take_the_others_along():
-    """Autonomy, controller, referee and metric all raise in world 1, and each only there."""
-
-    class Picky(Controller):
-        at = Param(NEVER)
-        wanted = Input("velocity_x velocity_y velocity_z", unit="m/s")
-        velocity = Output("velocity_x velocity_y velocity_z", unit="m/s")
-
-        def step(self, g):
-            self.velocity[:] = self.wanted
-            if (g.step_count == self.at).any():
-                raise ValueError("picky")
-
-    game = mission(
-        block(count=2, variance=(9, 9, 9), autonomy=Faulty(), controller=Picky()),
-        interactions=[FaultyReferee()],
-        metrics=[NoteMetric()],
-        motion_multiplier=2,
-    )
-    at = [NEVER, 4, NEVER]
-    paths = ("a.Faulty.at", "a.Picky.at", "FaultyReferee.at")
-    whole = Simulation(game, seeds=[1, 2, 3]).run()
-    for chosen in (paths, paths[1:], paths[2:], (paths[0], paths[2])):
-        results = Simulation(game, seeds=[1, 2, 3], params=dict.fromkeys(chosen, at)).run()
-        assert [r.end for r in results] == ["time", "error", "time"]
-        assert [results[0].state_hash, results[2].state_hash] == [whole[0].state_hash, whole[2].state_hash]
-        first = {"a.Faulty.at": "Faulty, a", "a.Picky.at": "Picky, a", "FaultyReferee.at": "FaultyReferee"}[
-            chosen[0]
-        ]
-        assert str(results[1].error).startswith(f"{first}, world 1, step 4: test_failures.py")
-    pair = Simulation(game, seeds=[1, 2], params={path: [NEVER, 4] for path in paths}).run()
-    assert [r.end for r in pair] == ["time", "error"]
-    assert pair[0].state_hash == whole[0].state_hash
-
-
 @pytest.mark.parametrize("rate", [None, 5.0])
-def test_what_a_failed_referee_did_is_undone_and_done_again_without_the_world(rate):
-    game = crowd(Drift(), interactions=[FaultyReferee(rate=rate)])
-    sim = Simulation(game, seeds=[1, 2, 3], params={"FaultyReferee.at": [NEVER, 4, NEVER]})
-    results = sim.run()
-    n = 10 if rate is None else 5
-    assert [r.end for r in results] == ["time", "error", "time"]
-    assert sim.read("FaultyReferee.n_calls")[0][[0, 2]].tolist() == [n, n]
-    assert sim.read("a.health")[0][[0, 2]].tolist() == [[1.0 + n] * 2] * 2
-    assert results[0].state_hash == Simulation(game, seeds=1).run()[0].state_hash
-
-
-def test_a_referee_with_a_rate_fails_alone_when_clocks_differ():
-    game = crowd(Drift(), interactions=[FaultyReferee(rate=5.0)])
-    sim = Simulation(game, seeds=[1, 2, 3], params={"FaultyReferee.at": [NEVER, 4, NEVER]})
-    sim.step()
-    sim.reset([0])
-    results = sim.run()
-    assert [r.end for r in results] == ["time", "error", "time"]
-    assert results[0].state_hash == Simulation(game, seeds=1).run()[0].state_hash
-
-
-def test_an_autonomy_with_a_rate_fails_alone_when_clocks_differ():
-    game = crowd(Drift(), autonomies=[EasyFaulty(rate=5.0)])
-    sim = Simulation(game, seeds=[1, 2, 3], params={"a.EasyFaulty.at": [NEVER, 4, NEVER]})
-    sim.step()
-    sim.reset([0])
-    results = sim.run()
-    assert [r.end for r in results] == ["time", "error", "time"]
-    assert "EasyFaulty, a 2, world 1, step 4" in str(results[1].error)
-    assert results[0].state_hash == Simulation(game, seeds=1).run()[0].state_hash
-
-
-def test_messages_of_a_call_that_failed_are_not_sent_twice():
-    class Chatty(Talker):
+def test_a_world_fails_alone_when_clocks_differ(rate):
+    class DownReferee(Metric):
         at = Param(NEVER)
 
-        def step(self, g):
-            super().step(g)
-            if (g.step_count == self.at).any():
-                raise ValueError("chatty")
+        def step(self, w):
+            for world in np.flatnonzero(w.step_count == self.at):
+                w.fail(np.flatnonzero(w.world == world)[0], "its link is down")
 
-    game = mission(block(count=2, autonomy=[Drift(), Chatty(), Listener()]), metrics=[NoteMetric()])
-    sim = Simulation(game, seeds=[1, 2, 3], params={"a.Chatty.at": [NEVER, 4, NEVER]})
-    results = sim.run()
-    assert [r.metrics["NoteMetric"]["n_notes"] for r in results] == [20, 8, 20]
-    assert sim.read("a.Listener.n_heard")[0][0].tolist() == [18, 18]
-
-
-def test_a_motion_model_that_raises():
-    class Brittle(MotionModel):
-        at = Param(NEVER)
-        x = State("x y z", unit="m")
-        velocity = Input("velocity_x velocity_y velocity_z", unit="m/s")
-
-        @staticmethod
-        def derivative(velocity_x, velocity_y, velocity_z):
-            return velocity_x, velocity_y, velocity_z
-
-        def from_body(self, body, rows):
-            self.x[:, rows] = body.pos[:, rows]
-
-        def to_body(self, body):
-            body.pos[:] = self.x
-            if (body.step_count == self.at).any():
-                raise ValueError("brittle")
-
-    game = mission(block(count=2, variance=(9, 9, 9), autonomy=Wander(), motion=Brittle()))
-    results = Simulation(game, seeds=[1, 2, 3], params={"a.Brittle.at": [NEVER, 4, NEVER]}).run()
-    assert [r.end for r in results] == ["time", "error", "time"]
-    assert str(results[1].error).startswith("Brittle, a, world 1, step 4: test_failures.py:")
-    assert results[0].state_hash == Simulation(game, seeds=1).run()[0].state_hash
+    for path in ("a.Faulty", "DownReferee"):
+        game = mission(
+            block(count=2, variance=(9, 9, 9), autonomy=[Wander(), Faulty(how="fail", rate=rate)]),
+            metrics=[DownReferee(rate=rate)],
+        )
+        sim = Simulation(game, seeds=[1, 2, 3], params={f"{path}.at": [NEVER, 4, NEVER]})
+        sim.step()
+        sim.reset([0])
+        results = sim.run()
+        assert [(r.end, r.steps) for r in results] == [("time", 10), ("error", 5), ("time", 10)]
+        assert str(results[1].error) == f"{path.rpartition('.')[2]}, a 1, world 1, step 4: its link is down"
+        assert [results[k].state_hash for k in (0, 2)] == [alone(game, seed).state_hash() for seed in (1, 3)]
 
 
 def test_a_motion_model_that_leaves_the_numbers_is_named():
@@ -322,46 +340,6 @@ def test_a_controllers_nan_is_the_controllers():
         ),
     ):
         Simulation(mission(block(controller=Sloppy()))).run()
-
-
-def test_a_sensor_that_raises():
-    class Blind(Sensor):
-        at = Param(NEVER)
-        seen = Output()
-
-        def step(self, g):
-            self.seen[:] = 1.0
-            if (g.step_count == self.at).any():
-                raise ValueError("blind")
-
-    game = mission(block(count=2, sensor=Blind()))
-    results = Simulation(game, seeds=[1, 2], params={"a.Blind.at": [NEVER, 2]}).run()
-    assert [r.end for r in results] == ["time", "error"]
-    assert str(results[1].error).startswith("Blind, a, world 1, step 2")
-
-
-@pytest.mark.parametrize("hook", ["start", "result", "spawn"])
-def test_hooks_that_raise_are_named(hook):
-    class Starter(Metric):
-        def start(self, w):
-            if hook == "start":
-                raise ValueError("hooked")
-
-        def result(self, w):
-            if hook == "result":
-                raise ValueError("hooked")
-            return {}
-
-    class Spawner(Autonomy):
-        def spawn(self, g, rows):
-            if hook == "spawn":
-                raise ValueError("hooked")
-
-        def step(self, g):
-            pass
-
-    with pytest.raises(PluginError, match=r"(Starter|Spawner), .*test_failures.py:\d+: ValueError: hooked"):
-        Simulation(mission(block(autonomy=[Drift(), Spawner()]), metrics=[Starter()])).run()
 
 
 # -- what plugins may not do ----------------------------------------------------------------------------------------------------
@@ -547,28 +525,6 @@ def test_simulations_that_cannot_be():
         Simulation(mission(), on_error="ignore")
     with pytest.raises(ParameterError, match="threads = 0 is not allowed; it takes a whole number >= 1"):
         Simulation(mission(), threads=0)
-
-
-def test_a_plugin_that_fails_only_in_company_stops_the_whole():
-    """It breaks the promise that a world of a stack is as alone, so there is no world to blame."""
-
-    class Crowded(Autonomy):
-        def step(self, g):
-            if len(np.unique(g.world)) > 1:
-                raise ValueError("too many")
-
-    class CrowdedReferee(Interaction):
-        def step(self, w):
-            if len(np.unique(w.world)) > 1:
-                raise ValueError("too many")
-
-    for game in (crowd(Drift(), autonomies=[Crowded()]), crowd(Drift(), interactions=[CrowdedReferee()])):
-        with pytest.raises(
-            PluginError,
-            match=r"fails in the stack but in none of its worlds alone.*step 0: test_failures.py.*too many",
-        ):
-            Simulation(game, seeds=[1, 2]).step()
-        Simulation(game).step()
 
 
 def test_names_that_the_api_does_not_have():

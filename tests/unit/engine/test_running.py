@@ -1,4 +1,4 @@
-"""Clocks, rates, ends, pauses, resets, and what is read and written from outside."""
+"""Ends, pauses, resets, and what is read and written from outside."""
 
 from __future__ import annotations
 
@@ -27,19 +27,6 @@ from tussle.errors import MissionError, ParameterError, SnapshotError
 from tussle.stock import NoisyContacts, Predator, SimpleCapture, SimpleCollision, Unicycle
 
 
-class Counter(Autonomy):
-    """Counts its calls and remembers the steps."""
-
-    n = State(dtype=int)
-    last = State(dtype=int, default=-1)
-    when = State(unit="s", default=-1.0)
-
-    def step(self, g):
-        self.n[:] += 1
-        self.last[:] = g.step_count
-        self.when[:] = g.t
-
-
 class Tally(Metric):
     n = State(dtype=int, per="world")
 
@@ -50,74 +37,6 @@ class Tally(Metric):
         return {"n": self.n}
 
 
-# -- clocks and rates -----------------------------------------------------------------------------------------------------------
-
-
-def test_time_is_computed_not_accumulated():
-    sim = Simulation(mission(block(), dt=0.1, start=5.0, end=1e9))
-    sim.step(2000)
-    assert sim.t[0] == 5.0 + 2000 * 0.1
-    total = 5.0
-    for _ in range(2000):
-        total += 0.1
-    assert sim.t[0] != total
-
-
-def test_a_plugin_sees_the_time_of_the_steps_beginning():
-    sim = Simulation(mission(block(autonomy=[Drift(), Counter()]), start=2.0, end=9.0))
-    sim.step(4)
-    assert sim.read("a.Counter.when")[0].tolist() == [[2.0 + 3 * 0.1]]
-
-
-@pytest.mark.parametrize(
-    ("rate", "due"),
-    [
-        (None, list(range(12))),
-        (10.0, list(range(12))),
-        (50.0, list(range(12))),
-        (5.0, [0, 2, 4, 6, 8, 10]),
-        (2.5, [0, 4, 8]),
-        (3.0, [0, 4, 7, 10]),  # floor(3 k / 10) changes
-        (7.0, [0, 2, 3, 5, 6, 8, 9, 10]),
-        (0.1, [0]),
-    ],
-)
-def test_due_rule(rate, due):
-    sim = Simulation(
-        mission(block(autonomy=[Drift(), Counter(rate=rate)]), metrics=[Tally(rate=rate)], end=1.2)
-    )
-    seen = []
-    while not sim.is_over:
-        step = int(sim.steps[0])
-        sim.step()
-        if sim.read("a.Counter.last")[0][0, 0] == step:
-            seen.append(step)
-    assert seen == due
-    assert sim.result()[0].metrics["Tally"]["n"] == len(due)
-
-
-def test_due_rule_with_fractions_that_floats_do_not_hold():
-    """3 Hz at 1/30 s written as 0.1 s / 3 would drift; the decimal numbers are taken as they are written."""
-    sim = Simulation(mission(block(autonomy=[Drift(), Counter(rate=0.7)]), dt=0.1, end=1000.0))
-    sim.step(10_000)
-    assert sim.read("a.Counter.n")[0][0, 0] == 700
-
-
-def test_rates_hold_on_each_worlds_own_clock():
-    game = mission(block(autonomy=[Drift(), Counter(rate=2.5)]), metrics=[Tally(rate=2.5)], end=50.0)
-    sim = Simulation(game, seeds=[1, 2, 3])
-    sim.step(3)
-    sim.reset([1])
-    sim.step(10)
-    lone = Simulation(game)
-    lone.step(10)
-    assert sim.steps.tolist() == [13, 10, 13]
-    assert sim.read("a.Counter.n")[0][:, 0].tolist() == [4, 3, 4]
-    assert sim.read("a.Counter.last")[0][:, 0].tolist() == [12, 8, 12]
-    assert sim.read("Tally.n")[0].tolist() == [4, 3, 4]
-    assert lone.read("a.Counter.n")[0][0, 0] == 3
-
-
 class Substeps(Autonomy):
     speed = Output(unit="m/s")
     turn_rate = Output(unit="rad/s")
@@ -125,36 +44,6 @@ class Substeps(Autonomy):
 
     def step(self, g):
         self.speed[:] = 1.0
-
-
-def test_the_last_call_has_the_engines_dt_and_controllers_the_substeps():
-    from tussle.api import Controller, Input
-
-    class Watch(Controller):
-        speed_in = Input("speed", unit="m/s")
-        speed = Output(unit="m/s")
-        turn_rate = Output(unit="rad/s")
-        pitch_rate = Output(unit="rad/s")
-        n = State(dtype=int)
-        dt = State(unit="s")
-        when = State(unit="s")
-
-        def step(self, g):
-            self.n[:] += 1
-            self.dt[:] = g.dt
-            self.when[:] = g.t
-            self.speed[:] = self.speed_in
-
-    sim = Simulation(
-        mission(
-            block(autonomy=Substeps(), controller=Watch(), motion=Unicycle(vel_max=9.0)), motion_multiplier=4
-        )
-    )
-    sim.step(3)
-    assert sim.read("a.Watch.n")[0].tolist() == [[12]]
-    assert sim.read("a.Watch.dt")[0].tolist() == [[0.025]]
-    assert sim.read("a.Watch.when")[0][0, 0] == pytest.approx(0.2 + 3 * 0.025)
-    assert sim.read("a.pos")[0][0, 0, 0] == pytest.approx(0.3)
 
 
 # -- ends -----------------------------------------------------------------------------------------------------------------------
@@ -168,11 +57,11 @@ def teams(**values):
     ("conditions", "reapers", "end", "steps"),
     [
         ("time", {1: 0.3, 2: 0.5}, "time", 10),
-        ("time, one_team", {1: 0.3}, "one_team", 4),
-        ("one_team", {2: 0.5}, "one_team", 6),
+        ("time, one_team", {1: 0.3}, "one_team", 3),
+        ("one_team", {2: 0.5}, "one_team", 5),
         ("time, all_dead", {1: 0.3}, "time", 10),
-        ("time, all_dead", {1: 0.3, 2: 0.5}, "all_dead", 6),
-        ("one_team", {1: 0.3, 2: 0.3}, "all_dead", 4),
+        ("time, all_dead", {1: 0.3, 2: 0.5}, "all_dead", 5),
+        ("one_team", {1: 0.3, 2: 0.3}, "all_dead", 3),
     ],
 )
 def test_end_conditions(conditions, reapers, end, steps):
@@ -239,7 +128,7 @@ def test_a_game_that_is_decided_before_it_begins_ends_with_the_first_step_also_a
     )
     sim.step(3)
     sim.reset([1], params={"Reaper.at": 0.0})
-    assert [r.steps for r in sim.run()] == [6, 1]
+    assert [r.steps for r in sim.run()] == [5, 1]
 
 
 def test_worlds_end_apart_and_each_as_it_would_alone():
@@ -249,7 +138,7 @@ def test_worlds_end_apart_and_each_as_it_would_alone():
     at = [0.5, 99.0, 0.2, 1.0]
     sim = Simulation(game, seeds=[1, 2, 3, 4], params={"Reaper.at": at})
     results = sim.run()
-    assert [r.steps for r in results] == [6, 20, 3, 11]
+    assert [r.steps for r in results] == [5, 20, 2, 10]
     assert [r.end for r in results] == ["one_team", "time", "one_team", "one_team"]
     for k, r in enumerate(results):
         lone = Simulation(game, seeds=k + 1, params={"Reaper.at": at[k]})
@@ -543,7 +432,7 @@ def test_worlds_that_have_ended_are_read_as_they_ended():
     )
     sim = Simulation(game, seeds=[1, 2], params={"Reaper.at": [0.3, 99.0]})
     sim.run()
-    assert sim.read("a.pos")[0][:, 0, 0].tolist() == pytest.approx([0.4, 1.0])
+    assert sim.read("a.pos")[0][:, 0, 0].tolist() == pytest.approx([0.3, 1.0])
     assert sim.read("a.Drift.velocity")[0][:, 0, 0].tolist() == [1.0, 1.0]
 
 
