@@ -209,19 +209,19 @@ class Plan:
         reach, own = self.columns(g, plugin.__dict__)
         index = g.index(reach)
         blocks = index.blocks(g.first, g.last)
-        longs = (
-            blocks.queries, blocks.block_first, blocks.span_first, blocks.span_start, blocks.span_end, index.order
-        )  # fmt: skip
-        floats: tuple[np.ndarray, ...] = (blocks.x, blocks.y, blocks.z, index.sx, index.sy, index.sz)
+        longs, points = (blocks.cuts, blocks.spans, index.order), (blocks.points, index.points)
+        others: tuple[np.ndarray, ...] = ()
         for name, places in self.other:
             columns = g.by_place(index, name)
-            floats += columns if len(columns) == len(places) else tuple([columns[place] for place in places])
+            others += columns if len(columns) == len(places) else tuple([columns[place] for place in places])
         out = np.empty((self.n_out, g.n))
         run, first, most = self.run, g.first, blocks.most
         if g.context.threads == 1:
-            run(longs, floats, own, out, first, 0, blocks.n_blocks, most)
+            run(longs, points, others, own, out, first, (0, blocks.n_blocks), most)
         else:
-            g.context.split(blocks.n_blocks, lambda a, b: run(longs, floats, own, out, first, a, b, most))
+            g.context.split(
+                blocks.n_blocks, lambda *part: run(longs, points, others, own, out, first, part, most)
+            )
         return out
 
 

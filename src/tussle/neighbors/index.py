@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,19 +31,36 @@ class Blocks:
     from span_first[b] to span_first[b + 1] - 1. Walking them in this order is the order of (cell row, cell, id), in any stack.
     """
 
-    queries: Longs
-    """Sorted places of the query rows, (n,)."""
-    x: Floats
-    """East positions of the queries in their order [m], (n,), with LANES spare elements behind the end; so y and z."""
-    y: Floats
-    z: Floats
+    cuts: Longs
+    """queries, block_first, span_first, block_strip, (4, n + 1): for the n sorted places of the query rows, n and one more."""
+    spans: Longs
+    """span_start and span_end, (2, number of spans or more)."""
+    points: Floats
+    """Positions of the queries in their order [m], (3, n + LANES); what is behind the end may be read."""
     n_blocks: int
-    block_first: Longs
-    span_first: Longs
-    span_start: Longs
-    span_end: Longs
     most: int
     """Largest number of candidates that one block has."""
+
+    @property
+    def queries(self) -> Any:
+        """Sorted places of the query rows, (n,)."""
+        return self.cuts[0, :-1]
+
+    @property
+    def block_first(self) -> Any:
+        return self.cuts[1, :]
+
+    @property
+    def span_first(self) -> Any:
+        return self.cuts[2, :]
+
+    @property
+    def span_start(self) -> Any:
+        return self.spans[0, :]
+
+    @property
+    def span_end(self) -> Any:
+        return self.spans[1, :]
 
 
 def padded(n: int) -> Floats:
@@ -52,43 +70,25 @@ def padded(n: int) -> Floats:
 
 @dataclass(slots=True)
 class Room:
-    """Arrays for the blocks of one range of rows, used again from step to step."""
+    """Arrays for the blocks of one range of rows, used again from step to step; see `Blocks`."""
 
-    queries: Longs
-    block_first: Longs
-    block_strip: Longs
-    x: Floats
-    y: Floats
-    z: Floats
-    span_first: Longs
-    span_start: Longs
-    span_end: Longs
+    cuts: Longs
+    spans: Longs
+    points: Floats
 
     @classmethod
     def of(cls, n: int) -> Room:
         """For n rows; the spans may turn out to need more."""
-
-        def longs(k: int) -> Longs:
-            return np.empty(k, np.int64)
-
         return cls(
-            longs(n),
-            longs(n + 1),
-            longs(n),
-            padded(n),
-            padded(n),
-            padded(n),
-            longs(n + 1),
-            longs(2 * n + 64),
-            longs(2 * n + 64),
+            np.empty((4, n + 1), np.int64), np.empty((2, 2 * n + 64), np.int64), np.zeros((3, n + LANES))
         )
 
 
 class Index:
     """Positions of all rows of all worlds at one instant; what a world's rows see is independent of the other worlds.
 
-    After `layout` and `build`: `order` (N,) row of each place; `place` (N,) its inverse; `sx`, `sy`, `sz` (N,) positions by
-    place. `built` counts the builds. `inverse_cell` (n_worlds,) [1/m] is 0 where a world is one cell. World w holds places
+    After `layout` and `build`: `order` (N,) row of each place; `place` (N,) its inverse; `points` (3, N + LANES) positions by
+    place [m]. `built` counts the builds. `inverse_cell` (n_worlds,) [1/m] is 0 where a world is one cell. World w holds places
     world_start[w] to world_start[w + 1] - 1, and members[world_start[w] + k] is its k-th row by id.
     """
 
@@ -116,9 +116,10 @@ class Index:
         )  # fmt: skip
         self._keys, self._ids = fresh, new_ids
         self.row_world = np.array(world, np.int64)
-        self.order, self.place = np.zeros(n, np.int64), np.zeros(n, np.int64)
-        self.sx, self.sy, self.sz = padded(n), padded(n), padded(n)
-        self._strip_start, self._strip_world = np.zeros(n + 1, np.int64), np.zeros(n + 1, np.int64)
+        self._placed = np.zeros((2, n), np.int64)
+        self.order, self.place = self._placed
+        self.points = np.zeros((3, n + LANES))
+        self._strips = np.zeros((2, n + 1), np.int64)
         self._world_strip = np.zeros(n_worlds + 1, np.int64)
         self.inverse_cell = np.zeros(n_worlds)
         self.reach = np.zeros(n_worlds)
@@ -136,11 +137,9 @@ class Index:
         return len(self.reach)
 
     @property
-    def table(self) -> tuple[Longs, Longs, Longs, Longs, Floats, Floats, Floats, Floats]:
-        """world_start, keys, strip_start, world_strip, inverse_cell, sx, sy, sz: what the kernels of `search` take."""
-        return (
-            self.world_start, self._keys, self._strip_start, self._world_strip, self.inverse_cell, self.sx, self.sy, self.sz
-        )  # fmt: skip
+    def table(self) -> tuple[Longs, Longs, Longs, Longs, Floats, Floats]:
+        """world_start, keys, strips, world_strip, inverse_cell, points: what the kernels of `search` take."""
+        return self.world_start, self._keys, self._strips, self._world_strip, self.inverse_cell, self.points
 
     def build(self, x: Floats, y: Floats, z: Floats, reach: Floats) -> None:
         """Sort positions x, y, z (N,) [m] into cells. `reach` (n_worlds,) [m]: distance up to which blocks find everyone.
@@ -155,13 +154,13 @@ class Index:
             self._fixed = bool(np.isinf(self.reach).all())
         self.built += 1
         kernels.build(
-            (x, y, z), self.inverse_cell, (self.world_start, self.members), (self._keys, self._scratch),
-            (self.order, self.place), (self.sx, self.sy, self.sz), (self._strip_start, self._strip_world, self._world_strip),
+            (x, y, z), self.inverse_cell, (self.world_start, self.members), (self._keys, self._scratch), self._placed,
+            self.points, self._strips, self._world_strip,
         )  # fmt: skip
 
     def update(self, rows: Longs, x: Floats, y: Floats, z: Floats) -> None:
         """Rows (n,) moved to x, y, z (n,) [m] and keep their places; only where their world's reach is infinite."""
-        kernels.update(rows, x, y, z, self.place, self.sx, self.sy, self.sz)
+        kernels.update(rows, x, y, z, self.place, self.points)
 
     def gather(self, column: Floats) -> Floats:
         """A float column of the table by place, (N,), with LANES spare elements behind the end."""
@@ -177,8 +176,7 @@ class Index:
         if pos is None:
             fixed, built, blocks = self._cache.get((first, last), (False, -1, None))
             if blocks is not None and fixed:
-                by_place, points = (self.sx, self.sy, self.sz), (blocks.x, blocks.y, blocks.z)
-                kernels.query_positions(blocks.queries, self.order, by_place, first, False, points)
+                kernels.query_positions(blocks.queries, self.order, self.points, first, False, blocks.points)
                 return blocks
             if blocks is not None and built == self.built:
                 return blocks
@@ -187,25 +185,17 @@ class Index:
             room = Room.of(last - first)
             if pos is None:
                 self._rooms[first, last] = room
-        own = pos is not None
-        strips = (
-            self.order, self._strip_start, self._strip_world, self._world_strip, self.world_start, self._keys
-        )  # fmt: skip
+        points = self.points if pos is None else np.stack(pos)
+        index = self.order, self._strips, self._world_strip, self.world_start, self._keys
+        cells, rows, own = (self.inverse_cell, self.reach), (first, last), pos is not None
         while True:
-            needed = kernels.cut_blocks(
-                strips, (first, last), pos or (self.sx, self.sy, self.sz), own, (self.inverse_cell, self.reach),
-                (
-                    room.queries, room.block_first, room.block_strip, room.span_first, room.span_start, room.span_end, self._cursor
-                ),
-                (room.x, room.y, room.z), self._size,
-            )  # fmt: skip
-            if needed <= len(room.span_start):
+            work = room.cuts, room.spans, self._cursor
+            needed = kernels.cut_blocks(index, rows, points, own, cells, work, room.points, self._size)
+            if needed <= room.spans.shape[1]:
                 break
-            room.span_start, room.span_end = np.empty(2 * needed, np.int64), np.empty(2 * needed, np.int64)
-        blocks = Blocks(
-            room.queries, room.x, room.y, room.z, int(self._size[1]), room.block_first, room.span_first, room.span_start, room.span_end,
-            int(self._size[0]),
-        )  # fmt: skip
+            room.spans = np.empty((2, 2 * needed), np.int64)
+        most, n_blocks = self._size.tolist()
+        blocks = Blocks(room.cuts, room.spans, room.points, n_blocks, most)
         if pos is None:
             self._cache[first, last] = (self._fixed, self.built, blocks)
         return blocks

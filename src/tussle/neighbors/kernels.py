@@ -97,21 +97,21 @@ def arrange(rows, old, new, work, n_worlds):
                 done += 1
 
 
-@kernel("(F F F) F (I I) (Iw Iw) (Iw Iw) (Fw Fw Fw) (Iw Iw Iw)")
-def build(pos, inverse_cell, worlds, work, placed, by_place, strips):
+@kernel("(F F F) F (I I) (Iw Iw) I2w F2w I2w Iw")
+def build(pos, inverse_cell, worlds, work, placed, points, strips, world_strip):
     """Sort the rows of every world by (cell row, cell, id) and note where each cell row (strip) begins.
 
     pos: x, y, z (N,) [m]; inverse_cell (n_worlds,) [1/m], 0 for one cell per world; worlds: world_start, members. work: keys (N,)
-    hold ranks in their low bits on entry, in any order, the last one for speed; scratch (N,). Written: placed, order and place
-    (N,); by_place, the positions; strips, strip_start (N + 1,) and strip_world (N + 1,), first place and world of each strip,
-    and world_strip (n_worlds + 1,), first strip of each world.
+    hold ranks in their low bits on entry, in any order, the last one for speed; scratch (N,). Written: placed, order and place,
+    (2, N); points, positions by place, (3, N + LANES); strips, first place and world of each strip, (2, N + 1); world_strip
+    (n_worlds + 1,), first strip of each world.
     """
     x, y, z = pos
     world_start, members = worlds
     keys, scratch = work
-    order, place = placed
-    sx, sy, sz = by_place
-    strip_start, strip_world, world_strip = strips
+    order, place = placed[0], placed[1]
+    sx, sy, sz = points[0], points[1], points[2]
+    strip_start, strip_world = strips[0], strips[1]
     n_worlds = world_start.shape[0] - 1
     n_strips = 0
     for w in range(n_worlds):
@@ -152,14 +152,14 @@ def build(pos, inverse_cell, worlds, work, placed, by_place, strips):
     world_strip[n_worlds] = n_strips
 
 
-@kernel("I F F F I Fw Fw Fw")
-def update(rows, x, y, z, place, sx, sy, sz):
+@kernel("I F F F I F2w")
+def update(rows, x, y, z, place, points):
     """Rows that moved and keep their places: x, y, z (n,) positions [m] of rows (n,)."""
     for k in range(rows.shape[0]):
         p = place[rows[k]]
-        sx[p] = x[k]
-        sy[p] = y[k]
-        sz[p] = z[k]
+        points[0, p] = x[k]
+        points[1, p] = y[k]
+        points[2, p] = z[k]
 
 
 @kernel("F I Fw")
@@ -169,17 +169,15 @@ def gather(column, order, out):
         out[p] = column[order[p]]
 
 
-@kernel("I I (F F F) i8 b1 (Fw Fw Fw)")
+@kernel("I I F2 i8 b1 F2w")
 def query_positions(queries, order, pos, first, own, out):
-    """Positions [m] by query from pos: those of rows first ... (own), or by place."""
-    x, y, z = pos
-    qx, qy, qz = out
+    """Positions [m] by query, (3, n), from pos: those of rows first ... (own), or by place."""
     for k in range(queries.shape[0]):
         p = queries[k]
         i = order[p] - first if own else p
-        qx[k] = x[i]
-        qy[k] = y[i]
-        qz[k] = z[i]
+        out[0, k] = pos[0, i]
+        out[1, k] = pos[1, i]
+        out[2, k] = pos[2, i]
 
 
 @kernel("I I I i8 i8 Iw Iw Iw -> i8")
@@ -239,15 +237,18 @@ def rectangle(x, y, start, end):
 
 
 @device
-def find_spans(cells, strips, x, y, room, size, n_blocks):
+def find_spans(cells, index, x, y, room, size, n_blocks):
     """Candidate runs of every block: all entities of its world within `reach` of a query, and more.
 
     x, y (n,) positions [m] of the queries in query order; for the rest see `cut_blocks`. Returns the number of spans, which may
     exceed the room in span_start (then call again with more). size[0] becomes the largest number of candidates of one block.
     """
     inverse_cell, reach = cells
-    _, strip_start, strip_world, world_strip, world_start, keys = strips
-    _, block_first, block_strip, span_first, span_start, span_end, cursor = room
+    _, strips, world_strip, world_start, keys = index
+    cuts, spans, cursor = room
+    strip_start, strip_world = strips[0], strips[1]
+    block_first, span_first, block_strip = cuts[1], cuts[2], cuts[3]
+    span_start, span_end = spans[0], spans[1]
     room = span_start.shape[0]
     n_strips = world_strip[world_strip.shape[0] - 1]
     n_spans = 0
@@ -315,18 +316,20 @@ def find_spans(cells, strips, x, y, room, size, n_blocks):
     return n_spans
 
 
-@kernel("(I I I I I I) (i8 i8) (F F F) b1 (F F) (Iw Iw Iw Iw Iw Iw Iw) (Fw Fw Fw) Iw -> i8")
-def cut_blocks(strips, rows, pos, own, cells, room, out, size):
+@kernel("(I I2 I I I) (i8 i8) F2 b1 (F F) (I2w I2w Iw) F2w Iw -> i8")
+def cut_blocks(index, rows, pos, own, cells, room, out, size):
     """The queries of rows [first, last) in blocks, where they stand, and the candidate runs of every block.
 
-    strips: order, strip_start, strip_world, world_strip, world_start, keys. rows: first, last. pos, own: see `query_positions`.
-    cells: inverse_cell [1/m], reach [m], (n_worlds,). Written: room (queries, block_first, block_strip, span_first, span_start,
-    span_end; cursor (3 n_strips,) is work space), out (positions by query), size (most candidates of a block, number of blocks).
-    Returns the number of spans, which may exceed the room for them.
+    index: order, strips, world_strip, world_start, keys. rows: first, last. pos, own: see `query_positions`. cells: inverse_cell
+    [1/m], reach [m], (n_worlds,). Written: room, that is cuts (queries, block_first, span_first, block_strip; 4, n + 1), spans
+    (span_start, span_end) and work space (3 n_strips,); out (positions by query), size (most candidates of a block, number of
+    blocks). Returns the number of spans, which may exceed the room for them.
     """
+    order, strips, world_strip, _, _ = index
+    cuts = room[0]
     first, last = rows
-    queries, block_first, block_strip = room[0], room[1], room[2]
-    n_blocks = group_queries(strips[0], strips[1], strips[3], first, last, queries, block_first, block_strip)
-    query_positions(queries, strips[0], pos, first, own, out)
+    queries = cuts[0, : last - first]
+    n_blocks = group_queries(order, strips[0], world_strip, first, last, queries, cuts[1], cuts[3])
+    query_positions(queries, order, pos, first, own, out)
     size[1] = n_blocks
-    return find_spans(cells, strips, out[0], out[1], room, size, n_blocks)
+    return find_spans(cells, index, out[0], out[1], room, size, n_blocks)

@@ -37,7 +37,7 @@ def team_filter(
     """Mode, team by place and team to compare with by row, of the filter `teams`: None, "own", "other" or a number."""
     n = last - first
     if teams is None:
-        return search.ANY, index.sx, np.zeros(n)
+        return search.ANY, index.points[0], np.zeros(n)
     if team is None:
         raise ValueError(f"a filter teams={teams!r} needs the table's teams")
     by_row = team.astype(np.float64)
@@ -77,8 +77,9 @@ def pairs(
     offset, distance = np.empty((3, m)), np.empty(m)
     if m:
         search.pair_places(*query, (count, found))
-        points = index.sx, index.sy, index.sz
-        search.pair_columns((x, y, z), start, found, points, index.order, (row, other), offset, distance)
+        search.pair_columns(
+            (x, y, z), start, found, index.points, index.order, (row, other), offset, distance
+        )
     return Pairs(row, other, offset, distance, count, start)
 
 

@@ -16,8 +16,16 @@ from tussle.numeric.kernel import device, kernel
 
 ANY, SAME, DIFFERENT = 0, 1, 2
 
-TABLE = "(I I I I F F F F F)"
-"""Kernel code of a table."""
+TABLE = "(I I I2 I F F2 F)"
+"""Kernel code of what makes a table: `Index.table`, and behind it team by place."""
+
+
+@device
+def table_of(arrays):
+    """The table."""
+    world_start, keys, strips, world_strip, inverse_cell, points, team = arrays
+    return world_start, keys, strips[0], world_strip, inverse_cell, points[0], points[1], points[2], team
+
 
 SMALL_WORLD = 3000
 """Up to this many entities the nearest is sought by looking at all: 8 at a time that costs 0.25 ns each."""
@@ -268,7 +276,7 @@ def nearest_places(w, me, x, y, z, mode, wanted, table, best, ranks, places, k):
 
 
 @kernel(f"(F F F F F) i8 (I I) i8 {TABLE} I (Iw Iw) -> i8")
-def pair_places(queries, mode, places, first, table, start, out):
+def pair_places(queries, mode, places, first, arrays, start, out):
     """Places near each of the rows of a group that begins at row `first` of the table. Returns how many.
 
     queries: x, y, z, radius [m], wanted team, (n,) each; places: row_world, place (N,). Writes out: count (n,), and with room in
@@ -277,6 +285,7 @@ def pair_places(queries, mode, places, first, table, start, out):
     x, y, z, radius, wanted = queries
     row_world, place = places
     count, found = out
+    table = table_of(arrays)
     total = 0
     for i in range(x.shape[0]):
         row = first + i
@@ -287,11 +296,11 @@ def pair_places(queries, mode, places, first, table, start, out):
     return total
 
 
-@kernel("(F F F) I I (F F F) I (Iw Iw) F2w Fw")
-def pair_columns(pos, start, found, by_place, order, rows, offset, distance):
+@kernel("(F F F) I I F2 I (Iw Iw) F2w Fw")
+def pair_columns(pos, start, found, points, order, rows, offset, distance):
     """What pairs are asked for, by pair: rows of the group and of the table, offset (3, m) [m], distance [m]."""
     x, y, z = pos
-    sx, sy, sz = by_place
+    sx, sy, sz = points[0], points[1], points[2]
     row, other = rows
     for i in range(x.shape[0]):
         for k in range(start[i], start[i + 1]):
@@ -306,7 +315,7 @@ def pair_columns(pos, start, found, by_place, order, rows, offset, distance):
 
 
 @kernel(f"(F F F F) i8 i8 (I I I) i8 {TABLE} I2w F2w")
-def nearest_rows(queries, k, mode, places, first, table, other, square):
+def nearest_rows(queries, k, mode, places, first, arrays, other, square):
     """The k nearest rows of the table, other (k, n) or -1, and their squared distances [m^2], (k, n).
 
     queries: x, y, z [m], wanted team, (n,) each, of the rows of a group that begins at row `first` of the table; places: row_world,
@@ -314,6 +323,7 @@ def nearest_rows(queries, k, mode, places, first, table, other, square):
     """
     x, y, z, wanted = queries
     row_world, place, order = places
+    table = table_of(arrays)
     best, ranks, found = np.empty(k), np.empty(k, np.int64), np.empty(k, np.int64)
     for i in range(x.shape[0]):
         row = first + i

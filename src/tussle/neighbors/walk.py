@@ -141,10 +141,6 @@ def square_of(radius):  # type: ignore[no-untyped-def]
     return radius * radius if radius > 0.0 else -1.0
 
 
-LONGS = ["queries", "block_first", "span_first", "span_start", "span_end", "order"]
-POINTS = ["qx", "qy", "qz", "sx", "sy", "sz"]
-
-
 FROM_LANES = ["bits", "choose", "inverse_sqrt", "lanes_sqrt", "load", "number", "splat", "store", "truth"]
 
 
@@ -251,10 +247,8 @@ def make_walk(laws: Sequence[Law], where: Law | None, code_of: Callable[[str], s
     made = scope["walk"]
     made.__module__ = laws[0].function.__module__
     made.__qualname__ = "+".join(law.function.__qualname__ for law in (*laws, *([where] if where else [])))
-    signature = (
-        f"({' '.join('I' * len(LONGS))}) ({' '.join('F' * (len(POINTS) + len(text.other)))}) "
-        f"({' '.join(code_of(name) for name in text.own)}) F2w i8 i8 i8 i8"
-    )
+    other, own = " ".join("F" * len(text.other)), " ".join(code_of(name) for name in text.own)
+    signature = f"(I2 I2 I) (F2 F2) ({other}) ({own}) F2w i8 (i8 i8) i8"
     return Walk(text.own, text.other, kernel(signature)(made), at)
 
 
@@ -299,14 +293,27 @@ class WalkText:
 
     def lines(self) -> Iterator[str]:
         """The kernel."""
-        yield "def walk(longs, floats, own, out, first, begin, stop, most):"
-        yield f"    {', '.join(LONGS)} = longs"
-        yield f"    {', '.join([*POINTS, *(f'by_place_{name}' for name in self.other)])} = floats"
-        yield f"    {' '.join(f'by_row_{name},' for name in self.own)} = own"
+        yield "def walk(longs, points, other, own, out, first, part, most):"
+        yield "    cuts, spans, order = longs"
+        yield "    queries, block_first, span_first = cuts[0], cuts[1], cuts[2]"
+        yield "    span_start, span_end = spans[0], spans[1]"
+        for number, name in enumerate("qs"):
+            yield f"    {name}x, {name}y, {name}z = points[{number}][0], points[{number}][1], points[{number}][2]"
+        for number, name in enumerate(self.other):
+            yield f"    by_place_{name} = other[{number}]"
+        for number, name in enumerate(self.own):
+            yield f"    by_row_{name} = own[{number}]"
         yield f"    lane = np.empty({self.results_at + self.n_out} * LANES)"
         kept = [*(["all"] if None in self.lists else []), *(["own", "other"] if self.by_team else [])]
-        for name in [*(f"places_{each}" for each in kept), *(f"near_{n}" for n in range(len(self.limits)))]:
-            yield f"    {name} = np.empty(most + LANES, np.int64)"
+        lists = [
+            *(f"places_{each}" for each in kept),
+            *(f"near_{number}" for number in range(len(self.limits))),
+        ]
+        yield "    room = most + LANES"
+        yield f"    found = np.empty({len(lists)} * room, np.int64)"
+        for number, name in enumerate(lists):
+            yield f"    {name} = found[{number} * room : {number + 1} * room]"
+        yield "    begin, stop = part"
         yield "    for b in range(begin, stop):"
         yield "        q0 = block_first[b]"
         yield "        width = block_first[b + 1] - q0"

@@ -30,14 +30,21 @@ def sums_of(s, yaw, team, quat=None, fov=(7.0, 7.0), split=None, first=0, last=N
     other = {
         "other_level_forward_x": np.cos(yaw), "other_level_forward_y": np.sin(yaw), "other_team": team.astype(float)
     }  # fmt: skip
-    longs = b.queries, b.block_first, b.span_first, b.span_start, b.span_end, index.order
-    floats = (
-        b.x, b.y, b.z, index.sx, index.sy, index.sz, *(index.gather(other[name]) for name in walk.other)
-    )  # fmt: skip
+    columns = tuple(index.gather(other[name]) for name in walk.other)
     sums = np.full((walk.n_out, n), np.nan)
+    by_row = tuple(own[name] for name in walk.own)
     cuts = [0, b.n_blocks] if split is None else [0, b.n_blocks // 2, b.n_blocks]
     for begin, stop in itertools.pairwise(cuts):
-        walk.run(longs, floats, tuple(own[name] for name in walk.own), sums, first, begin, stop, b.most)
+        walk.run(
+            (b.cuts, b.spans, index.order),
+            (b.points, index.points),
+            columns,
+            by_row,
+            sums,
+            first,
+            (begin, stop),
+            b.most,
+        )
     return sums
 
 

@@ -36,7 +36,7 @@ def test_order_is_cell_row_then_cell_then_id():
     cells = np.floor(s.pos[:2] * index.inverse_cell[0])
     np.testing.assert_array_equal(index.order, np.lexsort((s.ids, cells[0], cells[1])))
     np.testing.assert_array_equal(index.place[index.order], np.arange(600))
-    np.testing.assert_array_equal(index.sx, s.pos[0][index.order])
+    np.testing.assert_array_equal(index.points[0, :600], s.pos[0][index.order])
 
 
 def test_far_entities_cost_no_memory_and_are_found():
@@ -96,10 +96,10 @@ def test_moved_rows_keep_their_places_with_one_cell_per_world():
     blocks = index.blocks(4, 6)
     assert blocks.n_blocks == 2
     index.update(np.array([4, 5]), np.array([7.0, 8.0]), np.zeros(2), np.zeros(2))
-    assert (index.sx[index.place[[4, 5]]] == [7.0, 8.0]).all()
+    assert (index.points[0, index.place[[4, 5]]] == [7.0, 8.0]).all()
     again = index.blocks(4, 6)
-    assert again.span_start is blocks.span_start
-    assert sorted(again.x) == [7.0, 8.0]
+    assert again.spans is blocks.spans
+    assert sorted(again.points[0, :2]) == [7.0, 8.0]
 
 
 def test_queries_may_stand_elsewhere_than_the_table_says():

@@ -79,8 +79,8 @@ def test_without_prey_there_is_no_target_and_commands_persist():
     own = [axis[first:].copy() for axis in s.pos]
     outputs = [np.full(n, 5.0) for _ in range(3)]
     level = np.array([np.ones(n), np.zeros(n), np.zeros(n), np.zeros(n)])
-    kernels.pursue(tuple(own), tuple(level), np.full(n, 35.0), rows, tuple(s.pos), tuple(outputs))
-    kernels.point(*own[:2], np.full(n, 35.0), rows, *s.pos[:2], *outputs[:2])
+    kernels.pursue(tuple(own), tuple(level), np.full(n, 35.0), rows, s.pos, tuple(outputs))
+    kernels.point(*own[:2], np.full(n, 35.0), rows, s.pos, *outputs[:2])
     assert all((o == 5.0).all() for o in outputs)
 
 
@@ -108,8 +108,8 @@ def test_pursuit_points_at_the_target():
     yaw, climb = np.linspace(-3, 3, n), np.linspace(-1, 1, n)
     speed, turn, pitch, heading, fast = (np.zeros(n) for _ in range(5))
     quat = tuple(quat_from_euler(np.zeros(n), -climb, yaw))
-    kernels.pursue(tuple(own), quat, np.full(n, 35.0), rows, tuple(s.pos), (speed, turn, pitch))
-    kernels.point(*own[:2], np.full(n, 35.0), rows, *s.pos[:2], heading, fast)
+    kernels.pursue(tuple(own), quat, np.full(n, 35.0), rows, s.pos, (speed, turn, pitch))
+    kernels.point(*own[:2], np.full(n, 35.0), rows, s.pos, heading, fast)
     d = s.pos[:, rows] - np.array(own)
     np.testing.assert_allclose(heading, np.arctan2(d[1], d[0]), atol=1e-14)
     np.testing.assert_allclose(np.exp(1j * turn), np.exp(1j * (heading - yaw)), atol=1e-13)

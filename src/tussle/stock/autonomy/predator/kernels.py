@@ -7,13 +7,13 @@ import math
 import numpy as np
 
 from tussle.neighbors.kernels import row_of
-from tussle.neighbors.search import DIFFERENT, SAME, TABLE, in_range, nearest_places
+from tussle.neighbors.search import DIFFERENT, SAME, TABLE, in_range, nearest_places, table_of
 from tussle.numeric import atan2, wrap
 from tussle.numeric.kernel import kernel
 
 
 @kernel(f"(F F F F) (I I) B (Iw Iw Iw Iw) (I I I I I I) i8 {TABLE} -> i8")
-def hunt(points, teams, allow_switching, out, rows, first, table):
+def hunt(points, teams, allow_switching, out, rows, first, arrays):
     """Choose targets and collect claims for the rows of a group that begins at row `first` of the table.
 
     By row of the group (n,): points x, y, z and capture_range [m]; own team and prey_team; allow_switching; target, the id hunted
@@ -26,6 +26,7 @@ def hunt(points, teams, allow_switching, out, rows, first, table):
     own_team, prey_team = teams
     target, target_row, claim_row, claim_place = out
     row_id, row_world, place, id_row, id_start, order = rows
+    table = table_of(arrays)
     best, ranks, places = np.empty(1), np.empty(1, np.int64), np.empty(1, np.int64)
     n_claims = 0
     room = claim_row.shape[0]
@@ -59,7 +60,7 @@ def hunt(points, teams, allow_switching, out, rows, first, table):
     return n_claims
 
 
-@kernel("(F F F) (F F F F) F I (F F F) (Fw Fw Fw)")
+@kernel("(F F F) (F F F F) F I F2 (Fw Fw Fw)")
 def pursue(pos, quat, max_speed, target_row, table_pos, commands):
     """Speed [m/s] and rates [rad/s] towards the target's position; rows without a target keep their last commands.
 
@@ -67,7 +68,7 @@ def pursue(pos, quat, max_speed, target_row, table_pos, commands):
     """
     x, y, z = pos
     qw, qx, qy, qz = quat
-    table_x, table_y, table_z = table_pos
+    table_x, table_y, table_z = table_pos[0], table_pos[1], table_pos[2]
     speed, turn_rate, pitch_rate = commands
     for i in range(x.shape[0]):
         row = target_row[i]
@@ -82,11 +83,11 @@ def pursue(pos, quat, max_speed, target_row, table_pos, commands):
             pitch_rate[i] = wrap(atan2(dz, math.sqrt(dx * dx + dy * dy)) - climb)
 
 
-@kernel("F F F I F F Fw Fw")
-def point(x, y, max_speed, target_row, table_x, table_y, heading, speed):
+@kernel("F F F I F2 Fw Fw")
+def point(x, y, max_speed, target_row, table_pos, heading, speed):
     """Desired heading [rad] and speed [m/s] towards the target; rows without a target keep their last commands."""
     for i in range(x.shape[0]):
         row = target_row[i]
         if row >= 0:
-            heading[i] = atan2(table_y[row] - y[i], table_x[row] - x[i])
+            heading[i] = atan2(table_pos[1, row] - y[i], table_pos[0, row] - x[i])
             speed[i] = max_speed[i]

@@ -49,13 +49,12 @@ class Predator(Autonomy):
                 (x, y, z, self.capture_range), (g.team, self.prey_team_id), self.allow_prey_switching,
                 (self.target, target_row, claim_row, claimed), rows, g.first, table,
             )  # fmt: skip
-        table_x, table_y, _ = table_pos = tuple(bodies.pos)
         if not self.wired.isdisjoint(("speed", "turn_rate", "pitch_rate")):
             commands = self.speed, self.turn_rate, self.pitch_rate
-            kernels.pursue(pos, tuple(g.quat), self.max_speed, target_row, table_pos, commands)
+            kernels.pursue(pos, tuple(g.quat), self.max_speed, target_row, bodies.pos, commands)
         if not self.wired.isdisjoint(("desired_heading", "desired_speed")):
             kernels.point(
-                x, y, self.max_speed, target_row, table_x, table_y, self.desired_heading, self.desired_speed
+                x, y, self.max_speed, target_row, bodies.pos, self.desired_heading, self.desired_speed
             )
         if n_claims:
             self.capture.publish(claim_row[:n_claims], target=bodies.id[claimed[:n_claims]])
