@@ -99,7 +99,7 @@ def _parse(sim: Simulation, path: str) -> tuple[int, tuple[str, ...], str]:
     columns = {**matching[0].places, **matching[0].ragged}
     if column not in columns:
         raise ParameterError(
-            f"{path!r}: {key[-1]} has no column {column!r}{nearest_name(column, known)}; {listed(known)}"
+            f"{path!r}: {key[-1]} has no column {column!r}{nearest_name(column, columns)}; {listed(columns)}"
         )
     return number, key, column
 

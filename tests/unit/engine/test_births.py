@@ -219,7 +219,7 @@ def test_ids_are_never_used_again():
     while not sim.is_over:
         sim.step()
         seen.append(ids(sim, "b"))
-    assert seen[0] == [3]
+    assert seen[0] == [3, -1, -1]
     assert seen[-1] == [3, 4, 5]
 
 
@@ -252,7 +252,9 @@ def test_w_spawn_is_born_at_the_beginning_of_the_next_step():
     seen = []
     sim.observers.append(lambda s: seen.append((int(s.steps[0]), s.read("child.pos")[0].tolist())))
     sim.step()
-    assert seen == [(3, [[[5.0, 6.0, 7.0]], [[0.0, 0.0, 0.0]], [[0.0, 0.0, 0.0]]])]
+    ((step, pos),) = seen
+    np.testing.assert_array_equal(pos, [[[5.0, 6.0, 7.0]], [[np.nan] * 3], [[np.nan] * 3]])
+    assert step == 3
     sim.run()
     assert sim.read("child.pos")[1].tolist() == [[True], [True], [False]]
     assert sim.read("child.id")[0].tolist() == [[3], [3], [0]]

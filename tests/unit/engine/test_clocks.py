@@ -262,7 +262,7 @@ def test_easy_mode_has_the_dt_of_its_period():
         ),
         (
             lambda: MotorSchemas(behaviors=[AvoidEntityMS(rate=5.0)]),
-            r"MotorSchemas.behaviors: AvoidEntityMS has a rate of its own, but is called by MotorSchemas; give",
+            r"MotorSchemas.behaviors: AvoidEntityMS\(rate=5.0\) takes no rate; give it to MotorSchemas",
         ),
     ],
 )

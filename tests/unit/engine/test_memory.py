@@ -15,7 +15,7 @@ MOST_GROWTH = (
     1.0 + 0.002 * N_GAMES
 )  # [MB]; allocators settle for some thousand games. What was kept took 20 kB a game and more
 MODELS = [
-    "HarmonicOscillator", "SimpleAircraft", "SingleIntegrator", "Still", "Unicycle", "Unicycle3D", "an author's own",
+    "HarmonicOscillator", "SimpleAircraft", "SingleIntegrator", "Still", "External", "Unicycle", "Unicycle3D", "an author's own",
     "classes made on the fly",
 ]  # fmt: skip
 

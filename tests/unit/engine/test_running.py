@@ -155,7 +155,7 @@ def test_without_health_an_entity_is_removed():
     sim.step(3)
     assert sim.read("a.health")[0][0].tolist() == pytest.approx([1.0, 0.1, 1.0])
     sim.step()
-    assert sim.read("a.id")[0][0].tolist() == [1, 0, 3]
+    assert sim.read("a.id")[0][0].tolist() == [1, -1, 3]
     assert sim.result()[0].alive == {0: 2}
 
 
@@ -421,7 +421,7 @@ def test_read_is_in_stable_agent_order_with_who_lives():
     after, alive = sim.read("a.pos")
     assert alive.tolist() == [[True, False, True], [True, True, True]]
     assert np.abs(after - pos)[alive].max() < 1.0
-    assert sim.read("a.id")[0].tolist() == [[1, 0, 3], [1, 2, 3]]
+    assert sim.read("a.id")[0].tolist() == [[1, -1, 3], [1, 2, 3]]
     assert sim.read("a.yaw")[0].shape == (2, 3)
     assert sim.read("a.forward")[0].shape == (2, 3, 3)
 

@@ -173,7 +173,7 @@ def test_those_who_die_in_a_step_have_flown_it():
             block("a", team=1, count=2), interactions=[Reaper(at=0.5)], metrics=[SimpleCollisionMetrics()]
         )
     )
-    assert sim.run()[0].metrics["SimpleCollisionMetrics"]["flight_time"] == pytest.approx({1: 2 * 0.6})
+    assert sim.run()[0].metrics["SimpleCollisionMetrics"]["flight_time"] == pytest.approx({1: 2 * 0.5})
 
 
 # -- CPA --------------------------------------------------------------------------------------------------------------------------
