@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from tussle.batch.cluster import OnDask, connect, missing_extra
+from tussle.documents import size_of
 from tussle.errors import BatchError, ParameterError, listed, nearest_name
 
 ALIASES = {"queue": "partition", "mem": "memory", "time": "walltime"}
@@ -24,6 +25,10 @@ ANSWERED_WITHIN = 60.0
 """Time in which Slurm answers, however busy it is [s]."""
 REPLACED_WITHIN = 30.0
 """Time without workers after which jobs are looked for [s]: Dask replaces one 15 s after it has seen its worker go."""
+
+
+END_OF_LOG = 1 << 16
+"""Bytes of what a job has printed that are looked at for its last line."""
 
 
 @dataclass(frozen=True)
@@ -215,7 +220,10 @@ class _Look:
         """The last that a job has said."""
         path = Path(self.jobs.logs) / f"tussle-{number}.err"
         try:
-            lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+            size = size_of(path)
+            with path.open("rb") as file:
+                file.seek(max(0, size - END_OF_LOG))
+                lines = file.read(END_OF_LOG).decode(errors="replace").splitlines()
         except OSError:
             return f"{path} is not there"
         last = [line.strip() for line in lines if line.strip()][-1:]

@@ -31,6 +31,7 @@ from tussle.batch.statistics import (
 from tussle.batch.survival import N_TIMES, Survival, survival_of
 from tussle.batch.variables import Choice, Range, Variable
 from tussle.batch.variables import written as text_of
+from tussle.batch.varied import variable_of
 from tussle.errors import MissingExtraError, ParameterError, listed, nearest_name
 
 if TYPE_CHECKING:
@@ -102,7 +103,7 @@ class Results:
     @cached_property
     def variables(self) -> list[Variable]:
         """What was varied."""
-        return [_variable(said) for said in self.info["variables"]]
+        return [variable_of(said) for said in self.info["variables"]]
 
     @cached_property
     def teams(self) -> dict[int, str]:
@@ -381,14 +382,6 @@ class Results:
     def __repr__(self) -> str:
         failed = f", {self.n_failed} failed" if self.n_failed else ""
         return f"<Results {str(self.path)!r}: {self.n_runs} of {self.n_planned} runs{failed}>"
-
-
-def _variable(said: dict[str, Any]) -> Variable:
-    """A variable as `batch.json` tells it."""
-    if said["kind"] == "choice":
-        return Choice(said["name"], tuple(said["values"]))
-    fields = ("name", "low", "high", "is_int", "is_log", "levels", "unit")
-    return Range(**{name: said[name] for name in fields})
 
 
 def _original(value: Any, variable: Variable) -> Any:

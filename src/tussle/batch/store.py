@@ -19,12 +19,16 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
+from tussle.batch.consistency import check_design, check_metrics, check_results
+from tussle.batch.schemas import BATCH, RULES
 from tussle.batch.tasks import Finished
 from tussle.errors import BatchError, RecordError
+from tussle.record.arrow_file import read_batches
+from tussle.record.parquet_file import read_parquet
 from tussle.record.run_file import plain, put_whole
-from tussle.record.stream import Stream, read_stream
+from tussle.record.stream import Stream
+from tussle.record.table_values import check_values
 
-FORMAT = 1
 BATCH_FILE, DESIGN_FILE, RESULTS_FILE, ALIVE_FILE = (
     "batch.json",
     "design.parquet",
@@ -58,20 +62,6 @@ PLAYED = pa.schema(
 
 IS_OWN = (BATCH_FILE, f"{BATCH_FILE}.part", LOCK)
 """What may lie in a directory in which no batch has been begun: one was killed as it began."""
-
-NEEDED = (
-    "name",
-    "mission",
-    "variables",
-    "n_points",
-    "n_seeds",
-    "first_seed",
-    "independent",
-    "n_runs",
-    "is_complete",
-    "teams",
-)
-"""What `batch.json` says in any case."""
 
 OF_RUN = ("end", "t", "steps", "winner", "state_hash", "error", "cpu_s", "host")
 
@@ -221,18 +211,7 @@ class Store:
                 raise BatchError(
                     f"{path}: holds something that is no batch ({min(foreign)}); choose another directory"
                 )
-            self._lock: IO[str] = (path / LOCK).open("a+")
-        try:
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            self._lock.close()
-            raise BatchError(f"{path}: another process is playing this batch") from None
-        except OSError as error:
-            warnings.warn(
-                f"{path}: this file system has no locks ({error.strerror}); see that nobody else plays this batch meanwhile",
-                RuntimeWarning,
-                stacklevel=2,
-            )
+        self._lock = locked(path, "playing this batch")
         with told(path):
             self.was_killed = (path / LOCK).stat().st_size > 0
             self._lock.write(f"{os.getpid()}\n")
@@ -253,6 +232,7 @@ class Store:
         draft = self.path / f"{name}.part"
         with told(self.path):
             try:
+                draft.unlink(missing_ok=True)  # what a link leads to is not ours
                 pq.write_table(table, draft, compression="zstd", write_page_checksum=True)
                 draft.replace(self.path / name)
             except OSError:
@@ -316,6 +296,30 @@ class Store:
             self._lock.close()
 
 
+def locked(path: Path, doing: str) -> IO[str]:
+    """The lock of a directory, held until it is closed.
+
+    Raises:
+        BatchError: Another process holds it.
+        RecordError: It cannot be made, or is a link or something else than a file.
+    """
+    with told(path):
+        handle = os.open(path / LOCK, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK, 0o666)
+        lock = os.fdopen(handle, "r+")
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        lock.close()
+        raise BatchError(f"{path}: another process is {doing}") from None
+    except OSError as error:
+        warnings.warn(
+            f"{path}: this file system has no locks ({error.strerror}); see that nobody else is {doing} meanwhile",
+            RuntimeWarning,
+            stacklevel=3,
+        )
+    return lock
+
+
 @contextlib.contextmanager
 def told(path: Path) -> Iterator[None]:
     """Errors of the operating system as those of records."""
@@ -337,30 +341,21 @@ def read_info(path: Path) -> dict[str, Any]:
     file = path / BATCH_FILE
     if not path.is_dir():
         raise BatchError(f"{path}: there is no such batch directory")
-    if not file.is_file():
+    if not file.exists():
         raise BatchError(f"{path}: this is no batch directory; it has no {BATCH_FILE}")
-    try:
-        info: Any = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise BatchError(f"{file}: cannot be read: {error}") from None
-    found = info.get("format") if isinstance(info, dict) else None
-    if found != FORMAT:
-        raise BatchError(f"{file}: the batch has format {found!r}; this tussle reads format {FORMAT}")
-    missing = [name for name in NEEDED if name not in info]
-    if missing:
-        raise BatchError(f"{file}: it says nothing of {', '.join(missing)}")
-    return dict(info)
+    return BATCH.read(file)
 
 
 def read_played(path: Path) -> tuple[pa.Table, list[str]]:
-    """Finished runs that are not in the tables yet, with what is missing; a file that was cut gives its whole batches."""
-    parts, notes = [PLAYED.empty_table()], []
+    """Finished runs that are not in the tables yet, with what is missing; a file that was cut gives its whole batches.
+
+    Raises:
+        BatchError: A file holds something else.
+    """
+    parts, notes = [PLAYED.empty_table()], list[str]()
     for file in sorted((path / PARTS).glob("*.arrow")):
-        table, note = read_stream(file, PLAYED)
-        if table.schema.equals(PLAYED):
-            parts.append(table.combine_chunks())
-        if note:
-            notes.append(note)
+        batches = list(read_batches(file, notes, BatchError, PLAYED, RULES))
+        parts.append(pa.Table.from_batches(batches, PLAYED).combine_chunks())
     return pa.concat_tables(parts), notes
 
 
@@ -378,16 +373,8 @@ def read_table(path: Path, name: str, columns: pa.Schema) -> pa.Table | None:
     file = path / name
     if not file.exists():
         return None
-    try:
-        table = pq.read_table(file, page_checksum_verification=True)
-        found = dict(zip(table.column_names, table.schema.types, strict=True))
-    except (OSError, ValueError, TypeError, pa.ArrowException) as error:
-        raise BatchError(f"{file}: cannot be read: {error}") from None
-    missing = [column for column in columns if found.get(column.name) != column.type]
-    if missing:
-        raise BatchError(
-            f"{file}: is no table of a batch; it has no column {missing[0].name!r} of {missing[0].type}"
-        )
+    table = read_parquet(file, columns, BatchError)
+    check_values(zip(table.column_names, table.columns, strict=True), RULES, file, BatchError)
     return table
 
 
@@ -420,6 +407,7 @@ def load(path: str | Path) -> Stored:
         raise BatchError(
             f"{path}: {DESIGN_FILE} is not there: the batch was stopped before its first run; play it again"
         )
+    check_design(design, info, path / DESIGN_FILE)
     played, notes = read_played(path)
     if info["is_complete"] and not (path / RESULTS_FILE).exists():
         raise BatchError(f"{path}: {RESULTS_FILE} is not there, though the batch was complete")
@@ -439,9 +427,15 @@ def merged(path: Path, played: pa.Table, design: pa.Table) -> tuple[pa.Table, pa
     old, old_alive = read_table(path, RESULTS_FILE, RESULTS), read_table(path, ALIVE_FILE, ALIVE)
     if old is not None and old_alive is None:
         raise BatchError(f"{path}: {ALIVE_FILE} is not there, but {RESULTS_FILE} is; the batch is damaged")
+    for table, name in ((old, RESULTS_FILE), (old_alive, ALIVE_FILE)):
+        if table is not None:
+            check_results(table, design, path / name)
     results, alive = tables(played, design)
+    for table in (results, alive):
+        check_values(zip(table.column_names, table.columns, strict=True), RULES, path / PARTS, BatchError)
     # Each by its own runs: a batch that is killed as it ends may have written one table and not the other.
     results = _with_new(old, results, ("run", "team", "metric"))
+    check_metrics(results, path / RESULTS_FILE)
     return results, _with_new(old_alive, alive, ("run", "t", "team"))
 
 

@@ -12,6 +12,7 @@ from tussle.batch.points import variables_of
 from tussle.batch.ranges_file import SCALES, read_ranges
 from tussle.batch.sampling import METHODS
 from tussle.batch.variables import Choice, Point, Range, Variable, parse_values
+from tussle.documents import read_text
 from tussle.errors import ParameterError, listed, nearest_name
 from tussle.mission.limits import Limits
 from tussle.mission.problems import MOST_LINES
@@ -59,7 +60,7 @@ def read_sweep(path: str | Path) -> Sweep:
         ParameterError: It cannot be read, is malformed, or says what is not allowed; all that is wrong is told, one line each.
     """
     file = Path(path)
-    text = _text(file)
+    text = read_text(file, ParameterError, Limits().text).removeprefix("\ufeff")
     is_xml = file.suffix.lower() == ".xml" or (
         file.suffix.lower() != ".toml" and text.lstrip().startswith("<")
     )
@@ -76,20 +77,6 @@ def read_sweep(path: str | Path) -> Sweep:
         more = ["... and more"] if len(problems) > MOST_LINES else []
         raise ParameterError("\n".join([*problems[:MOST_LINES], *more]))
     return Sweep(**said)
-
-
-def _text(file: Path) -> str:
-    most = Limits().text
-    try:
-        with file.open(encoding="utf-8-sig") as stream:
-            text = stream.read(most + 1)
-    except OSError as error:
-        raise ParameterError(f"{file}: it cannot be read: {error.strerror or error}") from None
-    except UnicodeDecodeError:
-        raise ParameterError(f"{file}: it is not text in UTF-8") from None
-    if len(text) > most:
-        raise ParameterError(f"{file}: it is longer than {most:,} characters")
-    return text
 
 
 def _read_toml(text: str, file: str) -> tuple[dict[str, Any], list[str]]:

@@ -61,6 +61,18 @@ def about(variable: Variable) -> dict[str, Any]:
     return {"kind": kind, **dataclasses.asdict(variable)}
 
 
+def variable_of(said: Mapping[str, Any]) -> Variable:
+    """A variable as `batch.json` keeps it, once the document's schema has been checked.
+
+    Raises:
+        ParameterError: Its values are not allowed.
+    """
+    if said["kind"] == "choice":
+        return Choice(said["name"], tuple(said["values"]))
+    fields = ("name", "low", "high", "is_int", "is_log", "levels", "unit")
+    return Range(**{name: said.get(name) for name in fields})  # type: ignore[arg-type]
+
+
 def said(variables: Iterable[Mapping[str, Any]]) -> str:
     """Variables as `batch.json` keeps them, in the words of the command line."""
     return "; ".join(f"{v['name']}={_values_said(v)}" for v in variables) or "nothing"

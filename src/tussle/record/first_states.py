@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 import pyarrow.csv
-import pyarrow.parquet
 
+from tussle.documents import size_of
 from tussle.errors import ParameterError, RecordError, listed
+from tussle.record.arrow_file import read_batches
+from tussle.record.parquet_file import MARGIN, MOST_EXPANSION, read_parquet
 from tussle.record.schema import TRAJECTORY, TRAJECTORY_FILE
-from tussle.record.stream import read_stream
 
 TIME = ("t", "time")
 POS, QUAT, VEL = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("vx", "vy", "vz")
@@ -89,13 +89,13 @@ def read_table(path: str | Path, *, world: int = 0) -> FirstStates:
     if missing:
         raise RecordError(f"{place}: column {missing[0]!r} is missing; {listed(table.column_names)}")
     if "world" in table.column_names:
-        table = table.filter(pc.equal(table["world"], world))
+        table = table.filter(pa.array(_numbers(place, table, "world") == world))
     if not table.num_rows:
         raise RecordError(
             f"{place}: there are no rows{f' of world {world}' if 'world' in table.column_names else ''}"
         )
     assert time is not None
-    t, ids = _numbers(place, table, time), _numbers(place, table, "id").astype(np.int64)
+    t, ids = _numbers(place, table, time), _whole(place, table, "id")
     order = np.lexsort((ids, t))
     _, first = np.unique(ids[order], return_index=True)
     rows = order[np.sort(first)]
@@ -103,8 +103,10 @@ def read_table(path: str | Path, *, world: int = 0) -> FirstStates:
     def take(*names: str) -> np.ndarray:
         return np.array([_numbers(place, table, name)[rows] for name in names])
 
-    team = take("team")[0].astype(np.int64) if "team" in table.column_names else None
+    team = _whole(place, table, "team")[rows] if "team" in table.column_names else None
     block = tuple(table["block"].take(rows).to_pylist()) if "block" in table.column_names else None
+    if block is not None and not all(isinstance(name, str) for name in block):
+        raise RecordError(f"{place}: column 'block' holds something other than names")
     return FirstStates(t[rows], ids[rows], take(*POS), take(*QUAT), take(*VEL), team, block, str(place))
 
 
@@ -115,6 +117,15 @@ def _numbers(place: Path, table: pa.Table, name: str) -> np.ndarray:
         raise RecordError(f"{place}: column {name!r} holds something other than numbers") from None
 
 
+def _whole(place: Path, table: pa.Table, name: str) -> np.ndarray:
+    numbers = _numbers(place, table, name)
+    if not (np.abs(numbers) < 2**31).all():  # what is no number is not either
+        raise RecordError(
+            f"{place}: column {name!r} holds something other than whole numbers from -2^31 to 2^31"
+        )
+    return numbers.astype(np.int64)
+
+
 def _read(place: Path) -> pa.Table:
     name = place.name.lower()
     if not name.endswith(SUFFIXES):
@@ -123,15 +134,34 @@ def _read(place: Path) -> pa.Table:
         )
     if not place.exists():
         raise RecordError(f"{place}: there is no such file")
-    if name.endswith(".arrow"):
-        return read_stream(place, TRAJECTORY)[0]  # of a run that was cut, the first states may well be there
     try:
+        if name.endswith(".arrow"):  # of a run that was cut, the first states may well be there
+            batches = list(read_batches(place, [], RecordError))
+            return _columns(pa.Table.from_batches(batches, None if batches else TRAJECTORY))
         if name.endswith(".parquet"):
-            return _columns(pyarrow.parquet.read_table(place))
-        return _columns(pyarrow.csv.read_csv(place))
-    except (pa.ArrowException, OSError) as error:
+            return read_parquet(place, pa.schema([]), RecordError, READ)
+        most = MARGIN + MOST_EXPANSION * size_of(place)
+        return _columns(pyarrow.csv.read_csv(_unpacked(place, most) if name.endswith(".gz") else place))
+    except (pa.ArrowException, OSError, ValueError) as error:
         raise RecordError(f"{place}: cannot be read: {error}") from error
 
 
+def _unpacked(place: Path, most: int) -> pa.BufferReader:
+    """The text of a compressed file.
+
+    Raises:
+        OSError: It is longer than `most` bytes.
+    """
+    parts: list[bytes] = []
+    with pa.input_stream(str(place)) as file:
+        while sum(map(len, parts)) <= most and (part := file.read(MARGIN)):
+            parts.append(part)
+    if sum(map(len, parts)) > most:
+        raise OSError(f"unpacked it takes more than {most:,} bytes")
+    return pa.BufferReader(b"".join(parts))
+
+
 def _columns(table: Any) -> pa.Table:
+    if len(set(table.column_names)) < table.num_columns:
+        raise ValueError(f"two columns have the same name; {listed(table.column_names)}")
     return table.select([name for name in table.column_names if name in READ])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+import io
 from functools import cached_property
 from importlib import import_module
 from importlib.util import find_spec
@@ -10,22 +10,38 @@ from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
+import pyarrow.csv
 
+from tussle.documents import read_text
 from tussle.errors import MissingExtraError, ParameterError, RecordError, listed, nearest_name
+from tussle.mission.limits import Limits
+from tussle.record.arrow_file import read_batches
 from tussle.record.schema import (
     EVENTS,
     EVENTS_FILE,
+    EVENTS_RULES,
     FILES,
-    FORMAT,
     MISSION_FILE,
+    RUN,
     RUN_FILE,
     SUMMARY_FILE,
     TRAJECTORY,
     TRAJECTORY_FILE,
+    TRAJECTORY_RULES,
 )
-from tussle.record.stream import read_stream
+from tussle.record.table_values import Rules
 
 FRAMES = ("pandas", "polars")
+SUMMARY = pyarrow.csv.ConvertOptions(
+    column_types={
+        "world": pa.int32(),
+        "seed": pa.uint64(),
+        "team": pa.int32(),
+        "end": pa.string(),
+        "t": pa.float64(),
+    }
+)
+"""Columns of `summary.csv` that do not depend on the mission."""
 
 
 class Run:
@@ -46,8 +62,8 @@ class Run:
         self.info: dict[str, Any] = {}
         self.notes: list[str] = []
         self._read_info()
-        self.trajectory_table = self._read_stream(TRAJECTORY_FILE, TRAJECTORY)
-        self.events_table = self._read_stream(EVENTS_FILE, EVENTS)
+        self.trajectory_table = self._read_table(TRAJECTORY_FILE, TRAJECTORY, TRAJECTORY_RULES)
+        self.events_table = self._read_table(EVENTS_FILE, EVENTS, EVENTS_RULES)
 
     def _read_info(self) -> None:
         path = self.path / RUN_FILE
@@ -57,30 +73,25 @@ class Run:
             )
             return
         try:
-            info = json.loads(path.read_text(encoding="utf-8"))
-        except ValueError as error:
-            self.notes.append(f"{RUN_FILE} cannot be read: {error}")
-            return
-        if info.get("format") != FORMAT:
+            self.info = RUN.read(path)
+        except RecordError as error:
             raise RecordError(
-                f"{path}: the run directory has format {info.get('format')!r}; this tussle reads format {FORMAT}"
-            )
-        self.info = info
-        if info["interrupted"]:
-            self.notes.append(f"the run was interrupted: {info['interrupted']}")
+                f"{error}; without the file, the tables are read as of a run that was cut"
+            ) from None
+        if self.info["interrupted"]:
+            self.notes.append(f"the run was interrupted: {self.info['interrupted']}")
 
-    def _read_stream(self, name: str, schema: pa.Schema) -> pa.Table:
-        path = self.path / name
-        table, note = read_stream(path, schema)
+    def _read_table(self, name: str, schema: pa.Schema, rules: Rules) -> pa.Table:
+        path, notes = self.path / name, list[str]()
+        table = pa.Table.from_batches(read_batches(path, notes, RecordError, schema, rules), schema)
         said = self.info.get("files", {}).get(name)
         if (
-            not note
+            not notes
             and said is not None
             and (path.stat().st_size, table.num_rows) != (said["bytes"], said["rows"])
         ):
-            note = f"{name} has {table.num_rows} rows, {said['rows']} were written"
-        if note:
-            self.notes.append(note)
+            notes = [f"{name} has {table.num_rows} rows, {said['rows']} were written"]
+        self.notes += notes
         return table
 
     @property
@@ -103,18 +114,25 @@ class Run:
         """One row per world and team, as a frame.
 
         Raises:
-            RecordError: The run has none, since it did not come to its end.
+            RecordError: The run has none, since it did not come to its end, or it cannot be read.
         """
         path = self.path / SUMMARY_FILE
         if not path.exists():
             raise RecordError(f"{path} is not there: {'; '.join(self.notes) or 'it has been removed'}")
-        return self._package().read_csv(path)
+        text = read_text(path, RecordError)
+        try:
+            table = pyarrow.csv.read_csv(io.BytesIO(text.encode()), convert_options=SUMMARY)
+        except pa.ArrowException as error:
+            raise RecordError(f"{path}: cannot be read: {error}") from None
+        if lacking := [name for name in SUMMARY.column_types if name not in table.column_names]:
+            raise RecordError(f"{path}: column {lacking[0]!r} is missing; {listed(table.column_names)}")
+        return self._frame(table)
 
     @property
     def mission(self) -> str | None:
         """Text of the mission file with all its values; None for a mission built in Python."""
         path = self.path / MISSION_FILE
-        return path.read_text(encoding="utf-8") if path.exists() else None
+        return read_text(path, RecordError, Limits.large().text) if path.exists() else None
 
     def _package(self) -> Any:
         name = self._frames or next((f for f in FRAMES if find_spec(f)), "")

@@ -99,6 +99,7 @@ def put_whole(path: Path, text: str) -> None:
     """Write a file so that it is there whole or not at all."""
     draft = path.with_name(path.name + ".part")
     try:
+        draft.unlink(missing_ok=True)  # what a link leads to is not ours
         draft.write_text(text, encoding="utf-8")
         draft.replace(path)
     except OSError:

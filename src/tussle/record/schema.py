@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import pyarrow as pa
 
+from tussle.documents import Document, Map, Maybe, Real, Team, Whole
+from tussle.errors import RecordError
+from tussle.record.table_values import COUNT, NUMBER, TEXT, Rules
+
 FORMAT = 1
 """Version of the run directory; the loader refuses those it does not know."""
 
@@ -57,3 +61,43 @@ EVENTS = pa.schema(
         _field("text", pa.string(), "block of the born, why one died, why a world ended"),
     ]
 )
+
+TRAJECTORY_RULES: Rules = (
+    {"world": COUNT, "t": NUMBER, "step": COUNT, "id": COUNT, "block": TEXT}
+    | dict.fromkeys(("x", "y", "z", "qw", "qx", "qy", "qz"), NUMBER)
+)  # fmt: skip
+EVENTS_RULES: Rules = {"world": COUNT, "t": NUMBER, "step": COUNT, "kind": TEXT, "id": COUNT, "other": COUNT}
+
+_TEAMS = Map(Real(is_any=True), Team)
+_WORLD = {
+    "world": Whole(),
+    "seed": Whole(most=2**64 - 1),
+    "end": str,
+    "steps": Whole(),
+    "t": Real(),
+    "alive": _TEAMS,
+    "scores": _TEAMS,
+    "winner": Maybe(Whole(-(2**31))),
+    "state_hash": str,
+    "error": Maybe(str),
+}
+RUN = Document(
+    "the run directory",
+    FORMAT,
+    {
+        "is_complete": bool,
+        "interrupted": str,
+        "period": Maybe(Real(5e-324)),
+        "mission": {
+            "name": str,
+            "dt": Real(5e-324),
+            "start": Real(),
+            "blocks": [{"name": str, "team": Whole(-(2**31), 2**31 - 1), "plugins": [str]}],
+        },
+        "worlds": [_WORLD],
+        "versions": Map(str),
+        "files": Map({"bytes": Whole(), "rows": Whole()}),
+    },
+    RecordError,
+)
+"""What `run.json` says."""

@@ -1,4 +1,4 @@
-"""A table on its way to a file, and back from one that may be cut anywhere."""
+"""A table on its way to a file."""
 
 from __future__ import annotations
 
@@ -66,25 +66,3 @@ class Stream:
         reason = os.strerror(error.errno) if error.errno else str(error)
         kept = f"; the {self.rows} rows written before are whole" if self.rows else ""
         return RecordError(f"{self.path}: cannot be written: {reason}{kept}")
-
-
-def read_stream(path: Path, schema: pa.Schema) -> tuple[pa.Table, str]:
-    """All whole batches of a file, and "" or what is missing. A file that is absent or cut gives what there is.
-
-    Args:
-        path: The file.
-        schema: Columns of the empty table when not even its head is there.
-    """
-    batches: list[pa.RecordBatch] = []
-    if not path.exists():
-        return schema.empty_table(), f"{path.name} is not there"
-    try:
-        with pa.OSFile(str(path), "rb") as file, pa.ipc.open_stream(file) as reader:
-            schema = reader.schema
-            while True:
-                batches.append(reader.read_next_batch())
-    except StopIteration:
-        return pa.Table.from_batches(batches, schema), ""
-    except (pa.ArrowInvalid, OSError) as error:
-        note = f"{path.name} is cut after {len(batches)} whole batches ({error})"
-        return pa.Table.from_batches(batches, schema), note

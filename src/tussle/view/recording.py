@@ -13,11 +13,13 @@ import pyarrow as pa
 from tussle.errors import RecordError, TussleError
 from tussle.mission import Loaded, Mission, read_mission
 from tussle.record import Run, load_run
-from tussle.record.schema import MISSION_FILE
+from tussle.record.schema import MISSION_FILE, RUN_FILE, TRAJECTORY_FILE
 from tussle.view.frame import Frame, Happening, empty_frame
 from tussle.view.looks import Looks
 from tussle.view.scenery import Scenery, scenery_of
 
+MOST_EMPTY = 5_000_000
+"""Moments without anybody that are made up from what is said of steps; in memory they take some 300 MB."""
 POS, QUAT, VEL = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("vx", "vy", "vz")
 
 
@@ -76,12 +78,21 @@ class Recording:
         cuts = np.flatnonzero((np.diff(worlds) != 0) | (np.diff(step) != 0)) + 1
         first = np.concatenate([[0], cuts]).astype(np.int64) if len(step) else np.zeros(0, np.int64)
         last = np.concatenate([first[1:], [len(step)]]).astype(np.int64)[: len(first)]
+        wrong = np.setdiff1d(np.flatnonzero(np.diff(self._whole("id")) <= 0) + 1, cuts)
+        if len(wrong):
+            raise RecordError(
+                f"{self.path / TRAJECTORY_FILE}: the ids of a step do not ascend in row {wrong[0]}"
+            )
         mine = np.flatnonzero(worlds[first] == self.world)
         mine = mine[np.argsort(step[first[mine]], kind="stable")]
         self._first, self._last = first[mine], last[mine]
         self.steps = step[self._first].astype(np.int64)
+        if (np.diff(self.steps) <= 0).any():
+            raise RecordError(f"{self.path / TRAJECTORY_FILE}: the rows of a step do not stand together")
         self._set_times()
         self._add_empty_frames()
+        if (np.diff(self.t) < 0.0).any():
+            raise RecordError(f"{self.path / TRAJECTORY_FILE}: times go back from one step to the next")
 
     def _set_times(self) -> None:
         """Times of the frames; start and step length as `run.json` says, else as the table shows."""
@@ -106,6 +117,12 @@ class Recording:
         stride = self._usual_stride()
         edges = np.concatenate([self.steps, [self._last_step() + 1]])
         gaps = np.flatnonzero(np.diff(edges) > stride)
+        n_missing = int((np.diff(edges)[gaps] // stride).sum())
+        if n_missing > MOST_EMPTY:
+            raise RecordError(
+                f"{self.path}: {n_missing:,} moments with nobody there, by the steps of {RUN_FILE} and {TRAJECTORY_FILE}; "
+                f"allowed are {MOST_EMPTY:,}"
+            )
         missing = [np.arange(edges[i] + stride, edges[i + 1], stride) for i in gaps]
         end = self._last_step()
         if end > self.steps[-1] and (not missing or missing[-1][-1] != end):
@@ -129,8 +146,13 @@ class Recording:
         said = self.run.info.get("mission", {}).get("blocks", [])
         names = [b["name"] for b in said]
         teams = {name: int(b["team"]) for name, b in zip(names, said, strict=True)}
-        if self._batches and not names:
-            names = self._batches[0]["block"].dictionary.to_pylist()
+        tables = [batch["block"].dictionary for batch in self._batches]
+        if tables and not names:
+            names = tables[0].to_pylist()
+        if any(table.to_pylist() != names for table in tables):
+            raise RecordError(
+                f"{self.path / TRAJECTORY_FILE}: its blocks are not {', '.join(names)}, as in {RUN_FILE} and the first rows"
+            )
         seen = self._teams_seen()
         for block, team in sorted(seen):
             teams.setdefault(names[block], team)

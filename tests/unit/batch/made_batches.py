@@ -62,7 +62,7 @@ def made_batch(
     played = pa.Table.from_batches(rows, store.PLAYED)
     results, counts = store.tables(played, plan.table())
     info = {
-        "format": store.FORMAT, "tussle": "0.1", "name": "A made game", "mission": {}, "sample": sample, "sample_seed": 0,
+        "format": 1, "tussle": "0.1", "name": "A made game", "mission": {"made_in": "python"}, "sample": sample, "sample_seed": 0,
         "variables": [about(v) for v in variables], "n_points": plan.n_points, "n_seeds": plan.n_seeds, "first_seed": 1,
         "independent": independent, "until": None, "n_runs": plan.n_runs, "stopped_by": None, "command": [], "versions": {},
         "is_complete": not missing, "timings": {"wall_s": 1.0, "cpu_s": 1.0},

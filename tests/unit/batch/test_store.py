@@ -293,7 +293,7 @@ def test_a_table_that_is_damaged_is_refused_and_never_believed(mission, referenc
         with pytest.raises(BatchError, match="cannot be read"):
             play(batch_of(mission, 7), reference)
     pq.write_table(pa.table({"run": [1]}), file)
-    with pytest.raises(BatchError, match="is no table of a batch; it has no column"):
+    with pytest.raises(BatchError, match="is another table; it has no column"):
         load_batch(reference)
 
 

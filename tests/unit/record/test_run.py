@@ -6,6 +6,7 @@ import shutil
 import numpy as np
 import pandas as pd
 import polars as pl
+import pyarrow as pa
 import pytest
 from recorded_games import hunt
 
@@ -81,9 +82,10 @@ def test_a_file_cut_anywhere_gives_its_whole_batches_and_no_complete_run(recorde
 
 def test_what_is_missing_is_told(copied):
     (copied / "run.json").write_text('{"format": 1, "is_comp')
-    run = load_run(copied)
-    assert not run.is_complete
-    assert "run.json cannot be read" in run.notes[0]
+    with pytest.raises(
+        RecordError, match=r"run.json: cannot be read: .*; without the file, the tables are read"
+    ):
+        load_run(copied)
     (copied / "run.json").unlink()
     run = load_run(copied)
     assert run.info == {}
@@ -108,12 +110,14 @@ def test_what_is_missing_is_told(copied):
 
 def test_rows_that_were_written_and_are_gone_are_told(recorded, copied):
     # A file that ends with its end mark, and yet is not the one that the run wrote.
-    data = (recorded / "events.arrow").read_bytes()
-    shutil.copy(recorded / "events.arrow", copied / "trajectory.arrow")
-    assert len(data)
+    with pa.OSFile(str(copied / "trajectory.arrow"), "wb") as file, pa.ipc.new_stream(file, TRAJECTORY):
+        pass
     run = load_run(copied)
     assert not run.is_complete
     assert "were written" in run.notes[0]
+    shutil.copy(recorded / "events.arrow", copied / "trajectory.arrow")
+    with pytest.raises(RecordError, match=r"trajectory.arrow: cannot be read: it has no column 'block'"):
+        load_run(copied)
 
 
 def test_another_format_is_refused(copied):

@@ -266,6 +266,6 @@ def test_what_cannot_be_is_refused_and_leaves_nothing(hunted, tmp_path, monkeypa
         write_mcap(hunted, tmp_path / "a.mcap")
     assert not list(tmp_path.iterdir())
     (tmp_path / "run").mkdir()
-    (tmp_path / "run" / "run.json").write_text("{")
+    (tmp_path / "run" / "summary.csv").touch()
     with pytest.raises(ViewError, match="the run holds no states"):
         write_mcap(Recording(tmp_path / "run"), tmp_path / "a.mcap")

@@ -1,14 +1,17 @@
 """A recording shows what was played, whatever the run directory has been through."""
 
+import json
 import shutil
 
 import numpy as np
+import pyarrow as pa
 import pytest
 from recorded_games import head_on, hunt
 
 from tussle import Block, Recorder, Simulation
 from tussle.errors import RecordError
 from tussle.mission import read_mission
+from tussle.record.schema import TRAJECTORY
 from tussle.stock import Still
 from tussle.view import Recording, frame_of
 
@@ -204,3 +207,47 @@ def test_a_mission_whose_plugins_are_not_here(tmp_path):
     assert recording.scenery.boundaries == []
     assert len(recording.notes) == 1
     assert "BoidsOfMine" in recording.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "row", "value", "said"),
+    [
+        ("step", -1, 2**31 - 1, "moments with nobody there, by the steps of run.json and trajectory.arrow"),
+        ("step", -1, 0, "the rows of a step do not stand together"),
+        ("t", 0, 1e9, "times go back from one step to the next"),
+        ("id", 1, 1, "the ids of a step do not ascend in row 1"),
+    ],
+)
+def test_a_table_whose_rows_do_not_fit_together_is_refused(tmp_path, played, name, row, value, said):
+    shutil.copytree(played[0], tmp_path / "run")
+    (tmp_path / "run" / "run.json").unlink()
+    table = Recording(played[0]).run.trajectory_table
+    table = table.filter(pa.array(table["world"].to_numpy() == 0)).combine_chunks()
+    values = table[name].to_numpy().copy()
+    values[row] = value
+    table = table.set_column(table.schema.get_field_index(name), TRAJECTORY.field(name), pa.array(values))
+    path = str(tmp_path / "run" / "trajectory.arrow")
+    with pa.OSFile(path, "wb") as file, pa.ipc.new_stream(file, TRAJECTORY) as writer:
+        writer.write_table(table)
+    with pytest.raises(RecordError, match=said):
+        Recording(tmp_path / "run")
+
+
+def test_a_run_file_that_says_something_else_than_the_table_is_refused(tmp_path, played):
+    shutil.copytree(played[0], tmp_path / "run")
+    file = tmp_path / "run" / "run.json"
+    info = json.loads(file.read_text())
+    info["worlds"][0]["steps"] = 10**18
+    file.write_text(json.dumps(info))
+    with pytest.raises(RecordError, match=r"moments with nobody there, by the steps of run\.json"):
+        Recording(tmp_path / "run")
+    info["mission"]["blocks"].pop()
+    file.write_text(json.dumps(info))
+    with pytest.raises(RecordError, match=r"trajectory.arrow: its blocks are not prey, late, as in run.json"):
+        Recording(tmp_path / "run", 1)
+    info["worlds"][0]["steps"] = "many"
+    file.write_text(json.dumps(info))
+    with pytest.raises(
+        RecordError, match=r"run.json: worlds\[0\].steps = 'many' is not allowed; it takes a whole number"
+    ):
+        Recording(tmp_path / "run")

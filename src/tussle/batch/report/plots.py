@@ -252,7 +252,7 @@ def edges_for(values: np.ndarray, *, fewest: int = 8, is_about_zero: bool = Fals
     spread = float(np.subtract(*np.quantile(values, [0.75, 0.25])))
     width = 2.0 * spread / len(values) ** (1.0 / 3.0)
     span = high - low
-    if span == 0.0:
+    if not 0.0 < span / 50.0 < math.inf:
         return np.array([low - 0.5, low + 0.5])
     is_whole = bool(np.all(values == np.round(values)))
     width = min(max(width, span / 50.0), span / fewest)

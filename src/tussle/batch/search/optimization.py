@@ -17,7 +17,7 @@ from tussle.batch.search.proposals import Proposer
 from tussle.batch.search.searched_mission import SearchedMission
 from tussle.batch.search.study import Study, best_of
 from tussle.batch.search.study_store import StudyStore, notes_on_versions, read_trials, versions_of_samplers
-from tussle.batch.search.trials import column_type
+from tussle.batch.search.trials import MOST_TRIALS, column_type
 from tussle.batch.variables import Variable
 from tussle.batch.varied import about, as_variables
 from tussle.errors import ParameterError
@@ -28,9 +28,6 @@ if TYPE_CHECKING:
     from tussle.batch.executors import Executor
     from tussle.batch.progress import Progress
     from tussle.batch.search.trials import Trial
-
-MOST_TRIALS = 10_000
-"""Samplers look at all trials before each round, and the table of them is written after each."""
 
 
 @dataclass
@@ -209,7 +206,7 @@ class Optimization:
         info = {**self.info, "command": list(command or sys.argv)}
         path = None if directory is None else Path(directory)
         with nullcontext() if path is None else StudyStore(path, info) as store:
-            done = [] if path is None else read_trials(path, variables)
+            done = [] if path is None or store is None else read_trials(path, store.info)
             notes = [] if store is None else notes_on_versions(store.info, info, len(done))
             progress = SearchProgress(trials, len(done), len(done))
             tell = on_progress or (lambda _: None)

@@ -2,24 +2,58 @@
 
 from __future__ import annotations
 
-import fcntl
 import json
 from collections.abc import Mapping, Sequence
 from importlib import metadata
 from pathlib import Path
-from typing import IO, Any, Self
+from typing import Any, Self
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from tussle.batch.plan import MOST_RUNS
+from tussle.batch.schemas import SEED, VARIABLE
+from tussle.batch.search.proposals import SAMPLERS
 from tussle.batch.search.study import Study
-from tussle.batch.search.trials import Trial, trials_of, trials_table
-from tussle.batch.store import told
-from tussle.batch.variables import Choice, Range, Variable
+from tussle.batch.search.trials import (
+    FACTS,
+    MOST_TRIALS,
+    Trial,
+    column_name,
+    column_type,
+    trials_of,
+    trials_table,
+)
+from tussle.batch.store import locked, told
+from tussle.batch.variables import Range, Variable
+from tussle.batch.varied import variable_of
+from tussle.documents import Document, Map, Whole
 from tussle.errors import BatchError
+from tussle.record.parquet_file import read_parquet
 from tussle.record.run_file import plain, put_whole, versions
+from tussle.record.table_values import COUNT, TEXT, Bounds, check_values
 
-FORMAT = 1
+STUDY = Document(
+    "the search",
+    1,
+    {
+        "variables": [VARIABLE],
+        "name": str,
+        "fingerprint": str,
+        "objective": str,
+        "direction": ("maximize", "minimize"),
+        "runs": Whole(1, MOST_RUNS),
+        "first_seed": SEED,
+        "sampler": SAMPLERS,
+        "sample_seed": Whole(),
+        "per_round": Whole(1),
+        "versions": Map(str),
+    },
+    BatchError,
+)
+"""What `study.json` says."""
+RULES = {"trial": COUNT, "round": COUNT, "n_failed": COUNT, "state": TEXT}
+"""Of the table of trials."""
 STUDY_FILE, TRIALS_FILE, LOCK = "study.json", "trials.parquet", "lock"
 
 COMPARED = (
@@ -59,12 +93,7 @@ class StudyStore:
                 raise BatchError(
                     f"{path}: holds something that is no search ({min(foreign)}); choose another directory"
                 )
-            self._lock: IO[str] = (path / LOCK).open("w")
-        try:
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            self._lock.close()
-            raise BatchError(f"{path}: another process is at this search") from None
+        self._lock = locked(path, "at this search")
         try:
             self.info = self._agreed(dict(plain(info)))
         except BaseException:
@@ -90,6 +119,7 @@ class StudyStore:
         draft = self.path / f"{TRIALS_FILE}.part"
         with told(self.path):
             try:
+                draft.unlink(missing_ok=True)
                 pq.write_table(table, draft, compression="zstd")
                 draft.replace(self.path / TRIALS_FILE)
             except OSError:
@@ -122,20 +152,17 @@ def read_info(path: Path) -> dict[str, Any]:
     file = path / STUDY_FILE
     if not path.is_dir():
         raise BatchError(f"{path}: there is no such directory")
-    if not file.is_file():
+    if not file.exists():
         raise BatchError(f"{path}: this is no directory of a search; it has no {STUDY_FILE}")
-    try:
-        info = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise BatchError(f"{file}: cannot be read: {error}") from None
-    if not isinstance(info, dict) or info.get("format") != FORMAT:
-        found = info.get("format") if isinstance(info, dict) else None
-        raise BatchError(f"{file}: the search has format {found!r}; this tussle reads format {FORMAT}")
-    return info
+    return STUDY.read(file)
 
 
-def read_trials(path: Path, variables: Sequence[Variable]) -> list[Trial]:
+def read_trials(path: Path, info: Mapping[str, Any]) -> list[Trial]:
     """All trials of whole rounds.
+
+    Args:
+        path: The directory.
+        info: What `study.json` says.
 
     Raises:
         BatchError: They cannot be read.
@@ -143,10 +170,23 @@ def read_trials(path: Path, variables: Sequence[Variable]) -> list[Trial]:
     file = path / TRIALS_FILE
     if not file.exists():
         return []
+    variables = [variable_of(said) for said in info["variables"]]
+    wanted = [(column_name(v), column_type(v)) for v in variables]
+    table = read_parquet(file, pa.schema([*FACTS, *wanted]), BatchError, most_rows=MOST_TRIALS)
+    tried = {column_name(v): Bounds(v.low, v.high) if isinstance(v, Range) else TEXT for v in variables}
+    check_values(zip(table.column_names, table.columns, strict=True), RULES | tried, file, BatchError)
     try:
-        return trials_of(pq.read_table(file), variables)
-    except (OSError, KeyError, TypeError, pa.ArrowException) as error:
+        trials = trials_of(table, variables)
+    except (KeyError, TypeError) as error:
         raise BatchError(f"{file}: cannot be read: {error}") from None
+    for i, trial in enumerate(trials):
+        if trial.number != i or len(trial.by_seed) not in (
+            (info["runs"],) if trial.is_complete else (0, info["runs"])
+        ):
+            raise BatchError(
+                f"{file}: trial {trial.number} in row {i} has {len(trial.by_seed)} games; a trial has {info['runs']}"
+            )
+    return trials
 
 
 def load_study(path: str | Path) -> Study:
@@ -157,18 +197,8 @@ def load_study(path: str | Path) -> Study:
     """
     path = Path(path)
     info = read_info(path)
-    try:
-        variables = tuple(_variable(said) for said in info["variables"])
-    except (KeyError, TypeError, ValueError) as error:
-        raise BatchError(f"{path / STUDY_FILE}: cannot be read: {error}") from None
-    return Study(path, info, variables, tuple(read_trials(path, variables)))
-
-
-def _variable(said: Mapping[str, Any]) -> Variable:
-    values = {name: value for name, value in said.items() if name != "kind"}
-    if said["kind"] == "choice":
-        return Choice(values["name"], tuple(values["values"]))
-    return Range(**values)
+    variables = tuple(variable_of(said) for said in info["variables"])
+    return Study(path, info, variables, tuple(read_trials(path, info)))
 
 
 def versions_of_samplers() -> dict[str, str]:

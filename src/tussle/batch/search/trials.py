@@ -26,6 +26,8 @@ FACTS = pa.schema(
     ]
 )
 """Columns of all tables of trials; the variables stand behind the first two."""
+MOST_TRIALS = 10_000
+"""Samplers look at all trials before each round, and the table of them is written after each."""
 N_KEYS = 2
 COMPLETE, FAILED = "complete", "failed"
 

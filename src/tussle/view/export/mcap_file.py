@@ -140,6 +140,7 @@ class Messages:
         self._writer = Writer(file, chunk_size=CHUNK, compression=CompressionType.ZSTD)
         self._writer.start(profile="", library=f"tussle {version('tussle')}")
         self._report = report
+        self._run = recording.path
         self._channels: dict[str, int] = {}
         self._keys = {team: f"team_{team}" for team in recording.teams}
         # The clock of the file counts from 0 upward.
@@ -166,8 +167,15 @@ class Messages:
         self._writer.add_metadata("run", about)
 
     def ns(self, t: float) -> int:
-        """A simulated time [s] on the file's clock [ns]."""
-        return round((t + self._shift) * 1e9)
+        """A simulated time [s] on the file's clock [ns].
+
+        Raises:
+            ViewError: It does not fit there.
+        """
+        ns = (t + self._shift) * 1e9
+        if not 0.0 <= ns < 2.0**63:
+            raise ViewError(f"{self._run}: {t:g} s is not a time of this file format, which takes 292 years")
+        return round(ns)
 
     def put(self, topic: str, t: float, message: Any) -> None:
         """Add a message of a time [s]; times do not go back."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,7 +12,18 @@ import pyarrow.csv
 import pyarrow.parquet
 
 from tussle.errors import ParameterError, RecordError, listed, nearest_name
-from tussle.record.schema import EVENTS, EVENTS_FILE, FILES, RUN_FILE, TRAJECTORY, TRAJECTORY_FILE
+from tussle.record.arrow_file import read_batches
+from tussle.record.schema import (
+    EVENTS,
+    EVENTS_FILE,
+    EVENTS_RULES,
+    FILES,
+    RUN,
+    RUN_FILE,
+    TRAJECTORY,
+    TRAJECTORY_FILE,
+    TRAJECTORY_RULES,
+)
 from tussle.view.export.whole_file import whole_file
 
 KINDS = ("csv", "parquet")
@@ -67,9 +77,12 @@ def write_tables(
     report = TablesReport()
     _check(place, world, report)
     beside = target.with_name(f"{target.stem}.events{target.suffix or '.' + kind}")
-    tables = ((TRAJECTORY_FILE, TRAJECTORY, target, show), (EVENTS_FILE, EVENTS, beside, None))
-    for name, schema, file, told in tables:
-        batches = _batches(place / name, schema, report.notes)
+    tables = (
+        (TRAJECTORY_FILE, TRAJECTORY, TRAJECTORY_RULES, target, show),
+        (EVENTS_FILE, EVENTS, EVENTS_RULES, beside, None),
+    )
+    for name, schema, rules, file, told in tables:
+        batches = read_batches(place / name, report.notes, RecordError, schema, rules)
         report.rows.append(_write(batches, schema, file, kind, world, told))
         report.paths.append(file)
     return report
@@ -83,33 +96,15 @@ def _check(place: Path, world: int | None, report: TablesReport) -> None:
     """
     if not any((place / name).exists() for name in FILES):
         raise RecordError(f"{place}: no run has been recorded there; {listed(FILES)}")
-    try:
-        worlds = json.loads((place / RUN_FILE).read_text(encoding="utf-8"))["worlds"]
-    except (OSError, ValueError, KeyError):
+    if (place / RUN_FILE).exists():
+        worlds = RUN.read(place / RUN_FILE)["worlds"]
+    else:
         report.notes.append(
             f"{RUN_FILE} is not there: the run goes on, or was cut short; what had been written is exported"
         )
         return
     if world is not None and not 0 <= world < len(worlds):
         raise RecordError(f"{place}: there is no world {world}; there are worlds 0 to {len(worlds) - 1}")
-
-
-def _batches(path: Path, schema: pa.Schema, notes: list[str]) -> Iterator[pa.RecordBatch]:
-    """All whole batches of a recorded table."""
-    if not path.exists():
-        notes.append(f"{path.name} is not there")
-        return
-    n = 0
-    try:
-        with pa.OSFile(str(path), "rb") as file, pa.ipc.open_stream(file) as reader:
-            while True:
-                batch = reader.read_next_batch()
-                n += 1
-                yield batch
-    except StopIteration:
-        return
-    except (pa.ArrowInvalid, OSError) as error:
-        notes.append(f"{path.name} is cut after {n} whole batches ({error})")
 
 
 def _write(

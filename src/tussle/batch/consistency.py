@@ -1,0 +1,94 @@
+"""Whether the tables of a batch directory belong to one another and to what `batch.json` says."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from tussle.batch.quantities import Quantity, column_name
+from tussle.batch.variables import Range
+from tussle.batch.varied import variable_of
+from tussle.errors import BatchError, ParameterError
+
+MOST_EMPTY = 200
+"""Cells of the table of runs, with a column for each quantity of each team, per row of the results: one where all games have the same
+quantities. What plugins report may differ between points."""
+MOST_METRICS = 10_000
+ALWAYS_ALLOWED = 1_000_000
+"""As many cells as any batch may have."""
+
+
+def check_design(design: pa.Table, info: Mapping[str, Any], file: Path) -> None:
+    """See that planned runs are numbered, and have points and seeds, as `Plan` says.
+
+    Raises:
+        BatchError: One is not.
+    """
+    n, n_points = design.num_rows, info["n_points"]
+    if not 0 < n <= info["n_runs"] or n % n_points:
+        raise BatchError(
+            f"{file}: has {n:,} runs; batch.json says {info['n_runs']:,}, of {n_points:,} points"
+        )
+    run = np.arange(n)
+    seed = np.uint64(info["first_seed"]) + (run if info["independent"] else run // n_points).astype(np.uint64)
+    for name, wanted in (("run", run), ("point", run % n_points), ("seed", seed)):
+        if (wrong := np.flatnonzero(design[name].to_numpy() != wanted)).size:
+            raise BatchError(
+                f"{file}: {name} = {design[name][int(wrong[0])]} in row {wrong[0]} is not allowed; it is {wanted[wrong[0]]}"
+            )
+    for variable in map(variable_of, info["variables"]):
+        _check_varied(design, variable.name, isinstance(variable, Range), file)
+
+
+def _check_varied(design: pa.Table, name: str, is_range: bool, file: Path) -> None:
+    """See that a variable has a column of its own, with a value in each row."""
+    if design.column_names.count(name) != 1:
+        raise BatchError(f"{file}: has no column {name!r}, which varies by batch.json")
+    column = design[name]
+    is_number = column.type in (pa.int64(), pa.float64())
+    if not is_number and (is_range or column.type != pa.string()):
+        raise BatchError(f"{file}: column {name!r} holds {column.type}, which no variable of batch.json has")
+    if column.null_count or (column.type == pa.float64() and not pc.all(pc.is_finite(column)).as_py()):
+        raise BatchError(f"{file}: column {name!r} lacks values")
+
+
+def check_results(table: pa.Table, design: pa.Table, file: Path) -> None:
+    """See that rows are of runs that are planned, and say the same point and seed, so far as they say any.
+
+    Raises:
+        BatchError: One is not, or does not.
+    """
+    run = table["run"].to_numpy()
+    if len(run) and run.max() >= design.num_rows:
+        raise BatchError(
+            f"{file}: run = {run.max()} is not allowed; the batch has runs 0 to {design.num_rows - 1}"
+        )
+    if (np.diff(run) < 0).any():
+        raise BatchError(f"{file}: the rows are not in the order of their runs")
+    for name in ("point", "seed"):
+        if name in table.column_names and (table[name].to_numpy() != design[name].to_numpy()[run]).any():
+            raise BatchError(f"{file}: a run has another {name} than in the design")
+
+
+def check_metrics(results: pa.Table, file: Path) -> None:
+    """See that the table of runs is not much larger than the results that it is made of, and that expressions can name its columns.
+
+    Raises:
+        BatchError: It is, or they cannot.
+    """
+    metrics = pc.unique(results["metric"])
+    n_metrics, n_teams, n_runs = len(metrics), len(pc.unique(results["team"])), len(pc.unique(results["run"]))
+    if n_metrics > MOST_METRICS or n_metrics * n_teams * n_runs > ALWAYS_ALLOWED + MOST_EMPTY * len(results):
+        raise BatchError(
+            f"{file}: {n_metrics:,} metrics of {n_teams:,} teams in {n_runs:,} runs are too many for {len(results):,} rows"
+        )
+    for metric in metrics.to_pylist():
+        try:
+            Quantity.parse(column_name(metric, 0))
+        except ParameterError as error:
+            raise BatchError(f"{file}: {error}") from None

@@ -1,0 +1,103 @@
+"""What `batch.json` and the tables beside it may say."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from tussle.batch.plan import MOST_RUNS
+from tussle.batch.varied import variable_of
+from tussle.documents import Checked, Document, Either, Inside, Map, Maybe, Real, Team, Whole, problem
+from tussle.errors import BatchError, ParameterError, listed, nearest_name
+from tussle.record.table_values import COUNT, INT32, NUMBER, TEXT, Bounds, Rules
+
+FORMAT = 1
+SEED = Whole(0, 2**64 - 1)
+OPTIONS = {"strict": Maybe(bool), "allow_large": Maybe(bool), "search": Maybe([str])}
+FILE = {
+    "file": Inside,
+    "settings": Map(str),
+    "ends_by_time": bool,
+    "plugin_files": [Inside],
+    "options": OPTIONS,
+}
+RANGE = {"low": Real(), "high": Real(), "is_int": bool, "is_log": bool, "levels": Maybe(Whole()), "unit": str}
+CHOICE = {"values": [Either((bool, str, Real()), "a text, a number, or true or false")]}
+
+
+def _against_mission(mission: dict[str, Any], where: str) -> str:
+    """What is wrong with where the mission came from, by whether it was a file."""
+    if mission["made_in"] == "python":
+        return ""
+    if said := problem(mission, FILE, where):
+        return said
+    for name in mission["options"]:
+        if name not in OPTIONS:
+            return (
+                f"{where}.options.{name:.80} is not allowed{nearest_name(name, OPTIONS)}; {listed(OPTIONS)}"
+            )
+    return ""
+
+
+def _against_variable(variable: dict[str, Any], where: str) -> str:
+    if said := problem(variable, RANGE if variable["kind"] == "range" else CHOICE, where):
+        return said
+    try:
+        variable_of(variable)
+    except ParameterError as error:
+        return f"{where}: {error}"
+    return ""
+
+
+def _against_counts(batch: dict[str, Any], _: str) -> str:
+    """What numbers say that should follow from one another."""
+    n_runs = batch["n_points"] * batch["n_seeds"]
+    if batch["n_runs"] != n_runs:
+        return f"n_runs = {batch['n_runs']} is not allowed; n_points and n_seeds make {n_runs}"
+    if (batch.get("n_seeds_kept") or 0) > batch["n_seeds"]:
+        return f"n_seeds_kept = {batch['n_seeds_kept']} is not allowed; there are {batch['n_seeds']} seeds"
+    return ""
+
+
+VARIABLE = Checked({"kind": ("range", "choice"), "name": str}, _against_variable)
+
+BATCH = Document(
+    "the batch",
+    FORMAT,
+    Checked(
+        {
+            "name": str,
+            "mission": Checked({"made_in": ("file", "python")}, _against_mission),
+            "variables": [VARIABLE],
+            "n_points": Whole(1, MOST_RUNS),
+            "n_seeds": Whole(1, MOST_RUNS),
+            "first_seed": SEED,
+            "independent": bool,
+            "n_runs": Whole(1, MOST_RUNS),
+            "is_complete": bool,
+            "teams": Map(str, Team),
+            "n_seeds_kept": Maybe(Whole()),
+            "fingerprint": Maybe(str),
+            "tussle": str,
+            "sample": str,
+            "sample_seed": Whole(0, 10**80),
+            "dt": Real(5e-324),
+            "start": Real(),
+            "end": Real(is_any=True),
+            "until": Maybe(str),
+            "stopped_by": Maybe(str),
+            "command": [str],
+            "versions": Map(str),
+            "timings": {"wall_s": Real(0.0), "cpu_s": Real(0.0)},
+        },
+        _against_counts,
+    ),
+    BatchError,
+)
+"""What `batch.json` says."""
+
+RUN = Bounds(0, MOST_RUNS - 1)
+RULES: Rules = {
+    "run": RUN, "point": RUN, "seed": Bounds(0, 2**64 - 1), "team": Bounds(-(2**31), INT32, may_miss=True), "metric": TEXT,
+    "end": TEXT, "t": NUMBER, "steps": COUNT, "state_hash": TEXT, "cpu_s": Bounds(0.0), "host": TEXT, "alive": COUNT,
+}  # fmt: skip
+"""Of the tables of a batch."""

@@ -1,0 +1,177 @@
+"""Arrow and Parquet files that lie about their sizes, or hold what is not allowed, are refused before memory is taken for them."""
+
+from __future__ import annotations
+
+import math
+import os
+import struct
+import tracemalloc
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from tussle.errors import RecordError
+from tussle.record.arrow_file import read_batches
+from tussle.record.first_states import read_table
+from tussle.record.parquet_file import read_parquet
+from tussle.record.schema import EVENTS, EVENTS_RULES, TRAJECTORY, TRAJECTORY_RULES
+
+ROW = {"world": 0, "t": 0.5, "step": 5, "kind": "birth", "id": 1, "other": 0, "text": "prey"}
+
+
+def events(**changes):
+    return pa.table({name: [value] * 3 for name, value in (ROW | changes).items()}, EVENTS)
+
+
+def put(path, table, **options):
+    with (
+        pa.OSFile(str(path), "wb") as file,
+        pa.ipc.new_stream(file, table.schema, options=pa.ipc.IpcWriteOptions(**options)) as writer,
+    ):
+        writer.write_table(table)
+    return path
+
+
+def read(path, schema=EVENTS, rules=EVENTS_RULES):
+    """A file with all that is missing of it; memory that was taken on the way is little."""
+    notes = []
+    pool = pa.default_memory_pool()
+    before = pool.bytes_allocated()
+    tracemalloc.start()
+    try:
+        return list(read_batches(path, notes, RecordError, schema, rules)), notes
+    finally:
+        assert tracemalloc.get_traced_memory()[1] < 1 << 26
+        assert pool.bytes_allocated() - before < 1 << 26
+        tracemalloc.stop()
+
+
+def test_a_whole_stream_and_a_cut_one(tmp_path):
+    path = put(tmp_path / "events.arrow", events())
+    batches, notes = read(path)
+    assert (batches[0].num_rows, notes) == (3, [])
+    assert read(tmp_path / "none.arrow") == ([], ["none.arrow is not there"])
+    whole = path.read_bytes()
+    for size in range(0, len(whole), 7):
+        path.write_bytes(whole[:size])
+        batches, notes = read(path)
+        assert len(notes) == 1
+        assert sum(b.num_rows for b in batches) in (0, 3)
+
+
+@pytest.mark.parametrize("number", [-1, 0, 1, 2**31 - 1, 2**40, 2**62, -(2**63)])
+def test_a_stream_that_lies_in_any_of_its_words_takes_no_memory(tmp_path, number):
+    path = put(tmp_path / "events.arrow", events())
+    whole = path.read_bytes()
+    n_refused = 0
+    for place in range(0, len(whole) - 8, 4):
+        for code, width in (("<q", 8), ("<i", 4)):
+            if width == 8 or -(2**31) <= number < 2**31:
+                path.write_bytes(whole[:place] + struct.pack(code, number) + whole[place + width :])
+                try:
+                    read(path)
+                except RecordError as error:
+                    n_refused += 1
+                    assert str(error).startswith(str(path))  # noqa: PT017  many are tried
+    assert n_refused > 50
+
+
+@pytest.mark.parametrize(
+    ("table", "said"),
+    [
+        (events().drop_columns(["kind"]), "it has no column 'kind' of string"),
+        (events().select(EVENTS.names[::-1]), "other columns than a table of tussle"),
+        (events().append_column("more", pa.array([1, 2, 3])), "other columns than a table of tussle"),
+        (events(t=math.nan), "column 't' holds something that is no number"),
+        (events(t=math.inf), "t = inf in row 0 is not allowed"),
+        (events(step=-1), "step = -1 in row 0 is not allowed; it takes 0 to 2147483647"),
+        (events().cast(pa.schema([f.with_nullable(True) for f in EVENTS])).set_column(0, "world", pa.nulls(3, pa.int32())),
+         "column 'world' lacks values"),
+    ],
+)  # fmt: skip
+def test_a_stream_of_something_else_is_refused(tmp_path, table, said):
+    with pytest.raises(RecordError, match=said):
+        read(put(tmp_path / "events.arrow", table))
+
+
+def test_a_stream_that_is_compressed_or_no_stream_is_refused(tmp_path):
+    zeros = pa.table({"id": np.zeros(10_000_000, np.int64)})
+    with pytest.raises(RecordError, match="it is compressed, which tables of tussle are not"):
+        read(put(tmp_path / "a.arrow", zeros, compression="zstd"), None, None)
+    (tmp_path / "b.arrow").write_bytes(b"something else " * 9)
+    with pytest.raises(RecordError, match="this is no stream of Arrow's format"):
+        read(tmp_path / "b.arrow")
+    os.mkfifo(tmp_path / "c.arrow")
+    with pytest.raises(RecordError, match="this is not a regular file"):
+        read(tmp_path / "c.arrow")
+
+
+def test_a_long_word_in_many_rows_is_refused(tmp_path):
+    words = pa.DictionaryArray.from_arrays(np.zeros(1000, np.int32), pa.array(["x" * 1_000_000]))
+    columns = [words if f.name == "block" else pa.array(np.ones(1000)).cast(f.type) for f in TRAJECTORY]
+    path = put(tmp_path / "trajectory.arrow", pa.Table.from_arrays(columns, schema=TRAJECTORY))
+    with pytest.raises(RecordError, match="column 'block' holds a word of 1,000,000 bytes in 1,000 rows"):
+        read(path, TRAJECTORY, TRAJECTORY_RULES)
+
+
+# -- Parquet --------------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("table", "said"),
+    [
+        (pa.table({"a": [1]}), "is another table; it has no column 'run' of int64"),
+        (pa.table({"run": [1], "a": [{"b": 1}]}), "column 'a' holds struct"),
+        (pa.table([[1], [2]], names=["run", "run"]), "each with a name of its own"),
+        (pa.table({"run": pa.array(np.zeros(20_000_000, np.int64))}), r"it says that it has 20,000,000 rows"),
+        (pa.table({"run": [1], "a": [[1]]}), "column 'a' holds list"),
+    ],
+)  # fmt: skip
+def test_a_parquet_table_of_something_else_is_refused(tmp_path, table, said):
+    pq.write_table(table, tmp_path / "a.parquet", compression="zstd")
+    with pytest.raises(RecordError, match=said):
+        read_parquet(tmp_path / "a.parquet", pa.schema([("run", pa.int64())]), RecordError)
+
+
+def test_a_parquet_table_whose_texts_are_a_bomb_is_refused(tmp_path):
+    text = pa.DictionaryArray.from_arrays(np.zeros(100_000, np.int32), pa.array(["x" * 100_000]))
+    pq.write_table(pa.table({"a": text}), tmp_path / "a.parquet", compression="zstd", store_schema=False)
+    assert (tmp_path / "a.parquet").stat().st_size < 10_000
+    with pytest.raises(RecordError, match="unpacked it takes more than"):
+        read_parquet(tmp_path / "a.parquet", pa.schema([]), RecordError)
+    with pytest.raises(RecordError, match="it has 100,000 rows; allowed are 99,999"):
+        read_parquet(tmp_path / "a.parquet", pa.schema([]), RecordError, most_rows=99_999)
+
+
+# -- a table to start from --------------------------------------------------------------------------------------------------------
+
+
+def test_a_csv_that_is_a_bomb_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr("tussle.record.first_states.MARGIN", 1 << 16)
+    monkeypatch.setattr("tussle.record.first_states.MOST_EXPANSION", 10)
+    with pa.output_stream(str(tmp_path / "a.csv.gz"), compression="gzip") as file:
+        file.write(b"id,t\n" + b"\n" * 10_000_000)
+    with pytest.raises(RecordError, match=r"a.csv.gz: cannot be read: unpacked it takes more than"):
+        read_table(tmp_path / "a.csv.gz")
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"id": [1.5e300]}, "column 'id' holds something other than whole numbers"),
+        ({"team": [math.nan]}, "column 'team' holds something other than whole numbers"),
+        ({"world": ["a"]}, "column 'world' holds something other than numbers"),
+        ({"block": [1]}, "column 'block' holds something other than names"),
+    ],
+)
+def test_a_table_to_start_from_with_odd_columns_is_refused(tmp_path, change, said):
+    row = {"id": [1], "t": [0.0], "x": [0.0], "y": [0.0], "z": [0.0], "qw": [1.0], "qx": [0.0], "qy": [0.0], "qz": [0.0], "vx": [0.0],
+           "vy": [0.0], "vz": [0.0]}  # fmt: skip
+    pq.write_table(pa.table(row | change), tmp_path / "a.parquet")
+    with pytest.raises(RecordError, match=said):
+        read_table(tmp_path / "a.parquet")
+    table = pa.table(row | {"other": [0]}).rename_columns([*row, "x"])
+    with pytest.raises(RecordError, match="two columns have the same name"):
+        read_table(put(tmp_path / "b.arrow", table))
