@@ -12,6 +12,7 @@ import pyarrow.parquet as pq
 from tussle.documents import size_of
 from tussle.errors import TussleError
 from tussle.record.arrow_file import same_columns
+from tussle.record.parquet_sizes import Sizes, sizes_of
 
 MOST_EXPANSION = 1000
 """Bytes in memory for each byte of a table's file, besides those that any table may take. In the results of a batch all that is of a run
@@ -42,13 +43,18 @@ def read_parquet(
         TussleError: It is no regular file, no such table, damaged, or takes far more memory than its size lets expect.
     """
     try:
-        most = MARGIN + MOST_EXPANSION * size_of(path)
+        size = size_of(path)
+        most = MARGIN + MOST_EXPANSION * size
+        with path.open("rb") as opened:
+            sizes = sizes_of(opened, size)
+        if said := _too_large(sizes, most, most_rows):
+            raise error(f"{path}: {said}")
         with pq.ParquetFile(path) as file:
-            schema, metadata = file.schema_arrow, file.metadata
+            schema = file.schema_arrow
         if said := same_columns(schema, wanted):
             raise error(f"{path}: is another table; {said}")
         names = [name for name in schema.names if only is None or name in only]
-        if said := _against(schema, names) or _too_large(metadata, most, most_rows):
+        if said := _against(schema, names):
             raise error(f"{path}: {said}")
         texts = [name for name in names if _is_text(schema.field(name).type)]
         with pq.ParquetFile(path, read_dictionary=texts, page_checksum_verification=True) as file:
@@ -76,17 +82,18 @@ def _is_text(kind: pa.DataType) -> bool:
     return bool(pa.types.is_string(kind) or pa.types.is_large_string(kind))
 
 
-def _too_large(metadata: pq.FileMetaData, most: int, most_rows: int) -> str:
-    """What is wrong with the sizes that a file names; "" for nothing. All of them are looked at before any is believed."""
-    groups = [metadata.row_group(i) for i in range(metadata.num_row_groups)]
-    columns = [group.column(i) for group in groups for i in range(group.num_columns)]
-    if metadata.num_rows > most_rows:
-        return f"it has {metadata.num_rows:,} rows; allowed are {most_rows:,}"
-    counts = [metadata.num_rows, *(g.num_rows for g in groups), *(c.num_values for c in columns)]
-    n, size = max(counts), max((c.total_uncompressed_size for c in columns), default=0)
-    if min(*counts, size, 0) < 0 or max(8 * n, size) > most:
-        return f"it says that it has {n:,} rows in {size:,} bytes; a file of its size may take {most:,}"
-    return ""
+def _too_large(sizes: Sizes, most: int, most_rows: int) -> str:
+    """What is wrong with the sizes that a file names; "" for nothing."""
+    if not 0 <= sizes.rows <= most_rows:
+        return f"it has {sizes.rows:,} rows; allowed are {most_rows:,}"
+    if sizes.largest > MARGIN:
+        return f"it has a page of {sizes.largest:,} bytes; allowed are {MARGIN:,}"
+    n_bytes = max(8 * sizes.rows, 8 * sizes.values, sizes.bytes)
+    return (
+        ""
+        if n_bytes <= most
+        else f"unpacked it takes {n_bytes:,} bytes; a file of its size may take {most:,}"
+    )
 
 
 def _unpacked(file: pq.ParquetFile, schema: pa.Schema, most: int) -> pa.Table:

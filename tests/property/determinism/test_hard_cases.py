@@ -18,7 +18,7 @@ from tussle.errors import PluginError
 
 
 class BadReferee(Interaction):
-    """Raises in one step of a world, after it has hurt whom it could."""
+    """Fails in one step of a world, after it has hurt whom it could there."""
 
     at = Param(-1)
 
@@ -26,19 +26,19 @@ class BadReferee(Interaction):
         w.bodies.health[:] *= 1.0
         due = (w.step_count == self.at)[w.world]
         if due.any():
-            w.bodies.health[:] = 0.5
-            w.kill(np.arange(w.n), "in a rage")
-            raise RuntimeError("boom")
+            w.bodies.health[due] = 0.5
+            w.kill(due, "in a rage")
+            w.fail(np.flatnonzero(due)[0], "boom")
 
 
 class BadPilot(Autonomy):
-    """Raises in one step of a world."""
+    """Fails in one step of a world."""
 
     at = Param(-1)
 
     def step(self, g):
-        if (g.step_count == self.at).any():
-            raise RuntimeError("boom")
+        for row in np.flatnonzero(g.step_count == self.at):
+            g.fail(row, "boom")
 
 
 class BadPlace(Interaction):

@@ -16,6 +16,7 @@ from tussle.errors import RecordError
 from tussle.record.arrow_file import read_batches
 from tussle.record.first_states import read_table
 from tussle.record.parquet_file import read_parquet
+from tussle.record.parquet_sizes import Sizes, sizes_of
 from tussle.record.schema import EVENTS, EVENTS_RULES, TRAJECTORY, TRAJECTORY_RULES
 
 ROW = {"world": 0, "t": 0.5, "step": 5, "kind": "birth", "id": 1, "other": 0, "text": "prey"}
@@ -125,7 +126,7 @@ def test_a_long_word_in_many_rows_is_refused(tmp_path):
         (pa.table({"a": [1]}), "is another table; it has no column 'run' of int64"),
         (pa.table({"run": [1], "a": [{"b": 1}]}), "column 'a' holds struct"),
         (pa.table([[1], [2]], names=["run", "run"]), "each with a name of its own"),
-        (pa.table({"run": pa.array(np.zeros(20_000_000, np.int64))}), r"it says that it has 20,000,000 rows"),
+        (pa.table({"run": pa.array(np.zeros(20_000_000, np.int64))}), "unpacked it takes 160,[0-9,]+ bytes; a file of its size may take"),
         (pa.table({"run": [1], "a": [[1]]}), "column 'a' holds list"),
     ],
 )  # fmt: skip
@@ -143,6 +144,67 @@ def test_a_parquet_table_whose_texts_are_a_bomb_is_refused(tmp_path):
         read_parquet(tmp_path / "a.parquet", pa.schema([]), RecordError)
     with pytest.raises(RecordError, match="it has 100,000 rows; allowed are 99,999"):
         read_parquet(tmp_path / "a.parquet", pa.schema([]), RecordError, most_rows=99_999)
+
+
+def test_a_parquet_table_with_one_very_long_list_is_refused(tmp_path):
+    zeros = pa.array(np.zeros(20_000_000))
+    table = pa.table({"a": pa.ListArray.from_arrays(pa.array([0, len(zeros)], pa.int32()), zeros)})
+    pq.write_table(table, tmp_path / "a.parquet", compression="zstd")
+    with pytest.raises(RecordError, match=r"unpacked it takes 160,[0-9,]+ bytes"):
+        read_parquet(tmp_path / "a.parquet", pa.schema([]), RecordError)
+
+
+def test_a_parquet_table_with_a_very_large_page_is_refused(tmp_path):
+    text = pa.array(["x" * 100_000_000])
+    pq.write_table(
+        pa.table({"a": text}),
+        tmp_path / "a.parquet",
+        compression="zstd",
+        use_dictionary=False,
+        write_statistics=False,
+    )
+    with pytest.raises(RecordError, match=r"it has a page of 100,000,[0-9]+ bytes; allowed are 67,108,864"):
+        read_parquet(tmp_path / "a.parquet", pa.schema([]), RecordError)
+
+
+def test_the_sizes_of_a_parquet_file_are_those_that_arrow_sees(tmp_path):
+    path = tmp_path / "a.parquet"
+    pq.write_table(
+        pa.table({"a": np.arange(5000), "b": [["x", "y"]] * 5000}),
+        path,
+        row_group_size=777,
+        use_dictionary=False,
+    )
+    about = pq.read_metadata(path)
+    groups = [about.row_group(i) for i in range(about.num_row_groups)]
+    with path.open("rb") as file:
+        sizes = sizes_of(file, path.stat().st_size)
+    assert (sizes.rows, sizes.values) == (5000, sum(g.column(1).num_values for g in groups)) == (5000, 10_000)
+    assert (
+        0
+        < sizes.largest
+        <= sizes.bytes
+        <= sum(g.column(i).total_uncompressed_size for g in groups for i in range(2))
+    )
+    pq.write_table(pa.table({"a": np.zeros(0)}), path)
+    with path.open("rb") as file:
+        assert sizes_of(file, path.stat().st_size) == Sizes(0)
+
+
+def test_a_parquet_file_that_is_damaged_anywhere_is_read_or_refused(tmp_path):
+    path = tmp_path / "a.parquet"
+    pq.write_table(pa.table({"a": np.arange(50), "b": [["x", "y"]] * 50}), path, row_group_size=20)
+    whole = path.read_bytes()
+    n_refused = 0
+    for place in range(len(whole)):
+        for value in (0, 0x7F, 0xFF, whole[place] ^ 0x10):
+            path.write_bytes(whole[:place] + bytes([value]) + whole[place + 1 :])
+            try:
+                read_parquet(path, pa.schema([("a", pa.int64())]), RecordError, ["a"])
+            except RecordError as error:
+                n_refused += 1
+                assert str(error).startswith(str(path))  # noqa: PT017  many are tried
+    assert n_refused > 100
 
 
 # -- a table to start from --------------------------------------------------------------------------------------------------------

@@ -68,7 +68,7 @@ class KillsAndMoves(Interaction):
     """Takes one out and puts another elsewhere, at a time."""
 
     def step(self, w):
-        if 0.45 < w.t[0] < 0.55:
+        if 0.55 < w.t[0] < 0.65:
             w.kill([0], "fate")
             w.move([1], pos=w.pos[:, [1]] + 5.0)
 
@@ -77,5 +77,5 @@ class FailsOnce(Interaction):
     """Fails in the step of KillsAndMoves, as long as nobody says a key."""
 
     def step(self, w):
-        if 0.45 < w.t[0] < 0.55 and not len(w.inbox(CustomKeyPress)):
+        if 0.55 < w.t[0] < 0.65 and not len(w.inbox(CustomKeyPress)):
             raise ValueError("nobody spoke")

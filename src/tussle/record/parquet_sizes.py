@@ -1,0 +1,161 @@
+"""The sizes that a Parquet file names, before Arrow reads it.
+
+Arrow takes as much memory as a page says that it needs, and ends the process where it is asked for the sizes of a damaged footer. The
+numbers of fields are those of parquet.thrift (Apache Parquet 2.9), written in Thrift's compact protocol.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, BinaryIO
+
+MOST_FOOTER = 1 << 22
+MOST_PAGES = 300_000
+MOST_HEAD = 1 << 16
+"""Bytes of what a page says of itself."""
+MOST_DEPTH = 16
+TRUE, FALSE, BYTE, DOUBLE, BINARY, LIST, SET, STRUCT = 1, 2, 3, 7, 8, 9, 10, 12
+ROWS, GROUPS = 3, 4
+COLUMNS, GROUP_ROWS = 1, 3
+ELSEWHERE, ABOUT = 1, 3
+VALUES, PACKED, DATA_AT, DICTIONARY_AT = 5, 7, 9, 11
+PAGE_SIZE, PAGE_PACKED, PAGE_KINDS, PAGE_VALUES = 2, 3, (5, 7, 8), 1
+
+
+@dataclass
+class Sizes:
+    """What a file says that it takes.
+
+    Attributes:
+        rows: Rows of the table, and of its groups together, whichever is more.
+        values: Values of the column that has most.
+        bytes: Of all pages, unpacked.
+        largest: Bytes of the largest page, unpacked.
+    """
+
+    rows: int
+    values: int = 0
+    bytes: int = 0
+    largest: int = 0
+
+
+def sizes_of(file: BinaryIO, size: int) -> Sizes:
+    """The sizes that a file names.
+
+    Args:
+        file: The file.
+        size: Its length [B].
+
+    Raises:
+        ValueError: It is no Parquet file, or is damaged.
+    """
+    try:
+        file.seek(max(0, size - 8))
+        length, mark = struct.unpack("<I4s", file.read(8))
+        if mark != b"PAR1" or not 0 < length <= min(MOST_FOOTER, size - 8):
+            raise ValueError("this is no Parquet file")
+        file.seek(size - 8 - length)
+        footer, _ = _value(STRUCT, file.read(length), 0, 0)
+        groups = footer.get(GROUPS, [])
+        found = Sizes(max(footer[ROWS], sum(group[GROUP_ROWS] for group in groups)))
+        values: dict[int, int] = {}
+        n_pages = 0
+        for group in groups:
+            for i, column in enumerate(group[COLUMNS]):
+                for n, page in _pages(file, column, size):
+                    n_pages += 1
+                    if n_pages > MOST_PAGES:
+                        raise ValueError(f"it has more than {MOST_PAGES:,} pages")
+                    values[i] = values.get(i, 0) + n
+                    found.bytes, found.largest = found.bytes + page, max(found.largest, page)
+        found.values = max(values.values(), default=0)
+    except (struct.error, LookupError, TypeError, AttributeError, OverflowError) as error:
+        raise ValueError(f"what it says of its sizes is damaged ({type(error).__name__})") from None
+    return found
+
+
+def _pages(file: BinaryIO, column: dict[int, Any], size: int) -> Iterator[tuple[int, int]]:
+    """Values of each page of a column, and its bytes unpacked."""
+    about = column[ABOUT]
+    if about[VALUES] == 0:  # Arrow reads no page then, and writes no places
+        return
+    at = min(about[DATA_AT], about.get(DICTIONARY_AT) or about[DATA_AT])
+    end = at + about[PACKED]
+    if ELSEWHERE in column or not 0 < at < end <= size:
+        raise ValueError("a column lies outside of the file")
+    while at < end:
+        file.seek(at)
+        page, length = _value(STRUCT, file.read(min(MOST_HEAD, end - at)), 0, 0)
+        n = max((page[kind][PAGE_VALUES] for kind in PAGE_KINDS if kind in page), default=0)
+        if min(n, page[PAGE_SIZE], page[PAGE_PACKED]) < 0:
+            raise ValueError("a page says that it has less than nothing")
+        yield n, page[PAGE_SIZE]
+        at += length + page[PAGE_PACKED]
+
+
+# -- Thrift's compact protocol --------------------------------------------------------------------------------------------------
+
+
+def _value(kind: int, data: bytes, at: int, depth: int) -> tuple[Any, int]:
+    """A value, and where the next one begins; of a struct its fields by number."""
+    if depth > MOST_DEPTH:
+        raise ValueError("what it says of its sizes is nested too deep")
+    if kind == BYTE:
+        return data[at], at + 1
+    if kind == DOUBLE:
+        return None, at + 8
+    if kind == BINARY:
+        length, at = _varint(data, at)
+        return None, at + length
+    if kind in (LIST, SET):
+        return _list(data, at, depth)
+    if kind == STRUCT:
+        return _struct(data, at, depth)
+    if kind in (TRUE, FALSE):
+        return None, at
+    if kind in (4, 5, 6):
+        number, at = _varint(data, at)
+        return (number >> 1) ^ -(number & 1), at
+    raise ValueError(f"what it says of its sizes is damaged (a field of kind {kind})")
+
+
+def _struct(data: bytes, at: int, depth: int) -> tuple[dict[int, Any], int]:
+    found: dict[int, Any] = {}
+    number = 0
+    while head := data[at]:
+        at += 1
+        if head >> 4:
+            number += head >> 4
+        else:
+            number, at = _value(4, data, at, depth)
+        found[number], at = _value(head & 15, data, at, depth + 1)
+    return found, at + 1
+
+
+def _list(data: bytes, at: int, depth: int) -> tuple[list[Any], int]:
+    head = data[at]
+    n, at = head >> 4, at + 1
+    if n == 15:
+        n, at = _varint(data, at)
+    kind = head & 15
+    if n > len(data) - at:  # each takes a byte at least
+        raise ValueError("a list says that it is longer than the file")
+    found = []
+    for _ in range(n):
+        item, at = _value(BYTE if kind in (TRUE, FALSE) else kind, data, at, depth + 1)
+        found.append(item)
+    return found, at
+
+
+def _varint(data: bytes, at: int) -> tuple[int, int]:
+    number = shift = 0
+    while True:
+        byte = data[at]
+        number |= (byte & 127) << shift
+        at, shift = at + 1, shift + 7
+        if byte < 128:
+            return number, at
+        if shift > 63:
+            raise ValueError("a number is longer than 64 bits")
