@@ -19,7 +19,7 @@ from tussle.errors import ConformanceError, TussleError, listed
 RULE = "declarations"
 HOOKS_NAMES = """
     spawn step step_one start result route rejects is_idle from_body to_body derivative advance integrator active_inputs
-    active_outputs most_worlds open_one close_one save_one load_one ready ready_timeout grade passthrough
+    active_outputs most_worlds open_one close_one save_one load_one ready ready_timeout reads_all grade passthrough
     abstract kind
 """
 HOOKS = frozenset(HOOKS_NAMES.split())

@@ -103,6 +103,8 @@ def _play(game: Game, cases: list[Case]) -> None:
                             f"{cases[world].words}, {text} after {step + 1} steps",
                         )
         except PluginError as error:
+            if not error.plugin:  # no plugin has raised it: the mission asks for what cannot be
+                raise MissionError(error.message) from error
             words = cases[error.world].words if error.world is not None else "with unusual parameters"
             raise ConformanceError(type(plugin).__name__, RULE, f"{words}, {error}") from error
 
