@@ -20,11 +20,14 @@ def paper(tmp_path_factory):
     """A batch without variables, played from a mission file."""
     stored = made_batch(scores_of_the_paper())
     stored.info.update(
-        mission={"made_in": "file", "file": "predator_prey.xml", "settings": {"end": "100"}},
+        mission={
+            "made_in": "file", "file": "predator_prey.xml", "settings": {"end": "100"}, "ends_by_time": False,
+            "plugin_files": [], "options": {},
+        },
         command=["tussle", "batch", "predator_prey", "--runs", "1000", "--end", "100"],
         versions={"python": "3.11.7", "tussle": "0.1"},
         timings={"began": "2026-11-21T19:40:00+00:00", "wall_s": 812.3, "cpu_s": 1600.2},
-    )
+    )  # fmt: skip
     return load(write_batch(stored, tmp_path_factory.mktemp("place") / "paper"))
 
 
