@@ -258,7 +258,7 @@ def test_w_spawn_is_born_at_the_beginning_of_the_next_step():
     sim.run()
     assert sim.read("child.pos")[1].tolist() == [[True], [True], [False]]
     assert sim.read("child.id")[0].tolist() == [[3], [3], [-1]]
-    assert sim.read("child.team")[0].tolist() == [[2], [2], [0]]
+    assert sim.read("child.team")[0].tolist() == [[2], [2], [-1]]
 
 
 def test_w_spawn_without_a_place_takes_the_blocks():
