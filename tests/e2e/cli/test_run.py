@@ -173,7 +173,7 @@ def test_a_plugin_that_fails_ends_the_game_and_what_was_played_is_kept(tussle, f
     done = tussle(*arguments, code=3)
     (line,) = done.stderr.splitlines()
     assert re.fullmatch(r"error: Fails, .*step 10: fails\.py:11: RuntimeError: out of fuel", line)
-    assert " ended  a plugin failed, at t = 1.1 s" in done.stdout.splitlines()
+    assert " ended  a plugin failed, at t = 1 s" in done.stdout.splitlines()
     run = load_run(folder / "out")
     assert not run.is_complete
     assert run.trajectory["t"].max() >= 1.0
