@@ -113,7 +113,11 @@ def _inside(path: Path, name: str) -> Path:
         BatchError: It lies elsewhere, or a link leads elsewhere.
     """
     file = path / store.MISSION / name.replace("\0", "")
-    if not file.resolve().is_relative_to(path.resolve() / store.MISSION):
+    try:
+        is_inside = file.resolve().is_relative_to(path.resolve() / store.MISSION)
+    except (OSError, RuntimeError) as error:  # links in a circle
+        raise BatchError(f"{path}: {name} cannot be read: {error}") from None
+    if not is_inside:
         raise BatchError(f"{path}: {name} lies outside of the batch directory, so it is not read")
     return file
 
