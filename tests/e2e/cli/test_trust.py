@@ -154,7 +154,14 @@ def test_no_file_outside_of_the_directory_is_run_even_when_trusted(here, ran, tm
     for more in ((), ("--trust",)):
         code, err = here(*AGAIN, *more)
         assert code in (1, 4)
-        assert "lies outside of the batch directory" in err or "there is no such plugin file" in err
+        assert any(
+            words in err
+            for words in (
+                "lies outside of the batch directory",
+                "there is no such plugin file",
+                "inside the directory",
+            )
+        )
     assert not ran.exists()
 
 
@@ -175,7 +182,10 @@ def test_a_directory_widens_nothing(here, option, value):
     said(lambda about: about["options"].update({option: value}))
     code, err = here(*AGAIN, "--trust")
     assert code == 4
-    assert f"error: out: a batch directory cannot set the option '{option}'" in err
+    assert (
+        f"error: out: a batch directory cannot set the option '{option}'" in err
+        or f"mission.options.{option} is not allowed" in err
+    )
 
 
 def test_what_a_directory_cannot_grant_is_granted_on_the_command_line(here):
@@ -201,7 +211,7 @@ def test_a_mission_file_outside_of_the_directory_is_not_read(here, tmp_path):
         said(lambda about, name=name: about.update(file=name))
         code, err = here(*AGAIN, "--trust")
         assert code in (1, 4)
-        assert "outside of the batch directory" in err or "is no file" in err
+        assert any(w in err for w in ("outside of the batch directory", "is no file", "inside the directory"))
     said(lambda about: about.update(file=3, plugin_files=None))
     code, err = here(*AGAIN)
     assert (code, err) == (4, "error: out/batch.json: what it says of file, plugin_files cannot be read\n")
