@@ -214,7 +214,7 @@ def test_a_mission_file_outside_of_the_directory_is_not_read(here, tmp_path):
         assert any(w in err for w in ("outside of the batch directory", "is no file", "inside the directory"))
     said(lambda about: about.update(file=3, plugin_files=None))
     code, err = here(*AGAIN)
-    assert (code, err) == (4, "error: out/batch.json: what it says of file, plugin_files cannot be read\n")
+    assert (code, err) == (4, "error: out/batch.json: mission.file = 3 is not allowed; it takes a text\n")
 
 
 def test_the_note_of_what_is_own_counts_only_where_nobody_else_writes(here, tmp_path):
