@@ -19,6 +19,8 @@ MOST_EMPTY = 200
 """Cells of the table of runs, with a column for each quantity of each team, per row of the results: one where all games have the same
 quantities. What plugins report may differ between points."""
 MOST_METRICS = 10_000
+MOST_VALUE = 1e100
+"""Of a metric that is finite: sums of squares of larger ones, as variances take them, are not."""
 ALWAYS_ALLOWED = 1_000_000
 """As many cells as any batch may have."""
 
@@ -76,10 +78,12 @@ def check_results(table: pa.Table, design: pa.Table, file: Path) -> None:
 
 
 def check_metrics(results: pa.Table, file: Path) -> None:
-    """See that the table of runs is not much larger than the results that it is made of, and that expressions can name its columns.
+    """See that the table of runs is not much larger than the results that it is made of, and that all can be made of it.
+
+    Expressions can name its columns, means of them can be taken, and whoever is left has begun.
 
     Raises:
-        BatchError: It is, or they cannot.
+        BatchError: One of this is not so.
     """
     metrics = pc.unique(results["metric"])
     n_metrics, n_teams, n_runs = len(metrics), len(pc.unique(results["team"])), len(pc.unique(results["run"]))
@@ -92,3 +96,18 @@ def check_metrics(results: pa.Table, file: Path) -> None:
             Quantity.parse(column_name(metric, 0))
         except ParameterError as error:
             raise BatchError(f"{file}: {error}") from None
+    values = results["value"].to_numpy()
+    with np.errstate(invalid="ignore"):
+        wrong = np.flatnonzero(np.isfinite(values) & (np.abs(values) > MOST_VALUE))
+    if len(wrong):
+        raise BatchError(
+            f"{file}: value = {values[wrong[0]]} in row {wrong[0]} is not allowed; a metric is infinite, or {MOST_VALUE:g} at the most"
+        )
+    ended = results.filter(pc.not_equal(results["end"], "error"))
+    left, begun = (
+        set(ended.filter(pc.equal(ended["metric"], name))["team"].to_pylist()) for name in ("alive", "start")
+    )
+    if left != begun:
+        raise BatchError(
+            f"{file}: team {min(left ^ begun, key=str)} has one of the metrics 'alive' and 'start', and not the other"
+        )

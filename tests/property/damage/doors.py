@@ -127,10 +127,6 @@ def mcap(path: Path, out: Path) -> None:
     write_mcap(Recording(path), out / "run.mcap")
 
 
-def films(path: Path, out: Path) -> None:
-    cli("export", path, "--png", out / "still.png", "--size", "64x64")
-
-
 def plots(path: Path, out: Path) -> None:
     cli("plot", path, "--out", out / "plots")
 
@@ -223,11 +219,11 @@ def wrong(path: Path, _: Path) -> None:
 
 Door = Callable[[Path, Path], None]
 DOORS: dict[str, tuple[tuple[Door, float], ...]] = {
-    "run": ((run, 1), (recording, 1), (start, 0.5), (csv, 0.4), (parquet, 0.1), (html, 0.15), (mcap, 0.15),
+    "run": ((run, 1), (recording, 1), (start, 0.5), (csv, 0.25), (parquet, 0.1), (html, 0.08), (mcap, 0.08),
     (replayed, 0.03), (viewed, 0.01),
-            (started, 0.05), (plots, 0.005), (films, 0.003)),
-    "batch": ((batch, 1), (again, 0.4), (resumed, 0.06), (analyzed, 0.05), (reported, 0.03), (played_again, 0.03), (logged, 0.03)),
-    "cut": ((batch, 1), (again, 0.4), (resumed, 0.06), (analyzed, 0.02)),
+            (started, 0.05), (plots, 0.005)),
+    "batch": ((batch, 1), (again, 0.25), (resumed, 0.04), (analyzed, 0.05), (reported, 0.03), (played_again, 0.03), (logged, 0.03)),
+    "cut": ((batch, 1), (again, 0.25), (resumed, 0.04), (analyzed, 0.02)),
     "search": ((search, 1), (searched, 0.06)),
 }  # fmt: skip
 """Ways to read each kind of directory, and how often each is tried."""

@@ -44,6 +44,4 @@ def test_damaged_directories_end_in_one_message_or_are_read(tmp_path):
     assert len({number for number, *_ in told}) == N
     damages = " ".join(damage for _, _, damage, *_ in told)
     assert [how for how in HOW if f" {how} " not in damages] == []
-    assert {kind for _, kind, _, _, said in told if said} == {
-        kind for _, kind, _, _, said in told if not said
-    }
+    assert {kind for _, kind, *_, said in told if said} == {kind for _, kind, *_, said in told if not said}

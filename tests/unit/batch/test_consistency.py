@@ -113,6 +113,12 @@ def test_a_table_that_does_not_fit_is_named(made, table, columns, said):
         ("seed", 9, "a run has another seed than in the design"),
         ("steps", -1, "steps = -1 in row .* is not allowed; it takes 0 to 2147483647"),
         ("end", None, "column 'end' lacks a value in row"),
+        (
+            "value",
+            1e101,
+            "value = 1e.101 in row .* is not allowed; a metric is infinite, or 1e.100 at the most",
+        ),
+        ("team", 9, "team 9 has one of the metrics 'alive' and 'start', and not the other"),
         ("metric", "a" * 300, "quantity 'a*'... has 303 characters"),
     ],
 )
