@@ -16,9 +16,6 @@ from tussle.batch.trust import DirectoryCode
 from tussle.errors import BatchError
 from tussle.mission import Loaded, Mission, PluginFile, read_mission
 
-OF_FILE = {"file": str, "settings": dict, "plugin_files": list, "options": dict, "ends_by_time": bool}
-"""What `batch.json` says of a mission that was read from a file."""
-
 
 def load_batch(path: str | Path) -> Results:
     """The results of a batch directory, complete or not.
@@ -81,9 +78,6 @@ def planned_run(
         raise BatchError(
             f"{path}: there is no run {number}; the batch has runs 0 to {results.design.num_rows - 1}"
         )
-    wrong = [name for name, kind in OF_FILE.items() if not isinstance(about.get(name), kind)]
-    if wrong:
-        raise BatchError(f"{path / store.BATCH_FILE}: what it says of {', '.join(wrong)} cannot be read")
     is_strict = _is_strict(path, about["options"], {"allow_large": allow_large, "search": bool(search)})
     file = _inside(path, about["file"])
     plugins = [_inside(path, f"{store.PLUGINS}/{name}") for name in about["plugin_files"]]

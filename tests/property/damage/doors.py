@@ -287,7 +287,7 @@ def opened(door: Door, path: Path, out: Path) -> str:
             door(path, out)
     except TussleError as error:
         said = str(error)
-        return said if path.name in said else f"FAULT the message does not say where: {said}"
+        return said if str(path)[:50] in said else f"FAULT the message does not say where: {said}"
     except TooLong:
         return f"FAULT longer than {SECONDS} s\n{traceback.format_exc(limit=-4)}"
     except BaseException:  # noqa: BLE001  whatever it is, it is told

@@ -507,6 +507,37 @@ def test_a_table_of_other_trials(tmp_path):
         search(directory=tmp_path / "out", trials=8)
 
 
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("high", None, r"low = [-\d.e]+ in row 0 is not allowed; high is nan"),
+        ("high", -1e9, "low = .* in row 0 is not allowed; high is -1000000000.0"),
+        ("objective", 1e101, "objective = 1e.101 in row 0 is not allowed"),
+        ("by_seed", [1.0], "trial 0 has 1 games; study.json says 2"),
+        ("trial", 7, "trial = 7 in row 0 is not allowed; it is 0"),
+    ],
+)
+def test_a_trial_that_cannot_be_is_named(tmp_path, name, value, said):
+    search(directory=tmp_path / "out", trials=8)
+    path = tmp_path / "out" / "trials.parquet"
+    table = pq.read_table(path)
+    i = table.schema.get_field_index(name)
+    column = pa.array([value, *table[name].to_pylist()[1:]], table.schema.types[i])
+    pq.write_table(table.set_column(i, name, column), path)
+    with pytest.raises(BatchError, match=rf"trials\.parquet: {said}"):
+        load_study(tmp_path / "out")
+
+
+def test_a_search_whose_variables_were_changed_is_another_one(tmp_path):
+    search(directory=tmp_path / "out", trials=8)
+    file = tmp_path / "out" / "study.json"
+    info = json.loads(file.read_text())
+    info["variables"].pop()
+    file.write_text(json.dumps(info))
+    with pytest.raises(BatchError, match=r"holds another search \(it differs in variables\)"):
+        search(directory=tmp_path / "out", trials=8)
+
+
 def test_a_directory_that_cannot_be_made(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(RecordError, match="file: cannot be written"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from importlib import metadata
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import Any, Self
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from tussle.batch.consistency import MOST_VALUE
 from tussle.batch.plan import MOST_RUNS
 from tussle.batch.schemas import SEED, VARIABLE
 from tussle.batch.search.proposals import SAMPLERS
@@ -52,7 +54,16 @@ STUDY = Document(
     BatchError,
 )
 """What `study.json` says."""
-RULES = {"trial": COUNT, "round": COUNT, "n_failed": COUNT, "state": TEXT}
+_MEAN = Bounds(-MOST_VALUE, MOST_VALUE, may_miss=True)
+RULES = {
+    "objective": _MEAN,
+    "low": _MEAN,
+    "high": _MEAN,
+    "trial": COUNT,
+    "round": COUNT,
+    "n_failed": COUNT,
+    "state": TEXT,
+}
 """Of the table of trials."""
 STUDY_FILE, TRIALS_FILE, LOCK = "study.json", "trials.parquet", "lock"
 
@@ -107,7 +118,7 @@ class StudyStore:
                 put_whole(self.path / STUDY_FILE, json.dumps(info, indent=1, allow_nan=False) + "\n")
             return info
         before = read_info(self.path)
-        if before.get("fingerprint") != info["fingerprint"]:
+        if any(before.get(name) != info[name] for name in (*COMPARED, "fingerprint")):
             raise BatchError(
                 f"{self.path}: holds another search ({_difference(before, info)}); choose another directory, or remove it"
             )
@@ -180,12 +191,13 @@ def read_trials(path: Path, info: Mapping[str, Any]) -> list[Trial]:
     except (KeyError, TypeError) as error:
         raise BatchError(f"{file}: cannot be read: {error}") from None
     for i, trial in enumerate(trials):
-        if trial.number != i or len(trial.by_seed) not in (
-            (info["runs"],) if trial.is_complete else (0, info["runs"])
-        ):
-            raise BatchError(
-                f"{file}: trial {trial.number} in row {i} has {len(trial.by_seed)} games; a trial has {info['runs']}"
-            )
+        if trial.low > trial.high or math.isnan(trial.low) != math.isnan(trial.high):
+            raise BatchError(f"{file}: low = {trial.low} in row {i} is not allowed; high is {trial.high}")
+        if trial.number != i:
+            raise BatchError(f"{file}: trial = {trial.number} in row {i} is not allowed; it is {i}")
+        n_games = len(trial.by_seed)
+        if n_games != info["runs"] and (n_games or trial.is_complete):
+            raise BatchError(f"{file}: trial {i} has {n_games} games; study.json says {info['runs']}")
     return trials
 
 
