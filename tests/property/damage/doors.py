@@ -78,7 +78,7 @@ def cli(*words: str | Path) -> None:
         raise result.exception
     if result.exit_code == terminal.NOT_WRITTEN:  # told by the command itself
         raise TussleError(result.stderr)
-    if result.exit_code not in (terminal.OK, terminal.PLUGIN_FAILED):
+    if result.exit_code in (terminal.OWN_FAULT, terminal.USAGE):
         raise Fault(f"exit code {result.exit_code}: {result.output} {result.stderr}")
 
 
