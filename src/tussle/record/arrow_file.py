@@ -114,7 +114,7 @@ def _check_batch(batch: pa.RecordBatch) -> None:
 
 
 def _whole(path: Path) -> tuple[int, bool]:
-    """Where the last whole message ends, and whether the end mark is missing behind it.
+    """Where the last whole message ends, and whether a part of another is behind it.
 
     Raises:
         OSError: It is no regular file.
@@ -125,7 +125,7 @@ def _whole(path: Path) -> tuple[int, bool]:
         while True:
             head = file.read(8)
             if len(head) < 8:
-                return end, True
+                return end, bool(head)
             mark, length = struct.unpack("<Ii", head)
             if mark != 0xFFFFFFFF:
                 if not end:

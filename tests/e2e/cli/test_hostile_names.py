@@ -184,7 +184,7 @@ def test_errors_show_what_a_file_says_as_it_is(here, folder):
     for more in ((), ("--debug",)):
         done = CliRunner().invoke(app, ["run", "game.xml", "--plugin-path", "odd.py", *more])
         assert done.exit_code == 1
-        assert "error: odd.py:1: it cannot be imported: ValueError: \\x1b[2J[/red] \\x9b" in done.output
+        assert "odd.py:1: it cannot be imported: ValueError: \\x1b[2J[/red] \\x9b" in done.output
         assert not STEERING.search(done.output)
 
 

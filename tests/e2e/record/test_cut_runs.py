@@ -27,7 +27,8 @@ def kill_after(seconds, directory):
     told = []
 
     def listen():
-        told.extend((float(t), int(step)) for t, step in map(str.split, child.stdout))
+        whole = (line for line in child.stdout if line.endswith("\n"))
+        told.extend((float(t), int(step)) for t, step in map(str.split, whole))
 
     listener = threading.Thread(target=listen)
     listener.start()

@@ -477,7 +477,7 @@ def test_what_lies_outside_the_run_is_said_or_refused(flown, tmp_path):
 
 def test_a_run_without_states_cannot_be_filmed(tmp_path):
     (tmp_path / "run").mkdir()
-    (tmp_path / "run" / "run.json").write_text("{")
+    (tmp_path / "run" / "trajectory.arrow").write_bytes(b"")
     with pytest.raises(ViewError, match="the run holds no states, so there is nothing to film"):
         write_film(Recording(tmp_path / "run"), mp4=tmp_path / "a.mp4")
 
