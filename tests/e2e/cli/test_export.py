@@ -171,6 +171,6 @@ def test_a_terminal_sees_how_far_it_is(played, folder):
     bars = [line for line in re.split(r"[\r\n]", ESCAPE.sub("", text)) if "left" in line]
     assert len(bars) >= 2
     for bar in bars:
-        assert re.search(r"film \S.* \d+/181 pictures +\d:\d\d left", bar)
+        assert re.search(r"film \S.* \d+/181 pictures +\d+:\d\d left", bar)
         assert len(bar.rstrip()) <= 80
     assert "181 pictures, 3.0 s at 1 × real time" in ESCAPE.sub("", text)
