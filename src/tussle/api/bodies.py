@@ -29,6 +29,8 @@ N_FLOATS = sum(FLOATS.values())
 EVERYWHERE = np.inf
 MOST_RANGES = 1000
 """Ranges of touched rows that are remembered one by one."""
+MOST_INDEXES = 32
+"""Reaches whose neighbour indexes are kept."""
 BRUTE = 600
 """Rows per world up to which a search for the nearest needs no cells."""
 
@@ -182,9 +184,10 @@ class Bodies:
         key = reach if isinstance(reach, float) else reach.tobytes()
         kept = self._laid_out.get(key)
         if kept is None:
-            index = self._indexes.get(key)
-            if index is None:
-                index = self._indexes[key] = Index()
+            index = self._indexes.pop(key, None) or Index()
+            self._indexes[key] = index  # behind those that were asked for earlier
+            if len(self._indexes) > MOST_INDEXES:
+                self._forget(next(iter(self._indexes)))
             index.layout(self.world, self.id, self.n_worlds)
             reaches = np.full(self.n_worlds, reach) if isinstance(reach, float) else reach
             kept = self._laid_out[key] = Kept(-1, (index, reaches, *self.pos))
@@ -199,6 +202,13 @@ class Bodies:
             kept.version = self.version
         self._newest = kept
         return index  # type: ignore[no-any-return]
+
+    def _forget(self, key: Any) -> None:
+        """Drop the index of a reach, and what is kept in its order."""
+        index = self._indexes.pop(key)
+        self._laid_out.pop(key, None)
+        for place in [place for place in self._by_place if place[0] == id(index)]:
+            del self._by_place[place]
 
     def by_place(self, index: Index, name: str) -> tuple[np.ndarray, ...]:
         """Components of a column in the order of an index's places, as floats, each (n,) and padded for lanes; for kernels."""

@@ -83,6 +83,8 @@ class GroupView:
             self.__dict__[name] = array
             self._seen.append(name)
             return array
+        if name.startswith("__"):  # what `copy` asks for
+            raise AttributeError(name)
         if name == "_seeds":
             self._seeds = self.context.row_seeds(self.world, self.block)
             self._seen.append(name)

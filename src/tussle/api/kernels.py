@@ -150,30 +150,3 @@ def check(pos, quat, health, faulty):
         faulty[i] = bad
         count += 1 if bad or not (health[i] > 0.0) else 0
     return count
-
-
-@kernel("F2 I F2w")
-def gather_floats(source, index, out):
-    """Columns index of source (k, n) into out (k, m); index -1 leaves out as it is."""
-    for r in range(source.shape[0]):
-        for j in range(index.shape[0]):
-            if index[j] >= 0:
-                out[r, j] = source[r, index[j]]
-
-
-@kernel("I2 I I2w")
-def gather_ints(source, index, out):
-    """Columns index of source (k, n) into out (k, m); index -1 leaves out as it is."""
-    for r in range(source.shape[0]):
-        for j in range(index.shape[0]):
-            if index[j] >= 0:
-                out[r, j] = source[r, index[j]]
-
-
-@kernel("B2 I B2w")
-def gather_truths(source, index, out):
-    """Columns index of source (k, n) into out (k, m); index -1 leaves out as it is."""
-    for r in range(source.shape[0]):
-        for j in range(index.shape[0]):
-            if index[j] >= 0:
-                out[r, j] = source[r, index[j]]

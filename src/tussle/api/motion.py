@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from tussle.api.bodies import DERIVED, FLOATS, OFFSETS, derive
+from tussle.api.bodies import DERIVED, FLOATS, OFFSETS, Bodies, derive
 from tussle.api.group import GroupView
 from tussle.api.kinds import EntityPlugin
 from tussle.columns import Param, State
@@ -25,9 +25,14 @@ class MotionBody(GroupView):
     """A motion model's rows in the body table; pos, vel, quat and omega are writable.
 
     Attributes:
+        span: Rows of the view [first, last) whose attitude `from_body` may ask for; of the others yaw, climb, roll and forward are 0.
         forward_speed: Speed along the body x axis [m/s], (n,).
         rows: The rows of pos, quat, vel and omega one by one, thirteen (n,); for kernels.
     """
+
+    def reset(self, bodies: Bodies, first: int, last: int) -> None:
+        super().reset(bodies, first, last)
+        self.span = (0, self.n)
 
     def __getattr__(self, name: str) -> Any:
         if name in WRITABLE:
@@ -49,9 +54,9 @@ class MotionBody(GroupView):
 
     def _derive(self, name: str) -> np.ndarray:
         # Straight from the quaternions: while a model writes them, what the table keeps is out of date.
-        k = DERIVED[name]
-        out = np.empty((k, self.n) if k > 1 else self.n)
-        derive(name, self._bodies.quat, self.first, self.last, self.first, out)
+        k, (first, last) = DERIVED[name], self.span
+        out = np.zeros((k, self.n) if k > 1 else self.n)
+        derive(name, self._bodies.quat, self.first + first, self.first + last, self.first, out)
         return out
 
     def set_attitude(self, roll: Any = 0.0, climb: Any = 0.0, yaw: Any = 0.0) -> None:

@@ -9,13 +9,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tussle import rng
+from tussle.api.bodies import Bodies
+from tussle.engine import kernels
 from tussle.engine.params import Overrides
 from tussle.errors import MissionError
-from tussle.mission import Block
-from tussle.numeric import cos, sin
-from tussle.numeric.quaternion import quat_from_euler
 from tussle.rng import stream_key
 
+POSITION, HEADING = (np.uint64(stream_key("birth", label)) for label in ("position", "heading"))
 MOST_TRIES = 10_000
 """Attempts to find a free place for one entity before the mission is called too crowded."""
 
@@ -39,51 +39,16 @@ class Room:
     full: set[int] = field(default_factory=set)
 
 
-@dataclass
-class Newborn:
-    """New entities as columns, ordered by (world, id).
-
-    Attributes:
-        world: (m,) likewise block (its number), place (in its block), id, team.
-        pos: [m], (3, m); vel [m/s], (3, m); quat (4, m).
-        values: health, radius, mass, each (m,).
-    """
-
-    world: np.ndarray
-    block: np.ndarray
-    place: np.ndarray
-    id: np.ndarray
-    team: np.ndarray
-    pos: np.ndarray
-    vel: np.ndarray
-    quat: np.ndarray
-    values: dict[str, np.ndarray]
-
-    def __len__(self) -> int:
-        return len(self.world)
-
-    @classmethod
-    def join(cls, parts: list[Newborn]) -> Newborn:
-        """All in one, ordered by (world, id)."""
-        world = np.concatenate([p.world for p in parts])
-        ids = np.concatenate([p.id for p in parts])
-        order = np.lexsort((ids, world))
-
-        def take(name: str) -> np.ndarray:
-            return np.asarray(np.concatenate([getattr(p, name) for p in parts], axis=-1)[..., order])
-
-        values = {k: np.concatenate([p.values[k] for p in parts])[order] for k in parts[0].values}
-        return cls(
-            world[order],
-            take("block"),
-            take("place"),
-            ids[order],
-            take("team"),
-            take("pos"),
-            take("vel"),
-            take("quat"),
-            values,
-        )
+def joined(parts: list[Bodies]) -> Bodies:
+    """All in one table, ordered by (world, id)."""
+    if len(parts) == 1:
+        floats, ints = parts[0].floats, parts[0].ints
+    else:
+        floats = np.concatenate([p.floats for p in parts], axis=1)
+        ints = np.concatenate([p.ints for p in parts], axis=1)
+    both = Bodies(floats, ints, parts[0].n_worlds)
+    order = np.lexsort((both.id, both.world))
+    return Bodies(floats.take(order, axis=1), ints.take(order, axis=1), both.n_worlds)
 
 
 class Births:
@@ -101,7 +66,7 @@ class Births:
         self.seeds = seeds
         self.start = start
         n_blocks, n_worlds = len(overrides.mission.blocks), overrides.n_worlds
-        self.keys = [stream_key("block", b.name) for b in overrides.mission.blocks]
+        self.keys = [np.uint64(stream_key("block", b.name)) for b in overrides.mission.blocks]
         self.next_id = np.ones(n_worlds, np.int64)
         self.n_born = np.zeros((n_blocks, n_worlds), np.int64)
         self.n_left = np.zeros((n_blocks, n_worlds), np.int64)
@@ -142,7 +107,10 @@ class Births:
                     wait = 1.0 / block.rate
                     number = self.n_born[i, worlds] + again
                     again += 1
-                    jitter = self._normal(i, "birth", worlds, np.full(len(worlds), slot), number, 0, 1)[0]
+                    seeds = self.seeds[worlds] ^ self.keys[i]
+                    jitter = rng.normal(
+                        seeds, stream_key("birth", "birth"), np.full(len(worlds), slot), number
+                    )[0]
                     # From the time it was due at, not that of the step, else a rate that does not divide the steps' would lag.
                     due_at = self.next_time[i][worlds, slot]
                     later = due_at + wait + block.interval_sd * jitter
@@ -169,36 +137,16 @@ class Births:
         """No birth is to come in this world."""
         return not (self.n_left[:, world] > 0).any()
 
-    def _normal(
-        self,
-        block: int,
-        label: str,
-        worlds: np.ndarray,
-        index: np.ndarray,
-        step: np.ndarray,
-        substep: int,
-        k: int,
-    ) -> np.ndarray:
-        return rng.normal(
-            self.seeds[worlds] ^ np.uint64(self.keys[block]),
-            stream_key("birth", label),
-            index,
-            step,
-            substep,
-            k,
-        )
-
     def _scatter(
-        self, block: int, spec: Block, worlds: np.ndarray, places: np.ndarray, attempt: int
-    ) -> np.ndarray:
-        """Offsets from the block's position [m], (3, m)."""
-        seeds = self.seeds[worlds] ^ np.uint64(self.keys[block])
-        stream, step = stream_key("birth", "position"), np.zeros(len(worlds), np.int64)
-        if spec.placement == "uniform":
-            draws = 2.0 * rng.uniform(seeds, stream, places, step, attempt, 3) - 1.0
-            return np.asarray(draws * np.array(spec.half_width)[:, None])
-        draws = rng.normal(seeds, stream, places, step, attempt, 3)
-        return np.asarray(draws * np.sqrt(np.array(spec.variance))[:, None])
+        self, block: int, worlds: np.ndarray, places: np.ndarray, attempt: int, pos: np.ndarray
+    ) -> None:
+        """Draw positions [m] into pos, (3, m)."""
+        spec = self.overrides.mission.blocks[block]
+        is_uniform = spec.placement == "uniform"
+        width = spec.half_width if is_uniform else np.sqrt(spec.variance)
+        shape, flags = np.array([spec.position, width], float), np.array([is_uniform, spec.scatter_first])
+        seeds = self.seeds[worlds] ^ self.keys[block]
+        kernels.scatter(seeds, POSITION, places, attempt, flags, shape, pos)
 
     def create(
         self,
@@ -206,7 +154,7 @@ class Births:
         worlds: np.ndarray,
         where: dict[str, np.ndarray] | None = None,
         room: Room | None = None,
-    ) -> Newborn:
+    ) -> Bodies:
         """Entities of one block, one per item of `worlds` (sorted).
 
         Args:
@@ -215,38 +163,29 @@ class Births:
             where: pos, vel, quat, team that were asked for.
             room: Where they may stand; None is everywhere.
         """
-        m, where = len(worlds), where or {}
+        where = where or {}
         spec = self.overrides.mission.blocks[block]
-        run = _run_numbers(worlds)
-        places = self.n_born[block, worlds] + run
-        ids = self.next_id[worlds] + run
-        np.add.at(self.n_born[block], worlds, 1)
-        np.add.at(self.next_id, worlds, 1)
-        centre = np.array(spec.position)[:, None]
-        pos = centre + np.where(
-            (places > 0) | spec.scatter_first, self._scatter(block, spec, worlds, places, 0), 0.0
-        )
-        if "pos" in where:
-            pos = np.array(where["pos"], float).reshape(3, -1) + np.zeros((3, m))
-        elif room is not None:
-            self._separate(block, worlds, places, pos, room)
+        new = Bodies.empty(len(worlds), self.overrides.n_worlds)
+        new.world[:], new.block[:] = worlds, block
+        kernels.number(worlds, self.next_id, self.n_born[block], new.id, new.place_in_block)
+        self._scatter(block, worlds, new.place_in_block, 0, new.pos)
+        if "pos" not in where and room is not None:
+            self._separate(block, worlds, new.place_in_block, new.pos, room)
 
-        def value(name: str) -> np.ndarray:
-            return self.overrides.block_values(spec, name, worlds)
-
-        jitter = self._normal(block, "heading", worlds, places, np.zeros(m, np.int64), 0, 1)[0]
-        yaw = value("heading") + np.sqrt(spec.heading_variance) * jitter
-        climb = value("climb")
-        quat = quat_from_euler(value("roll"), -climb, yaw)
-        speed = value("speed")
-        vel = np.array([speed * (cos(climb) * cos(yaw)), speed * (cos(climb) * sin(yaw)), speed * sin(climb)])
+        heading = np.empty((4, new.n))
+        for i, name in enumerate(("heading", "climb", "roll", "speed")):
+            heading[i] = self.overrides.block_value(spec, name, worlds)
+        seeds = self.seeds[worlds] ^ self.keys[block]
+        sd = np.sqrt(spec.heading_variance)
+        kernels.turn(seeds, HEADING, new.place_in_block, sd, heading, new.vel, new.quat)
         if spec.velocity is not None:
-            vel = np.repeat(np.array(spec.velocity)[:, None], m, axis=1)
-        vel = np.array(where.get("vel", vel), float).reshape(3, -1) + np.zeros((3, m))
-        quat = np.array(where.get("quat", quat), float).reshape(4, -1) + np.zeros((4, m))
-        team = np.zeros(m, np.int64) + np.asarray(where.get("team", spec.team)).astype(np.int64)
-        values = {name: value(name) for name in ("health", "radius", "mass")}
-        return Newborn(worlds, np.full(m, block), places, ids, team, pos, vel, quat, values)
+            new.vel[:] = np.array(spec.velocity)[:, None]
+        new.team[:] = spec.team
+        for name in ("health", "radius", "mass"):
+            getattr(new, name)[:] = self.overrides.block_value(spec, name, worlds)
+        for name, asked in where.items():
+            getattr(new, name)[:] = asked
+        return new
 
     def _separate(
         self, block: int, worlds: np.ndarray, places: np.ndarray, pos: np.ndarray, room: Room
@@ -279,17 +218,8 @@ class Births:
                         f"block {spec.name!r}: no free place for entity {int(places[i]) + 1} of {spec.count} "
                         f"after {attempt - 1} tries{others}; give the block more room (placement {spec.placement!r}) or fewer entities"
                     )
-                one = slice(i, i + 1)
-                pos[:, one] = np.array(spec.position)[:, None] + self._scatter(
-                    block, spec, np.array([world]), places[one], attempt
-                )
+                again = np.empty((3, 1))
+                self._scatter(block, np.array([world]), places[i : i + 1], attempt, again)
+                pos[:, i] = again[:, 0]
             taken[:, n] = pos[:, i]
             n += 1
-
-
-def _run_numbers(worlds: np.ndarray) -> np.ndarray:
-    """0, 1, 2 ... within each run of equal (sorted) worlds."""
-    if not len(worlds):
-        return np.zeros(0, np.int64)
-    starts = np.flatnonzero(np.concatenate([[True], worlds[1:] != worlds[:-1]]))
-    return np.asarray(np.arange(len(worlds)) - np.repeat(starts, np.diff([*starts, len(worlds)])))

@@ -12,7 +12,7 @@ from tussle.record import Happenings
 from tussle.record.happenings import BIRTH, CAPTURE, COLLISION, DEATH, END
 
 if TYPE_CHECKING:
-    from tussle.engine.births import Newborn
+    from tussle.api.bodies import Bodies
     from tussle.engine.simulation import Simulation
 
 TOLD: dict[type[Message], tuple[str, str, str, str]] = {
@@ -64,7 +64,7 @@ class Herald:
         for listener in list(self._listeners):
             listener(happenings)
 
-    def births(self, new: Newborn) -> None:
+    def births(self, new: Bodies) -> None:
         """Entities have come."""
         names = self._sim.context.block_names
         step = self._sim.context.clock.step[new.world]

@@ -43,6 +43,7 @@ class Binding:
         view: What its step is given.
         path: Names from the entity down, such as ("MotorSchemas", "AvoidEntityMS").
         places: Attribute -> where its column lies.
+        params: Those of them that are parameters.
         writable: Attributes that the plugin may write.
         links: Channel attributes that are copied from and to the bus around each call.
         ragged: Attribute -> list per row.
@@ -55,6 +56,7 @@ class Binding:
     view: GroupView
     path: tuple[str, ...]
     places: dict[str, Place] = field(default_factory=dict)
+    params: tuple[str, ...] = ()
     writable: set[str] = field(default_factory=set)
     links: dict[str, Link] = field(default_factory=dict)
     ragged: dict[str, RaggedColumn] = field(default_factory=dict)
@@ -162,6 +164,7 @@ class Group:
         self.autonomies = [self._bind(p, self.thinking, ()) for p in block.autonomy]
         self.controllers = [self._bind(p, self.steering, ()) for p in working]
         self.sensors = [self._bind(p, self.sensing, ()) for p in block.sensor]
+        self.holds_lists = any(b.ragged or b.handles for b in self.walk())
         self._believe()
         self.integrate = self.motion.plugin.integrator()
         self._place_motion()
@@ -202,9 +205,12 @@ class Group:
         plugin, key = binding.plugin, binding.path
         wired = set(self.wiring.wired.get(id(spec), ()))
         params = {k: c for k, c in type(spec).params().items() if c.is_row_data}
+        binding.params = tuple(params)
         for name, param in params.items():  # one after the other, so that a motion model's are one matrix
             dtype = float if is_motion else param.dtype
-            binding.places[name] = self.table.add((key, name), dtype, len(param.fields), param.default)
+            value = spec.values[name]
+            default = tuple(value) if param.fields else value
+            binding.places[name] = self.table.add((key, name), dtype, len(param.fields), default)
         for name, column in type(spec).columns.items():
             if isinstance(column, Param):
                 if column.structural:
@@ -281,9 +287,10 @@ class Group:
 
     # -- rows ---------------------------------------------------------------------------------------------------------------
 
-    def rearrange(self, index: np.ndarray) -> None:
-        """New row i is old row index[i] of this group; -1 is a new one at the declared defaults."""
-        self.table.rearrange(index)
+    def rearrange(self, source: np.ndarray) -> None:
+        """New row i is row source[i] of the old body table; one below 0 is a new one at the declared defaults."""
+        self.table.rearrange(source, self.first)
+        index = np.where(source >= 0, source - self.first, -1) if self.holds_lists else source
         for binding in self.walk():
             for name, column in binding.ragged.items():
                 binding.ragged[name] = column.take(index)
@@ -331,6 +338,15 @@ class Group:
             return link.rows
         place = binding.places[name]
         return tuple(range(place.first, place.first + max(1, place.k)))
+
+    def from_body(self, rows: np.ndarray) -> None:
+        """Have the motion model take over the states of some of its rows, in order, from the body table."""
+        view = self.moving
+        view.caller, view.span = self.motion.plugin, (int(rows[0]), int(rows[-1]) + 1)
+        try:
+            self.motion.plugin.from_body(view, rows)
+        finally:
+            view.span = (0, self.n)
 
     def advance(self, dt: float, substeps: int) -> None:
         """Integrate all rows over dt [s], and publish the new states to the body table."""

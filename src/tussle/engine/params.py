@@ -129,13 +129,12 @@ class Overrides:
             )
         return (head, tuple(names), rest[0]), params[rest[0]]
 
-    def block_values(self, block: Block, name: str, world: np.ndarray) -> np.ndarray:
-        """A number of a block for entities of the worlds `world`, (m,)."""
-        out = np.full(len(world), float(getattr(block, name)))
-        key = (block.name, (), name)
-        if key in self.columns:
-            out = np.where(self.given[key][world], self.columns[key][world], out)
-        return out
+    def block_value(self, block: Block, name: str, world: np.ndarray) -> float | np.ndarray:
+        """A number of a block for entities of the worlds `world`: one for all, or (m,)."""
+        value, key = float(getattr(block, name)), (block.name, (), name)
+        if key not in self.columns:
+            return value
+        return np.where(self.given[key][world], self.columns[key][world], value)
 
     def fill(self, owner: str, path: tuple[str, ...], name: str, base: Any, world: np.ndarray) -> np.ndarray:
         """A parameter for rows of the worlds `world`, (m,) or (k, m)."""

@@ -11,16 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from tussle.api import kernels
 from tussle.api.bodies import Bodies
 from tussle.api.context import Context
 from tussle.columns import Handle, RaggedColumn
-from tussle.engine import failure
-from tussle.engine.births import Newborn
+from tussle.engine import failure, kernels
 from tussle.engine.group import Binding, Group
 from tussle.engine.params import Overrides
 from tussle.errors import PluginError
 from tussle.mission import Block
+
+NOBODY = Bodies.empty(0, 1)
 
 
 @dataclass(frozen=True)
@@ -71,6 +71,8 @@ class Population:
         self.bodies.scans = is_sequential
         self.groups: list[Group] = []
         self._by_key: dict[Any, Group] = {}
+        self._asked: dict[tuple[int, int, int], Group] = {}
+        self._specs: dict[tuple[int, tuple[str, ...]], Any] = {}
         self.changed = 0
         self.on_new_group: Callable[[], None] = lambda: None
         self.on_failure: Callable[[int, PluginError], None] = lambda world, error: None
@@ -79,7 +81,12 @@ class Population:
 
     def group_of(self, blocks: tuple[Block, ...], number: int, place: int) -> Group:
         """The group of an entity: made when it is the first of its kind."""
-        block = blocks[number]
+        asked = (id(blocks), number, place if self.is_sequential else 0)
+        if asked not in self._asked:
+            self._asked[asked] = self._group_of(blocks[number], place)
+        return self._asked[asked]
+
+    def _group_of(self, block: Block, place: int) -> Group:
         shape = (tuple(p.structure() for p in block.autonomy), tuple(p.structure() for p in block.controller))
         key = (
             *shape,
@@ -117,47 +124,49 @@ class Population:
             for number in range(len(self.overrides.mission.blocks)):
                 self.group_of(self.overrides.variant(0), number, 0)
 
-    def _groups_of(self, new: Newborn) -> np.ndarray:
+    def _groups_of(self, new: Bodies) -> np.ndarray:
         """Number in `groups` of each newborn, (m,)."""
-        found: dict[Any, Group] = {}
-        owners = []
-        for world, block, entity in zip(new.world, new.block, new.id, strict=True):
-            blocks = self.overrides.variant(int(world))
-            key = (id(blocks), int(block), int(entity) if self.is_sequential else 0)
-            if key not in found:
-                found[key] = self.group_of(blocks, int(block), int(entity))
-            owners.append(found[key])
+        alike = new.block  # who has the same number here has the same group
+        if self.is_sequential:
+            alike = alike << 32 | new.id
+        if self.overrides.structural:
+            _, alike = np.unique([alike, new.world], axis=1, return_inverse=True)
+        _, first, which = np.unique(alike, return_index=True, return_inverse=True)
+        found: list[Any] = [None] * len(first)
+        for k in np.argsort(first):
+            i = first[k]
+            found[k] = self.group_of(
+                self.overrides.variant(int(new.world[i])), int(new.block[i]), int(new.id[i])
+            )
         number = {id(g): i for i, g in enumerate(self.groups)}
-        return np.array([number[id(g)] for g in owners], np.int64)
+        return np.array([number[id(g)] for g in found], np.int64)[which]
 
     # -- repack -------------------------------------------------------------------------------------------------------------
 
-    def repack(self, gone: np.ndarray | None, new: Newborn | None) -> np.ndarray:
-        """Remove rows (gone, (n,), true) and add newborn ones; returns for each new row its old one, -1 for newborn.
+    def repack(self, gone: np.ndarray | None, new: Bodies | None) -> np.ndarray:
+        """Remove rows (gone, (n,), true) and add newborn ones; returns for each new row its old one, below 0 for newborn.
 
         Rows stay ordered by (group, world, id).
         """
         old = self.bodies
-        keep = np.ones(old.n, bool) if gone is None else ~gone
-        owner = self._groups_of(new) if new is not None and len(new) else None
-        self._close_handles(~keep)
-        orders, changed = [], set()
+        new = NOBODY if new is None else new
+        gone = np.zeros(old.n, bool) if gone is None else gone
+        owner = self._groups_of(new)
+        self._close_handles(gone)
+        source = np.empty(old.n + new.n, np.int64)
+        changed, first = set(), 0
         for number, group in enumerate(self.groups):
-            rows = np.flatnonzero(keep[group.first : group.last])
-            index, fresh = rows, np.zeros(0, np.int64)
-            if owner is not None and new is not None:
-                fresh = np.flatnonzero(owner == number)
-                if len(fresh):
-                    world = np.concatenate([old.world[group.first + rows], new.world[fresh]])
-                    ids = np.concatenate([old.id[group.first + rows], new.id[fresh]])
-                    index = np.concatenate([rows, -1 - fresh])[np.lexsort((ids, world))]
-            orders.append(np.where(index >= 0, index + group.first, index))
-            if len(index) != group.n or len(fresh):
-                group.rearrange(np.where(index >= 0, index, -1))
+            fresh = np.flatnonzero(owner == number)
+            rows = source[first:]
+            n = kernels.merge(
+                gone, group.first, group.last, (old.world, old.id), (new.world, new.id), fresh, rows
+            )
+            if n != group.n or len(fresh):
+                group.rearrange(rows[:n])
                 changed.add(number)
-        source = np.concatenate(orders) if orders else np.zeros(0, np.int64)
-        self._fill_bodies(source, new)
-        first = 0
+            first += n
+        self._fill_bodies(source[:first], new)
+        source, first = source[:first], 0
         for number, group in enumerate(self.groups):
             if number in changed:
                 group.attach(self.bodies, first)
@@ -165,49 +174,45 @@ class Population:
                 group.shift(self.bodies, first)
             first += group.n
         self.changed += 1
-        return np.where(source >= 0, source, -1)
+        return source
 
-    def _fill_bodies(self, source: np.ndarray, new: Newborn | None) -> None:
+    def _fill_bodies(self, source: np.ndarray, new: Bodies) -> None:
         old = self.bodies
-        floats = np.empty((len(old.floats), len(source)))
-        ints = np.empty((len(old.ints), len(source)), np.int64)
-        kernels.gather_floats(old.floats, source, floats)
-        kernels.gather_ints(old.ints, source, ints)
-        self.bodies.replace(floats, ints)
-        if new is not None and len(new):
-            rows = np.flatnonzero(source < 0)
-            who = -1 - source[rows]
-            floats[:, rows] = 0.0
-            b = self.bodies
-            b.pos[:, rows], b.vel[:, rows], b.quat[:, rows] = (
-                new.pos[:, who],
-                new.vel[:, who],
-                new.quat[:, who],
-            )
-            for name, values in new.values.items():
-                getattr(b, name)[rows] = values[who]
-            b.id[rows], b.team[rows], b.world[rows] = new.id[who], new.team[who], new.world[who]
-            b.block[rows], b.place_in_block[rows] = new.block[who], new.place[who]
-            b.born[rows] = self.context.clock.step[new.world[who]]
+        new.born[:] = self.context.clock.step[new.world]
+        if kernels.stays(source, 0, old.n):
+            fresh = np.flatnonzero(source < 0)
+            old.floats[:, fresh] = new.floats[:, -1 - source[fresh]]
+            old.ints[:, fresh] = new.ints[:, -1 - source[fresh]]
+            old.replace(old.floats, old.ints)
+            return
+        floats, ints = (
+            np.empty((len(old.floats), len(source))),
+            np.empty((len(old.ints), len(source)), np.int64),
+        )
+        kernels.gather_floats(old.floats, 0, new.floats, source, floats)
+        kernels.gather_ints(old.ints, 0, new.ints, source, ints)
+        old.replace(floats, ints)
 
     def begin_rows(self, source: np.ndarray) -> None:
-        """Parameters, beliefs, motion states, handles and `spawn` hooks of the newborn rows, those whose `source` is -1."""
+        """Parameters, beliefs, motion states, handles and `spawn` hooks of the newborn rows, those whose `source` is below 0."""
         for group in self.groups:
             rows = np.flatnonzero(source[group.first : group.last] < 0)
             if not len(rows):
                 continue
+            block = self.bodies.block[group.first + rows]
+            numbers = [(int(k), rows[block == k]) for k in np.unique(block)]
             for binding in group.walk():
-                self.fill_params(group, binding, rows)
-                self._fill_ragged(group, binding, rows)
-            for binding in group.bindings:
-                binding.attach(group.table)
+                for number, some in numbers:
+                    self._fill_params(group, binding, number, some)
+                if binding.ragged:
+                    self._fill_ragged(group, binding, rows)
+                    binding.attach(group.table)
             for name, place in group.belief.items():
                 group.table.array(place)[..., rows] = getattr(self.bodies, name)[..., group.first + rows]
             for view in group.views:
                 view.begin()
-            group.moving.caller = group.motion.plugin
             with self._blaming(group, group.motion, rows):
-                group.motion.plugin.from_body(group.moving, rows)
+                group.from_body(rows)
             for binding in group.walk():
                 opened = self._open_handles(group, binding, rows)
                 binding.view.caller = binding.plugin
@@ -227,32 +232,33 @@ class Population:
             world = int(worlds[0]) if len(worlds) == 1 else None
             raise failure.raised(error, binding.plugin, where=group.name, step=step, world=world) from error
 
-    def fill_params(self, group: Group, binding: Binding, rows: np.ndarray) -> None:
-        """Set the parameters of rows of a group from their blocks and what is set per world."""
-        block_of = self.bodies.block[group.first + rows]
-        world = self.bodies.world[group.first + rows]
-        for name, column in type(binding.spec).params().items():
-            if not column.is_row_data:
-                continue
-            array = group.table.array(binding.places[name])
-            for number in np.unique(block_of):
-                block = self.overrides.mission.blocks[number]
-                mine = block_of == number
-                base = _find(block, binding.path).values[name]
-                array[..., rows[mine]] = self.overrides.fill(
-                    block.name, binding.path, name, base, world[mine]
-                )
+    def _fill_params(self, group: Group, binding: Binding, number: int, rows: np.ndarray) -> None:
+        """Set the parameters of rows of one block: those that are not the default of the group's table, which its first block gives."""
+        block, values = self.overrides.mission.blocks[number], self._spec(number, binding.path).values
+        for name in binding.params:
+            if self.overrides.columns or values[name] != binding.spec.values[name]:
+                world = self.bodies.world[group.first + rows]
+                filled = self.overrides.fill(block.name, binding.path, name, values[name], world)
+                group.table.array(binding.places[name])[..., rows] = filled
 
     def _fill_ragged(self, group: Group, binding: Binding, rows: np.ndarray) -> None:
         for name, column in type(binding.spec).params().items():
             if column.ragged:
                 lists: list[Any] = [binding.ragged[name][i].T for i in range(group.n)]
                 for row in rows:
-                    block = self.overrides.mission.blocks[self.bodies.block[group.first + row]]
-                    lists[row] = np.array(_find(block, binding.path).values[name], float).reshape(
-                        -1, *column.shape
-                    )
+                    spec = self._spec(int(self.bodies.block[group.first + row]), binding.path)
+                    lists[row] = np.array(spec.values[name], float).reshape(-1, *column.shape)
                 binding.ragged[name] = RaggedColumn.from_rows(lists, column)
+
+    def _spec(self, number: int, path: tuple[str, ...]) -> Any:
+        """The plugin of a block, or inside another one of it, as data."""
+        if (number, path) not in self._specs:
+            plugins, plugin = self.overrides.mission.blocks[number].plugins, None
+            for name in path:
+                plugin = next(p for p in plugins if p.instance_name == name)
+                plugins = tuple(c for k in type(plugin).children() for c in plugin.values[k])
+            self._specs[number, path] = plugin
+        return self._specs[number, path]
 
     # -- handles ------------------------------------------------------------------------------------------------------------
 
@@ -300,12 +306,3 @@ class Population:
     def close_handles(self) -> None:
         """Release all objects outside the arrays."""
         self._close_handles(np.ones(self.bodies.n, bool))
-
-
-def _find(block: Block, path: tuple[str, ...]) -> Any:
-    plugins = block.plugins
-    plugin = None
-    for name in path:
-        plugin = next(p for p in plugins if p.instance_name == name)
-        plugins = tuple(c for k in type(plugin).children() for c in plugin.values[k])
-    return plugin

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
+from tussle.api.bodies import Bodies
 from tussle.api.clock import Clock
 from tussle.api.context import Context
-from tussle.api.kinds import Interaction
+from tussle.api.kinds import Interaction, WorldPlugin
 from tussle.api.plugin import GRADES
 from tussle.api.world import WorldView
 from tussle.engine import access, failure
-from tussle.engine.births import Births, Newborn, Room
+from tussle.engine.births import Births, Room, joined
 from tussle.engine.events import Herald
 from tussle.engine.mail import Mail
 from tussle.engine.params import Overrides
@@ -292,7 +293,8 @@ class Simulation:
         ]
         for referee in self.referees:
             referee.reset(chosen)
-            referee.fill_params(self.overrides, chosen)
+            if self.overrides.columns:
+                referee.fill_params(self.overrides, chosen)
         due = self.births.begin(chosen)
         gone = mask | ~self.running  # worlds that ended last keep their rows as long as nobody runs
         self.repack(gone[self.population.bodies.world], self._create(due, at_start=True))
@@ -302,6 +304,8 @@ class Simulation:
 
     def _start_referees(self, mask: np.ndarray) -> None:
         for referee in self.referees:
+            if type(referee.plugin).start is WorldPlugin.start:
+                continue
             if mask.all():
                 self._start(referee, referee.view)
             else:
@@ -316,7 +320,7 @@ class Simulation:
         except Exception as error:
             raise failure.in_call(error, referee.plugin, view) from error
 
-    def _create(self, due: Mapping[int, np.ndarray], at_start: bool = False) -> Newborn | None:
+    def _create(self, due: Mapping[int, np.ndarray], at_start: bool = False) -> Bodies | None:
         rejecting = [r for r in self.interactions if type(r.plugin).rejects is not Interaction.rejects]
         placed: dict[int, list[np.ndarray]] = {}
 
@@ -344,7 +348,7 @@ class Simulation:
             if rejecting:
                 for world in np.unique(worlds):
                     placed.setdefault(int(world), []).append(part.pos[:, part.world == world])
-        return Newborn.join(parts) if parts else None
+        return joined(parts) if parts else None
 
     def _give_birth(self) -> None:
         parts = []
@@ -359,16 +363,13 @@ class Simulation:
             order = np.argsort(worlds, kind="stable")
             kept = order[is_open[worlds[order]]]
             if len(kept):
-                where = {
-                    k: v[..., kept] if np.ndim(v) and v.shape[-1] == len(worlds) else v
-                    for k, v in where.items()
-                }
+                where = {k: v[..., kept] for k, v in where.items()}
                 parts.append(self.births.create(names.index(wish["block"]), worlds[kept], where))
         due = self.births.due(self.context.clock.t, self.running) if self.births.has_rates else {}
         born = self._create(due) if due else None
         parts += [born] if born is not None else []
         if parts:
-            self.repack(None, Newborn.join(parts))
+            self.repack(None, joined(parts))
             self.step_end.take_out_dead()  # what an entity holds outside the arrays could not be opened
 
     def _check_space(self, worlds: np.ndarray) -> None:
@@ -387,7 +388,7 @@ class Simulation:
         """What ends a world although no plugin has raised."""
         return PluginError(text, step=int(self.context.clock.step[world]), world=world)
 
-    def repack(self, gone: np.ndarray | None, new: Newborn | None) -> None:
+    def repack(self, gone: np.ndarray | None, new: Bodies | None) -> None:
         """Remove rows (gone, (n,), true) and add newborn ones."""
         index = self.population.repack(gone, new)
         bodies = self.population.bodies
@@ -419,11 +420,11 @@ class Simulation:
         for group in self.population.groups:
             mine = rows[(rows >= group.first) & (rows < group.last)] - group.first
             if len(mine):
-                plugin, group.moving.phase = group.motion.plugin, phase
+                group.moving.phase = phase
                 try:
-                    plugin.from_body(group.moving, mine)
+                    group.from_body(mine)
                 except Exception as error:
-                    raise failure.in_call(error, plugin, group.moving, group) from error
+                    raise failure.in_call(error, group.motion.plugin, group.moving, group) from error
 
     def _set_common_step(self) -> None:
         steps = np.unique(self.context.clock.step[self.running])

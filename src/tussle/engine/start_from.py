@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tussle.engine.births import Births, Newborn, Room
+from tussle.api.bodies import Bodies
+from tussle.engine.births import Births, Room
 from tussle.engine.params import Overrides
 from tussle.errors import MissionError, listed, nearest_name
 from tussle.mission import Block
@@ -68,7 +69,7 @@ class RecordedBirths(Births):
         worlds: np.ndarray,
         where: dict[str, np.ndarray] | None = None,
         room: Room | None = None,
-    ) -> Newborn:
+    ) -> Bodies:
         if where is not None:
             return super().create(block, worlds, where, room)
         rows, table = self.rows[block], self.table

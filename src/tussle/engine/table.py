@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tussle.api import kernels
+from tussle.engine import kernels
 
 DTYPES: dict[type, Any] = {float: np.float64, int: np.int64, bool: np.bool_}
 
@@ -58,20 +58,17 @@ class Table:
         data = self.arrays[place.dtype]
         return data[place.first : place.first + place.k] if place.k else data[place.first]
 
-    def rearrange(self, index: np.ndarray) -> None:
-        """New row i is old row index[i]; -1 is a new row at the defaults."""
-        is_new = index < 0
-        fresh = is_new.any()
+    def rearrange(self, index: np.ndarray, first: int = 0) -> None:
+        """New row i is old row index[i] - first; one below 0 is a new row at the defaults."""
+        if kernels.stays(index, first, self.n):
+            fresh = np.flatnonzero(index < 0)
+            for dtype, values in self.defaults.items():
+                self.arrays[dtype][:, fresh] = np.array(values, DTYPES[dtype])[:, None]
+            return
         for dtype, old in self.arrays.items():
-            if not len(old):
-                self.arrays[dtype] = np.empty((0, len(index)), old.dtype)
-                continue
-            if not fresh:
-                new = np.empty((len(old), len(index)), old.dtype)
-                _GATHER[dtype](old, index, new)
-            else:
-                new = np.repeat(np.array(self.defaults[dtype], old.dtype)[:, None], len(index), axis=1)
-                new[:, ~is_new] = old[:, index[~is_new]]
+            new = np.empty((len(old), len(index)), old.dtype)
+            if len(old):
+                _GATHER[dtype](old, first, np.array(self.defaults[dtype], old.dtype)[:, None], index, new)
             self.arrays[dtype] = new
         self.n = len(index)
 
