@@ -287,15 +287,16 @@ class Group:
 
     # -- rows ---------------------------------------------------------------------------------------------------------------
 
-    def rearrange(self, source: np.ndarray) -> None:
-        """New row i is row source[i] of the old body table; one below 0 is a new one at the declared defaults."""
-        self.table.rearrange(source, self.first)
+    def rearrange(self, source: np.ndarray) -> bool:
+        """New row i is row source[i] of the old body table; one below 0 is a new one at the defaults. Whether arrays are other ones."""
+        is_moved = self.table.rearrange(source, self.first)
         index = np.where(source >= 0, source - self.first, -1) if self.holds_lists else source
         for binding in self.walk():
             for name, column in binding.ragged.items():
                 binding.ragged[name] = column.take(index)
             for name, objects in binding.handles.items():
                 binding.handles[name] = [objects[i] if i >= 0 else None for i in index]
+        return is_moved or self.holds_lists
 
     def attach(self, bodies: Bodies, first: int) -> None:
         """Take the place [first, first + n) in the body table, and give all plugins and views their arrays."""

@@ -161,8 +161,7 @@ class Population:
             n = kernels.merge(
                 gone, group.first, group.last, (old.world, old.id), (new.world, new.id), fresh, rows
             )
-            if n != group.n or len(fresh):
-                group.rearrange(rows[:n])
+            if (n != group.n or len(fresh)) and group.rearrange(rows[:n]):
                 changed.add(number)
             first += n
         self._fill_bodies(source[:first], new)
@@ -214,7 +213,7 @@ class Population:
             with self._blaming(group, group.motion, rows):
                 group.from_body(rows)
             for binding in group.walk():
-                opened = self._open_handles(group, binding, rows)
+                opened = self._open_handles(group, binding, rows) if binding.handles else rows
                 binding.view.caller = binding.plugin
                 with self._blaming(group, binding, rows):
                     binding.plugin.spawn(binding.view, opened)

@@ -58,19 +58,20 @@ class Table:
         data = self.arrays[place.dtype]
         return data[place.first : place.first + place.k] if place.k else data[place.first]
 
-    def rearrange(self, index: np.ndarray, first: int = 0) -> None:
-        """New row i is old row index[i] - first; one below 0 is a new row at the defaults."""
+    def rearrange(self, index: np.ndarray, first: int = 0) -> bool:
+        """New row i is old row index[i] - first; one below 0 is a new row at the defaults. Whether the arrays are other ones."""
         if kernels.stays(index, first, self.n):
             fresh = np.flatnonzero(index < 0)
             for dtype, values in self.defaults.items():
                 self.arrays[dtype][:, fresh] = np.array(values, DTYPES[dtype])[:, None]
-            return
+            return False
         for dtype, old in self.arrays.items():
             new = np.empty((len(old), len(index)), old.dtype)
             if len(old):
                 _GATHER[dtype](old, first, np.array(self.defaults[dtype], old.dtype)[:, None], index, new)
             self.arrays[dtype] = new
         self.n = len(index)
+        return True
 
     def copy(self) -> dict[type, np.ndarray]:
         return {dtype: array.copy() for dtype, array in self.arrays.items()}

@@ -96,6 +96,7 @@ class Index:
         self._keys = np.zeros(0, np.int64)
         self._ids = np.zeros(0, np.int64)
         self.world_start: Longs = np.zeros(1, np.int64)
+        self.row_world = self.row_id = np.zeros(1, np.int64)
         self.built = 0
         self._cache: dict[tuple[int, int], tuple[bool, int, Blocks]] = {}
         self.layout(np.zeros(0, np.int64), np.zeros(0, np.int64), 0)
@@ -104,6 +105,8 @@ class Index:
         """Take over a new table: `world` (N,) and `ids` (N,) of its rows, unique within a world. Positions come with `build`."""
         n = len(world)
         same_worlds = n_worlds == len(self.world_start) - 1
+        if same_worlds and np.array_equal(world, self.row_world) and np.array_equal(ids, self.row_id):
+            return
         old_start = self.world_start if same_worlds else np.zeros(n_worlds + 1, np.int64)
         self.world_start = np.zeros(n_worlds + 1, np.int64)
         self.members = np.zeros(n, np.int64)
@@ -115,7 +118,7 @@ class Index:
             (self._scratch, sequence), n_worlds,
         )  # fmt: skip
         self._keys, self._ids = fresh, new_ids
-        self.row_world = np.array(world, np.int64)
+        self.row_world, self.row_id = np.array(world, np.int64), np.array(ids, np.int64)
         self._placed = np.zeros((2, n), np.int64)
         self.order, self.place = self._placed
         self.points = np.zeros((3, n + LANES))

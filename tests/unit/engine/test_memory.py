@@ -9,6 +9,11 @@ from pathlib import Path
 
 import pytest
 
+from tussle import Block, Mission, Simulation
+from tussle.api import Autonomy
+from tussle.api.bodies import MOST_INDEXES
+from tussle.stock import Boids, Still, Unicycle
+
 N_GAMES = int(os.environ.get("TUSSLE_MEMORY_GAMES", "120"))
 """Games per model; the promise is about two thousand, which takes minutes."""
 MOST_GROWTH = (
@@ -18,6 +23,13 @@ MODELS = [
     "HarmonicOscillator", "SimpleAircraft", "SingleIntegrator", "Still", "External", "Unicycle", "Unicycle3D", "an author's own",
     "classes made on the fly",
 ]  # fmt: skip
+
+
+class Looker(Autonomy):
+    """Look another distance far in each step."""
+
+    def step(self, g):
+        g.near(10.0 + float(g.t[0]))
 
 
 @pytest.fixture(scope="module")
@@ -45,3 +57,25 @@ def test_all_motion_models_that_ship_are_measured():
 
     shipped = {name for name, path in manifest().items() if ".motion." in path}
     assert shipped == set(MODELS) - {"an author's own", "classes made on the fly"}
+
+
+def test_radii_that_change_at_each_reset_keep_no_index_each():
+    block = Block("boids", team=1, count=5, autonomy=[Boids()], motion=Unicycle())
+    sim = Simulation(Mission(blocks=[block], end=100.0, dt=0.1), seeds=range(4))
+    for k in range(3 * MOST_INDEXES):
+        sim.reset([k % 4], [k], {"boids.Boids.max_neighbor_range": 50.0 + k})
+        sim.step()
+    kept = sim.population.bodies._indexes
+    assert 0 < len(kept) <= MOST_INDEXES
+
+
+def test_radii_that_change_at_each_step_keep_no_index_each():
+    sim = Simulation(
+        Mission(
+            blocks=[Block("looker", team=1, count=5, autonomy=[Looker()], motion=Still())], end=100.0, dt=0.1
+        )
+    )
+    sim.step(3 * MOST_INDEXES)
+    bodies = sim.population.bodies
+    assert 0 < len(bodies._indexes) <= MOST_INDEXES
+    assert len(bodies._laid_out) <= MOST_INDEXES

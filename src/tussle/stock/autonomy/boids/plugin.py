@@ -135,8 +135,8 @@ class Boids(Autonomy):
     historic_in_view = together(historic_mates, others, team_push, other_push, where=in_view)
 
     def spawn(self, g: GroupView, rows: np.ndarray) -> None:
-        ahead = g.pos + self.goal_distance * g.forward
-        self.target[:, rows] = np.where(self.use_initial_heading, ahead, self.goal)[:, rows]
+        ahead = g.pos[:, rows] + self.goal_distance[rows] * g.forward[:, rows]
+        self.target[:, rows] = np.where(self.use_initial_heading[rows], ahead, self.goal[:, rows])
 
     def step(self, g: GroupView) -> None:
         wanted = np.empty((3, g.n))
