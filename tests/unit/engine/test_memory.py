@@ -60,10 +60,10 @@ def test_all_motion_models_that_ship_are_measured():
 
 
 def test_radii_that_change_at_each_reset_keep_no_index_each():
-    block = Block("boids", team=1, count=5, autonomy=[Boids()], motion=Unicycle())
+    block = Block(name="boids", team=1, count=5, autonomy=[Boids()], motion=Unicycle())
     sim = Simulation(Mission(blocks=[block], end=100.0, dt=0.1), seeds=range(4))
     for k in range(3 * MOST_INDEXES):
-        sim.reset([k % 4], [k], {"boids.Boids.max_neighbor_range": 50.0 + k})
+        sim.reset([k % 4], [k], {"boids.Boids.comms_range": 50.0 + k})
         sim.step()
     kept = sim.population.bodies._indexes
     assert 0 < len(kept) <= MOST_INDEXES
@@ -72,7 +72,9 @@ def test_radii_that_change_at_each_reset_keep_no_index_each():
 def test_radii_that_change_at_each_step_keep_no_index_each():
     sim = Simulation(
         Mission(
-            blocks=[Block("looker", team=1, count=5, autonomy=[Looker()], motion=Still())], end=100.0, dt=0.1
+            blocks=[Block(name="looker", team=1, count=5, autonomy=[Looker()], motion=Still())],
+            end=100.0,
+            dt=0.1,
         )
     )
     sim.step(3 * MOST_INDEXES)
