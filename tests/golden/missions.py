@@ -136,12 +136,13 @@ def births_and_radio() -> Mission:
 
 def narrow_view() -> Mission:
     """Flocking with a limited field of view, next to a flock without."""
-    flock = lambda name, limits: Block(  # noqa: E731
+    flock = lambda name, **view: Block(  # noqa: E731
         name=name, team=1, count=12, position=(0.0, 0.0, 100.0), variance=(900.0, 900.0, 100.0), heading_variance=1.0,
-        autonomy=Boids(limits_view=limits, fov_az="150 deg", fov_el="60 deg", comms_range=70.0), controller=DirectController(),
+        autonomy=Boids(comms_range=70.0, **view), controller=DirectController(),
         motion=Unicycle(vel_max=25.0, turn_rate_max=1.0, pitch_rate_max=0.5),
     )  # fmt: skip
-    return Mission(blocks=[flock("narrow", True), flock("wide", False)], motion_multiplier=3, end=5.0)
+    narrow = flock("narrow", fov_az="150 deg", fov_el="60 deg")
+    return Mission(blocks=[narrow, flock("wide")], motion_multiplier=3, end=5.0)
 
 
 def slow_clocks() -> Mission:

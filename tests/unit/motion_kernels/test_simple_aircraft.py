@@ -17,6 +17,14 @@ def limits(n, **changed):
     return p
 
 
+def published(x, u, p):
+    """What is published of states x: position, quaternion, velocity, turn rate, (13, n)."""
+    out = np.full((13, x.shape[1]), np.nan)
+    bounds = p[ROLL_MAX], p[PITCH_MAX], p[ROLL_RATE_MAX], p[PITCH_RATE_MAX]
+    kernels.to_body(x, (u[1], u[2]), bounds, (p[RADIUS], p[SLOPE], p[TARGET]), tuple(out))
+    return out
+
+
 def rk4(x, u, p, dt, substeps):
     """The textbook method, in NumPy; limits are not looked at."""
 
@@ -120,14 +128,29 @@ def test_steady_bank_flies_a_circle_of_the_turning_radius():
 
 def test_published_velocity_is_that_of_the_path_and_bank_is_right_wing_down():
     x, u, p = many(25)
-    out = np.full((10, 25), np.nan)
-    kernels.to_body(x, *out)
+    out = published(x, u, p)
     y = x.copy()
     kernels.advance(y, 0.0 * u, p, 1e-7, 1)
-    assert np.abs((y - x)[:3] / 1e-7 - out[7:]).max() < 1e-5
+    assert np.abs((y - x)[:3] / 1e-7 - out[7:10]).max() < 1e-5
     assert np.abs(out[3:7] - quat_from_euler(-x[3], -x[4], x[5])).max() < 1e-15
     nose = quat_rotate(out[3:7], np.array([[1.0], [0.0], [0.0]]) + 0.0 * x[:3])
-    assert np.abs(nose * x[6] - out[7:]).max() < 1e-12
+    assert np.abs(nose * x[6] - out[7:10]).max() < 1e-12
+
+
+def test_published_turn_rate_is_that_of_the_attitude():
+    x, u, p = many(25)
+    p[SLOPE] = 0.0
+    x[3, :5], u[1, :5] = p[ROLL_MAX, :5], 1.0  # the bank is at its limit and stays there
+    x[4, 5:9], u[2, 5:9] = -p[PITCH_MAX, 5:9], -1.0
+    before = published(x, u, p)
+    h = 1e-6
+    kernels.advance(x, u, p, h, 1)
+    rate = (published(x, u, p)[3:7] - before[3:7]) / h
+    # q' = omega q / 2 with omega in the world frame, so omega is the vector part of 2 q' q*
+    w, v = before[3], before[4:7]
+    omega = 2.0 * (-rate[0] * v + w * rate[1:] - np.cross(rate[1:], v, axis=0))
+    assert np.abs(before[10:]).max() > 0.5
+    assert np.abs(omega - before[10:]).max() < 1e-4
 
 
 def test_bits_do_not_depend_on_place():
@@ -135,14 +158,12 @@ def test_bits_do_not_depend_on_place():
     p[ROLL_MAX, ::5] = 0.3
     whole = x.copy()
     kernels.advance(whole, u, p, 0.1, 3)
-    out = np.empty((10, 150))
-    kernels.to_body(whole, *out)
+    out = published(whole, u, p)
     for width in range(1, 38):
         for first in range(0, 150 - width, width):
             rows = slice(first, first + width)
             part = np.ascontiguousarray(x[:, rows])
             kernels.advance(part, np.ascontiguousarray(u[:, rows]), np.ascontiguousarray(p[:, rows]), 0.1, 3)
-            shown = np.empty((10, width))
-            kernels.to_body(part, *shown)
+            shown = published(part, np.ascontiguousarray(u[:, rows]), np.ascontiguousarray(p[:, rows]))
             assert np.array_equal(part, whole[:, rows])
             assert np.array_equal(shown, out[:, rows])

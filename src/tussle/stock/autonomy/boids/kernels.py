@@ -6,6 +6,8 @@ One step: the plugin's neighbour laws, with the historic means `historic_means`,
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from tussle.neighbors.lanes import LANES, choose, inverse_sqrt, load_some, splat, store_some
@@ -74,6 +76,15 @@ def length(x, y, z):
     """Length of (x, y, z)."""
     square = x * x + y * y + z * z
     return square * inverse_sqrt(square)
+
+
+@kernel("F F -> b1")
+def sees_all(fov_az, fov_el):
+    """Whether fields of view [rad], (n,) each, leave nobody out, so that none has to be looked at."""
+    for i in range(fov_az.shape[0]):
+        if fov_az[i] < 2.0 * math.pi or fov_el[i] <= math.pi:
+            return False
+    return True
 
 
 @kernel("(F F F) F2 F2 (F F F F F F) F2w")

@@ -55,7 +55,6 @@ class Boids(Autonomy):
     goal_distance = Param(AHEAD, unit="m", ge=0.0, doc="How far.")
     goal = Param((1e6, 1e6, 1e3), fields="x y z", unit="m", doc="The goal otherwise.")
     means = Param("team", choices=("team", "historic"), doc="How heading and centroid are averaged.")
-    limits_view = Param(False, structural=True, doc="Heed fov_az and fov_el.")
     target = State("x y z", unit="m", doc="The goal in force.")
     speed = Output(unit="m/s")
     turn_rate = Output(unit="rad/s")
@@ -141,11 +140,12 @@ class Boids(Autonomy):
     def step(self, g: GroupView) -> None:
         wanted = np.empty((3, g.n))
         pos = _, _, z = tuple(g.pos)
+        sees_all = kernels.sees_all(self.fov_az, self.fov_el)
         if self.means == "historic":
-            seen = (self.historic_in_view if self.limits_view else self.historic)(g).values
+            seen = (self.historic if sees_all else self.historic_in_view)(g).values
             kernels.historic_means(pos, seen)
         else:
-            seen = (self.seen_in_view if self.limits_view else self.seen)(g).values
+            seen = (self.seen if sees_all else self.seen_in_view)(g).values
         weights = (
             self.max_speed, self.goal_weight, self.avoid_team_weight, self.avoid_nonteam_weight, self.centroid_weight,
             self.align_weight,

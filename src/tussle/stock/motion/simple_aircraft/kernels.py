@@ -135,16 +135,28 @@ def advance(x, u, p, dt, substeps):
         speed[first:last] = v0[:m]
 
 
-@kernel("F2 Fw Fw Fw Fw Fw Fw Fw Fw Fw Fw")
-def to_body(x, east, north, up, qw, qx, qy, qz, vx, vy, vz):
-    """Publish position, attitude and velocity.
+@device
+def effective(value, rate, rate_max, limit):
+    """The rate [rad/s] at which a value goes on: none beyond its limit."""
+    held = hold(rate, -rate_max, rate_max)
+    return 0.0 if (value >= limit and held > 0.0) or (value <= -limit and held < 0.0) else held
+
+
+@kernel("F2 (F F) (F F F F) (F F F) (Fw Fw Fw Fw Fw Fw Fw Fw Fw Fw Fw Fw Fw)")
+def to_body(x, rates, limits, circle, body):
+    """Publish position, attitude, velocity and turn rate.
 
     Args:
         x: State as in `advance`, (7, n).
-        east, north, up: Position [m], (n,), written.
-        qw, qx, qy, qz: Quaternion body to world, (n,), written.
-        vx, vy, vz: Velocity [m/s], (n,), world frame, written.
+        rates: roll_rate, pitch_rate [rad/s], (n,) each.
+        limits: max_roll, max_pitch [rad], max_roll_rate, max_pitch_rate [rad/s], (n,) each.
+        circle: turning_radius [m], radius_slope_per_speed [s], speed_target [m/s], (n,) each.
+        body: Position [m], quaternion, velocity [m/s] and turn rate [rad/s] in the world frame, thirteen (n,), written.
     """
+    roll_rate, pitch_rate = rates
+    roll_max, pitch_max, roll_rate_max, pitch_rate_max = limits
+    radius, slope, target = circle
+    east, north, up, qw, qx, qy, qz, vx, vy, vz, wx, wy, wz = body
     east[:] = x[0]
     north[:] = x[1]
     up[:] = x[2]
@@ -179,3 +191,20 @@ def to_body(x, east, north, up, qw, qx, qy, qz, vx, vy, vz):
             vx[i] = level * (cy * cy - sy * sy)
             vy[i] = level * (2.0 * sy * cy)
             vz[i] = speed[i] * (-2.0 * sp * cp)
+        for l in range(m):  # turns about the vertical, the level left axis and the body x axis
+            i = first + l
+            sr, cr = sine[l], cosine[l]
+            sp, cp = (
+                -2.0 * sine[m + l] * cosine[m + l],
+                cosine[m + l] * cosine[m + l] - sine[m + l] * sine[m + l],
+            )
+            sy, cy = (
+                2.0 * sine[2 * m + l] * cosine[2 * m + l],
+                cosine[2 * m + l] * cosine[2 * m + l] - sine[2 * m + l] * sine[2 * m + l],
+            )
+            banked = -effective(roll[i], roll_rate[i], roll_rate_max[i], roll_max[i])
+            lowered = -effective(pitch[i], pitch_rate[i], pitch_rate_max[i], pitch_max[i])
+            turned = turning(-2.0 * sr * cr, cr * cr - sr * sr, speed[i], radius[i], slope[i], target[i])
+            wx[i] = banked * (cp * cy) - lowered * sy
+            wy[i] = banked * (cp * sy) + lowered * cy
+            wz[i] = banked * sp + turned

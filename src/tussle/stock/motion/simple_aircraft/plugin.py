@@ -68,5 +68,8 @@ class SimpleAircraft(MotionModel):
         x[6, rows] = np.clip(speed, self.min_velocity[rows], self.max_velocity[rows])
 
     def to_body(self, body: MotionBody) -> None:
-        """Publish position, attitude and velocity."""
-        kernels.to_body(self.x, *body.pos, *body.quat, *body.vel)
+        """Publish position, attitude, velocity and turn rate."""
+        rates = self.roll_rate, self.pitch_rate
+        limits = self.max_roll, self.max_pitch, self.max_roll_rate, self.max_pitch_rate
+        circle = self.turning_radius, self.radius_slope_per_speed, self.speed_target
+        kernels.to_body(self.x, rates, limits, circle, body.rows)
