@@ -47,6 +47,7 @@ class TopicBuffer:
         name: The topic's name.
         type: The message type.
         inboxes: Receiving ends.
+        is_published: Some plugin of the mission publishes it.
     """
 
     def __init__(self, network: str, name: str, type_: type[Message]) -> None:
@@ -56,6 +57,7 @@ class TopicBuffer:
         self.sent: list[Batch] = []
         self.queue: list[Parcel] = []
         self.inboxes: list[Inbox] = []
+        self.is_published = False
         self._joined: Batch | None = None
 
     def add(self, batch: Batch) -> None:
@@ -226,6 +228,7 @@ class Publisher:
 
     def __init__(self, topic: TopicBuffer, view: Any) -> None:
         self.topic = topic
+        topic.is_published = True
         self.view = view
 
     def publish(self, rows: Any, **fields: Any) -> None:

@@ -56,6 +56,21 @@ class Mail:
         """Topic under the type's own name, for what the world says."""
         return self.topic(network, type_.__name__, type_, "world")
 
+    def unheard(self) -> list[str]:
+        """A sentence for each topic that some publish on one network and others listen to on another only."""
+        topics = self.topics.values()
+        return [
+            f"{said.name!r} is published on network {said.network!r} and listened to on {heard.network!r}, so nobody hears it; "
+            "the network of a Publish and of its Subscribe must be one"
+            for heard in topics
+            for said in topics
+            if said.name == heard.name
+            and heard.inboxes
+            and not said.inboxes
+            and said.is_published
+            and not heard.is_published
+        ]
+
     def deliver(self) -> None:
         """Route what was published in this step, and hand over what is due."""
         step = self.sim.context.clock.step

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Self
 
@@ -100,6 +101,8 @@ class Simulation:
         try:
             self.reset(range(n))
             self._schedule: list[Call] | None = Schedule(self).compose()
+            for text in self.mail.unheard():
+                warnings.warn(text, RuntimeWarning, stacklevel=2)
         except Exception:
             self.close()
             raise

@@ -14,7 +14,7 @@ from typing import Any
 from tussle import stock
 from tussle.api import Autonomy, Behavior, Controller, Interaction, Metric, MotionModel, Network, Sensor
 from tussle.api.plugin import Plugin
-from tussle.errors import MissionError, listed, nearest_name
+from tussle.errors import MissionError, nearest_name
 from tussle.mission.plugin_files import PluginFile
 
 KINDS: dict[str, type] = {
@@ -98,7 +98,8 @@ class Catalogue:
             if name in historic_names():
                 raise AbsentPluginError(f"{name} is not in tussle yet")
             raise MissionError(
-                f"there is no plugin {name[:80]!r}{nearest_name(name[:80], self.names)}; {listed(self.names)}"
+                f"there is no plugin {name[:80]!r}{nearest_name(name[:80], self.names)}; `tussle plugins` lists them, "
+                "and --plugin-path FILE brings those of a file"
             )
         offer = self._offers[name][-1]
         try:

@@ -58,3 +58,27 @@ def test_a_run_that_was_cut_is_plotted_and_it_is_said(tussle, played):
     said = tussle("plot", "played", "--kind", "left")
     assert "note: run.json is not there: the run goes on, or was cut short" in said.stderr
     assert said.stdout == "played/plots/left.png\n"
+
+
+def test_a_run_with_a_plugin_of_ones_own_is_noted_in_one_line(tussle, folder):
+    (folder / "mine.py").write_text(
+        'from tussle.stock import Predator\n\n\nclass Mine(Predator):\n    """Mine."""\n'
+    )
+    tussle(
+        "run",
+        "predator_prey",
+        "--end",
+        "1",
+        "--plugin-path",
+        "mine.py",
+        "--set",
+        "keepers.autonomy=Mine",
+        "--out",
+        "mine",
+    )
+    notes = tussle("plot", "mine").stderr.splitlines()
+    assert len(notes) == 1
+    assert "there is no plugin 'Mine'" in notes[0]
+    assert len(notes[0]) < 300
+    said = tussle("plot", "mine", "--plugin-path", "mine.py", "--out", "again")
+    assert said.stderr == ""

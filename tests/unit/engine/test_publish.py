@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from tussle import Block, Mission, Recorder, Simulation, load_run
-from tussle.api import Autonomy, Interaction, Output, State, Subscribe
+from tussle.api import Autonomy, Interaction, Output, Publish, State, Subscribe
 from tussle.errors import ParameterError, WiringError
 from tussle.messages import CustomKeyPress, WorldPointClicked
-from tussle.stock import SingleIntegrator
+from tussle.stock import GlobalNetwork, LocalNetwork, SingleIntegrator, Still
 
 
 class GoWhereClicked(Autonomy):
@@ -142,3 +142,29 @@ def test_steps_that_are_replayed_are_recorded_once(tmp_path):
     assert one.trajectory_table == two.trajectory_table
     assert one.events_table == two.events_table
     assert two.is_complete
+
+
+class Calls(Autonomy):
+    """Call every step."""
+
+    said = Publish(CustomKeyPress, network="LocalNetwork")
+
+    def step(self, g):
+        self.said.publish(np.arange(g.n), key="a")
+
+
+class Hears(Autonomy):
+    """Listen on another network."""
+
+    said = Subscribe(CustomKeyPress, network="GlobalNetwork")
+
+    def step(self, g):
+        assert not self.said
+
+
+def test_a_pair_on_two_networks_is_told():
+    block = Block(name="pair", team=1, count=2, autonomy=[Calls(), Hears()], motion=Still())
+    mission = Mission(blocks=[block], networks=[LocalNetwork(), GlobalNetwork()], end=1.0)
+    text = r"'CustomKeyPress' is published on network 'LocalNetwork' and listened to on 'GlobalNetwork', so nobody hears it"
+    with pytest.warns(RuntimeWarning, match=text):
+        Simulation(mission)
