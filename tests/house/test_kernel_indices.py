@@ -14,7 +14,20 @@ from tree import parsed, python_files, relative
 
 ENGINE_INDICES = {
     *("order", "place", "places", "queries", "index"),
-    *("world", "row_world", "target_row", "claim_place", "mates", "near", "row", "wanted", "other", "ids"),
+    *(
+        "world",
+        "row_world",
+        "target_row",
+        "claim_place",
+        "mates",
+        "near",
+        "row",
+        "wanted",
+        "other",
+        "ids",
+        "fresh",
+        "source",
+    ),
     *("id_start", "block_first", "span_first", "span_start", "span_end"),
 }
 """Arrays that the engine fills with rows, places and offsets of its own tables."""

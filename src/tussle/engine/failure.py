@@ -12,7 +12,7 @@ import numpy as np
 from tussle.api.bodies import Bodies
 from tussle.api.group import GroupView
 from tussle.engine.group import Binding, Group
-from tussle.errors import PluginError
+from tussle.errors import PluginError, TussleError
 
 _OWN = str(Path(__file__).resolve().parents[1])
 
@@ -34,6 +34,12 @@ def _place_of(error: BaseException, plugin: Any) -> str:
 
 def raised(error: BaseException, plugin: Any, *, where: str, step: int, world: int | None) -> PluginError:
     """The error that a plugin has raised; its traceback begins where the plugin's code does."""
+    if isinstance(error, TussleError) and all(
+        frame.filename.startswith(_OWN) for frame in traceback.extract_tb(error.__traceback__)
+    ):  # ours about the plugin, which says itself where
+        return PluginError(
+            str(error), where=where, step=step, world=world, plugin=plugin.instance_name, cause=error
+        )
     place = error.__traceback__
     while (
         place is not None and place.tb_frame.f_code.co_filename.startswith(_OWN) and place.tb_next is not None

@@ -46,10 +46,10 @@ def turn(seeds, stream, place, heading_sd, motion, vel, quat):
 
 
 @kernel("I Iw Iw Iw Iw")
-def number(worlds, next_id, n_born, ids, places):
+def number(world, next_id, n_born, ids, places):
     """Give each newborn, (m,), of a block the next id of its world and the next place in the block; both count on."""
-    for i in range(worlds.shape[0]):
-        w = worlds[i]
+    for i in range(world.shape[0]):
+        w = world[i]
         ids[i], places[i] = next_id[w], n_born[w]
         next_id[w] += 1
         n_born[w] += 1

@@ -13,7 +13,8 @@ import re
 import sys
 import threading
 import types
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache, update_wrapper
 from typing import Any, ClassVar, Self
@@ -21,7 +22,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from tussle.numeric import store
-from tussle.numeric.fingerprint import Fingerprint
+from tussle.numeric.fingerprint import Fingerprint, package
 
 Code = str | tuple[str, ...]
 FORMAT = 1  # of the files; part of every key
@@ -119,6 +120,36 @@ def renamed(function: Any, key: str) -> types.FunctionType:
     return copy
 
 
+def is_interpreted(function: Callable[..., Any]) -> bool:
+    """Whether NUMBA_DISABLE_JIT asks for a function to be run as the Python that it is, to be debugged; ours stay compiled."""
+    if package(function) == "tussle":
+        return False
+    from numba.core import config
+
+    return bool(vars(config)["DISABLE_JIT"])
+
+
+@contextmanager
+def compiling() -> Iterator[None]:
+    """Have Numba compile, whatever NUMBA_DISABLE_JIT says."""
+    from numba.core import config
+
+    settings = vars(config)
+    asked, settings["DISABLE_JIT"] = settings["DISABLE_JIT"], 0
+    try:
+        yield
+    finally:
+        settings["DISABLE_JIT"] = asked
+
+
+def jitted(function: Callable[..., Any], **options: Any) -> Any:
+    """Numba's dispatcher of a function."""
+    from numba import njit
+
+    with compiling():
+        return njit(**options)(function)
+
+
 class Device:
     """A small function that kernels call; compiled into its callers, with no file of its own.
 
@@ -145,10 +176,8 @@ class Device:
     def dispatcher(self) -> Any:
         """Numba's dispatcher, made when first asked for."""
         if self._dispatcher is None:
-            from numba import njit
-
             self._digest = Fingerprint(self.py_func).digest
-            self._dispatcher = njit(**self.options)(renamed(self.py_func, self._digest))
+            self._dispatcher = jitted(renamed(self.py_func, self._digest), **self.options)
         return self._dispatcher
 
     @property
@@ -157,7 +186,10 @@ class Device:
         return self.dispatcher._numba_type_
 
     def __call__(self, *args: Any) -> Any:
-        return self.dispatcher(*args)
+        if is_interpreted(self.py_func):
+            return self.py_func(*args)
+        with compiling():  # of types that it meets for the first time
+            return self.dispatcher(*args)
 
 
 def device(function: Callable[..., Any]) -> Any:
@@ -253,9 +285,7 @@ class Kernel(Device):
         return "\n".join(dispatcher.inspect_asm().values())
 
     def _new_dispatcher(self, key: str) -> Any:
-        from numba import njit
-
-        return njit(nogil=True, **self.options)(renamed(self.py_func, key))
+        return jitted(renamed(self.py_func, key), nogil=True, **self.options)
 
     def _build(self) -> None:
         from numba.core.compiler_lock import global_compiler_lock
@@ -285,7 +315,8 @@ class Kernel(Device):
             for holder in reached.holders:
                 if isinstance(holder, Device):
                     holder.refresh()
-            main.compile(self.types)
+            with compiling():
+                main.compile(self.types)
             result = next(iter(main.overloads.values()))
             stats.compiled += 1
             if not reached.opaque:
@@ -308,6 +339,8 @@ class Kernel(Device):
         return self._compiled.entry_point
 
     def __call__(self, *args: Any, **named: Any) -> Any:
+        if is_interpreted(self.py_func):
+            return self.py_func(*args, **named)
         self._build()
         return self._main(*args, **named)
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tussle.errors import DeclarationError, listed, nearest_name
-from tussle.numeric.kernel import Device, Kernel, device, kernel
+from tussle.numeric.kernel import Device, Kernel, device, is_interpreted, kernel
 
 Floats = NDArray[np.float64]
 DERIVATIVE = "Fw Fw Fw Fw"  # x (m,), u (k,), p (q,), dx (m,)
@@ -57,6 +57,7 @@ def compile_derivative(
     wrapper = scope["derivative"]
     wrapper.__module__ = function.__module__
     wrapper.__qualname__ = f"{function.__qualname__}.wrapper"
+    wrapper.states = tuple(x_names)
     return kernel(DERIVATIVE)(wrapper)
 
 
@@ -91,8 +92,13 @@ def driver() -> Kernel:
 
         return types.none(types.uint64, array, array, array, array), generate
 
-    @kernel("u8 F2w F2 F2 f8 i8")
-    def rk4_rows(address, states, inputs, params, dt, substeps):  # type: ignore[no-untyped-def]
+    return kernel("u8 F2w F2 F2 f8 i8")(integrating(call))
+
+
+def integrating(call: Callable[..., Any]) -> Callable[..., Any]:
+    """The integrating function; `call` calls the derivative that it is given."""
+
+    def rk4_rows(derivative, states, inputs, params, dt, substeps):  # type: ignore[no-untyped-def]
         m, n = states.shape
         h = dt / substeps
         x = np.empty(m)
@@ -111,16 +117,16 @@ def driver() -> Kernel:
             for j in range(p.shape[0]):
                 p[j] = params[j, i]
             for _ in range(substeps):
-                call(address, x, u, p, k1)
+                call(derivative, x, u, p, k1)
                 for j in range(m):
                     y[j] = x[j] + 0.5 * h * k1[j]
-                call(address, y, u, p, k2)
+                call(derivative, y, u, p, k2)
                 for j in range(m):
                     y[j] = x[j] + 0.5 * h * k2[j]
-                call(address, y, u, p, k3)
+                call(derivative, y, u, p, k3)
                 for j in range(m):
                     y[j] = x[j] + h * k3[j]
-                call(address, y, u, p, k4)
+                call(derivative, y, u, p, k4)
                 for j in range(m):
                     x[j] = x[j] + h / 6.0 * (k1[j] + 2.0 * k2[j] + 2.0 * k3[j] + k4[j])
             for j in range(m):
@@ -144,6 +150,7 @@ def rk4(
 
     Raises:
         ValueError: The arrays differ in their number of rows, or there is no substep.
+        DeclarationError: The derivative cannot be compiled.
     """
     if not states.shape[1] == inputs.shape[1] == params.shape[1]:
         raise ValueError(
@@ -151,4 +158,31 @@ def rk4(
         )
     if substeps < 1:
         raise ValueError(f"rk4: substeps must be at least 1, not {substeps}")
-    driver()(derivative.address, states, inputs, params, dt, substeps)
+    if is_interpreted(derivative.py_func):
+        integrating(lambda each, *arrays: each(*arrays))(derivative, states, inputs, params, dt, substeps)
+    else:
+        driver()(address_of(derivative), states, inputs, params, dt, substeps)
+
+
+def address_of(derivative: Kernel) -> int:
+    """Address of a compiled derivative.
+
+    Raises:
+        DeclarationError: It does not compile.
+    """
+    from numba.core.errors import NumbaError
+
+    try:
+        return derivative.address
+    except NumbaError as error:
+        wrapper = derivative.py_func
+        function, states = wrapper.__globals__["function"].py_func, wrapper.states  # type: ignore[attr-defined]
+        try:
+            found = np.atleast_1d(function(*[1.0] * len(inspect.signature(function).parameters)))
+        except Exception:  # noqa: BLE001 - what it does with ones tells nothing then
+            found = np.empty(len(states))
+        if len(found) != len(states):
+            text = f"returns {len(found)} derivatives; there are {len(states)} states: {', '.join(states)}"
+        else:
+            text = f"cannot be compiled: {error}"
+        raise DeclarationError(f"{label(function)} {text}") from error

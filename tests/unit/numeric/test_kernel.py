@@ -603,3 +603,21 @@ def test_a_tuple_of_arrays_is_one_argument():
         shared(own, (out[0], own[0]), 0)
     with pytest.raises(TypeError, match=r"argument 'own' must be a tuple of 2: .*, not ndarray"):
         shared(own[0], out, 0)
+
+
+def test_without_jit_an_authors_kernels_run_as_python_with_the_same_bits():
+    def played(**more):
+        script = Path(__file__).with_name("kernels_in_python.py")
+        done = subprocess.run(
+            [sys.executable, "-W", "error", script],
+            env={**os.environ, **more},
+            check=True,
+            capture_output=True,
+            text=True,
+        )
+        return done.stdout.splitlines()
+
+    compiled, interpreted = played(), played(NUMBA_DISABLE_JIT="1")
+    assert "half" not in compiled[0]
+    assert interpreted[0] == "derivative drive half"
+    assert compiled[1] == interpreted[1]

@@ -109,3 +109,21 @@ def test_rows_that_do_not_match_and_no_substeps_are_refused():
         rk4(derivative, np.ones((1, 2)), NONE, np.empty((0, 2)), 1.0)
     with pytest.raises(ValueError, match="at least 1, not 0"):
         rk4(derivative, np.ones((1, 1)), NONE, NONE, 1.0, 0)
+
+
+def test_a_derivative_of_another_length_is_told():
+    def car(x, v):
+        return v
+
+    with pytest.raises(
+        DeclarationError, match=r"test_rk4.py:\d+: .*car returns 1 derivatives; there are 2 states: x, v"
+    ):
+        rk4(compile_derivative(car, ["x", "v"], [], []), np.ones((2, 1)), NONE, NONE, 1.0)
+
+
+def test_a_derivative_that_does_not_compile_is_told():
+    def strange(x):
+        return {"x": x}["x"].hex()
+
+    with pytest.raises(DeclarationError, match=r"test_rk4.py:\d+: .*strange cannot be compiled: "):
+        rk4(compile_derivative(strange, ["x"], [], []), np.ones((1, 1)), NONE, NONE, 1.0)
