@@ -13,6 +13,7 @@ import sys
 import tempfile
 
 from pages import OUTPUT, PAGES, examples, namespace, printed_by
+from reference import PAGE, reference
 
 
 def game() -> str:
@@ -42,6 +43,7 @@ def main() -> None:
                 text = text.replace(old, new)
         text = OUTPUT.sub(lambda shown: f"{shown[1]}{game()}```", text)
         page.write_text(text)
+    PAGE.write_text(reference())
 
 
 if __name__ == "__main__":
