@@ -69,10 +69,12 @@ class Numbers(Column):
         fields: Names of the components; empty for a column that is one number a row.
         units: Unit of each component.
         dtype: float, int or bool.
+        ragged: It is a list per row, of any length, of items with these components; its array is a `RaggedColumn`.
     """
 
-    def __init__(self, fields: str, unit: str, dtype: type, doc: str) -> None:
+    def __init__(self, fields: str, unit: str, dtype: type, doc: str, ragged: bool = False) -> None:
         super().__init__(doc=doc)
+        self.ragged = ragged
         self.fields = _fields(fields, type(self).__name__)
         self.unit = unit
         self.units = units.split_units(unit, max(1, len(self.fields)))
@@ -88,7 +90,7 @@ class Numbers(Column):
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Shape of one row's value: () or (k,)."""
+        """Shape of one row's value, of a list of each item: () or (k,)."""
         return (len(self.fields),) if self.fields else ()
 
 
@@ -130,11 +132,10 @@ class Param(Numbers):
         dtype: type = bool if isinstance(default, bool) else int if isinstance(default, int) else float
         if dtype is int and unit:
             dtype = float  # whoever writes Param(35, unit="m/s") does not mean that 35.5 is not a speed
-        super().__init__(fields, unit, dtype, doc)
+        super().__init__(fields, unit, dtype, doc, ragged)
         self.text_units = units.split_units(text_unit or unit, max(1, len(self.fields)))
         self.ge, self.gt, self.le, self.lt = ge, gt, le, lt
         self.choices = tuple(choices)
-        self.ragged = ragged
         self.structural = structural or self.is_text
         self.default = self.convert(default, "default")
 
@@ -262,6 +263,7 @@ class State(Numbers):
         default: Value of a new row.
         dtype: float, int or bool.
         per: "entity"; for world plugins also "world" or "team".
+        ragged: A list per entity, which begins empty; `fields` are those of an item.
         doc: One line that says what it is.
     """
 
@@ -272,11 +274,16 @@ class State(Numbers):
         default: float = 0.0,
         dtype: type = float,
         per: str = "entity",
+        ragged: bool = False,
         doc: str = "",
     ) -> None:
-        super().__init__(fields, unit, dtype, doc)
+        super().__init__(fields, unit, dtype, doc, ragged)
         if per not in PER:
             raise DeclarationError(f"State: per={per!r} is not one of {', '.join(PER)}")
+        if ragged and (per != "entity" or default):
+            raise DeclarationError(
+                "State: a list (ragged=True) is one per entity and begins empty; it takes no per or default"
+            )
         self.default = default
         self.per = per
 
@@ -284,13 +291,24 @@ class State(Numbers):
 class Channel(Numbers):
     """A column that is wired to other plugins by the names of its channels; abstract."""
 
-    def __init__(self, channels: str, unit: str, doc: str) -> None:
-        super().__init__(channels, unit, float, doc)
+    def __init__(self, channels: str, unit: str, ragged: bool, fields: str, doc: str) -> None:
+        kind = type(self).__name__
+        names = _fields(channels, kind)
+        if fields and not ragged:
+            raise DeclarationError(
+                f"{kind}: fields={fields!r} are the components of a list's items and need ragged=True; channels are named first"
+            )
+        if ragged and len(names) > 1:
+            raise DeclarationError(
+                f"{kind}: a list is one channel, not {len(names)}; name the components of its items with fields={channels!r}"
+            )
+        super().__init__(fields if ragged else channels, unit, float, doc, ragged)
+        self._names = names
 
     @property
     def channels(self) -> tuple[str, ...]:
         """Names of the channels: those given, else the attribute's own name."""
-        return self.fields or (self.name,)
+        return self._names or (self.name,)
 
 
 class Input(Channel):
@@ -298,16 +316,21 @@ class Input(Channel):
 
     Args:
         channels: Names of the channels where they differ from the attribute or are several.
-        unit: SI unit, or one per channel.
-        optional: Nobody need write it; then it stays at `default`.
-        default: Value until somebody writes it.
+        unit: SI unit, or one per channel or field.
+        optional: Nobody need write it; then it stays at `default`, a list empty.
+        default: Value until somebody writes it; lists take none.
+        ragged: One channel whose value is a list per entity, (k, m).
+        fields: Names of the k components of a list's items; none for a list of numbers.
         doc: One line that says what it is.
     """
 
     def __init__(
-        self, channels: str = "", unit: str = "", optional: bool = False, default: float = 0.0, doc: str = ""
-    ) -> None:
-        super().__init__(channels, unit, doc)
+        self, channels: str = "", unit: str = "", optional: bool = False, default: float = 0.0, ragged: bool = False,
+        fields: str = "", doc: str = "",
+    ) -> None:  # fmt: skip
+        super().__init__(channels, unit, ragged, fields, doc)
+        if ragged and default:
+            raise DeclarationError("Input: a list (ragged=True) begins empty; it takes no default")
         self.optional = optional
         self.default = default
 
@@ -315,8 +338,10 @@ class Input(Channel):
 class Output(Channel):
     """Values that this plugin writes for others of its entity; same arguments as `Input`."""
 
-    def __init__(self, channels: str = "", unit: str = "", doc: str = "") -> None:
-        super().__init__(channels, unit, doc)
+    def __init__(
+        self, channels: str = "", unit: str = "", ragged: bool = False, fields: str = "", doc: str = ""
+    ) -> None:
+        super().__init__(channels, unit, ragged, fields, doc)
         self.default = 0.0
 
 
@@ -327,13 +352,6 @@ class EntityRef(Numbers):
         super().__init__("", "", int, doc)
         self.default = 0
         self.per = "entity"
-
-
-class Ragged(Numbers):
-    """A list per row, of any length: `start` (n + 1,) and `data` (k, total) or (total,)."""
-
-    def __init__(self, fields: str = "", unit: str = "", dtype: type = float, doc: str = "") -> None:
-        super().__init__(fields, unit, dtype, doc)
 
 
 class Handle(Column):
@@ -358,10 +376,12 @@ class Children(Column):
 
 
 class Field(Numbers):
-    """A field of a message type."""
+    """A field of a message type; with `ragged` a list of items, (k, m) or (m,) per message."""
 
-    def __init__(self, fields: str = "", unit: str = "", dtype: type = float, doc: str = "") -> None:
-        super().__init__(fields, unit, dtype, doc)
+    def __init__(
+        self, fields: str = "", unit: str = "", dtype: type = float, ragged: bool = False, doc: str = ""
+    ) -> None:
+        super().__init__(fields, unit, dtype, doc, ragged)
         self.default = 0
 
 
@@ -401,64 +421,3 @@ class Publish(Topic):
 
 class Subscribe(Topic):
     """The receiving end of a topic."""
-
-
-class RaggedColumn:
-    """The array of a `Ragged` (or ragged `Param`): row i owns data[..., start[i]:start[i + 1]].
-
-    Attributes:
-        start: First item of each row and the end, (n + 1,), int64.
-        data: Items, (total,) or (k, total).
-    """
-
-    def __init__(self, start: np.ndarray, data: np.ndarray) -> None:
-        self.start = start
-        self.data = data
-
-    @classmethod
-    def empty(cls, n: int, declaration: Numbers) -> RaggedColumn:
-        """All rows without items."""
-        shape = (*declaration.shape, 0)
-        return cls(np.zeros(n + 1, np.int64), np.zeros(shape, np.dtype(declaration.dtype)))
-
-    @classmethod
-    def from_rows(cls, rows: list[Any], declaration: Numbers) -> RaggedColumn:
-        """From one sequence per row, each of shape (m, k) or (m,)."""
-        column = cls.empty(len(rows), declaration)
-        parts = [np.asarray(r, column.data.dtype).reshape(-1, *declaration.shape).T for r in rows]
-        column.set(
-            np.cumsum([0, *[p.shape[-1] for p in parts]]), np.concatenate([column.data, *parts], axis=-1)
-        )
-        return column
-
-    def set(self, start: np.ndarray, data: np.ndarray) -> None:
-        """Replace all lists.
-
-        Raises:
-            ValueError: start does not fit the number of rows, or does not end at the number of items.
-        """
-        start = np.ascontiguousarray(start, np.int64)
-        data = np.ascontiguousarray(data, self.data.dtype)
-        if start.shape != self.start.shape or data.shape[:-1] != self.data.shape[:-1]:
-            raise ValueError(
-                f"start is {start.shape} and data {data.shape}; needed {self.start.shape} and {self.data.shape[:-1]} + (total,)"
-            )
-        if start[0] != 0 or start[-1] != data.shape[-1] or (np.diff(start) < 0).any():
-            raise ValueError(f"start must rise from 0 to the number of items, {data.shape[-1]}")
-        self.start, self.data = start, data
-
-    def __getitem__(self, row: int) -> np.ndarray:
-        return self.data[..., self.start[row] : self.start[row + 1]]
-
-    def __len__(self) -> int:
-        return len(self.start) - 1
-
-    def take(self, index: np.ndarray) -> RaggedColumn:
-        """Lists of the rows `index`; -1 gives an empty list."""
-        kept = np.where(index >= 0, index, 0)
-        first = self.start[kept] if len(self) else np.zeros(len(index), np.int64)
-        length = np.where(index >= 0, (self.start[kept + 1] if len(self) else first) - first, 0)
-        start = np.zeros(len(index) + 1, np.int64)
-        np.cumsum(length, out=start[1:])
-        items = np.repeat(first - start[:-1], length) + np.arange(start[-1])
-        return RaggedColumn(start, np.ascontiguousarray(self.data[..., items]))

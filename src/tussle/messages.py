@@ -7,14 +7,16 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from tussle.columns import Column, EntityRef, Field, Handle, Numbers, Ragged, RaggedColumn
+from tussle.columns import Column, EntityRef, Field, Handle, Numbers
 from tussle.errors import DeclarationError, ParameterError, listed, nearest_name
+from tussle.lists import RaggedColumn
 
 
 class Message:
     """A message type; abstract.
 
-    Fields are declared as class attributes: `Field`, `EntityRef`, at most one `Ragged`, or a `Handle` for any picklable object.
+    Fields are declared as class attributes: `Field`, at most one of them a list (`ragged=True`), `EntityRef`, or a `Handle` for any
+    picklable object.
     """
 
     fields: ClassVar[dict[str, Column]] = {}
@@ -24,13 +26,13 @@ class Message:
             k: c for base in reversed(cls.__mro__) for k, c in vars(base).items() if isinstance(c, Column)
         }
         for name, column in cls.fields.items():
-            if not isinstance(column, (Field, EntityRef, Ragged, Handle)):
+            if not isinstance(column, (Field, EntityRef, Handle)):
                 raise DeclarationError(
-                    f"{cls.__name__}.{name}: a message holds Field, EntityRef, Ragged or Handle, not {type(column).__name__}"
+                    f"{cls.__name__}.{name}: a message holds Field, EntityRef or Handle, not {type(column).__name__}"
                 )
             if name in ("world", "sender", "n"):
                 raise DeclarationError(f"{cls.__name__}.{name}: the name is reserved in messages")
-        if sum(isinstance(c, Ragged) for c in cls.fields.values()) > 1:
+        if sum(isinstance(c, Field) and c.ragged for c in cls.fields.values()) > 1:
             raise DeclarationError(
                 f"{cls.__name__} has more than one ragged field; make two message types of it"
             )
@@ -75,7 +77,7 @@ class Batch:
         data: dict[str, Any] = {}
         for name, column in self.type.fields.items():
             values = self.data[name]
-            if isinstance(column, Ragged):
+            if isinstance(values, RaggedColumn):
                 data[name] = values.take(index)
             elif isinstance(column, Handle):
                 data[name] = [values[i] for i in index]
@@ -118,14 +120,8 @@ class Batch:
         data: dict[str, Any] = {}
         for name, column in first.type.fields.items():
             parts = [b.data[name] for b in batches]
-            if isinstance(column, Ragged):
-                lengths = np.concatenate([np.diff(p.start) for p in parts])
-                joined = RaggedColumn.empty(len(lengths), column)
-                joined.set(
-                    np.concatenate([[0], np.cumsum(lengths)]),
-                    np.concatenate([p.data for p in parts], axis=-1),
-                )
-                data[name] = joined
+            if isinstance(parts[0], RaggedColumn):
+                data[name] = RaggedColumn.join(parts)
             elif isinstance(column, Handle):
                 data[name] = [v for p in parts for v in p]
             else:
@@ -156,13 +152,9 @@ def _field_values(type_: type[Message], name: str, column: Column, value: Any, n
         if isinstance(value, list) and len(value) != n:
             raise ParameterError(f"{where}: {len(value)} objects; needed is one object, or a list of {n}")
         return list(value) if isinstance(value, list) else [value] * n
-    if isinstance(column, Ragged):
-        if value is None:
-            return RaggedColumn.empty(n, column)
-        if not isinstance(value, RaggedColumn) or len(value) != n:
-            raise ParameterError(f"{where}: needed is a RaggedColumn of {n} rows")
-        return value
     assert isinstance(column, Numbers)
+    if column.ragged:
+        return _list_values(where, column, value, n)
     shape = (*column.shape, n)
     dtype = np.dtype(column.dtype)
     try:
@@ -172,6 +164,27 @@ def _field_values(type_: type[Message], name: str, column: Column, value: Any, n
         return np.ascontiguousarray(np.broadcast_to(source, shape))
     except ValueError:
         raise ParameterError(f"{where}: shape {np.shape(value)} does not fit {shape}") from None
+
+
+def _list_values(where: str, column: Numbers, value: Any, n: int) -> RaggedColumn:
+    """A list per message, as a copy: what is sent does not change."""
+    if isinstance(value, RaggedColumn):
+        if len(value) != n or value.data.shape[:-1] != column.shape:
+            raise ParameterError(
+                f"{where}: lists of {len(value)} rows, items of shape {value.data.shape[:-1]}; needed are {n} rows, {column.shape}"
+            )
+        return value.copy()
+    if value is None or isinstance(value, np.ndarray):
+        value = [np.empty(0) if value is None else value] * n
+    if not isinstance(value, (list, tuple)) or len(value) != n:
+        shape = f"({len(column.fields)}, m)" if column.fields else "(m,)"
+        raise ParameterError(
+            f"{where}: needed is an array {shape} for all messages, or a list of {n} such arrays"
+        )
+    try:
+        return RaggedColumn.from_rows(value, column)
+    except ParameterError as error:
+        raise ParameterError(f"{where}: {error}") from None
 
 
 class CaptureEntity(Message):
@@ -226,9 +239,10 @@ WAYPOINT_MODES = ("follow_once", "back_and_forth", "loiter", "racetrack")
 class WaypointList(Message):
     """Points to go to one after the other."""
 
-    points = Ragged(
+    points = Field(
         "x y z roll pitch yaw position_tolerance turn_tolerance",
         unit="m m m rad rad rad m rad",
+        ragged=True,
         doc="Places in the world frame, attitudes there, and how near is near enough.",
     )
     mode = Field(dtype=int, doc="Number in WAYPOINT_MODES.")

@@ -26,12 +26,11 @@ from tussle.columns import (
     Output,
     Param,
     Publish,
-    Ragged,
-    RaggedColumn,
     State,
     Subscribe,
 )
 from tussle.comms import EVERYONE, SAME_ENTITY
+from tussle.lists import RaggedColumn
 from tussle.messages import Batch, Message
 from tussle.numeric import wrap
 from tussle.numeric.arrays import unit
@@ -63,7 +62,6 @@ __all__ = [
     "Param",
     "Plugin",
     "Publish",
-    "Ragged",
     "RaggedColumn",
     "Sensor",
     "State",

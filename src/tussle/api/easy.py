@@ -10,6 +10,7 @@ import numpy as np
 from tussle.api.kinds import Autonomy
 from tussle.columns import Column, EntityRef, Handle, Output, Publish, State, Subscribe
 from tussle.errors import listed, nearest_name
+from tussle.lists import RaggedColumn
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -122,7 +123,7 @@ class Me:
         if isinstance(column, Handle):
             return plugin.__dict__[name][row]
         value = plugin.__dict__.get(name)
-        if not isinstance(value, np.ndarray):
+        if not isinstance(value, (np.ndarray, RaggedColumn)):
             return getattr(plugin, name)
         value = value[..., row]
         return value if value.ndim else value.item()

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tussle.api.bodies import DERIVED, FLOATS, INTS
-from tussle.columns import Channel, Numbers, Param, Ragged
+from tussle.columns import Channel, Numbers, Param
 from tussle.errors import DeclarationError, listed, nearest_name
 from tussle.neighbors.walk import OTHER, PAIR, Law, make_walk
 from tussle.numeric.kernel import Kernel
@@ -170,11 +170,7 @@ def own_columns(cls: Any) -> dict[str, str]:
     is_world = hasattr(cls, "is_idle")  # a world plugin; its class is above this module
     for name, declared in cls.declared(Numbers).items():
         per = getattr(declared, "per", "world" if is_world else "entity")
-        if (
-            isinstance(declared, Ragged)
-            or per == "team"
-            or (isinstance(declared, Param) and not declared.is_row_data)
-        ):
+        if declared.ragged or per == "team" or (isinstance(declared, Param) and not declared.is_row_data):
             continue
         fields = (
             declared.fields

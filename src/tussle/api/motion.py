@@ -11,7 +11,7 @@ import numpy as np
 from tussle.api.bodies import DERIVED, FLOATS, OFFSETS, Bodies, derive
 from tussle.api.group import GroupView
 from tussle.api.kinds import EntityPlugin
-from tussle.columns import Param, State
+from tussle.columns import Channel, Param, State
 from tussle.errors import DeclarationError, ParameterError, listed, nearest_name
 from tussle.numeric.quaternion import quat_from_euler
 from tussle.numeric.rk4 import compile_derivative, rk4
@@ -74,7 +74,7 @@ class MotionModel(EntityPlugin):
     (x, u, p, dt, substeps) instead; x (m, n), u (k, n) inputs and p (q, n) parameters in order of declaration.
 
     Raises:
-        DeclarationError: No state, several, or an argument of `derivative` that means nothing.
+        DeclarationError: No state, several, a list, or an argument of `derivative` that means nothing.
     """
 
     kind = "motion"
@@ -86,6 +86,11 @@ class MotionModel(EntityPlugin):
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
+        for name, column in cls.columns.items():
+            if isinstance(column, (State, Channel)) and column.ragged:
+                raise DeclarationError(
+                    f"{cls.__name__}.{name}: a motion model has no lists but parameters; what it flies by are numbers"
+                )
         if cls.derivative is None and cls.advance is None:
             return
         states = [c for c in cls.states().values() if c.fields]

@@ -7,17 +7,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tussle.errors import ParameterError
+from tussle.lists import Segments
 from tussle.neighbors import queries, search
 
 if TYPE_CHECKING:
+    from tussle.api.bodies import BodyView
     from tussle.api.group import GroupView
     from tussle.neighbors.index import Index
 
 
-class Pairs:
+class Pairs(Segments):
     """Pairs of a row and another entity of its world, ordered by row, each row's in a fixed order.
 
     Any body column of the other is an attribute too: `near.vel` (3, m), `near.team` (m,), `near.yaw` ...
+    `near[mask]`, (m,) true or false, is the pairs that it keeps.
 
     Attributes:
         row: Row of the group, (m,).
@@ -25,14 +28,16 @@ class Pairs:
         offset: From the row to the other [m], (3, m), world frame.
         distance: Its length [m], (m,).
         count: Number of pairs of each row, (n,).
+        start: First pair of each row, and the end, (n + 1,): where the lists of a `RaggedColumn` begin.
     """
 
-    def __init__(self, found: queries.Pairs, g: GroupView) -> None:
+    items = "pairs"
+
+    def __init__(self, found: queries.Pairs, bodies: BodyView) -> None:
         self.row, self.other = found.row, found.other
         self.offset, self.distance = found.offset, found.distance
-        self.count = found.count
-        self._start = found.start
-        self._bodies = g.bodies
+        self.count, self.start = found.count, found.start
+        self._bodies = bodies
 
     def __len__(self) -> int:
         return len(self.row)
@@ -40,36 +45,26 @@ class Pairs:
     def __getattr__(self, name: str) -> Any:
         return getattr(self._bodies, name)[..., self.other]
 
-    def _each(self, reduce: Any, values: Any, *rest: Any) -> np.ndarray:
-        values = np.asarray(values, float)
-        if values.shape[-1:] != self.row.shape:
+    def __getitem__(self, mask: Any) -> Pairs:
+        mask = np.asarray(mask)
+        if mask.dtype != bool or mask.shape != self.row.shape:
             raise ParameterError(
-                f"values of pairs have shape {values.shape}; the last axis needs the {len(self.row)} pairs"
+                f"near[...] takes a mask: true or false for each of the {len(self)} pairs, not {mask.dtype} {mask.shape}"
             )
-        out = np.zeros((*values.shape[:-1], len(self.count)))
-        k = int(np.prod(values.shape[:-1]))  # in so many words: without pairs, -1 would mean nothing
-        flat = np.ascontiguousarray(values.reshape(k, len(self.row)))
-        for source, target in zip(flat, out.reshape(k, len(self.count)), strict=True):
-            reduce(self._start, source, target, *rest)
-        return out
-
-    def sum(self, values: Any) -> np.ndarray:
-        """Sum over each row's pairs of values (m,) or (k, m): (n,) or (k, n), 0 for rows without pairs."""
-        return self._each(search.segment_sum, values)
-
-    def mean(self, values: Any) -> np.ndarray:
-        """Mean over each row's pairs, 0 for rows without pairs."""
-        return self._each(search.segment_mean, values, 0.0)
-
-    def min(self, values: Any) -> np.ndarray:
-        """Minimum over each row's pairs, infinity for rows without pairs."""
-        return self._each(search.segment_min, values, np.inf)
+        start = np.concatenate([[0], np.cumsum(mask)])[self.start]
+        kept = (
+            self.row[mask],
+            self.other[mask],
+            self.offset[:, mask],
+            self.distance[mask],
+            np.diff(start),
+            start,
+        )
+        return Pairs(queries.Pairs(*kept), self._bodies)
 
     def nearest(self) -> np.ndarray:
         """Pair with the smallest distance of each row, (n,); -1 for rows without pairs."""
-        out = np.empty(len(self.count), np.int64)
-        search.segment_first_min(self._start, self.distance, out)
-        return out
+        return self.argmin(self.distance)
 
 
 class Nearest:
@@ -93,7 +88,7 @@ def find_pairs(g: GroupView, radius: float | np.ndarray, teams: str | int | None
         np.full(g.n, radius) if not isinstance(radius, np.ndarray) else np.ascontiguousarray(radius, float)
     )
     found = queries.pairs(index, g.first, g.last, x, y, z, reach, g.bodies.team, _checked(teams))
-    return Pairs(found, g)
+    return Pairs(found, g.bodies)
 
 
 def _checked(teams: Any) -> Any:

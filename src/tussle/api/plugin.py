@@ -19,7 +19,6 @@ from tussle.columns import (
     Input,
     Output,
     Param,
-    Ragged,
     State,
     Topic,
 )
@@ -174,10 +173,6 @@ class Plugin:
     def most_worlds(cls) -> int | None:
         """The largest stack of worlds that its handles allow; None is any."""
         return min((h.max_worlds for h in cls.handles().values() if h.max_worlds is not None), default=None)
-
-    @classmethod
-    def ragged(cls) -> dict[str, Ragged]:
-        return cls.declared(Ragged)
 
     # -- as data --------------------------------------------------------------------------------------------------------
 

@@ -204,9 +204,7 @@ class WorldView(GroupView):
         )
         return out if k is not None else out[0]
 
-    def uniform_pairs(
-        self, label: str, world: np.ndarray, first: np.ndarray, second: np.ndarray
-    ) -> np.ndarray:
+    def uniform_by(self, label: str, world: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
         """Uniform draws in [0, 1), one per (world, first, second), (m,): keyed by these numbers, not by their place."""
         seeds = self.context.seeds[world] ^ (first.astype(np.uint64) * GOLDEN)
         draws = rng.uniform(seeds, self._stream(label), second, self.context.clock.step[world], 0, 1)

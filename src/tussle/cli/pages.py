@@ -111,8 +111,10 @@ def show_plugin(name: str, cls: type[Plugin]) -> None:
         if columns:
             channels = table(title, "unit", "")
             for channel in columns.values():
-                optional = "may be left out" if getattr(channel, "optional", False) else ""
-                channels.add_row("\n".join(channel.channels), _units(channel), _about(channel.doc, optional))
+                remarks = [f"list of {' '.join(channel.fields) or 'numbers'}"] if channel.ragged else []
+                remarks += ["may be left out"] if getattr(channel, "optional", False) else []
+                about = _about(channel.doc, "; ".join(remarks))
+                channels.add_row("\n".join(channel.channels), _units(channel), about)
             parts.append(channels)
     if cls.topics():
         messages = table("messages", "")

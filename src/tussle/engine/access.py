@@ -14,6 +14,7 @@ from tussle.columns import EntityRef, Handle, Numbers, Output, Param, State
 from tussle.engine import failure
 from tussle.engine.group import Binding, Group
 from tussle.engine.result import WorldResult
+from tussle.engine.table import Stored, Table
 from tussle.errors import ParameterError, SnapshotError, listed, nearest_name
 from tussle.record import hash_columns
 
@@ -29,11 +30,11 @@ class Parked:
 
     Attributes:
         bodies: Its rows.
-        tables: Key of the group -> (rows in `bodies`, dtype -> columns).
+        tables: Key of the group -> (rows in `bodies`, what its table held of them).
     """
 
     bodies: Bodies
-    tables: dict[Any, tuple[np.ndarray, dict[type, np.ndarray]]]
+    tables: dict[Any, tuple[np.ndarray, Stored]]
 
 
 def park(sim: Simulation, world: int) -> Parked:
@@ -44,26 +45,21 @@ def park(sim: Simulation, world: int) -> Parked:
     for group in sim.population.groups:
         mine = np.flatnonzero((rows >= group.first) & (rows < group.last))
         if len(mine):
-            tables[group.key] = (
-                mine,
-                {d: a[:, rows[mine] - group.first] for d, a in group.table.arrays.items()},
-            )
+            tables[group.key] = mine, group.table.take(rows[mine] - group.first)
     return Parked(Bodies(bodies.floats[:, rows].copy(), bodies.ints[:, rows].copy(), bodies.n_worlds), tables)
 
 
 # -- columns by path ------------------------------------------------------------------------------------------------------------
 
 
-def _sources(
-    sim: Simulation,
-) -> Iterator[tuple[Bodies, list[tuple[Group, np.ndarray, dict[type, np.ndarray]]]]]:
+def _sources(sim: Simulation) -> Iterator[tuple[Bodies, list[tuple[Group, np.ndarray, Stored | Table]]]]:
     """Body tables with the rows of each group: the live one, then the worlds that have ended."""
     groups = sim.population.groups
     by_key = {g.key: g for g in groups}
-    yield sim.population.bodies, [(g, np.arange(g.first, g.last), g.table.arrays) for g in groups]
+    yield sim.population.bodies, [(g, np.arange(g.first, g.last), g.table) for g in groups]
     for world, parked in sim.parked.items():
         if not (sim.population.bodies.world == world).any():
-            yield parked.bodies, [(by_key[k], rows, arrays) for k, (rows, arrays) in parked.tables.items()]
+            yield parked.bodies, [(by_key[k], rows, held) for k, (rows, held) in parked.tables.items()]
 
 
 def _binding(group: Group, path: tuple[str, ...]) -> Binding | None:
@@ -133,7 +129,7 @@ def read(sim: Simulation, path: str) -> tuple[np.ndarray, np.ndarray]:
     alive = np.zeros(shape, bool)
     out = _empty(sim, shape, number, key, column)
     for bodies, groups in _sources(sim):
-        for group, rows, arrays in groups:
+        for group, rows, held in groups:
             mine = np.flatnonzero(bodies.block[rows] == number)
             binding = _binding(group, key) if key else None
             if not len(mine) or (key and binding is None):
@@ -143,12 +139,11 @@ def read(sim: Simulation, path: str) -> tuple[np.ndarray, np.ndarray]:
             if binding is None:
                 out[at] = np.moveaxis(_body_column(bodies, column, rows[mine]), -1, 0)
             elif column in binding.ragged:
-                if bodies is sim.population.bodies:  # lists are not kept of worlds that have ended
-                    for world, place, row in zip(*at, mine, strict=True):
-                        out[world, place] = binding.plugin.__dict__[column][row].copy()
+                for world, place, row in zip(*at, mine, strict=True):
+                    out[world, place] = held.lists[binding.ragged[column]][row].copy()
             else:
                 place = binding.places[column]
-                data = arrays[place.dtype]
+                data = held.arrays[place.dtype]
                 values = data[place.first : place.first + place.k] if place.k else data[place.first]
                 out[at] = np.moveaxis(values[..., mine], -1, 0)
     return out, alive
@@ -263,8 +258,7 @@ def snapshot(sim: Simulation) -> Snapshot:
     groups = {}
     for group in population.groups:
         outside = [_save_handles(b) for b in group.walk()]
-        ragged = [{k: c.take(np.arange(group.n)) for k, c in _ragged(b).items()} for b in group.walk()]
-        groups[group.key] = (group.first, group.table.copy(), ragged, outside)
+        groups[group.key] = (group.first, group.table.copy(), outside)
     world = {
         "floats": population.bodies.floats.copy(),
         "ints": population.bodies.ints.copy(),
@@ -286,10 +280,6 @@ def snapshot(sim: Simulation) -> Snapshot:
         "params": sim.overrides.save(),
     }
     return Snapshot(sim.mission, sim.context.seeds.copy(), groups, world)
-
-
-def _ragged(binding: Binding) -> dict[str, Any]:
-    return {k: binding.plugin.__dict__[k] for k in binding.ragged}
 
 
 def _save_handles(binding: Binding) -> dict[str, list[bytes]]:
@@ -315,10 +305,8 @@ def restore(sim: Simulation, saved: Snapshot) -> None:
     population.bodies.replace(world["floats"].copy(), world["ints"].copy())
     for group in population.groups:
         kept = saved.groups.get(group.key)
-        first, arrays, ragged, outside = kept or _no_rows(group, population.bodies.n)
-        group.table.restore(arrays)
-        for binding, lists in zip(group.walk(), ragged, strict=True):
-            binding.ragged = {k: c.take(np.arange(len(c))) for k, c in lists.items()}
+        first, held, outside = kept or _no_rows(group, population.bodies.n)
+        group.table.restore(held)
         for binding, handles in zip(group.walk(), outside, strict=True):
             binding.handles = {k: [None] * len(held) for k, held in handles.items()}
         group.attach(population.bodies, first)
@@ -339,14 +327,8 @@ def restore(sim: Simulation, saved: Snapshot) -> None:
 
 
 def _no_rows(group: Group, first: int) -> tuple[Any, ...]:
-    empty = {d: a[:, :0] for d, a in group.table.arrays.items()}
-    none = np.zeros(0, np.int64)
-    return (
-        first,
-        empty,
-        [{k: c.take(none) for k, c in b.ragged.items()} for b in group.walk()],
-        [{k: [] for k in b.handles} for b in group.walk()],
-    )
+    none = group.table.take(np.zeros(0, np.int64))
+    return first, none, [{k: [] for k in b.handles} for b in group.walk()]
 
 
 def _load_handles(sim: Simulation, group: Group, outside: list[dict[str, list[bytes]]]) -> None:
@@ -415,11 +397,11 @@ def _hashed_columns(group: Group, binding: Binding, rows: np.ndarray) -> Iterato
             isinstance(column, Output) and name in binding.plugin.wired
         )
         label = ".".join((*binding.path, name))
-        if is_memory:
-            yield label, group.table.array(binding.places[name])[..., rows]
-        elif name in binding.ragged and not isinstance(column, Param):
-            lists = binding.plugin.__dict__[name].take(rows)
+        if is_memory and name in binding.ragged:
+            lists = group.table.lists[binding.ragged[name]].take(rows)
             yield label, np.concatenate([lists.start.view(np.float64), lists.data.astype(np.float64).ravel()])
+        elif is_memory:
+            yield label, group.table.array(binding.places[name])[..., rows]
         assert not isinstance(column, Handle) or name in binding.handles
 
 

@@ -99,6 +99,12 @@ def not_finite(group: Group, bodies: Bodies, row: int, step: int) -> PluginError
 
 def _not_finite_output(binding: Binding, group: Group, row: int) -> str:
     for name, column in type(binding.spec).outputs().items():
+        if name in binding.ragged:
+            items = group.table.lists[binding.ragged[name]][row]
+            bad = items[~np.isfinite(items)]
+            if len(bad):
+                return f"an item of output {column.channels[0]!r} = {bad[0]}"
+            continue
         values = np.atleast_1d(group.table.array(binding.places[name])[..., row])
         for channel, value in zip(column.channels, values, strict=True):
             if not np.isfinite(value):

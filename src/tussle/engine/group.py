@@ -22,15 +22,13 @@ from tussle.columns import (
     Output,
     Param,
     Publish,
-    Ragged,
-    RaggedColumn,
     State,
     Subscribe,
 )
 from tussle.comms import Inbox, Publisher
 from tussle.engine.table import Place, Table
 from tussle.engine.wiring import BELIEF, Link, Wiring
-from tussle.errors import DeclarationError, WiringError, nearest_name
+from tussle.errors import DeclarationError, WiringError, listed, nearest_name
 
 
 @dataclass
@@ -46,7 +44,7 @@ class Binding:
         params: Those of them that are parameters.
         writable: Attributes that the plugin may write.
         links: Channel attributes that are copied from and to the bus around each call.
-        ragged: Attribute -> list per row.
+        ragged: Attribute -> number of its lists in the table.
         handles: Attribute -> object per row.
         children: Bindings of the plugins inside this one.
     """
@@ -59,7 +57,7 @@ class Binding:
     params: tuple[str, ...] = ()
     writable: set[str] = field(default_factory=set)
     links: dict[str, Link] = field(default_factory=dict)
-    ragged: dict[str, RaggedColumn] = field(default_factory=dict)
+    ragged: dict[str, int] = field(default_factory=dict)
     handles: dict[str, list[Any]] = field(default_factory=dict)
     children: list[Binding] = field(default_factory=list)
 
@@ -75,7 +73,9 @@ class Binding:
         for name, place in self.places.items():
             array = table.array(place)
             own[name] = array if name in self.writable else read_only(array)
-        own.update(self.ragged)
+        for name, number in self.ragged.items():
+            lists = table.lists[number]
+            own[name] = lists if name in self.writable else lists.read_only()
         own.update(self.handles)
         for child in self.children:
             child.attach(table)
@@ -86,6 +86,8 @@ class Binding:
         for name, link in self.links.items():
             assert link.rows is not None
             table.array(self.places[name])[:] = data[list(link.rows)]
+        for child in self.children:
+            child.pull(table)
 
     def push(self, table: Table) -> None:
         """Copy the plugin's own output arrays to the bus."""
@@ -164,7 +166,7 @@ class Group:
         self.autonomies = [self._bind(p, self.thinking, ()) for p in block.autonomy]
         self.controllers = [self._bind(p, self.steering, ()) for p in working]
         self.sensors = [self._bind(p, self.sensing, ()) for p in block.sensor]
-        self.holds_lists = any(b.ragged or b.handles for b in self.walk())
+        self.holds_handles = any(b.handles for b in self.walk())
         self._believe()
         self.integrate = self.motion.plugin.integrator()
         self._place_motion()
@@ -216,7 +218,10 @@ class Group:
                 if column.structural:
                     plugin.__dict__[name] = spec.values[name]
                 if column.ragged:
-                    binding.ragged[name] = RaggedColumn.empty(0, column)
+                    binding.ragged[name] = self.table.add_list(column)
+            elif isinstance(column, State) and column.ragged:
+                binding.ragged[name] = self.table.add_list(column)
+                binding.writable.add(name)
             elif isinstance(column, (State, EntityRef)):
                 default = column.default
                 binding.places[name] = self.table.add((key, name), column.dtype, len(column.fields), default)
@@ -225,8 +230,6 @@ class Group:
                 self._bind_channel(binding, name, column, bool(path))
                 if path:
                     wired.add(name)
-            elif isinstance(column, Ragged):
-                binding.ragged[name] = RaggedColumn.empty(0, column)
             elif isinstance(column, Handle):
                 binding.handles[name] = []
             elif isinstance(column, (Publish, Subscribe)):
@@ -246,17 +249,20 @@ class Group:
 
     def _bind_channel(self, binding: Binding, name: str, column: Channel, is_child: bool) -> None:
         link = self.wiring.links.get((id(binding.spec), name))
-        if is_child:
-            if isinstance(column, Input) and not column.optional:
+        if link is None:  # inside another plugin, or switched off by a structural parameter
+            if is_child and isinstance(column, Input) and not column.optional:
+                sensed, channel = self.wiring.sensed, column.channels[0]
                 raise WiringError(
-                    f"{self.wiring.where}: {'.'.join(binding.path)}.{name} is an input, and a plugin inside another has none"
+                    f"{self.wiring.where}: {'.'.join(binding.path)}.{name} is an input, and a plugin inside another has none but, in "
+                    f"an autonomy, what sensors write; {channel!r} is not of that{nearest_name(channel, sensed)}; {listed(sensed)}"
                 )
-            link = Link(self.table.add((binding.path, name), float, len(column.fields), column.default))  # type: ignore[attr-defined]
-        if link is None:  # an input or output that a structural parameter has switched off
-            link = Link(self.table.add((binding.path, name), float, len(column.fields), column.default))  # type: ignore[attr-defined]
-        binding.places[name] = link.place
-        if link.rows is not None:
-            binding.links[name] = link
+            link = self.wiring.alone(column, (binding.path, name))
+        if isinstance(link, int):
+            binding.ragged[name] = link
+        else:
+            binding.places[name] = link.place
+            if link.rows is not None:
+                binding.links[name] = link
         if isinstance(column, Output):
             binding.writable.add(name)
 
@@ -278,6 +284,10 @@ class Group:
         for sensor in self.sensors:
             for name, (body, k, _) in BELIEF.items():
                 place = sensor.places.get(name)
+                if name in sensor.ragged:
+                    raise WiringError(
+                        f"{self.wiring.where}: {sensor.spec.instance_name}.{name} is a list; it needs {k} channels"
+                    )
                 if place is not None and isinstance(type(sensor.spec).columns[name], Output):
                     if place.k != k:
                         raise WiringError(
@@ -290,13 +300,11 @@ class Group:
     def rearrange(self, source: np.ndarray) -> bool:
         """New row i is row source[i] of the old body table; one below 0 is a new one at the defaults. Whether arrays are other ones."""
         is_moved = self.table.rearrange(source, self.first)
-        index = np.where(source >= 0, source - self.first, -1) if self.holds_lists else source
+        index = np.where(source >= 0, source - self.first, -1) if self.holds_handles else source
         for binding in self.walk():
-            for name, column in binding.ragged.items():
-                binding.ragged[name] = column.take(index)
             for name, objects in binding.handles.items():
                 binding.handles[name] = [objects[i] if i >= 0 else None for i in index]
-        return is_moved or self.holds_lists
+        return is_moved or self.holds_handles
 
     def attach(self, bodies: Bodies, first: int) -> None:
         """Take the place [first, first + n) in the body table, and give all plugins and views their arrays."""

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tussle.columns import RaggedColumn
 from tussle.comms import EVERYONE, SAME_ENTITY, TopicBuffer
 from tussle.engine import failure
 from tussle.engine.referees import Referee
 from tussle.errors import MissionError, PluginError, WiringError, listed, nearest_name
+from tussle.lists import RaggedColumn
 from tussle.messages import Batch, Message, SpawnEntity
 
 if TYPE_CHECKING:

@@ -13,11 +13,12 @@ import numpy as np
 
 from tussle.api.bodies import Bodies
 from tussle.api.context import Context
-from tussle.columns import Handle, RaggedColumn
+from tussle.columns import Handle, Param
 from tussle.engine import failure, kernels
 from tussle.engine.group import Binding, Group
 from tussle.engine.params import Overrides
 from tussle.errors import PluginError
+from tussle.lists import RaggedColumn
 from tussle.mission import Block
 
 NOBODY = Bodies.empty(0, 1)
@@ -205,7 +206,6 @@ class Population:
                     self._fill_params(group, binding, number, some)
                 if binding.ragged:
                     self._fill_ragged(group, binding, rows)
-                    binding.attach(group.table)
             for name, place in group.belief.items():
                 group.table.array(place)[..., rows] = getattr(self.bodies, name)[..., group.first + rows]
             for view in group.views:
@@ -241,13 +241,12 @@ class Population:
                 group.table.array(binding.places[name])[..., rows] = filled
 
     def _fill_ragged(self, group: Group, binding: Binding, rows: np.ndarray) -> None:
-        for name, column in type(binding.spec).params().items():
-            if column.ragged:
-                lists: list[Any] = [binding.ragged[name][i].T for i in range(group.n)]
-                for row in rows:
-                    spec = self._spec(int(self.bodies.block[group.first + row]), binding.path)
-                    lists[row] = np.array(spec.values[name], float).reshape(-1, *column.shape)
-                binding.ragged[name] = RaggedColumn.from_rows(lists, column)
+        for name, number in binding.ragged.items():
+            column = type(binding.spec).columns[name]
+            if isinstance(column, Param):
+                blocks = self.bodies.block[group.first + rows]
+                lists = [np.transpose(self._spec(int(block), binding.path).values[name]) for block in blocks]
+                group.table.lists[number].put(rows, RaggedColumn.from_rows(lists, column))
 
     def _spec(self, number: int, path: tuple[str, ...]) -> Any:
         """The plugin of a block, or inside another one of it, as data."""

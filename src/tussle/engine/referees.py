@@ -9,11 +9,12 @@ import numpy as np
 
 from tussle.api.bodies import read_only
 from tussle.api.world import WorldView
-from tussle.columns import Handle, Input, Output, Param, Publish, Ragged, State, Subscribe
+from tussle.columns import Handle, Input, Output, Param, Publish, State, Subscribe
 from tussle.comms import Publisher
 from tussle.engine.params import Overrides
-from tussle.engine.table import Place, Table
+from tussle.engine.table import Place, Stored, Table
 from tussle.errors import DeclarationError, WiringError
+from tussle.lists import RaggedColumn
 
 
 @dataclass
@@ -47,11 +48,15 @@ class Referee:
         referee = cls(spec.bound(), spec, view)
         n_worlds, n_teams = view.n_worlds, len(view.teams)
         for name, column in type(spec).columns.items():
-            if isinstance(column, (Input, Output, Ragged, Handle)):
+            is_list = isinstance(column, State) and column.ragged
+            if isinstance(column, (Input, Output, Handle)) or is_list:
                 raise DeclarationError(
-                    f"{type(spec).__name__}.{name}: a world plugin has no {type(column).__name__} columns"
+                    f"{type(spec).__name__}.{name}: a world plugin has no {'ragged ' * is_list}{type(column).__name__} columns"
                 )
-            if isinstance(column, Param) and column.is_row_data:
+            if isinstance(column, Param) and column.ragged:
+                own = [np.transpose(spec.values[name])] * n_worlds
+                referee.plugin.__dict__[name] = RaggedColumn.from_rows(own, column).read_only()
+            elif isinstance(column, Param) and column.is_row_data:
                 referee._add("world", name, column.dtype, len(column.fields), column.default)
             elif isinstance(column, State):
                 k = n_teams if column.per == "team" else len(column.fields)
@@ -105,10 +110,10 @@ class Referee:
             array = self.tables[per].array(place)
             self.plugin.__dict__[name] = array if isinstance(declared[name], State) else read_only(array)
 
-    def copy(self) -> dict[str, Any]:
+    def copy(self) -> dict[str, Stored]:
         return {per: table.copy() for per, table in self.tables.items()}
 
-    def restore(self, saved: dict[str, Any]) -> None:
+    def restore(self, saved: dict[str, Stored]) -> None:
         for per, table in self.tables.items():
             table.restore(saved[per])
         self.attach()

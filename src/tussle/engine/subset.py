@@ -10,7 +10,6 @@ import numpy as np
 
 from tussle.api.bodies import Bodies
 from tussle.api.world import WorldView
-from tussle.columns import RaggedColumn
 from tussle.comms import Inbox, Publisher
 from tussle.engine.group import Binding, Group
 from tussle.engine.population import Population
@@ -26,8 +25,8 @@ def _sub_bodies(bodies: Bodies, rows: np.ndarray) -> Bodies:
 
 def _sub_table(table: Table, rows: np.ndarray) -> Table:
     sub = copy.copy(table)
-    sub.arrays = {dtype: np.ascontiguousarray(array[:, rows]) for dtype, array in table.arrays.items()}
-    sub.n = len(rows)
+    part = table.take(rows)
+    sub.arrays, sub.lists, sub.n = part.arrays, part.lists, len(rows)
     return sub
 
 
@@ -36,7 +35,6 @@ def _sub_binding(binding: Binding, view: Any, rows: np.ndarray) -> Binding:
     plugin.__dict__.update(binding.plugin.__dict__)
     sub = copy.copy(binding)
     sub.plugin, sub.view = plugin, view
-    sub.ragged = {k: c.take(rows) for k, c in binding.ragged.items()}
     sub.handles = {k: [objects[i] for i in rows] for k, objects in binding.handles.items()}
     sub.children = [_sub_binding(child, view, rows) for child in binding.children]
     for name, value in list(plugin.__dict__.items()):
@@ -79,14 +77,6 @@ def _sub_group(group: Group, bodies: Bodies, first: int, rows: np.ndarray) -> Gr
     return sub
 
 
-def _merge_ragged(whole: RaggedColumn, part: RaggedColumn, rows: np.ndarray) -> None:
-    lists = [whole[i] for i in range(len(whole))]
-    for k, row in enumerate(rows):
-        lists[row] = part[k]
-    start = np.cumsum([0, *[part_.shape[-1] for part_ in lists]])
-    whole.set(start, np.concatenate(lists, axis=-1) if lists else whole.data)
-
-
 def call_group(
     population: Population, group: Group, worlds: np.ndarray, action: Callable[[Group], None]
 ) -> None:
@@ -97,13 +87,10 @@ def call_group(
     first = int(np.searchsorted(rows, group.first))
     sub = _sub_group(group, _sub_bodies(bodies, rows), first, mine - group.first)
     action(sub)
-    for dtype, array in sub.table.arrays.items():
-        group.table.arrays[dtype][:, mine - group.first] = array
+    group.table.put(mine - group.first, sub.table)
     bodies.floats[:, mine] = sub.bodies.floats[:, first : first + len(mine)]
     bodies.touch(group.first, group.last)
     for binding, part in zip(group.walk(), sub.walk(), strict=True):
-        for name in part.ragged:
-            _merge_ragged(binding.ragged[name], part.plugin.__dict__[name], mine - group.first)
         for name in part.handles:
             for k, row in enumerate(mine - group.first):
                 binding.handles[name][row] = part.plugin.__dict__[name][k]

@@ -1,4 +1,4 @@
-"""The storage of one group: all columns of its plugins as rows of one array per dtype."""
+"""The storage of one group: all columns of its plugins as rows of one array per dtype, and its lists."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from tussle.columns import Numbers
 from tussle.engine import kernels
+from tussle.lists import RaggedColumn
 
 DTYPES: dict[type, Any] = {float: np.float64, int: np.int64, bool: np.bool_}
 
@@ -24,20 +26,30 @@ class Place:
     k: int
 
 
+@dataclass(frozen=True, slots=True)
+class Stored:
+    """What a table holds of some rows: dtype -> (columns, n), and its lists."""
+
+    arrays: dict[type, np.ndarray]
+    lists: list[RaggedColumn]
+
+
 @dataclass
 class Table:
-    """Columns of n rows. Declare all with `add`, then `rows` gives each its array; `rearrange` moves rows.
+    """Columns of n rows. Declare all with `add` and `add_list`, then `array` gives each its array; `rearrange` moves rows.
 
     Attributes:
         n: Number of rows.
         arrays: dtype -> (columns, n).
         places: Column key -> its place.
+        lists: Lists of the rows, in the order in which they were declared.
     """
 
     n: int = 0
     defaults: dict[type, list[float]] = field(default_factory=lambda: {float: [], int: [], bool: []})
     arrays: dict[type, np.ndarray] = field(default_factory=dict)
     places: dict[Any, Place] = field(default_factory=dict)
+    lists: list[RaggedColumn] = field(default_factory=list)
 
     def add(self, key: Any, dtype: type, k: int, default: Any = 0.0) -> Place:
         """Declare a column of k components (0: one number a row); default is a number or k numbers."""
@@ -47,11 +59,17 @@ class Table:
         self.places[key] = place
         return place
 
+    def add_list(self, declaration: Numbers) -> int:
+        """Declare a list per row, empty at first; gives its number in `lists`."""
+        self.lists.append(RaggedColumn.empty(0, declaration))
+        return len(self.lists) - 1
+
     def allocate(self, n: int) -> None:
         """Make room for n rows at their defaults."""
         self.n = n
         for dtype, values in self.defaults.items():
             self.arrays[dtype] = np.repeat(np.array(values, DTYPES[dtype])[:, None], n, axis=1)
+        self.lists = [column.take(np.full(n, -1)) for column in self.lists]
 
     def array(self, place: Place) -> np.ndarray:
         """The array of a place, (n,) or (k, n), C-contiguous."""
@@ -64,18 +82,36 @@ class Table:
             fresh = np.flatnonzero(index < 0)
             for dtype, values in self.defaults.items():
                 self.arrays[dtype][:, fresh] = np.array(values, DTYPES[dtype])[:, None]
+            for column in self.lists:
+                column.put(fresh, column.take(np.full(len(fresh), -1)))
             return False
         for dtype, old in self.arrays.items():
             new = np.empty((len(old), len(index)), old.dtype)
             if len(old):
                 _GATHER[dtype](old, first, np.array(self.defaults[dtype], old.dtype)[:, None], index, new)
             self.arrays[dtype] = new
+        if self.lists:
+            index = np.where(index >= 0, index - first, -1)
+            self.lists = [column.take(index) for column in self.lists]
         self.n = len(index)
         return True
 
-    def copy(self) -> dict[type, np.ndarray]:
-        return {dtype: array.copy() for dtype, array in self.arrays.items()}
+    def copy(self) -> Stored:
+        return Stored({d: a.copy() for d, a in self.arrays.items()}, [c.copy() for c in self.lists])
 
-    def restore(self, arrays: dict[type, np.ndarray]) -> None:
-        self.arrays = {dtype: array.copy() for dtype, array in arrays.items()}
-        self.n = self.arrays[float].shape[1] if arrays else 0
+    def take(self, rows: np.ndarray) -> Stored:
+        """A copy of some rows."""
+        arrays = {d: np.ascontiguousarray(a[:, rows]) for d, a in self.arrays.items()}
+        return Stored(arrays, [column.take(rows) for column in self.lists])
+
+    def put(self, rows: np.ndarray, part: Table) -> None:
+        """Take over some rows from a table of these."""
+        for dtype, array in part.arrays.items():
+            self.arrays[dtype][:, rows] = array
+        for column, lists in zip(self.lists, part.lists, strict=True):
+            column.put(rows, lists)
+
+    def restore(self, stored: Stored) -> None:
+        self.arrays = {dtype: array.copy() for dtype, array in stored.arrays.items()}
+        self.lists = [column.copy() for column in stored.lists]
+        self.n = self.arrays[float].shape[1] if self.arrays else 0

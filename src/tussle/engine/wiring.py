@@ -1,8 +1,8 @@
-"""Who writes what whom reads: channels of one entity's plugins, by name, checked for names and units."""
+"""Who writes what whom reads: channels of one entity's plugins, by name, checked for names, units and the fields of lists."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -27,14 +27,16 @@ class Bus:
     """Channels between one stage and the next.
 
     Attributes:
-        row: Channel -> row in the table's float array.
-        unit: Channel -> unit.
+        row: Channel -> row in the table's float array, of a list its number in the table's lists.
+        unit: Channel -> unit, of a list those of its fields.
+        fields: Channel -> fields of its list; None is a number.
         writers: Channel -> names of the plugins that write it, in order.
         read: Channels that somebody reads.
     """
 
     row: dict[str, int] = field(default_factory=dict)
-    unit: dict[str, str] = field(default_factory=dict)
+    unit: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    fields: dict[str, tuple[str, ...] | None] = field(default_factory=dict)
     writers: dict[str, list[str]] = field(default_factory=dict)
     read: set[str] = field(default_factory=set)
 
@@ -68,9 +70,10 @@ class Wiring:
         self.where = where
         self.table = table
         self.advise = advise
-        self.links: dict[tuple[int, str], Link] = {}
+        self.links: dict[tuple[int, str], Link | int] = {}
         self.wired: dict[int, set[str]] = {}
         self.writers: list[tuple[str, str, list[str]]] = []
+        self.sensed: list[str] = []
 
     def connect(
         self, sensors: Sequence[Any], autonomies: Sequence[Any], controllers: Sequence[Any], motion: Any
@@ -78,7 +81,7 @@ class Wiring:
         """Lay all wires.
 
         Raises:
-            WiringError: An input that nobody writes, or whose writer has another unit.
+            WiringError: An input that nobody writes, or whose writer has another unit or other fields.
         """
         working = [c for c in controllers if not c.passthrough]
         self._check_passthrough(controllers, [*working, motion])
@@ -88,8 +91,11 @@ class Wiring:
         for producers, consumer in zip(stages, [*working, motion], strict=True):
             bus = self._bus(producers, [consumer])
             self._join(bus, producers, [consumer], sense)
+        self.sensed = sorted(sense.writers)
         for autonomy in autonomies:
             self._read(autonomy, {}, sense, required=True)
+            for plugin in _inner(autonomy):
+                self._read(plugin, {}, sense, required=False)
 
     def _check_passthrough(self, controllers: Sequence[Any], consumers: Sequence[Any]) -> None:
         following = list(consumers)
@@ -120,11 +126,14 @@ class Wiring:
         return bus
 
     def _add(self, bus: Bus, column: Channel) -> None:
-        for channel, unit in zip(column.channels, column.units, strict=True):
+        for channel, form in _forms(column).items():
             if channel not in bus.row:
-                place = self.table.add(("channel", len(self.table.places)), float, 0, column.default)  # type: ignore[attr-defined]
-                bus.row[channel] = place.first
-                bus.unit[channel] = unit
+                if column.ragged:
+                    bus.row[channel] = self.table.add_list(column)
+                else:
+                    place = self.table.add(("channel", len(self.table.places)), float, 0, column.default)  # type: ignore[attr-defined]
+                    bus.row[channel] = place.first
+                bus.fields[channel], bus.unit[channel] = form
 
     def _join(
         self, bus: Bus, producers: Sequence[Any], consumers: Sequence[Any], also: Bus | None = None
@@ -135,7 +144,7 @@ class Wiring:
                     bus.writers.setdefault(channel, []).append(plugin.instance_name)
         for plugin in producers:
             for name, column in written_channels(plugin):
-                self._check_units(plugin, column, bus)
+                self._check_form(plugin, column, bus)
                 self.links[id(plugin), name] = self._link(column, bus)
         for plugin in consumers:
             self._read(plugin, bus, also, required=True)
@@ -161,34 +170,52 @@ class Wiring:
                     source = candidate
                     break
             if source is None:
-                if not column.optional and required:  # type: ignore[attr-defined]
+                if not column.optional and not required:  # type: ignore[attr-defined]
+                    continue  # who binds it says so
+                if not column.optional:  # type: ignore[attr-defined]
                     written = {c for b in (bus, also) if b for c in b.writers}
                     absent = next((c for c in column.channels if c not in written), column.channels[0])
                     raise self._missing(plugin, absent, written, "")
                 if isinstance(bus, Bus) and all(c in bus.row for c in column.channels):
                     self.links[id(plugin), name] = self._link(column, bus)
                 else:
-                    place = self.table.add((id(plugin), name), float, len(column.fields), column.default)  # type: ignore[attr-defined]
-                    self.links[id(plugin), name] = Link(place)
+                    self.links[id(plugin), name] = self.alone(column, (id(plugin), name))
                 continue
-            self._check_units(plugin, column, source)
+            self._check_form(plugin, column, source)
             source.read.update(column.channels)
             self.links[id(plugin), name] = self._link(column, source)
 
-    def _link(self, column: Channel, bus: Bus) -> Link:
+    def alone(self, column: Channel, key: Any) -> Link | int:
+        """The place of a channel column that is wired to nobody."""
+        if column.ragged:
+            return self.table.add_list(column)
+        return Link(self.table.add(key, float, len(column.fields), column.default))  # type: ignore[attr-defined]
+
+    def _link(self, column: Channel, bus: Bus) -> Link | int:
         rows = tuple(bus.row[c] for c in column.channels)
+        if column.ragged:
+            return rows[0]
         if not column.fields or rows == tuple(range(rows[0], rows[0] + len(rows))):
             return Link(Place(float, rows[0], len(column.fields)))
         return Link(self.table.add(("own", len(self.table.places)), float, len(column.fields)), rows)
 
-    def _check_units(self, plugin: Any, column: Channel, bus: Bus) -> None:
-        for channel, unit in zip(column.channels, column.units, strict=True):
-            if not units.compatible(unit, bus.unit[channel]):
-                kind = "writes" if isinstance(column, Output) else "reads"
+    def _check_form(self, plugin: Any, column: Channel, bus: Bus) -> None:
+        kind = "writes" if isinstance(column, Output) else "reads"
+        for channel, (fields, own) in _forms(column).items():
+            at, there = (
+                f"{self.where}: {plugin.instance_name}.{column.name} {kind} channel {channel!r}",
+                bus.fields[channel],
+            )
+            if fields != there:
                 raise WiringError(
-                    f"{self.where}: {plugin.instance_name}.{column.name} {kind} channel {channel!r} in {unit or 'no unit'!r}, but it is "
-                    f"in {bus.unit[channel] or 'no unit'!r} for the plugin at its other end"
+                    f"{at} as {_form_text(fields)}, but it is {_form_text(there)} for the plugin at its other end"
                 )
+            for name, unit, other in zip(fields or ("",), own, bus.unit[channel], strict=True):
+                if not units.compatible(unit, other):
+                    of = f", field {name!r}," if name else ""
+                    raise WiringError(
+                        f"{at}{of} in {unit or 'no unit'!r}, but it is in {other or 'no unit'!r} for the plugin at its other end"
+                    )
 
     def _missing(self, reader: Any, channel: str, offered: Iterable[str], through: str) -> WiringError:
         offered = sorted(offered)
@@ -199,6 +226,28 @@ class Wiring:
             f"{self.where}: nobody writes channel {channel!r} for {reader.instance_name}{by}{nearest_name(channel, offered)}; "
             f"written are: {', '.join(offered) or 'none'}{advice}"
         )
+
+
+def _inner(plugin: Any) -> Iterator[Any]:
+    """All plugins inside one."""
+    for name in plugin.children():
+        for child in plugin.values[name]:
+            yield child
+            yield from _inner(child)
+
+
+def _forms(column: Channel) -> dict[str, tuple[tuple[str, ...] | None, tuple[str, ...]]]:
+    """Channel -> (fields of its list or None, units)."""
+    if column.ragged:
+        return {column.channels[0]: (column.fields, column.units)}
+    return {channel: (None, (unit,)) for channel, unit in zip(column.channels, column.units, strict=True)}
+
+
+def _form_text(fields: tuple[str, ...] | None) -> str:
+    if fields is None:
+        return "a number"
+    n = len(fields)
+    return f"a list of {n} field{'s' * (n > 1)} ({' '.join(fields)})" if n else "a list of numbers"
 
 
 __all__ = ["BELIEF", "Bus", "Link", "Wiring", "listed", "read_channels", "written_channels"]

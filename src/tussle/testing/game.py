@@ -213,7 +213,8 @@ def _slots(
     given: list[Any] = [holder, *companions]
     places: list[list[Any]] = [[p for p in given if isinstance(p, kind)] for kind in kinds]
     autonomies, controllers, sensors, motions = places
-    fed = [c for a in autonomies for _, c in read_channels(a)]
+    inner = [*autonomies, *(b for a in autonomies for b in a.values.get("behaviors", ()))]
+    fed = [c for a in inner for _, c in read_channels(a)]
     measured = [c for s in sensors for name, c in written_channels(s) if name not in BELIEF]
     fed = _without(fed, measured)
     readers = [[c for _, c in read_channels(p)] for p in (*controllers, *motions)]

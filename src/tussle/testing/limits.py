@@ -118,10 +118,10 @@ def _not_finite(sim: Simulation) -> tuple[int, str]:
     for group in sim.population.groups:
         for binding in group.walk():
             for name in binding.ragged:
-                items: Any = binding.plugin.__dict__[name]
+                items = binding.plugin.__dict__[name]
                 bad = np.flatnonzero(~np.isfinite(np.atleast_2d(items.data)).all(axis=0))
-                if len(bad) and not isinstance(type(binding.spec).columns[name], Param):
-                    row = group.first + int(np.searchsorted(items.start, bad[0], side="right")) - 1
+                if len(bad) and name in binding.writable:
+                    row = group.first + int(items.row[bad[0]])
                     where = f"an item of {'.'.join(binding.path)}.{name}"
                     return int(sim.population.bodies.world[row]), f"{where} is {items.data[..., bad[0]]}"
     return 0, ""

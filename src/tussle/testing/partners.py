@@ -23,7 +23,6 @@ from tussle.api import (
     Output,
     Param,
     Publish,
-    Ragged,
     RaggedColumn,
     Sensor,
     State,
@@ -44,7 +43,7 @@ class Word(Message):
     target = EntityRef(doc="The sender's nearest.")
 
 
-def signal(entity: Any, step: Any, number: float) -> np.ndarray:
+def signal(entity: Any, step: Any, number: Any) -> np.ndarray:
     """A number in [-1, 1) that differs from entity to entity, step to step and number to number; exact on every machine."""
     phase = 0.6180339887498949 * entity + 0.1357913579 * step + 0.3819660112501051 * number
     return np.asarray(2.0 * (phase - np.floor(phase)) - 1.0)
@@ -59,10 +58,29 @@ def write_signals(plugin: Any, g: GroupView, feel: np.ndarray) -> None:
     """Fill all outputs with signals of their units' size, changed a little by `feel` (n,)."""
     number = 0
     for name, column in plugin.outputs().items():
+        if column.ragged:
+            number += 1
+            plugin.__dict__[name].set(*_made_lists(column, g, number))
+            continue
         for values, unit in zip(np.atleast_2d(plugin.__dict__[name]), column.units, strict=True):
             number += 1
             size = AMPLITUDES.get(unit, 1.0)
             values[:] = size * (0.8 * signal(g.id, g.step_count, number) + 0.1 * squash(feel))
+
+
+def _made_lists(column: Channel, g: GroupView, number: float) -> tuple[np.ndarray, np.ndarray]:
+    """Start and items of lists of 0 to 2 signals for each row."""
+    row = np.repeat(np.arange(g.n), (g.id + g.step_count) % 3)
+    size = np.array([AMPLITUDES.get(unit, 1.0) for unit in column.units])[:, None]
+    items = size * signal(g.id[row], g.step_count[row], number + 0.1 * np.arange(len(size))[:, None])
+    return np.searchsorted(row, np.arange(g.n + 1)), items if column.fields else items[0]
+
+
+def felt(values: Any) -> np.ndarray:
+    """One number per row that depends on all numbers of an input, (n,)."""
+    if isinstance(values, RaggedColumn):
+        values = values.sum(squash(values.data))
+    return np.asarray(sum(squash(line) for line in np.atleast_2d(values)))
 
 
 def can_say(message: type[Message]) -> bool:
@@ -86,8 +104,8 @@ def made_up(message: type[Message], g: GroupView, rows: np.ndarray, nearest: np.
             out[name] = getattr(g, name)[:, rows]
         elif "team" in name:
             out[name] = g.team[rows] if name == teams[0] else g.bodies.team[nearest]
-        elif isinstance(column, Ragged):
-            shape = (2, *column.shape)
+        elif isinstance(column, Field) and column.ragged:
+            shape = (*column.shape, 2)
             out[name] = RaggedColumn.from_rows([np.full(shape, 10.0 * v) for v in value], column)
         elif isinstance(column, Numbers):
             size = np.array([AMPLITUDES.get(unit, 1.0) for unit in column.units])
@@ -100,7 +118,9 @@ def weigh(batch: Batch) -> np.ndarray:
     """One number per message that depends on all of its numbers, (n,)."""
     total = signal(batch.sender, 0.0, 1.0)
     for name, column in batch.type.fields.items():
-        if isinstance(column, (Field, EntityRef)):
+        if isinstance(column, Field) and column.ragged:
+            total = total + felt(batch.data[name])
+        elif isinstance(column, (Field, EntityRef)):
             for values in np.atleast_2d(batch.data[name]):
                 total = total + squash(values.astype(float))
     return total
@@ -123,8 +143,7 @@ class Driver(Autonomy):
                 np.add.at(self.heard, rows, weigh(batch))
         feel = squash(g.pos[0]) + squash(g.vel[1]) + squash(g.yaw) + squash(self.heard)
         for name in self.inputs():
-            for values in np.atleast_2d(self.__dict__[name]):
-                feel = feel + squash(values)
+            feel = feel + felt(self.__dict__[name])
         write_signals(self, g, feel)
         self._speak(g)
 
@@ -197,7 +216,7 @@ class Reaper(Interaction):
 
     def step(self, w: WorldView) -> None:
         step = w.step_count[w.world]
-        dice = w.uniform_pairs("death", w.world, w.id, np.zeros(w.n, np.int64))
+        dice = w.uniform_by("death", w.world, w.id, np.zeros(w.n, np.int64))
         is_doomed = (w.seeds[w.world] % 3 == 1) & (step >= self.last_step[w.world])
         w.kill((dice < self.chance[w.world]) | is_doomed, "reaped")
         born = np.flatnonzero(w.step_count == 5 + (w.seeds % 2).astype(np.int64))
@@ -213,17 +232,19 @@ class Reaper(Interaction):
 
 def _inputs(channels: Iterable[Channel], optional: bool) -> dict[str, Any]:
     return {
-        f"in_{i}": Input(" ".join(c.channels), unit=_units(c), optional=optional)
-        for i, c in enumerate(channels)
+        f"in_{i}": Input(" ".join(c.channels), optional=optional, **_form(c)) for i, c in enumerate(channels)
     }
 
 
 def _outputs(channels: Iterable[Channel]) -> dict[str, Any]:
-    return {f"out_{i}": Output(" ".join(c.channels), unit=_units(c)) for i, c in enumerate(channels)}
+    return {f"out_{i}": Output(" ".join(c.channels), **_form(c)) for i, c in enumerate(channels)}
 
 
-def _units(column: Channel) -> str:
-    return " ".join(unit or "1" for unit in column.units)
+def _form(column: Channel) -> dict[str, Any]:
+    unit = " ".join(unit or "1" for unit in column.units)
+    return (
+        {"unit": unit, "ragged": True, "fields": " ".join(column.fields)} if column.ragged else {"unit": unit}
+    )
 
 
 def _made(base: type, name: str, columns: dict[str, Any]) -> Any:
@@ -244,8 +265,8 @@ def driver(
 
 
 def sink(reads: Iterable[Channel]) -> Sink:
-    """A motion model that reads these channels."""
-    made: Sink = _made(Sink, "Sink", _inputs(reads, optional=False))
+    """A motion model that reads those of these channels that are numbers."""
+    made: Sink = _made(Sink, "Sink", _inputs([c for c in reads if not c.ragged], optional=False))
     return made
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from tussle.api import GroupView, Interaction, MotionModel, Plugin, WorldView
+from tussle.api.pairs import Pairs
 from tussle.engine.group import Binding, Group
 from tussle.engine.referees import Referee
 from tussle.engine.simulation import Simulation
@@ -22,7 +23,7 @@ from tussle.testing.traces import columns_of, first_difference
 MEMORY = "memory in columns"
 BOUND = frozenset({"_values", "instance_name", "rate", "is_bound", "wired"})
 HOOKS = ("spawn", "step", "from_body", "to_body", "start", "route", "result", "rejects")
-DRAWS = ("uniform", "normal", "draws_of", "normal_pairs", "uniform_pairs")
+DRAWS = ("uniform", "normal", "draws_of", "normal_pairs", "uniform_pairs", "uniform_by")
 
 Own = dict[Key, Any]
 """Lines that a hook may write -> which rows of them."""
@@ -153,7 +154,8 @@ class Watch:
         def draw(*args: Any, **kwargs: Any) -> Any:
             given = inspect.signature(law).bind(view, *args, **kwargs).arguments
             label, step = given["label"], self.sim.context.clock.step.tobytes()
-            of = [np.asarray(v).tobytes() for k, v in given.items() if k not in {"self", "label", "law", "k"}]
+            keys = [v for k, v in given.items() if k not in {"self", "label", "law", "k"}]
+            of = [v.other.tobytes() if isinstance(v, Pairs) else np.asarray(v).tobytes() for v in keys]
             key, now = (
                 (label, getattr(view.caller, "instance_name", ""), step, view.substep, *of),
                 (hook, self.calls),
@@ -175,7 +177,7 @@ def _own(group: Group, binding: Binding, hook: str) -> Own:
     own: Own = {
         key: slice(None)
         for b in binding.walk()
-        for k in b.writable
+        for k in b.writable.intersection(b.places)
         for key in keys_of(group.table, b.places[k])
     }
     if isinstance(binding.spec, MotionModel) and hook == "to_body":

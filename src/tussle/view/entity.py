@@ -9,13 +9,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tussle.api.bodies import DERIVED, FLOATS, derive
-from tussle.columns import RaggedColumn, Subscribe
+from tussle.columns import Subscribe
 from tussle.comms import EVERYONE, SAME_ENTITY
+from tussle.lists import RaggedColumn
 
 if TYPE_CHECKING:
     from tussle.comms.topic import Parcel, TopicBuffer
     from tussle.engine.group import Group
     from tussle.engine.simulation import Simulation
+    from tussle.engine.table import Stored, Table
 
 MOST_MESSAGES = 50
 """Messages that are listed, of those heard and of those said."""
@@ -110,13 +112,13 @@ def entity_state(simulation: Simulation, world: int, who: int) -> EntityState | 
     for group in simulation.population.groups:
         if parked is None:
             if group.first <= row < group.last:
-                _read_plugins(group, row - group.first, group.table.arrays, state.plugins, is_live=True)
+                _read_plugins(group, row - group.first, group.table, state.plugins)
                 state.heard.extend(_heard(group, world, who))
         elif group.key in parked.tables:
-            rows, arrays = parked.tables[group.key]
+            rows, held = parked.tables[group.key]
             place = np.flatnonzero(rows == row)
             if len(place):
-                _read_plugins(group, int(place[0]), arrays, state.plugins, is_live=False)
+                _read_plugins(group, int(place[0]), held, state.plugins)
     state.said.extend(_said(simulation, world, who))
     return state
 
@@ -127,14 +129,7 @@ def _plain(value: Any) -> Any:
     return array if array.ndim else array.item()
 
 
-def _read_plugins(
-    group: Group,
-    row: int,
-    arrays: dict[type, np.ndarray],
-    into: dict[str, dict[str, Reading]],
-    *,
-    is_live: bool,
-) -> None:
+def _read_plugins(group: Group, row: int, held: Table | Stored, into: dict[str, dict[str, Reading]]) -> None:
     """All columns of an entity's plugins, in the order of their declaration."""
     for binding in group.walk():
         columns = into[".".join(binding.path)] = {}
@@ -142,11 +137,11 @@ def _read_plugins(
             about = (getattr(column, "unit", ""), getattr(column, "fields", ()), column.doc)
             place = binding.places.get(name)
             if place is not None:
-                data = arrays[place.dtype]
+                data = held.arrays[place.dtype]
                 part = data[place.first : place.first + place.k] if place.k else data[place.first]
                 columns[name] = Reading(_plain(part[..., row]), *about)
-            elif name in binding.ragged and is_live:
-                columns[name] = Reading(np.array(binding.ragged[name][row].T), *about)
+            elif name in binding.ragged:
+                columns[name] = Reading(np.array(held.lists[binding.ragged[name]][row].T), *about)
             elif name in binding.spec.values and name not in type(binding.spec).children():
                 columns[name] = Reading(binding.spec.values[name], *about)
 

@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tussle.api.bodies import FLOATS, OFFSETS
-from tussle.columns import RaggedColumn
 from tussle.comms.topic import Parcel
 from tussle.engine.access import Parked, Snapshot
+from tussle.engine.table import Stored
 from tussle.errors import SnapshotError
+from tussle.lists import RaggedColumn
 from tussle.messages import Batch
 from tussle.view.frame import Frame, Lens
 from tussle.view.pacing import Allowance
@@ -212,6 +213,8 @@ def memory_of(item: Any) -> int:
         return memory_of([item.batch, item.due, item.to])
     if isinstance(item, Parked):
         return memory_of([item.bodies.floats, item.bodies.ints, item.tables])
+    if isinstance(item, Stored):
+        return memory_of([item.arrays, item.lists])
     if isinstance(item, (Snapshot, Batch, RaggedColumn)):
         return sum(memory_of(value) for name, value in vars(item).items() if name != "mission")
     return 0

@@ -32,7 +32,7 @@ class Hits(Interaction):
     grade = "portable"
 
     def step(self, w):
-        w.kill(w.uniform_pairs("luck", w.world, w.id, w.id) < 0.1, "bad luck")
+        w.kill(w.uniform_by("luck", w.world, w.id, w.id) < 0.1, "bad luck")
         time.sleep(0.01)
 
 

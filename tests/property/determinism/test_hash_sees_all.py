@@ -7,8 +7,7 @@ import pytest
 from golden_plugins import Nursery
 
 from tussle import Block, Mission, Simulation
-from tussle.api import Autonomy, Field, Interaction, Message, Output, Param, Publish, Ragged, Subscribe
-from tussle.columns import RaggedColumn
+from tussle.api import Autonomy, Field, Interaction, Message, Output, Param, Publish, RaggedColumn, Subscribe
 from tussle.stock import SingleIntegrator, SphereNetwork
 
 
@@ -99,7 +98,7 @@ class Talk(Message):
     """A number and a list."""
 
     number = Field()
-    points = Ragged("x y")
+    points = Field("x y", ragged=True)
 
 
 class Speaker(Autonomy):
@@ -112,7 +111,7 @@ class Speaker(Autonomy):
 
     def step(self, g):
         rows = [
-            np.array([[0.0, 1.0]] * (int(k) - 1) + [[0.0, x]])
+            np.array([[0.0, 1.0]] * (int(k) - 1) + [[0.0, x]]).T
             for k, x in zip(self.length, self.last, strict=True)
         ]
         points = RaggedColumn.from_rows(rows, Talk.fields["points"])

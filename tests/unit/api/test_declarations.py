@@ -23,7 +23,6 @@ from tussle.api import (
     Output,
     Param,
     Publish,
-    Ragged,
     RaggedColumn,
     State,
 )
@@ -193,11 +192,11 @@ def test_shipped_plugins_are_data(kind):
         (lambda: type("A", (Autonomy,), {"_x": Param(1.0)}), r"A._x: the name is reserved"),
         (
             lambda: type("M", (Message,), {"x": State()}),
-            r"M.x: a message holds Field, EntityRef, Ragged or Handle, not State",
+            r"M.x: a message holds Field, EntityRef or Handle, not State",
         ),
         (lambda: type("M", (Message,), {"sender": Field()}), r"M.sender: the name is reserved in messages"),
         (
-            lambda: type("M", (Message,), {"a": Ragged(), "b": Ragged()}),
+            lambda: type("M", (Message,), {"a": Field(ragged=True), "b": Field(ragged=True)}),
             r"M has more than one ragged field; make two message types of it",
         ),
     ],
@@ -240,14 +239,14 @@ def test_declarations_are_inherited_and_compare():
 
 
 def test_ragged_columns():
-    column = RaggedColumn.from_rows([[(1, 2), (3, 4)], [], [(5, 6)]], Ragged("x y"))
+    column = RaggedColumn.from_rows([[(1, 3), (2, 4)], [], [(5,), (6,)]], Field("x y", ragged=True))
     assert len(column) == 3
     assert column[0].tolist() == [[1.0, 3.0], [2.0, 4.0]]
     assert column[1].shape == (2, 0)
     taken = column.take(np.array([2, -1, 0]))
     assert taken.start.tolist() == [0, 1, 1, 3]
     assert taken.data.tolist() == [[5.0, 1.0, 3.0], [6.0, 2.0, 4.0]]
-    assert RaggedColumn.empty(0, Ragged()).take(np.array([-1, -1])).start.tolist() == [0, 0, 0]
+    assert RaggedColumn.empty(0, Field(ragged=True)).take(np.array([-1, -1])).start.tolist() == [0, 0, 0]
     with pytest.raises(
         ValueError, match=r"start is \(2,\) and data \(2, 3\); needed \(4,\) and \(2,\) \+ \(total,\)"
     ):
@@ -271,8 +270,17 @@ def test_batches_of_messages():
         _ = both.valu
     with pytest.raises(ParameterError, match=r"Note.value: shape \(3,\) does not fit \(2,\)"):
         Batch.make(Note, np.zeros(2, int), np.zeros(2, int), {"value": [1, 2, 3]})
-    with pytest.raises(ParameterError, match=r"Parcel.points: needed is a RaggedColumn of 1 rows"):
-        Batch.make(Parcel, np.zeros(1, int), np.zeros(1, int), {"points": [[1, 2]]})
+    one = np.zeros(1, int)
+    for points, text in (
+        ([[1, 2]], r"the list of row 0 has shape \(2,\); needed is \(2, m\)"),
+        ([(1, 2), (3, 4)], r"needed is an array \(2, m\) for all messages, or a list of 1 such arrays"),
+        (
+            RaggedColumn.empty(2, Parcel.fields["points"]),
+            r"lists of 2 rows, items of shape \(2,\); needed are 1 rows, \(2,\)",
+        ),
+    ):
+        with pytest.raises(ParameterError, match=f"Parcel.points: {text}"):
+            Batch.make(Parcel, one, one, {"points": points})
     with pytest.raises(ParameterError, match=r"Parcel.thing: .*needed is one object, or a list of 2"):
         Batch.make(Parcel, np.zeros(2, int), np.zeros(2, int), {"thing": ["a", "b", "c"]})
     captured = Batch.make(EntityCaptured, np.zeros(2, int), np.zeros(2, int), {"source": [1, 2]})

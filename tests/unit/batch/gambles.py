@@ -34,7 +34,7 @@ class Roulette(Interaction):
     is_gentle = Param(False, structural=True)
 
     def step(self, w):
-        luck = w.uniform_pairs("luck", w.world, w.id, w.team)
+        luck = w.uniform_by("luck", w.world, w.id, w.team)
         least, most = self.harm[:, w.world]
         hit = luck < self.odds[w.world]
         if self.rule == "first":

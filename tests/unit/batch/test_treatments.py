@@ -10,7 +10,7 @@ import pytest
 from gambles import game
 
 from tussle import Block, Mission, Simulation
-from tussle.api import Autonomy, Param, Ragged
+from tussle.api import Autonomy, Param, State
 from tussle.batch.treatments import build_points, exactly, group_points, read_points, split, with_value
 from tussle.errors import MissionError, ParameterError, TussleError
 from tussle.mission import PluginFile
@@ -148,7 +148,7 @@ class Listed(Autonomy):
     """Has a list for a parameter."""
 
     rows = Param((), fields="x y", ragged=True)
-    seen = Ragged("x y")
+    seen = State("x y", ragged=True)
 
     def step(self, g):
         pass

@@ -358,10 +358,8 @@ class Sender(Autonomy):
     parcels = Publish(Parcel)
 
     def step(self, g):
-        from tussle.api import RaggedColumn
-
         rows = np.flatnonzero(g.step_count == 1)
-        points = RaggedColumn.from_rows([[(1.0, 2.0)] * (i % 3) for i in g.id[rows]], Parcel.fields["points"])
+        points = [np.repeat([[1.0], [2.0]], i % 3, axis=1) for i in g.id[rows]]
         self.parcels.publish(
             rows, value=g.id[rows] * 10, points=points, thing=[{"id": int(i)} for i in g.id[rows]]
         )

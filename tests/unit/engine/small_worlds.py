@@ -17,7 +17,7 @@ from tussle.api import (
     State,
     Subscribe,
 )
-from tussle.columns import Field, Handle, Ragged
+from tussle.columns import Field, Handle
 from tussle.stock import SingleIntegrator
 
 VELOCITY = "velocity_x velocity_y velocity_z"
@@ -57,7 +57,7 @@ class Parcel(Message):
     """A number, a list of points and any object."""
 
     value = Field(dtype=int)
-    points = Ragged("x y")
+    points = Field("x y", ragged=True)
     thing = Handle()
 
 

@@ -208,7 +208,7 @@ def test_waypoints_on_top_of_the_one_before_are_dropped():
     def kept(**values):
         groups = flight(points, (0.0, 0.0, 0.0), **values).population.groups
         binding = next(b for g in groups for b in g.walk() if b.path == ("WaypointDispatcher",))
-        return binding.ragged["points"][0][0].tolist()
+        return binding.plugin.points[0][0].tolist()
 
     assert kept() == [500.0, 501.2, 900.0]
     assert kept(filter_dist=0.0) == [500.0, 500.5, 501.2, 501.9, 900.0]

@@ -10,8 +10,6 @@ from tussle.api import (
     GroupView,
     Param,
     Publish,
-    Ragged,
-    RaggedColumn,
     State,
     Subscribe,
     unit,
@@ -42,7 +40,7 @@ class WaypointDispatcher(Autonomy):
     tolerance_in_2d = Param(False, doc="Tolerances count in the plane only.")
     waypointlist_network = Param("GlobalNetwork", doc="Network that carries the lists.")
     waypoint_network = Param("LocalNetwork", doc="Network for the point to go to.")
-    points = Ragged("x y z tolerance", unit="m", doc="The list that is being flown.")
+    points = State("x y z tolerance", unit="m", ragged=True, doc="The list that is being flown.")
     mode = State(dtype=int, doc="What to do at its end, a number of WAYPOINT_MODES.")
     current = State(dtype=int, doc="Number of the next waypoint.")
     previous = State(dtype=int, doc="Number of the last one; the same where there is none.")
@@ -55,7 +53,7 @@ class WaypointDispatcher(Autonomy):
     def step(self, g: GroupView) -> None:
         if self.lists:
             self._take(*self.lists.latest())
-        rows = np.flatnonzero(np.diff(self.points.start))
+        rows = np.flatnonzero(self.points.count)
         if not len(rows):
             return
         first, data = self.points.start[rows], self.points.data
@@ -76,7 +74,6 @@ class WaypointDispatcher(Autonomy):
 
     def _take(self, rows: np.ndarray, heard: Batch) -> None:
         """Begin the lists that rows have heard."""
-        lists = [self.points[i].T for i in range(len(self.points))]
         for number, row in enumerate(rows):
             told = heard.points[number]
             kept: list[int] = []
@@ -84,16 +81,14 @@ class WaypointDispatcher(Autonomy):
                 offset = told[:3, i] - told[:3, kept[-1]] if kept else None
                 if offset is None or np.sqrt((offset * offset).cumsum()[-1]) >= self.filter_dist[row]:
                     kept.append(i)
-            lists[row] = told[[0, 1, 2, 6]][:, kept].T
-        column = RaggedColumn.from_rows(lists, type(self).points)
-        self.points.set(column.start, column.data)
+            self.points[row] = told[[0, 1, 2, 6]][:, kept]
         self.mode[rows] = heard.mode
         self.current[rows] = self.previous[rows] = 0
         self.is_returning[rows] = self.is_done[rows] = False
 
     def _advance(self, rows: np.ndarray) -> None:
         """Next waypoint of the rows that have reached theirs."""
-        n_points = np.diff(self.points.start)[rows]
+        n_points = self.points.count[rows]
         mode, here = self.mode[rows], self.current[rows]
         turns_back = (mode == BACK_AND_FORTH) & np.where(
             self.is_returning[rows], here == 0, here + 1 == n_points

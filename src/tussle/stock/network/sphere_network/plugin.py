@@ -58,4 +58,4 @@ class SphereNetwork(Network):
         ordinal = np.arange(messages.n) - np.maximum.accumulate(np.where(is_first, np.arange(messages.n), 0))
         key = messages.sender[number] + (ordinal[number] << 32)
         world = messages.world[number]
-        return np.asarray(w.uniform_pairs("loss", world, key, w.id[receiver]) < self.prob_transmit[world])
+        return np.asarray(w.uniform_by("loss", world, key, w.id[receiver]) < self.prob_transmit[world])

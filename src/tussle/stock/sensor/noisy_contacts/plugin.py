@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from tussle.api import GroupView, Output, Param, Ragged, Sensor
+from tussle.api import GroupView, Output, Param, Sensor
 from tussle.stock.sensor.noisy_contacts import kernels
 
 PAIR = "mean sd"
@@ -35,23 +35,24 @@ class NoisyContacts(Sensor):
     orient_noise_0 = Param((0.0, 0.0), fields=PAIR, unit="rad", doc="Turn about the contact's x axis.")
     orient_noise_1 = Param((0.0, 0.0), fields=PAIR, unit="rad", doc="Turn about the contact's y axis.")
     orient_noise_2 = Param((0.0, 0.0), fields=PAIR, unit="rad", doc="Turn about the contact's z axis.")
-    contacts = Ragged(
-        fields=FIELDS, unit="1 1 m m m m/s m/s m/s 1 1 1 1", doc="Measured entities of each row, world frame."
+    contacts = Output(
+        ragged=True,
+        fields=FIELDS,
+        unit="1 1 m m m m/s m/s m/s 1 1 1 1",
+        doc="Who is measured, and where; world frame.",
     )
     n_contacts = Output(doc="Number of entities measured.")
 
     def step(self, g: GroupView) -> None:
         """New lists for all rows."""
         near = g.near(self.max_range)
-        row, ids, bodies = near.row, near.id, g.bodies
+        bodies = g.bodies
         data = np.empty((len(FIELDS.split()), len(near)))
         kernels.blur(
-            (row, near.other, bodies.id, bodies.team), (bodies.pos, bodies.vel, bodies.quat),
+            (near.row, near.other, bodies.id, bodies.team), (bodies.pos, bodies.vel, bodies.quat),
             (self.pos_noise_0, self.pos_noise_1, self.pos_noise_2), (self.vel_noise_0, self.vel_noise_1, self.vel_noise_2),
             (self.orient_noise_0, self.orient_noise_1, self.orient_noise_2),
-            tuple([g.normal_pairs(label, row, ids, 3) for label in ("pos", "vel", "orient")]), data,
+            tuple([g.normal_pairs(label, near, 3) for label in ("pos", "vel", "orient")]), data,
         )  # fmt: skip
-        start = np.zeros(g.n + 1, np.int64)
-        np.cumsum(near.count, out=start[1:])
-        self.contacts.set(start, data)
+        self.contacts.set(near.start, data)
         self.n_contacts[:] = near.count
