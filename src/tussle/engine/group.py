@@ -18,7 +18,6 @@ from tussle.columns import (
     Channel,
     EntityRef,
     Handle,
-    Input,
     Output,
     Param,
     Publish,
@@ -27,7 +26,7 @@ from tussle.columns import (
 )
 from tussle.comms import Inbox, Publisher
 from tussle.engine.table import Place, Table
-from tussle.engine.wiring import BELIEF, Link, Wiring
+from tussle.engine.wiring import BELIEF, Link, Wiring, read_channels
 from tussle.errors import DeclarationError, WiringError, listed, nearest_name
 
 
@@ -250,7 +249,8 @@ class Group:
     def _bind_channel(self, binding: Binding, name: str, column: Channel, is_child: bool) -> None:
         link = self.wiring.links.get((id(binding.spec), name))
         if link is None:  # inside another plugin, or switched off by a structural parameter
-            if is_child and isinstance(column, Input) and not column.optional:
+            is_read = any(k == name for k, _ in read_channels(binding.spec))
+            if is_child and is_read and not column.optional:  # type: ignore[attr-defined]
                 sensed, channel = self.wiring.sensed, column.channels[0]
                 raise WiringError(
                     f"{self.wiring.where}: {'.'.join(binding.path)}.{name} is an input, and a plugin inside another has none but, in "

@@ -234,10 +234,12 @@ def test_angles_are_degrees_where_they_always_were(files):
 def test_behaviors_are_plugins_in_a_parameter(files):
     block = files.entity("""<autonomy max_speed="9" behaviors="
        [ AvoidEntityMS gain='2.0' sphere_of_influence='10' contacts='truth' ]
+       [ AvoidEntityMS name='wary' contacts='noisy' ]
        [ MoveToGoalMS goal='1,2,3' p_gain='0.7' ]">MotorSchemas</autonomy>""")
     assert block.autonomy == (
         MotorSchemas(max_speed=9, behaviors=[
-            AvoidEntityMS(gain=2.0, sphere_of_influence=10), MoveToGoalMS(goal=(1, 2, 3), distance_pid=(0.7, 0, 0, 0)),
+            AvoidEntityMS(gain=2.0, sphere_of_influence=10), AvoidEntityMS(name="wary", contacts="noisy"),
+            MoveToGoalMS(goal=(1, 2, 3), distance_pid=(0.7, 0, 0, 0)),
         ]),
     )  # fmt: skip
 
