@@ -17,7 +17,7 @@ from rich.text import Text
 
 from tussle.api import Plugin
 from tussle.cli.terminal import out, put
-from tussle.columns import Numbers, Param, Publish
+from tussle.columns import Channel, Numbers, Param, Publish
 from tussle.engine.simulation import Simulation
 from tussle.mission import Mission, shipped_missions
 
@@ -111,10 +111,8 @@ def show_plugin(name: str, cls: type[Plugin]) -> None:
         if columns:
             channels = table(title, "unit", "")
             for channel in columns.values():
-                remarks = [f"list of {' '.join(channel.fields) or 'numbers'}"] if channel.ragged else []
-                remarks += ["may be left out"] if getattr(channel, "optional", False) else []
-                about = _about(channel.doc, "; ".join(remarks))
-                channels.add_row("\n".join(channel.channels), _units(channel), about)
+                optional = "may be left out" if getattr(channel, "optional", False) else ""
+                channels.add_row(*_channel(channel), _about(channel.doc, optional))
             parts.append(channels)
     if cls.topics():
         messages = table("messages", "")
@@ -177,6 +175,15 @@ def _written(value: Any) -> str:
 
 def _units(column: Numbers) -> str:
     return "\n".join(column.units) if len(set(column.units)) > 1 else column.units[0]
+
+
+def _channel(channel: Channel) -> tuple[str, str]:
+    """Names and units of a channel column; of a list, those of its fields below it."""
+    if channel.ragged:
+        names = [channel.channels[0], *(f"  {field}" for field in channel.fields)]
+        units = ["list", *channel.units] if channel.fields else [f"list {channel.unit}"]
+        return "\n".join(names), "\n".join(units)
+    return "\n".join(channel.channels), _units(channel)
 
 
 def _takes(column: Param) -> str:
