@@ -120,7 +120,9 @@ def weigh(batch: Batch) -> np.ndarray:
     for name, column in batch.type.fields.items():
         if isinstance(column, Field) and column.ragged:
             lists = batch.data[name]
-            total = total + felt(lists.sum(squash(np.clip(lists.data, -1e300, 1e300))))  # inf may mean something
+            total = total + felt(
+                lists.sum(squash(np.clip(lists.data, -1e300, 1e300)))
+            )  # inf may mean something
         elif isinstance(column, (Field, EntityRef)):
             for values in np.atleast_2d(batch.data[name]):
                 total = total + squash(values.astype(float))

@@ -89,7 +89,8 @@ def test_a_plugin_page_has_parameters_channels_and_units(tussle):
 def test_a_plugin_page_has_the_fields_of_lists(tussle):
     lines = [line.split() for line in tussle("describe", "NoisyContacts").stdout.splitlines()]
     first = next(i for i, line in enumerate(lines) if line[:2] == ["contacts", "list"])
-    assert [line[0] for line in lines[first + 1 : first + 13]] == "id team x y z vx vy vz qw qx qy qz".split()
+    fields = " ".join(line[0] for line in lines[first + 1 : first + 13])
+    assert fields == "id team x y z vx vy vz qw qx qy qz"
     assert [lines[first + 3], lines[first + 6]] == [["x", "m"], ["vx", "m/s"]]
 
 

@@ -272,6 +272,26 @@ def test_reset_and_restore_bring_lists_back():
     assert [r.state_hash for r in sim.result()] == fresh
 
 
+def test_a_reset_empties_the_lists_of_its_worlds_alone():
+    class Fixed(Count):
+        """Has a parameter that is a list, too."""
+
+        corners = Param(((1.0, 2.0),), fields="x y", ragged=True)
+
+    sim = Simulation(mission(block(count=2, autonomy=Reader(), sensor=Fixed())), seeds=[1, 2, 3])
+    sim.step(3)
+    sim.reset([1])
+    lists, _ = sim.read("a.Fixed.marks")
+    assert [[own.tolist() for own in world] for world in lists] == [
+        [[1.0] * 3, [2.0] * 3],
+        [[], []],
+        [[1.0] * 3, [2.0] * 3],
+    ]
+    assert [own.tolist() for own in sim.read("a.Fixed.corners")[0].ravel()] == [[[1.0], [2.0]]] * 6
+    sim.step(1)
+    assert sim.read("a.Reader.length")[0].tolist() == [[3, 3], [0, 0], [3, 3]]
+
+
 def test_a_list_counts_in_the_hash():
     game = mission(block(count=2, autonomy=Reader(), sensor=Count()))
     hashed = []
@@ -341,9 +361,23 @@ class Overflows(Sensor):
         self.seen.set(np.arange(g.n + 1), 1.0 / self.scale)
 
 
+class Twice(Sensor):
+    """Draws the same numbers for pairs twice."""
+
+    seen = Output(unit="m", ragged=True)
+
+    def step(self, g):
+        near = g.near(40.0)
+        self.seen.set(near.start, g.normal_pairs("a", near) + g.uniform_pairs("a", near))
+
+
 @pytest.mark.parametrize(
     ("plugin", "rule"),
-    [(Mixed, "stack invariance"), (Overflows, "an item of Overflows.seen is inf")],
+    [
+        (Twice, "step draws 'a' again in a step"),
+        (Mixed, "stack invariance"),
+        (Overflows, "an item of Overflows.seen is inf"),
+    ],
 )
 def test_the_kit_looks_into_lists(plugin, rule):
     with pytest.raises(ConformanceError, match=rule):
