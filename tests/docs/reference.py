@@ -133,7 +133,8 @@ def about(column: Column) -> str:
         return f"{kind} {column.message.__name__}. {column.doc}".strip()
     if not isinstance(column, Numbers):
         return f"{kind}. {column.doc}".strip()
-    names = f" `{' '.join(column.fields)}`" if column.fields else ""
+    names = " list of" if column.ragged else ""
+    names += f" `{' '.join(column.fields)}`" if column.fields else ""
     units = list(dict.fromkeys(column.units))
     unit = f" [{' '.join(units)}]" if any(units) else ""
     takes = terminal._takes(column) if isinstance(column, Param) else ""
