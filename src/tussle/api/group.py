@@ -270,20 +270,20 @@ class GroupView:
         )
         return np.asarray(function(self._seeds[one], self._stream(label), place, step, self.substep, k)[:, 0])
 
-    def uniform_pairs(self, label: str, near: Pairs, k: int | None = None) -> np.ndarray:
+    def uniform_pairs(self, label: str, near: Any, k: int | None = None) -> np.ndarray:
         """Uniform draws in [0, 1), one per pair of `near`, (m,) or (k, m): the same for a pair whatever other entities there are.
 
         A draw is keyed by the entity of the row, the id of the other and the step.
         """
         return self._of_pairs(rng.uniform, label, near, k)
 
-    def normal_pairs(self, label: str, near: Pairs, k: int | None = None) -> np.ndarray:
+    def normal_pairs(self, label: str, near: Any, k: int | None = None) -> np.ndarray:
         """Standard normal draws, one per pair of `near`, (m,) or (k, m); as `uniform_pairs`."""
         return self._of_pairs(rng.normal, label, near, k)
 
-    def _of_pairs(self, law: Callable[..., np.ndarray], label: str, near: Pairs, k: int | None) -> np.ndarray:
+    def _of_pairs(self, law: Callable[..., np.ndarray], label: str, near: Any, k: int | None) -> np.ndarray:
         row, clock = near.row, self.context.clock
-        seeds = self._seeds[row] ^ (near.id.astype(np.uint64) * GOLDEN)
+        seeds = self._seeds[row] ^ (self.bodies.id[near.other].astype(np.uint64) * GOLDEN)
         step = clock.step[self.world[row]]
         out = law(seeds, self._stream(label), self.place_in_block[row], step, self.substep, k or 1)
         return out if k is not None else out[0]

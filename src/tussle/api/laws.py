@@ -52,10 +52,10 @@ def neighbors(
         teams: "own", "other", or None for all.
         **reductions: Name of each contribution and how it is reduced: "sum"; "mean", 0 without neighbours; "min" and "max", inf and
             -inf without; "count" of those that are true; "nearest", that of the nearest neighbour (the smaller id of equals), NaN
-            without.
+            without. Or "each" for all contributions: `self.law(g)` then lists the pairs that count, see `Listed`; made for few.
 
     Raises:
-        DeclarationError: A reduction is unknown, or there is none, or no radius.
+        DeclarationError: A reduction is unknown, or there is none, or no radius, or some are "each" and others not.
     """
 
     def declare(function: Callable[..., Any]) -> NeighborLaw:
@@ -75,7 +75,13 @@ def together(*laws: NeighborLaw, where: Callable[..., Any] | None = None) -> Nei
     Args:
         laws: The laws.
         where: A function of a pair like a law's, with one result: whether the pair counts for any of them.
+
+    Raises:
+        DeclarationError: A law lists its pairs; these are not reduced to rows in a walk.
     """
+    for law in (law for each in laws for law in each.laws):
+        if law.lists:
+            raise DeclarationError(f"{label(law.function)}: a law that lists its pairs stands alone")
     condition = law_of(where, (), None, {"counts": "count"}) if where is not None else None
     every = tuple(law for each in laws for law in each.laws)
     return NeighborLaw(
@@ -116,7 +122,7 @@ class NeighborLaw:
         plan = self._plans.get(type(plugin))
         if plan is None:
             plan = self._plans[type(plugin)] = make_plan(g, plugin, self.laws, self.where)
-        return Contributions(self.names, plan.walk(g, plugin))
+        return plan.walk(g, plugin, self.names)
 
     def check(self, cls: type, name: str) -> None:
         """Refuse a law whose arguments mean nothing to a plugin.
@@ -160,6 +166,27 @@ class Contributions:
         return iter(self.values)
 
 
+class Listed(Contributions):
+    """Contributions pair by pair, by name, (m,) each; ordered by row, each row's pairs in a fixed order.
+
+    Attributes:
+        values: All of them in the order of the declaration, (k, m).
+        row: Row of the view, (m,).
+        other: Row of the other in the body table, (m,).
+    """
+
+    __slots__ = ("other", "row")
+
+    def __init__(
+        self, names: tuple[str, ...], values: np.ndarray, row: np.ndarray, other: np.ndarray
+    ) -> None:
+        super().__init__(names, values)
+        self.row, self.other = row, other
+
+    def __len__(self) -> int:
+        return len(self.row)
+
+
 @lru_cache(maxsize=256)
 def own_columns(cls: Any) -> dict[str, str]:
     """Expression, over a view `g` and a plugin's attributes `own`, of each column of the entity that its laws may name."""
@@ -193,15 +220,17 @@ class Plan:
         n_out: Number of contributions.
         columns: Gives, of a view and a plugin's attributes, how far to look [m] and the columns by row.
         other: Its columns by place: of the body table, and which components.
+        lists: It gives one value for each pair, instead of one for each row.
     """
 
     run: Kernel
     n_out: int
     columns: Callable[[GroupView, dict[str, Any]], tuple[Any, tuple[np.ndarray, ...]]]
     other: tuple[tuple[str, tuple[int, ...]], ...]
+    lists: bool
 
-    def walk(self, g: GroupView, plugin: Any) -> np.ndarray:
-        """What the neighbours of each row contribute, (k, n)."""
+    def walk(self, g: GroupView, plugin: Any, names: tuple[str, ...]) -> Contributions:
+        """What the neighbours of each row contribute."""
         reach, own = self.columns(g, plugin.__dict__)
         index = g.index(reach)
         blocks = index.blocks(g.first, g.last)
@@ -210,15 +239,40 @@ class Plan:
         for name, places in self.other:
             columns = g.by_place(index, name)
             others += columns if len(columns) == len(places) else tuple([columns[place] for place in places])
-        out = np.empty((self.n_out, g.n))
         run, first, most = self.run, g.first, blocks.most
+        if self.lists:
+            return self.listed(
+                g, names, blocks.n_blocks, lambda *last: run(longs, points, others, own, *last, most)
+            )
+        out = np.empty((self.n_out, g.n))
         if g.context.threads == 1:
             run(longs, points, others, own, out, first, (0, blocks.n_blocks), most)
         else:
             g.context.split(
                 blocks.n_blocks, lambda *part: run(longs, points, others, own, out, first, part, most)
             )
-        return out
+        return Contributions(names, out)
+
+    def listed(self, g: GroupView, names: tuple[str, ...], n_blocks: int, run: Callable[..., int]) -> Listed:
+        """What each pair contributes."""
+        made: list[tuple[np.ndarray, np.ndarray]] = []
+
+        def fill(begin: int, end: int) -> None:
+            room, n = -1, 8 * (end - begin)
+            while n > room:  # again, where there are more pairs than there was room for
+                room = n
+                pairs, values = np.empty((2, room), np.int64), np.empty((self.n_out, room))
+                n = run((pairs, values), g.first, (begin, end))
+            made.append((pairs[:, :n], values[:, :n]))
+
+        if g.context.threads == 1:
+            fill(0, n_blocks)
+        else:
+            g.context.split(n_blocks, fill)
+        pairs, values = (np.concatenate(arrays, axis=1) for arrays in zip(*made, strict=True))
+        order = np.argsort(pairs[0], kind="stable")
+        row, other = np.take(pairs, order, axis=1)
+        return Listed(names, np.take(values, order, axis=1), row, other)
 
 
 def make_plan(g: GroupView, plugin: Any, laws: tuple[Law, ...], where: Law | None) -> Plan:
@@ -241,4 +295,6 @@ def make_plan(g: GroupView, plugin: Any, laws: tuple[Law, ...], where: Law | Non
         name, place = BODY[part.removeprefix(OTHER)]
         other[name] = (*other.get(name, ()), place)
     by_row = "".join(f"{columns[name]}, " for name in made.own)
-    return Plan(made.run, made.n_out, evaluated(f"({farthest}, ({by_row}))"), tuple(other.items()))
+    return Plan(
+        made.run, made.n_out, evaluated(f"({farthest}, ({by_row}))"), tuple(other.items()), laws[0].lists
+    )

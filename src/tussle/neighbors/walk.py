@@ -21,7 +21,7 @@ from tussle.neighbors.lanes import LANES, bits, choose, load
 from tussle.numeric.kernel import Kernel, device, kernel
 from tussle.numeric.rk4 import label
 
-REDUCTIONS = ("sum", "mean", "min", "max", "count", "nearest")
+REDUCTIONS = ("sum", "mean", "min", "max", "count", "nearest", "each")
 PAIR = ("offset_x", "offset_y", "offset_z", "distance", "distance_squared", "inverse_distance")
 """Arguments that belong to a pair; the others are columns, of the other one with the prefix OTHER."""
 OTHER = "other_"
@@ -57,6 +57,15 @@ class Law:
             raise DeclarationError(
                 f"{label(self.function)}: teams={self.teams!r} is not None, 'own' or 'other'"
             )
+        if self.lists and set(self.reductions.values()) != {"each"}:
+            raise DeclarationError(
+                f"{label(self.function)}: a law that lists its pairs reduces every contribution by 'each', or none"
+            )
+
+    @property
+    def lists(self) -> bool:
+        """Whether it gives one value for each pair, instead of one for each row."""
+        return "each" in self.reductions.values()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -141,7 +150,18 @@ def square_of(radius):  # type: ignore[no-untyped-def]
     return radius * radius if radius > 0.0 else -1.0
 
 
-FROM_LANES = ["bits", "choose", "inverse_sqrt", "lanes_sqrt", "load", "number", "splat", "store", "truth"]
+FROM_LANES = [
+    "bits",
+    "choose",
+    "inverse_sqrt",
+    "lanes_sqrt",
+    "load",
+    "lowest",
+    "number",
+    "splat",
+    "store",
+    "truth",
+]
 
 
 @dataclass(frozen=True)
@@ -173,6 +193,8 @@ class Part:
     def begin(self) -> Iterator[str]:
         """What stands before the loop over the candidates."""
         start = {"min": "np.inf", "max": "-np.inf", "nearest": "np.nan"}
+        if self.law.lists:
+            return
         for k, reduction in self.reductions:
             yield f"a_{k} = splat({start.get(reduction, '0.0')})"
         if "mean" in self.law.reductions.values():
@@ -195,6 +217,9 @@ class Part:
         at = self.at
         yield from self.contributions()
         yield f"ok = {self.counted}"
+        if self.law.lists:
+            yield from self.append()
+            return
         if "nearest" in self.law.reductions.values():
             nearer = f"(distance_squared_ == best_{at}) & (other_id_ < best_id_{at})"
             yield f"closer = ok & ((distance_squared_ < best_{at}) | ({nearer}))"
@@ -211,6 +236,21 @@ class Part:
             elif reduction == "nearest":
                 mask, value = "closer", f"v_{k}"
             yield f"a_{k} = choose({mask}, {value}, a_{k})"
+
+    def append(self) -> Iterator[str]:
+        """The pairs that count to the lists, as far as there is room."""
+        yield "hits = bits(ok)"
+        yield "if hits != 0:"
+        for k, _ in self.reductions:
+            yield f"    store(lane, (results_at + {k}) * LANES, v_{k})"
+        yield "while hits != 0:"
+        yield "    k = lowest(hits)"
+        yield "    hits &= hits - 1"
+        yield "    if n_listed < out[1].shape[1]:"
+        yield "        out[0][0, n_listed], out[0][1, n_listed] = order[queries[q0 + k]] - first, order[p]"
+        for k, _ in self.reductions:
+            yield f"        out[1][{k}, n_listed] = lane[(results_at + {k}) * LANES + k]"
+        yield "    n_listed += 1"
 
     def end(self) -> Iterator[str]:
         """What stands behind the loop."""
@@ -248,7 +288,8 @@ def make_walk(laws: Sequence[Law], where: Law | None, code_of: Callable[[str], s
     made.__module__ = laws[0].function.__module__
     made.__qualname__ = "+".join(law.function.__qualname__ for law in (*laws, *([where] if where else [])))
     other, own = " ".join("F" * len(text.other)), " ".join(code_of(name) for name in text.own)
-    signature = f"(I2 I2 I) (F2 F2) ({other}) ({own}) F2w i8 (i8 i8) i8"
+    out = "(I2w F2w) i8 (i8 i8) i8 -> i8" if text.lists_pairs else "F2w i8 (i8 i8) i8"
+    signature = f"(I2 I2 I) (F2 F2) ({other}) ({own}) {out}"
     return Walk(text.own, text.other, kernel(signature)(made), at)
 
 
@@ -290,6 +331,7 @@ class WalkText:
         self.lists = list(dict.fromkeys(part.law.teams for part in parts))
         self.limits_at = 1 + len(self.taken)
         self.results_at = self.limits_at + len(self.limits)
+        self.lists_pairs = parts[0].law.lists
 
     def lines(self) -> Iterator[str]:
         """The kernel."""
@@ -313,6 +355,7 @@ class WalkText:
         yield f"    found = np.empty({len(lists)} * room, np.int64)"
         for number, name in enumerate(lists):
             yield f"    {name} = found[{number} * room : {number + 1} * room]"
+        yield f"    results_at, n_listed = {self.results_at}, 0"
         yield "    begin, stop = part"
         yield "    for b in range(begin, stop):"
         yield "        q0 = block_first[b]"
@@ -325,8 +368,10 @@ class WalkText:
         yield from indented(3, self.load_lanes())
         for teams in self.lists:
             yield from indented(3, self.over(teams))
-        yield from indented(3, self.put())
+        yield from indented(3, () if self.lists_pairs else self.put())
         yield "            done |= taken"
+        if self.lists_pairs:
+            yield "    return n_listed"
 
     def take_lanes(self) -> Iterator[str]:
         """Columns of the lanes into `lane`; lanes that are not taken get a reach that nothing is within."""

@@ -97,6 +97,40 @@ def test_a_law_of_the_world_takes_its_parameters_world_by_world():
     sim.step()
 
 
+@pytest.mark.parametrize("threads", [1, 3])
+def test_a_law_lists_its_pairs(threads):
+    class Meeting(Autonomy):
+        sight = State(unit="m")
+
+        @neighbors("sight", gap="each", mate="each", high="each")
+        @staticmethod
+        def meet(distance, id, other_id, team, other_team, other_pos_z):  # noqa: A002 - a column
+            if id > other_id:
+                return None
+            return distance, team == other_team, other_pos_z
+
+        @neighbors(0.0, none="each")
+        @staticmethod
+        def touch(offset_x):
+            return offset_x
+
+        def spawn(self, g, rows):
+            self.sight[rows] = (12.0 * g.uniform("sight"))[rows]
+
+        def step(self, g):
+            near, met = g.near(self.sight), self.meet(g)
+            counts = g.id[near.row] < near.id
+            assert 0 < len(met) == counts.sum() < len(near)
+            np.testing.assert_array_equal(met.row, near.row[counts])
+            np.testing.assert_array_equal(met.other, near.other[counts])
+            np.testing.assert_array_equal(met.gap, near.distance[counts])
+            np.testing.assert_array_equal(met.mate, (g.team[near.row] == near.team)[counts])
+            np.testing.assert_array_equal(met.values[2], near.pos[2][counts])
+            assert len(self.touch(g)) == self.touch(g).none.size == 0
+
+    play(Meeting(), n=2000, spread=60.0, motion=Still(), threads=threads)
+
+
 # What a function may hold -------------------------------------------------------------------------------------------------
 
 
@@ -287,6 +321,10 @@ def test_wrong_reductions_and_teams_are_refused():
         plugin(halves, "sight", teams="mine", x="sum")
     with pytest.raises(DeclarationError, match="name the radius"):
         plugin(halves, x="sum")
+    with pytest.raises(DeclarationError, match="reduces every contribution by 'each', or none"):
+        plugin(halves, "sight", x="sum", pair="each")
+    with pytest.raises(DeclarationError, match="a law that lists its pairs stands alone"):
+        plugin(halves, "sight", x="each", y="each", where=halves)
 
 
 def test_another_number_of_contributions_is_refused():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tussle.api import Interaction, Param, WorldView
+from tussle.api import Interaction, Param, WorldView, neighbors
 from tussle.messages import EntityCollided
 
 
@@ -34,25 +34,31 @@ class SimpleCollision(Interaction):
     def step(self, w: WorldView) -> None:
         self._collide(w)
 
+    @neighbors("collision_range", first="each", second="each", first_team="each", second_team="each")
+    @staticmethod
+    def meet(
+        id: int, other_id: int, team: int, other_team: int,  # noqa: A002 - a column
+        enable_team_collisions: bool, enable_non_team_collisions: bool,
+    ) -> tuple[int, ...] | None:  # fmt: skip
+        if id > other_id or not (
+            enable_team_collisions if team == other_team else enable_non_team_collisions
+        ):
+            return None
+        return id, other_id, team, other_team
+
     def _collide(self, w: WorldView) -> None:
-        pairs = w.near(self.collision_range[w.world])
-        if not len(pairs.row):
+        met = self.meet(w)
+        if not len(met):
             return
-        first, second = pairs.row, pairs.other
-        world = w.world[first]
-        is_team = w.team[first] == w.team[second]
-        counts = np.where(is_team, self.enable_team_collisions[world], self.enable_non_team_collisions[world])
-        counts &= w.id[first] < w.id[second]
-        first, second, world = first[counts], second[counts], world[counts]
         w.publish(
             EntityCollided,
-            world,
-            first=w.id[first],
-            second=w.id[second],
-            first_team=w.team[first],
-            second_team=w.team[second],
+            w.world[met.row],
+            first=met.first,
+            second=met.second,
+            first_team=met.first_team,
+            second_team=met.second_team,
         )
-        w.kill(np.unique(np.concatenate([first, second])), "collision")
+        w.kill(np.unique(np.concatenate([met.row, met.other])), "collision")
 
     def rejects(self, w: WorldView, world: int, pos: np.ndarray, taken: np.ndarray) -> bool:
         dx, dy, dz = taken - pos[:, None]

@@ -6,37 +6,30 @@ from tussle.numeric.kernel import kernel
 from tussle.numeric.quaternion import quat_conjugate, quat_from_euler, quat_multiply
 
 
-@kernel("(I I I I) (F2 F2 F2) (F2 F2 F2) (F2 F2 F2) (F2 F2 F2) (F2 F2 F2) F2w")
-def blur(rows, truth, pos_noise, vel_noise, orient_noise, draws, contacts):
-    """Fill the contact lists.
+@kernel("I (F2 F2 F2) (F2 F2 F2) (F2 F2 F2) (F2 F2 F2) F2w")
+def blur(row, pos_noise, vel_noise, orient_noise, draws, contacts):
+    """Add noise to the states of contacts.
 
     Args:
-        rows: Row of the group that measures and row of the body table that is measured, (m,) each; ids and teams of the body table,
-            (N,) each.
-        truth: Positions [m] and velocities [m/s] of the body table, (3, N), world frame, and quaternions body to world, (4, N).
+        row: Row of the group that measures each, (m,).
         pos_noise: Mean and standard deviation of x, y and z [m], (2, n) each, n rows of the group.
         vel_noise: Those of the velocity [m/s].
         orient_noise: Those of the turns about the body x, y and z axes, in this order [rad].
         draws: Standard normal draws for position, velocity and turns, (3, m) each.
-        contacts: id, team, x y z [m], vx vy vz [m/s], qw qx qy qz, (12, m), written.
+        contacts: id, team, x y z [m], vx vy vz [m/s], qw qx qy qz, (12, m), the truth at first.
     """
-    row, other, ids, teams = rows
-    true_pos, true_vel, true_quat = truth
     pos_0, pos_1, pos_2 = pos_noise
     vel_0, vel_1, vel_2 = vel_noise
     orient_0, orient_1, orient_2 = orient_noise
     pos_draw, vel_draw, orient_draw = draws
     for k in range(row.shape[0]):
         i = row[k]
-        j = other[k]
-        contacts[0, k] = ids[j]
-        contacts[1, k] = teams[j]
-        contacts[2, k] = true_pos[0, j] + (pos_0[0, i] + pos_0[1, i] * pos_draw[0, k])
-        contacts[3, k] = true_pos[1, j] + (pos_1[0, i] + pos_1[1, i] * pos_draw[1, k])
-        contacts[4, k] = true_pos[2, j] + (pos_2[0, i] + pos_2[1, i] * pos_draw[2, k])
-        contacts[5, k] = true_vel[0, j] + (vel_0[0, i] + vel_0[1, i] * vel_draw[0, k])
-        contacts[6, k] = true_vel[1, j] + (vel_1[0, i] + vel_1[1, i] * vel_draw[1, k])
-        contacts[7, k] = true_vel[2, j] + (vel_2[0, i] + vel_2[1, i] * vel_draw[2, k])
+        contacts[2, k] += pos_0[0, i] + pos_0[1, i] * pos_draw[0, k]
+        contacts[3, k] += pos_1[0, i] + pos_1[1, i] * pos_draw[1, k]
+        contacts[4, k] += pos_2[0, i] + pos_2[1, i] * pos_draw[2, k]
+        contacts[5, k] += vel_0[0, i] + vel_0[1, i] * vel_draw[0, k]
+        contacts[6, k] += vel_1[0, i] + vel_1[1, i] * vel_draw[1, k]
+        contacts[7, k] += vel_2[0, i] + vel_2[1, i] * vel_draw[2, k]
         about_x = orient_0[0, i] + orient_0[1, i] * orient_draw[0, k]
         about_y = orient_1[0, i] + orient_1[1, i] * orient_draw[1, k]
         about_z = orient_2[0, i] + orient_2[1, i] * orient_draw[2, k]
@@ -44,5 +37,5 @@ def blur(rows, truth, pos_noise, vel_noise, orient_noise, draws, contacts):
         bw, bx, by, bz = quat_from_euler(-about_x, -about_y, -about_z)
         tw, tx, ty, tz = quat_conjugate(bw, bx, by, bz)
         contacts[8, k], contacts[9, k], contacts[10, k], contacts[11, k] = quat_multiply(
-            true_quat[0, j], true_quat[1, j], true_quat[2, j], true_quat[3, j], tw, tx, ty, tz
+            contacts[8, k], contacts[9, k], contacts[10, k], contacts[11, k], tw, tx, ty, tz
         )

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from tussle.api import GroupView, Output, Param, Sensor
+from tussle.api import GroupView, Output, Param, Sensor, neighbors
 from tussle.stock.sensor.noisy_contacts import kernels
 
 PAIR = "mean sd"
@@ -43,16 +43,26 @@ class NoisyContacts(Sensor):
     )
     n_contacts = Output(doc="Number of entities measured.")
 
+    @neighbors("max_range", **dict.fromkeys(FIELDS.split(), "each"))
+    @staticmethod
+    def contact(
+        other_id: int, other_team: int, other_pos_x: float, other_pos_y: float, other_pos_z: float,
+        other_vel_x: float, other_vel_y: float, other_vel_z: float,
+        other_quat_w: float, other_quat_x: float, other_quat_y: float, other_quat_z: float,
+    ) -> tuple[float, ...]:  # fmt: skip
+        return (
+            other_id, other_team, other_pos_x, other_pos_y, other_pos_z, other_vel_x, other_vel_y, other_vel_z,
+            other_quat_w, other_quat_x, other_quat_y, other_quat_z,
+        )  # fmt: skip
+
     def step(self, g: GroupView) -> None:
         """New lists for all rows."""
-        near = g.near(self.max_range)
-        bodies = g.bodies
-        data = np.empty((len(FIELDS.split()), len(near)))
+        near = self.contact(g)
         kernels.blur(
-            (near.row, near.other, bodies.id, bodies.team), (bodies.pos, bodies.vel, bodies.quat),
-            (self.pos_noise_0, self.pos_noise_1, self.pos_noise_2), (self.vel_noise_0, self.vel_noise_1, self.vel_noise_2),
+            near.row, (self.pos_noise_0, self.pos_noise_1, self.pos_noise_2), (self.vel_noise_0, self.vel_noise_1, self.vel_noise_2),
             (self.orient_noise_0, self.orient_noise_1, self.orient_noise_2),
-            tuple([g.normal_pairs(label, near, 3) for label in ("pos", "vel", "orient")]), data,
+            tuple([g.normal_pairs(label, near, 3) for label in ("pos", "vel", "orient")]), near.values,
         )  # fmt: skip
-        self.contacts.set(near.start, data)
-        self.n_contacts[:] = near.count
+        start = np.searchsorted(near.row, np.arange(g.n + 1))
+        self.contacts.set(start, near.values)
+        self.n_contacts[:] = start[1:] - start[:-1]
