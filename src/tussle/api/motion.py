@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from tussle.api.bodies import DERIVED, FLOATS, OFFSETS, Bodies, derive
+from tussle.api.bodies import DERIVED, OFFSETS, Bodies, derive
 from tussle.api.group import GroupView
 from tussle.api.kinds import EntityPlugin
 from tussle.columns import Channel, Param, State
@@ -18,7 +18,6 @@ from tussle.numeric.rk4 import compile_derivative, rk4
 
 BODY_INPUTS = ("force_x", "force_y", "force_z", "torque_x", "torque_y", "torque_z", "mass")
 WRITABLE = ("pos", "quat", "vel", "omega")
-_ROWS = [OFFSETS[name] + i for name in WRITABLE for i in range(FLOATS[name])]
 
 
 class MotionBody(GroupView):
@@ -27,7 +26,8 @@ class MotionBody(GroupView):
     Attributes:
         span: Rows of the view [first, last) whose attitude `from_body` may ask for; of the others yaw, climb, roll and forward are 0.
         forward_speed: Speed along the body x axis [m/s], (n,).
-        rows: The rows of pos, quat, vel and omega one by one, thirteen (n,); for kernels.
+        table: Body table, pos, vel, quat and omega of all entities one below the other, (>= 13, N), whose columns first ... first + n - 1
+            are this model's; for kernels.
     """
 
     def reset(self, bodies: Bodies, first: int, last: int) -> None:
@@ -40,17 +40,15 @@ class MotionBody(GroupView):
             self.__dict__[name] = array
             self._seen.append(name)
             return array
-        if name == "rows":
-            floats = self._bodies.floats
-            rows = tuple(floats[i, self.first : self.last] for i in _ROWS)
-            self.__dict__[name] = rows
-            self._seen.append(name)
-            return rows
         if name == "forward_speed":
             east, north, up = self.forward
             vx, vy, vz = self.vel
             return vx * east + vy * north + vz * up
         return super().__getattr__(name)
+
+    @property
+    def table(self) -> np.ndarray:
+        return self._bodies.floats
 
     def _derive(self, name: str) -> np.ndarray:
         # Straight from the quaternions: while a model writes them, what the table keeps is out of date.
@@ -221,4 +219,4 @@ class MotionModel(EntityPlugin):
         return path[..., 0] if is_single else path
 
 
-assert set(WRITABLE) <= set(FLOATS)
+assert [OFFSETS[name] for name in ("pos", "vel", "quat", "omega")] == [0, 3, 6, 10]  # as kernels write them

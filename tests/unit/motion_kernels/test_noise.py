@@ -21,7 +21,7 @@ def pairs(n, mean, sd):
 def believed(pos, vel, quat, noise, draws):
     n = pos.shape[1]
     out = np.empty((3, n)), np.empty((3, n)), np.empty((4, n))
-    state.blur(*pos, *vel, *quat, *noise, *draws, *out)
+    state.blur((*pos, *vel, *quat), tuple(noise[:3]), tuple(noise[3:6]), tuple(noise[6:]), tuple(draws), *out)
     return out
 
 
@@ -65,9 +65,9 @@ def test_contacts_are_the_others_with_the_noise_of_the_one_who_measures():
     row, other = np.array([0, 0, 1]), np.array([4, 5, 0])
     noise = [np.array([[0.0, 1.0], [0.0, 2.0]])] * 9
     draws = np.random.default_rng(9).normal(size=(3, 3, 3))
-    data = np.full((12, 3), np.nan)
-    columns = (row, other, ids, teams), (pos, vel, quat)
-    contacts.blur(*columns, tuple(noise[:3]), tuple(noise[3:6]), tuple(noise[6:]), tuple(draws), data)
+    columns = ids[None, other], teams[None, other], pos[:, other], vel[:, other], quat[:, other]
+    data = np.ascontiguousarray(np.concatenate(columns))
+    contacts.blur(row, tuple(noise[:3]), tuple(noise[3:6]), tuple(noise[6:]), tuple(draws), data)
     assert data[0].tolist() == [14, 15, 10]
     assert data[1].tolist() == [3, 3, 1]
     assert np.array_equal(data[2:5, :2], pos[:, [4, 5]])

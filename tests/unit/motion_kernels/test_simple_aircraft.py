@@ -21,8 +21,8 @@ def published(x, u, p):
     """What is published of states x: position, quaternion, velocity, turn rate, (13, n)."""
     out = np.full((13, x.shape[1]), np.nan)
     bounds = p[ROLL_MAX], p[PITCH_MAX], p[ROLL_RATE_MAX], p[PITCH_RATE_MAX]
-    kernels.to_body(x, (u[1], u[2]), bounds, (p[RADIUS], p[SLOPE], p[TARGET]), tuple(out))
-    return out
+    kernels.to_body(x, (u[1], u[2]), bounds, (p[RADIUS], p[SLOPE], p[TARGET]), out, 0)
+    return out[[0, 1, 2, 6, 7, 8, 9, 3, 4, 5, 10, 11, 12]]
 
 
 def rk4(x, u, p, dt, substeps):

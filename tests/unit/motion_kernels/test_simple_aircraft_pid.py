@@ -24,19 +24,14 @@ class Steering:
 
     def step(self, lateral, vertical, speed, z, vx, vy, vz, angle, dt=0.1):
         kernels.steer(
-            lateral,
-            vertical,
-            speed,
-            z,
-            vx,
-            vy,
-            vz,
+            (lateral, vertical, speed),
+            (z, vx, vy, vz),
             angle,
-            *self.flags,
-            *self.gains,
+            self.flags,
+            tuple(self.gains),
             self.memory,
             dt,
-            *self.out,
+            tuple(self.out),
         )
         return self.out
 
@@ -84,8 +79,8 @@ def test_flies_an_aircraft_to_heading_altitude_and_speed():
     p = np.array([13.0, 15.0, 40.0, *np.radians([30.0, 30.0, 57.3, 57.3]), 50.0, 0.0])[:, None]
     u, body = np.zeros((3, 1)), np.empty((13, 1))
     for _ in range(600):
-        aircraft.to_body(x, (u[1], u[2]), tuple(p[3:7]), (p[0], p[8], p[7]), tuple(body))
-        u = out = steering.step(*columns(1.0, 130.0, 25.0), x[2], *body[7:10], x[5])
+        aircraft.to_body(x, (u[1], u[2]), tuple(p[3:7]), (p[0], p[8], p[7]), body, 0)
+        u = out = steering.step(*columns(1.0, 130.0, 25.0), x[2], *body[3:6], x[5])
         aircraft.advance(x, np.ascontiguousarray(out), p, 0.1, 1)
     assert x[5, 0] == pytest.approx(1.0, abs=0.02)
     assert x[2, 0] == pytest.approx(130.0, abs=1.0)

@@ -44,7 +44,9 @@ class Steering:
         self.out = np.full((5, n), np.nan)
 
     def step(self, wanted, z, vel, attitude, dt=0.1):
-        kernels.steer(*wanted, z, *vel, *attitude, *self.gains, self.memory, dt, *self.out)
+        kernels.steer(
+            tuple(wanted), (z, *vel), tuple(attitude), tuple(self.gains), self.memory, dt, tuple(self.out)
+        )
         return self.out
 
 

@@ -13,31 +13,26 @@ from tussle.numeric.pid import pid
 BLOCK = 128  # rows
 
 
-@kernel("F F F F F F F F b1 b1 F2 F2 F2 F2w f8 Fw Fw Fw")
-def steer(
-    lateral, vertical, speed, z, vx, vy, vz, angle, use_roll, use_glide_slope,
-    heading_gains, altitude_gains, speed_gains, memory, dt,
-    throttle, roll_rate, pitch_rate,
-):  # fmt: skip
+@kernel("(F F F) (F F F F) F (b1 b1) (F2 F2 F2) F2w f8 (Fw Fw Fw)")
+def steer(wanted, motion, angle, flags, gains, memory, dt, commands):
     """One call of the three loops.
 
     Args:
-        lateral: Wanted heading, or with use_roll bank (right wing down) [rad], (n,).
-        vertical: Wanted altitude [m], or with use_glide_slope slope of the descent [rad], (n,).
-        speed: Wanted speed [m/s], (n,).
-        z: Altitude [m], (n,).
-        vx, vy, vz: Velocity [m/s], (n,), world frame.
+        wanted: Heading, or with use_roll bank (right wing down) [rad]; altitude [m], or with use_glide_slope slope of the descent
+            [rad]; speed [m/s], (n,).
+        motion: Altitude [m] and velocity [m/s], world frame, (n,).
         angle: Heading, or with use_roll bank (right wing down) [rad], (n,).
-        use_roll: Whether the lateral loop holds a bank.
-        use_glide_slope: Whether the vertical loop holds a slope.
-        heading_gains, altitude_gains, speed_gains: kp, ki, kd, band, (4, n).
+        flags: use_roll, whether the lateral loop holds a bank; use_glide_slope, whether the vertical loop holds a slope.
+        gains: Of the lateral, vertical and speed loop: kp, ki, kd, band, (4, n).
         memory: Integral and last error of the lateral, vertical and speed loop; 1.0 once there is a last error, (7,
             n), updated in place.
         dt: Time since the last call [s].
-        throttle: Command [-], (n,), written.
-        roll_rate: Command [rad/s], positive banks into a left turn, (n,), written.
-        pitch_rate: Command [rad/s], nose up, (n,), written.
+        commands: Throttle [-], roll rate [rad/s], positive banks into a left turn, pitch rate [rad/s], nose up, (n,), written.
     """
+    lateral, vertical, speed = wanted
+    z, vx, vy, vz = motion
+    use_roll, use_glide_slope = flags
+    throttle, roll_rate, pitch_rate = commands
     error = np.empty((3, BLOCK))
     change = np.empty((3, BLOCK))
     # A bank to the right needs a negative roll rate of the model; a steeper descent a lower nose.
@@ -68,11 +63,10 @@ def steer(
             change[0, l] = wrap(change[0, l])
             seen[first + l] = 1.0
         for k in range(3):
-            gains = heading_gains if k == 0 else altitude_gains if k == 1 else speed_gains
             out = roll_rate if k == 0 else pitch_rate if k == 1 else throttle
             sign = lateral_sign if k == 0 else vertical_sign if k == 1 else 1.0
             integral = memory[2 * k]
-            kp, ki, kd, band = gains[0], gains[1], gains[2], gains[3]
+            kp, ki, kd, band = gains[k][0], gains[k][1], gains[k][2], gains[k][3]
             for l in range(m):
                 i = first + l
                 command, integral[i] = pid(

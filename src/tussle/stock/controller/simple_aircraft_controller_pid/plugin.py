@@ -65,6 +65,6 @@ class SimpleAircraftControllerPID(Controller):
         lateral, angle = (self.desired_roll, g.roll) if self.use_roll else (self.desired_heading, g.yaw)
         vertical = self.desired_glide_slope if self.use_glide_slope else self.desired_altitude
         kernels.steer(
-            lateral, vertical, self.desired_speed, g.pos[2], *g.vel, angle, self.use_roll, self.use_glide_slope,
-            self.heading_pid, self.alt_pid, self.vel_pid, self.memory, g.dt, self.throttle, self.roll_rate, self.pitch_rate,
+            (lateral, vertical, self.desired_speed), (g.pos[2], *g.vel), angle, (self.use_roll, self.use_glide_slope),
+            (self.heading_pid, self.alt_pid, self.vel_pid), self.memory, g.dt, (self.throttle, self.roll_rate, self.pitch_rate),
         )  # fmt: skip

@@ -13,27 +13,26 @@ from tussle.numeric.pid import pid
 BLOCK = 128  # rows
 
 
-@kernel("F F F F F F F F F F F2 F2 F2 F2 F2w f8 Fw Fw Fw Fw Fw")
-def steer(
-    altitude, speed, heading, z, vx, vy, vz, yaw, climb, roll,
-    heading_gains, pitch_gains, roll_gains, speed_gains, memory, dt,
-    out_speed, acceleration, turn_rate, pitch_rate, roll_rate,
-):  # fmt: skip
+@kernel("(F F F) (F F F F) (F F F) (F2 F2 F2 F2) F2w f8 (Fw Fw Fw Fw Fw)")
+def steer(wanted, motion, attitude, gains, memory, dt, commands):
     """One call of the four loops.
 
     Args:
-        altitude, speed, heading: Wanted altitude [m], speed [m/s], heading [rad], (n,).
-        z: Altitude [m], (n,).
-        vx, vy, vz: Velocity [m/s], (n,), world frame.
-        yaw, climb, roll: Heading, elevation (nose up), bank (right wing down) [rad], (n,).
-        heading_gains, pitch_gains, roll_gains, speed_gains: kp, ki, kd, band, (4, n).
+        wanted: Altitude [m], speed [m/s], heading [rad], (n,).
+        motion: Altitude [m] and velocity [m/s], world frame, (n,).
+        attitude: Heading, elevation (nose up), bank (right wing down) [rad], (n,).
+        gains: Of heading, pitch, roll and speed: kp, ki, kd, band, (4, n).
         memory: Integral and last error of heading, pitch, roll, speed; 1.0 once there is a last error, (9, n),
             updated in place.
         dt: Time since the last call [s].
-        out_speed: The wanted speed, handed through [m/s], (n,), written.
-        acceleration: Command of the speed loop [m/s^2], (n,), written.
-        turn_rate, pitch_rate, roll_rate: Commands [rad/s], (n,), written.
+        commands: The wanted speed, handed through [m/s], command of the speed loop [m/s^2], turn, pitch and roll rate [rad/s],
+            (n,), written.
     """
+    altitude, speed, heading = wanted
+    z, vx, vy, vz = motion
+    yaw, climb, roll = attitude
+    out_speed, acceleration, turn_rate, pitch_rate, roll_rate = commands
+    outs = turn_rate, pitch_rate, roll_rate, acceleration
     rise = np.empty(BLOCK)
     run = np.empty(BLOCK)
     error = np.empty((4, BLOCK))
@@ -65,12 +64,8 @@ def steer(
             change[2, l] = wrap(change[2, l])
             seen[first + l] = 1.0
         for k in range(4):
-            gains = (
-                heading_gains if k == 0 else pitch_gains if k == 1 else roll_gains if k == 2 else speed_gains
-            )
-            out = turn_rate if k == 0 else pitch_rate if k == 1 else roll_rate if k == 2 else acceleration
-            integral = memory[2 * k]
-            kp, ki, kd, band = gains[0], gains[1], gains[2], gains[3]
+            out, integral = outs[k], memory[2 * k]
+            kp, ki, kd, band = gains[k][0], gains[k][1], gains[k][2], gains[k][3]
             for l in range(m):
                 i = first + l
                 out[i], integral[i] = pid(

@@ -60,7 +60,7 @@ class UnicyclePID(Controller):
     def step(self, g: GroupView) -> None:
         """All loops of all rows."""
         kernels.steer(
-            self.desired_altitude, self.desired_speed, self.desired_heading, g.pos[2], *g.vel, g.yaw, g.climb, g.roll,
-            self.heading_pid, self.pitch_pid, self.roll_pid, self.speed_pid, self.memory, g.dt,
-            self.speed, self.acceleration_x, self.turn_rate, self.pitch_rate, self.roll_rate,
+            (self.desired_altitude, self.desired_speed, self.desired_heading), (g.pos[2], *g.vel), (g.yaw, g.climb, g.roll),
+            (self.heading_pid, self.pitch_pid, self.roll_pid, self.speed_pid), self.memory, g.dt,
+            (self.speed, self.acceleration_x, self.turn_rate, self.pitch_rate, self.roll_rate),
         )  # fmt: skip

@@ -142,8 +142,8 @@ def effective(value, rate, rate_max, limit):
     return 0.0 if (value >= limit and held > 0.0) or (value <= -limit and held < 0.0) else held
 
 
-@kernel("F2 (F F) (F F F F) (F F F) (Fw Fw Fw Fw Fw Fw Fw Fw Fw Fw Fw Fw Fw)")
-def to_body(x, rates, limits, circle, body):
+@kernel("F2 (F F) (F F F F) (F F F) F2w i8")
+def to_body(x, rates, limits, circle, table, first_row):
     """Publish position, attitude, velocity and turn rate.
 
     Args:
@@ -151,15 +151,18 @@ def to_body(x, rates, limits, circle, body):
         rates: roll_rate, pitch_rate [rad/s], (n,) each.
         limits: max_roll, max_pitch [rad], max_roll_rate, max_pitch_rate [rad/s], (n,) each.
         circle: turning_radius [m], radius_slope_per_speed [s], speed_target [m/s], (n,) each.
-        body: Position [m], quaternion, velocity [m/s] and turn rate [rad/s] in the world frame, thirteen (n,), written.
+        table: Body table: position [m], velocity [m/s], quaternion body to world, turn rate [rad/s], world frame, (>= 13, N);
+            written.
+        first_row: Where the rows begin in it.
     """
     roll_rate, pitch_rate = rates
     roll_max, pitch_max, roll_rate_max, pitch_rate_max = limits
     radius, slope, target = circle
-    east, north, up, qw, qx, qy, qz, vx, vy, vz, wx, wy, wz = body
-    east[:] = x[0]
-    north[:] = x[1]
-    up[:] = x[2]
+    begin, end = first_row, first_row + x.shape[1]
+    table[:3, begin:end] = x[:3]
+    vx, vy, vz = table[3, begin:end], table[4, begin:end], table[5, begin:end]
+    qw, qx, qy, qz = table[6, begin:end], table[7, begin:end], table[8, begin:end], table[9, begin:end]
+    wx, wy, wz = table[10, begin:end], table[11, begin:end], table[12, begin:end]
     roll, pitch, yaw, speed = x[3], x[4], x[5], x[6]
     angle = np.empty(3 * BLOCK)
     sine = np.empty(3 * BLOCK)

@@ -72,4 +72,4 @@ class SimpleAircraft(MotionModel):
         rates = self.roll_rate, self.pitch_rate
         limits = self.max_roll, self.max_pitch, self.max_roll_rate, self.max_pitch_rate
         circle = self.turning_radius, self.radius_slope_per_speed, self.speed_target
-        kernels.to_body(self.x, rates, limits, circle, body.rows)
+        kernels.to_body(self.x, rates, limits, circle, body.table, body.first)

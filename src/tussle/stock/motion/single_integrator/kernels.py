@@ -70,22 +70,18 @@ def advance(x, u, p, dt, substeps):
                 yaw[first + l] = heading[first + l]
 
 
-@kernel("F2 Fw Fw Fw Fw Fw Fw Fw Fw Fw Fw")
-def to_body(x, east, north, up, qw, qx, qy, qz, vx, vy, vz):
+@kernel("F2 F2w i8")
+def to_body(x, table, first_row):
     """Publish position, attitude (no bank) and velocity.
 
     Args:
         x: State as in `advance`, (8, n).
-        east, north, up: Position [m], (n,), written.
-        qw, qx, qy, qz: Quaternion body to world, (n,), written.
-        vx, vy, vz: Velocity [m/s], (n,), world frame, written.
+        table: Body table: position [m], velocity [m/s], quaternion body to world, world frame, (>= 10, N); written.
+        first_row: Where the rows begin in it.
     """
-    east[:] = x[0]
-    north[:] = x[1]
-    up[:] = x[2]
-    vx[:] = x[3]
-    vy[:] = x[4]
-    vz[:] = x[5]
+    body = table[:, first_row : first_row + x.shape[1]]
+    body[:3] = x[:3]
+    body[3:6] = x[3:6]
     yaw, climb = x[6], x[7]
     angle = np.empty(2 * BLOCK)
     sine = np.empty(2 * BLOCK)
@@ -100,7 +96,7 @@ def to_body(x, east, north, up, qw, qx, qy, qz, vx, vy, vz):
             sine[j], cosine[j] = sincos(angle[j])
         for l in range(m):
             i = first + l
-            qw[i] = cosine[m + l] * cosine[l]
-            qx[i] = -(sine[m + l] * sine[l])
-            qy[i] = sine[m + l] * cosine[l]
-            qz[i] = cosine[m + l] * sine[l]
+            body[6, i] = cosine[m + l] * cosine[l]
+            body[7, i] = -(sine[m + l] * sine[l])
+            body[8, i] = sine[m + l] * cosine[l]
+            body[9, i] = cosine[m + l] * sine[l]

@@ -50,4 +50,4 @@ class SingleIntegrator(MotionModel):
 
     def to_body(self, body: MotionBody) -> None:
         """Publish position, attitude and velocity."""
-        kernels.to_body(self.x, *body.rows[:10])
+        kernels.to_body(self.x, body.table, body.first)

@@ -10,8 +10,9 @@ and the same for sin. With pitch, cos(pitch) cos(yaw) is split into the angles y
 is RK4's up to rounding (and with less of it), and 12 substeps cost as much as one. Advancing cosine and sine by a
 rotation per substep was the alternative: as exact, but its cost grows with the substeps.
 
-Rows are worked in blocks through scratch arrays, all angles of a block in one flat loop, because LLVM vectorises
-loops over few arrays only. Each row sees the same operations wherever it stands.
+Rows are worked in blocks through one scratch array each for angles, sines and cosines, because LLVM vectorises loops over
+few arrays only; at fixed distances in one array it sees that columns do not overlap. Each row sees the same operations wherever
+it stands.
 """
 
 from __future__ import annotations
@@ -55,6 +56,40 @@ def simpson_gain(sin_delta, cos_delta, sin_n_delta, odd, n, n_is_even):
     return (2.0 + cosine) * ratio * (1.0 / 3.0)
 
 
+@device
+def simpson_gain_once(cos_delta, odd):
+    """The gain of one substep: the ratio of the sines is 1."""
+    return (2.0 + (cos_delta - 2.0 * odd * cos_delta)) * (1.0 / 3.0)
+
+
+@device
+def put_sincos(angle, m, sine, cosine):
+    """Sines and cosines of the first m angles [rad] of a row of scratch."""
+    for l in range(m):
+        sine[l], cosine[l] = sincos(angle[l])
+
+
+@device
+def turn_and_rise(yaw, pitch, first, m, rates, dt, half_h, work):
+    """Turn a block of rows; columns of `work`: middle yaw and pitch, half turns per substep of yaw + pitch, yaw - pitch, pitch."""
+    turn_rate, turn_max, pitch_rate, pitch_max = rates
+    for l in range(m):
+        work[3, l] = clamp(turn_rate[first + l], turn_max[first + l])
+    for l in range(m):
+        work[4, l] = clamp(pitch_rate[first + l], pitch_max[first + l])
+    for l in range(m):
+        work[0, l] = yaw[first + l] + 0.5 * dt * work[3, l]
+        yaw[first + l] += dt * work[3, l]
+    for l in range(m):
+        work[1, l] = pitch[first + l] + 0.5 * dt * work[4, l]
+        pitch[first + l] += dt * work[4, l]
+    for l in range(m):
+        turn, raised = half_h * work[3, l], half_h * work[4, l]
+        work[2, l] = turn + raised
+        work[3, l] = turn - raised
+        work[4, l] = raised
+
+
 @kernel("F2w F2 F2 f8 i8")
 def advance_pitch(x, u, p, dt, substeps):
     """Advance the unicycle that pitches, in place.
@@ -66,56 +101,49 @@ def advance_pitch(x, u, p, dt, substeps):
         dt: Duration [s].
         substeps: Number of equal RK4 steps in dt.
     """
-    east, north, up, yaw, pitch = x[0], x[1], x[2], x[3], x[4]
-    speed, turn_rate, pitch_rate = u[0], u[1], u[2]
-    vel_max, turn_max, pitch_max = p[0], p[1], p[2]
+    east, north, up = x[0], x[1], x[2]
+    speed, vel_max, rates = u[0], p[0], (u[1], p[1], u[2], p[2])
     count = float(substeps)
     n_is_even = 1.0 if substeps % 2 == 0 else 0.0
-    half_dt = 0.5 * dt
-    half_h = half_dt / count
-    angle = np.empty(8 * BLOCK)
-    sine = np.empty(8 * BLOCK)
-    cosine = np.empty(8 * BLOCK)
-    delta = np.empty(3 * BLOCK)
-    gain = np.empty(3 * BLOCK)
+    angle = np.empty((8, BLOCK))
+    sine = np.empty((8, BLOCK))
+    cosine = np.empty((8, BLOCK))
+    gain = np.empty((3, BLOCK))
     length = np.empty(BLOCK)
     n = x.shape[1]
     for first in range(0, n, BLOCK):
         m = min(BLOCK, n - first)
+        turn_and_rise(x[3], x[4], first, m, rates, dt, 0.5 * dt / count, angle)
+        for l in range(m):
+            length[l] = clamp(speed[first + l], vel_max[first + l]) * dt
+        for k in range(3):
+            delta, n_delta, parity = angle[2 + k], angle[5 + k], gain[k]
+            for l in range(m):
+                delta[l], parity[l] = fold(delta[l])
+                n_delta[l] = count * delta[l]
+        for k in range(5 if substeps == 1 else 8):
+            put_sincos(angle[k], m, sine[k], cosine[k])
+        for k in range(3):
+            sin_delta, cos_delta, sin_n_delta, out = sine[2 + k], cosine[2 + k], sine[5 + k], gain[k]
+            if substeps == 1:
+                for l in range(m):
+                    out[l] = simpson_gain_once(cos_delta[l], out[l])
+            else:
+                for l in range(m):
+                    out[l] = simpson_gain(
+                        sin_delta[l], cos_delta[l], sin_n_delta[l], out[l], count, n_is_even
+                    )
         for l in range(m):
             i = first + l
-            turn = clamp(turn_rate[i], turn_max[i])
-            raised = clamp(pitch_rate[i], pitch_max[i])
-            length[l] = clamp(speed[i], vel_max[i]) * dt
-            angle[l] = yaw[i] + half_dt * turn
-            angle[m + l] = pitch[i] + half_dt * raised
-            delta[l] = half_h * turn + half_h * raised
-            delta[m + l] = half_h * turn - half_h * raised
-            delta[2 * m + l] = half_h * raised
-            yaw[i] += dt * turn
-            pitch[i] += dt * raised
-        for j in range(3 * m):
-            folded, odd = fold(delta[j])
-            angle[2 * m + j] = folded
-            angle[5 * m + j] = count * folded
-            gain[j] = odd
-        for j in range(8 * m):
-            sine[j], cosine[j] = sincos(angle[j])
-        for j in range(3 * m):
-            gain[j] = simpson_gain(
-                sine[2 * m + j], cosine[2 * m + j], sine[5 * m + j], gain[j], count, n_is_even
-            )
-        for l in range(m):
-            i = first + l
-            cc = cosine[l] * cosine[m + l]
-            ss = sine[l] * sine[m + l]
-            sc = sine[l] * cosine[m + l]
-            cs = cosine[l] * sine[m + l]
-            plus = 0.5 * gain[l]
-            minus = 0.5 * gain[m + l]
+            cc = cosine[0, l] * cosine[1, l]
+            ss = sine[0, l] * sine[1, l]
+            sc = sine[0, l] * cosine[1, l]
+            cs = cosine[0, l] * sine[1, l]
+            plus = 0.5 * gain[0, l]
+            minus = 0.5 * gain[1, l]
             east[i] += length[l] * (plus * (cc - ss) + minus * (cc + ss))
             north[i] += length[l] * (plus * (sc + cs) + minus * (sc - cs))
-            up[i] += length[l] * (gain[2 * m + l] * sine[m + l])
+            up[i] += length[l] * (gain[2, l] * sine[1, l])
 
 
 @kernel("F2w F2 F2 f8 i8")
@@ -194,80 +222,86 @@ def mean_direction(sy, cy, sp, cp, sd, cd, se, ce):
     return east, north, (2.0 + ce) * sb * (1.0 / 3.0)
 
 
-@kernel("F2 F F F F F F b1 b1 f8 Fw Fw Fw Fw Fw Fw Fw Fw Fw Fw Fw Fw Fw")
-def to_body(
-    x, speed, turn_rate, third, vel_max, turn_max, third_max, pitches, banks, h,
-    east, north, up, qw, qx, qy, qz, vx, vy, vz, wx, wy, wz,
-):  # fmt: skip
-    """Publish position, attitude, velocity and turn rate.
+@kernel("F2 (F F F) (F F F) b1 b1 f8 F2w i8")
+def to_body(x, commands, limits, pitches, banks, h, table, first_row):
+    """Publish position, velocity, attitude and turn rate.
 
     The velocity is the displacement of the last substep over its length: Simpson's mean over the arc that ends at x,
     which needs no memory of where the row stood before.
 
     Args:
         x: x, y, z [m], yaw, pitch [rad], (5, n), world frame, pitch nose up.
-        speed: Commanded speed [m/s], (n,).
-        turn_rate: Commanded turn rate [rad/s], (n,).
-        third: Commanded pitch rate [rad/s] if `pitches`, else climb speed [m/s], (n,).
-        vel_max: Limit of speed [m/s], (n,).
-        turn_max: Limit of turn_rate [rad/s], (n,).
-        third_max: Limit of `third`, (n,).
+        commands: Commanded speed [m/s], turn rate [rad/s], and pitch rate [rad/s] if `pitches`, else climb speed [m/s], (n,).
+        limits: Limits of these, (n,).
         pitches: Whether pitch is steered.
         banks: Whether the vehicle shows the bank of a coordinated turn.
         h: Length of the last substep [s].
-        east, north, up: Position [m], (n,), written.
-        qw, qx, qy, qz: Quaternion body to world, (n,), written.
-        vx, vy, vz: Velocity [m/s], (n,), world frame, written.
-        wx, wy, wz: Turn rate [rad/s], (n,), world frame, written.
+        table: Body table: position [m], velocity [m/s], quaternion body to world, turn rate [rad/s], world frame, (>= 13, N);
+            written.
+        first_row: Where the rows begin in it.
     """
-    east[:] = x[0]
-    north[:] = x[1]
-    up[:] = x[2]
+    speed, turn_rate, third = commands
+    vel_max, turn_max, third_max = limits
     yaw, pitch = x[3], x[4]
     half_h = 0.5 * h
-    angle, sine, cosine = np.empty(5 * BLOCK), np.empty(5 * BLOCK), np.empty(5 * BLOCK)
+    angle, sine, cosine = np.empty((5, BLOCK)), np.empty((5, BLOCK)), np.empty((5, BLOCK))
+    held, made = (
+        np.empty((3, BLOCK)),
+        np.empty((10, BLOCK)),
+    )  # commands within their limits; velocity, quaternion, turn rate
+    sine[4] = 0.0
+    cosine[4] = 1.0
     for first in range(0, x.shape[1], BLOCK):
         m = min(BLOCK, x.shape[1] - first)
         for l in range(m):
-            i = first + l
-            raised = half_h * clamp(third[i], third_max[i])
-            angle[l] = 0.5 * yaw[i]
-            angle[m + l] = -0.5 * pitch[i]
-            angle[2 * m + l] = half_h * clamp(turn_rate[i], turn_max[i])
-            angle[3 * m + l] = raised if pitches else 0.0
+            held[0, l] = clamp(speed[first + l], vel_max[first + l])
+        for l in range(m):
+            held[1, l] = clamp(turn_rate[first + l], turn_max[first + l])
+        for l in range(m):
+            held[2, l] = clamp(third[first + l], third_max[first + l])
+        for l in range(m):
+            angle[0, l] = 0.5 * yaw[first + l]
+            angle[1, l] = -0.5 * pitch[first + l]
+            angle[2, l] = half_h * held[1, l]
+        for l in range(m):
+            angle[3, l] = half_h * held[2, l] if pitches else 0.0
         if banks:
             for l in range(m):
-                i = first + l
-                sideways = clamp(speed[i], vel_max[i]) * clamp(turn_rate[i], turn_max[i])
-                angle[4 * m + l] = -0.5 * atan2(sideways, GRAVITY)
-        for j in range(5 * m if banks else 4 * m):
-            sine[j], cosine[j] = sincos(angle[j])
-        if not banks:
-            sine[4 * m : 5 * m] = 0.0
-            cosine[4 * m : 5 * m] = 1.0
+                angle[4, l] = -0.5 * atan2(held[0, l] * held[1, l], GRAVITY)
+        for k in range(5 if banks else 4):
+            put_sincos(angle[k], m, sine[k], cosine[k])
         for l in range(m):
-            i, b, r = first + l, m + l, 4 * m + l
-            qw[i], qx[i], qy[i], qz[i] = from_half_angles(
-                sine[r], cosine[r], sine[b], cosine[b], sine[l], cosine[l]
+            made[3, l], made[4, l], made[5, l], made[6, l] = from_half_angles(
+                sine[4, l], cosine[4, l], sine[1, l], cosine[1, l], sine[0, l], cosine[0, l]
             )
         for l in range(
             m
         ):  # from half the yaw to the yaw, from half the quaternion pitch to the pitch (nose up)
-            sy, cy, sp, cp = sine[l], cosine[l], sine[m + l], cosine[m + l]
-            sine[l], cosine[l] = 2.0 * sy * cy, cy * cy - sy * sy
-            sine[m + l], cosine[m + l] = -2.0 * sp * cp, cp * cp - sp * sp
+            sy, cy, sp, cp = sine[0, l], cosine[0, l], sine[1, l], cosine[1, l]
+            sine[0, l], cosine[0, l] = 2.0 * sy * cy, cy * cy - sy * sy
+            sine[1, l], cosine[1, l] = -2.0 * sp * cp, cp * cp - sp * sp
         for l in range(m):
-            i, b, d, e = first + l, m + l, 2 * m + l, 3 * m + l
             mean_x, mean_y, mean_z = mean_direction(
-                sine[l], cosine[l], sine[b], cosine[b], sine[d], cosine[d], sine[e], cosine[e]
+                sine[0, l],
+                cosine[0, l],
+                sine[1, l],
+                cosine[1, l],
+                sine[2, l],
+                cosine[2, l],
+                sine[3, l],
+                cosine[3, l],
             )
-            ahead = clamp(speed[i], vel_max[i])
-            vx[i] = ahead * mean_x
-            vy[i] = ahead * mean_y
-            vz[i] = ahead * mean_z if pitches else clamp(third[i], third_max[i])
+            made[0, l] = held[0, l] * mean_x
+            made[1, l] = held[0, l] * mean_y
+            made[2, l] = held[0, l] * mean_z if pitches else held[2, l]
         for l in range(m):
-            i = first + l
-            raised = clamp(third[i], third_max[i]) if pitches else 0.0
-            wx[i] = raised * sine[l]
-            wy[i] = -raised * cosine[l]
-            wz[i] = clamp(turn_rate[i], turn_max[i])
+            raised = held[2, l] if pitches else 0.0
+            made[7, l] = raised * sine[0, l]
+            made[8, l] = -raised * cosine[0, l]
+            made[9, l] = held[1, l]
+        for k in range(3):
+            for l in range(m):
+                table[k, first_row + first + l] = x[k, first + l]
+        for k in range(10):
+            for l in range(m):
+                table[3 + k, first_row + first + l] = made[k, l]

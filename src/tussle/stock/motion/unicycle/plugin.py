@@ -88,6 +88,6 @@ class Unicycle(MotionModel):
         third = self.pitch_rate if pitches else self.velocity_z
         third_max = self.pitch_rate_max if pitches else self.velocity_z_max
         kernels.to_body(
-            self.x, self.speed, self.turn_rate, third, self.vel_max, self.turn_rate_max, third_max,
-            pitches, self.enable_roll, body.dt, *body.rows,
+            self.x, (self.speed, self.turn_rate, third), (self.vel_max, self.turn_rate_max, third_max),
+            pitches, self.enable_roll, body.dt, body.table, body.first,
         )  # fmt: skip

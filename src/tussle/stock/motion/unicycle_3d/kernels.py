@@ -94,31 +94,30 @@ def advance_acceleration(x, u, p, accel_max, dt, substeps):
         fly(x, i, bank, -rise, turn, speed, pull, p[0, i], dt, substeps)
 
 
-@kernel("F2 F F F F F F Fw Fw Fw Fw Fw Fw Fw Fw Fw Fw Fw Fw Fw")
-def to_body(
-    x, turn_rate, pitch_rate, roll_rate, turn_max, pitch_max, roll_max,
-    east, north, up, qw, qx, qy, qz, vx, vy, vz, wx, wy, wz,
-):  # fmt: skip
-    """Publish position, attitude, velocity and turn rate.
+@kernel("F2 (F F F) (F F F) F2w i8")
+def to_body(x, rates, limits, table, first_row):
+    """Publish position, velocity, attitude and turn rate.
 
     Args:
         x: State as in `advance_speed`, (8, n).
-        turn_rate, pitch_rate, roll_rate: Commanded rates [rad/s], (n,).
-        turn_max, pitch_max, roll_max: Their limits [rad/s], (n,).
-        east, north, up: Position [m], (n,), written.
-        qw, qx, qy, qz: Quaternion body to world, (n,), written.
-        vx, vy, vz: Velocity [m/s], (n,), world frame, written.
-        wx, wy, wz: Turn rate [rad/s], (n,), world frame, written.
+        rates: Commanded turn, pitch and roll rate [rad/s], (n,).
+        limits: Their limits [rad/s], (n,).
+        table: Body table: position [m], velocity [m/s], quaternion body to world, turn rate [rad/s], world frame, (>= 13, N);
+            written.
+        first_row: Where the rows begin in it.
     """
+    turn_rate, pitch_rate, roll_rate = rates
+    turn_max, pitch_max, roll_max = limits
+    body = table[:, first_row : first_row + x.shape[1]]
+    body[:3] = x[:3]
+    body[6:10] = x[3:7]
     for i in range(x.shape[1]):
         w, a, b, c, speed = x[3, i], x[4, i], x[5, i], x[6, i], x[7, i]
-        east[i], north[i], up[i] = x[0, i], x[1, i], x[2, i]
-        qw[i], qx[i], qy[i], qz[i] = w, a, b, c
         fx, fy, fz = forward(w, a, b, c)
-        vx[i], vy[i], vz[i] = speed * fx, speed * fy, speed * fz
+        body[3, i], body[4, i], body[5, i] = speed * fx, speed * fy, speed * fz
         bank = clamp(roll_rate[i], roll_max[i])
         dive = -clamp(pitch_rate[i], pitch_max[i])
         turn = clamp(turn_rate[i], turn_max[i])
-        wx[i] = fx * bank + 2.0 * (a * b - w * c) * dive + 2.0 * (a * c + w * b) * turn
-        wy[i] = fy * bank + (1.0 - 2.0 * (a * a + c * c)) * dive + 2.0 * (b * c - w * a) * turn
-        wz[i] = fz * bank + 2.0 * (b * c + w * a) * dive + (1.0 - 2.0 * (a * a + b * b)) * turn
+        body[10, i] = fx * bank + 2.0 * (a * b - w * c) * dive + 2.0 * (a * c + w * b) * turn
+        body[11, i] = fy * bank + (1.0 - 2.0 * (a * a + c * c)) * dive + 2.0 * (b * c - w * a) * turn
+        body[12, i] = fz * bank + 2.0 * (b * c + w * a) * dive + (1.0 - 2.0 * (a * a + b * b)) * turn

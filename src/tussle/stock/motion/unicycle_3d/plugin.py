@@ -77,6 +77,6 @@ class Unicycle3D(MotionModel):
     def to_body(self, body: MotionBody) -> None:
         """Publish position, attitude, velocity and turn rate."""
         kernels.to_body(
-            self.x, self.turn_rate, self.pitch_rate, self.roll_rate, self.turn_rate_max, self.pitch_rate_max,
-            self.roll_rate_max, *body.pos, *body.quat, *body.vel, *body.omega,
+            self.x, (self.turn_rate, self.pitch_rate, self.roll_rate),
+            (self.turn_rate_max, self.pitch_rate_max, self.roll_rate_max), body.table, body.first,
         )  # fmt: skip

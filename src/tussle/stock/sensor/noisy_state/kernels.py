@@ -6,28 +6,26 @@ from tussle.numeric.kernel import kernel
 from tussle.numeric.quaternion import quat_conjugate, quat_from_euler, quat_multiply
 
 
-@kernel("F F F F F F F F F F F2 F2 F2 F2 F2 F2 F2 F2 F2 F2 F2 F2 F2w F2w F2w")
-def blur(
-    x, y, z, vx, vy, vz, qw, qx, qy, qz,
-    pos_0, pos_1, pos_2, vel_0, vel_1, vel_2, orient_0, orient_1, orient_2,
-    pos_draw, vel_draw, orient_draw, pos, vel, quat,
-):  # fmt: skip
+@kernel("(F F F F F F F F F F) (F2 F2 F2) (F2 F2 F2) (F2 F2 F2) (F2 F2 F2) F2w F2w F2w")
+def blur(truth, pos_noise, vel_noise, orient_noise, draws, pos, vel, quat):
     """True state plus mean plus standard deviation times a draw, component by component.
 
     Args:
-        x, y, z: True position [m], (n,), world frame.
-        vx, vy, vz: True velocity [m/s], (n,), world frame.
-        qw, qx, qy, qz: True quaternion body to world, (n,).
-        pos_0, pos_1, pos_2: Mean and standard deviation of x, y, z [m], (2, n) each.
-        vel_0, vel_1, vel_2: Those of the velocity [m/s], (2, n) each.
-        orient_0, orient_1, orient_2: Those of the turns about the body x, y and z axes, in this order [rad], (2, n)
-            each.
-        pos_draw, vel_draw, orient_draw: Standard normal draws, (3, n) each.
+        truth: Position [m], velocity [m/s], world frame, and quaternion body to world, ten (n,).
+        pos_noise: Mean and standard deviation of x, y, z [m], (2, n) each.
+        vel_noise: Those of the velocity [m/s].
+        orient_noise: Those of the turns about the body x, y and z axes, in this order [rad].
+        draws: Standard normal draws for position, velocity and turns, (3, n) each.
         pos: Noisy position [m], (3, n), written.
         vel: Noisy velocity [m/s], (3, n), written.
         quat: Noisy quaternion, (4, n), written.
     """
-    for i in range(x.shape[0]):
+    x, y, z, vx, vy, vz, qw, qx, qy, qz = truth
+    pos_0, pos_1, pos_2 = pos_noise
+    vel_0, vel_1, vel_2 = vel_noise
+    orient_0, orient_1, orient_2 = orient_noise
+    pos_draw, vel_draw, orient_draw = draws
+    for i in range(pos.shape[1]):
         pos[0, i] = x[i] + (pos_0[0, i] + pos_0[1, i] * pos_draw[0, i])
         pos[1, i] = y[i] + (pos_1[0, i] + pos_1[1, i] * pos_draw[1, i])
         pos[2, i] = z[i] + (pos_2[0, i] + pos_2[1, i] * pos_draw[2, i])
