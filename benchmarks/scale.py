@@ -3,7 +3,9 @@
     python benchmarks/scale.py [--sizes 1000 20000] [--repeats 3] [--json FILE]
 
 Unicycle boids, spread as densely as the 2,000 of Table 1 (which are normal with 632 m; here uniform over the square that has the same
-mean number of neighbours), dt 0.1 s, one motion step. `real_time` is simulated seconds per CPU second.
+mean number of neighbours), dt 0.1 s, one motion step. `real_time` is simulated seconds per CPU second, `in_wall_time` per second.
+From 100,000 on with one thread and with two; `state` is the hash after two steps, the same for both, and `cpu_per_wall` says how much
+of two cores the second thread was given.
 """
 
 from __future__ import annotations
@@ -24,6 +26,7 @@ SIGMA = math.sqrt(400_000.0)
 AREA_PER_AGENT = 4.0 * math.pi * SIGMA**2 / 2000.0
 """Area per agent at which uniform agents have as many neighbours on average as 2,000 normal ones [m^2]."""
 STEPS = 50
+THREADED = 100_000
 
 
 def mission(n: int) -> Mission:
@@ -43,23 +46,29 @@ def mission(n: int) -> Mission:
     return Mission(blocks=[block], dt=0.1, end=STEPS * 0.1, name=f"{n} boids")
 
 
-def measure(n: int) -> dict[str, Any]:
-    cpu, steps = 0.0, 0
+def measure(n: int, threads: int = 1) -> dict[str, Any]:
+    cpu, wall, steps = 0.0, 0.0, 0
     while cpu < measuring.LEAST_CPU:
-        sim = Simulation(mission(n))
-        sim.step()
-        begin = time.process_time()
+        sim = Simulation(mission(n), threads=threads)
+        sim.step(2)
+        state = sim.state_hash(0)
+        begin, wall_begin = time.process_time(), time.perf_counter()
         while not sim.is_over:
             sim.step()
             steps += 1
             if n >= 30_000 and time.process_time() - begin > 2.0 * measuring.LEAST_CPU:
                 break
         cpu += time.process_time() - begin
+        wall += time.perf_counter() - wall_begin
     row = {
         "model": "Unicycle",
         "n": n,
+        "threads": threads,
         "ns_per_agent_step": 1e9 * cpu / steps / n,
         "real_time": steps * 0.1 / cpu,
+        "in_wall_time": steps * 0.1 / wall,
+        "cpu_per_wall": cpu / wall,
+        "state": state[:8],
         "cpu_s": cpu,
     }
     row |= {"alive": sim.population.bodies.n, "captures": 0, "resident_mb": _resident_mb()}
@@ -75,9 +84,11 @@ def _resident_mb() -> float:
 def main() -> None:
     args = measuring.arguments(__doc__.splitlines()[0], SIZES)
     rows = [
-        measuring.median_of(args.repeats, lambda n=n: measure(n), "ns_per_agent_step") for n in args.sizes
+        measuring.median_of(args.repeats, lambda n=n, t=threads: measure(n, t), "ns_per_agent_step")
+        for n in args.sizes
+        for threads in ((1, 2) if n >= THREADED else (1,))
     ]
-    measuring.report("Unicycle boids at constant density, one thread", rows, args.json)
+    measuring.report("Unicycle boids at constant density", rows, args.json)
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ import numpy as np
 
 from tussle.api import kernels
 from tussle.errors import listed, nearest_name
-from tussle.neighbors.index import Index, padded
+from tussle.neighbors.index import Index, Split, padded
 
 FLOATS = {
     "pos": 3,
@@ -177,8 +177,11 @@ class Bodies:
         )
         return rows
 
-    def index(self, reach: float | np.ndarray) -> Index:
-        """Neighbour index good for queries up to `reach` [m], one number or one per world, at the positions of now."""
+    def index(self, reach: float | np.ndarray, split: Split | None = None) -> Index:
+        """Neighbour index good for queries up to `reach` [m], one number or one per world, at the positions of now.
+
+        `split` calls a function over parts of the rows in several threads.
+        """
         if self.scans:
             reach = EVERYWHERE
         key = reach if isinstance(reach, float) else reach.tobytes()
@@ -198,7 +201,7 @@ class Bodies:
                 for first, last in ranges:
                     index.update(np.arange(first, last), x[first:last], y[first:last], z[first:last])
             else:
-                index.build(x, y, z, reaches)
+                index.build(x, y, z, reaches, split)
             kept.version = self.version
         self._newest = kept
         return index  # type: ignore[no-any-return]

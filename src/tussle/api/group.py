@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,8 @@ from tussle.errors import PluginError, listed, nearest_name
 from tussle.neighbors.index import Index
 from tussle.scene import Scene
 
+ROWS_PER_THREAD = 4096
+"""Fewer rows are not worth a thread: a kernel needs some 20 ns for each, and a thread 50 us."""
 GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 
 
@@ -155,6 +158,10 @@ class GroupView:
         """All rows of all groups: what is true of everybody."""
         return self._bodies.view
 
+    def split(self, run: Callable[[int, int], Any]) -> None:
+        """Call run(first, last) over the rows, in as many threads as the simulation has where there are enough rows; for kernels."""
+        self.context.split(self.n, run, ROWS_PER_THREAD)
+
     def begin(self) -> None:
         """At the beginning of a step, as if nothing had been called yet: what hooks of newborn rows see."""
         self.dt, self.substep, self.phase = self._period, 0, 0.0
@@ -205,7 +212,9 @@ class GroupView:
 
     def index(self, radius: float | np.ndarray) -> Index:
         """Neighbour index for queries within radius [m], one number or (n,); for kernels."""
-        return self._bodies.index(self.reach(radius))
+        if self.context.threads == 1:
+            return self._bodies.index(self.reach(radius))
+        return self._bodies.index(self.reach(radius), partial(self.context.split, least=ROWS_PER_THREAD))
 
     def any_index(self) -> Index:
         """Neighbour index for searches without a radius; for kernels."""

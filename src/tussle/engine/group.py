@@ -362,9 +362,20 @@ class Group:
         u = self.u
         if self.stacks_inputs:
             u = self._stacked_inputs()
-        self.integrate(self.x, u, self.p, dt, substeps)
+        if self.moving.context.threads == 1:
+            self.integrate(self.x, u, self.p, dt, substeps)
+        else:
+            self.moving.split(lambda *part: self._integrate_part(slice(*part), u, dt, substeps))
         self.motion.plugin.to_body(self.moving)
         self.bodies.touch(self.first, self.last)
+
+    def _integrate_part(self, rows: slice, u: np.ndarray, dt: float, substeps: int) -> None:
+        """Integrate some rows, on a copy: kernels take arrays without gaps."""
+        x = np.ascontiguousarray(self.x[:, rows])
+        self.integrate(
+            x, np.ascontiguousarray(u[:, rows]), np.ascontiguousarray(self.p[:, rows]), dt, substeps
+        )
+        self.x[:, rows] = x
 
     def _stacked_inputs(self) -> np.ndarray:
         rows = [self.table.arrays[float][self.u_rows]]

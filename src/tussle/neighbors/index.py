@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,6 +15,7 @@ from tussle.neighbors.lanes import LANES
 
 Floats = NDArray[np.float64]
 Longs = NDArray[np.int64]
+Split = Callable[[int, Callable[[int, int], Any]], Any]
 
 RINGS = 2
 """Cells per reach of a world: with 2 a block's box is about as high as it is long where time is spent (best of 1 to 3 at
@@ -144,8 +147,10 @@ class Index:
         """world_start, keys, strips, world_strip, inverse_cell, points: what the kernels of `search` take."""
         return self.world_start, self._keys, self._strips, self._world_strip, self.inverse_cell, self.points
 
-    def build(self, x: Floats, y: Floats, z: Floats, reach: Floats) -> None:
+    def build(self, x: Floats, y: Floats, z: Floats, reach: Floats, split: Split | None = None) -> None:
         """Sort positions x, y, z (N,) [m] into cells. `reach` (n_worlds,) [m]: distance up to which blocks find everyone.
+
+        `split` calls a function over parts of the places in several threads.
 
         An infinite reach puts a world into one cell, in order of id; with every reach infinite the order depends on the layout
         alone.
@@ -156,10 +161,18 @@ class Index:
             self._cache.clear()
             self._fixed = bool(np.isinf(self.reach).all())
         self.built += 1
-        kernels.build(
-            (x, y, z), self.inverse_cell, (self.world_start, self.members), (self._keys, self._scratch), self._placed,
-            self.points, self._strips, self._world_strip,
-        )  # fmt: skip
+        pos, worlds, work = (x, y, z), (self.world_start, self.members), (self._keys, self._scratch)
+        n, cells, strips = len(self.order), self.inverse_cell, (self._strips, self._world_strip)
+
+        def run(phases: int, begin: int, end: int) -> None:
+            kernels.build(pos, cells, worlds, work, self._placed, self.points, strips, (phases, begin, end))
+
+        if split is None:
+            run(kernels.KEYS + kernels.SORT + kernels.PLACES, 0, n)
+        else:  # rows lie anywhere in memory: what takes time is to fetch them
+            split(n, partial(run, kernels.KEYS))
+            run(kernels.SORT, 0, n)
+            split(n, partial(run, kernels.PLACES))
 
     def update(self, rows: Longs, x: Floats, y: Floats, z: Floats) -> None:
         """Rows (n,) moved to x, y, z (n,) [m] and keep their places; only where their world's reach is infinite."""

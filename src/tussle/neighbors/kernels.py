@@ -97,52 +97,45 @@ def arrange(rows, old, new, work, n_worlds):
                 done += 1
 
 
-@kernel("(F F F) F (I I) (Iw Iw) I2w F2w I2w Iw")
-def build(pos, inverse_cell, worlds, work, placed, points, strips, world_strip):
-    """Sort the rows of every world by (cell row, cell, id) and note where each cell row (strip) begins.
-
-    pos: x, y, z (N,) [m]; inverse_cell (n_worlds,) [1/m], 0 for one cell per world; worlds: world_start, members. work: keys (N,)
-    hold ranks in their low bits on entry, in any order, the last one for speed; scratch (N,). Written: placed, order and place,
-    (2, N); points, positions by place, (3, N + LANES); strips, first place and world of each strip, (2, N + 1); world_strip
-    (n_worlds + 1,), first strip of each world.
-    """
-    x, y, z = pos
+@device
+def make_keys(pos, inverse_cell, worlds, keys, begin, end):
+    """Keys of the places [begin, end), whose ranks are in the low bits on entry."""
+    x, y = pos[0], pos[1]
     world_start, members = worlds
-    keys, scratch = work
-    order, place = placed[0], placed[1]
-    sx, sy, sz = points[0], points[1], points[2]
-    strip_start, strip_world = strips[0], strips[1]
-    n_worlds = world_start.shape[0] - 1
-    n_strips = 0
-    for w in range(n_worlds):
-        start = world_start[w]
-        end = world_start[w + 1]
+    for w in range(world_start.shape[0] - 1):
+        start, stop = world_start[w], world_start[w + 1]
         inverse = inverse_cell[w]
-        bits = rank_bits(end - start)
+        bits = rank_bits(stop - start)
         mask = (1 << bits) - 1
         cell_bits = (KEY_BITS - bits) >> 1
         limit = float((1 << (cell_bits - 1)) - 1)
-        world_strip[w] = n_strips
-        if inverse == 0.0:
-            for p in range(start, end):
+        for p in range(max(start, begin), min(stop, end)):
+            if inverse == 0.0:
                 keys[p] = p - start
-        else:
-            for p in range(start, end):
+            else:
                 rank = keys[p] & mask
                 row = members[start + rank]
                 cell = (cell_of(y[row], inverse, limit) << cell_bits) | cell_of(x[row], inverse, limit)
                 keys[p] = (cell << bits) | rank
+
+
+@device
+def sort_worlds(inverse_cell, world_start, work, strips, world_strip):
+    """Sort the keys of every world and note where each strip begins."""
+    keys, scratch = work
+    strip_start, strip_world = strips[0], strips[1]
+    n_worlds = world_start.shape[0] - 1
+    n_strips = 0
+    for w in range(n_worlds):
+        start, end = world_start[w], world_start[w + 1]
+        if inverse_cell[w] != 0.0:
             sort_keys(keys, scratch, start, end)
+        bits = rank_bits(end - start)
+        shift = bits + ((KEY_BITS - bits) >> 1)
+        world_strip[w] = n_strips
         last = -1
         for p in range(start, end):
-            key = keys[p]
-            row = members[start + (key & mask)]
-            order[p] = row
-            place[row] = p
-            sx[p] = x[row]
-            sy[p] = y[row]
-            sz[p] = z[row]
-            strip = key >> (bits + cell_bits)
+            strip = keys[p] >> shift
             if strip != last:
                 strip_start[n_strips] = p
                 strip_world[n_strips] = w
@@ -150,6 +143,47 @@ def build(pos, inverse_cell, worlds, work, placed, points, strips, world_strip):
             last = strip
         strip_start[n_strips] = end
     world_strip[n_worlds] = n_strips
+
+
+@device
+def put_places(pos, worlds, keys, placed, points, begin, end):
+    """Which row stands at the places [begin, end), and where."""
+    x, y, z = pos
+    world_start, members = worlds
+    order, place = placed[0], placed[1]
+    sx, sy, sz = points[0], points[1], points[2]
+    for w in range(world_start.shape[0] - 1):
+        start, stop = world_start[w], world_start[w + 1]
+        mask = (1 << rank_bits(stop - start)) - 1
+        for p in range(max(start, begin), min(stop, end)):
+            row = members[start + (keys[p] & mask)]
+            order[p] = row
+            place[row] = p
+            sx[p] = x[row]
+            sy[p] = y[row]
+            sz[p] = z[row]
+
+
+KEYS, SORT, PLACES = 1, 2, 4
+
+
+@kernel("(F F F) F (I I) (Iw Iw) I2w F2w (I2w Iw) (i8 i8 i8)")
+def build(pos, inverse_cell, worlds, work, placed, points, strips, part):
+    """Sort the rows of every world by (cell row, cell, id) and note where each cell row (strip) begins.
+
+    pos: x, y, z (N,) [m]; inverse_cell (n_worlds,) [1/m], 0 for one cell per world; worlds: world_start, members. work: keys (N,)
+    hold ranks in their low bits on entry, in any order, the last one for speed; scratch (N,). Written: placed, order and place,
+    (2, N); points, positions by place, (3, N + LANES); strips: first place and world of each strip, (2, N + 1), and the first
+    strip of each world, (n_worlds + 1,). part: a sum of KEYS, SORT and PLACES, in this order to be done, and the places
+    [begin, end) to do it for; SORT is for all.
+    """
+    phases, begin, end = part
+    if phases & KEYS:
+        make_keys(pos, inverse_cell, worlds, work[0], begin, end)
+    if phases & SORT:
+        sort_worlds(inverse_cell, worlds[0], work, strips[0], strips[1])
+    if phases & PLACES:
+        put_places(pos, worlds, work[0], placed, points, begin, end)
 
 
 @kernel("I F F F I F2w")

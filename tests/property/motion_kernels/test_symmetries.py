@@ -63,7 +63,14 @@ def test_unicycle_comes_back_when_time_runs_backwards(yaw, pitch, v, w, q, n):
 def test_unicycle_publishes_its_speed_along_its_nose(yaw, pitch, v, w, q):
     out = np.empty((13, 1))
     unicycle.to_body(
-        column(0, 0, 0, yaw, pitch), tuple(column(v, w, q)), tuple(UNLIMITED[:3]), True, False, 1e-9, out, 0
+        column(0, 0, 0, yaw, pitch),
+        tuple(column(v, w, q)),
+        tuple(UNLIMITED[:3]),
+        (True, False),
+        1e-9,
+        out,
+        0,
+        (0, 1),
     )
     assert abs(np.linalg.norm(out[3:6]) - abs(v)) < 1e-12
     assert np.abs(quat_rotate(out[6:10], column(v, 0, 0)) - out[3:6]).max() < 1e-6

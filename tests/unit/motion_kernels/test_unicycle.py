@@ -37,7 +37,9 @@ def many(n, seed=1, speed=30.0, rate=1.0):
 
 def publish(x, u, p, h, pitches=True, banks=False):
     out = np.full((13, x.shape[1]), np.nan)
-    kernels.to_body(x, tuple(u), (p[0], p[1], p[2] if pitches else p[3]), pitches, banks, h, out, 0)
+    kernels.to_body(
+        x, tuple(u), (p[0], p[1], p[2] if pitches else p[3]), (pitches, banks), h, out, 0, (0, len(out[0]))
+    )
     return out[:3], out[6:10], out[3:6], out[10:]
 
 

@@ -146,9 +146,9 @@ WEIGHTS = {"goal": 0.1, "team": 1.0, "other": 10.0, "centroid": 1.0, "align": 0.
 def run_law(s, sums, goal):
     n = sums.shape[1]
     wanted = np.full((3, n), np.nan)
-    kernels.law(
-        tuple(s.pos), goal, sums, (np.full(n, 30.0), *(np.full(n, w) for w in WEIGHTS.values())), wanted
-    )
+    weights = (np.full(n, 30.0), *(np.full(n, w) for w in WEIGHTS.values()))
+    for part in ((0, n // 3), (n // 3, n)):
+        kernels.law(tuple(s.pos), goal, sums, weights, wanted, part)
     return wanted
 
 
@@ -207,7 +207,8 @@ def test_outputs_follow_the_wanted_velocity():
     kernels.velocity(wanted, fast, out)
     size = np.sqrt((wanted**2).sum(0))
     np.testing.assert_allclose(out, wanted * np.minimum(15.0 / np.maximum(size, 1.0), 1.0), rtol=1e-14)
-    kernels.rates(wanted, yaw, climb, fast, *results[:3])
+    for part in ((0, 7), (7, n)):
+        kernels.rates(wanted, yaw, climb, fast, *results[:3], part)
     turn = np.arctan2(wanted[1], wanted[0]) - yaw
     np.testing.assert_allclose(results[1], np.arctan2(np.sin(turn), np.cos(turn)), atol=1e-14)
     np.testing.assert_allclose(results[2], np.arctan2(wanted[2], np.hypot(*wanted[:2])) - climb, atol=1e-14)

@@ -87,18 +87,18 @@ def sees_all(fov_az, fov_el):
     return True
 
 
-@kernel("(F F F) F2 F2 (F F F F F F) F2w")
-def law(pos, goal, seen, weights, wanted):
+@kernel("(F F F) F2 F2 (F F F F F F) F2w (i8 i8)")
+def law(pos, goal, seen, weights, wanted, part):
     """Velocity wanted [m/s], (3, n), of positions [m], goals (3, n) [m], and what is seen (13, n).
 
     The weighted sum of the five unit or repulsion vectors over the sum of their lengths, times max_speed. The heading's length
     enters that sum without its weight, as in the existing system. Without neighbours it is the goal's direction at 1 m/s.
-    weights: max_speed, goal, team mates, others, centroid, alignment, (n,) each.
+    weights: max_speed, goal, team mates, others, centroid, alignment, (n,) each; part: first row and end of those to do.
     """
     px, py, pz = pos
     max_speed, goal_weight, team_weight, other_weight, centroid_weight, align_weight = weights
-    for i in range(0, px.shape[0], LANES):
-        m = min(LANES, px.shape[0] - i)
+    for i in range(part[0], part[1], LANES):
+        m = min(LANES, part[1] - i)
         gx, gy, gz = rows(goal, 0, i, m)
         gx, gy, gz = shortened(gx - load_some(px, i, m), gy - load_some(py, i, m), gz - load_some(pz, i, m))
         cx, cy, cz = rows(seen, OFFSET, i, m)
@@ -133,15 +133,18 @@ def velocity(wanted, max_speed, out):
         put_rows(out, i, m, vx * factor, vy * factor, vz * factor)
 
 
-@kernel("F2 F F F Fw Fw Fw")
-def rates(wanted, yaw, climb, max_speed, speed, turn_rate, pitch_rate):
+@kernel("F2 F F F Fw Fw Fw (i8 i8)")
+def rates(wanted, yaw, climb, max_speed, speed, turn_rate, pitch_rate, part):
     """Speed [m/s] and the rates [rad/s] that turn the body x axis (yaw, climb [rad], nose up positive) to the wanted velocity."""
-    vx, vy, vz = wanted[0], wanted[1], wanted[2]
-    for i in range(speed.shape[0]):
+    begin, end = part
+    vx, vy, vz = wanted[0, begin:end], wanted[1, begin:end], wanted[2, begin:end]
+    yaw, climb, max_speed = yaw[begin:end], climb[begin:end], max_speed[begin:end]
+    speed, turn_rate, pitch_rate = speed[begin:end], turn_rate[begin:end], pitch_rate[begin:end]
+    for i in range(end - begin):
         turn_rate[i] = wrap(atan2(vy[i], vx[i]) - yaw[i])
-    for i in range(speed.shape[0]):
+    for i in range(end - begin):
         pitch_rate[i] = wrap(atan2(vz[i], np.sqrt(vx[i] * vx[i] + vy[i] * vy[i])) - climb[i])
-    for i in range(speed.shape[0]):
+    for i in range(end - begin):
         speed[i] = max_speed[i]
 
 

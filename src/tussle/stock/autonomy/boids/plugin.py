@@ -150,10 +150,12 @@ class Boids(Autonomy):
             self.max_speed, self.goal_weight, self.avoid_team_weight, self.avoid_nonteam_weight, self.centroid_weight,
             self.align_weight,
         )  # fmt: skip
-        kernels.law(pos, self.target, seen, weights, wanted)
+        g.split(lambda *part: kernels.law(pos, self.target, seen, weights, wanted, part))
         wired = self.wired
         if "turn_rate" in wired or "pitch_rate" in wired or "speed" in wired:
-            kernels.rates(wanted, g.yaw, g.climb, self.max_speed, self.speed, self.turn_rate, self.pitch_rate)
+            facing = g.yaw, g.climb
+            commands = self.speed, self.turn_rate, self.pitch_rate
+            g.split(lambda *part: kernels.rates(wanted, *facing, self.max_speed, *commands, part))
         if "velocity" in wired:
             kernels.velocity(wanted, self.max_speed, self.velocity)
         if "desired_heading" in wired or "desired_altitude" in wired or "desired_speed" in wired:

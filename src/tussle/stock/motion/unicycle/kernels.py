@@ -222,8 +222,8 @@ def mean_direction(sy, cy, sp, cp, sd, cd, se, ce):
     return east, north, (2.0 + ce) * sb * (1.0 / 3.0)
 
 
-@kernel("F2 (F F F) (F F F) b1 b1 f8 F2w i8")
-def to_body(x, commands, limits, pitches, banks, h, table, first_row):
+@kernel("F2 (F F F) (F F F) (b1 b1) f8 F2w i8 (i8 i8)")
+def to_body(x, commands, limits, flags, h, table, first_row, part):
     """Publish position, velocity, attitude and turn rate.
 
     The velocity is the displacement of the last substep over its length: Simpson's mean over the arc that ends at x,
@@ -231,18 +231,22 @@ def to_body(x, commands, limits, pitches, banks, h, table, first_row):
 
     Args:
         x: x, y, z [m], yaw, pitch [rad], (5, n), world frame, pitch nose up.
-        commands: Commanded speed [m/s], turn rate [rad/s], and pitch rate [rad/s] if `pitches`, else climb speed [m/s], (n,).
+        commands: Commanded speed [m/s], turn rate [rad/s], and pitch rate [rad/s] if pitch is steered, else climb speed [m/s], (n,).
         limits: Limits of these, (n,).
-        pitches: Whether pitch is steered.
-        banks: Whether the vehicle shows the bank of a coordinated turn.
+        flags: Whether pitch is steered; whether the vehicle shows the bank of a coordinated turn.
         h: Length of the last substep [s].
         table: Body table: position [m], velocity [m/s], quaternion body to world, turn rate [rad/s], world frame, (>= 13, N);
             written.
         first_row: Where the rows begin in it.
+        part: First row and end of the rows to publish.
     """
-    speed, turn_rate, third = commands
-    vel_max, turn_max, third_max = limits
-    yaw, pitch = x[3], x[4]
+    pitches, banks = flags
+    begin, end = part
+    n = end - begin
+    speed, turn_rate, third = commands[0][begin:end], commands[1][begin:end], commands[2][begin:end]
+    vel_max, turn_max, third_max = limits[0][begin:end], limits[1][begin:end], limits[2][begin:end]
+    yaw, pitch = x[3, begin:end], x[4, begin:end]
+    table[:3, first_row + begin : first_row + end] = x[:3, begin:end]
     half_h = 0.5 * h
     angle, sine, cosine = np.empty((5, BLOCK)), np.empty((5, BLOCK)), np.empty((5, BLOCK))
     held, made = (
@@ -251,8 +255,8 @@ def to_body(x, commands, limits, pitches, banks, h, table, first_row):
     )  # commands within their limits; velocity, quaternion, turn rate
     sine[4] = 0.0
     cosine[4] = 1.0
-    for first in range(0, x.shape[1], BLOCK):
-        m = min(BLOCK, x.shape[1] - first)
+    for first in range(0, n, BLOCK):
+        m = min(BLOCK, n - first)
         for l in range(m):
             held[0, l] = clamp(speed[first + l], vel_max[first + l])
         for l in range(m):
@@ -299,9 +303,7 @@ def to_body(x, commands, limits, pitches, banks, h, table, first_row):
             made[7, l] = raised * sine[0, l]
             made[8, l] = -raised * cosine[0, l]
             made[9, l] = held[1, l]
-        for k in range(3):
-            for l in range(m):
-                table[k, first_row + first + l] = x[k, first + l]
         for k in range(10):
+            out, source = table[3 + k, first_row + begin : first_row + end], made[k]
             for l in range(m):
-                table[3 + k, first_row + first + l] = made[k, l]
+                out[first + l] = source[l]

@@ -87,7 +87,10 @@ class Unicycle(MotionModel):
         pitches = self.use_pitch
         third = self.pitch_rate if pitches else self.velocity_z
         third_max = self.pitch_rate_max if pitches else self.velocity_z_max
-        kernels.to_body(
-            self.x, (self.speed, self.turn_rate, third), (self.vel_max, self.turn_rate_max, third_max),
-            pitches, self.enable_roll, body.dt, body.table, body.first,
-        )  # fmt: skip
+        commands = self.speed, self.turn_rate, third
+        limits, flags = (self.vel_max, self.turn_rate_max, third_max), (pitches, self.enable_roll)
+        body.split(
+            lambda *part: kernels.to_body(
+                self.x, commands, limits, flags, body.dt, body.table, body.first, part
+            )
+        )
