@@ -107,7 +107,10 @@ def test_aircraft_path_turns_with_its_start(yaw, by, roll, pitch, v, p, q, n):
 
 @given(yaw=angle, roll=st.floats(-1.3, 1.3), pitch=st.floats(-1.3, 1.3), v=st.floats(1.0, 80.0))
 def test_aircraft_flies_at_its_speed_along_its_nose(yaw, roll, pitch, v):
-    out = np.empty((10, 1))
-    aircraft.to_body(column(0, 0, 0, roll, pitch, yaw, v), out, 0)
+    out, (radius, slope, target, *bounds) = np.empty((13, 1)), (AIRFRAME[k] for k in (0, 8, 7, 3, 4, 5, 6))
+    still = np.zeros(1)
+    aircraft.to_body(
+        column(0, 0, 0, roll, pitch, yaw, v), (still, still), tuple(bounds), (radius, slope, target), out, 0
+    )
     assert abs(np.linalg.norm(out[3:6]) - v) < 1e-12
     assert np.abs(quat_rotate(out[6:10], column(v, 0, 0)) - out[3:6]).max() < 1e-12
