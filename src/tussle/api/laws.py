@@ -52,7 +52,7 @@ def neighbors(
         teams: "own", "other", or None for all.
         **reductions: Name of each contribution and how it is reduced: "sum"; "mean", 0 without neighbours; "min" and "max", inf and
             -inf without; "count" of those that are true; "nearest", that of the nearest neighbour (the smaller id of equals), NaN
-            without. Or "each" for all contributions: `self.law(g)` then lists the pairs that count, see `Listed`; made for few.
+            without. Or "each" for all contributions: `self.law(g)` then lists the pairs that count, see `Listed`.
 
     Raises:
         DeclarationError: A reduction is unknown, or there is none, or no radius, or some are "each" and others not.
