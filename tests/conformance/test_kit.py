@@ -14,6 +14,10 @@ from tussle.api import (
     Behavior,
     Controller,
     EasyAutonomy,
+    EasyController,
+    EasyInteraction,
+    EasyMetric,
+    EasySensor,
     EntityRef,
     GroupView,
     Input,
@@ -71,6 +75,97 @@ class SoundEasy(EasyAutonomy):
         other = me.nearest()
         me.speed = 0.0 if other is None else math.sqrt(me.distance(other))
         me.turn_rate = math.sin(me.yaw)
+
+
+class SoundEasyChooser(EasyAutonomy):
+    """Keeps to one, draws, says so, and counts what it hears."""
+
+    grade = "portable"
+    sight = Param(20.0, unit="m", gt=0.0)
+    favourite = EntityRef()
+    heard = State(dtype=int)
+    speed = Output(unit="m/s")
+    turn_rate = Output(unit="rad/s")
+    capture = Publish(CaptureEntity)
+    captures = Subscribe(CaptureEntity)
+
+    def spawn_one(self, me) -> None:
+        me.heard = int(4.0 * me.uniform())
+
+    def step_one(self, me) -> None:
+        me.favourite = me.favourite or me.nearest(team="other")
+        me.heard += sum(1 for claim in me.captures if claim.sender and claim.target)
+        me.speed = me.uniform() + me.uniform() + len(me.near(me.sight, team="own"))
+        me.turn_rate = 0.1 * me.normal() + 0.01 * me.heard
+        if me.favourite and me.distance(me.favourite) < me.sight:
+            me.publish("capture", target=me.favourite)
+
+
+class SoundEasyController(EasyController):
+    """A first-order lag, for one entity at a time."""
+
+    grade = "portable"
+    lag = Param(0.5, unit="s", gt=0.0)
+    desired_speed = Input(unit="m/s")
+    speed = Output(unit="m/s")
+    memory = State(unit="m/s")
+
+    def step_one(self, me) -> None:
+        me.memory += me.dt / (me.lag + me.dt) * (me.desired_speed - me.memory)
+        me.speed = me.memory
+
+
+class SoundEasySensor(EasySensor):
+    """Measures its height with noise, and the way to its nearest."""
+
+    grade = "portable"
+    noise = Param(0.5, unit="m", ge=0.0)
+    height = Output(unit="m")
+    way = Output("way_x way_y way_z", unit="m")
+
+    def step_one(self, me) -> None:
+        other = me.nearest(radius=50.0)
+        me.height = me.pos[2] + me.noise * me.normal()
+        me.way = other.offset if other else 0.0
+
+
+class SoundEasyReferee(EasyInteraction):
+    """Hurts who claims too much, by chance, and pushes who stands near."""
+
+    grade = "portable"
+    harm = Param(0.1, ge=0.0)
+    claims = State(dtype=int, per="world")
+    hits = State(dtype=int)
+
+    def start_one(self, w) -> None:
+        w.claims = len(w.entities)
+
+    def step_one(self, w) -> None:
+        for claim in w.inbox(CaptureEntity):
+            w.claims += 1
+            if claim.sender and w.uniform() < 0.5:
+                claim.sender.hits += 1
+                claim.sender.health -= w.harm * claim.sender.hits
+        for entity in w.entities:
+            near = entity.near(5.0)
+            if near:
+                w.move(entity, pos=entity.pos - 0.1 * near[0].offset)
+        if w.claims % 7 == 1:
+            w.spawn("red", pos=(float(w.claims), 0.0, 0.0))
+
+
+class SoundEasyMetric(EasyMetric):
+    """Counts how many of each team there are."""
+
+    grade = "portable"
+    seen = State(dtype=int, per="team")
+
+    def step_one(self, w) -> None:
+        for entity in w.entities:
+            w.seen[entity.team] += 1
+
+    def result_one(self, w):
+        return {"seen": w.seen, "score": w.seen, "there": len(w.entities)}
 
 
 class SoundController(Controller):
@@ -633,18 +728,79 @@ class DrawsAtBirthAndAfter(SoundAutonomy):
         self.speed[:] = g.uniform("start")
 
 
-class DrawsTwiceForOne(SoundEasy):
-    """The same in easy mode."""
-
-    def step_one(self, me) -> None:
-        me.speed, me.turn_rate = me.normal("gust"), me.normal("gust")
-
-
 class DrawsTwiceForWorlds(SoundReferee):
     """The same for worlds."""
 
     def step(self, w) -> None:
         self.claims[:] = (w.uniform("luck") + w.uniform("luck")).astype(int)
+
+
+class EasySine(SoundEasyChooser):
+    """The sine of `math` differs from machine to machine."""
+
+    def step_one(self, me) -> None:
+        me.speed = math.sin(me.yaw)
+
+
+class EasyChance(SoundEasySensor):
+    """Asks Python's random module."""
+
+    def step_one(self, me) -> None:
+        me.height = random.random()
+
+
+class EasyCalls(SoundEasyReferee):
+    """Counts its calls for all worlds together."""
+
+    def step_one(self, w) -> None:
+        CALLS.append(1)
+        w.claims = len(CALLS)
+
+
+class EasyMisspelt(SoundEasyController):
+    """Reads what it does not have."""
+
+    def step_one(self, me) -> None:
+        me.speed = me.desired_sped
+
+
+class EasyReadsAll(SoundEasyController):
+    """Reads the values of all entities."""
+
+    def step_one(self, me) -> None:
+        me.speed = me.desired_speed * self.lag
+
+
+class EasyBothLaws(SoundEasySensor):
+    """Draws by two laws under one label."""
+
+    def step_one(self, me) -> None:
+        me.height = me.uniform("height") + me.normal("height")
+
+
+class EasyHides(SoundEasyChooser):
+    """Remembers in the plugin object, behind its back."""
+
+    def step_one(self, me) -> None:
+        object.__setattr__(self, "last", me.id)
+
+
+class EasyHurts(SoundEasyMetric):
+    """A metric that changes what it counts."""
+
+    def step_one(self, w) -> None:
+        for entity in w.entities:
+            entity.health = 0.5
+
+
+class EasyNan(SoundEasyMetric):
+    """Divides by a distance that may be 0."""
+
+    limit = Param(1.0, ge=0.0)
+    part = State(per="world")
+
+    def step_one(self, w) -> None:
+        w.part = math.inf if w.limit == 0.0 else 1.0 / w.limit
 
 
 class JumpyDerivative(SoundMotion):
@@ -732,19 +888,38 @@ BROKEN = {
             UsesLibmInDerivative,
             UsesLibmInKernel,
             UsesLibmInLaw,
+            EasySine,
         ),
     ],
-    "stack invariance": [CountsRows, KnowsItsRow, CountsCalls, RemembersById, UsesChance],
+    "stack invariance": [
+        CountsRows,
+        KnowsItsRow,
+        CountsCalls,
+        RemembersById,
+        UsesChance,
+        EasyChance,
+        EasyCalls,
+    ],
     "snapshot": [MissesSnapshot],
     "reset": [ForgetsToReset],
-    "runs": [NoStep, WrongStep, HalfBelief, SetsAttribute, WritesView, Raises],
-    "memory in columns": [HidesAttribute, ChangesClass],
-    "own columns": [WritesAroundView, WritesParameter, WritesWrongColumn],
+    "runs": [
+        NoStep,
+        WrongStep,
+        HalfBelief,
+        SetsAttribute,
+        WritesView,
+        Raises,
+        EasyMisspelt,
+        EasyReadsAll,
+        EasyBothLaws,
+    ],
+    "memory in columns": [HidesAttribute, ChangesClass, EasyHides],
+    "own columns": [WritesAroundView, WritesParameter, WritesWrongColumn, EasyHurts],
     "idle": [SaysIdle],
-    "finite": [NanAtBound, NanInReferee, RaisesAtBound],
+    "finite": [NanAtBound, NanInReferee, RaisesAtBound, EasyNan],
     "rollout": [RolloutOfItsOwn],
     "velocity": [NoVelocity, VelocityOfBody, VelocityOfCommand, WrongRate, ForgetsClimb],
-    "draws": [DrawsTwice, DrawsByBothLaws, DrawsAtBirthAndAfter, DrawsTwiceForOne, DrawsTwiceForWorlds],
+    "draws": [DrawsTwice, DrawsByBothLaws, DrawsAtBirthAndAfter, DrawsTwiceForWorlds],
     "order of convergence": [JumpyDerivative],
     "advance": [EulerKernel],
     "rows": [RowsDiffer],

@@ -1,6 +1,16 @@
 """What a plugin author imports."""
 
-from tussle.api.easy import EasyAutonomy, Me, Other
+from tussle.api.easy import (
+    EasyAutonomy,
+    EasyController,
+    EasyInteraction,
+    EasyMetric,
+    EasySensor,
+    Me,
+    Member,
+    OneWorld,
+    Other,
+)
 from tussle.api.group import GroupView
 from tussle.api.kinds import (
     Autonomy,
@@ -44,6 +54,10 @@ __all__ = [
     "Children",
     "Controller",
     "EasyAutonomy",
+    "EasyController",
+    "EasyInteraction",
+    "EasyMetric",
+    "EasySensor",
     "EntityPlugin",
     "EntityRef",
     "Field",
@@ -52,11 +66,13 @@ __all__ = [
     "Input",
     "Interaction",
     "Me",
+    "Member",
     "Message",
     "Metric",
     "MotionBody",
     "MotionModel",
     "Network",
+    "OneWorld",
     "Other",
     "Output",
     "Param",

@@ -28,6 +28,7 @@ class Context:
         block_names: Names of the entity blocks; the body column `block` counts in them.
         scene: Origin, ground, boundaries, bases.
         teams: Team numbers of the mission, ascending.
+        running: Which worlds have not ended, (n_worlds,).
         services: Name -> function of the world plugins' services.
         topic: Gives the topic of (network, name, type).
         threads: Number of threads that a kernel over blocks may use.
@@ -40,6 +41,7 @@ class Context:
     block_names: list[str]
     scene: Scene
     teams: np.ndarray
+    running: np.ndarray
     services: dict[str, Callable[..., Any]] = field(default_factory=dict)
     topic: Callable[..., Any] | None = None
     threads: int = 1

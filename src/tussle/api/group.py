@@ -13,14 +13,7 @@ from tussle.api import kernels
 from tussle.api.bodies import DERIVED, FLOATS, INTS, Bodies, BodyView, Kept, derive, read_only
 from tussle.api.context import Context, stream
 from tussle.api.draw import Draw
-from tussle.api.pairs import (
-    Nearest,
-    Pairs,
-    find_near_rows,
-    find_nearest,
-    find_nearest_row,
-    find_pairs,
-)
+from tussle.api.pairs import Nearest, Pairs, find_nearest, find_pairs
 from tussle.errors import PluginError, listed, nearest_name
 from tussle.neighbors.index import Index
 from tussle.scene import Scene
@@ -28,6 +21,7 @@ from tussle.scene import Scene
 ROWS_PER_THREAD = 4096
 """Fewer rows are not worth a thread: a kernel needs some 20 ns for each, and a thread 50 us."""
 GOLDEN = np.uint64(0x9E3779B97F4A7C15)
+LAWS: dict[str, Callable[..., np.ndarray]] = {"uniform": rng.uniform, "normal": rng.normal}
 
 
 class GroupView:
@@ -242,14 +236,6 @@ class GroupView:
         """The table behind `bodies`; for queries."""
         return self._bodies
 
-    def nearest_row(self, row: int, team: int | None = None) -> int:
-        """Body row of the nearest other entity (of a team) of one row; -1 when there is none."""
-        return find_nearest_row(self, row, team)
-
-    def near_rows(self, row: int, radius: float, team: int | None = None) -> list[int]:
-        """Body rows of the other entities (of a team) nearer than radius [m] to one row, nearest first."""
-        return find_near_rows(self, row, radius, team)
-
     # -- chance and services ------------------------------------------------------------------------------------------------
 
     def _stream(self, label: str) -> int:
@@ -257,27 +243,19 @@ class GroupView:
 
     def uniform(self, label: str, k: int | None = None) -> np.ndarray:
         """Uniform draws in [0, 1), (n,) or (k, n): the same for an entity whatever else there is in the world."""
-        out = rng.uniform(
-            self._seeds, self._stream(label), self.place_in_block, self.step_count, self.substep, k or 1
-        )
+        out = self.draw_lines("uniform", label, k or 1)
         return out if k is not None else out[0]
 
     def normal(self, label: str, k: int | None = None) -> np.ndarray:
         """Standard normal draws, (n,) or (k, n)."""
-        out = rng.normal(
-            self._seeds, self._stream(label), self.place_in_block, self.step_count, self.substep, k or 1
-        )
+        out = self.draw_lines("normal", label, k or 1)
         return out if k is not None else out[0]
 
-    def draws_of(self, row: int, law: str, label: str, k: int) -> np.ndarray:
-        """The draws of one row, (k,): the same that `uniform` and `normal` give it."""
-        one = slice(row, row + 1)
-        function = rng.uniform if law == "uniform" else rng.normal
-        place, step = (
-            np.ascontiguousarray(self.place_in_block[one]),
-            np.ascontiguousarray(self.step_count[one]),
+    def draw_lines(self, law: str, label: str, k: int) -> np.ndarray:
+        """The draws of `uniform` and `normal`, (k, n); for easy mode."""
+        return LAWS[law](
+            self._seeds, self._stream(label), self.place_in_block, self.step_count, self.substep, k
         )
-        return np.asarray(function(self._seeds[one], self._stream(label), place, step, self.substep, k)[:, 0])
 
     def uniform_pairs(self, label: str, near: Any, k: int | None = None) -> np.ndarray:
         """Uniform draws in [0, 1), one per pair of `near`, (m,) or (k, m): the same for a pair whatever other entities there are.

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, ClassVar
 
+import numpy as np
+
 from tussle.api.plugin import Plugin
 from tussle.columns import Output, Param
 
 if TYPE_CHECKING:
-    import numpy as np
-
     from tussle.api.group import GroupView
     from tussle.api.world import WorldView
 
@@ -77,6 +77,14 @@ class WorldPlugin(Plugin):
     def result(self, w: WorldView) -> dict[str, np.ndarray]:
         """Values to report: name -> (n_worlds,) or (n_teams, n_worlds)."""
         return {}
+
+    def result_of(self, w: WorldView, world: int) -> dict[str, Any]:
+        """Values to report of one world: name -> number, or team -> number."""
+        out: dict[str, Any] = {}
+        for name, array in self.result(w).items():
+            item = np.asarray(array)[..., world]
+            out[name] = dict(zip(w.teams.tolist(), item.tolist(), strict=True)) if item.ndim else item.item()
+        return out
 
 
 class Interaction(WorldPlugin):

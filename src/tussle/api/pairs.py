@@ -123,28 +123,3 @@ def _search(
     search.nearest_rows(
         queries, k, mode, (index.row_world, index.place, index.order), first, table, other, square
     )
-
-
-def find_nearest_row(g: GroupView, row: int, team: int | None) -> int:
-    """Body row of the nearest other entity of one row, (of a team); -1 when there is none."""
-    index = g.table_bodies.any_index()
-    x, y, z = g.pos[:, row : row + 1]
-    other, square = np.empty((1, 1), np.int64), np.empty((1, 1))
-    mode, wanted = (search.ANY, 0.0) if team is None else (search.SAME, float(team))
-    _search(g, index, (x, y, z, np.array([wanted])), 1, mode, g.first + row, other, square)
-    return int(other[0, 0])
-
-
-def find_near_rows(g: GroupView, row: int, radius: float, team: int | None) -> list[int]:
-    """Body rows of the other entities (of a team) nearer than radius [m] to one row, nearest first, the smaller id when equal."""
-    bodies = g.bodies
-    members, world_start, _, _ = g.table_bodies.layout()
-    world = int(g.world[row])
-    rows = members[world_start[world] : world_start[world + 1]]
-    rows = rows[rows != g.first + row]
-    if team is not None:
-        rows = rows[bodies.team[rows] == team]
-    dx, dy, dz = bodies.pos[:, rows] - g.pos[:, row : row + 1]
-    distance = np.sqrt(dx * dx + dy * dy + dz * dz)
-    kept = np.flatnonzero(distance < radius)
-    return [int(r) for r in rows[kept[np.argsort(distance[kept], kind="stable")]]]

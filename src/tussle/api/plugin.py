@@ -245,11 +245,23 @@ class Plugin:
             ):
                 return  # `self.x += 1` has already written into the column when Python assigns the result.
             raise AttributeError(
-                f"{cls.__name__}.{name} is a column: write into it with self.{name}[:] = value"
+                f"{cls.__name__}.{name} is a column: write into it with {self._write_of(name)}"
             )
         raise AttributeError(
             f"{cls.__name__}.{name} is not declared{nearest_name(name, cls.columns)}: one plugin object serves all entities, so memory "
-            f"goes into a column: {name} = State(...) on the class, then self.{name}[:] = value (or me.{name} = value in easy mode)"
+            f"goes into a column: {name} = State(...) on the class, then {self._write_of(name)}"
+        )
+
+    def _write_of(self, name: str) -> str:
+        return f"self.{name}[:] = value"
+
+    def __getattr__(self, name: str) -> Any:
+        cls = type(self)
+        if name in cls.columns:  # Column.__get__ has refused: it is no array here
+            return cls.columns[name].__get__(self, cls)
+        allowed = [n for n in (*cls.columns, *dir(cls)) if not n.startswith("_")]
+        raise AttributeError(
+            f"{cls.__name__} has no {name!r}{nearest_name(name, allowed)}; {listed(cls.columns)}"
         )
 
     # -- hooks that do nothing unless filled in ---------------------------------------------------------------------------

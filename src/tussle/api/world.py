@@ -10,7 +10,7 @@ import numpy as np
 from tussle import rng
 from tussle.api.bodies import Bodies, BodyView
 from tussle.api.context import Context
-from tussle.api.group import GOLDEN, GroupView
+from tussle.api.group import GOLDEN, LAWS, GroupView
 from tussle.comms import TopicBuffer
 from tussle.errors import MissionError, ParameterError, listed, nearest_name
 from tussle.messages import Batch, Message
@@ -49,6 +49,7 @@ class WorldView(GroupView):
     def __init__(self, bodies: Bodies, context: Context) -> None:
         super().__init__(bodies, 0, bodies.n, context, context.clock.dt)
         self.only: np.ndarray | None = None  # worlds that this view speaks for, (n_worlds,); None is all
+        self.failing_world: int | None = None
         self.deaths: list[tuple[np.ndarray, str]] = []
         self.moved: list[np.ndarray] = []
         self.births: list[dict[str, Any]] = []
@@ -158,6 +159,11 @@ class WorldView(GroupView):
             )
         return values
 
+    def spoken_for(self) -> list[int]:
+        """Numbers of the worlds that run and that this view speaks for."""
+        running = self.context.running
+        return [int(w) for w in np.flatnonzero(running if self.only is None else running & self.only)]
+
     def _spoken_for(self, world: np.ndarray) -> np.ndarray:
         """Which of these worlds this view speaks for: all, but for a call on behalf of some."""
         return np.arange(len(world)) if self.only is None else np.flatnonzero(self.only[world])
@@ -191,18 +197,15 @@ class WorldView(GroupView):
 
     def uniform(self, label: str, k: int | None = None) -> np.ndarray:
         """Uniform draws in [0, 1), one per world, (n_worlds,) or (k, n_worlds)."""
-        return self._draws(rng.uniform, label, k)
+        return super().uniform(label, k)
 
     def normal(self, label: str, k: int | None = None) -> np.ndarray:
         """Standard normal draws, one per world, (n_worlds,) or (k, n_worlds)."""
-        return self._draws(rng.normal, label, k)
+        return super().normal(label, k)
 
-    def _draws(self, law: Callable[..., np.ndarray], label: str, k: int | None) -> np.ndarray:
-        clock = self.context.clock
-        out = law(
-            self.context.seeds, self._stream(label), np.zeros(self.n_worlds, np.int64), clock.step, 0, k or 1
-        )
-        return out if k is not None else out[0]
+    def draw_lines(self, law: str, label: str, k: int) -> np.ndarray:
+        clock, index = self.context.clock, np.zeros(self.n_worlds, np.int64)
+        return LAWS[law](self.context.seeds, self._stream(label), index, clock.step, 0, k)
 
     def uniform_by(self, label: str, world: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
         """Uniform draws in [0, 1), one per (world, first, second), (m,): keyed by these numbers, not by their place."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pickle
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -418,7 +418,7 @@ def world_result(sim: Simulation, world: int, reason: str, is_hashed: bool = Tru
     for referee in [*sim.interactions, *sim.metrics]:
         referee.view.caller = referee.plugin
         try:
-            found = _of_world(sim, referee.plugin.result(referee.view), world)
+            found = referee.plugin.result_of(referee.view, world)
         except Exception as error:
             if reason == "error":  # something has failed already, and this may come of it
                 continue
@@ -431,15 +431,3 @@ def world_result(sim: Simulation, world: int, reason: str, is_hashed: bool = Tru
     if is_hashed:
         result.state_hash = state_hash(sim, world)
     return result
-
-
-def _of_world(sim: Simulation, values: Mapping[str, np.ndarray], world: int) -> dict[str, Any]:
-    out: dict[str, Any] = {}
-    for name, array in values.items():
-        item = np.asarray(array)[..., world]
-        out[name] = (
-            {int(t): v.item() for t, v in zip(sim.context.teams, item, strict=True)}
-            if item.ndim
-            else item.item()
-        )
-    return out

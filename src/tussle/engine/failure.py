@@ -11,6 +11,7 @@ import numpy as np
 
 from tussle.api.bodies import Bodies
 from tussle.api.group import GroupView
+from tussle.api.world import WorldView
 from tussle.engine.group import Binding, Group
 from tussle.errors import PluginError, TussleError
 
@@ -59,6 +60,8 @@ def in_call(error: Exception, plugin: Any, view: GroupView, group: Group | None 
     rows = slice(None) if row is None else slice(row, row + 1)
     clock = view.context.clock
     worlds = np.unique(view.world[rows]) if view.n else np.arange(len(clock.step))
+    if isinstance(view, WorldView) and view.failing_world is not None:
+        worlds, view.failing_world = np.array([view.failing_world]), None
     where = "" if group is None else group.name
     if row is not None and group is not None:
         where = f"{group.block_of(row)} {int(view.id[row])}"

@@ -10,7 +10,7 @@ import numpy as np
 
 from tussle.api.bodies import Bodies, read_only
 from tussle.api.context import Context
-from tussle.api.easy import EasyAutonomy
+from tussle.api.easy.plugins import EasyEntityPlugin
 from tussle.api.group import GroupView
 from tussle.api.kinds import Behavior
 from tussle.api.motion import MotionBody
@@ -103,7 +103,7 @@ def check_hooks(spec: Any, where: str) -> None:
         DeclarationError: It has none, or one by another name.
     """
     needed = {"motion": ("from_body", "to_body"), "network": ("route",)}.get(spec.kind, ("step",))
-    if isinstance(spec, EasyAutonomy):
+    if isinstance(spec, EasyEntityPlugin):
         needed = ("step_one",)
     if getattr(spec, "passthrough", False):
         return

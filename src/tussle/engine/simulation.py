@@ -93,7 +93,13 @@ class Simulation:
         clock = Clock(n, mission.start, mission.dt)
         seeds_ = np.array([s % 2**64 for s in numbers], np.uint64)
         self.context = Context(
-            clock, seeds_, [b.name for b in mission.blocks], mission.scene, mission.teams, threads=threads
+            clock,
+            seeds_,
+            [b.name for b in mission.blocks],
+            mission.scene,
+            mission.teams,
+            self.running,
+            threads=threads,
         )
         self.overrides = Overrides(mission, n)
         self.overrides.set(params or {}, np.arange(n))

@@ -18,12 +18,13 @@ from tussle.errors import ConformanceError, TussleError, listed
 
 RULE = "declarations"
 HOOKS_NAMES = """
-    spawn step step_one start result route rejects is_idle from_body to_body derivative advance integrator active_inputs
+    spawn spawn_one step step_one start start_one result result_one route rejects is_idle from_body to_body derivative advance
+    integrator active_inputs
     active_outputs most_worlds open_one close_one save_one load_one ready ready_timeout reads_all grade passthrough
     abstract kind
 """
 HOOKS = frozenset(HOOKS_NAMES.split())
-MACHINERY = frozenset({"columns", "services", "__signature__"})
+MACHINERY = frozenset({"columns", "services", "me_type", "world_types", "__signature__"})
 MUTABLE = (list, dict, set, bytearray, np.ndarray)
 MAGIC_NAMES = """
     __init__ __new__ __setattr__ __getattr__ __getattribute__ __delattr__ __eq__ __hash__ __reduce__
@@ -85,7 +86,8 @@ def _hooks(cls: type[Plugin]) -> Iterator[str]:
         if not (cls.derivative or cls.advance) and cls.integrator is MotionModel.integrator:
             yield "it has neither derivative nor advance"
     elif issubclass(cls, (Interaction, Metric)) and all(
-        getattr(cls, k).__module__.startswith("tussle.api.") for k in ("start", "step", "result")
+        getattr(cls, k, cls.step).__module__.startswith("tussle.api.")
+        for k in ("start", "step", "result", "start_one", "step_one", "result_one")
     ):
         yield "it has neither start nor step nor result"
 

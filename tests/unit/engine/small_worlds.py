@@ -109,7 +109,7 @@ class EasyListener(EasyAutonomy):
         for note in me.notes:
             me.n_heard = me.n_heard + 1
             me.value = note.value
-            me.sender = note.sender
+            me.sender = note.sender.id
 
 
 class NoteMetric(Metric):

@@ -1,0 +1,175 @@
+"""The cost of easy mode per entity and step, by what the behaviour asks for.
+
+    python benchmarks/easy.py [--sizes 200] [--repeats 5] [--json FILE]
+
+N chasers and N prey in one world; the prey fly by a plugin of NumPy. `us_per_entity_step` is the CPU time of the chasers' calls alone.
+`keeps` is the Chaser of the guide, which looks for prey when it has none; `looks` takes the nearest anew in every step.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import Any
+
+import measuring
+
+from tussle import Block, Mission, Simulation
+from tussle.api import (
+    Autonomy,
+    EasyAutonomy,
+    EntityRef,
+    GroupView,
+    Me,
+    Output,
+    Param,
+    Publish,
+    State,
+    Subscribe,
+    wrap,
+)
+from tussle.engine.schedule import Call
+from tussle.messages import CaptureEntity
+from tussle.stock import Unicycle
+
+SIZES = (200,)
+STEPS = 100
+
+
+class Prey(Autonomy):
+    """Fly on."""
+
+    speed = Output(unit="m/s")
+    turn_rate = Output(unit="rad/s")
+    pitch_rate = Output(unit="rad/s")
+
+    def step(self, g: GroupView) -> None:
+        self.speed[:] = 20.0
+
+
+class Keeps(EasyAutonomy):
+    """Chase the nearest prey and keep to it until it is gone."""
+
+    prey_team = Param(1, doc="Team that is hunted.")
+    max_speed = Param(35.0, unit="m/s", ge=0.0)
+    capture_range = Param(0.0, unit="m", ge=0.0)
+    target = EntityRef(doc="Prey being chased; None when it is gone.")
+    speed = Output(unit="m/s")
+    turn_rate = Output(unit="rad/s")
+    pitch_rate = Output(unit="rad/s")
+    capture = Publish(CaptureEntity)
+
+    def step_one(self, me: Me) -> None:
+        me.target = me.target or me.nearest(team=me.prey_team)
+        if me.target is None:
+            me.speed = me.turn_rate = me.pitch_rate = 0.0
+            return
+        east, north, up = me.target.pos - me.pos
+        me.speed = me.max_speed
+        me.turn_rate = wrap(math.atan2(north, east) - me.yaw)
+        me.pitch_rate = math.atan2(up, math.hypot(east, north)) - me.climb
+        if me.distance(me.target) < me.capture_range:
+            me.publish("capture", target=me.target)
+
+
+class Looks(Keeps):
+    """Chase whoever is nearest now."""
+
+    def step_one(self, me: Me) -> None:
+        me.target = None
+        super().step_one(me)
+
+
+class Flocks(Keeps):
+    """Fly to the middle of those of the own team within 100 m."""
+
+    def step_one(self, me: Me) -> None:
+        near = me.near(100.0, team=me.team)
+        me.speed = me.max_speed
+        if near:
+            east, north, _ = sum(other.pos for other in near) / len(near) - me.pos
+            me.turn_rate = wrap(math.atan2(north, east) - me.yaw)
+
+
+class Claims(Keeps):
+    """Send a message in every step, and read what came."""
+
+    claims = Subscribe(CaptureEntity, network="LocalNetwork")
+    claim = Publish(CaptureEntity, network="LocalNetwork")
+    heard = State(dtype=int)
+
+    def step_one(self, me: Me) -> None:
+        for claim in me.claims:
+            if claim.target:
+                me.heard = me.heard + 1
+        me.publish("claim", target=me.id)
+
+
+class Wanders(Keeps):
+    """Turn by chance."""
+
+    def step_one(self, me: Me) -> None:
+        me.speed = me.max_speed
+        me.turn_rate = 0.5 * me.normal("turn")
+
+
+BEHAVIOURS = (Keeps, Looks, Flocks, Claims, Wanders)
+
+
+def mission(n: int, autonomy: Any) -> Mission:
+    """N chasers of one team, N prey of another."""
+    from tussle.stock import LocalNetwork
+
+    common: dict[str, Any] = {
+        "count": n,
+        "variance": (1e5, 1e5, 1e3),
+        "scatter_first": True,
+        "motion": Unicycle(vel_max=35.0),
+    }
+    chaser = Block(name="chaser", team=2, autonomy=autonomy, **common)
+    prey = Block(name="prey", team=1, autonomy=Prey(), **common)
+    return Mission(
+        blocks=[chaser, prey], networks=[LocalNetwork()], dt=0.1, end=0.1 * STEPS, end_conditions="time"
+    )
+
+
+def measure(behaviour: type[EasyAutonomy], n: int) -> dict[str, Any]:
+    """Play one game and time the calls of one plugin."""
+    spent = [0.0]
+    sim = Simulation(mission(n, behaviour()))
+    sim.step(3)
+    calls = sim.schedule
+    for i, call in enumerate(calls):
+        if behaviour.__name__ in call.label:
+            calls[i] = Call(call.label, _timed(call.run, spent))
+    sim.run()
+    steps = STEPS - 3
+    return {
+        "behaviour": behaviour.__name__.lower(),
+        "n": n,
+        "us_per_entity_step": 1e6 * spent[0] / steps / n,
+        "cpu_s": spent[0],
+    }
+
+
+def _timed(run: Any, spent: list[float]) -> Any:
+    def timed() -> None:
+        begin = time.process_time()
+        run()
+        spent[0] += time.process_time() - begin
+
+    return timed
+
+
+def main() -> None:
+    args = measuring.arguments(__doc__.splitlines()[0], SIZES)
+    rows = [
+        measuring.median_of(args.repeats, lambda b=b, n=n: measure(b, n), "us_per_entity_step")
+        for n in args.sizes
+        for b in BEHAVIOURS
+    ]
+    measuring.report("Easy mode, one world, one thread", rows, args.json)
+
+
+if __name__ == "__main__":
+    main()

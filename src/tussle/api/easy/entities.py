@@ -1,0 +1,381 @@
+"""What an entity's plugin is given in easy mode: the entity itself, and the others that it sees."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from tussle.api.easy.search import Search
+from tussle.api.easy.values import BODY, NUMBERS, VECTORS, Columns, Heard, Write, plain
+from tussle.columns import Publish
+from tussle.errors import ParameterError, listed, nearest_name
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from tussle.api.group import GroupView
+    from tussle.scene import Scene
+
+ROLES = {
+    "autonomy": "an autonomy decides",
+    "controller": "a controller steers",
+    "sensor": "a sensor measures",
+}
+MOST_KEPT = 64
+"""Others that an entity keeps as objects, so as not to make them anew in each step."""
+
+
+class Draws:
+    """Random numbers of a view's rows, each drawn for all of them, by law and label.
+
+    Args:
+        view: Whose rows they are.
+        n: Number of rows.
+    """
+
+    def __init__(self, view: Any, n: int) -> None:
+        self._view, self._n = view, n
+        self._of: dict[str, tuple[str, list[list[float]], list[int]]] = {}
+
+    def clear(self, prefix: str = "") -> None:
+        """Forget what was drawn: another call begins, whose labels are told from others' by a prefix."""
+        self._of.clear()
+        self._prefix = prefix
+
+    def next(self, row: int, law: str, label: str) -> float:
+        """The next number of a row under a label: what `g.uniform(label, k)` and `g.normal(label, k)` give, one after the other.
+
+        Raises:
+            ParameterError: The label has served for numbers of another law in this step.
+        """
+        label = label or law
+        drawn, lines, used = self._of.setdefault(label, (law, [], [0] * self._n))
+        if drawn != law:
+            raise ParameterError(
+                f"the label {label!r} has been drawn as {drawn} in this step, with the same random bits; use another label for {law}"
+            )
+        j = used[row]
+        used[row] = j + 1
+        if j >= len(lines):
+            lines[:] = self._view.draw_lines(law, self._prefix + label, max(1, 2 * j)).tolist()
+        return lines[j][row]
+
+
+class DrawIn:
+    """Draws shapes in one world; see `tussle.api.draw`."""
+
+    __slots__ = ("_draw", "_world")
+
+    def __init__(self, draw: Any, world: int) -> None:
+        self._draw, self._world = draw, world
+
+    def __getattr__(self, kind: str) -> Any:
+        shape = getattr(self._draw, kind)
+        return lambda **attributes: shape(**{"world": self._world, **attributes})
+
+
+class Look:
+    """What the entities of one plugin share, until rows change.
+
+    Attributes:
+        plugin: The bound plugin.
+        author: What its author knows as `self`.
+        g: The view.
+        own: The plugin's columns.
+        mine: Body columns of the rows, as they believe them to be.
+        truth: Body columns of everybody.
+    """
+
+    def __init__(self, plugin: Any, g: GroupView) -> None:
+        self.plugin, self.author, self.g = plugin, plugin.for_one(), g
+        self.own: dict[str, Any] = plugin.__dict__
+        self.bodies = g.bodies
+        self.mine, self.truth = Columns(g), Columns(g.bodies)
+        self.search, self.draws = Search(g), Draws(g, g.n)
+        self.heard: dict[str, Any] = {}
+        _, _, id_row, id_start = g.table_bodies.layout()
+        self.id_row: Any = memoryview(id_row)  # type: ignore[arg-type]
+        self.id_start: list[int] = id_start.tolist()
+        self.everyone = [plugin.me_type(self, row, world) for row, world in enumerate(g.world.tolist())]
+
+    def begin(self, hook: str = "") -> None:
+        """A call begins."""
+        self.mine.clear()
+        self.truth.clear()
+        self.heard.clear()
+        self.search.clear()
+        self.draws.clear(hook)
+
+    def row_of(self, world: int, entity: int) -> int:
+        """Body row of an id; -1 for 0 and for who is gone."""
+        place = self.id_start[world] + entity
+        return self.id_row[place] if entity > 0 and place < self.id_start[world + 1] else -1
+
+
+def _read_only(of: Any, value: Any) -> None:
+    of._refuse(f"{of._called} is read-only")
+
+
+def _vector(name: str) -> property:
+    return property(lambda of: of._body[name][of._row], _read_only)
+
+
+def _number(name: str) -> property:
+    return property(lambda of: of._body[name].item(of._row), _read_only)
+
+
+class Entity:
+    """An entity's body, as plain values; abstract.
+
+    Attributes:
+        pos: Position [m], (3,), world frame; likewise vel [m/s], quat (w, x, y, z), omega [rad/s], force, torque, forward.
+        yaw: Heading [rad]; likewise climb, roll.
+        health: As told by who hurts; likewise radius [m], mass [kg], id, team.
+    """
+
+    __slots__ = ("_body", "_look", "_row")
+    _called: ClassVar[str] = "entity"
+    _columns: ClassVar[tuple[str, ...]] = ()
+    _body: Columns
+    _row: int
+    _look: Any
+
+    def __getattr__(self, name: str) -> Any:
+        if name in self._columns:
+            self._refuse(f"me.{name} is sent, not read: me.publish({name!r}, ...)")
+        allowed = list(dict.fromkeys((*self._columns, *BODY, *offered(type(self)))))
+        self._refuse(f"{self._called} has no {name!r}{nearest_name(name, allowed)}; {listed(allowed)}")
+
+    def _refuse(self, text: str) -> Any:
+        raise AttributeError(f"{type(self._look.plugin).__name__}: {text}")
+
+    def _body_row(self) -> int:
+        return self._row
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Entity):
+            return NotImplemented
+        return self._body_row() == other._body_row() and self._look.bodies is other._look.bodies
+
+    def __hash__(self) -> int:
+        return hash(self._body_row())
+
+
+for _name in VECTORS:
+    setattr(Entity, _name, _vector(_name))
+for _name in NUMBERS:
+    setattr(Entity, _name, _number(_name))
+
+
+def offered(cls: type) -> list[str]:
+    """What an author is offered beside columns and the body."""
+    return [n for n in dir(cls) if not n.startswith("_") and n not in BODY]
+
+
+def square_between(a: Entity, b: Entity) -> float:
+    """Squared distance [m^2], as the kernels compute it."""
+    try:
+        ax, ay, az = a._body["pos"][a._row].tolist()
+        bx, by, bz = b._body["pos"][b._row].tolist()
+    except AttributeError:
+        raise ParameterError(f"a distance is between two entities, not {a!r} and {b!r}") from None
+    x, y, z = ax - bx, ay - by, az - bz
+    return x * x + y * y + z * z  # type: ignore[no-any-return]
+
+
+class Other(Entity):
+    """Another entity, as it is: its body, and where it is from the one that sees it.
+
+    Attributes:
+        offset: From the one that sees it [m], (3,), world frame.
+        distance: Its length [m].
+    """
+
+    __slots__ = ("_by", "_id")
+    _called = "another entity"
+    _id: int
+
+    def __init__(self, by: Any, entity: int, row: int) -> None:
+        self._look, self._body, self._row = by._look, by._look.truth, row
+        self._by, self._id = by, entity
+
+    @property
+    def offset(self) -> np.ndarray:
+        by = self._by
+        return self._body["pos"][self._row] - by._body["pos"][by._row]  # type: ignore[no-any-return]
+
+    @property
+    def distance(self) -> float:
+        return math.sqrt(square_between(self, self._by))
+
+    def __repr__(self) -> str:
+        return f"<entity {self._id} of team {self._body['team'].item(self._row)}>"
+
+
+class Seeing(Entity):
+    """An entity that can ask who is near it; abstract."""
+
+    __slots__ = ()
+
+    def _other(self, entity: int, row: int) -> Any:
+        raise TypeError(f"{type(self).__name__} has no _other")
+
+    def nearest(
+        self, team: str | int | None = None, radius: float | None = None, k: int | None = None
+    ) -> Any:
+        """The nearest other entity, None when there is none; the smaller id at equal distance.
+
+        Args:
+            team: "own", "other", a team number, or None for all.
+            radius: Only who is nearer than that [m].
+            k: Give a list of the k nearest, nearest first; shorter where there are fewer.
+        """
+        if k is not None and (type(k) is not int or k < 1):
+            raise ParameterError(f"nearest: k = {k!r} is not allowed; it takes a whole number >= 1")
+        found = self._look.search.nearest(self._row, k or 1, team)
+        if k is None and radius is None:
+            return self._other(*found[0]) if found else None
+        others = [self._other(entity, row) for entity, row in found]
+        if radius is not None:
+            others = [o for o in others if radius > 0.0 and square_between(o, self) < radius * radius]
+        if k is not None:
+            return others
+        return others[0] if others else None
+
+    def near(self, radius: float, team: str | int | None = None) -> list[Other]:
+        """Other entities nearer than radius [m], nearest first; `team` as in `nearest`."""
+        return [self._other(entity, row) for entity, row in self._look.search.near(self._row, radius, team)]
+
+
+class Me(Seeing):
+    """One entity in easy mode: its plugin's columns by name, its body as it believes it to be, and its view of others.
+
+    Numbers are Python's, several are an array (k,), an `EntityRef` is an `Other` or None, a `Subscribe` a list of messages.
+    """
+
+    __slots__ = ("_own", "_seen", "_world")
+    _called = "me"
+    _writers: ClassVar[dict[str, Write]] = {}
+
+    def __init__(self, look: Look, row: int, world: int) -> None:
+        set_ = object.__setattr__
+        set_(self, "_look", look)
+        set_(self, "_body", look.mine)
+        set_(self, "_own", look.own)
+        set_(self, "_row", row)
+        set_(self, "_world", world)
+        set_(self, "_seen", {})
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        write = self._writers.get(name)
+        if write is None:
+            self._cannot_write(name, value)
+        else:
+            write(self, name, value)
+
+    def _cannot_write(self, name: str, value: Any) -> None:
+        plugin = self._look.plugin
+        column = plugin.columns.get(name)
+        if column is not None:
+            raise AttributeError(
+                f"me.{name} is read-only: it is a {type(column).__name__} of {type(plugin).__name__}"
+            )
+        if name in BODY:
+            raise AttributeError(
+                f"me.{name} is read-only: {ROLES[plugin.kind]}, its motion model moves {self._look.g.who(self._row)}"
+            )
+        if name in offered(type(self)):
+            raise AttributeError(f"me.{name} is read-only")
+        setattr(plugin, name, value)  # refused there, with the sentence on columns
+
+    # -- others -------------------------------------------------------------------------------------------------------------
+
+    def _entity(self, entity: int) -> Other | None:
+        """The entity of an id; None for 0 and for who is gone."""
+        row = self._look.row_of(self._world, entity)
+        return None if row < 0 else self._other(entity, row)
+
+    def _other(self, entity: int, row: int) -> Other:
+        found = self._seen.get(entity)
+        if found is None:
+            if len(self._seen) >= MOST_KEPT:
+                self._seen.clear()
+            found = self._seen[entity] = Other(self, entity, row)
+        return found  # type: ignore[no-any-return]
+
+    def distance(self, other: Entity) -> float:
+        """Distance to another entity [m]."""
+        return math.sqrt(square_between(other, self))
+
+    # -- time, chance, messages -----------------------------------------------------------------------------------------------
+
+    @property
+    def t(self) -> float:
+        """Time of the states that are seen [s]."""
+        return self._body["t"].item(self._row)  # type: ignore[no-any-return]
+
+    @property
+    def dt(self) -> float:
+        """Time since the plugin's last call [s]."""
+        return self._look.g.dt  # type: ignore[no-any-return]
+
+    @property
+    def step_count(self) -> int:
+        """Number of the step."""
+        return self._body["step_count"].item(self._row)  # type: ignore[no-any-return]
+
+    @property
+    def motion_state(self) -> np.ndarray:
+        """State of the entity's motion model, (m,): where a planner's rollout begins."""
+        return self._body["motion_state"][self._row]  # type: ignore[no-any-return]
+
+    @property
+    def scene(self) -> Scene:
+        """Origin, ground, boundaries."""
+        return self._look.g.scene  # type: ignore[no-any-return]
+
+    @property
+    def draw(self) -> DrawIn:
+        """Draws shapes: `me.draw.line(pos=...)`, as `g.draw`, in this entity's world."""
+        return DrawIn(self._look.g.draw, self._world)
+
+    def uniform(self, label: str = "") -> float:
+        """A draw in [0, 1), in each step the next one under its label: the same for this entity whatever else there is."""
+        return self._look.draws.next(self._row, "uniform", label)  # type: ignore[no-any-return]
+
+    random = uniform
+
+    def normal(self, label: str = "") -> float:
+        """A standard normal draw; as `uniform`."""
+        return self._look.draws.next(self._row, "normal", label)  # type: ignore[no-any-return]
+
+    def fail(self, why: str) -> None:
+        """End this entity's world with an error at the end of the step; the others go on."""
+        self._look.g.fail(self._row, why)
+
+    def _messages(self, topic: str) -> list[Heard]:
+        look = self._look
+        of_row = look.heard.get(topic)
+        if of_row is None:
+            of_row = look.heard[topic] = look.own[topic].by_row()
+        return [Heard(self, batch, i) for batch, i in of_row(self._row)]
+
+    def publish(self, topic: str, **fields: Any) -> None:
+        """Send a message to a `Publish` column; fields that refer to entities take entities."""
+        plugin = self._look.plugin
+        if not isinstance(plugin.columns.get(topic), Publish):
+            topics = [k for k, c in plugin.columns.items() if isinstance(c, Publish)]
+            raise AttributeError(
+                f"{type(plugin).__name__} publishes no {topic!r}{nearest_name(topic, topics)}; {listed(topics)}"
+            )
+        self._own[topic].publish([self._row], **plain(fields))
+
+    def _body_row(self) -> int:
+        return self._row + self._look.g.first  # type: ignore[no-any-return]
+
+    @property
+    def _id(self) -> int:
+        return self._body["id"].item(self._row)  # type: ignore[no-any-return]
+
+    def __repr__(self) -> str:
+        return f"<{self._look.g.who(self._row)}>"

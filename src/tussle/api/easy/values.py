@@ -1,0 +1,190 @@
+"""Columns as plain values: a number, an array of a few, an entity, a list of messages."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, MutableMapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tussle.columns import (
+    Children,
+    Column,
+    EntityRef,
+    Handle,
+    Numbers,
+    Output,
+    Param,
+    Publish,
+    State,
+    Subscribe,
+)
+from tussle.errors import DeclarationError, ParameterError
+
+if TYPE_CHECKING:
+    from tussle.messages import Batch
+
+VECTORS = ("pos", "vel", "quat", "omega", "force", "torque", "forward")
+NUMBERS = ("yaw", "climb", "roll", "health", "radius", "mass", "id", "team")
+BODY = (*VECTORS, *NUMBERS)
+
+Read = Callable[[Any], Any]
+Write = Callable[[Any, str, Any], None]
+
+
+def reader(name: str, column: Column) -> Read:
+    """What reads a column of an object that has `_own`, the plugin's columns, and `_row`, its place in them."""
+    if isinstance(column, EntityRef):
+        return lambda of: of._seen.get(number := of._own[name].item(of._row)) or of._entity(number)
+    if isinstance(column, Subscribe):
+        return lambda of: of._messages(name)
+    if isinstance(column, Children) or (isinstance(column, Param) and column.structural):
+        return lambda of: of._own[name]
+    if isinstance(column, Handle):
+        return lambda of: of._own[name][of._row]
+    if isinstance(column, State) and column.per == "team":
+        return lambda of: PerTeam(of._own[name][:, of._row], of._look.teams, f"{of._called}.{name}")
+    assert isinstance(column, Numbers)
+    if column.fields or is_list(column):
+        return lambda of: of._own[name][..., of._row]
+    return lambda of: of._own[name].item(of._row)
+
+
+def is_list(column: Column) -> bool:
+    """Whether it is a list per row, of any length."""
+    return isinstance(column, Numbers) and column.ragged
+
+
+def writer(name: str, column: Column) -> Write | None:
+    """What writes a column; None where it is not the plugin's to write."""
+    if isinstance(column, EntityRef):
+        return _write_reference
+    if not isinstance(column, (State, Output)) or (isinstance(column, State) and column.per == "team"):
+        return None
+    return _write_several if column.fields or is_list(column) else write_number
+
+
+def write_number(of: Any, name: str, value: Any) -> None:
+    """Write a column of one number."""
+    try:
+        of._own[name][of._row] = value
+    except (TypeError, ValueError):
+        raise _misfit(of, name, value, "a number") from None
+
+
+def _write_several(of: Any, name: str, value: Any) -> None:
+    try:
+        of._own[name][..., of._row] = value
+    except (TypeError, ValueError):
+        fields = type(of._look.plugin).columns[name].fields
+        raise _misfit(of, name, value, f"{len(fields)} numbers ({', '.join(fields)})") from None
+
+
+def _misfit(of: Any, name: str, value: Any, wanted: str) -> ParameterError:
+    shape = np.shape(value) if isinstance(value, (np.ndarray, list, tuple)) else ()
+    given = f"of shape {shape}" if shape else repr(value)
+    return ParameterError(f"{type(of._look.plugin).__name__}.{name} takes {wanted}, not {given}")
+
+
+def _write_reference(of: Any, name: str, value: Any) -> None:
+    number = 0 if value is None else getattr(value, "_id", value)
+    if type(number) is not int:
+        raise _misfit(of, name, value, "an entity or None")
+    of._own[name][of._row] = number
+
+
+def make_type(base: type, columns: Mapping[str, Column], owner: str) -> type:
+    """The type of what an author is given: `base` with a plugin's columns as attributes.
+
+    Raises:
+        DeclarationError: A column is called as something that `base` offers.
+    """
+    for name in columns:
+        if hasattr(base, name) and name not in BODY:
+            raise DeclarationError(
+                f"{owner}.{name}: {base._called}.{name} is something else in easy mode; choose another name"  # type: ignore[attr-defined]
+            )
+    own: dict[str, Any] = {
+        name: property(reader(name, column), doc=column.doc)
+        for name, column in columns.items()
+        if not isinstance(column, Publish)
+    }
+    writers = {name: write for name, column in columns.items() if (write := writer(name, column))}
+    made = {"__slots__": (), "__doc__": base.__doc__, "_columns": tuple(columns), "_writers": writers, **own}
+    return type(base.__name__, (base,), made)
+
+
+class Columns(dict[str, np.ndarray]):
+    """Body columns of a view, by row first, (n,) or (n, k); each is looked up when it is first read."""
+
+    def __init__(self, view: Any) -> None:
+        super().__init__()
+        self._view = view
+
+    def __missing__(self, name: str) -> np.ndarray:
+        column: np.ndarray = getattr(self._view, name).T
+        self[name] = column
+        return column
+
+
+class PerTeam(MutableMapping[int, Any]):
+    """A column per team in one world: team number -> number."""
+
+    def __init__(self, values: np.ndarray, teams: dict[int, int], name: str) -> None:
+        self._values, self._teams, self._name = values, teams, name
+
+    def _place(self, team: int) -> int:
+        try:
+            return self._teams[team]
+        except KeyError:
+            teams = ", ".join(map(str, self._teams))
+            raise ParameterError(f"{self._name}: there is no team {team!r}; there are: {teams}") from None
+
+    def __getitem__(self, team: int) -> Any:
+        return self._values.item(self._place(team))
+
+    def __setitem__(self, team: int, value: Any) -> None:
+        self._values[self._place(team)] = value
+
+    def __delitem__(self, team: int) -> None:
+        raise TypeError(f"{self._name} has one number for each team")
+
+    def __iter__(self) -> Iterator[int]:
+        return iter(self._teams)
+
+    def __len__(self) -> int:
+        return len(self._teams)
+
+    def __repr__(self) -> str:
+        return repr(dict(self))
+
+
+class Heard:
+    """One message: its fields as attributes, and `sender`; both it and what fields refer to are entities, or None when gone."""
+
+    __slots__ = ("_batch", "_i", "_of")
+
+    def __init__(self, of: Any, batch: Batch, i: int) -> None:
+        self._of, self._batch, self._i = of, batch, i
+
+    def __getattr__(self, name: str) -> Any:
+        batch, i = self._batch, self._i
+        if name == "sender":
+            return self._of._entity(batch.sender.item(i))
+        values = getattr(batch, name)
+        column = batch.type.fields.get(name)
+        if isinstance(column, EntityRef):
+            return self._of._entity(values.item(i))
+        if isinstance(column, Handle):
+            return values[i]
+        item = values[..., i]
+        return item if item.ndim else item.item()
+
+    def __repr__(self) -> str:
+        fields = ", ".join(f"{name}={getattr(self, name)!r}" for name in self._batch.type.fields)
+        return f"<{self._batch.type.__name__} from {self.sender!r}: {fields}>"
+
+
+def plain(fields: dict[str, Any]) -> dict[str, Any]:
+    """Fields of a message with ids in place of entities."""
+    return {name: getattr(value, "_id", value) for name, value in fields.items()}

@@ -1,0 +1,433 @@
+"""Easy mode for world plugins: one world at a time, with entities and plain numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from small_worlds import Drift, Note, Talker, block, mission
+
+from tussle import Simulation
+from tussle.api import (
+    Autonomy,
+    EasyInteraction,
+    EasyMetric,
+    Interaction,
+    Message,
+    Metric,
+    Param,
+    Publish,
+    State,
+)
+from tussle.errors import DeclarationError, PluginError
+from tussle.messages import CaptureEntity, EntityCaptured
+
+
+def referee(function, base=EasyInteraction, **columns):
+    """A world plugin that does this in its step."""
+    return type("Judge", (base,), {"step_one": function, "__module__": __name__, **columns})
+
+
+def played(*plugins, seeds=1, steps=1, blocks=(), **values):
+    """A simulation with these world plugins after some steps."""
+    kinds = {
+        "interactions": [p for p in plugins if isinstance(p, Interaction)],
+        "metrics": [p for p in plugins if isinstance(p, Metric)],
+    }
+    default = (block("a", team=1, count=2), block("b", team=2, count=2, position=(10, 0, 0)))
+    sim = Simulation(mission(*(blocks or default), **kinds, **values), seeds=seeds)
+    sim.step(steps)
+    return sim
+
+
+def failing(function, **columns):
+    with pytest.raises(PluginError) as caught:
+        played(referee(function, **columns)())
+    return str(caught.value)
+
+
+# -- what there is ----------------------------------------------------------------------------------------------------------------
+
+
+def test_a_world_is_plain_values():
+    seen = {}
+
+    def look(self, w):
+        entities = [(e.id, e.team) for e in w.entities]
+        seen[w.seed] = (
+            w.t,
+            w.dt,
+            w.step_count,
+            w.teams,
+            w.harm,
+            entities,
+            w.entity(3).id,
+            w.entity(9),
+            repr(w),
+        )
+
+    plugin = referee(look, harm=Param(0.5))
+    played(plugin(), seeds=[7, 8])
+    t, dt, step, teams, harm, entities, third, nobody, text = seen[8]
+    assert [type(v) for v in (t, dt, step, harm)] == [float, float, int, float]
+    assert (t, dt, step, teams, harm) == (0.1, 0.1, 0, [1, 2], 0.5)
+    assert (entities, third, nobody, text) == ([(1, 1), (2, 1), (3, 2), (4, 2)], 3, None, "<world 1>")
+
+
+def test_memory_is_per_world_team_and_entity():
+    def count(self, w):
+        w.calls += 1
+        w.centre = np.mean([e.pos for e in w.entities], axis=0)
+        for e in w.entities:
+            e.age = e.age + w.dt
+            w.seen[e.team] += e.id
+        assert dict(w.seen) == {1: 3 * w.calls, 2: 7 * w.calls}
+        assert len(w.seen) == 2
+
+    columns = {
+        "calls": State(dtype=int, per="world"),
+        "centre": State("x y z", per="world"),
+        "seen": State(dtype=int, per="team"),
+        "age": State(),
+    }
+    sim = played(referee(count, **columns)(), seeds=[1, 2], steps=3)
+    assert sim.read("Judge.calls")[0].tolist() == [3, 3]
+    assert sim.read("Judge.centre")[0][0] == pytest.approx([5.3, 0.0, 0.0])
+    plugin = sim.interactions[0].plugin
+    assert plugin.seen.tolist() == [[9, 9], [21, 21]]
+    assert plugin.age == pytest.approx(np.full(8, 0.3))
+
+
+def test_entities_see_each_other():
+    def look(self, w):
+        first, _, third, _ = w.entities
+        assert first.nearest(team="other") == third
+        assert [e.id for e in third.near(50.0, team=1)] == [1, 2]
+        assert third.nearest(team=1).distance == w.distance(first, third) == 10.0
+        assert third.nearest(team=1).offset.tolist() == [-10.0, 0.0, 0.0]
+        assert first.nearest(team=2, radius=10.0) is None
+        assert [e.id for e in first.nearest(k=3)] == [2, 3, 4]
+        w.looked = True
+
+    sim = played(referee(look, looked=State(dtype=bool, per="world"))(), seeds=[1, 2])
+    assert sim.read("Judge.looked")[0].all()
+
+
+# -- what it does -----------------------------------------------------------------------------------------------------------------
+
+
+class Claims(Autonomy):
+    """Claims a target."""
+
+    say = Publish(CaptureEntity)
+
+    def step(self, g):
+        self.say.publish(g.id == 1, target=3)
+
+
+class Referee(EasyInteraction):
+    """Judges captures: who claims who is nearer than that has it."""
+
+    reach = Param(20.0, unit="m")
+
+    def step_one(self, w):
+        for claim in w.inbox(CaptureEntity):
+            if claim.target and w.distance(claim.sender, claim.target) < w.reach:
+                w.kill(claim.target, "captured")
+                w.publish(
+                    EntityCaptured, source=claim.sender, target=claim.target, source_team=claim.sender.team
+                )
+
+
+class Score(EasyMetric):
+    """Captures of each team."""
+
+    captures = State(dtype=int, per="team")
+
+    def step_one(self, w):
+        for capture in w.inbox(EntityCaptured):
+            w.captures[capture.source.team] += 1
+
+    def result_one(self, w):
+        return {"score": w.captures, "total": sum(w.captures.values())}
+
+
+def test_a_referee_and_a_metric():
+    blocks = (
+        block("a", team=1, autonomy=[Drift(), Claims()]),
+        block("b", team=2, count=3, position=(10, 0, 0)),
+    )
+    sim = played(Referee(), Score(), blocks=blocks, seeds=[1, 2], steps=10)
+    assert [r.metrics["Score"] for r in sim.result()] == [{"score": {1: 1, 2: 0}, "total": 1}] * 2
+    assert [r.scores for r in sim.result()] == [{1: 1.0, 2: 0.0}] * 2
+    assert sim.read("b.pos")[1].tolist() == [[True, False, True]] * 2
+
+
+def test_entities_are_moved_hurt_pushed_and_born():
+    def act(self, w):
+        first = w.entities[0]
+        if w.step_count == 0:
+            w.move(first, pos=(0.0, 50.0, 0.0))
+            assert first.pos.tolist() == [0.0, 50.0, 0.0]
+            assert first.nearest().distance > 49.0
+            first.health -= 0.25
+            first.force = (1.0, 2.0, 3.0)
+            first.force += (1.0, 0.0, 0.0)
+            assert first.force.tolist() == [2.0, 2.0, 3.0]
+            w.spawn("b", pos=(1.0, 2.0, 3.0), team=1)
+
+    sim = played(referee(act)(), steps=2, seeds=[1, 2])
+    assert sim.read("a.pos")[0][:, 0].tolist() == [[pytest.approx(0.1), 50.0, 0.0]] * 2
+    assert sim.read("a.health")[0][:, 0].tolist() == [0.75] * 2
+    assert sim.read("b.team")[0].tolist() == [[2, 2, 1]] * 2
+
+
+def test_start_one_comes_first_and_draws_numbers_of_its_own():
+    class Lots(EasyInteraction):
+        lot = State(per="world")
+        first = State(per="world")
+        later = State(per="world")
+
+        def start_one(self, w):
+            w.lot = w.uniform()
+
+        def step_one(self, w):
+            w.first, w.later = w.uniform(), w.uniform()
+
+    class Arrays(Interaction):
+        first = State(per="world")
+        later = State(per="world")
+
+        def step(self, w):
+            self.first[:], self.later[:] = w.uniform("uniform", 2)
+
+    easy, arrays = played(Lots(name="same"), seeds=[1, 2]), played(Arrays(name="same"), seeds=[1, 2])
+    for name in ("first", "later"):
+        assert easy.read(f"same.{name}")[0].tobytes() == arrays.read(f"same.{name}")[0].tobytes()
+    numbers = np.concatenate([easy.read(f"same.{name}")[0] for name in ("lot", "first", "later")])
+    assert len(np.unique(numbers)) == 6
+
+
+def test_worlds_that_have_ended_are_not_asked_again():
+    """A referee that takes for granted that somebody is there is right as long as its world runs."""
+
+    def oldest(self, w):
+        w.calls += 1
+        assert w.entities[0].id > 0
+        if w.step_count == 3 and w.seed == 2:
+            for e in w.entities:
+                w.kill(e, "all of them")
+
+    sim = played(
+        referee(oldest, calls=State(dtype=int, per="world"))(),
+        seeds=[1, 2, 3],
+        steps=10,
+        end_conditions="time, all_dead",
+    )
+    assert sim.is_over
+    assert [r.end for r in sim.result()] == ["time", "all_dead", "time"]
+    assert sim.read("Judge.calls")[0].tolist() == [10, 4, 10]
+
+
+def test_drawings_belong_to_their_world():
+    drawn = []
+
+    def draw(self, w):
+        w.draw.sphere(pos=w.entities[0].pos, radius=1.0)
+
+    game = mission(block(), interactions=[referee(draw)()])
+    sim = Simulation(game, seeds=[1, 2])
+    sim.context.draw.sinks.append(lambda kind, attributes: drawn.append((kind, attributes["world"])))
+    sim.step()
+    assert drawn == [("sphere", 0), ("sphere", 1)]
+
+
+def test_one_without_a_step_is_left_out():
+    class AtTheEnd(EasyMetric):
+        def result_one(self, w):
+            return {"n": len(w.entities)}
+
+    sim = played(AtTheEnd())
+    assert not any("AtTheEnd" in call.label for call in sim.schedule)
+    assert sim.result()[0].metrics == {"AtTheEnd": {"n": 4}}
+
+
+# -- errors -----------------------------------------------------------------------------------------------------------------------
+
+COLUMNS = {
+    "reach": Param(1.0),
+    "n": State(dtype=int, per="world"),
+    "lost": State(dtype=int, per="team"),
+    "age": State(),
+}
+
+
+@pytest.mark.parametrize(
+    ("step", "text"),
+    [
+        (
+            lambda self, w: w.entitis,
+            "Judge: w has no 'entitis' (did you mean 'entities'?); there are: reach, n, lost",
+        ),
+        (
+            lambda self, w: w.entities[0].agee,
+            "an entity has no 'agee' (did you mean 'age'?); there are: age, pos",
+        ),
+        (
+            lambda self, w: self.reach,
+            "Judge.reach has a value of its own for each: read w.reach, not self.reach",
+        ),
+        (lambda self, w: setattr(w, "clas", 1), "clas = State(...) on the class, then w.clas = value"),
+        (lambda self, w: setattr(w, "reach", 1.0), "Judge: w.reach is read-only"),
+        (lambda self, w: setattr(w, "t", 1.0), "Judge: w.t is read-only"),
+        (
+            lambda self, w: setattr(w, "lost", 1),
+            "Judge: lost has a value per team: write w.lost[team] = value",
+        ),
+        (lambda self, w: setattr(w, "age", 1), "Judge: age has a value per entity: write entity.age = value"),
+        (lambda self, w: setattr(w, "n", "many"), "Judge.n takes a number, not 'many'"),
+        (lambda self, w: w.lost[9], "w.lost: there is no team 9; there are: 1, 2"),
+        (
+            lambda self, w: w.distance(w.entities[0], None),
+            "a distance is between two entities, not <entity 1 of team 1> and None",
+        ),
+        (lambda self, w: w.lost.pop(1), "w.lost has one number for each team"),
+        (lambda self, w: w.kill(1, "x"), "w.kill takes an entity, of w.entities or of a message, not 1"),
+        (
+            lambda self, w: setattr(w.entities[0], "pos", (0, 0, 0)),
+            "pos of an entity is read-only; pos, vel and quat change by w.move(",
+        ),
+        (
+            lambda self, w: setattr(w.entities[0], "aeg", 1),
+            "an entity's 'aeg' cannot be written (did you mean 'age'?); there are: age",
+        ),
+        (lambda self, w: w.spawn("c"), "w.spawn: there is no block 'c'"),
+        (
+            lambda self, w: w.move(w.entities[0], pos=(1.0, 2.0)),
+            "w.move: pos has shape (2, 1); needed is (3, 1)",
+        ),
+        (lambda self, w: w.publish(Note, valeu=1), "Note has no field 'valeu' (did you mean 'value'?)"),
+    ],
+)
+def test_what_goes_wrong_is_said_in_the_authors_terms(step, text):
+    assert text in failing(step, **COLUMNS)
+
+
+def test_the_world_and_the_line_that_failed_are_named():
+    def fail(self, w):
+        if w.seed == 8 and w.step_count == 2:
+            raise ValueError("not this one")
+
+    sim = Simulation(mission(block(), interactions=[referee(fail)()]), seeds=[7, 8, 9])
+    with pytest.raises(
+        PluginError, match=r"Judge, world 1, step 2: test_easy_worlds.py:\d+: ValueError: not this one"
+    ):
+        sim.step(5)
+
+
+@pytest.mark.parametrize(
+    ("result", "text"),
+    [
+        (
+            {"score": 3.0},
+            "Judge.result_one: 'score' = 3.0 is not allowed; it takes {team: number}, one for each team",
+        ),
+        ({"score": {1: 2.0}}, "Judge.result_one: 'score' says nothing of team 2"),
+        ({"lost": {1: 2.0, 2: 1.0, 3: 4.0}}, "Judge.result_one: 'lost': there is no team 3; there are: 1, 2"),
+        (
+            {"name": "red"},
+            "Judge.result_one: 'name' = 'red' is not allowed; it takes a number, or {team: number}",
+        ),
+    ],
+)
+def test_results_that_mean_nothing(result, text):
+    plugin = referee(lambda self, w: None, EasyMetric, result_one=lambda self, w: result)
+    with pytest.raises(PluginError) as caught:
+        played(plugin(), steps=10)
+    assert text in str(caught.value)
+
+
+def test_columns_that_hide_what_w_offers_are_refused():
+    with pytest.raises(DeclarationError, match=r"Judge.entities: w.entities is something else in easy mode"):
+        referee(lambda self, w: None, entities=State(per="world"))
+    with pytest.raises(
+        DeclarationError, match=r"Judge.distance: an entity.distance is something else in easy mode"
+    ):
+        referee(lambda self, w: None, distance=State())
+
+
+def test_a_published_column_is_not_read():
+    assert "w.say is sent, not read: w.publish(" in failing(lambda self, w: w.say, say=Publish(Note))
+
+
+# -- stacks -----------------------------------------------------------------------------------------------------------------------
+
+
+class Storm(EasyInteraction):
+    """Uses everything that a world number could get wrong."""
+
+    strength = Param(0.5, ge=0.0)
+    n = State(dtype=int, per="world")
+    hits = State(dtype=int)
+    by_team = State(dtype=int, per="team")
+
+    def step_one(self, w):
+        w.n += len(w.inbox(Note))
+        for e in w.entities:
+            other = e.nearest(team="other")
+            if other is not None and w.uniform("hit") < 0.2:
+                other.hits += 1
+                w.by_team[other.team] += 1
+                other.health -= 0.1 * w.strength * other.hits
+            elif w.normal() > 1.0:
+                w.move(e, pos=e.pos + 1.0)
+        if w.uniform() < 0.2:
+            w.spawn("a", pos=(w.n, 0.0, 0.0))
+
+    def result_one(self, w):
+        return {"n": w.n, "by_team": w.by_team}
+
+
+def stormy(**values):
+    common = {"variance": (200, 200, 0), "scatter_first": True, "autonomy": [Drift(), Talker()]}
+    return mission(
+        block("a", count=5, team=1, **common),
+        block("b", count=20, team=2, **common),
+        interactions=[Storm(**values)],
+        end_conditions="time",
+    )
+
+
+def results(game, seeds, params=None):
+    sim = Simulation(game, seeds=seeds, params=params)
+    return [(r.state_hash, r.metrics) for r in sim.run()]
+
+
+@pytest.mark.parametrize("values", [{}, {"rate": 5.0}])
+def test_world_k_of_a_stack_is_world_k_alone(values):
+    game = stormy(**values)
+    stacked = results(game, [3, 4, 5], {"Storm.strength": [0.1, 0.5, 2.0]})
+    assert stacked == [
+        results(game, [s], {"Storm.strength": [v]})[0] for s, v in ((3, 0.1), (4, 0.5), (5, 2.0))
+    ]
+    assert len({str(r) for r in stacked}) == 3
+    sim = Simulation(game, seeds=[3, 4, 5], params={"Storm.strength": [0.1, 0.5, 2.0]})
+    sim.step(3)
+    saved = sim.snapshot()
+    sim.reset([1])  # clocks differ, and the plugin with a rate is called for some worlds
+    sim.run()
+    assert [(r.state_hash, r.metrics) for r in sim.result()] == stacked
+    sim.restore(saved)
+    sim.run()
+    assert [(r.state_hash, r.metrics) for r in sim.result()] == stacked
+
+
+class Unused(Message):
+    """Nobody says it."""
+
+
+def test_an_empty_inbox_is_an_empty_list():
+    def look(self, w):
+        assert w.inbox(Unused) == []
+        w.looked = True
+
+    assert played(referee(look, looked=State(dtype=bool, per="world"))()).read("Judge.looked")[0].all()
