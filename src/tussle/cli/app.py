@@ -263,6 +263,9 @@ def new(
             "--from", metavar="STOCK", help="Begin with a copy of a plugin that ships.", show_default=False
         ),
     ] = None,
+    easy: Annotated[
+        bool, typer.Option("--easy", help="Write it for one entity, or one world, at a time.")
+    ] = False,
     directory: Annotated[
         Path, typer.Option("--out", metavar="DIR", help="Where the files are written.")
     ] = Path(),
@@ -275,7 +278,7 @@ def new(
         from tussle.cli.scaffold import write_plugin
 
         with compiling():
-            written = write_plugin(kind, name, origin, directory)
+            written = write_plugin(kind, name, origin, directory, easy)
         pages.show_written(written.files, written.next_steps)
 
 

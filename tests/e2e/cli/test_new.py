@@ -10,7 +10,7 @@ import pytest
 from cli_process import environment
 
 from tussle import Simulation, stock
-from tussle.cli.scaffold import KINDS, write_plugin
+from tussle.cli.scaffold import EASY_KINDS, KINDS, write_plugin
 from tussle.mission import load_plugin_file, read_mission
 
 FROM = {
@@ -19,12 +19,17 @@ FROM = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("origin", [None, *FROM.values()])
+@pytest.mark.parametrize("origin", [None, "--easy", *FROM.values()])
 def test_each_begins_with_a_plugin_that_plays_and_a_test_that_passes(tussle, folder, origin):
-    kinds = KINDS if origin is None else [k for k, name in FROM.items() if name == origin]
+    kinds = {None: KINDS, "--easy": EASY_KINDS}.get(origin) or [
+        k for k, name in FROM.items() if name == origin
+    ]
+    options = {None: (), "--easy": ("--easy",)}.get(origin, ("--from", origin))
     for kind in kinds:
         name = f"My{kind.capitalize()}"
-        done = tussle("new", kind, name, *(() if origin is None else ("--from", origin)), "--out", "mine")
+        done = tussle("new", kind, name, *options, "--out", "mine")
+        if origin == "--easy":
+            assert "_one(self" in (folder / f"mine/my_{kind}.py").read_text()
         assert f" mine/my_{kind}.py " in done.stdout
         assert f"\n tussle run mine/my_{kind}.xml --plugin-path mine/my_{kind}.py\n" in done.stdout
         played = tussle(
@@ -62,6 +67,11 @@ def test_every_plugin_that_ships_can_be_begun_with(tmp_path):
         (["autonomy", "../Mine"], "is no name of a plugin"),
         (["autonomy", "Boids"], "a plugin that ships is called 'Boids'"),
         (["autonomy", "Mine", "--from", "Boid"], "did you mean 'Boids'?"),
+        (
+            ["motion", "Mine", "--easy"],
+            "--easy does not go with the kind motion; easy ones are autonomy, controller",
+        ),
+        (["metric", "Mine", "--easy", "--from", "CPA"], "--easy does not go with --from CPA"),
         (["autonomy", "Mine", "--from", "Unicycle"], "this is of the kind motion, not autonomy"),
     ],
 )

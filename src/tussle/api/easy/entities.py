@@ -217,8 +217,9 @@ class Seeing(Entity):
 
     __slots__ = ()
 
-    def _other(self, entity: int, row: int) -> Any:
-        raise TypeError(f"{type(self).__name__} has no _other")
+    if TYPE_CHECKING:
+
+        def _other(self, entity: int, row: int) -> Any: ...
 
     def nearest(
         self, team: str | int | None = None, radius: float | None = None, k: int | None = None

@@ -49,7 +49,7 @@ class Search:
 
     def _ask(self, question: tuple[str, Any, Any], key: Any, row: int) -> Found:
         n = self._asked[key] = self._asked.get(key, 0) + 1
-        if n <= 1 + self._g.n // 32:  # few rows ask this, or it is another radius each time
+        if n <= 1 + self._g.n // 256:  # few rows ask this, or it is another radius each time
             return self._answers(*question, row, row + 1)[0]
         known = self._known[key] = self._answers(*question, 0, self._g.n)
         return known[row]

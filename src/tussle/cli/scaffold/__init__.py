@@ -17,6 +17,8 @@ from tussle.errors import MissionError, ParameterError, listed, nearest_name
 
 TEMPLATES = Path(__file__).parent / "templates"
 KINDS = ("autonomy", "motion", "controller", "sensor", "interaction", "metric", "network")
+EASY_KINDS = ("autonomy", "controller", "sensor", "interaction", "metric")
+"""Kinds that can be written for one entity or one world at a time; an autonomy from the template always is."""
 
 TEST = '''"""{name} keeps the contract of plugins, and its mission can be played."""
 
@@ -55,7 +57,7 @@ class Written:
     next_steps: str
 
 
-def write_plugin(kind: str, name: str, origin: str | None, directory: Path) -> Written:
+def write_plugin(kind: str, name: str, origin: str | None, directory: Path, is_easy: bool = False) -> Written:
     """Write NAME.py, test_NAME.py and NAME.xml.
 
     Args:
@@ -63,13 +65,19 @@ def write_plugin(kind: str, name: str, origin: str | None, directory: Path) -> W
         name: Name of the class, such as "MyBoids"; the files are called after it.
         origin: A plugin that ships, to begin with a copy of it.
         directory: Where; made if need be.
+        is_easy: Write it for one entity or one world at a time.
 
     Raises:
-        ParameterError: The kind or the plugin to copy is unknown, or the name cannot be a class's.
+        ParameterError: The kind or the plugin to copy is unknown, the name cannot be a class's, or the kind has no easy mode.
         MissionError: One of the files is there already, or cannot be written.
     """
     _check_names(kind, name)
-    source, plugin = _from_template(kind, name) if origin is None else _from_stock(kind, name, origin)
+    if is_easy and (kind not in EASY_KINDS or origin):
+        other = f"--from {origin}" if origin else f"the kind {kind}; easy ones are {', '.join(EASY_KINDS)}"
+        raise ParameterError(f"--easy does not go with {other}")
+    source, plugin = (
+        _from_template(kind, name, is_easy) if origin is None else _from_stock(kind, name, origin)
+    )
     module = re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", name).lower()
     texts = {
         directory / f"{module}.py": (source, f"the {kind}"),
@@ -99,11 +107,12 @@ def _check_names(kind: str, name: str) -> None:
         )
 
 
-def _from_template(kind: str, name: str) -> tuple[str, Plugin]:
+def _from_template(kind: str, name: str, is_easy: bool) -> tuple[str, Plugin]:
     from importlib import import_module
 
-    text = (TEMPLATES / f"{kind}.py").read_text(encoding="utf-8")
-    plugin: Plugin = import_module(f"tussle.cli.scaffold.templates.{kind}").New()
+    template = f"easy_{kind}" if is_easy and kind != "autonomy" else kind
+    text = (TEMPLATES / f"{template}.py").read_text(encoding="utf-8")
+    plugin: Plugin = import_module(f"tussle.cli.scaffold.templates.{template}").New()
     return class_renamed(text, "New", name), plugin
 
 
