@@ -161,7 +161,11 @@ def _field_values(type_: type[Message], name: str, column: Column, value: Any, n
         source = np.asarray(0 if value is None else value, dtype)
         if column.shape and source.ndim == 1:
             source = source[:, None]
-        return np.ascontiguousarray(np.broadcast_to(source, shape))
+        if source.ndim > len(shape):
+            raise ValueError
+        out = np.empty(shape, dtype)  # np.broadcast_to takes longer than all the rest of a message
+        out[...] = source
+        return out
     except ValueError:
         raise ParameterError(f"{where}: shape {np.shape(value)} does not fit {shape}") from None
 

@@ -35,12 +35,12 @@ def does(function, **columns):
     return type("Easy", (EasyAutonomy,), {"step_one": function, "__module__": __name__, **columns})
 
 
-def one_step(*plugins, n=3, others=(), **values):
+def one_step(*plugins, n=3, others=(), steps=1, **values):
     """A simulation of some entities with these plugins after one step."""
     sim = Simulation(
         mission(block(count=n, variance=(400, 400, 0), autonomy=[Drift(), *plugins]), *others, **values)
     )
-    sim.step()
+    sim.step(steps)
     return sim
 
 
@@ -306,6 +306,28 @@ def test_senders_and_references_that_are_gone_are_none():
     assert gone
     assert all(sender is None and about is None for _, sender, about in gone)
     assert all(sender == about == 2 for t, sender, about in heard if t < 0.2)
+
+
+def test_messages_are_not_changed_by_who_hears_them():
+    def talk(self, me):
+        for m in me.heard:
+            m.where[0] = 7.0
+        me.publish("say", where=(1.0, 2.0))
+
+    with pytest.raises(PluginError, match="read-only"):
+        one_step(does(talk, say=Publish(Pair), heard=Subscribe(Pair))(), steps=2)
+
+
+def test_drawings_belong_to_the_entitys_world():
+    drawn = []
+
+    def draw(self, me):
+        me.draw.vectors(pos=me.pos, direction=me.forward)
+
+    sim = Simulation(mission(block(count=2, autonomy=[Drift(), does(draw)()])), seeds=[1, 2])
+    sim.context.draw.sinks.append(lambda kind, attributes: drawn.append((kind, attributes["world"])))
+    sim.step()
+    assert drawn == [("vectors", 0)] * 2 + [("vectors", 1)] * 2
 
 
 # -- chance -----------------------------------------------------------------------------------------------------------------------

@@ -233,7 +233,9 @@ class Seeing(Entity):
         """
         if k is not None and (type(k) is not int or k < 1):
             raise ParameterError(f"nearest: k = {k!r} is not allowed; it takes a whole number >= 1")
-        found = self._look.search.nearest(self._row, k or 1, team)
+        search = self._look.search
+        known = search.known.get((k or 1, team))
+        found = known[self._row] if known else search.nearest(self._row, k or 1, team)
         if k is None and radius is None:
             return self._other(*found[0]) if found else None
         others = [self._other(entity, row) for entity, row in found]
@@ -245,7 +247,10 @@ class Seeing(Entity):
 
     def near(self, radius: float, team: str | int | None = None) -> list[Other]:
         """Other entities nearer than radius [m], nearest first; `team` as in `nearest`."""
-        return [self._other(entity, row) for entity, row in self._look.search.near(self._row, radius, team)]
+        search = self._look.search
+        known = search.known.get((radius, team, "near"))
+        found = known[self._row] if known else search.near(self._row, radius, team)
+        return [self._other(entity, row) for entity, row in found]
 
 
 class Me(Seeing):

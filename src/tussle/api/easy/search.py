@@ -21,37 +21,34 @@ class Search:
 
     The first rows that ask are answered one by one. A question that many ask is answered for all rows, in one call of the kernel;
     what it finds is the same.
+
+    Attributes:
+        known: (k, team) of `nearest`, and (radius, team, "near") of `near` -> what each row finds, as far as all have been answered.
     """
 
     def __init__(self, g: GroupView) -> None:
         self._g = g
         self._asked: dict[Any, int] = {}
-        self._known: dict[Any, list[Found]] = {}
+        self.known: dict[Any, list[Found]] = {}
 
     def clear(self) -> None:
         """Forget the answers: somebody has moved."""
         self._asked.clear()
-        self._known.clear()
+        self.known.clear()
 
     def nearest(self, row: int, k: int, team: Any) -> Found:
         """(id, body row) of the k nearest others of a row, nearest first, the smaller id first at equal distance."""
-        known = self._known.get((k, team))
-        return known[row] if known else self._ask(("nearest", k, _checked(team)), (k, team), row)
+        return self._ask(("nearest", k, _checked(team)), (k, team), row)
 
     def near(self, row: int, radius: float, team: Any) -> Found:
         """(id, body row) of the others nearer than radius [m] to a row; ordered as by `nearest`."""
-        known = self._known.get((radius, team, "near"))
-        return (
-            known[row]
-            if known
-            else self._ask(("near", float(radius), _checked(team)), (radius, team, "near"), row)
-        )
+        return self._ask(("near", float(radius), _checked(team)), (radius, team, "near"), row)
 
     def _ask(self, question: tuple[str, Any, Any], key: Any, row: int) -> Found:
         n = self._asked[key] = self._asked.get(key, 0) + 1
         if n <= 1 + self._g.n // 256:  # few rows ask this, or it is another radius each time
             return self._answers(*question, row, row + 1)[0]
-        known = self._known[key] = self._answers(*question, 0, self._g.n)
+        known = self.known[key] = self._answers(*question, 0, self._g.n)
         return known[row]
 
     def _answers(self, kind: str, limit: Any, team: Any, first: int, last: int) -> list[Found]:

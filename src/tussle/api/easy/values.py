@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tussle.api.bodies import read_only
 from tussle.columns import (
     Children,
     Column,
@@ -178,7 +179,7 @@ class Heard:
         if isinstance(column, Handle):
             return values[i]
         item = values[..., i]
-        return item if item.ndim else item.item()
+        return read_only(item) if item.ndim else item.item()
 
     def __repr__(self) -> str:
         fields = ", ".join(f"{name}={getattr(self, name)!r}" for name in self._batch.type.fields)
