@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from tussle.api.easy.search import Search
-from tussle.api.easy.values import BODY, NUMBERS, VECTORS, Columns, Heard, Write, plain
+from tussle.api.easy.values import BODY, NUMBERS, VECTORS, Cells, Columns, Heard, Write, plain, write_number
 from tussle.columns import Publish
 from tussle.errors import ParameterError, listed, nearest_name
 
@@ -81,7 +81,7 @@ class Look:
         plugin: The bound plugin.
         author: What its author knows as `self`.
         g: The view.
-        own: The plugin's columns.
+        own: The plugin's columns; `cells`, those of one number.
         mine: Body columns of the rows, as they believe them to be.
         truth: Body columns of everybody.
     """
@@ -89,6 +89,7 @@ class Look:
     def __init__(self, plugin: Any, g: GroupView) -> None:
         self.plugin, self.author, self.g = plugin, plugin.for_one(), g
         self.own: dict[str, Any] = plugin.__dict__
+        self.cells = Cells(self.own)
         self.bodies = g.bodies
         self.mine, self.truth = Columns(g), Columns(g.bodies)
         self.search, self.draws = Search(g), Draws(g, g.n)
@@ -121,7 +122,7 @@ def _vector(name: str) -> property:
 
 
 def _number(name: str) -> property:
-    return property(lambda of: of._body[name].item(of._row), _read_only)
+    return property(lambda of: of._body[name][of._row], _read_only)
 
 
 class Entity:
@@ -175,11 +176,12 @@ def offered(cls: type) -> list[str]:
 def square_between(a: Entity, b: Entity) -> float:
     """Squared distance [m^2], as the kernels compute it."""
     try:
-        ax, ay, az = a._body["pos"][a._row].tolist()
-        bx, by, bz = b._body["pos"][b._row].tolist()
+        ax, ay, az = a._body.xyz
+        bx, by, bz = b._body.xyz
     except AttributeError:
         raise ParameterError(f"a distance is between two entities, not {a!r} and {b!r}") from None
-    x, y, z = ax - bx, ay - by, az - bz
+    i, j = a._row, b._row
+    x, y, z = ax[i] - bx[j], ay[i] - by[j], az[i] - bz[j]
     return x * x + y * y + z * z  # type: ignore[no-any-return]
 
 
@@ -209,7 +211,7 @@ class Other(Entity):
         return math.sqrt(square_between(self, self._by))
 
     def __repr__(self) -> str:
-        return f"<entity {self._id} of team {self._body['team'].item(self._row)}>"
+        return f"<entity {self._id} of team {self._body['team'][self._row]}>"
 
 
 class Seeing(Entity):
@@ -259,7 +261,7 @@ class Me(Seeing):
     Numbers are Python's, several are an array (k,), an `EntityRef` is an `Other` or None, a `Subscribe` a list of messages.
     """
 
-    __slots__ = ("_own", "_seen", "_world")
+    __slots__ = ("_cells", "_own", "_seen", "_world")
     _called = "me"
     _writers: ClassVar[dict[str, Write]] = {}
 
@@ -268,12 +270,19 @@ class Me(Seeing):
         set_(self, "_look", look)
         set_(self, "_body", look.mine)
         set_(self, "_own", look.own)
+        set_(self, "_cells", look.cells)
         set_(self, "_row", row)
         set_(self, "_world", world)
         set_(self, "_seen", {})
 
     def __setattr__(self, name: str, value: Any) -> None:
         write = self._writers.get(name)
+        if write is write_number:
+            try:
+                self._cells[name][self._row] = value  # as `write_number` does, without a call
+                return
+            except (TypeError, ValueError):
+                pass
         if write is None:
             self._cannot_write(name, value)
         else:
@@ -318,7 +327,7 @@ class Me(Seeing):
     @property
     def t(self) -> float:
         """Time of the states that are seen [s]."""
-        return self._body["t"].item(self._row)  # type: ignore[no-any-return]
+        return self._body["t"][self._row]  # type: ignore[no-any-return]
 
     @property
     def dt(self) -> float:
@@ -328,7 +337,7 @@ class Me(Seeing):
     @property
     def step_count(self) -> int:
         """Number of the step."""
-        return self._body["step_count"].item(self._row)  # type: ignore[no-any-return]
+        return self._body["step_count"][self._row]  # type: ignore[no-any-return]
 
     @property
     def motion_state(self) -> np.ndarray:
@@ -381,7 +390,7 @@ class Me(Seeing):
 
     @property
     def _id(self) -> int:
-        return self._body["id"].item(self._row)  # type: ignore[no-any-return]
+        return self._body["id"][self._row]  # type: ignore[no-any-return]
 
     def __repr__(self) -> str:
         return f"<{self._look.g.who(self._row)}>"

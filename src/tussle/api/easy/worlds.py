@@ -9,7 +9,7 @@ import numpy as np
 
 from tussle.api.easy.entities import DrawIn, Draws, Entity, Other, Seeing, offered, square_between
 from tussle.api.easy.search import Search
-from tussle.api.easy.values import BODY, Columns, Heard, Write, make_type, plain
+from tussle.api.easy.values import BODY, Cells, Columns, Heard, Write, make_type, plain
 from tussle.columns import Column, State
 from tussle.errors import ParameterError, listed, nearest_name
 
@@ -36,6 +36,7 @@ class WorldLook:
     def __init__(self, plugin: Any, w: WorldView, hook: str) -> None:
         self.plugin, self.author, self.g = plugin, plugin.for_one(), w
         self.own: dict[str, Any] = plugin.__dict__
+        self.cells = Cells(self.own)
         self.bodies = w.bodies
         self.truth = Columns(w.bodies)
         self.teams = {team: place for place, team in enumerate(w.teams.tolist())}
@@ -70,6 +71,10 @@ class Member(Seeing, Other):
     def _own(self) -> dict[str, Any]:
         return self._look.own  # type: ignore[no-any-return]
 
+    @property
+    def _cells(self) -> Cells:
+        return self._look.cells  # type: ignore[no-any-return]
+
     def __setattr__(self, name: str, value: Any) -> None:
         write = self._writers.get(name)
         if write is not None:
@@ -96,7 +101,7 @@ class OneWorld:
     Numbers are Python's, several are an array (k,); a column per team is read and written by team number: `w.lost[2] += 1`.
     """
 
-    __slots__ = ("_look", "_members", "_own", "_row")
+    __slots__ = ("_cells", "_look", "_members", "_own", "_row")
     _called: ClassVar[str] = "w"
     _columns: ClassVar[tuple[str, ...]] = ()
     _writers: ClassVar[dict[str, Write]] = {}
@@ -107,6 +112,7 @@ class OneWorld:
         set_ = object.__setattr__
         set_(self, "_look", look)
         set_(self, "_own", look.own)
+        set_(self, "_cells", look.cells)
         set_(self, "_row", world)
         set_(self, "_members", None)
 
@@ -141,11 +147,8 @@ class OneWorld:
             look, (rows, start, _, _) = self._look, self._look.g.table_bodies.layout()
             mine = rows[start[self._row] : start[self._row + 1]].tolist()
             member = look.plugin.world_types[1]
-            object.__setattr__(
-                self,
-                "_members",
-                [member(look, i, r) for i, r in zip(look.truth["id"][mine].tolist(), mine, strict=True)],
-            )
+            ids = look.truth["id"]
+            object.__setattr__(self, "_members", [member(look, ids[row], row) for row in mine])
         return list(self._members)
 
     def entity(self, number: int) -> Member | None:
