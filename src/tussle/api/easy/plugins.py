@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from tussle.api.easy.entities import Look, Me
+from tussle.api.easy.entities import Me
+from tussle.api.easy.looks import Look
 from tussle.api.easy.values import make_type
 from tussle.api.easy.worlds import WorldLook, make_world_types
 from tussle.api.kinds import Autonomy, Controller, EntityPlugin, Interaction, Metric, Sensor, WorldPlugin
@@ -26,7 +27,7 @@ class EasyPlugin(Plugin):
     writes_as: ClassVar[str]
     """What the author writes in place of `self` for a column."""
 
-    def for_one(self) -> Any:
+    def _for_one(self) -> Any:
         """What the author knows as `self`: the plugin without its arrays, which are of all entities and all worlds."""
         author = object.__new__(type(self))
         own = {k: v for k, v in self.__dict__.items() if k not in type(self).columns}

@@ -25,8 +25,25 @@ from tussle.errors import DeclarationError, ParameterError
 if TYPE_CHECKING:
     from tussle.messages import Batch
 
-VECTORS = ("pos", "vel", "quat", "omega", "force", "torque", "forward")
-NUMBERS = ("yaw", "climb", "roll", "health", "radius", "mass", "id", "team")
+VECTORS = {
+    "pos": "Position [m], (3,), world frame.",
+    "vel": "Velocity [m/s], (3,), world frame.",
+    "quat": "Attitude (w, x, y, z), (4,).",
+    "omega": "Angular velocity [rad/s], (3,).",
+    "force": "Force of interactions [N], (3,), world frame.",
+    "torque": "Torque of interactions [N m], (3,).",
+    "forward": "Unit vector along the body x axis, (3,), world frame.",
+}
+NUMBERS = {
+    "yaw": "Heading, counter-clockwise from East [rad].",
+    "climb": "Elevation of the nose, up positive [rad].",
+    "roll": "Bank, right wing down positive [rad].",
+    "health": "Who has none left is removed.",
+    "radius": "Size [m].",
+    "mass": "[kg].",
+    "id": "Number of the entity in its world.",
+    "team": "Number of its team.",
+}
 BODY = (*VECTORS, *NUMBERS)
 
 Read = Callable[[Any], Any]

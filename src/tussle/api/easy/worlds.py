@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from tussle.api.easy.entities import DrawIn, Draws, Entity, Other, Seeing, offered, square_between
+from tussle.api.easy.entities import Entity, Other, Seeing, offered, square_between
+from tussle.api.easy.looks import DrawIn, Draws
 from tussle.api.easy.search import Search
 from tussle.api.easy.values import BODY, Cells, Columns, Heard, Write, make_type, plain
 from tussle.columns import Column, State
@@ -34,7 +35,7 @@ class WorldLook:
     """
 
     def __init__(self, plugin: Any, w: WorldView, hook: str) -> None:
-        self.plugin, self.author, self.g = plugin, plugin.for_one(), w
+        self.plugin, self.author, self.g = plugin, plugin._for_one(), w
         self.own: dict[str, Any] = plugin.__dict__
         self.cells = Cells(self.own)
         self.bodies = w.bodies
