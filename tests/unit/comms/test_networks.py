@@ -244,7 +244,10 @@ def test_topic_and_network_can_be_parameters():
         still("b", Listener(topic="Loud"), Listener(topic="Quiet", network="other", name="Nothing")),
         networks=[GlobalNetwork(name="other")],
     )
-    sim = alone(game, 1)
+    with pytest.warns(
+        RuntimeWarning, match="'Quiet' is published on network 'GlobalNetwork' and listened to on 'other'"
+    ):
+        sim = alone(game, 1)
     assert heard(sim, "b.Listener").tolist() == [[9]]
     assert heard(sim, "b.Nothing").tolist() == [[0]]
 
