@@ -591,12 +591,6 @@ class WritesWrongColumn(Metric):
         w.bodies.health[:] = 2.0
 
 
-class SaysIdle(SoundMetric):
-    """Says that it has nothing to do, and has."""
-
-    is_idle = True
-
-
 class NanAtBound(SoundAutonomy):
     """Divides by what may be zero."""
 
@@ -915,7 +909,6 @@ BROKEN = {
     ],
     "memory in columns": [HidesAttribute, ChangesClass, EasyHides],
     "own columns": [WritesAroundView, WritesParameter, WritesWrongColumn, EasyHurts],
-    "idle": [SaysIdle],
     "finite": [NanAtBound, NanInReferee, RaisesAtBound, EasyNan],
     "rollout": [RolloutOfItsOwn],
     "velocity": [NoVelocity, VelocityOfBody, VelocityOfCommand, WrongRate, ForgetsClimb],

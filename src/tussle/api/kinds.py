@@ -69,11 +69,6 @@ class WorldPlugin(Plugin):
     def step(self, w: WorldView) -> None:
         """One step of all worlds."""
 
-    @property
-    def is_idle(self) -> bool:
-        """Nothing to do in any step, so the schedule leaves it out."""
-        return type(self).step is WorldPlugin.step
-
     def result(self, w: WorldView) -> dict[str, np.ndarray]:
         """Values to report: name -> (n_worlds,) or (n_teams, n_worlds)."""
         return {}

@@ -194,7 +194,7 @@ def own_columns(cls: Any) -> dict[str, str]:
     for part, (name, place) in BODY.items():
         column = f"g.column({name!r})" if name in DERIVED else f"g.{name}"
         found[part] = column if part == name else f"{column}[{place}]"
-    is_world = hasattr(cls, "is_idle")  # a world plugin; its class is above this module
+    is_world = hasattr(cls, "start")  # a world plugin; its class is above this module
     for name, declared in cls.declared(Numbers).items():
         per = getattr(declared, "per", "world" if is_world else "entity")
         if declared.ragged or per == "team" or (isinstance(declared, Param) and not declared.is_row_data):

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tussle.api.kinds import WorldPlugin
 from tussle.api.plugin import Plugin
 from tussle.columns import Subscribe
 from tussle.engine import failure
@@ -63,10 +64,10 @@ class Schedule:
                 calls.append(self._entity_call("sensor", group, binding))
         if sim.interactions:
             calls.append(Call("forces back to zero: they have acted", self._clear_forces))
-        calls += [self._world_call("interaction", r) for r in sim.interactions if not r.plugin.is_idle]
+        calls += [self._world_call("interaction", r) for r in sim.interactions if steps(r)]
         if sim.interactions:
             calls.append(Call("take over what was moved", sim.take_over_moves))
-        calls += [self._world_call("metric", r) for r in sim.metrics if not r.plugin.is_idle]
+        calls += [self._world_call("metric", r) for r in sim.metrics if steps(r)]
         if sim.events:
             calls.append(Call("tell of captures and collisions", sim.events.messages))
         calls.append(
@@ -222,6 +223,11 @@ class Schedule:
         part = f" ({substep + 1}/{m})" if kind == "controller" and m > 1 else ""
         place = f" {group.place}" if self.sim.mission.update == "sequential" else ""
         return f"{kind:<12} {group.name}{place}: {binding.spec.instance_name}{_rate_text(binding.spec)}{part}"
+
+
+def steps(referee: Referee) -> bool:
+    """Whether a world plugin has anything to do in a step."""
+    return type(referee.plugin).step is not WorldPlugin.step
 
 
 def _rate_text(plugin: Any) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from tussle.api import MotionModel, Plugin, WorldPlugin
+from tussle.api import MotionModel, Plugin
 from tussle.errors import ConformanceError, TussleError, WiringError
 from tussle.testing.declarations import check_declarations
 from tussle.testing.game import build
@@ -14,7 +14,7 @@ from tussle.testing.limits import check_limits
 from tussle.testing.motion import check_motion
 from tussle.testing.stacks import check_reset, check_snapshot, check_stacks
 from tussle.testing.traces import Traces
-from tussle.testing.watch import check_calls, check_class_values, check_idle, class_values
+from tussle.testing.watch import check_calls, check_class_values, class_values
 
 
 def check_plugin(cls: type[Plugin], *, companions: Sequence[Any] | None = None, **params: Any) -> None:
@@ -79,8 +79,6 @@ def check_plugin(cls: type[Plugin], *, companions: Sequence[Any] | None = None, 
 def _play(plugin: Plugin, companions: Sequence[Any], is_first: bool) -> None:
     game = build(plugin, companions)
     check_calls(game)
-    if isinstance(plugin, WorldPlugin):
-        check_idle(game)
     if type(plugin).grade != "external":
         if isinstance(plugin, MotionModel):
             check_motion(game, is_first)

@@ -18,7 +18,6 @@ from tussle.errors import ConformanceError
 from tussle.testing.declarations import MACHINERY, own_classes
 from tussle.testing.game import SEEDS, STEPS, Game
 from tussle.testing.lines import BODY_ROWS, Key, keys_of, lines_of
-from tussle.testing.traces import columns_of, first_difference
 
 MEMORY = "memory in columns"
 BOUND = frozenset({"_values", "instance_name", "rate", "is_bound", "is_for_one", "wired", "_look"})
@@ -49,27 +48,6 @@ def check_calls(game: Game) -> None:
             if extra:
                 text = f"{extra[0]} is held by the plugin object, which serves all entities; declare a State"
                 raise ConformanceError(cls.__name__, MEMORY, text)
-
-
-def check_idle(game: Game) -> None:
-    """A world plugin that says `is_idle` has a step that does nothing: the schedule leaves it out.
-
-    Raises:
-        ConformanceError: It does something.
-    """
-    cls = type(game.plugin)
-    with game.play(SEEDS[:1]) as sim:
-        sim.step(3)
-        for referee in sim.referees:
-            if type(referee.spec) is cls and referee.plugin.is_idle:
-                view = sim.world_view
-                before, asked = columns_of(sim, 0), [len(x) for x in (view.deaths, view.moved, view.births)]
-                view.caller = referee.plugin
-                referee.plugin.step(view)
-                difference = first_difference(before, columns_of(sim, 0))
-                if difference or asked != [len(x) for x in (view.deaths, view.moved, view.births)]:
-                    text = f"it says is_idle, but its step does something: {difference or 'it kills, moves or spawns'}"
-                    raise ConformanceError(cls.__name__, "idle", text)
 
 
 def class_values(cls: type[Plugin]) -> dict[str, Any]:

@@ -131,10 +131,6 @@ class EasyWorldPlugin(EasyPlugin, WorldPlugin):
         """Values to report of one world: name -> a number, or {team: number}."""
         return {}
 
-    @property
-    def is_idle(self) -> bool:
-        return type(self).step_one is EasyWorldPlugin.step_one
-
     def _each(self, w: WorldView, hook: str, worlds: Iterable[int]) -> None:
         look = WorldLook(self, w, "" if hook == "step_one" else f"{hook} ")
         call = getattr(look.author, hook)
@@ -150,7 +146,8 @@ class EasyWorldPlugin(EasyPlugin, WorldPlugin):
             self._each(w, "start_one", w.spoken_for())
 
     def step(self, w: WorldView) -> None:
-        self._each(w, "step_one", w.spoken_for())
+        if type(self).step_one is not EasyWorldPlugin.step_one:
+            self._each(w, "step_one", w.spoken_for())
 
     def result_of(self, w: WorldView, world: int) -> dict[str, Any]:
         look = WorldLook(self, w, "result_one ")

@@ -26,13 +26,9 @@ class SimpleCollision(Interaction):
     def start(self, w: WorldView) -> None:
         self._collide(w)
 
-    @property
-    def is_idle(self) -> bool:
-        """With startup_collisions_only it looks at the start alone."""
-        return bool(self.startup_collisions_only)
-
     def step(self, w: WorldView) -> None:
-        self._collide(w)
+        if not self.startup_collisions_only:
+            self._collide(w)
 
     @neighbors("collision_range", first="each", second="each", first_team="each", second_team="each")
     @staticmethod
