@@ -11,6 +11,11 @@ settings.register_profile("untimed", deadline=None, suppress_health_check=[Healt
 settings.load_profile("untimed")
 
 
+def pytest_xdist_auto_num_workers() -> int:
+    """Two a core: many tests wait for programs that they start."""
+    return 2 * (os.cpu_count() or 1)
+
+
 @pytest.fixture(scope="session", autouse=True)
 def _own_state(tmp_path_factory):
     """Tests leave nothing in the state folder of who runs them."""

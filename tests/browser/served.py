@@ -15,7 +15,12 @@ from playwright.sync_api import Page as Tab
 from tussle.view.page.server import Page
 
 # viser's page says these where everything is well: a note to its authors, and what drawing without a graphics card is.
-HARMLESS = ("THREE.Clock: This module has been deprecated", "GPU stall due to ReadPixels", "Software WebGL")
+HARMLESS = (
+    "THREE.Clock: This module has been deprecated",
+    "GPU stall due to ReadPixels",
+    "Software WebGL",
+    "GL_INVALID_OPERATION: glDrawElementsInstanced",  # of the software renderer, for one frame in very many games
+)
 SMALL = {"width": 820, "height": 520}
 UNHURRIED = {"gui_update_period": "300"}
 """Time between frames [ms]: each takes a browser without a graphics card about as long, and it looks after the panel in between."""
