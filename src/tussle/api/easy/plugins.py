@@ -120,6 +120,8 @@ class EasyWorldPlugin(EasyPlugin, WorldPlugin):
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
         cls.world_types = make_world_types(cls.columns, cls.__name__)
+        if cls.step_one is not EasyWorldPlugin.step_one:  # the schedule leaves out who has no step
+            cls.step = cls._step_each  # type: ignore[assignment, method-assign]
 
     def start_one(self, w: Any) -> None:
         """Called once for a world that begins, after its first entities are placed."""
@@ -145,9 +147,8 @@ class EasyWorldPlugin(EasyPlugin, WorldPlugin):
         if type(self).start_one is not EasyWorldPlugin.start_one:
             self._each(w, "start_one", w.spoken_for())
 
-    def step(self, w: WorldView) -> None:
-        if type(self).step_one is not EasyWorldPlugin.step_one:
-            self._each(w, "step_one", w.spoken_for())
+    def _step_each(self, w: WorldView) -> None:
+        self._each(w, "step_one", w.spoken_for())
 
     def result_of(self, w: WorldView, world: int) -> dict[str, Any]:
         look = WorldLook(self, w, "result_one ")
