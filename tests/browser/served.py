@@ -19,7 +19,7 @@ HARMLESS = (
     "THREE.Clock: This module has been deprecated",
     "GPU stall due to ReadPixels",
     "Software WebGL",
-    "GL_INVALID_OPERATION: glDrawElementsInstanced",  # of the software renderer, for one frame in very many games
+    "GL_INVALID_OPERATION: glDrawElementsInstanced",  # of the software renderer; seen once
 )
 SMALL = {"width": 820, "height": 520}
 UNHURRIED = {"gui_update_period": "300"}

@@ -182,8 +182,11 @@ class Population:
         if kernels.stays(source, 0, old.n):
             fresh = np.flatnonzero(source < 0)
             old.floats[:, fresh] = new.floats[:, -1 - source[fresh]]
-            old.ints[:, fresh] = new.ints[:, -1 - source[fresh]]
-            old.replace(old.floats, old.ints)
+            ints = (
+                old.ints.copy()
+            )  # who has seen the old ones, as a recorder, knows by it that others have come
+            ints[:, fresh] = new.ints[:, -1 - source[fresh]]
+            old.replace(old.floats, ints)
             return
         floats, ints = (
             np.empty((len(old.floats), len(source))),
