@@ -67,6 +67,7 @@ class Bodies:
         n: Number of rows.
         pos: Position [m], (3, n), world frame; likewise vel [m/s], quat (w, x, y, z), omega [rad/s], force [N], torque [N m],
             health, radius [m], mass [kg], and id, team, world, block, place_in_block.
+        loads: Forces and torques, (6, n).
         born: Step of its world in which each entity was born, (n,); 0 for those that are there from the start.
     """
 
@@ -108,6 +109,7 @@ class Bodies:
         for name, k in FLOATS.items():
             first = OFFSETS[name]
             own[name] = floats[first : first + k] if k > 1 else floats[first]
+        self.loads = floats[OFFSETS["force"] : OFFSETS["torque"] + 3]
         for i, name in enumerate(STORED_INTS):
             own[name] = ints[i]
         self.version = self._oldest = 0

@@ -67,6 +67,7 @@ class GroupView:
         self._seen.clear()
         self._bodies = bodies
         self._derived: dict[str, Kept] = {}
+        self._components: dict[str, tuple[np.ndarray, ...]] = {}
         self.first, self.last = first, last
         self.n = last - first
         self._reaches: dict[int, tuple[np.ndarray, float | np.ndarray]] = {}
@@ -106,6 +107,13 @@ class GroupView:
     def column(self, name: str) -> np.ndarray:
         """A body column or what is derived from it, by name: what the entity believes, where it believes something."""
         return self._derive(name) if name in DERIVED else getattr(self, name)
+
+    def components(self, name: str) -> tuple[np.ndarray, ...]:
+        """Components of a column such as pos, each (n,); for kernels."""
+        known = self._components.get(name)
+        if known is None:
+            known = self._components[name] = tuple(getattr(self, name))
+        return known
 
     @property
     def yaw(self) -> np.ndarray:
@@ -154,7 +162,10 @@ class GroupView:
 
     def split(self, run: Callable[[int, int], Any]) -> None:
         """Call run(first, last) over the rows, in as many threads as the simulation has where there are enough rows; for kernels."""
-        self.context.split(self.n, run, ROWS_PER_THREAD)
+        if self.context.threads == 1:
+            run(0, self.n)
+        else:
+            self.context.split(self.n, run, ROWS_PER_THREAD)
 
     def begin(self) -> None:
         """At the beginning of a step, as if nothing had been called yet: what hooks of newborn rows see."""

@@ -115,14 +115,15 @@ class NeighborLaw:
         self._plans: dict[type, Plan] = {}
 
     def __get__(self, plugin: Any, owner: type) -> Any:
-        return self if plugin is None else partial(self.contributions, plugin)
+        if plugin is None:
+            return self
+        plan = self._plans.get(owner)
+        return partial(plan.walk if plan else self.first_walk, plugin)
 
-    def contributions(self, plugin: Any, g: GroupView) -> Contributions:
-        """What the neighbours of each row contribute."""
-        plan = self._plans.get(type(plugin))
-        if plan is None:
-            plan = self._plans[type(plugin)] = make_plan(g, plugin, self.laws, self.where)
-        return plan.walk(g, plugin, self.names)
+    def first_walk(self, plugin: Any, g: GroupView) -> Contributions:
+        """What the neighbours of each row contribute; from then on the plan is known."""
+        plan = self._plans[type(plugin)] = make_plan(g, plugin, self)
+        return plan.walk(plugin, g)
 
     def check(self, cls: type, name: str) -> None:
         """Refuse a law whose arguments mean nothing to a plugin.
@@ -217,19 +218,19 @@ class Plan:
 
     Attributes:
         run: The walk's kernel.
-        n_out: Number of contributions.
+        names: Names of the contributions.
         columns: Gives, of a view and a plugin's attributes, how far to look [m] and the columns by row.
         other: Its columns by place: of the body table, and which components.
         lists: It gives one value for each pair, instead of one for each row.
     """
 
     run: Kernel
-    n_out: int
+    names: tuple[str, ...]
     columns: Callable[[GroupView, dict[str, Any]], tuple[Any, tuple[np.ndarray, ...]]]
     other: tuple[tuple[str, tuple[int, ...]], ...]
     lists: bool
 
-    def walk(self, g: GroupView, plugin: Any, names: tuple[str, ...]) -> Contributions:
+    def walk(self, plugin: Any, g: GroupView) -> Contributions:
         """What the neighbours of each row contribute."""
         reach, own = self.columns(g, plugin.__dict__)
         index = g.index(reach)
@@ -239,21 +240,17 @@ class Plan:
         for name, places in self.other:
             columns = g.by_place(index, name)
             others += columns if len(columns) == len(places) else tuple([columns[place] for place in places])
-        run, first, most = self.run, g.first, blocks.most
+        arrays = longs, points, others, own
         if self.lists:
-            return self.listed(
-                g, names, blocks.n_blocks, lambda *last: run(longs, points, others, own, *last, most)
-            )
-        out = np.empty((self.n_out, g.n))
+            return self.listed(g, blocks.n_blocks, lambda *last: self.run(*arrays, *last, blocks.most))
+        out = np.empty((len(self.names), g.n))
         if g.context.threads == 1:
-            run(longs, points, others, own, out, first, (0, blocks.n_blocks), most)
+            self.run(*arrays, out, g.first, (0, blocks.n_blocks), blocks.most)
         else:
-            g.context.split(
-                blocks.n_blocks, lambda *part: run(longs, points, others, own, out, first, part, most)
-            )
-        return Contributions(names, out)
+            g.context.split(blocks.n_blocks, lambda *part: self.run(*arrays, out, g.first, part, blocks.most))
+        return Contributions(self.names, out)
 
-    def listed(self, g: GroupView, names: tuple[str, ...], n_blocks: int, run: Callable[..., int]) -> Listed:
+    def listed(self, g: GroupView, n_blocks: int, run: Callable[..., int]) -> Listed:
         """What each pair contributes."""
         made: list[tuple[np.ndarray, np.ndarray]] = []
 
@@ -261,7 +258,7 @@ class Plan:
             room, n = -1, 8 * (end - begin)
             while n > room:  # again, where there are more pairs than there was room for
                 room = n
-                pairs, values = np.empty((2, room), np.int64), np.empty((self.n_out, room))
+                pairs, values = np.empty((2, room), np.int64), np.empty((len(self.names), room))
                 n = run((pairs, values), g.first, (begin, end))
             made.append((pairs[:, :n], values[:, :n]))
 
@@ -272,18 +269,21 @@ class Plan:
         pairs, values = (np.concatenate(arrays, axis=1) for arrays in zip(*made, strict=True))
         order = np.argsort(pairs[0], kind="stable")
         row, other = np.take(pairs, order, axis=1)
-        return Listed(names, np.take(values, order, axis=1), row, other)
+        return Listed(self.names, np.take(values, order, axis=1), row, other)
 
 
-def make_plan(g: GroupView, plugin: Any, laws: tuple[Law, ...], where: Law | None) -> Plan:
-    """The plan for the laws of a plugin; g and plugin show of which types the columns are."""
+def make_plan(g: GroupView, plugin: Any, declared: NeighborLaw) -> Plan:
+    """The plan for what a plugin declares; g and plugin show of which types the columns are."""
     cls: Any = type(plugin)
+    laws = declared.laws
     columns, scope = own_columns(cls), {"np": np}
 
     def evaluated(text: str) -> Any:
         return eval(f"lambda g, own: {text}", scope)  # noqa: S307 - made of declared names
 
-    made = make_walk(laws, where, lambda name: CODES[evaluated(columns[name])(g, plugin.__dict__).dtype.kind])
+    made = make_walk(
+        laws, declared.where, lambda name: CODES[evaluated(columns[name])(g, plugin.__dict__).dtype.kind]
+    )
     common = set.intersection(*[set(law.radii) for law in laws])
     radii = [min(common, key=str)] if common else list(dict.fromkeys(law.radii[0] for law in laws))
     reach = [
@@ -296,5 +296,5 @@ def make_plan(g: GroupView, plugin: Any, laws: tuple[Law, ...], where: Law | Non
         other[name] = (*other.get(name, ()), place)
     by_row = "".join(f"{columns[name]}, " for name in made.own)
     return Plan(
-        made.run, made.n_out, evaluated(f"({farthest}, ({by_row}))"), tuple(other.items()), laws[0].lists
+        made.run, declared.names, evaluated(f"({farthest}, ({by_row}))"), tuple(other.items()), laws[0].lists
     )

@@ -77,9 +77,7 @@ class Schedule:
         return calls
 
     def _clear_forces(self) -> None:
-        bodies = self.sim.population.bodies
-        bodies.force[:] = 0.0
-        bodies.torque[:] = 0.0
+        self.sim.population.bodies.loads.fill(0.0)
 
     def _motion(self, groups: list[Group]) -> list[Call]:
         sim = self.sim
@@ -203,17 +201,20 @@ class Schedule:
             except Exception as error:
                 raise failure.in_call(error, some.plugin, w, None) from error
 
+        label = f"{kind:<12} {referee.spec.instance_name}{_rate_text(referee.spec)}"
+        if cadence is None:
+            return Call(label, lambda: call(referee, referee.view, dt))
+
         def call_part(dt: float) -> Callable[[Referee, Any], None]:
             return lambda some, w: call(some, w, dt)
 
         def run() -> None:
-            for since, worlds in [(1, None)] if cadence is None else self._due(cadence):
+            for since, worlds in self._due(cadence):
                 if worlds is None:
                     call(referee, referee.view, since * dt)
                 else:
                     call_referee(sim.population, referee, worlds, call_part(since * dt))
 
-        label = f"{kind:<12} {referee.spec.instance_name}{_rate_text(referee.spec)}"
         return Call(label, run)
 
     # -- words ------------------------------------------------------------------------------------------------------------

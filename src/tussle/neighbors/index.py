@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -25,7 +24,7 @@ SPARSE_WORLD = 400
 """Below this many entities one cell per reach is faster: fuller blocks (1.0 against 1.3 us per entity at 110, even at 500)."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Blocks:
     """Query rows in groups of up to LANES that stand close together, each with the runs of places where its neighbours are.
 
@@ -164,15 +163,13 @@ class Index:
         pos, worlds, work = (x, y, z), (self.world_start, self.members), (self._keys, self._scratch)
         n, cells, strips = len(self.order), self.inverse_cell, (self._strips, self._world_strip)
 
-        def run(phases: int, begin: int, end: int) -> None:
-            kernels.build(pos, cells, worlds, work, self._placed, self.points, strips, (phases, begin, end))
-
+        arrays = pos, cells, worlds, work, self._placed, self.points, strips
         if split is None:
-            run(kernels.KEYS + kernels.SORT + kernels.PLACES, 0, n)
+            kernels.build(*arrays, (kernels.KEYS + kernels.SORT + kernels.PLACES, 0, n))
         else:  # rows lie anywhere in memory: what takes time is to fetch them
-            split(n, partial(run, kernels.KEYS))
-            run(kernels.SORT, 0, n)
-            split(n, partial(run, kernels.PLACES))
+            split(n, lambda *part: kernels.build(*arrays, (kernels.KEYS, *part)))
+            kernels.build(*arrays, (kernels.SORT, 0, n))
+            split(n, lambda *part: kernels.build(*arrays, (kernels.PLACES, *part)))
 
     def update(self, rows: Longs, x: Floats, y: Floats, z: Floats) -> None:
         """Rows (n,) moved to x, y, z (n,) [m] and keep their places; only where their world's reach is infinite."""

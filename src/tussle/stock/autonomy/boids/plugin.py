@@ -139,7 +139,7 @@ class Boids(Autonomy):
 
     def step(self, g: GroupView) -> None:
         wanted = np.empty((3, g.n))
-        pos = _, _, z = tuple(g.pos)
+        pos = g.components("pos")
         sees_all = kernels.sees_all(self.fov_az, self.fov_el)
         if self.means == "historic":
             seen = (self.historic if sees_all else self.historic_in_view)(g).values
@@ -160,5 +160,10 @@ class Boids(Autonomy):
             kernels.velocity(wanted, self.max_speed, self.velocity)
         if "desired_heading" in wired or "desired_altitude" in wired or "desired_speed" in wired:
             kernels.desired(
-                wanted, z, self.max_speed, self.desired_heading, self.desired_speed, self.desired_altitude
+                wanted,
+                pos[2],
+                self.max_speed,
+                self.desired_heading,
+                self.desired_speed,
+                self.desired_altitude,
             )

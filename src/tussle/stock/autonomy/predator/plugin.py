@@ -34,7 +34,7 @@ class Predator(Autonomy):
         index = g.any_index()
         bodies = g.bodies
         _, _, id_row, id_start = g.table_bodies.layout()
-        pos = x, y, z = tuple(g.pos)
+        pos = x, y, z = g.components("pos")
         rows = bodies.id, index.row_world, index.place, id_row, id_start, index.order
         table = (*index.table, g.by_place(index, "team")[0])
         target_row = np.empty(g.n, np.int64)
@@ -50,7 +50,7 @@ class Predator(Autonomy):
             )  # fmt: skip
         if not self.wired.isdisjoint(("speed", "turn_rate", "pitch_rate")):
             commands = self.speed, self.turn_rate, self.pitch_rate
-            kernels.pursue(pos, tuple(g.quat), self.max_speed, target_row, bodies.pos, commands)
+            kernels.pursue(pos, g.components("quat"), self.max_speed, target_row, bodies.pos, commands)
         if not self.wired.isdisjoint(("desired_heading", "desired_speed")):
             kernels.point(
                 x, y, self.max_speed, target_row, bodies.pos, self.desired_heading, self.desired_speed

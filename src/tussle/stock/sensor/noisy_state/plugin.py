@@ -42,7 +42,7 @@ class NoisyState(Sensor):
     def step(self, g: GroupView) -> None:
         """A new belief for all rows."""
         kernels.blur(
-            (*g.pos, *g.vel, *g.quat), (self.pos_noise_0, self.pos_noise_1, self.pos_noise_2),
+            (*g.components("pos"), *g.components("vel"), *g.components("quat")), (self.pos_noise_0, self.pos_noise_1, self.pos_noise_2),
             (self.vel_noise_0, self.vel_noise_1, self.vel_noise_2), (self.orient_noise_0, self.orient_noise_1, self.orient_noise_2),
             (g.normal("pos", 3), g.normal("vel", 3), g.normal("orient", 3)), self.belief_pos, self.belief_vel, self.belief_quat,
         )  # fmt: skip
