@@ -8,10 +8,8 @@ whose z had the wrong sign there. After the start, none of these missions draws 
 
 from __future__ import annotations
 
-from functools import cache
-
 import pytest
-from recordings import NAMES, load, mission
+from recordings import NAMES, Recording, load, mission
 from replay import Flight, fly
 from variants import VARIANTS, historic
 
@@ -28,32 +26,22 @@ NEEDED = [
 ]
 
 
-@cache
-def flown(name: str) -> Flight:
-    return fly(historic(mission(name)), load(name))
-
-
 @pytest.mark.parametrize("name", NAMES)
-def test_positions_agree_over_the_whole_length(name: str) -> None:
-    flight, recording = flown(name), load(name)
+def test_it_flies_as_recorded_over_the_whole_length(name: str) -> None:
+    """Positions, attitudes, who is there and how long, and what is counted."""
+    recording = load(name)
+    flight = fly(historic(mission(name)), recording)
     assert set(flight.error) == set(recording.frames.tolist())
     assert flight.max_error <= LIMIT, f"{flight.max_error:.1e} m, largest at (frame, id) {flight.worst}"
+    assert max(flight.turn.values()) <= ATTITUDE_LIMIT
+    assert flight.strangers is None
+    assert flight.last_frame == recording.last_frame
+    if name != "harmonic-oscillator":
+        counts_alike(flight, recording)
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_attitudes_agree_over_the_whole_length(name: str) -> None:
-    assert max(flown(name).turn.values()) <= ATTITUDE_LIMIT
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_everybody_is_there_just_as_long(name: str) -> None:
-    assert flown(name).strangers is None
-    assert flown(name).last_frame == load(name).last_frame
-
-
-@pytest.mark.parametrize("name", [n for n in NAMES if n != "harmonic-oscillator"])
-def test_collisions_and_time_in_the_air_are_counted_alike(name: str) -> None:
-    flight, recording = flown(name), load(name)
+def counts_alike(flight: Flight, recording: Recording) -> None:
+    """Collisions and time in the air."""
     assert flight.result is not None
     counted = flight.result.metrics["SimpleCollisionMetrics"]
     for team, row in recording.summary.items():

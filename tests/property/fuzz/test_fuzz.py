@@ -23,12 +23,7 @@ pytestmark = pytest.mark.filterwarnings("ignore:.*so nobody hears it")  # random
 def test_worlds_of_random_missions_are_as_alone(first):
     found = [difference(number) for number in range(first, min(first + CHUNK, N_MISSIONS))]
     assert [text for text in found if text] == []
-    assert None in found or "" in found
-
-
-def test_most_random_missions_play():
-    """Otherwise the test above would look at nothing."""
-    assert sum(difference(number) == "" for number in range(10)) >= 6
+    assert found.count("") > len(found) // 3  # the others' parts do not fit together
 
 
 @pytest.mark.slow

@@ -33,10 +33,6 @@ def grown(executor, directory, n_runs):
     return [last - first for first, last in zip(seen[0], seen[-1], strict=True)]
 
 
-def test_some_thousand_runs_in_this_process(tmp_path):
-    assert grown(InProcess(), tmp_path / "out", 4000)[0] < MOST_GROWTH
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("executor", [InProcess(), Processes(2)], ids=["in process", "processes"])
 def test_ten_thousand_runs(tmp_path, executor):
