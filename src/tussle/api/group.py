@@ -225,6 +225,11 @@ class GroupView:
         """Neighbour index for searches without a radius; for kernels."""
         return self._bodies.any_index()
 
+    @property
+    def is_alone(self) -> bool:
+        """Entities move one after the other: each row of a group is in a world of its own."""
+        return self._bodies.scans
+
     def by_place(self, index: Index, name: str) -> tuple[np.ndarray, ...]:
         """Components of a body column of everybody in the order of an index's places; for kernels."""
         return self._bodies.by_place(index, name)

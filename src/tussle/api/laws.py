@@ -218,6 +218,7 @@ class Plan:
 
     Attributes:
         run: The walk's kernel.
+        run_alone: The same for views whose rows are each in a world of their own.
         names: Names of the contributions.
         columns: Gives, of a view and a plugin's attributes, how far to look [m] and the columns by row.
         other: Its columns by place: of the body table, and which components.
@@ -225,6 +226,7 @@ class Plan:
     """
 
     run: Kernel
+    run_alone: Kernel
     names: tuple[str, ...]
     columns: Callable[[GroupView, dict[str, Any]], tuple[Any, tuple[np.ndarray, ...]]]
     other: tuple[tuple[str, tuple[int, ...]], ...]
@@ -244,10 +246,11 @@ class Plan:
         if self.lists:
             return self.listed(g, blocks.n_blocks, lambda *last: self.run(*arrays, *last, blocks.most))
         out = np.empty((len(self.names), g.n))
+        run = self.run_alone if g.is_alone else self.run
         if g.context.threads == 1:
-            self.run(*arrays, out, g.first, (0, blocks.n_blocks), blocks.most)
+            run(*arrays, out, g.first, (0, blocks.n_blocks), blocks.most)
         else:
-            g.context.split(blocks.n_blocks, lambda *part: self.run(*arrays, out, g.first, part, blocks.most))
+            g.context.split(blocks.n_blocks, lambda *part: run(*arrays, out, g.first, part, blocks.most))
         return Contributions(self.names, out)
 
     def listed(self, g: GroupView, n_blocks: int, run: Callable[..., int]) -> Listed:
@@ -296,5 +299,10 @@ def make_plan(g: GroupView, plugin: Any, declared: NeighborLaw) -> Plan:
         other[name] = (*other.get(name, ()), place)
     by_row = "".join(f"{columns[name]}, " for name in made.own)
     return Plan(
-        made.run, declared.names, evaluated(f"({farthest}, ({by_row}))"), tuple(other.items()), laws[0].lists
+        made.run,
+        made.run_alone,
+        declared.names,
+        evaluated(f"({farthest}, ({by_row}))"),
+        tuple(other.items()),
+        laws[0].lists,
     )

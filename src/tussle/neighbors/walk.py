@@ -7,7 +7,6 @@ are near enough for laws that look less far.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -86,13 +85,15 @@ class Walk:
     Attributes:
         own: Columns by row that its kernel takes, in order; "team" among them where laws tell teams apart.
         other: Columns by place.
-        run: The kernel.
+        run: The kernel; eight agents at a time are the lanes.
+        run_alone: The same for agents that have no other near them in the rows asked for: eight neighbours at a time are the lanes.
         n_out: Number of contributions in all.
     """
 
     own: tuple[str, ...]
     other: tuple[str, ...]
     run: Kernel
+    run_alone: Kernel
     n_out: int
 
 
@@ -158,10 +159,15 @@ FROM_LANES = [
     "load",
     "lowest",
     "number",
+    "ones",
     "splat",
     "store",
     "truth",
 ]
+
+
+START = {"min": "np.inf", "max": "-np.inf", "nearest": "np.nan"}
+"""What a reduction of nobody is, other than 0."""
 
 
 @dataclass(frozen=True)
@@ -192,11 +198,10 @@ class Part:
 
     def begin(self) -> Iterator[str]:
         """What stands before the loop over the candidates."""
-        start = {"min": "np.inf", "max": "-np.inf", "nearest": "np.nan"}
         if self.law.lists:
             return
         for k, reduction in self.reductions:
-            yield f"a_{k} = splat({start.get(reduction, '0.0')})"
+            yield f"a_{k} = splat({START.get(reduction, '0.0')})"
         if "mean" in self.law.reductions.values():
             yield f"n_{self.at} = splat(0.0)"
         if "nearest" in self.law.reductions.values():
@@ -252,6 +257,57 @@ class Part:
             yield f"        out[1][{k}, n_listed] = lane[(results_at + {k}) * LANES + k]"
         yield "    n_listed += 1"
 
+    def begin_alone(self) -> Iterator[str]:
+        """What stands before the loop over one agent's neighbours."""
+        for k, reduction in self.reductions:
+            yield f"a_{k} = {START.get(reduction, '0.0')}"
+        yield f"n_{self.at} = 0"
+        if "nearest" in self.law.reductions.values():
+            yield f"best_{self.at}, best_id_{self.at} = np.inf, np.inf"
+
+    def step_alone(self, limit: int) -> Iterator[str]:
+        """Eight neighbours of one agent."""
+        at, values = self.at, [(k, r) for k, r in self.reductions if r != "count"]
+        yield f"hits = near_{limit} & {self.law.teams or 'all'}_"
+        yield "if hits != 0:"
+        yield from indented(1, self.contributions())
+        if self.can_skip:
+            yield f"    hits &= bits(counts_{at})"
+        yield f"    n_{at} += ones(hits)"
+        for k, reduction in self.reductions:
+            if reduction == "count":
+                yield f"    a_{k} += float(ones(hits & bits(v_{k})))"
+            else:
+                yield f"    store(lane, {k} * LANES, v_{k})"
+        if "nearest" in self.law.reductions.values():
+            yield "    store(lane, squares_at * LANES, distance_squared_)"
+            yield "    store(lane, (squares_at + 1) * LANES, other_id_)"
+        if not values:
+            return
+        yield "    while hits != 0:"
+        yield "        j = lowest(hits)"
+        yield "        hits &= hits - 1"
+        if "nearest" in self.law.reductions.values():
+            yield "        square, number = lane[squares_at * LANES + j], lane[(squares_at + 1) * LANES + j]"
+            yield f"        closer = square < best_{at} or (square == best_{at} and number < best_id_{at})"
+            yield "        if closer:"
+            yield f"            best_{at}, best_id_{at} = square, number"
+        for k, reduction in values:
+            value = f"lane[{k} * LANES + j]"
+            if reduction in ("sum", "mean"):
+                yield f"        a_{k} += {value}"
+                continue
+            sign = "<" if reduction == "min" else ">"
+            yield f"        if {'closer' if reduction == 'nearest' else f'{value} {sign} a_{k}'}:"
+            yield f"            a_{k} = {value}"
+
+    def end_alone(self) -> Iterator[str]:
+        """One agent's contributions to its row."""
+        for k, reduction in self.reductions:
+            if reduction == "mean":
+                yield f"a_{k} = a_{k} / n_{self.at} if n_{self.at} > 0 else 0.0"
+            yield f"out[{k}, i] = a_{k}"
+
     def end(self) -> Iterator[str]:
         """What stands behind the loop."""
         for k, reduction in self.reductions:
@@ -283,14 +339,21 @@ def make_walk(laws: Sequence[Law], where: Law | None, code_of: Callable[[str], s
         parts.append(part_of(law, at, scope))
         at += len(law.reductions)
     text = WalkText(parts, part_of(where, at, scope) if where else None, at)
-    exec("\n".join(text.lines()) + "\n", scope)  # noqa: S102 - written here; what authors wrote is in functions of its own
-    made = scope["walk"]
-    made.__module__ = laws[0].function.__module__
-    made.__qualname__ = "+".join(law.function.__qualname__ for law in (*laws, *([where] if where else [])))
     other, own = " ".join("F" * len(text.other)), " ".join(code_of(name) for name in text.own)
     out = "(I2w F2w) i8 (i8 i8) i8 -> i8" if text.lists_pairs else "F2w i8 (i8 i8) i8"
     signature = f"(I2 I2 I) (F2 F2) ({other}) ({own}) {out}"
-    return Walk(text.own, text.other, kernel(signature)(made), at)
+
+    def written(lines: Iterable[str], suffix: str) -> Kernel:
+        exec("\n".join(lines) + "\n", scope)  # noqa: S102 - written here; what authors wrote is in functions of its own
+        made = scope["walk"]
+        made.__module__ = laws[0].function.__module__
+        names = (law.function.__qualname__ for law in (*laws, *([where] if where else [])))
+        made.__qualname__ = "+".join(names) + suffix
+        return kernel(signature)(made)
+
+    run = written(text.lines(), "")
+    alone = run if text.lists_pairs else written(text.lines_alone(), " alone")
+    return Walk(text.own, text.other, run, alone, at)
 
 
 def part_of(law: Law, at: int, scope: dict[str, Any]) -> Part:
@@ -333,8 +396,8 @@ class WalkText:
         self.results_at = self.limits_at + len(self.limits)
         self.lists_pairs = parts[0].law.lists
 
-    def lines(self) -> Iterator[str]:
-        """The kernel."""
+    def head(self) -> Iterator[str]:
+        """The kernel's arguments."""
         yield "def walk(longs, points, other, own, out, first, part, most):"
         yield "    cuts, spans, order = longs"
         yield "    queries, block_first, span_first = cuts[0], cuts[1], cuts[2]"
@@ -345,6 +408,11 @@ class WalkText:
             yield f"    by_place_{name} = other[{number}]"
         for number, name in enumerate(self.own):
             yield f"    by_row_{name} = own[{number}]"
+        yield "    begin, stop = part"
+
+    def lines(self) -> Iterator[str]:
+        """The kernel that has agents in the lanes."""
+        yield from self.head()
         yield f"    lane = np.empty({self.results_at + self.n_out} * LANES)"
         kept = [*(["all"] if None in self.lists else []), *(["own", "other"] if self.by_team else [])]
         lists = [
@@ -356,7 +424,6 @@ class WalkText:
         for number, name in enumerate(lists):
             yield f"    {name} = found[{number} * room : {number + 1} * room]"
         yield f"    results_at, n_listed = {self.results_at}, 0"
-        yield "    begin, stop = part"
         yield "    for b in range(begin, stop):"
         yield "        q0 = block_first[b]"
         yield "        width = block_first[b + 1] - q0"
@@ -372,6 +439,58 @@ class WalkText:
         yield "            done |= taken"
         if self.lists_pairs:
             yield "    return n_listed"
+
+    def lines_alone(self) -> Iterator[str]:
+        """The kernel that has neighbours in the lanes; they are added one by one, in the order of the other kernel."""
+        every = [*self.parts, *([self.where] if self.where else [])]
+        names = sorted({name for part in every for name in part.law.names})
+        yield from self.head()
+        yield f"    squares_at = {self.n_out}"
+        yield "    lane = np.empty((squares_at + 2) * LANES)"
+        yield "    for b in range(begin, stop):"
+        yield "        for q in range(block_first[b], block_first[b + 1]):"
+        yield "            me = queries[q]"
+        yield "            i = order[me] - first"
+        for name in self.taken:
+            yield f"            {name}_ = splat(float(by_row_{name}[i]))"
+        for at, radii in enumerate(self.limits):
+            yield f"            limit2_{at} = {square(radii)}"
+        for part in self.parts:
+            yield from indented(3, part.begin_alone())
+        yield "            for s in range(span_first[b], span_first[b + 1]):"
+        yield "                for p in range(span_start[s], span_end[s], LANES):"
+        yield from indented(5, self.neighbors_alone(names))
+        for part in self.parts:
+            yield from indented(5, part.step_alone(self.limits.index(part.law.radii)))
+        for part in self.parts:
+            yield from indented(3, part.end_alone())
+
+    def neighbors_alone(self, names: Sequence[str]) -> Iterator[str]:
+        """Eight neighbours of one agent, and which of them there are, are of its team, and near enough."""
+        for axis in "xyz":
+            yield f"offset_{axis}_ = load(s{axis}, p) - q{axis}[q]"
+        yield "distance_squared_ = offset_x_ * offset_x_ + offset_y_ * offset_y_ + offset_z_ * offset_z_"
+        yield "all_ = (1 << min(LANES, span_end[s] - p)) - 1"
+        yield "if p <= me < p + LANES:"
+        yield "    all_ &= ~(1 << (me - p))"
+        for at in range(len(self.limits)):
+            yield f"near_{at} = bits(distance_squared_ < limit2_{at}) & all_"
+        yield f"if {' | '.join(f'near_{at}' for at in range(len(self.limits)))} == 0:"
+        yield "    continue"
+        if "distance" in names:
+            yield "distance_ = lanes_sqrt(distance_squared_)"
+        if "inverse_distance" in names:
+            yield "inverse_distance_ = inverse_sqrt(distance_squared_)"
+        for name in names:
+            if name.startswith(OTHER):
+                yield f"{name}_ = load(by_place_{name}, p)"
+        if self.where:
+            yield from self.where.contributions()
+            counts = f" & bits(counts_{self.where.at})" if self.where.can_skip else ""
+            yield f"all_ &= bits(v_{self.where.at}){counts}"
+        if self.by_team:
+            yield "own_ = all_ & bits(load(by_place_other_team, p) == float(by_row_team[i]))"
+            yield "other_ = all_ & ~own_"
 
     def take_lanes(self) -> Iterator[str]:
         """Columns of the lanes into `lane`; lanes that are not taken get a reach that nothing is within."""
@@ -393,10 +512,7 @@ class WalkText:
         for at, name in enumerate(self.taken, 1):
             yield f"    lane[{at} * LANES + k] = by_row_{name}[i]"
         for at, radii in enumerate(self.limits):
-            square = f"square_of({column(radii[0])})"
-            for radius in radii[1:]:
-                square = f"min({square}, square_of({column(radius)}))"
-            yield f"    limit_{at} = {square} if active else -1.0"
+            yield f"    limit_{at} = {square(radii)} if active else -1.0"
             yield f"    lane[{self.limits_at + at} * LANES + k] = limit_{at}"
         yield "    if active:"
         yield "        taken |= 1 << k"
@@ -483,13 +599,15 @@ class WalkText:
         yield f"            out[at, i] = lane[({self.results_at} + at) * LANES + k]"
 
 
-def column(radius: str | float) -> str:
-    """A radius of the row i."""
-    return (
-        f"by_row_{radius}[i]"
-        if isinstance(radius, str)
-        else ("np.inf" if radius == math.inf else repr(radius))
-    )
+def square(radii: tuple[str | float, ...]) -> str:
+    """Squared smallest of the radii of the row i."""
+    text = ""
+    for radius in radii:
+        value = (
+            f"by_row_{radius}[i]" if isinstance(radius, str) else repr(float(radius)).replace("inf", "np.inf")
+        )
+        text = f"min({text}, square_of({value}))" if text else f"square_of({value})"
+    return text
 
 
 def indented(depth: int, lines: Iterable[str]) -> Iterator[str]:

@@ -9,12 +9,12 @@ from tussle.api import Autonomy, Output, Param, State, neighbors
 from tussle.stock import SingleIntegrator
 
 
-def play(autonomy, steps=3, n=300, motion=SingleIntegrator(), spread=30.0, **values):  # noqa: B008 - a value
+def play(autonomy, steps=3, n=300, motion=SingleIntegrator(), spread=30.0, update="synchronous", **values):  # noqa: B008 - a value
     """A crowd of two teams under an autonomy that checks itself in every step."""
     crowd = {"count": n, "variance": (spread**2, spread**2, 100.0), "motion": motion}
     blocks = [Block(name=f"team_{team}", team=team, autonomy=autonomy, **crowd) for team in (1, 2)]
     with Simulation(
-        Mission(blocks=blocks, end=100.0), on_error="raise", **{"seeds": [1, 2], **values}
+        Mission(blocks=blocks, end=100.0, update=update), on_error="raise", **{"seeds": [1, 2], **values}
     ) as sim:
         sim.step(steps)
         return [sim.state_hash(world) for world in range(sim.n_worlds)]
