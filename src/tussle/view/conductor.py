@@ -52,7 +52,7 @@ class Conductor:
         error: What stopped the game.
         version: Counts changes of what there is to be seen.
         epoch: Counts jumps in time.
-        shown_step: Step of what is to be seen: during a seek, that where it began.
+        shown: Step of what is to be seen, and whether the world is over there: during a seek, that where it began.
     """
 
     def __init__(
@@ -68,7 +68,7 @@ class Conductor:
         self.is_paused = is_paused
         self.error: Exception | None = None
         self.version = self.epoch = 0
-        self.shown_step = player.step
+        self.shown = player.step, player.is_over
         self._on_moment = on_moment
         self._orders: deque[Order] = deque()
         self._goal: int | None = None
@@ -193,7 +193,7 @@ class Conductor:
     def _changed(self) -> None:
         if not self.is_seeking:
             self.version += 1
-            self.shown_step = self.player.step
+            self.shown = self.player.step, self.player.is_over
 
     # -- orders -------------------------------------------------------------------------------------------------------------------
 

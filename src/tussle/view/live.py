@@ -234,12 +234,12 @@ class Live:
     @property
     def step_number(self) -> int:
         """Number of the step that begins with what is shown; during a seek, that where it began."""
-        return self._conductor.shown_step
+        return self._conductor.shown[0]
 
     @property
     def t(self) -> float:
         """Time of what is shown [s]."""
-        return self._time_of(self._conductor.shown_step)
+        return self._time_of(self._conductor.shown[0])
 
     @property
     def span(self) -> tuple[float, float]:
@@ -257,7 +257,7 @@ class Live:
     @property
     def is_over(self) -> bool:
         """The world has ended, or something has failed: it can only be wound back or begun anew."""
-        return self._player.is_over
+        return self._conductor.shown[1]
 
     @property
     def is_seeking(self) -> bool:
