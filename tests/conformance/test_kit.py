@@ -256,7 +256,8 @@ class SoundBouncer(MotionModel):
     grade = "portable"
     x = State("east north up vx vy vz", unit="m m m m/s m/s m/s")
 
-    def integrator(self):
+    @property
+    def advance(self):
         return bounce
 
     def from_body(self, body, rows) -> None:

@@ -39,7 +39,8 @@ class ClampingAircraft(SimpleAircraft):
     the last step before a limit is not thrown away. Differing lines: the three clips, and RK4 over rates that ignore the limits.
     """
 
-    def integrator(self) -> Integrator:
+    @property
+    def advance(self) -> Integrator:
         def advance(x: Floats, u: Floats, p: Floats, dt: float, substeps: int) -> None:
             (
                 radius,
@@ -92,9 +93,6 @@ class RelativeUnicycle3D(Unicycle3D):
     )
 
     advance = unicycle_rk4.advance
-
-    def integrator(self) -> Integrator:
-        return unicycle_rk4.advance
 
     def from_body(self, body: MotionBody, rows: Floats) -> None:
         super().from_body(body, rows)

@@ -68,8 +68,9 @@ class MotionModel(EntityPlugin):
 
     A model declares one `State` with named fields, its inputs and parameters, and `derivative`: a static function whose arguments
     are matched by name to fields, inputs, parameters, force_x ... torque_z (world frame) and mass, and which returns the fields'
-    derivatives in order. One shared Runge-Kutta driver of fourth order integrates it. A model may bring its own `advance` kernel
-    (x, u, p, dt, substeps) instead; x (m, n), u (k, n) inputs and p (q, n) parameters in order of declaration.
+    derivatives in order. One shared Runge-Kutta driver of fourth order integrates it. A model may bring its own kernel instead:
+    `advance = kernel` over (x, u, p, dt, substeps), x (m, n), u (k, n) inputs and p (q, n) parameters in order of declaration; or
+    a property `advance` that returns the kernel of the structural variant.
 
     Raises:
         DeclarationError: No state, several, a list, or an argument of `derivative` that means nothing.
@@ -77,7 +78,6 @@ class MotionModel(EntityPlugin):
 
     kind = "motion"
     derivative: ClassVar[Any] = None
-    advance: ClassVar[Any] = None
     abstract: ClassVar[bool] = True
     reads_all: ClassVar[bool] = False
     """All channels that reach it are made, since they are read from outside."""
@@ -89,7 +89,10 @@ class MotionModel(EntityPlugin):
                 raise DeclarationError(
                     f"{cls.__name__}.{name}: a motion model has no lists but parameters; what it flies by are numbers"
                 )
-        if cls.derivative is None and cls.advance is None:
+        own = vars(cls).get("advance")
+        if own is not None and not isinstance(own, (property, staticmethod)):
+            cls.advance = staticmethod(own)  # type: ignore[method-assign]  # a function would be taken for a method
+        if cls.derivative is None and cls.advance is MotionModel.advance:
             return
         states = [c for c in cls.states().values() if c.fields]
         if len(states) != 1:
@@ -133,15 +136,14 @@ class MotionModel(EntityPlugin):
 
     def body_inputs(self) -> list[str]:
         """Which of force, torque and mass the derivative takes."""
-        if self.advance is not None or self.derivative is None:
+        if type(self).advance is not MotionModel.advance or self.derivative is None:
             return []
         names = inspect.signature(self.derivative).parameters
         return [name for name in BODY_INPUTS if name in names]
 
-    def integrator(self) -> Any:
+    @property
+    def advance(self) -> Any:
         """The compiled function (x, u, p, dt, substeps) that flies this model, and that `rollout` calls."""
-        if self.advance is not None:
-            return type(self).advance
         f = compile_derivative(
             type(self).derivative,
             list(self.state().fields),
@@ -210,7 +212,7 @@ class MotionModel(EntityPlugin):
             value = value[:, None] if column.fields and value.ndim == 1 else value
             rows.append(np.broadcast_to(value, (len(column.fields) or 1, n)))
         p = np.ascontiguousarray(np.concatenate(rows)) if rows else np.zeros((0, n))
-        integrate = self.integrator()
+        integrate = self.advance
         path = np.empty((len(u) + 1, *x.shape))
         path[0] = x
         for k in range(len(u)):

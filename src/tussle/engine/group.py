@@ -167,7 +167,7 @@ class Group:
         self.sensors = [self._bind(p, self.sensing, ()) for p in block.sensor]
         self.holds_handles = any(b.handles for b in self.walk())
         self._believe()
-        self.integrate = self.motion.plugin.integrator()
+        self.integrate = self.motion.plugin.advance
         self._place_motion()
         self.table.allocate(0)
         self.attach(bodies, bodies.n)

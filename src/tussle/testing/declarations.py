@@ -19,7 +19,7 @@ from tussle.errors import ConformanceError, TussleError, listed
 RULE = "declarations"
 HOOKS_NAMES = """
     spawn spawn_one step step_one start start_one result result_one route rejects from_body to_body derivative advance
-    integrator active_inputs
+    active_inputs
     active_outputs most_worlds open_one close_one save_one load_one ready ready_timeout reads_all grade passthrough
     abstract kind
 """
@@ -83,7 +83,7 @@ def _attributes(cls: type[Plugin]) -> Iterator[str]:
 def _hooks(cls: type[Plugin]) -> Iterator[str]:
     """Who has nothing to do; what the engine calls it asks for itself, when the kit's game is built."""
     if issubclass(cls, MotionModel):
-        if not (cls.derivative or cls.advance) and cls.integrator is MotionModel.integrator:
+        if not cls.derivative and cls.advance is MotionModel.advance:
             yield "it has neither derivative nor advance"
     elif issubclass(cls, (Interaction, Metric)) and all(
         getattr(cls, k, cls.step).__module__.startswith("tussle.api.")

@@ -12,7 +12,6 @@ from tussle.api import MotionModel
 from tussle.engine.group import Group
 from tussle.engine.simulation import Simulation
 from tussle.errors import ConformanceError
-from tussle.numeric.rk4 import compile_derivative, rk4
 from tussle.testing.game import Game
 
 EPS = float(np.finfo(float).eps)
@@ -78,8 +77,10 @@ def check_motion(game: Game, is_default: bool) -> None:
         _check_rollout(model, flight)
         _check_rows(model, flight)
         _check_bodies(model, flight)
-        if model.derivative is not None and (is_default or model.advance is None):
-            equation = _solver(model)
+        if model.derivative is not None and (is_default or type(model).advance is MotionModel.advance):
+            equation = vars(MotionModel)["advance"].fget(
+                model
+            )  # the shared driver on the model's own equation
             _check_order(model, flight, equation)
             _check_kernel(model, flight, equation)
         else:
@@ -103,7 +104,7 @@ def _check_rollout(model: Any, flight: Flight) -> None:
 
 def _check_rows(model: Any, flight: Flight) -> None:
     """A row's path must not depend on where it stands, or on how many others there are."""
-    integrate = model.integrator()
+    integrate = model.advance
     whole = flight.x[0].copy()
     integrate(whole, flight.u[0], flight.p, flight.dt, flight.substeps)
     n = whole.shape[1]
@@ -120,21 +121,6 @@ def _check_rows(model: Any, flight: Flight) -> None:
 
 
 # -- the equation and who solves it -----------------------------------------------------------------------------------------------
-
-
-def _solver(model: Any) -> Integrator:
-    """The shared driver on the model's own equation."""
-    f = compile_derivative(
-        type(model).derivative,
-        list(model.state().fields),
-        [*model.input_channels(), *_body_inputs(model)],
-        model._param_names(),
-    )
-    return lambda x, u, p, dt, substeps: rk4(f, x, u, p, dt, substeps)
-
-
-def _body_inputs(model: Any) -> list[str]:
-    return list(model.body_inputs())
 
 
 def _solved(integrate: Integrator, flight: Flight, step: int, dt: float, substeps: int) -> np.ndarray:
@@ -168,7 +154,7 @@ def _check_kernel(model: Any, flight: Flight, equation: Integrator) -> None:
     """The model's own kernel stays as near to the driver's path as both are to the truth (Richardson's estimate of the driver's error)."""
     angles = np.array([unit == "rad" for unit in model.state().units])
     for step in (0, STEPS // 2):
-        path = _solved(model.integrator(), flight, step, flight.dt, flight.substeps)
+        path = _solved(model.advance, flight, step, flight.dt, flight.substeps)
         coarse = _solved(equation, flight, step, flight.dt, flight.substeps)
         fine = _solved(equation, flight, step, flight.dt, 2 * flight.substeps)
         error = np.abs(coarse - fine) * 16.0 / 15.0
@@ -189,7 +175,7 @@ def _check_kernel(model: Any, flight: Flight, equation: Integrator) -> None:
 
 def _check_convergence(model: Any, flight: Flight) -> None:
     """A kernel without an equation to hold it to: finer substeps must at least lead somewhere."""
-    integrate = model.integrator()
+    integrate = model.advance
     ends = [_solved(integrate, flight, 0, flight.dt, n) for n in (8, 16, 32, 64)]
     gaps = [float(np.abs(b - a).max()) for a, b in pairwise(ends)]
     noise = float(_rounding(flight, 0, ends[-1], 64).max())

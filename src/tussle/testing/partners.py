@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -188,9 +188,7 @@ class Sink(MotionModel):
 
     grade = "portable"
     x = State("x y z vx vy vz yaw climb", unit="m m m m/s m/s m/s rad rad")
-
-    def integrator(self) -> Callable[..., None]:
-        return drift
+    advance = drift
 
     def from_body(self, body: MotionBody, rows: np.ndarray) -> None:
         self.x[:3, rows], self.x[3:6, rows] = body.pos[:, rows], body.vel[:, rows]

@@ -86,7 +86,6 @@ class Outside(MotionModel):
     link = Handle(max_worlds=4, doc="Pipe to the child.")
     velocity = Input(VELOCITY, unit="m/s")
 
-    @staticmethod
     def advance(x, u, p, dt, substeps):
         """Nothing: the child does it."""
 

@@ -66,13 +66,12 @@ class Unicycle(MotionModel):
             min(max(pitch_rate, -pitch_rate_max), pitch_rate_max),
         )
 
-    advance = kernels.advance_pitch
-
     def active_inputs(self) -> list[str]:
         """The third input is pitch_rate or velocity_z."""
         return ["speed", "turn_rate", "pitch_rate" if self.use_pitch else "velocity_z"]
 
-    def integrator(self) -> Any:
+    @property
+    def advance(self) -> Any:
         """Kernel of the structural variant."""
         return kernels.advance_pitch if self.use_pitch else kernels.advance_level
 

@@ -48,14 +48,13 @@ class Unicycle3D(MotionModel):
     pitch_rate = Input(unit="rad/s", doc="Rate about the body y axis, nose up positive.")
     roll_rate = Input(unit="rad/s", doc="Rate about the body x axis, right wing down positive.")
 
-    advance = kernels.advance_speed
-
     def active_inputs(self) -> list[str]:
         """The first input is speed or acceleration_x."""
         first = "speed" if self.accel_max < 0.0 else "acceleration_x"
         return [first, "turn_rate", "pitch_rate", "roll_rate"]
 
-    def integrator(self) -> Any:
+    @property
+    def advance(self) -> Any:
         """Kernel of the structural variant."""
         limit = float(self.accel_max)
         if limit < 0.0:
