@@ -125,7 +125,7 @@ def births_and_radio() -> Mission:
     )  # fmt: skip
     listener = Block(
         name="listener", team=2, count=4, position=(20.0, 0.0, 0.0),
-        autonomy=MotorSchemas(pub_vel_vec=True, behaviors=[MoveToGoalMS(use_initial_heading=True, network_name="SphereNetwork")]),
+        autonomy=MotorSchemas(behaviors=[MoveToGoalMS(use_initial_heading=True, network_name="SphereNetwork")]),
         motion=SingleIntegrator(max_speed=8.0),
     )  # fmt: skip
     return Mission(

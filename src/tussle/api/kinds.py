@@ -18,6 +18,8 @@ class EntityPlugin(Plugin):
     """A plugin of an entity; abstract."""
 
     kind: ClassVar[str] = "entity plugin"
+    wired: frozenset[str]
+    """In a simulation: names of its outputs that somebody reads. The others may be left as they are."""
 
     def spawn(self, g: GroupView, rows: np.ndarray) -> None:
         """Set the columns of new rows where their declared defaults do not do; `rows` are row numbers in `g`."""

@@ -57,8 +57,6 @@ class Plugin:
 
     columns: ClassVar[dict[str, Column]] = {}
     services: ClassVar[tuple[str, ...]] = ()
-    wired: frozenset[str]
-    """Bound: names of its outputs that somebody reads."""
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -227,7 +225,7 @@ class Plugin:
     def bound(self) -> Self:
         """A copy whose arrays the engine fills in; the original stays data."""
         copy = object.__new__(type(self))
-        copy.__dict__.update(self.__dict__, is_bound=True, wired=frozenset())
+        copy.__dict__.update(self.__dict__, is_bound=True)
         return copy
 
     def __setattr__(self, name: str, value: Any) -> None:

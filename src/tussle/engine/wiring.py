@@ -48,13 +48,6 @@ def read_channels(plugin: Any) -> list[tuple[str, Channel]]:
     return [(k, inputs[k]) for k in names]
 
 
-def written_channels(plugin: Any) -> list[tuple[str, Channel]]:
-    """Output columns that a plugin uses, in order of declaration."""
-    outputs = type(plugin).outputs()
-    names = plugin.active_outputs() if hasattr(plugin, "active_outputs") else list(outputs)
-    return [(k, outputs[k]) for k in names]
-
-
 class Wiring:
     """The wires of one group.
 
@@ -103,7 +96,7 @@ class Wiring:
             if not controller.passthrough:
                 following.pop(0)
                 continue
-            offered = {c for _, column in written_channels(controller) for c in column.channels}
+            offered = {c for column in type(controller).outputs().values() for c in column.channels}
             needed = [
                 c
                 for _, column in read_channels(following[0])
@@ -121,7 +114,7 @@ class Wiring:
             for _, column in read_channels(plugin):
                 self._add(bus, column)
         for plugin in producers:
-            for _, column in written_channels(plugin):
+            for column in type(plugin).outputs().values():
                 self._add(bus, column)
         return bus
 
@@ -139,11 +132,11 @@ class Wiring:
         self, bus: Bus, producers: Sequence[Any], consumers: Sequence[Any], also: Bus | None = None
     ) -> None:
         for plugin in producers:
-            for _, column in written_channels(plugin):
+            for column in type(plugin).outputs().values():
                 for channel in column.channels:
                     bus.writers.setdefault(channel, []).append(plugin.instance_name)
         for plugin in producers:
-            for name, column in written_channels(plugin):
+            for name, column in type(plugin).outputs().items():
                 self._check_form(plugin, column, bus)
                 self.links[id(plugin), name] = self._link(column, bus)
         for plugin in consumers:
@@ -154,7 +147,7 @@ class Wiring:
             if len(names) > 1:
                 self.writers.append((self.where, channel, names))
         for plugin in producers:
-            for name, column in written_channels(plugin):
+            for name, column in type(plugin).outputs().items():
                 if name in BELIEF or any(c in bus.read for c in column.channels):
                     self.wired.setdefault(id(plugin), set()).add(name)
                 if bus.read.isdisjoint(column.channels) and not consumers:
@@ -250,4 +243,4 @@ def _form_text(fields: tuple[str, ...] | None) -> str:
     return f"a list of {n} field{'s' * (n > 1)} ({' '.join(fields)})" if n else "a list of numbers"
 
 
-__all__ = ["BELIEF", "Bus", "Link", "Wiring", "listed", "read_channels", "written_channels"]
+__all__ = ["BELIEF", "Bus", "Link", "Wiring", "listed", "read_channels"]

@@ -21,7 +21,7 @@ from tussle.api import (
 )
 from tussle.columns import Channel, Topic
 from tussle.engine.simulation import Simulation
-from tussle.engine.wiring import BELIEF, read_channels, written_channels
+from tussle.engine.wiring import BELIEF, read_channels
 from tussle.mission import Block, Mission
 from tussle.stock import GlobalNetwork, MotorSchemas
 from tussle.testing.partners import (
@@ -215,15 +215,15 @@ def _slots(
     autonomies, controllers, sensors, motions = places
     inner = [*autonomies, *(b for a in autonomies for b in a.values.get("behaviors", ()))]
     fed = [c for a in inner for _, c in read_channels(a)]
-    measured = [c for s in sensors for name, c in written_channels(s) if name not in BELIEF]
+    measured = [c for s in sensors for name, c in type(s).outputs().items() if name not in BELIEF]
     fed = _without(fed, measured)
     readers = [[c for _, c in read_channels(p)] for p in (*controllers, *motions)]
     wanted = next((columns for columns in readers if columns), [])
-    written = [c for a in autonomies for _, c in written_channels(a)]
+    written = [c for a in autonomies for c in type(a).outputs().values()]
     pilot = driver(_without(wanted, written), measured, says, hears)
     if not motions:
         last = [c for c in controllers if not c.passthrough] or controllers
-        end = [c for _, c in written_channels(last[-1])] if last else []
+        end = list(type(last[-1]).outputs().values()) if last else []
         motions = [sink(end or [*Driver.outputs().values(), *_without(written, [])])]
     sensors = [*sensors, *([feeler(fed)] if fed else [])]
     return {

@@ -36,7 +36,7 @@ def hashes(results):
 
 # -- each run is what it is alone -----------------------------------------------------------------------------------------------
 
-SCHEMAS = "MotorSchemas pub_vel_vec='true'"
+SCHEMAS = "MotorSchemas"
 FILE_VARY = {
     "numbers": ["odds=0.05:0.4", "health=1:3", "SimpleCapture.capture_range=1:60", "blues.speed=0:3"],
     "counts": ["reds=2,4"],

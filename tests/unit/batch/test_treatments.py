@@ -21,7 +21,7 @@ def schemas(**goal):
     """A mission with a plugin inside another."""
     inner = [MoveToGoalMS(**goal), AvoidEntityMS(name="shy", gain=2.0)]
     walker = Block(
-        name="walkers", team=1, count=3, autonomy=MotorSchemas(behaviors=inner, pub_vel_vec=True), motion=SingleIntegrator(),
+        name="walkers", team=1, count=3, autonomy=MotorSchemas(behaviors=inner), motion=SingleIntegrator(),
     )  # fmt: skip
     return Mission(blocks=[walker], dt=0.1, end=1.0, networks=())
 

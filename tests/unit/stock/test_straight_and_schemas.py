@@ -175,11 +175,9 @@ def test_motor_schemas_take_the_mean_by_gain_of_those_that_wish(behaviors, veloc
     assert wished(*behaviors) == pytest.approx([np.arctan2(y, x), 100.0 + z, np.sqrt(x * x + y * y + z * z)])
 
 
-def test_motor_schemas_write_a_velocity_if_asked():
+def test_motor_schemas_write_the_same_as_a_velocity():
     def fly(**values):
-        flier = block(
-            autonomy=MotorSchemas(behaviors=[Wish(to=(1.0, 2.0, -3.0))], pub_vel_vec=True, **values)
-        )
+        flier = block(autonomy=MotorSchemas(behaviors=[Wish(to=(1.0, 2.0, -3.0))], **values))
         sim = Simulation(mission(flier))
         sim.run()
         return sim.read("a.pos")[0][0, 0].tolist()
@@ -192,9 +190,7 @@ def test_motor_schemas_write_a_velocity_if_asked():
 def avoiding(*others, **values):
     values.setdefault("sphere_of_influence", 10.0)
     values.setdefault("minimum_range", 4.0)
-    me = block(
-        autonomy=MotorSchemas(behaviors=[AvoidEntityMS(**values)], max_speed=6.0, pub_vel_vec=True), team=1
-    )
+    me = block(autonomy=MotorSchemas(behaviors=[AvoidEntityMS(**values)], max_speed=6.0), team=1)
     there = [
         block(f"o{i}", team=team, position=pos, autonomy=Drift(to=(0, 0, 0)))
         for i, (pos, team) in enumerate(others)
@@ -226,7 +222,7 @@ def test_others_are_avoided_if_asked_and_the_one_at_the_same_place_never():
 
 def going(steps=1, **values):
     mover = block(
-        autonomy=MotorSchemas(behaviors=[MoveToGoalMS(**values)], max_speed=1e6, pub_vel_vec=True),
+        autonomy=MotorSchemas(behaviors=[MoveToGoalMS(**values)], max_speed=1e6),
         heading="90 deg",
     )
     sim = Simulation(mission(mover, end=5.0))
@@ -268,9 +264,7 @@ class Guide(Autonomy):
 
 
 def test_a_waypoint_replaces_the_goal_of_the_entity_it_is_for():
-    mover = MotorSchemas(
-        behaviors=[MoveToGoalMS(goal=(100.0, 0, 0), network_name="LocalNetwork")], pub_vel_vec=True
-    )
+    mover = MotorSchemas(behaviors=[MoveToGoalMS(goal=(100.0, 0, 0), network_name="LocalNetwork")])
     sim = Simulation(mission(block(count=2, autonomy=[mover, Guide()]), networks=[LocalNetwork()]))
     sim.step(3)
     assert sim.read("a.MotorSchemas.MoveToGoalMS.target")[0][0].tolist() == [[100.0, 0.0, 0.0]] * 2
@@ -286,7 +280,7 @@ def test_a_waypoint_of_the_world_is_heard_by_all():
         def step(self, w):
             w.publish(Waypoint, np.flatnonzero(w.step_count == 0), pos=(1.0, 2.0, 3.0))
 
-    mover = MotorSchemas(behaviors=[MoveToGoalMS(network_name="GlobalNetwork")], pub_vel_vec=True)
+    mover = MotorSchemas(behaviors=[MoveToGoalMS(network_name="GlobalNetwork")])
     sim = Simulation(mission(block(count=2, autonomy=mover), interactions=[Tower()]), seeds=[1, 2])
     sim.step(2)
     assert sim.read("a.MotorSchemas.MoveToGoalMS.target")[0].tolist() == [[[1.0, 2.0, 3.0]] * 2] * 2
@@ -295,7 +289,7 @@ def test_a_waypoint_of_the_world_is_heard_by_all():
 def test_who_is_born_later_has_no_kick_of_the_derivative_either():
     mover = MoveToGoalMS(goal=(100.0, 0.0, 0.0), distance_pid=(0.0, 0.0, 1.0, 0.0))
     late = block(
-        autonomy=MotorSchemas(behaviors=[mover], max_speed=1e6, pub_vel_vec=True),
+        autonomy=MotorSchemas(behaviors=[mover], max_speed=1e6),
         count=1,
         rate=1.0,
         first_birth=0.5,

@@ -229,7 +229,7 @@ def test_entities_are_led_each_along_its_own_list_and_without_one_not_at_all():
             autonomy=[
                 *([WaypointGenerator(waypoints=[point(300.0, 100.0 * i)] * n, network_name="LocalNetwork")] if n else []),
                 WaypointDispatcher(waypointlist_network="LocalNetwork"),
-                MotorSchemas(pub_vel_vec=True, behaviors=[MoveToGoalMS(goal=(0.0, -500.0, 0.0))]),
+                MotorSchemas(behaviors=[MoveToGoalMS(goal=(0.0, -500.0, 0.0))]),
             ],
         )
         for i, n in ((1, 1), (2, 2), (3, 0))

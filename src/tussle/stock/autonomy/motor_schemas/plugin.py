@@ -12,26 +12,20 @@ class MotorSchemas(Autonomy):
     """Adds up what its behaviours wish, each by its gain, over the gains of those that wish anything (Arkin 1989).
 
     So a behaviour that wishes nothing, such as avoidance with nobody near, does not dilute the others. With no wish at all the entity
-    goes straight on at full speed.
+    goes straight on at full speed. The sum is written as heading, altitude and speed, and as `velocity`: the motion model or controller
+    takes what it reads.
     """
 
     grade = "portable"
 
     max_speed = Param(21.0, unit="m/s", gt=0.0, doc="Longest wish, and speed when there is none.")
-    pub_vel_vec = Param(
-        False, structural=True, doc="Write a wanted velocity instead of heading, altitude and speed."
-    )
-    add_lower_bound_to_vz = Param(False, doc="Bound the wanted vertical speed from below.")
+    add_lower_bound_to_vz = Param(False, doc="Bound the vertical part of the wanted velocity from below.")
     vz_lower_bound = Param(-1.0, unit="m/s", doc="That bound.")
     behaviors = Children(Behavior, doc="What it is made of.")
     desired_heading = Output(unit="rad")
     desired_altitude = Output(unit="m")
     desired_speed = Output(unit="m/s")
     velocity = Output("velocity_x velocity_y velocity_z", unit="m/s")
-
-    def active_outputs(self) -> list[str]:
-        """Names of the outputs that this instance writes."""
-        return ["velocity"] if self.pub_vel_vec else ["desired_heading", "desired_altitude", "desired_speed"]
 
     def step(self, g: GroupView) -> None:
         total = np.zeros((3, g.n))
@@ -47,13 +41,11 @@ class MotorSchemas(Autonomy):
         g.caller = self
         wished = weight > 0.0
         v = np.where(wished, total / np.where(wished, weight, 1.0), self.max_speed * g.forward)
-        if self.pub_vel_vec:
-            v[2] = np.where(self.add_lower_bound_to_vz, np.maximum(v[2], self.vz_lower_bound), v[2])
-            self.velocity[:] = v
-        else:
-            self.desired_heading[:] = atan2(v[1], v[0])
-            self.desired_altitude[:] = g.pos[2] + v[2]
-            self.desired_speed[:] = np.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+        self.desired_heading[:] = atan2(v[1], v[0])
+        self.desired_altitude[:] = g.pos[2] + v[2]
+        self.desired_speed[:] = np.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+        self.velocity[:2] = v[:2]
+        self.velocity[2] = np.where(self.add_lower_bound_to_vz, np.maximum(v[2], self.vz_lower_bound), v[2])
 
     @service
     def longest_wish(self, g: GroupView) -> np.ndarray:
