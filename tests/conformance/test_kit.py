@@ -575,7 +575,7 @@ class WritesAroundView(SoundAutonomy):
     """Pushes others past the view."""
 
     def step(self, g: GroupView) -> None:
-        g.table_bodies.vel[0] += 1.0
+        g._bodies.vel[0] += 1.0
 
 
 class WritesParameter(SoundAutonomy):

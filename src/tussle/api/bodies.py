@@ -174,9 +174,7 @@ class Bodies:
         """Row of each (world, id), (m,); -1 for id 0 and for those that are gone."""
         _, _, id_row, id_start = self.layout()
         rows = np.empty(len(ids), np.int64)
-        kernels.find_rows(
-            np.ascontiguousarray(world, np.int64), np.ascontiguousarray(ids, np.int64), id_row, id_start, rows
-        )
+        kernels.find_rows(world, np.ascontiguousarray(ids, np.int64), id_row, id_start, rows)
         return rows
 
     def index(self, reach: float | np.ndarray, split: Split | None = None) -> Index:

@@ -37,7 +37,6 @@ class GroupView:
             mass, and the whole numbers id, team, world, block, place_in_block. For autonomies and controllers pos, vel and quat are the
             entity's belief where a sensor writes one.
         motion_state: State of the entity's motion model, (m, n), fields in order of declaration: where a planner's rollout begins.
-        caller: The plugin that is being called.
     """
 
     is_subset = False
@@ -47,7 +46,6 @@ class GroupView:
         self.context = context
         self._period = dt
         self.begin()
-        self.caller: Any = None
         self.failing_row = None
         self.motion_state: np.ndarray = np.empty((0, 0))
         self._seen: list[str] = []
@@ -167,14 +165,23 @@ class GroupView:
         else:
             self.context.split(self.n, run, ROWS_PER_THREAD)
 
-    def begin(self) -> None:
-        """At the beginning of a step, as if nothing had been called yet: what hooks of newborn rows see."""
-        self.dt, self.substep, self.phase = self._period, 0, 0.0
+    def begin(
+        self, plugin: Any = None, phase: float = 0.0, dt: float | None = None, substep: int = 0
+    ) -> None:
+        """A call of a plugin begins; without more than that, as at the beginning of a step: what hooks of newborn rows see."""
+        self._caller, self.phase, self.substep = plugin, phase, substep
+        self.dt = self._period if dt is None else dt
+
+    def step(self, plugin: Any) -> None:
+        """Step a plugin inside the one that is called; its draws are its own."""
+        caller, self._caller = self._caller, plugin
+        plugin.step(self)
+        self._caller = caller
 
     def fail(self, row: int, why: str) -> None:
         """End the world of a row with an error at the end of this step; the others go on. For what handles stand for."""
         world = int(self.world[row])
-        step, plugin = int(self.context.clock.step[world]), self.caller.instance_name
+        step, plugin = int(self.context.clock.step[world]), self._caller.instance_name
         name = self.context.block_names[int(self.block[row])]
         assert self.context.fail is not None
         self.context.fail(
@@ -247,15 +254,10 @@ class GroupView:
         """The k nearest other entities of each row, at any distance; `teams` as in `near`, or one team per row."""
         return find_nearest(self, k, teams)
 
-    @property
-    def table_bodies(self) -> Bodies:
-        """The table behind `bodies`; for queries."""
-        return self._bodies
-
     # -- chance and services ------------------------------------------------------------------------------------------------
 
     def _stream(self, label: str) -> int:
-        return stream(self.caller.instance_name if self.caller is not None else "", label)
+        return stream(self._caller.instance_name if self._caller is not None else "", label)
 
     def uniform(self, label: str, k: int | None = None) -> np.ndarray:
         """Uniform draws in [0, 1), (n,) or (k, n): the same for an entity whatever else there is in the world."""

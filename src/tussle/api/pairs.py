@@ -103,7 +103,7 @@ def _checked(teams: Any) -> Any:
 
 def find_nearest(g: GroupView, k: int, teams: Any) -> Nearest:
     """See `GroupView.nearest`."""
-    index = g.table_bodies.any_index()
+    index = g.any_index()
     x, y, z = g.pos
     if isinstance(teams, np.ndarray):
         other, square = np.empty((k, g.n), np.int64), np.empty((k, g.n))

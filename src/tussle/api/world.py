@@ -88,7 +88,7 @@ class WorldView(GroupView):
 
     def rows_at(self, world: np.ndarray, ids: np.ndarray) -> np.ndarray:
         """Row of each (world, id), (m,); -1 for id 0 and for those that are gone."""
-        return self._bodies.rows_of(world, ids)
+        return self._bodies.rows_of(np.ascontiguousarray(world, np.int64), ids)
 
     # -- changes ----------------------------------------------------------------------------------------------------------
 

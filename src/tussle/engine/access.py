@@ -217,7 +217,7 @@ def write(sim: Simulation, path: str, values: Any) -> None:
             target[..., rows[mine]] = part
             bodies.touch(group.first, group.last)
             if column in ("pos", "vel", "quat") and differs.any():
-                group.moving.begin()
+                group.moving.begin(group.motion.plugin)
                 group.motion.plugin.from_body(group.moving, mine[differs])
         else:
             target[..., mine] = part
@@ -333,7 +333,7 @@ def _no_rows(group: Group, first: int) -> tuple[Any, ...]:
 
 def _load_handles(sim: Simulation, group: Group, outside: list[dict[str, list[bytes]]]) -> None:
     for binding, handles in zip(group.walk(), outside, strict=True):
-        binding.view.begin()
+        binding.view.begin(binding.plugin)
         for name, held in handles.items():
             for row, data in enumerate(held):
                 about = sim.population.handle_row(group, binding, row)
@@ -414,9 +414,8 @@ def world_result(sim: Simulation, world: int, reason: str, is_hashed: bool = Tru
     steps = int(clock.step[world])
     result = WorldResult(world, int(sim.context.seeds[world]), reason, steps, float(clock.t[world]), alive)
     scores: dict[int, float] = {}
-    sim.world_view.begin()
     for referee in [*sim.interactions, *sim.metrics]:
-        referee.view.caller = referee.plugin
+        referee.view.begin(referee.plugin)
         try:
             found = referee.plugin.result_of(referee.view, world)
         except Exception as error:

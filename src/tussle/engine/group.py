@@ -351,7 +351,7 @@ class Group:
     def from_body(self, rows: np.ndarray) -> None:
         """Have the motion model take over the states of some of its rows, in order, from the body table."""
         view = self.moving
-        view.caller, view.span = self.motion.plugin, (int(rows[0]), int(rows[-1]) + 1)
+        view.span = (int(rows[0]), int(rows[-1]) + 1)
         try:
             self.motion.plugin.from_body(view, rows)
         finally:

@@ -121,7 +121,7 @@ class Mail:
 
     def _route(self, topic: TopicBuffer, network: Referee, batch: Batch) -> None:
         sim, clock, view = self.sim, self.sim.context.clock, network.view
-        view.caller, view.phase, view.dt = network.plugin, 1.0, clock.dt
+        view.begin(network.plugin, 1.0, clock.dt)
         to = network.plugin.route(view, batch)
         if not isinstance(to, str):
             number, rows = to

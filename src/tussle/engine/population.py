@@ -211,13 +211,12 @@ class Population:
                     self._fill_ragged(group, binding, rows)
             for name, place in group.belief.items():
                 group.table.array(place)[..., rows] = getattr(self.bodies, name)[..., group.first + rows]
-            for view in group.views:
-                view.begin()
+            group.moving.begin(group.motion.plugin)
             with self._blaming(group, group.motion, rows):
                 group.from_body(rows)
             for binding in group.walk():
+                binding.view.begin(binding.plugin)
                 opened = self._open_handles(group, binding, rows) if binding.handles else rows
-                binding.view.caller = binding.plugin
                 with self._blaming(group, binding, rows):
                     binding.plugin.spawn(binding.view, opened)
 

@@ -322,8 +322,7 @@ class Simulation:
         self.take_over_moves(0.0)
 
     def _start(self, referee: Referee, view: WorldView) -> None:
-        view.begin()
-        view.caller = referee.plugin
+        view.begin(referee.plugin)
         try:
             referee.plugin.start(view)
         except Exception as error:
@@ -429,7 +428,7 @@ class Simulation:
         for group in self.population.groups:
             mine = rows[(rows >= group.first) & (rows < group.last)] - group.first
             if len(mine):
-                group.moving.phase = phase
+                group.moving.begin(group.motion.plugin, phase)
                 try:
                     group.from_body(mine)
                 except Exception as error:

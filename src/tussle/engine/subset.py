@@ -108,7 +108,6 @@ def call_referee(
     sub_view.deaths, sub_view.moved, sub_view.births = [], [], []
     sub_view.only = worlds
     sub_view.reset(sub_bodies, 0, len(rows))
-    sub_view.caller = referee.plugin
     sub = copy.copy(referee)
     sub.plugin = object.__new__(type(referee.plugin))
     sub.plugin.__dict__.update(referee.plugin.__dict__)

@@ -139,7 +139,7 @@ class Watch:
             keys = [v for k, v in given.items() if k not in {"self", "label", "law", "k"}]
             of = [v.other.tobytes() if isinstance(v, Pairs) else np.asarray(v).tobytes() for v in keys]
             key, now = (
-                (label, getattr(view.caller, "instance_name", ""), step, view.substep, *of),
+                (label, getattr(view._caller, "instance_name", ""), step, view.substep, *of),
                 (hook, self.calls),
             )
             first = self.drawn.setdefault(key, now)

@@ -7,7 +7,7 @@ import pytest
 from small_worlds import Drift, block, mission
 
 from tussle import Simulation
-from tussle.api import Autonomy, Behavior, Interaction, Param, Publish
+from tussle.api import Autonomy, Behavior, Children, Interaction, Output, Param, Publish, State
 from tussle.errors import PluginError
 from tussle.messages import Waypoint
 from tussle.stock import (
@@ -185,6 +185,33 @@ def test_motor_schemas_write_the_same_as_a_velocity():
     assert fly() == pytest.approx([1.0, 2.0, -3.0])
     assert fly(add_lower_bound_to_vz=True) == pytest.approx([1.0, 2.0, -1.0])
     assert fly(add_lower_bound_to_vz=True, vz_lower_bound=-2.5) == pytest.approx([1.0, 2.0, -2.5])
+
+
+def test_each_behaviour_draws_its_own_numbers_and_so_does_who_steps_them():
+    class Gambler(Behavior):
+        def step(self, g):
+            self.wish[:] = g.uniform("dice", 3)
+
+    class Nest(Autonomy):
+        inner = Children(Behavior)
+        drawn = State("x y z")
+        velocity = Output("velocity_x velocity_y velocity_z", unit="m/s")
+
+        def step(self, g):
+            for behavior in self.inner:
+                g.step(behavior)
+            self.drawn[:] = g.uniform("dice", 3)
+
+    def drawn(autonomy, path):
+        sim = Simulation(mission(block(autonomy=autonomy)))
+        sim.step()
+        return sim.read(path)[0][0, 0].tolist()
+
+    nest = Nest(inner=[Gambler(), Gambler(name="other")])
+    first, second = drawn(nest, "a.Nest.Gambler.wish"), drawn(nest, "a.Nest.other.wish")
+    assert first != second
+    assert first == drawn(Nest(inner=[Gambler()]), "a.Nest.Gambler.wish")
+    assert drawn(nest, "a.Nest.drawn") == drawn(Nest(), "a.Nest.drawn")
 
 
 def avoiding(*others, **values):

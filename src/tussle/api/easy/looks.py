@@ -81,7 +81,7 @@ class Look:
         self.mine, self.truth = Columns(g), Columns(g.bodies)
         self.search, self.draws = Search(g), Draws(g, g.n)
         self.heard: dict[str, Any] = {}
-        _, _, id_row, id_start = g.table_bodies.layout()
+        _, _, id_row, id_start = g._bodies.layout()
         self.id_row: Any = memoryview(id_row)  # type: ignore[arg-type]
         self.id_start: list[int] = id_start.tolist()
         self.everyone = [plugin.me_type(self, row, world) for row, world in enumerate(g.world.tolist())]

@@ -145,7 +145,7 @@ class OneWorld:
     def entities(self) -> list[Member]:
         """All entities of this world, by id."""
         if self._members is None:
-            look, (rows, start, _, _) = self._look, self._look.g.table_bodies.layout()
+            look, (rows, start, _, _) = self._look, self._look.g._bodies.layout()
             mine = rows[start[self._row] : start[self._row + 1]].tolist()
             member = look.plugin.world_types[1]
             ids = look.truth["id"]

@@ -31,14 +31,12 @@ class MotorSchemas(Autonomy):
         total = np.zeros((3, g.n))
         weight = np.zeros(g.n)
         for behavior in self.behaviors:
-            g.caller = behavior
-            behavior.step(g)
+            g.step(behavior)
             wish = behavior.wish
             length = np.sqrt(wish[0] * wish[0] + wish[1] * wish[1] + wish[2] * wish[2])
             shorter = np.minimum(1.0, self.max_speed / np.where(length > 0.0, length, 1.0))
             total += behavior.gain * shorter * wish
             weight += np.where(length > 0.0, behavior.gain, 0.0)
-        g.caller = self
         wished = weight > 0.0
         v = np.where(wished, total / np.where(wished, weight, 1.0), self.max_speed * g.forward)
         self.desired_heading[:] = atan2(v[1], v[0])

@@ -6,26 +6,25 @@ import math
 
 import numpy as np
 
-from tussle.neighbors.kernels import row_of
 from tussle.neighbors.search import DIFFERENT, SAME, TABLE, in_range, nearest_places, table_of
 from tussle.numeric import atan2, wrap
 from tussle.numeric.kernel import kernel
 
 
-@kernel(f"(F F F F) (I I) B (Iw Iw Iw Iw) (I I I I I I) i8 {TABLE} -> i8")
+@kernel(f"(F F F F) (I I) B (Iw Iw Iw Iw) (I I I I) i8 {TABLE} -> i8")
 def hunt(points, teams, allow_switching, out, rows, first, arrays):
     """Choose targets and collect claims for the rows of a group that begins at row `first` of the table.
 
     By row of the group (n,): points x, y, z and capture_range [m]; own team and prey_team; allow_switching; target, the id hunted
-    or 0, is kept while it lives and switching is not allowed, else becomes the nearest of prey_team (of equals the smaller id);
-    target_row is its row of the table or -1. rows: by row of the table id, world and place; id_row[id_start[w] + i] is the row of
-    id i of world w; order. Claims, everyone of another team nearer than capture_range: claim_row (row of the group) and
-    claim_place, which becomes the row of the table, as far as there is room. Returns how many claims there are.
+    or 0, and target_row, its row of the table or -1, are kept while it lives and switching is not allowed, else become those of the
+    nearest of prey_team (of equals the smaller id). rows: by row of the table id, world and place; order. Claims, everyone of another
+    team nearer than capture_range: claim_row (row of the group) and claim_place, which becomes the row of the table, as far as there
+    is room. Returns how many claims there are.
     """
     x, y, z, capture_range = points
     own_team, prey_team = teams
     target, target_row, claim_row, claim_place = out
-    row_id, row_world, place, id_row, id_start, order = rows
+    row_id, row_world, place, order = rows
     table = table_of(arrays)
     best, ranks, places = np.empty(1), np.empty(1, np.int64), np.empty(1, np.int64)
     n_claims = 0
@@ -34,7 +33,7 @@ def hunt(points, teams, allow_switching, out, rows, first, arrays):
         row = first + i
         w = row_world[row]
         me = place[row]
-        found = row_of(w, target[i], id_row, id_start)
+        found = target_row[i]
         if found < 0 or allow_switching[i]:
             nearest_places(w, me, x[i], y[i], z[i], SAME, float(prey_team[i]), table, best, ranks, places, 1)
             found = order[places[0]] if places[0] >= 0 else -1

@@ -33,11 +33,10 @@ class Predator(Autonomy):
     def step(self, g: GroupView) -> None:
         index = g.any_index()
         bodies = g.bodies
-        _, _, id_row, id_start = g.table_bodies.layout()
         pos = x, y, z = g.components("pos")
-        rows = bodies.id, index.row_world, index.place, id_row, id_start, index.order
+        rows = bodies.id, index.row_world, index.place, index.order
         table = (*index.table, g.by_place(index, "team")[0])
-        target_row = np.empty(g.n, np.int64)
+        target_row = g.rows_of(self.target)
         room, n_claims = 0, 16 * g.n + 64
         while (
             n_claims > room
@@ -48,10 +47,11 @@ class Predator(Autonomy):
                 (x, y, z, self.capture_range), (g.team, self.prey_team_id), self.allow_prey_switching,
                 (self.target, target_row, claim_row, claimed), rows, g.first, table,
             )  # fmt: skip
-        if not self.wired.isdisjoint(("speed", "turn_rate", "pitch_rate")):
+        wired = self.wired
+        if "speed" in wired or "turn_rate" in wired or "pitch_rate" in wired:
             commands = self.speed, self.turn_rate, self.pitch_rate
             kernels.pursue(pos, g.components("quat"), self.max_speed, target_row, bodies.pos, commands)
-        if not self.wired.isdisjoint(("desired_heading", "desired_speed")):
+        if "desired_heading" in wired or "desired_speed" in wired:
             kernels.point(
                 x, y, self.max_speed, target_row, bodies.pos, self.desired_heading, self.desired_speed
             )
