@@ -391,7 +391,7 @@ class Topic(Column):
     Args:
         message: The message type.
         topic: Name; the type's name unless given.
-        network: Instance name of the network that carries it.
+        network: Instance name of the network that carries it; by default the one that reaches everyone.
         topic_param: Name of a text Param of the plugin that holds the topic's name.
         network_param: Name of a text Param of the plugin that holds the network's name.
         doc: One line that says what it is.
@@ -402,7 +402,7 @@ class Topic(Column):
         message: type,
         *,
         topic: str = "",
-        network: str = "GlobalNetwork",
+        network: str = "",
         topic_param: str = "",
         network_param: str = "",
         doc: str = "",

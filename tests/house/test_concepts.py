@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import ast
+
+import pytest
+from tree import ROOT, python_files, relative
+
 from tussle import Block, Mission, Simulation
 from tussle.api import Autonomy, Interaction, MotionModel
-from tussle.stock import Still
+from tussle.stock import Still, manifest
 
 GONE = ("caller", "table_bodies", "integrator", "active_outputs")
 
@@ -24,3 +29,37 @@ def test_what_doubled_another_name_is_gone():
     Simulation(game).step()
     assert len(given) == 4
     assert not [(name, thing) for name in GONE for thing in given if hasattr(thing, name)]
+
+
+NAMELESS = ("src/tussle/columns.py", "src/tussle/mission/", "src/tussle/engine/", "src/tussle/api/")
+
+
+def names_in(text: str) -> set[str]:
+    """Identifiers, and texts that are one name, such as a key or a default; examples in sentences are not."""
+    tree = ast.walk(ast.parse(text))
+    return {
+        str(getattr(node, "id", None) or getattr(node, "attr", None) or getattr(node, "value", None))
+        for node in tree
+        if isinstance(node, (ast.Name, ast.Attribute, ast.Constant))
+    }
+
+
+@pytest.mark.parametrize(
+    "path", [f for f in python_files("src") if relative(f).startswith(NAMELESS)], ids=relative
+)
+def test_what_is_for_all_plugins_names_none(path):
+    assert not names_in(path.read_text()) & set(manifest())
+
+
+def test_nor_do_the_tables_beside_it():
+    tables = [f for folder in NAMELESS[1:] for f in (ROOT / folder).glob("*.toml")]
+    assert not [f for f in tables if any(f'"{name}"' in f.read_text() for name in manifest())]
+
+
+def test_the_rule_sees_names():
+    assert names_in('x = Boids(); y = stock.Predator; z = {"CPA": 1}; w = "as Still does"') >= {
+        "Boids",
+        "Predator",
+        "CPA",
+    }
+    assert "Still" not in names_in('w = "as Still does"')

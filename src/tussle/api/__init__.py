@@ -25,7 +25,7 @@ from tussle.api.kinds import (
 )
 from tussle.api.laws import neighbors, together
 from tussle.api.motion import MotionBody, MotionModel
-from tussle.api.plugin import Plugin, service
+from tussle.api.plugin import HistoricAttributes, Plugin, service
 from tussle.api.world import WorldView
 from tussle.columns import (
     Children,
@@ -63,6 +63,7 @@ __all__ = [
     "Field",
     "GroupView",
     "Handle",
+    "HistoricAttributes",
     "Input",
     "Interaction",
     "Me",

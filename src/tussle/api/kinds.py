@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from tussle.api.plugin import Plugin
+from tussle.api.plugin import HistoricAttributes, Plugin
 from tussle.columns import Output, Param
 
 if TYPE_CHECKING:
@@ -104,6 +104,7 @@ class Network(WorldPlugin):
     """Carries messages between entities; abstract."""
 
     kind = "network"
+    historic_attributes = HistoricAttributes(least_zero=("comm_delay",))
     comm_delay = Param(0.0, unit="s", ge=0.0, doc="Time from sending to the earliest delivery.")
 
     def route(self, w: WorldView, messages: Any) -> Any:

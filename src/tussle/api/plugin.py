@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
@@ -31,6 +32,25 @@ GRADES = ("portable", "machine", "external")
 RESERVED = ("name", "rate")
 
 
+@dataclass(frozen=True)
+class HistoricAttributes:
+    """How a plugin's attributes in the existing system's mission files differ from its parameters.
+
+    Attributes:
+        renamed: Attribute -> parameter.
+        joined: Parameter -> the attributes that are its fields.
+        unread: Attributes that mean nothing here.
+        least_zero: Parameters that are 0 here where a negative number means "none" there.
+        differs: Parameter -> what is said where a file leaves it out, since its default is another one there.
+    """
+
+    renamed: Mapping[str, str] = field(default_factory=dict)
+    joined: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    unread: tuple[str, ...] = ()
+    least_zero: tuple[str, ...] = ()
+    differs: Mapping[str, str] = field(default_factory=dict)
+
+
 def service(method: F) -> F:
     """Mark a method that other plugins call by name with `g.call` or `w.call`."""
     method.__dict__["is_service"] = True
@@ -54,6 +74,9 @@ class Plugin:
 
     grade: ClassVar[str] = "machine"
     """What is promised of its bits: "portable", "machine" or "external"."""
+
+    historic_attributes: ClassVar[HistoricAttributes] = HistoricAttributes()
+    """How it is written in the existing system's mission files, where that is not by the names of its parameters."""
 
     columns: ClassVar[dict[str, Column]] = {}
     services: ClassVar[tuple[str, ...]] = ()

@@ -181,9 +181,7 @@ class WorldView(GroupView):
             return Batch.empty(type_)
         return topics[0].outbox() if len(topics) == 1 else Batch.concatenate([t.outbox() for t in topics])
 
-    def publish(
-        self, type_: type[Message], world: Any, network: str = "GlobalNetwork", **fields: Any
-    ) -> None:
+    def publish(self, type_: type[Message], world: Any, network: str = "", **fields: Any) -> None:
         """Send one message per item of `world` in the name of the world (sender 0)."""
         world = np.atleast_1d(np.asarray(world, np.int64))
         if len(world):

@@ -13,6 +13,7 @@ from tussle.engine.referees import Referee
 from tussle.errors import MissionError, PluginError, WiringError, listed, nearest_name
 from tussle.lists import RaggedColumn
 from tussle.messages import Batch, Message, SpawnEntity
+from tussle.stock import ALWAYS_THERE
 
 if TYPE_CHECKING:
     from tussle.engine.simulation import Simulation
@@ -38,6 +39,7 @@ class Mail:
         Raises:
             WiringError: There is no such network, or the topic carries another type.
         """
+        network = network or ALWAYS_THERE[0]
         if network not in self.names:
             raise WiringError(
                 f"{where}: topic {name!r} is on network {network!r}{nearest_name(network, self.names)}; {listed(self.names)}"

@@ -473,7 +473,7 @@ class Simulation:
         type_: type[Message],
         worlds: Iterable[int] | None = None,
         *,
-        network: str = "GlobalNetwork",
+        network: str = "",
         topic: str = "",
         **fields: Any,
     ) -> None:
@@ -484,7 +484,7 @@ class Simulation:
         Args:
             type_: The message type.
             worlds: Worlds that it is said in; by default all that are running.
-            network: The network that carries it.
+            network: The network that carries it; by default the one that reaches everyone.
             topic: By default the type's name.
             **fields: Of the message; one value, or one per world along the last axis.
 

@@ -33,12 +33,7 @@ KINDS: dict[str, type] = {
 @cache
 def historic() -> dict[str, Any]:
     """What is known of the existing system's plugins."""
-    return tomllib.loads((Path(__file__).parent / "historic.toml").read_text(encoding="utf-8"))
-
-
-def historic_names() -> set[str]:
-    """Names of all plugins of the existing system."""
-    return {name for names in historic()["plugins"].values() for name in names}
+    return tomllib.loads((Path(stock.__file__).parent / "historic.toml").read_text(encoding="utf-8"))
 
 
 class AbsentPluginError(MissionError):
@@ -95,7 +90,7 @@ class Catalogue:
             MissionError: There is none, or its module cannot be imported.
         """
         if name not in self._offers:
-            if name in historic_names():
+            if name in historic()["plugins"]["names"]:
                 raise AbsentPluginError(f"{name} is not in tussle yet")
             raise MissionError(
                 f"there is no plugin {name[:80]!r}{nearest_name(name[:80], self.names)}; `tussle plugins` lists them, "

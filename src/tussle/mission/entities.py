@@ -309,7 +309,7 @@ class EntityReader:
     def _motion(self, fields: Fields, taken: set[str]) -> Any:
         if fields.has("motion_model"):
             return self.plugins.make(Written.of(fields.found["motion_model"]), taken)
-        still = Written("motion_model", "Still", {}, lambda _: fields.node.place)
+        still = Written("motion_model", ENTITY["motion_model"].default, {}, lambda _: fields.node.place)
         return self.plugins.make(still, taken)
 
     def _base(self, node: Node, team: int) -> None:

@@ -78,8 +78,8 @@ class PluginReader:
         self._add_shared(written)
         name, rate = self._name(written, taken), self._rate(written)
         values: dict[str, Any] = {}
-        known, is_right = _Attributes.of(cls), True
-        self._join(written, known)
+        known, is_right = cls.historic_attributes, True
+        self._join(written, cls)
         for attribute, text in written.attributes.items():
             if attribute in PLUGIN:
                 continue
@@ -91,8 +91,8 @@ class PluginReader:
                     self._say(written.where(attribute), cls, parameter, error)
                     is_right = False
             else:
-                self._not_a_parameter(written, cls, attribute, known)
-        for attribute, text in historic()["differs"].get(cls.__name__, {}).items():
+                self._not_a_parameter(written, cls, attribute)
+        for attribute, text in known.differs.items():
             if attribute not in values:
                 self.problems.note(written.where(""), text)
         if not is_right:
@@ -174,18 +174,18 @@ class PluginReader:
             return None
         return rate or None
 
-    def _join(self, written: Written, known: _Attributes) -> None:
+    def _join(self, written: Written, cls: type[Plugin]) -> None:
         """Put attributes that are components of one parameter into it."""
-        for parameter, parts in known.joined.items():
+        for parameter, parts in cls.historic_attributes.joined.items():
             if any(part in written.attributes for part in parts):
-                column = known.cls.params()[parameter]
+                column = cls.params()[parameter]
                 components = zip(parts, column.default, strict=True)
                 text = ", ".join(written.attributes.pop(part, repr(default)) for part, default in components)
                 written.attributes.setdefault(parameter, text)
 
     def _value(self, cls: type[Plugin], parameter: str, text: str, written: Written, depth: int) -> Any:
         if parameter not in cls.children():
-            if parameter in _Attributes.of(cls).least_zero and text.strip().startswith("-"):
+            if parameter in cls.historic_attributes.least_zero and text.strip().startswith("-"):
                 text = "0"
             return codecs.param(text, cls.params()[parameter], self.from_geodetic)
         if depth >= MOST_NESTED:
@@ -198,10 +198,8 @@ class PluginReader:
         ]
         return [plugin for plugin in made if plugin is not None]
 
-    def _not_a_parameter(
-        self, written: Written, cls: type[Plugin], attribute: str, known: _Attributes
-    ) -> None:
-        viewer, place = historic()["viewer"], written.where(attribute)
+    def _not_a_parameter(self, written: Written, cls: type[Plugin], attribute: str) -> None:
+        viewer, place, known = historic()["viewer"], written.where(attribute), cls.historic_attributes
         if attribute.startswith(tuple(viewer["prefixes"])) or attribute in viewer["names"]:
             self.drawn[f"{written.plugin}@{attribute}"] = written.attributes[attribute]
         elif attribute in known.unread or attribute in historic()["unread"]["names"]:
@@ -214,25 +212,3 @@ class PluginReader:
         name = f"{cls.__name__}.{parameter}"
         text = str(error)
         self.problems.error(place, text if text.startswith(name) else f"{name}: {text}")
-
-
-@dataclass(frozen=True)
-class _Attributes:
-    """How a class's attributes differ from its parameters."""
-
-    cls: type[Plugin]
-    renamed: Mapping[str, str]
-    joined: Mapping[str, list[str]]
-    unread: tuple[str, ...]
-    least_zero: tuple[str, ...]
-
-    @classmethod
-    def of(cls, plugin: type[Plugin]) -> _Attributes:
-        table = historic()["attributes"].get(plugin.__name__, {})
-        return cls(
-            plugin,
-            {k: v for k, v in table.get("renamed", {}).items() if v in plugin.params()},
-            {k: v for k, v in table.get("joined", {}).items() if k in plugin.params()},
-            tuple(table.get("unread", ())),
-            tuple(table.get("least_zero", ())),
-        )

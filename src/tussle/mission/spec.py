@@ -23,8 +23,6 @@ T = TypeVar("T")
 END_CONDITIONS = ("time", "one_team", "all_dead", "none")
 UPDATES = ("synchronous", "sequential")
 PLACEMENTS = ("normal", "uniform")
-ALWAYS_THERE = ("GlobalNetwork", "LocalNetwork")
-"""Networks of every mission: from everyone to everyone, and within one entity."""
 
 
 def _numbers(where: str, value: Any, unit: str, n: int) -> tuple[float, ...]:
@@ -324,7 +322,7 @@ class Mission:
         for name, kind in (("interactions", Interaction), ("metrics", Metric), ("networks", Network)):
             _set(self, name, _plugins(f"mission: {name}", getattr(self, name), kind))
         given = [p.instance_name for p in self.networks]
-        missing = tuple(stock.load(n)() for n in ALWAYS_THERE if n not in given)
+        missing = tuple(stock.load(n)() for n in stock.ALWAYS_THERE if n not in given)
         _set(self, "networks", (*missing, *self.networks))
         _plugins("mission", self.world_plugins, object)
         for plugin in self.world_plugins:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from tussle import stock
+
 
 class Known(NamedTuple):
     """A tag or attribute.
@@ -148,7 +150,7 @@ ENTITY = {
     "generate_time_variance": Known("Standard deviation of the time between births.", "0", "s", bound=">= 0"),
     "autonomy": Known("An autonomy; several act in the order of the file.", "none", reads="text"),
     "controller": Known("A controller; several stand one behind the other.", "none", reads="text"),
-    "motion_model": Known("The motion model.", "Still", reads="text"),
+    "motion_model": Known("The motion model.", stock.UNMOVED, reads="text"),
     "sensor": Known("A sensor; several.", "none", reads="text"),
     "base": Known("A home of the team; its tags are below.", "none", reads="text"),
     "connect_entity": Known("0 left wires unchecked; here they are always checked.", "1", reads="text"),

@@ -11,6 +11,11 @@ from typing import Any
 
 from tussle.errors import ParameterError, listed, nearest_name
 
+ALWAYS_THERE = ("GlobalNetwork", "LocalNetwork")
+"""Networks of every mission: from everyone to everyone, which carries what names no other, and within one entity."""
+UNMOVED = "Still"
+"""The motion model of an entity that a mission file gives none."""
+
 
 @cache
 def manifest() -> dict[str, str]:

@@ -23,7 +23,7 @@ from tussle.columns import Channel, Topic
 from tussle.engine.simulation import Simulation
 from tussle.engine.wiring import BELIEF, read_channels
 from tussle.mission import Block, Mission
-from tussle.stock import GlobalNetwork, MotorSchemas
+from tussle.stock import ALWAYS_THERE, GlobalNetwork, MotorSchemas
 from tussle.testing.partners import (
     Driver,
     Reaper,
@@ -120,6 +120,7 @@ def _topics(plugin: Any) -> tuple[set[Any], set[Any]]:
         assert isinstance(column, Topic), name
         topic = plugin.values[column.topic_param] if column.topic_param else column.topic
         network = plugin.values[column.network_param] if column.network_param else column.network
+        network = network or ALWAYS_THERE[0]
         (hears if isinstance(column, Publish) else says).add(
             (column.message, topic or column.message.__name__, network)
         )

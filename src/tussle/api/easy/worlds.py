@@ -195,7 +195,7 @@ class OneWorld:
         first, last = np.searchsorted(batch.world, (self._row, self._row + 1)).tolist()
         return [Heard(self, batch, i) for i in range(first, last)]
 
-    def publish(self, type_: type[Message], network: str = "GlobalNetwork", **fields: Any) -> None:
+    def publish(self, type_: type[Message], network: str = "", **fields: Any) -> None:
         """Send a message in the name of the world; fields that refer to entities take entities."""
         self._look.g.publish(type_, self._row, network, **plain(fields))
 

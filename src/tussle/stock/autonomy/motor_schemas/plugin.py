@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tussle.api import Autonomy, Behavior, Children, GroupView, Output, Param, service
+from tussle.api import Autonomy, Behavior, Children, GroupView, HistoricAttributes, Output, Param, service
 from tussle.numeric import atan2
 
 
@@ -17,6 +17,13 @@ class MotorSchemas(Autonomy):
     """
 
     grade = "portable"
+    historic_attributes = HistoricAttributes(
+        unread=("state_topic_name", "network_name", "pub_vel_vec"),
+        differs={
+            "behaviors": "MotorSchemas without behaviors flies straight on; "
+            "in the existing system it then avoids others and goes to (100, 0, 0)"
+        },
+    )
 
     max_speed = Param(21.0, unit="m/s", gt=0.0, doc="Longest wish, and speed when there is none.")
     add_lower_bound_to_vz = Param(False, doc="Bound the vertical part of the wanted velocity from below.")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tussle.api import Behavior, GroupView, Param, State, Subscribe, unit
+from tussle.api import Behavior, GroupView, HistoricAttributes, Param, State, Subscribe, unit
 from tussle.messages import Waypoint
 
 AHEAD = 1e6  # [m]
@@ -19,6 +19,9 @@ class MoveToGoalMS(Behavior):
     """Wish towards the goal, at a speed that a PID on the distance gives; a `Waypoint` message replaces the goal."""
 
     grade = "portable"
+    historic_attributes = HistoricAttributes(
+        joined={"distance_pid": ("p_gain", "i_gain", "d_gain", "integral_band")}
+    )
 
     goal = Param((0.0, 0.0, 0.0), fields="x y z", unit="m", doc="Where to.")
     use_initial_heading = Param(False, doc="The goal lies 1000 km ahead of where the entity begins.")

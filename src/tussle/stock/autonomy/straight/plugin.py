@@ -6,7 +6,18 @@ from typing import Any
 
 import numpy as np
 
-from tussle.api import Autonomy, GroupView, Handle, Output, Param, Publish, State, Subscribe, unit
+from tussle.api import (
+    Autonomy,
+    GroupView,
+    Handle,
+    HistoricAttributes,
+    Output,
+    Param,
+    Publish,
+    State,
+    Subscribe,
+    unit,
+)
 from tussle.messages import BoundaryShape, SpawnEntity
 from tussle.numeric import atan2
 from tussle.numeric.quaternion import quat_from_euler
@@ -23,6 +34,7 @@ class Straight(Autonomy):
     """
 
     grade = "portable"
+    historic_attributes = HistoricAttributes(unread=("save_camera_images",))
 
     speed = Param(21.0, unit="m/s", ge=0.0, doc="Wanted speed.")
     enable_boundary_control = Param(False, structural=True, doc="Turn back at a boundary.")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tussle.api import Interaction, Param, State, WorldView, service
+from tussle.api import HistoricAttributes, Interaction, Param, State, WorldView, service
 from tussle.messages import BoundaryCrossed, BoundaryShape
 from tussle.scene import Cuboid, Plane, Sphere
 
@@ -16,6 +16,10 @@ class Boundary(Interaction):
     """
 
     grade = "portable"
+    historic_attributes = HistoricAttributes(
+        renamed={"id": "boundary_id", "team_id": "team", "type": "shape"},
+        unread=("network_name", "polyhedron_points"),
+    )
 
     boundary_id = Param(0, structural=True, doc="Number that others know it by.")
     team = Param(0, structural=True, doc="Team that it belongs to.")

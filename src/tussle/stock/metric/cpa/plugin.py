@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tussle.api import Metric, Param, State, WorldView
+from tussle.api import HistoricAttributes, Metric, Param, State, WorldView
 
 
 class CPA(Metric):
@@ -17,6 +17,7 @@ class CPA(Metric):
     """
 
     grade = "portable"
+    historic_attributes = HistoricAttributes(unread=("ground_collisions",))
 
     team_cpa = Param(False, structural=True, doc="Only team mates count.")
     team_id = Param(0, structural=True, doc="Only entities of this team, when > 0.")

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from tussle.api import Input, MotionBody, MotionModel, Param, State
+from tussle.api import HistoricAttributes, Input, MotionBody, MotionModel, Param, State
 from tussle.numeric import cos, sin
 from tussle.stock.motion.unicycle import kernels
 
@@ -27,6 +27,12 @@ class Unicycle(MotionModel):
     """
 
     grade = "portable"
+    historic_attributes = HistoricAttributes(
+        differs={
+            "use_pitch": "Unicycle is steered in pitch here unless use_pitch='false' is written; "
+            "in the existing system only with use_pitch='true'"
+        }
+    )
 
     vel_max = Param(1.0, unit="m/s", ge=0.0, doc="Limit of the speed, forwards and backwards.")
     turn_rate_max = Param(1.0, unit="rad/s", ge=0.0, doc="Limit of the turn rate.")

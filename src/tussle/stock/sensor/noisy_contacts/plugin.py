@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from tussle.api import GroupView, Output, Param, Sensor, neighbors
+from tussle.api import GroupView, HistoricAttributes, Output, Param, Sensor, neighbors
 from tussle.stock.sensor.noisy_contacts import kernels
 
 PAIR = "mean sd"
@@ -24,6 +24,7 @@ class NoisyContacts(Sensor):
     """
 
     grade = "portable"
+    historic_attributes = HistoricAttributes(unread=("topic_name",))
 
     max_range = Param(math.inf, unit="m", ge=0.0, doc="Nobody further away is measured.")
     pos_noise_0 = Param((0.0, 5.0), fields=PAIR, unit="m", doc="Error of x: mean and standard deviation.")
