@@ -355,16 +355,31 @@ class EntityRef(Numbers):
 
 
 class Handle(Column):
-    """An opaque object per row: a process, a socket, a flight model (see `Plugin.open_one`).
+    """An opaque object per row: a process, a socket, a flight model.
+
+    Its plugin may have these methods:
+
+    * open_one(row): The object of a new row, which `row` names (world, id, seed, position); None without it.
+    * close_one(handle): Release one row's object; called exactly once for each that was opened.
+    * save_one(handle): Picklable state of one row's object. Without it snapshots are refused.
+    * load_one(row, state): An object like the one that was saved; `open_one` without it.
+    * ready(g): Whether what the objects stand for is ready for the next step; asked until true or until `ready_timeout`.
 
     Args:
         max_worlds: Largest stack of worlds that the objects allow; None is any.
+        ready_timeout: Longest wait for `ready` [s of wall time].
         doc: One line that says what it is.
     """
 
-    def __init__(self, max_worlds: int | None = None, doc: str = "") -> None:
+    def __init__(self, max_worlds: int | None = None, ready_timeout: float = 10.0, doc: str = "") -> None:
         super().__init__(doc=doc)
-        self.max_worlds = max_worlds
+        self.max_worlds, self.ready_timeout = max_worlds, ready_timeout
+
+    @staticmethod
+    def most_worlds(plugin: Any) -> int | None:
+        """The largest stack of worlds that all handles of a plugin allow; None is any."""
+        limits = [h.max_worlds for h in plugin.handles().values() if h.max_worlds is not None]
+        return min(limits, default=None)
 
 
 class Children(Column):

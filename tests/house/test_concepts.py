@@ -11,7 +11,16 @@ from tussle import Block, Mission, Simulation
 from tussle.api import Autonomy, Interaction, MotionModel
 from tussle.stock import Still, manifest
 
-GONE = ("caller", "table_bodies", "integrator", "active_outputs")
+GONE = (
+    "caller",
+    "table_bodies",
+    "integrator",
+    "active_outputs",
+    "ready_timeout",
+    "ready",
+    "open_one",
+    "most_worlds",
+)
 
 
 def test_what_doubled_another_name_is_gone():

@@ -190,11 +190,6 @@ class Plugin:
     def handles(cls) -> dict[str, Handle]:
         return cls.declared(Handle)
 
-    @classmethod
-    def most_worlds(cls) -> int | None:
-        """The largest stack of worlds that its handles allow; None is any."""
-        return min((h.max_worlds for h in cls.handles().values() if h.max_worlds is not None), default=None)
-
     # -- as data --------------------------------------------------------------------------------------------------------
 
     @property
@@ -284,35 +279,3 @@ class Plugin:
         raise AttributeError(
             f"{cls.__name__} has no {name!r}{nearest_name(name, allowed)}; {listed(cls.columns)}"
         )
-
-    # -- hooks that do nothing unless filled in ---------------------------------------------------------------------------
-
-    def open_one(self, row: Any) -> Any:
-        """Make the object that a Handle column holds for a new row; `row` names it (world, id, seed, position)."""
-        return None
-
-    def close_one(self, handle: Any) -> None:
-        """Release one row's object; called exactly once for each that was opened."""
-
-    def save_one(self, handle: Any) -> Any:
-        """Picklable state of one row's object, for snapshots.
-
-        Raises:
-            SnapshotError: Unless the plugin fills it in.
-        """
-        from tussle.errors import SnapshotError
-
-        raise SnapshotError(
-            f"{type(self).__name__} holds objects outside the arrays and cannot save them, so no snapshot can be taken"
-        )
-
-    def load_one(self, row: Any, state: Any) -> Any:
-        """An object like the one that was saved; the counterpart of `save_one`."""
-        return self.open_one(row)
-
-    def ready(self, g: Any) -> bool:
-        """Whether what the handles stand for is ready for the next step; asked until true or until `ready_timeout`."""
-        return True
-
-    ready_timeout: ClassVar[float] = 10.0
-    """Longest wait for `ready` [s of wall time]."""

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tussle.batch.tasks import Beat, Finished, Run
+from tussle.columns import Handle
 from tussle.engine.simulation import Simulation
 from tussle.errors import PluginError, TussleError
 
@@ -37,7 +38,7 @@ def stack_size(mission: Mission) -> int:
 def most_worlds(mission: Mission) -> int:
     """The largest stack that all plugins of a mission take part in."""
     plugins: list[Plugin] = [*mission.world_plugins, *(p for block in mission.blocks for p in block.plugins)]
-    return min([MOST, *(type(p).most_worlds() or MOST for p in plugins)])
+    return min([MOST, *(Handle.most_worlds(p) or MOST for p in plugins)])
 
 
 def play(mission: Mission, take: Take, size: int) -> Iterator[Finished | Beat]:

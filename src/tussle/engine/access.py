@@ -283,7 +283,13 @@ def snapshot(sim: Simulation) -> Snapshot:
 
 
 def _save_handles(binding: Binding) -> dict[str, list[bytes]]:
+    name, saves = type(binding.spec).__name__, hasattr(type(binding.spec), "save_one")
+
     def save(h: Any) -> bytes:
+        if h is not None and not saves:
+            raise SnapshotError(
+                f"{name} holds objects outside the arrays and cannot save them, so no snapshot can be taken"
+            )
         return pickle.dumps((h is not None, None if h is None else binding.plugin.save_one(h)))
 
     return {k: [save(h) for h in held] for k, held in binding.handles.items()}
@@ -338,7 +344,11 @@ def _load_handles(sim: Simulation, group: Group, outside: list[dict[str, list[by
             for row, data in enumerate(held):
                 about = sim.population.handle_row(group, binding, row)
                 is_open, state = pickle.loads(data)
-                binding.handles[name][row] = binding.plugin.load_one(about, state) if is_open else None
+                binding.handles[name][row] = _loaded(binding.plugin, about, state) if is_open else None
+
+
+def _loaded(plugin: Any, about: Any, state: Any) -> Any:
+    return plugin.load_one(about, state) if hasattr(type(plugin), "load_one") else plugin.open_one(about)
 
 
 # -- hash and result ----------------------------------------------------------------------------------------------------------------

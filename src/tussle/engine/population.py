@@ -13,7 +13,7 @@ import numpy as np
 
 from tussle.api.bodies import Bodies
 from tussle.api.context import Context
-from tussle.columns import Handle, Param
+from tussle.columns import Param
 from tussle.engine import failure, kernels
 from tussle.engine.group import Binding, Group
 from tussle.engine.params import Overrides
@@ -271,19 +271,18 @@ class Population:
     def _open_handles(self, group: Group, binding: Binding, rows: np.ndarray) -> np.ndarray:
         """Open what newborn rows hold outside the arrays; returns the rows with which that went well."""
         failed = []
-        for name, column in type(binding.spec).columns.items():
-            if isinstance(column, Handle):
-                for row in rows:
-                    about = self.handle_row(group, binding, int(row))
-                    try:
-                        binding.handles[name][row] = binding.plugin.open_one(about)
-                    except Exception as error:
-                        failed.append(row)
-                        where, step = f"{group.name} {about.id}", int(self.context.clock.step[about.world])
-                        self.on_failure(
-                            about.world,
-                            failure.raised(error, binding.plugin, where=where, step=step, world=about.world),
-                        )
+        for name in type(binding.spec).handles() if hasattr(type(binding.spec), "open_one") else ():
+            for row in rows:
+                about = self.handle_row(group, binding, int(row))
+                try:
+                    binding.handles[name][row] = binding.plugin.open_one(about)
+                except Exception as error:
+                    failed.append(row)
+                    where, step = f"{group.name} {about.id}", int(self.context.clock.step[about.world])
+                    self.on_failure(
+                        about.world,
+                        failure.raised(error, binding.plugin, where=where, step=step, world=about.world),
+                    )
         return np.setdiff1d(rows, failed) if failed else rows
 
     def _close_handles(self, gone: np.ndarray) -> None:
@@ -292,7 +291,7 @@ class Population:
                 for objects in binding.handles.values():
                     for i in np.flatnonzero(gone[group.first : group.last]):
                         held, objects[i] = objects[i], None
-                        if held is not None:
+                        if held is not None and hasattr(type(binding.spec), "close_one"):
                             self._close_one(group, binding, held)
 
     def _close_one(self, group: Group, binding: Binding, held: Any) -> None:

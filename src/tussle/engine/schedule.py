@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tussle.api.kinds import WorldPlugin
-from tussle.api.plugin import Plugin
 from tussle.columns import Subscribe
 from tussle.engine import failure
 from tussle.engine.group import Binding, Group
@@ -174,15 +173,16 @@ class Schedule:
 
     def _waits_for(self, group: Group, binding: Binding) -> Callable[[], None] | None:
         """What waits until all that a plugin's handles stand for is ready; None where it never waits."""
-        waiting = [b for b in binding.walk() if b.handles and type(b.spec).ready is not Plugin.ready]
+        waiting = [b for b in binding.walk() if b.handles and hasattr(type(b.spec), "ready")]
 
         def wait() -> None:
             for each in waiting:
-                limit = time.monotonic() + each.plugin.ready_timeout
+                longest = max(handle.ready_timeout for handle in type(each.spec).handles().values())
+                limit = time.monotonic() + longest
                 try:
                     while not each.plugin.ready(each.view):
                         if time.monotonic() > limit:
-                            raise PluginError(f"was not ready within {each.plugin.ready_timeout:g} s")
+                            raise PluginError(f"was not ready within {longest:g} s")
                         time.sleep(0.001)
                 except Exception as error:
                     raise failure.in_call(error, each.plugin, each.view, group) from error

@@ -15,6 +15,7 @@ from tussle.api.context import Context
 from tussle.api.kinds import Interaction, WorldPlugin
 from tussle.api.plugin import GRADES
 from tussle.api.world import WorldView
+from tussle.columns import Handle
 from tussle.engine import access, failure
 from tussle.engine.births import Births, Room, joined
 from tussle.engine.events import Herald
@@ -122,7 +123,7 @@ class Simulation:
         if on_error not in (None, "raise", "record"):
             raise ParameterError(f"on_error = {on_error!r} is not allowed; it is 'raise' or 'record'")
         for plugin in [*mission.world_plugins, *(p for b in mission.blocks for p in b.plugins)]:
-            most = type(plugin).most_worlds()
+            most = Handle.most_worlds(plugin)
             if most is not None and len(seeds) > most:
                 raise MissionError(
                     f"{plugin.instance_name} takes part in at most {most} worlds of one stack, not {len(seeds)}"

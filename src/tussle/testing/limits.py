@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from tussle.columns import Param
+from tussle.columns import Handle, Param
 from tussle.engine.simulation import Simulation
 from tussle.errors import ConformanceError, MissionError, PluginError
 from tussle.testing.game import Game
@@ -39,7 +39,7 @@ def check_limits(game: Game) -> None:
     """
     cls = type(game.plugin)
     cases = [Case("", None, "with the default parameters"), *_cases(game)]
-    most = cls.most_worlds() or len(cases)
+    most = Handle.most_worlds(cls) or len(cases)
     for first in range(0, len(cases), most):
         some = cases[first : first + most]
         try:

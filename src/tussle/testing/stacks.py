@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from tussle.api import Plugin
 from tussle.columns import Handle
 from tussle.engine.simulation import Simulation
 from tussle.testing.game import SEEDS, STEPS, Game
@@ -33,7 +32,7 @@ def check_stacks(game: Game, traces: Traces) -> None:
     Raises:
         ConformanceError: It is not.
     """
-    most = type(game.plugin).most_worlds()
+    most = Handle.most_worlds(game.plugin)
     for n, threads in STACKS:
         if most is not None and n > most:
             continue
@@ -51,7 +50,8 @@ def check_reset(game: Game, traces: Traces) -> None:
     Raises:
         ConformanceError: They do not, or do.
     """
-    if type(game.plugin).most_worlds() is not None and type(game.plugin).most_worlds() < 4:
+    most = Handle.most_worlds(game.plugin)
+    if most is not None and most < 4:
         return
     seeds = list(SEEDS[:4])
     with game.play(seeds) as sim:
@@ -81,9 +81,9 @@ def check_snapshot(game: Game, traces: Traces) -> None:
         ConformanceError: Another one does.
     """
     cls = type(game.plugin)
-    if any(isinstance(c, Handle) for c in cls.columns.values()) and cls.save_one is Plugin.save_one:
+    if cls.handles() and not hasattr(cls, "save_one"):
         return  # it holds objects outside the arrays and refuses, which is allowed
-    n = 3 if cls.most_worlds() is None else min(3, cls.most_worlds())
+    n = min(3, Handle.most_worlds(cls) or 3)
     seeds = list(SEEDS[:n])
     with game.play(seeds) as sim:
         sim.step(7)

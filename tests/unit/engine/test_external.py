@@ -250,10 +250,9 @@ class Slow(Autonomy):
     """Lets a step wait for the outside; counts how often it was asked, and its calls."""
 
     grade = "external"
-    ready_timeout = 300.0
     patience = Param(3)
     asked = State(dtype=int)
-    link = Handle()
+    link = Handle(ready_timeout=300.0)
     calls: ClassVar[list[int]] = []
 
     def open_one(self, row):
@@ -270,7 +269,7 @@ class Slow(Autonomy):
 
 
 class Hasty(Slow):
-    ready_timeout = 0.2
+    link = Handle(ready_timeout=0.2)
 
 
 def waiting(count=1, **values):
