@@ -13,7 +13,8 @@ import numpy as np
 from tussle.api.bodies import DERIVED, FLOATS, INTS
 from tussle.columns import Channel, Numbers, Param
 from tussle.errors import DeclarationError, listed, nearest_name
-from tussle.neighbors.walk import OTHER, PAIR, Law, make_walk
+from tussle.neighbors.law import OTHER, PAIR, Law
+from tussle.neighbors.walk import make_walk
 from tussle.numeric.kernel import Kernel
 from tussle.numeric.rk4 import label
 

@@ -25,19 +25,15 @@ def game(n=60, seed=0, tied=False):
 def run(s, team, first, target, switching, capture_range=4.0, room=5000):
     index = s.index(20.0)
     n = len(s.ids) - first
-    span = int(s.ids.max()) + 1
-    id_start = np.arange(N_WORLDS + 1) * span
-    id_row = np.full(N_WORLDS * span, -1)
-    id_row[id_start[s.world] + s.ids] = np.arange(len(s.ids))
-    target_row, claim_row, claim_other = (
-        np.zeros(n, np.int64),
-        np.zeros(room, np.int64),
-        np.zeros(room, np.int64),
+    row_of = {each: row for row, each in enumerate(zip(s.world.tolist(), s.ids.tolist(), strict=True))}
+    target_row = np.array(
+        [row_of.get(each, -1) for each in zip(s.world[first:].tolist(), target.tolist(), strict=True)]
     )
+    claim_row, claim_other = np.zeros(room, np.int64), np.zeros(room, np.int64)
     own = [axis[first:].copy() for axis in s.pos]
     n_claims = kernels.hunt(
         (*own, np.full(n, capture_range)), (team[first:], np.ones(n, np.int64)), np.full(n, switching),
-        (target, target_row, claim_row, claim_other), (s.ids, s.world, index.place, id_row, id_start, index.order), first,
+        (target, target_row, claim_row, claim_other), (s.ids, s.world, index.place, index.order), first,
         (*index.table, index.gather(team.astype(float))),
     )  # fmt: skip
     return target_row, n_claims, claim_row, claim_other, index

@@ -1,0 +1,403 @@
+"""The text of a walk's kernel: the pair loop, written for the laws that it runs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+from tussle.neighbors.law import OTHER, Law
+
+START = {"min": "np.inf", "max": "-np.inf", "nearest": "np.nan"}
+"""What a reduction of nobody is, other than 0."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """One law of a walk, ready to be written: contribution k of all is v_k for one pair and a_k over them.
+
+    Attributes:
+        law: The law.
+        at: Number of its first contribution, and of its function.
+        masks: Which of its contributions are masks.
+        can_skip: It returns None for some.
+    """
+
+    law: Law
+    at: int
+    masks: tuple[bool, ...]
+    can_skip: bool
+
+    @property
+    def reductions(self) -> list[tuple[int, str]]:
+        """Number and reduction of each contribution."""
+        return list(enumerate(self.law.reductions.values(), self.at))
+
+    @property
+    def counted(self) -> str:
+        """Mask of the lanes for which the pair counts."""
+        return f"inside & counts_{self.at}" if self.can_skip else "inside"
+
+    def begin(self) -> Iterator[str]:
+        """What stands before the loop over the candidates."""
+        if self.law.lists:
+            return
+        for k, reduction in self.reductions:
+            yield f"a_{k} = splat({START.get(reduction, '0.0')})"
+        if "mean" in self.law.reductions.values():
+            yield f"n_{self.at} = splat(0.0)"
+        if "nearest" in self.law.reductions.values():
+            yield f"best_{self.at}, best_id_{self.at} = splat(np.inf), splat(np.inf)"
+
+    def contributions(self) -> Iterator[str]:
+        """The call of the law."""
+        names = [f"v_{k}" for k, _ in self.reductions] + ([f"counts_{self.at}"] if self.can_skip else [])
+        yield f"{', '.join(names)}, = law_{self.at}({', '.join(f'{name}_' for name in self.law.arguments)})"
+        for (k, reduction), is_mask in zip(self.reductions, self.masks, strict=True):
+            if reduction == "count" and not is_mask:
+                yield f"v_{k} = truth(v_{k})"
+            if reduction != "count" and is_mask:
+                yield f"v_{k} = number(v_{k})"
+
+    def step(self) -> Iterator[str]:
+        """One candidate."""
+        at = self.at
+        yield from self.contributions()
+        yield f"ok = {self.counted}"
+        if self.law.lists:
+            yield from self.append()
+            return
+        if "nearest" in self.law.reductions.values():
+            nearer = f"(distance_squared_ == best_{at}) & (other_id_ < best_id_{at})"
+            yield f"closer = ok & ((distance_squared_ < best_{at}) | ({nearer}))"
+            yield f"best_{at} = choose(closer, distance_squared_, best_{at})"
+            yield f"best_id_{at} = choose(closer, other_id_, best_id_{at})"
+        if "mean" in self.law.reductions.values():
+            yield f"n_{at} = choose(ok, n_{at} + 1.0, n_{at})"
+        for k, reduction in self.reductions:
+            mask, value = "ok", f"a_{k} + v_{k}"
+            if reduction == "count":
+                mask, value = f"ok & v_{k}", f"a_{k} + 1.0"
+            elif reduction in ("min", "max"):
+                mask, value = f"ok & (v_{k} {'<' if reduction == 'min' else '>'} a_{k})", f"v_{k}"
+            elif reduction == "nearest":
+                mask, value = "closer", f"v_{k}"
+            yield f"a_{k} = choose({mask}, {value}, a_{k})"
+
+    def append(self) -> Iterator[str]:
+        """The pairs that count to the lists, as far as there is room."""
+        yield "hits = bits(ok)"
+        yield "if hits != 0:"
+        for k, _ in self.reductions:
+            yield f"    store(lane, (results_at + {k}) * LANES, v_{k})"
+        yield "while hits != 0:"
+        yield "    k = lowest(hits)"
+        yield "    hits &= hits - 1"
+        yield "    if n_listed < out[1].shape[1]:"
+        yield "        out[0][0, n_listed], out[0][1, n_listed] = order[queries[q0 + k]] - first, order[p]"
+        for k, _ in self.reductions:
+            yield f"        out[1][{k}, n_listed] = lane[(results_at + {k}) * LANES + k]"
+        yield "    n_listed += 1"
+
+    def begin_alone(self) -> Iterator[str]:
+        """What stands before the loop over one agent's neighbours."""
+        for k, reduction in self.reductions:
+            yield f"a_{k} = {START.get(reduction, '0.0')}"
+        yield f"n_{self.at} = 0"
+        if "nearest" in self.law.reductions.values():
+            yield f"best_{self.at}, best_id_{self.at} = np.inf, np.inf"
+
+    def step_alone(self, limit: int) -> Iterator[str]:
+        """Eight neighbours of one agent."""
+        at, values = self.at, [(k, r) for k, r in self.reductions if r != "count"]
+        yield f"hits = near_{limit} & {self.law.teams or 'all'}_"
+        yield "if hits != 0:"
+        yield from indented(1, self.contributions())
+        if self.can_skip:
+            yield f"    hits &= bits(counts_{at})"
+        yield f"    n_{at} += ones(hits)"
+        for k, reduction in self.reductions:
+            if reduction == "count":
+                yield f"    a_{k} += float(ones(hits & bits(v_{k})))"
+            else:
+                yield f"    store(lane, {k} * LANES, v_{k})"
+        if "nearest" in self.law.reductions.values():
+            yield "    store(lane, squares_at * LANES, distance_squared_)"
+            yield "    store(lane, (squares_at + 1) * LANES, other_id_)"
+        if not values:
+            return
+        yield "    while hits != 0:"
+        yield "        j = lowest(hits)"
+        yield "        hits &= hits - 1"
+        if "nearest" in self.law.reductions.values():
+            yield "        square, number = lane[squares_at * LANES + j], lane[(squares_at + 1) * LANES + j]"
+            yield f"        closer = square < best_{at} or (square == best_{at} and number < best_id_{at})"
+            yield "        if closer:"
+            yield f"            best_{at}, best_id_{at} = square, number"
+        for k, reduction in values:
+            value = f"lane[{k} * LANES + j]"
+            if reduction in ("sum", "mean"):
+                yield f"        a_{k} += {value}"
+                continue
+            sign = "<" if reduction == "min" else ">"
+            yield f"        if {'closer' if reduction == 'nearest' else f'{value} {sign} a_{k}'}:"
+            yield f"            a_{k} = {value}"
+
+    def end_alone(self) -> Iterator[str]:
+        """One agent's contributions to its row."""
+        for k, reduction in self.reductions:
+            if reduction == "mean":
+                yield f"a_{k} = a_{k} / n_{self.at} if n_{self.at} > 0 else 0.0"
+            yield f"out[{k}, i] = a_{k}"
+
+    def end(self) -> Iterator[str]:
+        """What stands behind the loop."""
+        for k, reduction in self.reductions:
+            if reduction == "mean":
+                yield f"a_{k} = choose(n_{self.at} > 0.0, a_{k} / n_{self.at}, 0.0)"
+
+
+class WalkText:
+    """The text of a walk's kernel.
+
+    Scratch `lane` holds groups of LANES numbers: the place of each lane, its own columns, its squared radii, then the results.
+
+    Args:
+        parts: The laws.
+        where: A condition of all of them.
+        n_out: Number of contributions.
+    """
+
+    def __init__(self, parts: Sequence[Part], where: Part | None, n_out: int) -> None:
+        self.parts, self.where, self.n_out = parts, where, n_out
+        every = [*parts, *([where] if where else [])]
+        names = dict.fromkeys(name for part in every for name in part.law.columns)
+        self.by_team = any(part.law.teams for part in parts)
+        names |= dict.fromkeys(("team", "other_team") if self.by_team else ())
+        self.own = tuple(name for name in names if not name.startswith(OTHER)) or ("team",)
+        self.other = tuple(
+            sorted(name for name in names if name.startswith(OTHER))
+        )  # components stand together
+        self.taken = [name for name in self.own if any(name in part.law.arguments for part in every)]
+        self.limits = list(dict.fromkeys(part.law.radii for part in parts))
+        self.lists = list(dict.fromkeys(part.law.teams for part in parts))
+        self.limits_at = 1 + len(self.taken)
+        self.results_at = self.limits_at + len(self.limits)
+        self.lists_pairs = parts[0].law.lists
+
+    def head(self) -> Iterator[str]:
+        """The kernel's arguments."""
+        yield "def walk(longs, points, other, own, out, first, part, most):"
+        yield "    cuts, spans, order = longs"
+        yield "    queries, block_first, span_first = cuts[0], cuts[1], cuts[2]"
+        yield "    span_start, span_end = spans[0], spans[1]"
+        for number, name in enumerate("qs"):
+            yield f"    {name}x, {name}y, {name}z = points[{number}][0], points[{number}][1], points[{number}][2]"
+        for number, name in enumerate(self.other):
+            yield f"    by_place_{name} = other[{number}]"
+        for number, name in enumerate(self.own):
+            yield f"    by_row_{name} = own[{number}]"
+        yield "    begin, stop = part"
+
+    def lines(self) -> Iterator[str]:
+        """The kernel that has agents in the lanes."""
+        yield from self.head()
+        yield f"    lane = np.empty({self.results_at + self.n_out} * LANES)"
+        kept = [*(["all"] if None in self.lists else []), *(["own", "other"] if self.by_team else [])]
+        lists = [
+            *(f"places_{each}" for each in kept),
+            *(f"near_{number}" for number in range(len(self.limits))),
+        ]
+        yield "    room = most + LANES"
+        yield f"    found = np.empty({len(lists)} * room, np.int64)"
+        for number, name in enumerate(lists):
+            yield f"    {name} = found[{number} * room : {number + 1} * room]"
+        yield f"    results_at, n_listed = {self.results_at}, 0"
+        yield "    for b in range(begin, stop):"
+        yield "        q0 = block_first[b]"
+        yield "        width = block_first[b + 1] - q0"
+        yield "        x, y, z = load(qx, q0), load(qy, q0), load(qz, q0)"
+        yield "        done = 0"
+        yield "        while done != (1 << width) - 1:"
+        yield from indented(3, self.take_lanes())
+        yield from indented(3, self.find_places())
+        yield from indented(3, self.load_lanes())
+        for teams in self.lists:
+            yield from indented(3, self.over(teams))
+        yield from indented(3, () if self.lists_pairs else self.put())
+        yield "            done |= taken"
+        if self.lists_pairs:
+            yield "    return n_listed"
+
+    def lines_alone(self) -> Iterator[str]:
+        """The kernel that has neighbours in the lanes; they are added one by one, in the order of the other kernel."""
+        every = [*self.parts, *([self.where] if self.where else [])]
+        names = sorted({name for part in every for name in part.law.names})
+        yield from self.head()
+        yield f"    squares_at = {self.n_out}"
+        yield "    lane = np.empty((squares_at + 2) * LANES)"
+        yield "    for b in range(begin, stop):"
+        yield "        for q in range(block_first[b], block_first[b + 1]):"
+        yield "            me = queries[q]"
+        yield "            i = order[me] - first"
+        for name in self.taken:
+            yield f"            {name}_ = splat(float(by_row_{name}[i]))"
+        for at, radii in enumerate(self.limits):
+            yield f"            limit2_{at} = {square(radii)}"
+        for part in self.parts:
+            yield from indented(3, part.begin_alone())
+        yield "            for s in range(span_first[b], span_first[b + 1]):"
+        yield "                for p in range(span_start[s], span_end[s], LANES):"
+        yield from indented(5, self.neighbors_alone(names))
+        for part in self.parts:
+            yield from indented(5, part.step_alone(self.limits.index(part.law.radii)))
+        for part in self.parts:
+            yield from indented(3, part.end_alone())
+
+    def neighbors_alone(self, names: Sequence[str]) -> Iterator[str]:
+        """Eight neighbours of one agent, and which of them there are, are of its team, and near enough."""
+        for axis in "xyz":
+            yield f"offset_{axis}_ = load(s{axis}, p) - q{axis}[q]"
+        yield "distance_squared_ = offset_x_ * offset_x_ + offset_y_ * offset_y_ + offset_z_ * offset_z_"
+        yield "all_ = (1 << min(LANES, span_end[s] - p)) - 1"
+        yield "if p <= me < p + LANES:"
+        yield "    all_ &= ~(1 << (me - p))"
+        for at in range(len(self.limits)):
+            yield f"near_{at} = bits(distance_squared_ < limit2_{at}) & all_"
+        yield f"if {' | '.join(f'near_{at}' for at in range(len(self.limits)))} == 0:"
+        yield "    continue"
+        if "distance" in names:
+            yield "distance_ = lanes_sqrt(distance_squared_)"
+        if "inverse_distance" in names:
+            yield "inverse_distance_ = inverse_sqrt(distance_squared_)"
+        for name in names:
+            if name.startswith(OTHER):
+                yield f"{name}_ = load(by_place_{name}, p)"
+        if self.where:
+            yield from self.where.contributions()
+            counts = f" & bits(counts_{self.where.at})" if self.where.can_skip else ""
+            yield f"all_ &= bits(v_{self.where.at}){counts}"
+        if self.by_team:
+            yield "own_ = all_ & bits(load(by_place_other_team, p) == float(by_row_team[i]))"
+            yield "other_ = all_ & ~own_"
+
+    def take_lanes(self) -> Iterator[str]:
+        """Columns of the lanes into `lane`; lanes that are not taken get a reach that nothing is within."""
+        active = "k < width"
+        if self.by_team:  # a block of several teams is walked once for each
+            yield "k = 0"
+            yield "while (done >> k) & 1:"
+            yield "    k += 1"
+            yield "wanted = by_row_team[order[queries[q0 + k]] - first]"
+            active = "(k < width) & (by_row_team[i] == wanted)"
+        yield "taken = 0"
+        yield "reach2 = 0.0"
+        yield "west, east, south, north, low, high = np.inf, -np.inf, np.inf, -np.inf, np.inf, -np.inf"
+        yield "for k in range(LANES):"
+        yield "    q = q0 + min(k, width - 1)"
+        yield "    i = order[queries[q]] - first"
+        yield f"    active = {active}"
+        yield "    lane[k] = queries[q]"
+        for at, name in enumerate(self.taken, 1):
+            yield f"    lane[{at} * LANES + k] = by_row_{name}[i]"
+        for at, radii in enumerate(self.limits):
+            yield f"    limit_{at} = {square(radii)} if active else -1.0"
+            yield f"    lane[{self.limits_at + at} * LANES + k] = limit_{at}"
+        yield "    if active:"
+        yield "        taken |= 1 << k"
+        for at in range(len(self.limits)):
+            yield f"        reach2 = max(reach2, limit_{at})"
+        yield "        west, east = min(west, qx[q]), max(east, qx[q])"
+        yield "        south, north = min(south, qy[q]), max(north, qy[q])"
+        yield "        low, high = min(low, qz[q]), max(high, qz[q])"
+
+    def find_places(self) -> Iterator[str]:
+        """Places near the lanes, of all, of their team, of other teams."""
+        spans = "span_first[b], span_first[b + 1], span_start, span_end, (sx, sy, sz)"
+        box = "(west, east, south, north, low, high), reach2"
+        if None in self.lists:
+            yield f"n_all = find_near({spans}, {box}, places_all)"
+        if self.by_team:
+            team = "by_place_other_team, float(wanted)"
+            yield f"n_own, n_other = find_teams({spans}, {team}, {box}, places_own, places_other)"
+
+    def load_lanes(self) -> Iterator[str]:
+        """What stays the same over the candidates."""
+        yield "me = load(lane, 0)"
+        for at, name in enumerate(self.taken, 1):
+            yield f"{name}_ = load(lane, {at} * LANES)"
+        for at in range(len(self.limits)):
+            yield f"limit2_{at} = load(lane, {self.limits_at + at} * LANES)"
+
+    def over(self, teams: str | None) -> Iterator[str]:
+        """Loops over the candidates of some teams, one for each radius; the first notes which are near enough for the others."""
+        parts = [part for part in self.parts if part.law.teams == teams]
+        limits = [n for n, radii in enumerate(self.limits) if any(part.law.radii == radii for part in parts)]
+        for number in limits:
+            inside = [part for part in parts if part.law.radii == self.limits[number]]
+            for part in inside:
+                yield from part.begin()
+            is_first = number == limits[0]
+            list_name = teams or "all"
+            places, count = f"near_{number}", f"n_near_{number}"
+            if is_first:
+                places, count = f"places_{list_name}", f"n_{list_name}"
+            rest = limits[1:] if is_first else []
+            for other in rest:
+                yield f"n_near_{other} = 0"
+            yield f"for c in range({count}):"
+            yield from indented(1, self.pair(places, number, teams, inside, rest))
+            for part in inside:
+                yield from part.end()
+
+    def pair(
+        self, places: str, number: int, teams: str | None, parts: list[Part], rest: list[int]
+    ) -> Iterator[str]:
+        """One candidate against eight agents."""
+        yield f"p = {places}[c]"
+        for axis in "xyz":
+            yield f"offset_{axis}_ = s{axis}[p] - {axis}"
+        yield "distance_squared_ = offset_x_ * offset_x_ + offset_y_ * offset_y_ + offset_z_ * offset_z_"
+        for other in rest:
+            yield f"near_{other}[n_near_{other}] = p"
+            yield f"n_near_{other} += bits(distance_squared_ < limit2_{other}) != 0"
+        taken = {name for part in [*parts, *([self.where] if self.where else [])] for name in part.law.names}
+        if "distance" in taken:
+            yield "distance_ = lanes_sqrt(distance_squared_)"
+        if "inverse_distance" in taken:
+            yield "inverse_distance_ = inverse_sqrt(distance_squared_)"
+        for name in sorted(taken):
+            if name.startswith(OTHER):
+                yield f"{name}_ = splat(by_place_{name}[p])"
+        me = "" if teams == "other" else " & (me != float(p))"
+        yield f"inside = (distance_squared_ < limit2_{number}){me}"
+        if self.where:
+            yield from self.where.contributions()
+            yield f"inside = {self.where.counted} & v_{self.where.at}"
+        for part in parts:
+            yield from part.step()
+
+    def put(self) -> Iterator[str]:
+        """Contributions of the lanes taken to their rows."""
+        for at in range(self.n_out):
+            yield f"store(lane, {self.results_at + at} * LANES, a_{at})"
+        yield "for k in range(LANES):"
+        yield "    if (taken >> k) & 1:"
+        yield "        i = order[queries[q0 + k]] - first"
+        yield f"        for at in range({self.n_out}):"
+        yield f"            out[at, i] = lane[({self.results_at} + at) * LANES + k]"
+
+
+def square(radii: tuple[str | float, ...]) -> str:
+    """Squared smallest of the radii of the row i."""
+    text = ""
+    for radius in radii:
+        value = (
+            f"by_row_{radius}[i]" if isinstance(radius, str) else repr(float(radius)).replace("inf", "np.inf")
+        )
+        text = f"min({text}, square_of({value}))" if text else f"square_of({value})"
+    return text
+
+
+def indented(depth: int, lines: Iterable[str]) -> Iterator[str]:
+    """The lines further in."""
+    return ("    " * depth + line for line in lines)
