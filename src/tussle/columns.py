@@ -8,15 +8,17 @@ read this one declaration.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
 
-from tussle import units
+from tussle import texts, units
 from tussle.errors import DeclarationError, ParameterError, UnitError
 
 PER = ("entity", "world", "team")
+MOST_INTEGER = 2**53
+"""Beyond it a double skips whole numbers."""
 
 
 class Column:
@@ -68,16 +70,21 @@ class Numbers(Column):
     Attributes:
         fields: Names of the components; empty for a column that is one number a row.
         units: Unit of each component.
+        text_units: Unit of a number without one in a text, of each component.
         dtype: float, int or bool.
         ragged: It is a list per row, of any length, of items with these components; its array is a `RaggedColumn`.
     """
 
-    def __init__(self, fields: str, unit: str, dtype: type, doc: str, ragged: bool = False) -> None:
+    def __init__(
+        self, fields: str, unit: str, dtype: type, doc: str, ragged: bool = False, text_unit: str = ""
+    ) -> None:
         super().__init__(doc=doc)
         self.ragged = ragged
         self.fields = _fields(fields, type(self).__name__)
         self.unit = unit
-        self.units = units.split_units(unit, max(1, len(self.fields)))
+        self.units, self.text_units = (
+            units.split_units(each, max(1, len(self.fields))) for each in (unit, text_unit or unit)
+        )
         for each in self.units:
             if not units.is_si(each):
                 raise DeclarationError(
@@ -92,6 +99,21 @@ class Numbers(Column):
     def shape(self) -> tuple[int, ...]:
         """Shape of one row's value, of a list of each item: () or (k,)."""
         return (len(self.fields),) if self.fields else ()
+
+    def read(self, text: str, from_geodetic: Callable[..., Any] | None = None) -> Any:
+        """What a text means here, in SI units, as a mission file writes it; see `Param.convert`.
+
+        Raises:
+            ParameterError: It is not written as values of this column are.
+        """
+        if len(text.replace(",", " ").split()) > texts.MOST_ITEMS:
+            raise ParameterError(f"{texts.shown(text)} has more than {texts.MOST_ITEMS:,} numbers")
+        parts = list(zip(self.fields or ("",), self.units, self.text_units, strict=True))
+        if self.ragged:
+            return texts.items(text, parts, bool(self.fields), from_geodetic)
+        if self.fields:
+            return texts.row(text, parts)
+        return texts.truth(text) if self.dtype is bool else units.parse(text, *parts[0][1:])
 
 
 class Param(Numbers):
@@ -132,8 +154,7 @@ class Param(Numbers):
         dtype: type = bool if isinstance(default, bool) else int if isinstance(default, int) else float
         if dtype is int and unit:
             dtype = float  # whoever writes Param(35, unit="m/s") does not mean that 35.5 is not a speed
-        super().__init__(fields, unit, dtype, doc, ragged)
-        self.text_units = units.split_units(text_unit or unit, max(1, len(self.fields)))
+        super().__init__(fields, unit, dtype, doc, ragged, text_unit)
         self.ge, self.gt, self.le, self.lt = ge, gt, le, lt
         self.choices = tuple(choices)
         self.structural = structural or self.is_text
@@ -158,78 +179,73 @@ class Param(Numbers):
         unit = f" in {self.unit}" if self.unit else ""
         return f"{kind}{unit}{' ' + text if text else ''}"
 
-    def convert(self, value: Any, where: str = "") -> Any:
-        """Value in SI units as plain Python, checked.
+    def read(self, text: str, from_geodetic: Callable[..., Any] | None = None) -> Any:
+        """As of any column of numbers; a text parameter is the text itself."""
+        return text.strip() if self.is_text and not self.ragged else super().read(text, from_geodetic)
+
+    def convert(self, value: Any, where: str = "", from_geodetic: Callable[..., Any] | None = None) -> Any:
+        """Value in SI units as plain Python, checked: a number is SI, a text is read as a mission file reads it, everywhere.
 
         Args:
-            value: A number (SI), a text as in a mission file ("40 kt", or "40" in `text_unit`), or for several fields a sequence.
+            value: A number; a text: "40 kt", "40" in `text_unit`, "1, 0.2, 1, 45" for several fields, "[ 0 1 ] [ 2 3 ]" for a list,
+                "true"; or a sequence of numbers and texts.
             where: Place for the message.
+            from_geodetic: Latitude, longitude [rad], altitude [m], (3,), to world positions [m], for rows of a text that begin with GPS.
 
         Raises:
             ParameterError: It has another type or unit, is not finite, or is out of bounds.
         """
+        if isinstance(value, str):
+            value = self._told(value, where, lambda: self.read(value, from_geodetic))
         if self.ragged:
-            if isinstance(value, str) or not isinstance(value, Iterable):
+            if not isinstance(value, Iterable):
                 raise self._error(where, value, f"a list of {self.allowed()}")
-            return tuple(
-                tuple(self._numbers(row, where)) if self.fields else self._number(row, 0, where)
-                for row in value
-            )
-        if self.fields:
-            return tuple(self._numbers(value, where))
-        return self._number(value, 0, where)
+            return tuple(self._item(item, where) for item in value)
+        return self._item(value, where)
 
-    def _numbers(self, value: Any, where: str) -> list[Any]:
-        values = [part.strip() for part in value.split(",")] if isinstance(value, str) else value
+    def _told(self, text: str, where: str, read: Callable[[], Any]) -> Any:
         try:
-            values = list(values)
+            return read()
+        except UnitError as error:
+            raise UnitError(f"{self._place(where)} = {text!r}: {error}") from None
+        except ParameterError as error:
+            if self.fields or self.ragged:
+                raise ParameterError(f"{self._place(where)} = {texts.shown(text)}: {error}") from None
+            raise self._error(where, text, self.allowed()) from None
+
+    def _item(self, value: Any, where: str) -> Any:
+        """One number, or one of each field."""
+        if not self.fields:
+            return self._number(value, 0, where)
+        try:
+            values = tuple(value)
         except TypeError:
-            raise self._error(where, value, f"{len(self.fields)} values ({', '.join(self.fields)})") from None
+            values = ()
         if len(values) != len(self.fields):
             raise self._error(where, value, f"{len(self.fields)} values ({', '.join(self.fields)})")
-        return [self._number(v, i, where) for i, v in enumerate(values)]
+        return tuple(self._number(v, i, where) for i, v in enumerate(values))
 
-    def _number(self, value: Any, component: int, where: str) -> Any:
+    def _number(self, value: Any, i: int, where: str) -> Any:
         if self.is_text:
             if not isinstance(value, str) or (self.choices and value not in self.choices):
                 raise self._error(where, value, self.allowed())
             return value
-        if self.dtype is bool:
-            return self._truth(value, where)
         if isinstance(value, str):
-            value = self._parsed(value, component, where)
-        if isinstance(value, (bool, np.bool_)) or not isinstance(
-            value, (int, float, np.integer, np.floating)
-        ):
+            text = value
+            value = self._told(text, where, lambda: units.parse(text, self.units[i], self.text_units[i]))
+        if self.dtype is bool and isinstance(value, (bool, np.bool_, int, float)) and value in (0, 1):
+            return bool(value)
+        if self.dtype is bool or isinstance(value, (bool, np.bool_)):
             raise self._error(where, value, self.allowed())
-        if self.dtype is int:
-            if not math.isfinite(value) or int(value) != value:
-                raise self._error(where, value, self.allowed())
-            number: float = int(value)
-        else:
-            number = float(value)
-        if math.isnan(number):
+        if not isinstance(value, (int, float, np.integer, np.floating)) or math.isnan(value):
             raise self._error(where, value, self.allowed())
+        is_inexact = isinstance(value, float) and not abs(value) <= MOST_INTEGER
+        if self.dtype is int and (is_inexact or int(value) != value):
+            raise self._error(where, value, self.allowed())
+        number = int(value) if self.dtype is int else float(value)
         if not self.is_within(number):
             raise self._error(where, value, self.allowed())
         return number
-
-    def _parsed(self, text: str, component: int, where: str) -> float:
-        try:
-            return units.parse(text, self.units[component], self.text_units[component])
-        except UnitError as error:
-            raise ParameterError(f"{self._place(where)} = {text!r}: {error}") from None
-        except ValueError:
-            raise self._error(where, text, self.allowed()) from None
-
-    def _truth(self, value: Any, where: str) -> bool:
-        if isinstance(value, (bool, np.bool_)):
-            return bool(value)
-        if isinstance(value, str) and value.strip().lower() in ("true", "false", "1", "0"):
-            return value.strip().lower() in ("true", "1")
-        if isinstance(value, (int, float)) and value in (0, 1):
-            return bool(value)
-        raise self._error(where, value, self.allowed())
 
     def is_within(self, number: float) -> bool:
         """Whether a number is within the bounds."""

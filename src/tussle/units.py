@@ -183,11 +183,12 @@ def _named(name: str) -> Unit:
     raise UnitError(f"{name!r} is not a unit{guess}; {listed(n for n in UNITS if n not in ('', '1'))}")
 
 
-def parse(value: str | float, unit: str, text_unit: str = "") -> float:
-    """A quantity in SI units.
+@lru_cache(maxsize=4096)
+def parse(text: str, unit: str, text_unit: str = "") -> float:
+    """A quantity in SI units; a mission that is read a thousand times has few texts that differ, so they are kept.
 
     Args:
-        value: A number, or a text such as "12", "40 kt", "-1.5e3 m".
+        text: Such as "12", "40 kt", "-1.5e3 m".
         unit: Unit that is wanted, and the unit of a number without one.
         text_unit: Unit of a number without one where that is historically another, such as "deg"; "" is `unit`.
 
@@ -198,26 +199,18 @@ def parse(value: str | float, unit: str, text_unit: str = "") -> float:
         UnitError: Its unit is unknown or measures something else.
         ParameterError: It is not a number, or is too large for one.
     """
-    return _parsed(value, unit, text_unit) if isinstance(value, str) else _in_si(value, unit, text_unit)
-
-
-def _in_si(value: str | float, unit: str, text_unit: str) -> float:
     wanted = unit_of(unit)
-    number, written = _split(value) if isinstance(value, str) else (float(value), "")
+    number, written = _split(text)
     name = written or text_unit or unit
     given = unit_of(name)
     if given.dimension != wanted.dimension:
-        raise UnitError(_mismatch(value if written else f"{value} {name}", name, unit))
-    if isinstance(number, float) and not math.isfinite(number):
+        raise UnitError(_mismatch(text if written else f"{text} {name}", name, unit))
+    if isinstance(number, float):  # infinite
         return number
     try:
-        return float(Fraction(number) * given.factor)
+        return float(number * given.factor)
     except OverflowError:
-        raise ParameterError(f"{value!r} is too large for a number") from None
-
-
-_parsed = lru_cache(maxsize=4096)(_in_si)
-"""The same for texts: a mission that is read a thousand times has few that differ."""
+        raise ParameterError(f"{text!r} is too large for a number") from None
 
 
 def _split(text: str) -> tuple[Fraction | float, str]:
@@ -232,7 +225,7 @@ def _split(text: str) -> tuple[Fraction | float, str]:
     return (float(number) if number.endswith("inf") else Fraction(number)), match["unit"].strip()
 
 
-def _mismatch(value: str | float, given: str, wanted: str) -> str:
+def _mismatch(value: str, given: str, wanted: str) -> str:
     allowed = spellings(wanted)
     if unit_of(wanted).dimension == NONE:
         return f"{value!r} has a unit; this is a plain number (or '%'), without unit"

@@ -14,10 +14,11 @@ from tussle.mission import codecs
 from tussle.mission.limits import Limits
 from tussle.mission.node import Budget, Node
 from tussle.mission.plugin_tags import PluginReader, Written
-from tussle.mission.problems import Place, Problems, shown
+from tussle.mission.problems import Place, Problems
 from tussle.mission.spec import PLACEMENTS, Block
 from tussle.mission.tags import BASE, ENTITY, ENTITY_ATTRIBUTES, MANY, Known
 from tussle.scene import Base, Origin
+from tussle.texts import FALSE, shown, truth
 
 MOST_TEAM = 2**31 - 1
 
@@ -125,7 +126,7 @@ class Fields:
         if name in self.found:
             try:
                 return codec(self.found[name].text)
-            except MissionError as error:
+            except TussleError as error:
                 self.problems.error(self.found[name].place, f"{name}: {error}")
         default = self.known[name].default
         return codec(default) if default and default != "none" else None
@@ -242,7 +243,7 @@ class EntityReader:
             self.problems.note(
                 fields.place("script_name"), "<script_name> is ignored: it belongs to JSBSim models"
             )
-        if fields.has("connect_entity") and fields.found["connect_entity"].text.lower() in codecs.FALSE:
+        if fields.has("connect_entity") and fields.found["connect_entity"].text.lower() in FALSE:
             self.problems.note(
                 fields.place("connect_entity"), "<connect_entity> is ignored: wires are always checked"
             )
@@ -281,7 +282,7 @@ class EntityReader:
             "variance": fields.vector("variance_x", "variance_y", "variance_z"),
             "half_width": fields.vector("half_width_x", "half_width_y", "half_width_z"),
             "heading_variance": fields.number("variance_heading", "rad^2"),
-            "scatter_first": fields.read("use_variance_all_ents", codecs.truth),
+            "scatter_first": fields.read("use_variance_all_ents", truth),
         }
 
     def _births(self, fields: Fields, count: int) -> dict[str, Any]:

@@ -11,8 +11,9 @@ from tussle.errors import MissionError, TussleError
 from tussle.mission import codecs
 from tussle.mission.catalogue import KINDS, AbsentPluginError, Catalogue, historic
 from tussle.mission.node import Budget, Node
-from tussle.mission.problems import Place, Problems, shown
+from tussle.mission.problems import Place, Problems
 from tussle.mission.tags import PLUGIN
+from tussle.texts import shown
 
 MOST_NESTED = 4
 """Behaviours in behaviours."""
@@ -169,7 +170,7 @@ class PluginReader:
                 raise MissionError(
                     f"{shown(text)} is not allowed; it takes a number of calls per second >= 0"
                 )
-        except MissionError as error:
+        except TussleError as error:
             self.problems.error(place, f"loop_rate: {error}")
             return None
         return rate or None
@@ -187,7 +188,7 @@ class PluginReader:
         if parameter not in cls.children():
             if parameter in cls.historic_attributes.least_zero and text.strip().startswith("-"):
                 text = "0"
-            return codecs.param(text, cls.params()[parameter], self.from_geodetic)
+            return cls.params()[parameter].convert(text, from_geodetic=self.from_geodetic)
         if depth >= MOST_NESTED:
             raise MissionError(f"plugins stand in one another more than {MOST_NESTED} deep")
         place = written.where(parameter)

@@ -7,8 +7,8 @@ from itertools import islice
 from typing import NamedTuple
 
 from tussle.errors import MissionError, listed, nearest_name
+from tussle.texts import LONGEST_SHOWN, shown
 
-LONGEST_SHOWN = 80
 MOST_LINES = 100
 """Errors told at once, and notes; a file with more is most likely not a mission."""
 
@@ -24,12 +24,6 @@ class Place(NamedTuple):
 
     def __str__(self) -> str:
         return f"{self.file}:{self.line}" if self.line else f"{self.file}, as set"
-
-
-def shown(text: str) -> str:
-    """A text from the file for a message, on one line and not longer than a message bears."""
-    flat = " ".join(text.split())
-    return repr(flat if len(flat) <= LONGEST_SHOWN else flat[:LONGEST_SHOWN] + "...")
 
 
 class Problems:

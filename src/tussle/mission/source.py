@@ -12,7 +12,8 @@ from pathlib import Path
 from tussle.errors import MissionError, listed, nearest_name
 from tussle.mission.node import Budget, Node, parse
 from tussle.mission.placeholders import replace_placeholders
-from tussle.mission.problems import Place, Problems, shown
+from tussle.mission.problems import Place, Problems
+from tussle.texts import shown
 
 LIBRARY = Path(__file__).parent / "library"
 XINCLUDE = "http://www.w3.org/2001/XInclude}"

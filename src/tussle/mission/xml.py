@@ -19,11 +19,12 @@ from tussle.mission.node import Budget, Node
 from tussle.mission.overrides import apply_path, split_overrides
 from tussle.mission.plugin_files import PluginFile
 from tussle.mission.plugin_tags import PluginReader
-from tussle.mission.problems import Place, Problems, shown
+from tussle.mission.problems import Place, Problems
 from tussle.mission.source import Reader, Source, find_mission
 from tussle.mission.spec import END_CONDITIONS, UPDATES, Mission
 from tussle.mission.tags import RUN, SEED_ATTRIBUTES, WORLD, Known
 from tussle.scene import Scene
+from tussle.texts import shown, truth
 
 SEED = re.compile(r"\d{1,20}", re.ASCII)
 PLUGIN_TAGS = {"entity_interaction": "interactions", "metrics": "metrics", "network": "networks"}
@@ -283,10 +284,10 @@ class _WorldReader:
         try:
             value: Any = node.text
             if known.reads == "truth":
-                value = codecs.truth(node.text)
+                value = truth(node.text)
             elif known.reads == "number":
                 value = codecs.number(node.text)
-        except MissionError as error:
+        except TussleError as error:
             self.problems.error(node.place, f"{name}: {error}")
             return
         into[name] = {"value": value, **node.attributes} if node.attributes else value

@@ -377,7 +377,7 @@ def test_all_that_is_wrong_is_told_at_once(files):
     assert found[5][0].startswith("count: '-3' is not allowed; it takes a whole number from 0")
     assert "'5 kt' is in kt, which cannot become m" in found[5][1]
     assert found[7] == ["Boids.max_speed = -1.0 is not allowed; it takes a finite number in m/s >= 0"]
-    assert found[8][0].startswith("Boids.comms_range: 'abc' is not a number")
+    assert found[8][0].startswith("Boids.comms_range = 'abc' is not allowed; it takes a finite number in m")
     assert set(found[9]) == {
         "motion_model JSBSimModel is not in tussle yet",
         "Boids does not go into controller; it goes into autonomy",

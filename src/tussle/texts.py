@@ -1,0 +1,114 @@
+"""What a text means where a value is wanted: one reading for mission files, settings, sweeps and Python."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from tussle import units
+from tussle.errors import ParameterError
+
+TRUE, FALSE = ("true", "1", "yes", "on"), ("false", "0", "no", "off")
+MOST_ITEMS = 100_000
+"""Numbers in one value."""
+LONGEST_SHOWN = 80
+ROW = re.compile(r"\s*\[([^\[\]]*)\]")
+FRAMES = ("XYZ", "GPS")
+
+Part = tuple[str, str, str]
+"""Of one component: its name, its SI unit, and the unit of a number without one."""
+
+
+def shown(text: str) -> str:
+    """A text from outside for a message, on one line and not longer than a message bears."""
+    flat = " ".join(text.split())
+    return repr(flat if len(flat) <= LONGEST_SHOWN else flat[:LONGEST_SHOWN] + "...")
+
+
+def truth(text: str) -> bool:
+    """Whether a text says yes: true, 1, yes or on, in any case; false, 0, no or off is no.
+
+    Raises:
+        ParameterError: It is something else.
+    """
+    word = text.strip().lower()
+    if word in TRUE:
+        return True
+    if word in FALSE:
+        return False
+    raise ParameterError(f"{shown(text)} is not allowed; it takes true or false")
+
+
+def row(text: str, parts: Sequence[Part]) -> tuple[float, ...]:
+    """One number for each part, SI: "1, 0.2, 1, 45", "0.0 5.0" or "[ 0 5 ]"; with commas, each may have its unit.
+
+    Raises:
+        ParameterError: There are more or fewer, or one of them is no number.
+    """
+    bare = text.strip()
+    bare = bare[1:-1] if bare.startswith("[") and bare.endswith("]") else bare
+    items = [item.strip() for item in bare.split(",")] if "," in bare else bare.split()
+    if items and not items[-1] and "," in bare:
+        items.pop()
+    if len(items) != len(parts):
+        names = ", ".join(name for name, _, _ in parts)
+        raise ParameterError(f"{shown(text)} has {len(items)} numbers; it takes {len(parts)} ({names})")
+    return tuple(units.parse(item, *part[1:]) for item, part in zip(items, parts, strict=True))
+
+
+def rows(text: str) -> list[str]:
+    """What stands in each pair of brackets: "[ 0 1 2 ] [ 3 4 5 ]".
+
+    Raises:
+        ParameterError: Something stands outside, or a bracket is left open.
+    """
+    found, place = [], 0
+    while match := ROW.match(text, place):
+        found.append(match[1].strip())
+        place = match.end()
+    if text[place:].strip(" \t\n,"):
+        raise ParameterError(f"{shown(text[place:])} is not a row; rows are written [ ... ] [ ... ]")
+    return found
+
+
+def items(
+    text: str, parts: Sequence[Part], has_fields: bool, from_geodetic: Callable[..., Any] | None
+) -> list[Any]:
+    """The items of a list, SI: numbers, or one row of numbers each.
+
+    Args:
+        text: As written.
+        parts: The components of an item.
+        has_fields: An item is a row.
+        from_geodetic: Latitude, longitude [rad], altitude [m], (3,), to world positions [m], for rows that begin with GPS.
+
+    Raises:
+        ParameterError: It is not written as a list is.
+    """
+    if not has_fields:
+        bare = " ".join(rows(text)) if "[" in text else text
+        return [units.parse(word, *parts[0][1:]) for word in bare.replace(",", " ").split()]
+    return [_placed(each, parts, from_geodetic) for each in rows(text)]
+
+
+def _placed(text: str, parts: Sequence[Part], from_geodetic: Callable[..., Any] | None) -> tuple[float, ...]:
+    """Numbers of one row; a first word XYZ or GPS says how its fields x, y, z are meant."""
+    frame, _, rest = text.partition(" ")
+    names = [name for name, _, _ in parts]
+    if frame not in FRAMES or "frame" in names:
+        return row(text, parts)
+    places = [i for i, name in enumerate(names) if name in ("x", "y", "z")]
+    if frame == "XYZ" or len(places) != 3:
+        return row(rest, parts)
+    if from_geodetic is None:
+        raise ParameterError(
+            f"{shown(text)} needs the origin of a mission file; here positions are x, y, z in m"
+        )
+    geodetic = list(parts)
+    for i, (unit, bare) in zip(places, (("rad", "deg"), ("rad", "deg"), ("m", "m")), strict=True):
+        geodetic[i] = (names[i], unit, bare)
+    values = list(row(rest, geodetic))
+    for i, value in zip(places, from_geodetic([values[i] for i in places]), strict=True):
+        values[i] = float(value)
+    return tuple(values)
