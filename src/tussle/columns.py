@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from tussle import texts, units
-from tussle.errors import DeclarationError, ParameterError, UnitError
+from tussle.errors import DeclarationError, ParameterError, UnitError, nearest_name
 
 PER = ("entity", "world", "team")
 MOST_INTEGER = 2**53
@@ -170,7 +170,9 @@ class Param(Numbers):
         if self.choices:
             return "one of " + ", ".join(repr(c) for c in self.choices)
         bounds = [(self.ge, ">="), (self.gt, ">"), (self.le, "<="), (self.lt, "<")]
-        text = " and ".join(f"{sign} {bound:g}" for bound, sign in bounds if bound is not None)
+        text = " and ".join(
+            f"{sign} {bound:g}" for bound, sign in bounds if bound not in (None, -math.inf, math.inf)
+        )
         kind = (
             "text"
             if self.is_text
@@ -258,11 +260,12 @@ class Param(Numbers):
         )
 
     def _place(self, where: str) -> str:
-        name = f"{self.owner}.{self.name}" if self.owner else "Param"
+        name = f"{self.owner}.{self.name}".strip(".") or "Param"
         return f"{where}: {name}" if where and where != "default" else name
 
     def _error(self, where: str, value: Any, allowed: str) -> ParameterError:
-        return ParameterError(f"{self._place(where)} = {value!r} is not allowed; it takes {allowed}")
+        guess = nearest_name(value, self.choices) if isinstance(value, str) and self.is_text else ""
+        return ParameterError(f"{self._place(where)} = {value!r} is not allowed{guess}; it takes {allowed}")
 
     def __get__(self, instance: object | None, owner: type) -> Any:
         if instance is None:

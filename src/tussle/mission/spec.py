@@ -5,15 +5,16 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 import numpy as np
 
-from tussle import stock, units
+from tussle import stock
 from tussle.api import Autonomy, Controller, Interaction, Metric, MotionModel, Network, Sensor
-from tussle.errors import MissionError, listed, nearest_name
+from tussle.columns import Param
+from tussle.errors import MissionError, ParameterError, listed, nearest_name
 from tussle.mission.cadence import Cadence
 from tussle.mission.limits import Limits
 from tussle.scene import Scene
@@ -25,35 +26,31 @@ UPDATES = ("synchronous", "sequential")
 PLACEMENTS = ("normal", "uniform")
 
 
-def _numbers(where: str, value: Any, unit: str, n: int) -> tuple[float, ...]:
-    values = list(value) if isinstance(value, Iterable) and not isinstance(value, str) else [value] * n
-    if len(values) != n or value is None:
-        raise MissionError(f"{where} = {value!r}: needed are {n} numbers")
-    return tuple(_number(where, v, unit) for v in values)
+def _converted(where: str, frozen: Any, columns: Mapping[str, Param]) -> None:
+    """Convert what is declared, in place; None stays where it is the default."""
+    for name, column in columns.items():
+        value = getattr(frozen, name)
+        if value is None and getattr(type(frozen), name) is None:
+            continue
+        if column.fields and isinstance(value, (int, float)):
+            value = [value] * len(column.fields)
+        try:
+            _set(frozen, name, column.convert(value, where))
+        except ParameterError as error:
+            raise MissionError(str(error)) from None
 
 
-def _number(where: str, value: Any, unit: str) -> float:
-    try:
-        # A text is read as in a mission file, where angles without a unit are in degrees.
-        number = (
-            units.parse(value, unit, "deg" if unit == "rad" else unit)
-            if isinstance(value, str)
-            else float(value)
+def _declared(kind: type, **columns: Any) -> dict[str, Param]:
+    """Declarations of a dataclass's values; the defaults are those of its fields."""
+    declared = {}
+    for name, said in columns.items():
+        default = said.pop("default", getattr(kind, name))
+        is_number = not isinstance(default, (bool, str))
+        declared[name] = column = Param(
+            default, **({"gt": -math.inf, "lt": math.inf} if is_number else {}) | said
         )
-    except (TypeError, ValueError) as error:
-        raise MissionError(f"{where} = {value!r} is not allowed: {error}") from None
-    if not math.isfinite(number):
-        raise MissionError(
-            f"{where} = {value!r} is not allowed; it takes a finite number{' in ' + unit if unit else ''}"
-        )
-    return number
-
-
-def _whole(where: str, value: Any, bound: str = "") -> int:
-    is_number = isinstance(value, (int, float, np.integer)) and not isinstance(value, bool)
-    if not is_number or not math.isfinite(value) or int(value) != value:
-        raise MissionError(f"{where} = {value!r} is not allowed; it takes a whole number{bound}")
-    return int(value)
+        column.name = name
+    return declared
 
 
 def _items(where: str, value: Any, what: str) -> tuple[Any, ...]:
@@ -176,14 +173,7 @@ class Block:
             raise MissionError(
                 f"{where}: a block's name is not empty and has no dot, since paths such as prey.Boids.gain use dots"
             )
-        for name, unit in (("position", "m"), ("variance", "m^2"), ("half_width", "m")):
-            _set(self, name, _numbers(f"{where}: {name}", getattr(self, name), unit, 3))
-        if self.velocity is not None:
-            _set(self, "velocity", _numbers(f"{where}: velocity", self.velocity, "m/s", 3))
-        for name, unit in _BLOCK_NUMBERS.items():
-            if getattr(self, name) is not None or name != "rate":
-                _set(self, name, _number(f"{where}: {name}", getattr(self, name), unit))
-        self._check_bounds(where)
+        _converted(where, self, BLOCK_VALUES)
         _set(self, "autonomy", _plugins(f"{where}: autonomy", self.autonomy, Autonomy))
         _set(self, "controller", _plugins(f"{where}: controller", self.controller, Controller))
         _set(self, "sensor", _plugins(f"{where}: sensor", self.sensor, Sensor))
@@ -193,28 +183,6 @@ class Block:
             )
         _plugins(where, self.plugins, object)
         _refuse_rate(where, self.motion, "is integrated over every step")
-
-    def _check_bounds(self, where: str) -> None:
-        for name in ("count", "slots", "team"):
-            _set(self, name, _whole(f"{where}: {name}", getattr(self, name)))
-        if self.placement not in PLACEMENTS:
-            raise MissionError(
-                f"{where}: placement = {self.placement!r} is not allowed; {listed(PLACEMENTS)}"
-            )
-        for name in ("variance", "half_width"):
-            if min(getattr(self, name)) < 0.0:
-                raise MissionError(
-                    f"{where}: {name} = {getattr(self, name)!r} is not allowed; it takes numbers >= 0"
-                )
-        for name in ("count", "heading_variance", "speed", "interval_sd"):
-            if getattr(self, name) < 0:
-                raise MissionError(
-                    f"{where}: {name} = {getattr(self, name)!r} is not allowed; it takes a number >= 0"
-                )
-        for name in ("health", "radius", "mass", "rate", "slots"):
-            value = getattr(self, name)
-            if value is not None and not value > 0:
-                raise MissionError(f"{where}: {name} = {value!r} is not allowed; it takes a number > 0")
 
     def replace(self, **changes: Any) -> Block:
         """A copy with other values."""
@@ -227,19 +195,32 @@ class Block:
         return (*self.autonomy, *self.controller, self.motion, *self.sensor)
 
 
-_BLOCK_NUMBERS = {
-    "heading": "rad",
-    "heading_variance": "",
-    "climb": "rad",
-    "roll": "rad",
-    "speed": "m/s",
-    "health": "",
-    "radius": "m",
-    "mass": "kg",
-    "rate": "1/s",
-    "first_birth": "s",
-    "interval_sd": "s",
-}
+BLOCK_VALUES = _declared(
+    Block,
+    team={},
+    count={"ge": 0},
+    position={"unit": "m", "fields": "x y z"},
+    variance={"unit": "m^2", "fields": "x y z", "ge": 0.0},
+    half_width={"unit": "m", "fields": "x y z", "ge": 0.0},
+    placement={"choices": PLACEMENTS},
+    scatter_first={},
+    heading={"unit": "rad", "text_unit": "deg"},
+    heading_variance={"unit": "rad^2", "text_unit": "deg^2", "ge": 0.0},
+    climb={"unit": "rad", "text_unit": "deg"},
+    roll={"unit": "rad", "text_unit": "deg"},
+    velocity={"default": (0.0, 0.0, 0.0), "unit": "m/s", "fields": "x y z"},
+    speed={"unit": "m/s", "ge": 0.0},
+    health={"gt": 0.0},
+    radius={"unit": "m", "gt": 0.0},
+    mass={"unit": "kg", "gt": 0.0},
+    rate={"default": 1.0, "unit": "1/s", "gt": 0.0},
+    slots={"gt": 0},
+    first_birth={"unit": "s"},
+    interval_sd={"unit": "s", "ge": 0.0},
+)
+"""What the values of a block are, as parameters of plugins are declared."""
+WORLD_VALUES = ("heading", "climb", "roll", "speed", "health", "radius", "mass")
+"""Those that may differ from world to world of a stack."""
 
 
 @_named
@@ -290,25 +271,14 @@ class Mission:
                 raise MissionError(
                     f"mission: two blocks are called {name!r}; paths and random numbers need their names to differ"
                 )
-        for name in ("dt", "end", "start"):
-            _set(self, name, _number(f"mission: {name}", getattr(self, name), "s"))
-        if not self.dt > 0.0:
-            raise MissionError(f"mission: dt = {self.dt!r} is not allowed; it takes a number of seconds > 0")
+        _converted("mission", self, MISSION_VALUES)
         if not math.isfinite((self.end - self.start) / self.dt):
             raise MissionError(
                 f"mission: end = {self.end!r} with dt = {self.dt!r} is not allowed; that many steps cannot be counted"
             )
-        multiplier = _whole("mission: motion_multiplier", self.motion_multiplier, " >= 1")
-        if multiplier < 1:
-            raise MissionError(
-                f"mission: motion_multiplier = {multiplier!r} is not allowed; it takes a whole number >= 1"
-            )
-        _set(self, "motion_multiplier", multiplier)
-        if self.update not in UPDATES:
-            raise MissionError(f"mission: update = {self.update!r} is not allowed; {listed(UPDATES)}")
         conditions = self.end_conditions
         conditions = (
-            tuple(c.strip() for c in conditions.split(","))
+            tuple(conditions.replace(",", " ").split())
             if isinstance(conditions, str)
             else _items("mission: end_conditions", conditions, f"a list; {listed(END_CONDITIONS)}")
         )
@@ -369,3 +339,14 @@ class Mission:
         """A copy that ends at its end time, whatever else ends it."""
         conditions = tuple(self.end_conditions)
         return self if "time" in conditions else self.replace(end_conditions=(*conditions, "time"))
+
+
+MISSION_VALUES = _declared(
+    Mission,
+    dt={"unit": "s", "gt": 0.0},
+    end={"unit": "s"},
+    start={"unit": "s"},
+    motion_multiplier={"ge": 1},
+    update={"choices": UPDATES},
+)
+"""What the numbers and words of a mission are; in paths they follow "run"."""
