@@ -260,8 +260,10 @@ class Param(Numbers):
         )
 
     def _place(self, where: str) -> str:
-        name = f"{self.owner}.{self.name}".strip(".") or "Param"
-        return f"{where}: {name}" if where and where != "default" else name
+        where = "" if where == "default" else where
+        if not self.owner:
+            return where or "Param"
+        return f"{where}: {self.owner}.{self.name}" if where else f"{self.owner}.{self.name}"
 
     def _error(self, where: str, value: Any, allowed: str) -> ParameterError:
         guess = nearest_name(value, self.choices) if isinstance(value, str) and self.is_text else ""

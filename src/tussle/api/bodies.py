@@ -36,16 +36,10 @@ BRUTE = 600
 
 _DERIVING = {name: getattr(kernels, name) for name in DERIVED}
 OFFSETS = {name: sum(list(FLOATS.values())[:i]) for i, name in enumerate(FLOATS)}
-_UNITS = {
-    "pos": "m",
-    "vel": "m/s",
-    "quat": "",
-    "omega": "rad/s",
-    "force": "N",
-    "torque": "N m",
-    "radius": "m",
-    "mass": "kg",
-}
+BODY_UNITS = {
+    "pos": "m", "vel": "m/s", "quat": "", "omega": "rad/s", "force": "N", "torque": "N m", "health": "", "radius": "m",
+    "mass": "kg", "yaw": "rad", "climb": "rad", "roll": "rad", "forward": "", "level_forward": "",
+}  # fmt: skip
 
 
 @dataclass(slots=True)

@@ -15,9 +15,10 @@ from typing import Any
 import numpy as np
 
 from tussle.batch.tasks import Package
-from tussle.engine.params import BLOCK_VALUES
-from tussle.errors import MissionError, ParameterError, TussleError, listed, nearest_name
+from tussle.errors import MissionError, ParameterError, TussleError, nearest_name
 from tussle.mission import Block, Loaded, Mission, PluginFile, read_mission
+from tussle.mission.paths import with_value
+from tussle.mission.spec import WORLD_VALUES
 
 Point = Mapping[str, Any]
 Signature = tuple[Any, ...]
@@ -113,74 +114,6 @@ def _made(function: Callable[..., Mission], values: Mapping[str, Any]) -> Missio
     return mission
 
 
-def with_value(mission: Mission, path: str, value: Any) -> Mission:
-    """A mission with one value changed, by a path such as "prey.count", "prey.Boids.gain", "SimpleCapture.capture_range", "run.dt".
-
-    Raises:
-        ParameterError: The path leads nowhere, or the value is not allowed.
-    """
-    head, *rest = path.split(".")
-    blocks = {b.name: b for b in mission.blocks}
-    if head == "run" and len(rest) == 1:
-        return mission.replace(**{rest[0]: value})
-    if head in blocks and len(rest) == 1:
-        changed = blocks[head].replace(**{rest[0]: value})
-    elif head in blocks and rest:
-        changed = _block_with(blocks[head], path, rest, value)
-    else:
-        for kind in ("interactions", "metrics", "networks") if rest else ():
-            plugins = getattr(mission, kind)
-            if head in [p.instance_name for p in plugins]:
-                return mission.replace(**{kind: _plugins_with(plugins, path, [head, *rest], value)})
-        known = ["run", *blocks, *(p.instance_name for p in mission.world_plugins)]
-        raise ParameterError(
-            f"{path!r} leads nowhere: there is no block or world plugin {head!r}{nearest_name(head, known)}; {listed(known)}"
-            if head not in known
-            else f"{path!r} names no value of {head}; write {head}.NAME"
-        )
-    return mission.replace(blocks=[changed if b.name == head else b for b in mission.blocks])
-
-
-def _block_with(block: Block, path: str, names: Sequence[str], value: Any) -> Block:
-    for kind in ("autonomy", "controller", "sensor"):
-        plugins = getattr(block, kind)
-        if names[0] in [p.instance_name for p in plugins]:
-            return block.replace(**{kind: _plugins_with(plugins, path, names, value)})
-    if names[0] == block.motion.instance_name:
-        return block.replace(motion=_plugins_with([block.motion], path, names, value)[0])
-    known = [p.instance_name for p in block.plugins]
-    raise ParameterError(
-        f"{path!r}: {block.name} has no plugin {names[0]!r}{nearest_name(names[0], known)}; {listed(known)}"
-    )
-
-
-def _plugins_with(plugins: Sequence[Any], path: str, names: Sequence[str], value: Any) -> list[Any]:
-    """The plugins with a value changed in the one that the first name means, or in one of its children."""
-    known = [p.instance_name for p in plugins]
-    if names[0] not in known:
-        raise ParameterError(
-            f"{path!r}: there is no plugin {names[0]!r}{nearest_name(names[0], known)}; {listed(known)}"
-        )
-    changed = list(plugins)
-    place = known.index(names[0])
-    plugin = changed[place]
-    if len(names) == 2:
-        try:
-            changed[place] = plugin.replace(**{names[1]: value})
-        except ParameterError as error:
-            raise ParameterError(f"{path!r}: {error}") from None
-        return changed
-    for key in type(plugin).children():
-        inner = plugin.values[key]
-        if names[1] in [p.instance_name for p in inner]:
-            changed[place] = plugin.replace(**{key: _plugins_with(inner, path, names[1:], value)})
-            return changed
-    inner = [p.instance_name for key in type(plugin).children() for p in plugin.values[key]]
-    raise ParameterError(
-        f"{path!r}: {names[0]} has no plugin {names[1]!r}{nearest_name(names[1], inner)}; {listed(inner)}"
-    )
-
-
 # -- groups ---------------------------------------------------------------------------------------------------------------
 
 
@@ -256,7 +189,7 @@ def split(mission: Mission) -> tuple[Signature, dict[str, Any]]:
 
 def _split_block(block: Block, own: dict[str, Any]) -> Signature:
     kinds = ("autonomy", "controller", "sensor")
-    for name in BLOCK_VALUES:
+    for name in WORLD_VALUES:
         own[f"{block.name}.{name}"] = getattr(block, name)
     plugins = tuple(
         tuple(
@@ -266,7 +199,7 @@ def _split_block(block: Block, own: dict[str, Any]) -> Signature:
         for kind in kinds
     )
     motion = _split_plugin(block.motion, f"{block.name}.{block.motion.instance_name}", own, is_of_block=True)
-    fields = {f.name for f in dataclasses.fields(block)} - {*kinds, "motion", *BLOCK_VALUES}
+    fields = {f.name for f in dataclasses.fields(block)} - {*kinds, "motion", *WORLD_VALUES}
     rest = tuple((name, repr(getattr(block, name))) for name in sorted(fields))
     return (plugins, motion, rest)
 

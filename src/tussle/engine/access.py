@@ -9,13 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tussle.api.bodies import DERIVED, FLOATS, INTS, Bodies, derive
+from tussle.api.bodies import BODY_UNITS, DERIVED, FLOATS, INTS, Bodies, derive
+from tussle.api.plugin import Plugin
 from tussle.columns import EntityRef, Handle, Numbers, Output, Param, State
 from tussle.engine import failure
 from tussle.engine.group import Binding, Group
 from tussle.engine.result import WorldResult
 from tussle.engine.table import Stored, Table
-from tussle.errors import ParameterError, SnapshotError, listed, nearest_name
+from tussle.errors import ParameterError, SnapshotError, listed
+from tussle.mission import Block, paths
 from tussle.record import hash_columns
 
 if TYPE_CHECKING:
@@ -35,6 +37,14 @@ class Parked:
 
     bodies: Bodies
     tables: dict[Any, tuple[np.ndarray, Stored]]
+
+
+FIELDS = {1: "", 2: "x y", 3: "x y z", 4: "w x y z"}
+BODY_COLUMNS: dict[str, Numbers] = {
+    **{name: State(FIELDS[k], BODY_UNITS[name].replace(" ", "*")) for name, k in (FLOATS | DERIVED).items()},
+    **{name: State(dtype=int) for name in INTS},
+}
+"""Columns of a block's bodies, as a plugin would declare them."""
 
 
 def park(sim: Simulation, world: int) -> Parked:
@@ -66,38 +76,20 @@ def _binding(group: Group, path: tuple[str, ...]) -> Binding | None:
     return next((b for b in group.walk() if b.path == path), None)
 
 
-def _parse(sim: Simulation, path: str) -> tuple[int, tuple[str, ...], str]:
-    """(block number, plugin path, column)."""
-    head, *names = path.split(".")
-    blocks = sim.context.block_names
-    if head not in blocks or not names:
-        allowed = [*blocks, *(r.spec.instance_name for r in sim.referees)]
-        raise ParameterError(
-            f"{path!r}: there is no column by this path{nearest_name(head, allowed)}; paths begin with: {', '.join(allowed)}"
-        )
-    number = blocks.index(head)
-    *plugins, column = names
-    if not plugins:
-        allowed = [*FLOATS, *INTS, *DERIVED]
-        if column not in allowed:
-            raise ParameterError(
-                f"{path!r}: bodies have no column {column!r}{nearest_name(column, allowed)}; {listed(allowed)}"
-            )
-        return number, (), column
-    key = tuple(plugins)
-    found = [b for g in sim.population.groups for b in g.walk() if g.block.name == head or b.path == key]
-    known = {".".join(b.path) for b in found}
-    matching = [b for b in found if b.path == key]
-    if not matching:
-        raise ParameterError(
-            f"{path!r}: {head} has no plugin {'.'.join(key)!r}{nearest_name('.'.join(key), known)}; {listed(sorted(known))}"
-        )
-    columns = {**matching[0].places, **matching[0].ragged}
-    if column not in columns:
-        raise ParameterError(
-            f"{path!r}: {key[-1]} has no column {column!r}{nearest_name(column, columns)}; {listed(columns)}"
-        )
-    return number, key, column
+def _columns(owner: Any) -> dict[str, Numbers]:
+    """Columns that an owner has in a simulation: those of bodies for a block, else those that its plugin declares."""
+    if isinstance(owner, Block):
+        return BODY_COLUMNS
+    if not isinstance(owner, Plugin):
+        return {}
+    is_shared = {k for k, c in owner.params().items() if c.structural}
+    return {k: c for k, c in owner.declared(Numbers).items() if k not in is_shared}
+
+
+def _follow(sim: Simulation, path: str) -> tuple[Any, tuple[str, ...], str, Numbers]:
+    """(block or world plugin, plugin path in the block, column, its declaration)."""
+    owners, name = paths.follow(path, paths.Whole(sim.mission), paths.inside, _columns)
+    return owners[0], tuple(p.instance_name for p in owners[1:]), name, _columns(owners[-1])[name]
 
 
 def _body_column(bodies: Bodies, name: str, rows: np.ndarray) -> np.ndarray:
@@ -120,14 +112,17 @@ def capacity(sim: Simulation, number: int) -> int:
 
 def read(sim: Simulation, path: str) -> tuple[np.ndarray, np.ndarray]:
     """See `Simulation.read`."""
-    world_plugin = _world_column(sim, path)
-    if world_plugin is not None:
-        values = np.moveaxis(world_plugin, -1, 0).copy()
+    head, key, name, column = _follow(sim, path)
+    if not isinstance(head, Block):
+        values = np.moveaxis(_world_column(sim, path, name), -1, 0).copy()
         return values, np.ones(len(values), bool)
-    number, key, column = _parse(sim, path)
+    number = sim.context.block_names.index(head.name)
     shape = sim.n_worlds, capacity(sim, number)
     alive = np.zeros(shape, bool)
-    out = _empty(sim, shape, number, key, column)
+    empty = None if column.ragged else MISSING[np.dtype(column.dtype).kind]
+    out = np.full(
+        shape if column.ragged else (*shape, *column.shape), empty, object if column.ragged else column.dtype
+    )
     for bodies, groups in _sources(sim):
         for group, rows, held in groups:
             mine = np.flatnonzero(bodies.block[rows] == number)
@@ -137,86 +132,66 @@ def read(sim: Simulation, path: str) -> tuple[np.ndarray, np.ndarray]:
             at = bodies.world[rows[mine]], bodies.place_in_block[rows[mine]]
             alive[at] = True
             if binding is None:
-                out[at] = np.moveaxis(_body_column(bodies, column, rows[mine]), -1, 0)
-            elif column in binding.ragged:
+                out[at] = np.moveaxis(_body_column(bodies, name, rows[mine]), -1, 0)
+            elif name in binding.ragged:
                 for world, place, row in zip(*at, mine, strict=True):
-                    out[world, place] = held.lists[binding.ragged[column]][row].copy()
+                    out[world, place] = held.lists[binding.ragged[name]][row].copy()
             else:
-                place = binding.places[column]
+                place = binding.places[name]
                 data = held.arrays[place.dtype]
                 values = data[place.first : place.first + place.k] if place.k else data[place.first]
                 out[at] = np.moveaxis(values[..., mine], -1, 0)
     return out, alive
 
 
-def _empty(
-    sim: Simulation, shape: tuple[int, int], number: int, key: tuple[str, ...], column: str
-) -> np.ndarray:
-    """What is read where nobody lives: NaN, -1 of whole numbers, None of lists."""
-    if not key:
-        k = DERIVED.get(column) or FLOATS.get(column, 1)
-        dtype = np.dtype(np.int64 if column in INTS else float)
-    else:
-        binding = next(b for g in sim.population.groups for b in g.walk() if b.path == key)
-        if column in binding.ragged:
-            return np.full(shape, None, object)
-        k, dtype = binding.places[column].k or 1, np.dtype(binding.places[column].dtype)
-        return np.full((*shape, k) if binding.places[column].k else shape, MISSING[dtype.kind], dtype)
-    return np.full((*shape, k) if k > 1 else shape, MISSING[dtype.kind], dtype)
-
-
-def _world_column(sim: Simulation, path: str) -> np.ndarray | None:
-    head, _, column = path.partition(".")
-    for referee in sim.referees:
-        if referee.spec.instance_name == head and head not in sim.context.block_names:
-            if column not in referee.places:
-                raise ParameterError(
-                    f"{path!r}: {head} has no column {column!r}{nearest_name(column, referee.places)}; {listed(referee.places)}"
-                )
-            per, place = referee.places[column]
-            if per == "entity":
-                raise ParameterError(
-                    f"{path!r}: a column per entity of a world plugin has no fixed shape and cannot be read"
-                )
-            return referee.tables[per].array(place)
-    return None
+def _world_column(sim: Simulation, path: str, name: str) -> np.ndarray:
+    head = path.partition(".")[0]
+    referee = next(r for r in sim.referees if r.spec.instance_name == head)
+    if name not in referee.places:
+        raise ParameterError(f"{path!r} is the same in all worlds, and no column of the simulation")
+    per, place = referee.places[name]
+    if per == "entity":
+        raise ParameterError(
+            f"{path!r}: a column per entity of a world plugin has no fixed shape and cannot be read"
+        )
+    return referee.tables[per].array(place)
 
 
 def write(sim: Simulation, path: str, values: Any) -> None:
     """See `Simulation.write`."""
-    world_plugin = _world_column(sim, path)
-    if world_plugin is not None:
-        world_plugin[:] = np.moveaxis(np.broadcast_to(values, np.moveaxis(world_plugin, -1, 0).shape), 0, -1)
+    head, key, name, column = _follow(sim, path)
+    if isinstance(values, str):
+        try:
+            values = column.read(values)
+        except ParameterError as error:
+            raise type(error)(f"{path!r}: {error}") from None
+    if not isinstance(head, Block):
+        array = _world_column(sim, path, name)
+        given = np.moveaxis(_shaped(path, values, np.moveaxis(array, -1, 0).shape), 0, -1)
+        _check_written(path, given, column)
+        array[:] = given
         return
-    number, key, column = _parse(sim, path)
-    if not key and (column in INTS or column in DERIVED):
+    if not key and name not in FLOATS:
         raise ParameterError(f"{path!r} cannot be written; {listed(FLOATS)}")
-    bodies = sim.population.bodies
-    n_agents = capacity(sim, number)
+    if column.ragged:
+        raise ParameterError(f"{path!r} is a list per entity, which a plugin makes; it cannot be written")
+    number, bodies = sim.context.block_names.index(head.name), sim.population.bodies
+    given = _shaped(path, values, (sim.n_worlds, capacity(sim, number), *column.shape))
     for group in sim.population.groups:
         rows = np.arange(group.first, group.last)
         mine = np.flatnonzero(bodies.block[rows] == number)
         binding = _binding(group, key) if key else None
         if not len(mine) or (key and binding is None):
             continue
-        if binding is not None and column in binding.ragged:
-            raise ParameterError(f"{path!r} is a list per entity, which a plugin makes; it cannot be written")
-        target = getattr(bodies, column) if binding is None else group.table.array(binding.places[column])
-        shape = (sim.n_worlds, n_agents, *target.shape[:-1])
-        try:
-            given = np.broadcast_to(np.asarray(values), shape)
-        except ValueError:
-            raise ParameterError(
-                f"{path!r}: values have shape {np.shape(values)}; needed is {shape}"
-            ) from None
+        target = getattr(bodies, name) if binding is None else group.table.array(binding.places[name])
         part = np.moveaxis(given[bodies.world[rows[mine]], bodies.place_in_block[rows[mine]]], 0, -1)
-        _check_written(path, part, None if binding is None else type(binding.spec).columns[column])
+        _check_written(path, part, column, is_body=binding is None)
         if binding is None:
             # Rows that are written as they were keep their motion state: taking it over from the attitude would round it.
             differs = np.atleast_2d(target[..., rows[mine]] != part).any(axis=0)
             target[..., rows[mine]] = part
             bodies.touch(group.first, group.last)
-            if column in ("pos", "vel", "quat") and differs.any():
+            if name in ("pos", "vel", "quat") and differs.any():
                 group.moving.begin(group.motion.plugin)
                 group.motion.plugin.from_body(group.moving, mine[differs])
         else:
@@ -225,12 +200,22 @@ def write(sim: Simulation, path: str, values: Any) -> None:
                 view.reset(bodies, group.first, group.last)
 
 
-def _check_written(path: str, values: np.ndarray, column: Any) -> None:
+def _shaped(path: str, values: Any, shape: tuple[int, ...]) -> np.ndarray:
+    given = np.asarray(values)
+    if given.dtype.kind not in "biuf":
+        raise ParameterError(f"{path!r}: values are {given.dtype}; needed are numbers, or one text for all")
+    try:
+        return np.broadcast_to(given, shape)
+    except ValueError:
+        raise ParameterError(f"{path!r}: values have shape {given.shape}; needed is {shape}") from None
+
+
+def _check_written(path: str, values: np.ndarray, column: Numbers, is_body: bool = False) -> None:
     if np.issubdtype(values.dtype, np.floating) and np.isnan(values).any():
         raise ParameterError(f"{path!r}: values hold NaN")
-    if column is None and not path.endswith(".health") and not np.isfinite(values).all():
+    if is_body and not path.endswith(".health") and not np.isfinite(values).all():
         raise ParameterError(f"{path!r}: values must be finite")
-    if isinstance(column, Numbers) and column.dtype is int:
+    if column.dtype is int:
         with np.errstate(invalid="ignore"):
             if (np.asarray(values).astype(np.int64) != values).any():
                 raise ParameterError(f"{path!r}: values must be whole numbers of 64 bits")

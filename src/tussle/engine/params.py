@@ -8,20 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from tussle.api.plugin import Plugin
 from tussle.columns import Param
-from tussle.errors import MissionError, ParameterError, listed, nearest_name
-from tussle.mission import Block, Mission
-
-BLOCK_VALUES = {
-    "heading": Param(0.0, unit="rad", text_unit="deg"),
-    "climb": Param(0.0, unit="rad", text_unit="deg"),
-    "roll": Param(0.0, unit="rad", text_unit="deg"),
-    "speed": Param(0.0, unit="m/s", ge=0.0),
-    "health": Param(1.0, gt=0.0),
-    "radius": Param(1.0, unit="m", gt=0.0),
-    "mass": Param(1.0, unit="kg", gt=0.0),
-}
-"""Numbers of a block that may differ from world to world, with the bounds that the block itself has."""
+from tussle.errors import ParameterError
+from tussle.mission import Block, Mission, paths
+from tussle.mission.spec import WORLD_VALUES
 
 
 class Overrides:
@@ -34,7 +25,6 @@ class Overrides:
     def __init__(self, mission: Mission, n_worlds: int) -> None:
         self.mission = mission
         self.n_worlds = n_worlds
-        self.blocks = {b.name: i for i, b in enumerate(mission.blocks)}
         self.columns: dict[tuple[str, tuple[str, ...], str], np.ndarray] = {}
         self.given: dict[tuple[str, tuple[str, ...], str], np.ndarray] = {}
         self.structural: dict[tuple[str, tuple[str, ...], str], list[Any]] = {}
@@ -49,10 +39,6 @@ class Overrides:
         checked = []  # all of them before any is set
         for path, value in values.items():
             key, column = self._find(path)
-            if column.ragged:
-                raise ParameterError(
-                    f"{path!r} is a list, which is no column of a stack; set it in the mission"
-                )
             many = (
                 isinstance(value, (list, np.ndarray))
                 and len(value) == len(worlds)
@@ -90,44 +76,16 @@ class Overrides:
         )
 
     def _find(self, path: str) -> tuple[tuple[str, tuple[str, ...], str], Param]:
-        head, *rest = path.split(".")
-        world = {p.instance_name: p for p in self.mission.world_plugins}
-        if head in self.blocks and len(rest) == 1 and rest[0] in BLOCK_VALUES:
-            column = copy.copy(BLOCK_VALUES[rest[0]])
-            column.name, column.owner = rest[0], head
-            return (head, (), rest[0]), column
-        if head in self.blocks:
-            block = self.mission.blocks[self.blocks[head]]
-            plugins = {p.instance_name: p for p in block.plugins}
-        elif head in world:
-            plugins, rest = {head: world[head]}, [head, *rest]
+        owners, name = paths.follow(path, paths.Whole(self.mission), paths.inside, paths.settable)
+        column, names = paths.declared(owners[-1], name), path.split(".")
+        if isinstance(owners[0], Block):
+            plugins, is_own = tuple(names[1:-1]), len(owners) > 1 or name in WORLD_VALUES
         else:
-            allowed = [*self.blocks, *world]
-            raise ParameterError(
-                f"{path!r}: there is no block or world plugin {head!r}{nearest_name(head, allowed)}; {listed(allowed)}"
-            )
-        names: list[str] = []
-        while len(rest) > 1:
-            name = rest.pop(0)
-            if name not in plugins:
-                raise ParameterError(
-                    f"{path!r}: {head} has no plugin {name!r}{nearest_name(name, plugins)}; {listed(plugins)}"
-                )
-            names.append(name)
-            plugin = plugins[name]
-            plugins = {c.instance_name: c for k in type(plugin).children() for c in plugin.values[k]}
-        if not names or not rest:
-            allowed = [*plugins, *(BLOCK_VALUES if head in self.blocks else ())]
-            missing = rest[0] if rest else ""
-            raise ParameterError(
-                f"{path!r} names no parameter{nearest_name(missing, allowed)}; {head} has: {', '.join(allowed)}"
-            )
-        params = type(plugin).params()
-        if rest[0] not in params:
-            raise ParameterError(
-                f"{path!r}: {names[-1]} has no parameter {rest[0]!r}{nearest_name(rest[0], params)}; {listed(params)}"
-            )
-        return (head, tuple(names), rest[0]), params[rest[0]]
+            plugins, is_own = (names[0],), isinstance(owners[0], Plugin) and len(owners) == 1
+            is_own = is_own and column is not None and not column.structural
+        if column is None or column.ragged or not is_own:
+            raise ParameterError(f"{path!r} is one for all worlds of a stack; set it in the mission")
+        return (names[0], plugins, name), column
 
     def block_value(self, block: Block, name: str, world: np.ndarray) -> float | np.ndarray:
         """A number of a block for entities of the worlds `world`: one for all, or (m,)."""
@@ -149,33 +107,8 @@ class Overrides:
         """The blocks of a world: those of the mission, but for structural parameters set for it."""
         key = tuple((path, row[world]) for path, row in self.structural.items() if row[world] is not None)
         if key not in self._variants:
-            blocks = list(self.mission.blocks)
-            for (owner, path, name), value in key:
-                if owner not in self.blocks:
-                    raise MissionError(
-                        f"{'.'.join(path)}.{name} is structural, so a stack of worlds shares it; set it in the mission"
-                    )
-                i = self.blocks[owner]
-                blocks[i] = _with_param(blocks[i], path, name, value)
-            self._variants[key] = tuple(blocks)
+            mission = self.mission
+            for (owner, plugins, name), value in key:
+                mission = paths.with_value(mission, ".".join((owner, *plugins, name)), value)
+            self._variants[key] = tuple(mission.blocks)
         return self._variants[key]
-
-
-def _with_param(block: Block, path: tuple[str, ...], name: str, value: Any) -> Block:
-    import dataclasses
-
-    def change(plugin: Any, names: tuple[str, ...]) -> Any:
-        if plugin.instance_name != names[0]:
-            return plugin
-        if len(names) == 1:
-            return plugin.replace(**{name: value})
-        inner = {k: [change(c, names[1:]) for c in plugin.values[k]] for k in type(plugin).children()}
-        return plugin.replace(**inner)
-
-    return dataclasses.replace(
-        block,
-        autonomy=[change(p, path) for p in block.autonomy],
-        controller=[change(p, path) for p in block.controller],
-        motion=change(block.motion, path),
-        sensor=[change(p, path) for p in block.sensor],
-    )

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+import numbers
 import re
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from tussle import units
 from tussle.columns import MOST_INTEGER
-from tussle.errors import MissionError, listed, nearest_name
+from tussle.errors import MissionError, ParameterError, listed, nearest_name
 from tussle.texts import shown
 
 RATIO = re.compile(r"\s*([-+.\deE]+)\s*/\s*([-+.\deE]+)\s*", re.ASCII)
@@ -122,3 +126,48 @@ def behaviors(text: str) -> list[Told]:
     if text[place:].strip(" \t\n,"):
         raise MissionError(f"{shown(text[place:])} is not a plugin; it takes [ NAME key='value' ... ]")
     return found
+
+
+def told_text(name: str, attributes: Mapping[str, str]) -> str:
+    """One plugin as `behaviors` reads it.
+
+    Raises:
+        MissionError: A value has both kinds of quotes.
+    """
+    parts = []
+    for key, value in attributes.items():
+        quote = "'" if "'" not in value else '"'
+        if quote in value:
+            raise MissionError(
+                f"{shown(value)} has both kinds of quotes and cannot stand in a plugin within a plugin"
+            )
+        parts.append(f" {key}={quote}{value}{quote}")
+    return f"[ {name}{''.join(parts)} ]"
+
+
+def written(value: Any, si: Sequence[str] = ("",), bare: Sequence[str] = ("",)) -> str:
+    """A value as a file has it, with all digits, so that it is read as what it is: a text is as it stands there, a number is SI.
+
+    Args:
+        value: A text, a number, a truth value, or a sequence of numbers or of sequences of numbers.
+        si: SI unit of each component.
+        bare: Unit of each component's bare number; where it is another, the SI unit is written.
+
+    Raises:
+        ParameterError: It is something else.
+    """
+    if isinstance(value, str):
+        return value
+    if isinstance(value, (bool, np.bool_)):
+        return "true" if value else "false"
+    if isinstance(value, numbers.Real):
+        number = str(int(value)) if isinstance(value, numbers.Integral) else repr(float(value))
+        return number if si[0] == bare[0] else f"{number} {si[0] or '1'}"
+    if not isinstance(value, (Sequence, np.ndarray)):
+        raise ParameterError(
+            f"{value!r} is not allowed; a file takes a number, a text, true or false, or a list of numbers"
+        )
+    if any(isinstance(item, (Sequence, np.ndarray)) and not isinstance(item, str) for item in value):
+        return " ".join(f"[ {written(row, si, bare)} ]" for row in value)
+    units_of = zip(si, bare, strict=True) if len(si) == len(value) else [(si[0], bare[0])] * len(value)
+    return ", ".join(written(item, (a,), (b,)) for item, (a, b) in zip(value, units_of, strict=True))

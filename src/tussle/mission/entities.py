@@ -15,7 +15,7 @@ from tussle.mission.limits import Limits
 from tussle.mission.node import Budget, Node
 from tussle.mission.plugin_tags import PluginReader, Written
 from tussle.mission.problems import Place, Problems
-from tussle.mission.spec import PLACEMENTS, Block
+from tussle.mission.spec import PLACEMENTS, RUN, Block
 from tussle.mission.tags import BASE, ENTITY, ENTITY_ATTRIBUTES, MANY, Known
 from tussle.scene import Base, Origin
 from tussle.texts import FALSE, shown, truth
@@ -68,7 +68,7 @@ def _merged(common: Iterable[Node], own: list[Node], budget: Budget) -> list[Nod
 
 def block_names(nodes: Iterable[Node]) -> list[str]:
     """Name of each entity's block: its tag, else its name, else "team_ID"; a second one of a name is "NAME_2"."""
-    taken: set[str] = set()
+    taken = {RUN}
     last: dict[str, int] = {}
     names = []
     for node in nodes:

@@ -1,114 +1,158 @@
-"""Settings from outside by path: `run.dt=0.05`, `prey.count=50`, `prey.Boids.max_speed=20`, `prey.motion_model=SingleIntegrator`."""
+"""Settings from outside: values of placeholders, and by path (`tussle.mission.paths`) of tags and attributes."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Iterable, Mapping
+from typing import Any
 
-from tussle.errors import MissionError, listed, nearest_name
+from tussle.api.plugin import Plugin
+from tussle.errors import MissionError, ParameterError, TussleError, listed, nearest_name
 from tussle.mission import codecs
+from tussle.mission.catalogue import Catalogue
 from tussle.mission.entities import block_names
 from tussle.mission.node import Node
-from tussle.mission.problems import Place
-from tussle.mission.tags import ENTITY, RUN
+from tussle.mission.paths import follow
+from tussle.mission.plugin_tags import free_name
+from tussle.mission.spec import RUN
+from tussle.mission.tags import ENTITY, PLUGIN
+from tussle.mission.tags import RUN as RUN_ATTRIBUTES
+from tussle.texts import shown
 
 WORLD_PLUGINS = ("entity_interaction", "metrics", "network")
-ENTITY_PLUGINS = ("autonomy", "controller", "motion_model", "sensor")
-PLACE = Place("the settings", 0)
+ENTITY_PLUGINS = ("autonomy", "controller", "sensor", "motion_model")
 
 
-def split_overrides(
-    overrides: Mapping[str, str], placeholders: Mapping[str, str]
-) -> tuple[dict[str, str], dict[str, str]]:
-    """Overrides of placeholders, and those by path.
+def as_texts(settings: Mapping[str, Any]) -> dict[str, str]:
+    """Settings as placeholders take them: a number is put into the file bare, and has the unit of its place there.
 
     Raises:
-        MissionError: A name is neither.
+        MissionError: A value cannot be written.
     """
-    named, paths = {}, {}
-    for name, value in overrides.items():
-        if name in placeholders:
-            named[name] = value
-        elif "." in name:
-            paths[name] = value
-        else:
+    found = {}
+    for name, value in settings.items():
+        try:
+            found[str(name)] = codecs.written(value)
+        except ParameterError as error:
+            raise MissionError(f"setting {name}: {error}") from None
+    return found
+
+
+class Overrides:
+    """Sets values in a mission's tree.
+
+    Args:
+        root: The tree; it is changed.
+        catalogue: Finds the classes of plugins, whose declarations say what a number is.
+        known: Names of the placeholders, which have been set.
+    """
+
+    def __init__(self, root: Node, catalogue: Catalogue, known: Iterable[str]) -> None:
+        self.root, self.catalogue, self.known = root, catalogue, sorted(known)
+
+    def set(self, path: str, value: Any) -> str:
+        """Set one value: a number is SI, a text is as in the file.
+
+        Returns:
+            The value as the file has it now.
+
+        Raises:
+            MissionError: The path leads nowhere, or the value cannot be written.
+        """
+        if "." not in path:
             raise MissionError(
-                f"the mission has no setting {name[:80]!r}{nearest_name(name[:80], placeholders)}; {listed(sorted(placeholders))}; "
+                f"the mission has no setting {path[:80]!r}{nearest_name(path[:80], self.known)}; {listed(self.known)}; "
                 f"also by path: run.dt, BLOCK.TAG, BLOCK.PLUGIN.ATTRIBUTE, PLUGIN.ATTRIBUTE"
             )
-    return named, paths
+        try:
+            owners, name = follow(path, self.root, self._inside, self._values)
+            owner = owners[-1]
+            text = codecs.written(value, *self._units(owner, name))
+            if owner.tag == "run" and owner not in self.root.children:
+                self.root.children.insert(0, owner)
+            if owner.tag == "entity":
+                _set_tag(owner, name, text)
+            else:
+                owner.attributes[name] = text
+                # Not of the file: what is wrong with it is an error even where the file's own would be a note.
+                owner.lines[name] = 0
+            for outer in reversed(owners[1:-1]):
+                _write_inner(outer)
+        except TussleError as error:
+            said = str(error).removeprefix(f"{shown(path)}: ")
+            raise MissionError(f"setting {path[:200]}={str(value)[:80]}: {said}") from None
+        return text
 
+    def _inside(self, node: Node) -> dict[str, Node]:
+        """The run, blocks and plugins of the world in all; plugins in a block; plugins in a plugin."""
+        if node is self.root:
+            entities = list(node.find_all("entity"))
+            blocks = dict(zip(block_names(entities), entities, strict=True))
+            runs = [Node(RUN, {}, "", [], node.place), *node.find_all(RUN)]
+            return {RUN: runs[-1], **blocks, **_named(node, WORLD_PLUGINS)}
+        if node.tag == "entity":
+            return _named(node, ENTITY_PLUGINS)
+        if node.tag == "run":
+            return {}
+        cls = self.catalogue.load(node.text)
+        renamed = cls.historic_attributes.renamed
+        inner = [key for key in node.attributes if renamed.get(key, key) in cls.children()]
+        node.children = [
+            Node(key, told.attributes, told.name, [], node.place)
+            for key in inner
+            for told in codecs.behaviors(node.attributes[key])
+        ]
+        return _named(node, inner)
 
-def apply_path(root: Node, path: str, value: str) -> None:
-    """Set one value in the tree.
-
-    Raises:
-        MissionError: The path leads nowhere.
-    """
-    first, *rest = path.split(".")
-    try:
-        if first == "run" and len(rest) == 1:
-            _set_run(root, rest[0], value)
-            return
-        entities = list(root.find_all("entity"))
-        blocks = dict(zip(block_names(entities), entities, strict=True))
-        if first in blocks and rest:
-            _set_in_block(blocks[first], rest, value)
-            return
-        world = {
-            node.attributes.get("name", node.text): node
-            for node in root.children
-            if node.tag in WORLD_PLUGINS
+    def _values(self, node: Node) -> Collection[str] | None:
+        """Names of what can be set; of a plugin the reader says what it does not know."""
+        if node is self.root:
+            return ()
+        tags = {
+            "run": RUN_ATTRIBUTES,
+            "entity": {tag: known for tag, known in ENTITY.items() if tag != "base"},
         }
-        if first in world and len(rest) == 1:
-            _set_attribute(world[first], rest[0], value)
-            return
-        known = ["run", *blocks, *world]
-        raise MissionError(f"there is no {first[:80]!r}{nearest_name(first[:80], known)}; {listed(known)}")
-    except MissionError as error:
-        raise MissionError(f"setting {path[:200]}={value[:80]}: {error}") from None
+        return tags.get(node.tag)
+
+    def _units(self, node: Node, name: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """SI unit and unit of a bare number, of each component of a value."""
+        known = (PLUGIN | {"run": RUN_ATTRIBUTES, "entity": ENTITY}.get(node.tag, {})).get(name)
+        if known is None:
+            return _units_of(self.catalogue.load(node.text), name)
+        return (known.unit.replace("deg", "rad"),), (known.unit,)
 
 
-def _set_run(root: Node, attribute: str, value: str) -> None:
-    if attribute not in RUN:
-        raise MissionError(f"run has no {attribute[:80]!r}{nearest_name(attribute[:80], RUN)}; {listed(RUN)}")
-    runs = list(root.find_all("run"))
-    if not runs:
-        runs = [Node("run", {}, "", [], root.place)]
-        root.children.insert(0, runs[0])
-    _set_attribute(runs[-1], attribute, value)
+def _units_of(cls: type[Plugin], attribute: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    known, params = cls.historic_attributes, cls.params()
+    for parameter, parts in known.joined.items():
+        if attribute in parts:
+            i, column = parts.index(attribute), params[parameter]
+            return (column.units[i],), (column.text_units[i],)
+    found = params.get(known.renamed.get(attribute, attribute))
+    return (found.units, found.text_units) if found is not None else (("",), ("",))
 
 
-def _set_attribute(node: Node, name: str, value: str) -> None:
-    node.attributes[name] = value
-    # Not of the file: what is wrong with it is an error even where the file's own would be a note.
-    node.lines[name] = 0
+def _named(node: Node, tags: Iterable[str]) -> dict[str, Node]:
+    """Plugins in a tag by the names that they get when they are read."""
+    taken: set[str] = set()
+    plugins = [child for tag in tags for child in node.find_all(tag)]
+    return {free_name(n.attributes.get("name", n.text).strip(), taken): n for n in plugins}
 
 
-def _set_in_block(block: Node, rest: list[str], value: str) -> None:
-    if len(rest) == 1:
-        _set_tag(block, rest[0], value)
-        return
-    name, attribute = rest[0], ".".join(rest[1:])
-    plugins = {n.attributes.get("name", n.text): n for n in block.children if n.tag in ENTITY_PLUGINS}
-    if name not in plugins or len(rest) > 2:
-        raise MissionError(
-            f"the block has no plugin {name[:80]!r}{nearest_name(name[:80], plugins)}; {listed(plugins)}"
-        )
-    _set_attribute(plugins[name], attribute, value)
+def _write_inner(node: Node) -> None:
+    """Write the plugins within a plugin back into its attributes."""
+    for key in dict.fromkeys(child.tag for child in node.children):
+        inner = (codecs.told_text(n.text, n.attributes) for n in node.find_all(key))
+        node.attributes[key], node.lines[key] = " ".join(inner), 0
+    node.children = []
 
 
 def _set_tag(block: Node, tag: str, value: str) -> None:
     """Put one tag in the place of all of its name; a plugin may bring attributes: "Unicycle vel_max='30'"."""
-    if tag not in ENTITY or tag == "base":
-        raise MissionError(
-            f"an entity has no tag {tag[:80]!r}{nearest_name(tag[:80], ENTITY)}; {listed(ENTITY)}"
-        )
     block.children = [child for child in block.children if child.tag != tag]
-    if tag in ENTITY_PLUGINS:
-        if value.strip():
-            told = codecs.told(value)
-            block.children.append(
-                Node(tag, told.attributes, told.name, [], block.place, dict.fromkeys(told.attributes, 0))
-            )
-    else:
+    if tag not in ENTITY_PLUGINS:
         block.children.append(Node(tag, {}, value.strip(), [], block.place))
+    elif value.strip():
+        told = codecs.told(value)
+        block.children.append(
+            Node(tag, told.attributes, told.name, [], block.place, dict.fromkeys(told.attributes, 0))
+        )

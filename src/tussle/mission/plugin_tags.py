@@ -20,6 +20,15 @@ MOST_NESTED = 4
 RATED = ("autonomy", "controller", "sensor", "behaviors")
 
 
+def free_name(wanted: str, taken: set[str]) -> str:
+    """The name that a plugin gets: the wanted one, or with a number behind it where that is taken; then it is taken."""
+    name, n = wanted, 2
+    while name in taken:
+        name, n = f"{wanted}_{n}", n + 1
+    taken.add(name)
+    return name
+
+
 @dataclass
 class Written:
     """A plugin as it stands in the file.
@@ -146,14 +155,11 @@ class PluginReader:
             text = f"name {shown(wanted)} is not allowed: a name is not empty and has no dot, since paths such as prey.Boids.gain use dots"
             self.problems.error(written.where("name"), text)
             wanted = written.plugin
-        name, n = wanted, 2
-        while name in taken:
-            name, n = f"{wanted}_{n}", n + 1
+        name = free_name(wanted, taken)
         if name != wanted:
             self.problems.note(
                 written.where("name"), f"a second {wanted} is called {name}; give it a name='...' of its own"
             )
-        taken.add(name)
         return name
 
     def _rate(self, written: Written) -> float | None:

@@ -22,6 +22,8 @@ from tussle.scene import Scene
 T = TypeVar("T")
 
 END_CONDITIONS = ("time", "one_team", "all_dead", "none")
+RUN = "run"
+"""What paths to times and steps begin with."""
 UPDATES = ("synchronous", "sequential")
 PLACEMENTS = ("normal", "uniform")
 
@@ -35,7 +37,7 @@ def _converted(where: str, frozen: Any, columns: Mapping[str, Param]) -> None:
         if column.fields and isinstance(value, (int, float)):
             value = [value] * len(column.fields)
         try:
-            _set(frozen, name, column.convert(value, where))
+            _set(frozen, name, column.convert(value, f"{where}: {name}"))
         except ParameterError as error:
             raise MissionError(str(error)) from None
 
@@ -46,10 +48,7 @@ def _declared(kind: type, **columns: Any) -> dict[str, Param]:
     for name, said in columns.items():
         default = said.pop("default", getattr(kind, name))
         is_number = not isinstance(default, (bool, str))
-        declared[name] = column = Param(
-            default, **({"gt": -math.inf, "lt": math.inf} if is_number else {}) | said
-        )
-        column.name = name
+        declared[name] = Param(default, **({"gt": -math.inf, "lt": math.inf} if is_number else {}) | said)
     return declared
 
 
@@ -295,6 +294,10 @@ class Mission:
         missing = tuple(stock.load(n)() for n in stock.ALWAYS_THERE if n not in given)
         _set(self, "networks", (*missing, *self.networks))
         _plugins("mission", self.world_plugins, object)
+        if RUN in [*names, *(p.instance_name for p in self.world_plugins)]:
+            raise MissionError(
+                f"mission: {RUN!r} is no name of a block or plugin; paths such as run.dt begin with it"
+            )
         for plugin in self.world_plugins:
             if plugin.instance_name in names:
                 raise MissionError(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ from tussle.mission.catalogue import KINDS, Catalogue
 from tussle.mission.entities import EntityReader, Fields, block_names, expanded
 from tussle.mission.limits import Limits
 from tussle.mission.node import Budget, Node
-from tussle.mission.overrides import apply_path, split_overrides
+from tussle.mission.overrides import Overrides, as_texts
 from tussle.mission.plugin_files import PluginFile
 from tussle.mission.plugin_tags import PluginReader
 from tussle.mission.problems import Place, Problems
@@ -46,6 +46,7 @@ class Loaded:
         placeholders: Names that can be set, with their defaults.
         places: Block name -> "file:line", for messages about it.
         files: All files that were read: the mission's and those it includes.
+        settings: What was set, as texts that the file takes.
     """
 
     mission: Mission
@@ -59,11 +60,12 @@ class Loaded:
     placeholders: dict[str, str] = field(default_factory=dict)
     places: dict[str, str] = field(default_factory=dict)
     files: tuple[Path, ...] = ()
+    settings: dict[str, str] = field(default_factory=dict)
 
 
 def read_mission(
     source: str | Path,
-    overrides: Mapping[str, str] | None = None,
+    overrides: Mapping[str, Any] | None = None,
     *,
     strict: bool = False,
     plugin_files: Sequence[str | Path | PluginFile] = (),
@@ -75,8 +77,8 @@ def read_mission(
     Args:
         source: A file, or the name of a mission that ships, such as "predator_prey".
         overrides: Values of the file's `${name=default}`, and of anything in it by path: "run.dt", "prey.count",
-            "prey.Boids.max_speed", "SimpleCapture.capture_range", "prey.motion_model" ("Unicycle vel_max='30'"). As text, in the
-            file's units.
+            "prey.Boids.max_speed", "SimpleCapture.capture_range", "prey.motion_model" ("Unicycle vel_max='30'"). By path a number
+            is SI and a text is as in the file; the value of a placeholder is put into the file as it is.
         strict: Tags and attributes that mean nothing are errors instead of notes.
         plugin_files: Python files whose plugins the mission may name.
         search: Folders in which missions and included files are looked for, besides the mission's own.
@@ -86,7 +88,8 @@ def read_mission(
         MissionError: It cannot be read or played. One line for each thing that is wrong, beginning with file and line.
     """
     budget = Budget(Limits.large() if allow_large else Limits())
-    settings = {str(name): str(value) for name, value in (overrides or {}).items()}
+    given = {str(name): value for name, value in (overrides or {}).items()}
+    settings = as_texts(given)
     catalogue = Catalogue(plugin_files)
     problems = Problems(strict=strict)
     path = find_mission(source, search)
@@ -95,13 +98,12 @@ def read_mission(
         raise MissionError(
             f"{read.root.place}: the outermost tag is <{read.root.tag[:80]}>; a mission's is <runscript>"
         )
-    _, paths = split_overrides(settings, read.placeholders)
     expanded(read.root, problems, budget)
-    for name, value in paths.items():
-        apply_path(read.root, name, value)
+    tree = Overrides(read.root, catalogue, read.placeholders)
+    paths = {name: tree.set(name, value) for name, value in given.items() if name not in read.placeholders}
     if paths:
         read.text = read.root.to_text()
-    return _WorldReader(read, catalogue, problems, budget).loaded()
+    return replace(_WorldReader(read, catalogue, problems, budget).loaded(), settings=settings | paths)
 
 
 class _WorldReader:

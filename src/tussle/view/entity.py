@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tussle.api.bodies import DERIVED, FLOATS, derive
+from tussle.api.bodies import BODY_UNITS, DERIVED, FLOATS, derive
 from tussle.columns import Subscribe
 from tussle.comms import EVERYONE, SAME_ENTITY
 from tussle.lists import RaggedColumn
@@ -21,10 +21,6 @@ if TYPE_CHECKING:
 
 MOST_MESSAGES = 50
 """Messages that are listed, of those heard and of those said."""
-BODY_UNITS = {
-    "pos": "m", "vel": "m/s", "quat": "", "omega": "rad/s", "force": "N", "torque": "N m", "health": "", "radius": "m",
-    "mass": "kg", "yaw": "rad", "climb": "rad", "roll": "rad",
-}  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -60,26 +60,30 @@ def test_a_value_of_a_plugin_within_another_is_set_by_its_path():
 @pytest.mark.parametrize(
     ("path", "value", "words"),
     [
-        ("red.count", 1, "no block or world plugin 'red' (did you mean 'reds'?)"),
-        ("roulete.odds", 1, "no block or world plugin 'roulete' (did you mean 'Roulette'?)"),
-        ("count", 1, "no block or world plugin 'count'"),
-        ("reds.counts", 1, "Block has no 'counts' (did you mean 'count'?)"),
-        ("reds.Nervos.how", 1, "reds has no plugin 'Nervos' (did you mean 'Nervous'?)"),
-        ("reds.Nervous.hoe", 1, "Nervous has no parameter 'hoe' (did you mean 'how'?)"),
-        ("reds.Nervous.how.more", 1, "Nervous has no plugin 'how'"),
-        ("reds", 1, "'reds' names no value of reds; write reds.NAME"),
-        ("Roulette", 1, "'Roulette' names no value of Roulette; write Roulette.NAME"),
-        ("", 1, "no block or world plugin"),
-        ("run.ends", 1, "Mission has no 'ends' (did you mean 'end'?)"),
-        ("run.dt", -1, "dt = -1.0 is not allowed"),
+        (
+            "red.count",
+            1,
+            "'red.count': the mission has no 'red' (did you mean 'reds'?); there are: run, reds, ",
+        ),
+        ("roulete.odds", 1, "the mission has no 'roulete' (did you mean 'Roulette'?)"),
+        ("count", 1, "'count': the mission has no 'count'"),
+        ("reds.counts", 1, "reds has no 'counts' (did you mean 'count'?)"),
+        ("reds.Nervos.how", 1, "reds has no 'Nervos' (did you mean 'Nervous'?)"),
+        ("reds.Nervous.hoe", 1, "Nervous has no 'hoe' (did you mean 'how'?)"),
+        ("reds.Nervous.how.more", 1, "Nervous has no 'how'; there are none"),
+        ("reds", 1, "'reds' names no value of reds; there are: name, team"),
+        ("Roulette", 1, "'Roulette' names no value of Roulette; there are: odds"),
+        ("", 1, "'': the mission has no ''"),
+        ("run.ends", 1, "run has no 'ends' (did you mean 'end'?)"),
+        ("run.dt", -1, "dt = -1 is not allowed"),
         ("reds.count", -1, "count = -1 is not allowed"),
         ("reds.count", 2.5, "count = 2.5 is not allowed"),
         ("reds.motion", "Unicycle", "'Unicycle' is not a motion model"),
         ("Roulette.odds", 2.0, "odds = 2.0 is not allowed; it takes a finite number >= 0 and <= 1"),
         ("Roulette.rule", "some", "rule = 'some' is not allowed"),
-        ("run", 1, "'run' names no value of run; write run.NAME"),
-        ("run.dt.x", 1, "'run.dt.x' names no value of run"),
-        ("Roulette.odds.x", 1, "Roulette has no plugin 'odds'; there are none"),
+        ("run", 1, "'run' names no value of run; there are: blocks, dt"),
+        ("run.dt.x", 1, "'run.dt.x': run has no 'dt'"),
+        ("Roulette.odds.x", 1, "Roulette has no 'odds'; there are none"),
     ],
 )
 def test_a_path_that_leads_nowhere_and_a_value_that_is_not_allowed_are_refused(path, value, words):
@@ -89,7 +93,7 @@ def test_a_path_that_leads_nowhere_and_a_value_that_is_not_allowed_are_refused(p
 
 
 def test_a_path_within_a_plugin_names_what_is_there():
-    with pytest.raises(ParameterError, match=r"MotorSchemas has no plugin 'shyy' \(did you mean 'shy'\?\)"):
+    with pytest.raises(ParameterError, match=r"MotorSchemas has no 'shyy' \(did you mean 'shy'\?\)"):
         with_value(schemas(), "walkers.MotorSchemas.shyy.gain", 1.0)
 
 
@@ -119,7 +123,7 @@ def picky(odds):
         (
             game(),
             [{"Roulette.odd": 1}],
-            "point 0 (Roulette.odd=1): 'Roulette.odd': Roulette has no parameter",
+            "point 0 (Roulette.odd=1): 'Roulette.odd': Roulette has no 'odd'",
         ),
     ],
 )

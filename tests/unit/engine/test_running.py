@@ -310,7 +310,7 @@ def test_reset_gives_seeds_and_params_in_the_order_of_the_worlds():
         (([0, 0],), r"reset: there are worlds 0 to 1, each once, not \[0, 0\]"),
         (([0, 1], [5]), r"reset: 1 seeds for 2 worlds"),
         (([0], ["x"]), r"seed 'x' is not allowed; it takes a whole number"),
-        (([0], None, {"a.Drift.two": 1}), r"Drift has no parameter 'two' \(did you mean 'to'\?\)"),
+        (([0], None, {"a.Drift.two": 1}), r"Drift has no 'two' \(did you mean 'to'\?\)"),
     ],
 )
 def test_resets_that_cannot_be(arguments, message):
@@ -487,14 +487,14 @@ def test_world_columns_are_read_and_written_by_world():
 @pytest.mark.parametrize(
     ("path", "value", "message"),
     [
-        ("a.pso", 0.0, r"'a.pso': bodies have no column 'pso' \(did you mean 'pos'\?\)"),
-        ("c.pos", 0.0, r"'c.pos': there is no column by this path.*paths begin with: a, GlobalNetwork"),
-        ("a", 0.0, r"'a': there is no column by this path"),
-        ("a.Drft.to", 0.0, r"'a.Drft.to': a has no plugin 'Drft' \(did you mean 'Drift'\?\)"),
+        ("a.pso", 0.0, r"'a.pso': a has no 'pso' \(did you mean 'pos'\?\)"),
+        ("c.pos", 0.0, r"'c.pos': the mission has no 'c'; there are: run, a, GlobalNetwork"),
+        ("a", 0.0, r"'a' names no value of a; there are: pos, vel"),
+        ("a.Drft.to", 0.0, r"'a.Drft.to': a has no 'Drft' \(did you mean 'Drift'\?\)"),
         (
             "a.Drift.too",
             0.0,
-            r"'a.Drift.too': Drift has no column 'too' \(did you mean 'to'\?\); there are: to, velocity",
+            r"'a.Drift.too': Drift has no 'too' \(did you mean 'to'\?\); there are: to, velocity",
         ),
         ("a.yaw", 0.0, r"'a.yaw' cannot be written; there are: pos, vel, quat"),
         ("a.id", 0.0, r"'a.id' cannot be written"),
@@ -509,7 +509,7 @@ def test_world_columns_are_read_and_written_by_world():
         (
             "GlobalNetwork.comm_dely",
             0.0,
-            r"GlobalNetwork has no column 'comm_dely' \(did you mean 'comm_delay'\?\)",
+            r"GlobalNetwork has no 'comm_dely' \(did you mean 'comm_delay'\?\)",
         ),
     ],
 )
@@ -590,15 +590,15 @@ def test_structural_params_split_groups_and_each_world_is_as_alone():
 @pytest.mark.parametrize(
     ("params", "message"),
     [
-        ({"b.Drift.to": 1}, r"'b.Drift.to': there is no block or world plugin 'b'"),
-        ({"a.Drif.to": 1}, r"'a.Drif.to': a has no plugin 'Drif' \(did you mean 'Drift'\?\)"),
+        ({"b.Drift.to": 1}, r"'b.Drift.to': the mission has no 'b'; there are: run, a"),
+        ({"a.Drif.to": 1}, r"'a.Drif.to': a has no 'Drif' \(did you mean 'Drift'\?\)"),
         (
             {"a.Drift.two": 1},
-            r"'a.Drift.two': Drift has no parameter 'two' \(did you mean 'to'\?\); there are: to",
+            r"'a.Drift.two': Drift has no 'two' \(did you mean 'to'\?\); there are: to",
         ),
-        ({"a.sped": 1}, r"'a.sped' names no parameter.*a has: .*speed"),
-        ({"a": 1}, r"'a' names no parameter"),
-        ({"a.speed": "3 kg"}, r"a.speed: a.speed = '3 kg'"),
+        ({"a.sped": 1}, r"'a.sped': a has no 'sped' .did you mean 'speed'"),
+        ({"a": 1}, r"'a' names no value of a; there are: name, team"),
+        ({"a.speed": "3 kg"}, r"a.speed = '3 kg'"),
         ({"a.speed": -1.0}, r"a.speed = -1.0 is not allowed"),
         ({"a.health": 0.0}, r"a.health = 0.0 is not allowed"),
         ({"a.mass": [1.0, -1.0]}, r"a.mass = -1.0 is not allowed"),
@@ -618,7 +618,8 @@ def test_bad_params_are_refused_with_their_path(params, message):
 def test_a_structural_param_of_a_world_plugin_belongs_to_the_mission():
     game = mission(interactions=[SimpleCollision()])
     with pytest.raises(
-        (MissionError, ParameterError), match=r"startup_collisions_only is structural.*set it in the mission"
+        (MissionError, ParameterError),
+        match=r"startup_collisions_only' is one for all worlds of a stack; set it in the mission",
     ):
         Simulation(game, seeds=[1, 2], params={"SimpleCollision.startup_collisions_only": [True, False]})
 
@@ -639,5 +640,7 @@ def test_a_ragged_param_belongs_to_the_mission():
     sim = alone(game, 1)
     assert sim.read("a.Path.n")[0].tolist() == [[3, 3]]
     assert sim.read("b.Path.n")[0].tolist() == [[1]]
-    with pytest.raises(ParameterError, match=r"a.Path.points. is a list.*mission"):
+    with pytest.raises(
+        ParameterError, match=r"a.Path.points' is one for all worlds of a stack; set it in the mission"
+    ):
         Simulation(game, params={"a.Path.points": [(1.0, 2.0)]})

@@ -79,7 +79,10 @@ def test_steps_until_the_end(end, steps):
         ({"name": ""}, r"block '': a block's name is not empty"),
         ({"name": "a.b"}, r"block 'a.b': a block's name .* has no dot"),
         ({"name": 5}, r"block 5: a block's name is a text"),
-        ({"position": (1, 2)}, r"block 'a': position = \(1, 2\) is not allowed; it takes 3 values \(x, y, z\)"),
+        (
+            {"position": (1, 2)},
+            r"block 'a': position = \(1, 2\) is not allowed; it takes 3 values \(x, y, z\)",
+        ),
         ({"position": None}, r"block 'a': position = None is not allowed; it takes 3 values"),
         ({"position": (1, 2, "3 kg")}, r"block 'a': position = '3 kg': .*kg"),
         (

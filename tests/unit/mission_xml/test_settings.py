@@ -95,13 +95,13 @@ def test_plugins_are_replaced_and_removed(files):
     ("path", "said"),
     [
         ("run.tick", "run has no 'tick'"),
-        ("c.count", r"there is no 'c'; there are: run, a, b, SimpleCapture"),
-        ("a.cuont", r"an entity has no tag 'cuont' \(did you mean 'count'\?\)"),
-        ("a.Boid.max_speed", r"the block has no plugin 'Boid' \(did you mean 'Boids'\?\)"),
-        ("a.base", "an entity has no tag 'base'"),
-        ("a.Boids.x.y", "the block has no plugin"),
+        ("c.count", r"the mission has no 'c'; there are: run, a, b, SimpleCapture"),
+        ("a.cuont", r"a has no 'cuont' \(did you mean 'count'\?\)"),
+        ("a.Boid.max_speed", r"a has no 'Boid' \(did you mean 'Boids'\?\)"),
+        ("a.base", "a has no 'base'"),
+        ("a.Boids.x.y", "Boids has no 'x'; there are none"),
         ("a.motion_model", r"'\[ \[ x \]' is not a plugin"),
-        (".", "there is no ''"),
+        (".", "the mission has no ''"),
     ],
 )
 def test_paths_that_lead_nowhere(files, path, said):

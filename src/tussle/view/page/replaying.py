@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tussle.view.entity import BODY_UNITS, EntityState, Reading
+from tussle.api.bodies import BODY_UNITS
+from tussle.view.entity import EntityState, Reading
 from tussle.view.pacing import checked_warp, faster, slower
 
 if TYPE_CHECKING:
