@@ -15,17 +15,15 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from tussle.batch.executors import OVERDUE, Executor, InProcess, Processes
 from tussle.batch.plan import Plan
-from tussle.batch.points import values_text, variables_of
+from tussle.batch.points import settings_of, variables_of
 from tussle.batch.sampling import method_for
 from tussle.batch.sampling import sample as sample_points
 from tussle.batch.store import PLUGINS
 from tussle.batch.tasks import Finished, Run
 from tussle.batch.treatments import Treatment, build_points, exactly, group_points, read_points
-from tussle.batch.variables import Range, Variable, written
+from tussle.batch.variables import Variable
 from tussle.batch.varied import about, as_variables
 from tussle.engine.simulation import Simulation
 from tussle.errors import BatchError, ParameterError, PluginError
@@ -133,32 +131,25 @@ class Batch:
         """The mission file as it stands without any varied value; None for a mission made in Python."""
         if not isinstance(self.source, (str, Path)):
             return None
-        return read_mission(self.source, self._texts, **self._options)
-
-    @property
-    def _texts(self) -> dict[str, str]:
-        """What is set in all points, as texts."""
-        numbers = (bool, int, float, np.generic)
-        return {k: written(v) if isinstance(v, numbers) else str(v) for k, v in self.settings.items()}
+        return read_mission(self.source, self.settings, **self._options)
 
     def _missions(self, points: Sequence[Mapping[str, Any]]) -> Iterator[Mission]:
         """The mission of each point; the files that they are read from are noted."""
         self._files: dict[Path, bytes] = {}
         if isinstance(self.source, (str, Path)):
-            texts = [values_text(point, self.variables) for point in points]
-            for loaded in read_points(self.source, self._texts, texts, **self._options):
+            for loaded in read_points(
+                self.source, self.settings, map(self._settings, points), **self._options
+            ):
                 for file in loaded.files:
                     if file not in self._files:
                         self._files[file] = file.read_bytes()
                 yield self._ended(loaded.mission)
         else:
-            for mission in build_points(self.source, self.settings, [self._with_units(p) for p in points]):
+            for mission in build_points(self.source, self.settings, map(self._settings, points)):
                 yield self._ended(mission)
 
-    def _with_units(self, point: Mapping[str, Any]) -> dict[str, Any]:
-        """The values of a point as parameters take them: with its unit as a text, otherwise as it is."""
-        units = {v.name: v for v in self.variables if isinstance(v, Range) and v.unit}
-        return {name: units[name].text(value) if name in units else value for name, value in point.items()}
+    def _settings(self, point: Mapping[str, Any]) -> dict[str, Any]:
+        return settings_of(point, self.variables, is_argument=callable(self.source))
 
     def _ended(self, mission: Mission) -> Mission:
         return mission.ending_by_time() if self._ends_by_time else mission
@@ -246,7 +237,7 @@ class Batch:
         parts = [
             *sources,
             *(text for file in self.plugin_files for text in file.texts.values()),
-            json.dumps([dict(p) for p in self.plan.points], default=str),
+            json.dumps([self._settings(p) for p in self.plan.points], default=str),
             repr((self.plan.first_seed, self.plan.independent, self._ends_by_time, versions()["tussle"])),
         ]
         return hashlib.blake2b("\0".join(parts).encode(), digest_size=16).hexdigest()
@@ -318,7 +309,7 @@ class Batch:
         return {
             "made_in": "file",
             "file": self.loaded.path.name,
-            "settings": self._texts,
+            "settings": self.loaded.settings,
             "ends_by_time": self._ends_by_time,
             "plugin_files": self._plugin_names(),
             "options": {k: v for k, v in self._options.items() if k != "plugin_files"},

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from tussle.batch.variables import written
 from tussle.errors import ParameterError
+from tussle.mission.codecs import written
 
 MOST_RUNS = 10_000_000
 

@@ -8,8 +8,10 @@ from tussle.batch.variables import Choice, Value, Variable, check_value, key_of
 from tussle.errors import ParameterError, nearest_name
 
 
-def values_text(point: Mapping[str, Value], variables: Sequence[Variable]) -> dict[str, str]:
-    """The values of a point as the settings that `tussle.mission.read_mission` takes.
+def settings_of(
+    point: Mapping[str, Value], variables: Sequence[Variable], is_argument: bool = False
+) -> dict[str, Value]:
+    """The values of a point as a mission takes them, a file or one made in Python; or as the arguments of a function that makes one.
 
     Raises:
         ParameterError: The point has no value of a variable, or one that is none.
@@ -21,7 +23,7 @@ def values_text(point: Mapping[str, Value], variables: Sequence[Variable]) -> di
     missing = [variable.name for variable in variables if variable.name not in point]
     if missing:
         raise ParameterError(f"the point has no value of {', '.join(missing)}")
-    return {variable.name: variable.text(point[variable.name]) for variable in variables}
+    return {variable.name: variable.setting(point[variable.name], is_argument) for variable in variables}
 
 
 def variables_of(points: Sequence[Mapping[str, Value]]) -> list[Variable]:

@@ -64,7 +64,9 @@ def _variable(name: str, node: Node) -> Variable:
             )
     is_int = told.get("type") == "int"
     if "vec" in told:
-        return Choice(name, tuple(_number(name, item, is_int=is_int) for item in told["vec"].split(",")))
+        return Choice(
+            name, tuple(_number(name, item, is_int=is_int) for item in told["vec"].split(",")), is_text=True
+        )
     missing = [key for key in ("low", "high", "type") if key not in told]
     if missing:
         raise ParameterError(f"{name}: it has no {' and no '.join(missing)}; a range has low, high and type")
@@ -74,8 +76,8 @@ def _variable(name: str, node: Node) -> Variable:
         raise ParameterError(f"{name}: count={told['count']!r} is not allowed; it takes a whole number")
     if low == high or count == 1:
         value = f"{shown(low)} {unit}" if unit else _number(name, shown(low), is_int=is_int)
-        return Choice(name, (value,))
-    return Range(name, low, high, is_int, told.get("scale") == "log", count, unit)
+        return Choice(name, (value,), is_text=True)
+    return Range(name, low, high, is_int, told.get("scale") == "log", count, unit, is_text=True)
 
 
 def _number(name: str, text: str, *, is_int: bool) -> int | float:

@@ -10,7 +10,7 @@ from typing import Any
 import pyarrow.compute as pc
 
 from tussle.batch import store
-from tussle.batch.points import values_text
+from tussle.batch.points import settings_of
 from tussle.batch.results import Results
 from tussle.batch.trust import DirectoryCode
 from tussle.errors import BatchError
@@ -91,13 +91,15 @@ def planned_run(
         )
     planned = results.design.slice(number, 1).to_pylist()[0]
     point = {v.name: planned[v.name] for v in results.variables}
-    settings = {**about["settings"], **values_text(point, results.variables)}
+    settings = {**about["settings"], **settings_of(point, results.variables)}
     loaded = read_mission(
         file, settings, strict=is_strict, plugin_files=code.files, search=search, allow_large=allow_large
     )
     mission = loaded.mission.ending_by_time() if about["ends_by_time"] else loaded.mission
     found = results.table.filter(pc.equal(results.table["run"], number))["state_hash"]
-    return PlannedRun(loaded, mission, planned["seed"], settings, found[0].as_py() if len(found) else "")
+    return PlannedRun(
+        loaded, mission, planned["seed"], loaded.settings, found[0].as_py() if len(found) else ""
+    )
 
 
 def _inside(path: Path, name: str) -> Path:

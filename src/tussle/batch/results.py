@@ -30,9 +30,9 @@ from tussle.batch.statistics import (
 )
 from tussle.batch.survival import N_TIMES, Survival, survival_of
 from tussle.batch.variables import Choice, Range, Variable
-from tussle.batch.variables import written as text_of
 from tussle.batch.varied import variable_of
 from tussle.errors import MissingExtraError, ParameterError, listed, nearest_name
+from tussle.mission.codecs import written as text_of
 
 if TYPE_CHECKING:
     from tussle.batch.store import Stored

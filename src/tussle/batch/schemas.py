@@ -20,8 +20,16 @@ FILE = {
     "plugin_files": [Inside],
     "options": OPTIONS,
 }
-RANGE = {"low": Real(), "high": Real(), "is_int": bool, "is_log": bool, "levels": Maybe(Whole()), "unit": str}
-CHOICE = {"values": [Either((bool, str, Real()), "a text, a number, or true or false")]}
+RANGE = {
+    "low": Real(),
+    "high": Real(),
+    "is_int": bool,
+    "is_log": bool,
+    "levels": Maybe(Whole()),
+    "unit": str,
+    "is_text": bool,
+}
+CHOICE = {"values": [Either((bool, str, Real()), "a text, a number, or true or false")], "is_text": bool}
 
 
 def _against_mission(mission: dict[str, Any], where: str) -> str:

@@ -6,7 +6,7 @@ import dataclasses
 import inspect
 import pickle
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -33,28 +33,28 @@ class Treatment:
 
 
 def read_points(
-    source: str | Path, settings: Mapping[str, str], texts: Sequence[Mapping[str, str]], **options: Any
+    source: str | Path, settings: Mapping[str, Any], points: Iterable[Point], **options: Any
 ) -> Iterator[Loaded]:
     """The mission file once for each point.
 
     Args:
         source: The file.
         settings: What is set in all points.
-        texts: What each point sets.
+        points: What each point sets.
         options: As for `read_mission`.
 
     Raises:
         MissionError: A point cannot be played; the message names it.
     """
-    for number, text in enumerate(texts):
-        with _naming(number, text):
-            yield read_mission(source, {**settings, **text}, **options)
+    for number, point in enumerate(points):
+        with _naming(number, point):
+            yield read_mission(source, {**settings, **point}, **options)
 
 
 def build_points(
     source: Mission | Callable[..., Mission],
     settings: Mapping[str, Any],
-    points: Sequence[Point],
+    points: Iterable[Point],
 ) -> Iterator[Mission]:
     """A mission made in Python once for each point.
 

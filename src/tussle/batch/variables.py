@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from tussle.errors import ParameterError, UnitError, nearest_name
+from tussle.mission.codecs import written
 from tussle.numeric import exp, log
 from tussle.units import LONGEST_TEXT, QUANTITY, unit_of
 
@@ -49,7 +50,8 @@ class Range:
         is_int: Whole numbers only.
         is_log: Values lie evenly by their logarithm.
         levels: It takes only so many values, evenly from low to high; None for all between.
-        unit: Unit that is written behind the number; "" is that of what the name leads to.
+        unit: Unit that is written behind the number.
+        is_text: Its bounds come from a text such as "20:30", so a number without unit is read as in a mission file; else it is SI.
 
     Raises:
         ParameterError: The bounds, the levels or the name are not allowed.
@@ -63,6 +65,7 @@ class Range:
     is_log: bool = False
     levels: int | None = None
     unit: str = ""
+    is_text: bool = False
 
     def __post_init__(self) -> None:
         _check_name(self.name)
@@ -158,8 +161,14 @@ class Range:
         """The value as it is put into a mission file; a text stays as it is."""
         if isinstance(value, str):
             return value
-        number = str(int(value)) if self.is_int else repr(float(value))
+        number = written(int(value) if self.is_int else float(value))
         return f"{number} {self.unit}" if self.unit else number
+
+    def setting(self, value: Value, is_argument: bool = False) -> Value:
+        """The value as a mission takes it: a text where it is one, else a number in SI units. Arguments of functions stay numbers."""
+        if isinstance(value, str) or self.unit or (self.is_text and not is_argument):
+            return self.text(value)
+        return int(value) if self.is_int else float(value)
 
     def _level(self, i: int, n: int) -> int | float:
         if i in (0, n - 1):
@@ -187,6 +196,7 @@ class Choice:
     Attributes:
         name: A placeholder of the mission, or a path such as "prey.motion_model".
         values: Texts, numbers or truth values, all different.
+        is_text: They come from a text such as "20,30", so a number is read as in a mission file; else it is SI.
 
     Raises:
         ParameterError: A value is of another type or stands twice, there is none, or the name is not allowed.
@@ -194,6 +204,7 @@ class Choice:
 
     name: str
     values: tuple[Any, ...]
+    is_text: bool = False
 
     def __post_init__(self) -> None:
         _check_name(self.name)
@@ -226,17 +237,12 @@ class Choice:
         """The value as it is put into a mission file."""
         return written(value)
 
+    def setting(self, value: Value, is_argument: bool = False) -> Value:
+        """As of a range."""
+        return written(value) if self.is_text and not is_argument else value
+
 
 Variable = Range | Choice
-
-
-def written(value: Any) -> str:
-    """A value without a unit as mission files write it: `true` and `false`, numbers with all their digits, texts as they are."""
-    if isinstance(value, str):
-        return value
-    if isinstance(value, bool | np.bool_):
-        return "true" if value else "false"
-    return str(int(value)) if isinstance(value, numbers.Integral) else repr(float(value))
 
 
 def shown(number: float) -> str:
@@ -326,7 +332,7 @@ def parse_values(name: str, text: str) -> Variable:
             raise ParameterError(
                 f"{name}: the range {_cut(item)!r} cannot stand among choices; write a range alone, as 20:30, or values, as 20,25,30"
             )
-    return Choice(name, tuple(read_value(item) for item in items))
+    return Choice(name, tuple(read_value(item) for item in items), is_text=True)
 
 
 def read_value(text: str) -> Value:
@@ -387,7 +393,7 @@ def _parse_range(name: str, parts: list[str]) -> Range:
                 f"{name}: {'levels are' if word == 'levels' else f'{word} is'} said twice behind the range"
             )
         said[word] = int(part) if word == "levels" else 1
-    return Range(name, low, high, "int" in said, "log" in said, said.get("levels"), unit)
+    return Range(name, low, high, "int" in said, "log" in said, said.get("levels"), unit, is_text=True)
 
 
 def _cut(text: str) -> str:

@@ -6,8 +6,9 @@ import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from tussle.batch.variables import Choice, Range, Variable, parse_values, parse_variable, written
+from tussle.batch.variables import Choice, Range, Variable, parse_values, parse_variable
 from tussle.errors import ParameterError
+from tussle.mission.codecs import written
 
 
 def as_variables(vary: Mapping[str, Any] | Iterable[str | Variable]) -> list[Variable]:
@@ -68,8 +69,8 @@ def variable_of(said: Mapping[str, Any]) -> Variable:
         ParameterError: Its values are not allowed.
     """
     if said["kind"] == "choice":
-        return Choice(said["name"], tuple(said["values"]))
-    fields = ("name", "low", "high", "is_int", "is_log", "levels", "unit")
+        return Choice(said["name"], tuple(said["values"]), said["is_text"])
+    fields = ("name", "low", "high", "is_int", "is_log", "levels", "unit", "is_text")
     return Range(**{name: said.get(name) for name in fields})  # type: ignore[arg-type]
 
 

@@ -14,7 +14,7 @@ from rich.live import Live
 from rich.progress import BarColumn, Progress
 from rich.text import Text
 
-from tussle.batch.points import values_text
+from tussle.batch.points import settings_of
 from tussle.batch.search.optimization import Optimization, SearchProgress
 from tussle.cli.batch import Interrupted
 from tussle.cli.interrupt import Interrupt
@@ -185,8 +185,8 @@ class SearchMeter:
         parts = []
         if (best := progress.best) is not None:
             values = ", ".join(
-                f"{name}={text}"
-                for name, text in values_text(best.values, self._search.proposer.variables).items()
+                f"{name}={value}"
+                for name, value in settings_of(best.values, self._search.proposer.variables).items()
             )
             parts.append(f"best {interval(best.objective, best.low, best.high)} with {values}")
         if progress.n_failed:

@@ -220,7 +220,8 @@ def _check_written(path: str, values: np.ndarray, column: Numbers, is_body: bool
             if (np.asarray(values).astype(np.int64) != values).any():
                 raise ParameterError(f"{path!r}: values must be whole numbers of 64 bits")
     if isinstance(column, Param):
-        for value in np.unique(values, axis=-1).T if column.fields else np.unique(values):
+        different = np.unique(values, axis=-1).T if column.fields else np.unique(values)
+        for value in different.tolist():
             column.convert(value, path)
 
 

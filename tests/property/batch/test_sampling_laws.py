@@ -9,10 +9,11 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from tussle.batch.points import values_text
+from tussle.batch.points import settings_of
 from tussle.batch.sampling import sample
 from tussle.batch.variables import Choice, Range, parse_variable
 from tussle.errors import ParameterError
+from tussle.mission.codecs import written
 from tussle.units import parse
 
 DRAWN = ("lhs", "sobol", "saltelli", "product")
@@ -62,7 +63,7 @@ def test_more_of_the_way_is_no_smaller_value(variable, shares):
 @given(variable=ranges(), share=st.floats(0, 1))
 def test_the_text_of_a_value_is_that_value(variable, share):
     value = variable.value_at(share)
-    text = values_text({"x": value}, [variable])["x"]
+    text = written(settings_of({"x": value}, [variable])["x"])
     number, _, unit = text.partition(" ")
     assert (float(number), unit) == (value, variable.unit)
     assert math.isfinite(parse(text, "m/s" if variable.unit else ""))

@@ -7,7 +7,7 @@ import pickle
 import numpy as np
 import pytest
 
-from tussle.batch.points import values_text, variables_of
+from tussle.batch.points import settings_of, variables_of
 from tussle.batch.variables import Choice, Range, parse_variable
 from tussle.errors import ParameterError, UnitError
 from tussle.mission import read_mission
@@ -16,29 +16,29 @@ from tussle.mission import read_mission
 @pytest.mark.parametrize(
     ("text", "variable"),
     [
-        ("prey_speed=20:30", Range("prey_speed", 20, 30)),
-        ("prey_speed=20:30 kt", Range("prey_speed", 20, 30, unit="kt")),
-        (" prey_speed = 20 kt : 30 kt ", Range("prey_speed", 20, 30, unit="kt")),
+        ("prey_speed=20:30", Range("prey_speed", 20, 30, is_text=True)),
+        ("prey_speed=20:30 kt", Range("prey_speed", 20, 30, unit="kt", is_text=True)),
+        (" prey_speed = 20 kt : 30 kt ", Range("prey_speed", 20, 30, unit="kt", is_text=True)),
         ("a.turn=-1:1 rad/s:log", "a low bound > 0"),
-        ("prey.count=50:100:int", Range("prey.count", 50, 100, is_int=True)),
-        ("prey.Boids.gain=1e-3:10:log", Range("prey.Boids.gain", 0.001, 10, is_log=True)),
-        ("n=1:100:int:log", Range("n", 1, 100, is_int=True, is_log=True)),
-        ("n=1:100:log:int", Range("n", 1, 100, is_int=True, is_log=True)),
-        ("x=0:1:5", Range("x", 0, 1, levels=5)),
-        ("x=0:10:int:5", Range("x", 0, 10, is_int=True, levels=5)),
-        ("x=0:10:5:int", Range("x", 0, 10, is_int=True, levels=5)),
-        ("x=-20:-10 m:3", Range("x", -20, -10, levels=3, unit="m")),
-        ("tactic=keep,switch", Choice("tactic", ("keep", "switch"))),
-        ("tactic = keep , switch ", Choice("tactic", ("keep", "switch"))),
-        ("prey.count=50,100,200", Choice("prey.count", (50, 100, 200))),
-        ("x=-1.5,+2,1e3", Choice("x", (-1.5, 2, 1000.0))),
-        ("x=20 kt,30 kt", Choice("x", ("20 kt", "30 kt"))),
-        ("x=true,false", Choice("x", ("true", "false"))),
-        ("x=inf,1_0,0x1", Choice("x", ("inf", "1_0", "0x1"))),
-        ("x=3", Choice("x", (3,))),
-        ("prey.motion_model=Unicycle vel_max='30',None", Choice("prey.motion_model", ("Unicycle vel_max='30'", "None"))),
-        ("x=a=b,c", Choice("x", ("a=b", "c"))),
-        ("clock=noon:sharp,dawn", Choice("clock", ("noon:sharp", "dawn"))),
+        ("prey.count=50:100:int", Range("prey.count", 50, 100, is_int=True, is_text=True)),
+        ("prey.Boids.gain=1e-3:10:log", Range("prey.Boids.gain", 0.001, 10, is_log=True, is_text=True)),
+        ("n=1:100:int:log", Range("n", 1, 100, is_int=True, is_log=True, is_text=True)),
+        ("n=1:100:log:int", Range("n", 1, 100, is_int=True, is_log=True, is_text=True)),
+        ("x=0:1:5", Range("x", 0, 1, levels=5, is_text=True)),
+        ("x=0:10:int:5", Range("x", 0, 10, is_int=True, levels=5, is_text=True)),
+        ("x=0:10:5:int", Range("x", 0, 10, is_int=True, levels=5, is_text=True)),
+        ("x=-20:-10 m:3", Range("x", -20, -10, levels=3, unit="m", is_text=True)),
+        ("tactic=keep,switch", Choice("tactic", ("keep", "switch"), is_text=True)),
+        ("tactic = keep , switch ", Choice("tactic", ("keep", "switch"), is_text=True)),
+        ("prey.count=50,100,200", Choice("prey.count", (50, 100, 200), is_text=True)),
+        ("x=-1.5,+2,1e3", Choice("x", (-1.5, 2, 1000.0), is_text=True)),
+        ("x=20 kt,30 kt", Choice("x", ("20 kt", "30 kt"), is_text=True)),
+        ("x=true,false", Choice("x", ("true", "false"), is_text=True)),
+        ("x=inf,1_0,0x1", Choice("x", ("inf", "1_0", "0x1"), is_text=True)),
+        ("x=3", Choice("x", (3,), is_text=True)),
+        ("prey.motion_model=Unicycle vel_max='30',None", Choice("prey.motion_model", ("Unicycle vel_max='30'", "None"), is_text=True)),
+        ("x=a=b,c", Choice("x", ("a=b", "c"), is_text=True)),
+        ("clock=noon:sharp,dawn", Choice("clock", ("noon:sharp", "dawn"), is_text=True)),
     ],
 )  # fmt: skip
 def test_texts_of_the_command_line(text, variable):
@@ -206,7 +206,7 @@ def test_a_mission_reads_the_values_of_a_point():
         "keepers.Predator.max_speed": 25.0,
         "switchers.Predator.allow_prey_switching": "false",
     }
-    texts = values_text(point, variables)
+    texts = settings_of(point, variables)
     assert texts["keepers.Predator.max_speed"] == "25.0 kt"
     blocks = {b.name: b for b in read_mission("predator_prey", texts).mission.blocks}
     assert blocks["prey"].count == 7
@@ -219,9 +219,9 @@ def test_a_point_has_one_value_of_each_variable():
     with pytest.raises(
         ParameterError, match=r"'prey_sped', which does not vary \(did you mean 'prey_speed'\?\)"
     ):
-        values_text({"prey_sped": 1, "tactic": "keep"}, variables)
+        settings_of({"prey_sped": 1, "tactic": "keep"}, variables)
     with pytest.raises(ParameterError, match="the point has no value of tactic"):
-        values_text({"prey_speed": 1}, variables)
+        settings_of({"prey_speed": 1}, variables)
 
 
 def test_points_that_are_given_tell_what_varies():

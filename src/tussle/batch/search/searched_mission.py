@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from tussle.batch.batch import Batch
+from tussle.batch.points import settings_of
 from tussle.batch.treatments import build_points
-from tussle.batch.variables import Choice, Value, Variable
+from tussle.batch.variables import Value, Variable
 from tussle.errors import BatchError, TussleError
 from tussle.mission import Loaded, Mission, PluginFile, read_mission
 
@@ -52,8 +53,7 @@ class SearchedMission:
         """
         loaded = None
         if isinstance(self.source, (str, Path)):
-            settings = {k: str(v) for k, v in self.settings.items()}
-            loaded = read_mission(self.source, settings, plugin_files=self.plugin_files, **self.options)
+            loaded = read_mission(self.source, self.settings, plugin_files=self.plugin_files, **self.options)
             name, texts = loaded.path.stem, [loaded.text]
         else:
             missions = self._corners(self.source)
@@ -79,14 +79,8 @@ class SearchedMission:
         return found
 
     def given(self, point: Point) -> dict[str, Value]:
-        """Values as a batch takes them: as texts where they go into a file or have a unit."""
-        is_file = isinstance(self.source, (str, Path))
-        return {
-            v.name: v.text(point[v.name])
-            if is_file or (not isinstance(v, Choice) and v.unit)
-            else point[v.name]
-            for v in self.variables
-        }
+        """Values as a mission takes them."""
+        return settings_of(point, self.variables, is_argument=callable(self.source))
 
     def batch(self, points: Sequence[Point]) -> Batch:
         """All games of some sets of values.
@@ -128,7 +122,7 @@ class SearchedMission:
         return {
             "made_in": "file",
             "file": content.loaded.path.name,
-            "settings": {k: str(v) for k, v in self.settings.items()},
+            "settings": content.loaded.settings,
             "plugin_files": [Path(p).name for p in self.plugin_files],
             "ends_by_time": self.ends_by_time,
         }

@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from tussle.batch.points import values_text
+from tussle.batch.points import settings_of
 from tussle.batch.search.proposals import Proposer
 from tussle.batch.search.trials import Trial, trials_table
 from tussle.batch.statistics import Comparison, paired_difference
 from tussle.batch.variables import Value, Variable
+from tussle.mission.codecs import written
 
 
 @dataclass(frozen=True)
@@ -120,7 +121,7 @@ class Study:
 
     def settings(self, values: Mapping[str, Value]) -> dict[str, str]:
         """Values as a mission file takes them."""
-        return values_text(values, self.variables)
+        return {name: written(value) for name, value in settings_of(values, self.variables).items()}
 
     def label(self, values: Mapping[str, Value]) -> str:
         """Values on one line: "prey_speed=23.4 kt, tactic=keep"."""

@@ -9,8 +9,9 @@ from typing import Any
 
 import pyarrow as pa
 
-from tussle.batch.variables import Choice, Value, Variable, key_of, written
+from tussle.batch.variables import Choice, Value, Variable, key_of
 from tussle.errors import ParameterError
+from tussle.mission.codecs import written
 
 FACTS = pa.schema(
     [
