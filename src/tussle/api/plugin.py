@@ -29,6 +29,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 C = TypeVar("C", bound=Column)
 
 GRADES = ("portable", "machine", "external")
+RATE = Param(1.0, unit="1/s", gt=0.0, lt=math.inf)
 RESERVED = ("name", "rate")
 
 
@@ -111,17 +112,14 @@ class Plugin:
         cls.__signature__ = inspect.Signature(params)  # type: ignore[attr-defined]
 
     def __init__(
-        self, *unnamed: Any, name: str | None = None, rate: float | None = None, **values: Any
+        self, *unnamed: Any, name: str | None = None, rate: float | str | None = None, **values: Any
     ) -> None:
         cls = type(self)
         if unnamed:
             raise ParameterError(
                 f"{cls.__name__}({', '.join(map(repr, unnamed))}): parameters are given by name; {listed(cls.params())}"
             )
-        if rate is not None and (isinstance(rate, (bool, str)) or not 0.0 < rate < math.inf):
-            raise ParameterError(
-                f"{cls.__name__}: rate = {rate!r} is not allowed; it takes a number of calls per second > 0, or None"
-            )
+        rate = None if rate is None else RATE.convert(rate, f"{cls.__name__}: rate")
         params, children = cls.params(), cls.children()
         for key in values:
             if key not in params and key not in children:

@@ -34,14 +34,12 @@ class PlannedRun:
         loaded: Its mission file, with the values of its point.
         mission: What is played.
         seed: Its seed.
-        settings: All that was set in the file.
         state_hash: What it ended in; "" where it is not finished.
     """
 
     loaded: Loaded
     mission: Mission
     seed: int
-    settings: dict[str, str]
     state_hash: str
 
 
@@ -97,9 +95,7 @@ def planned_run(
     )
     mission = loaded.mission.ending_by_time() if about["ends_by_time"] else loaded.mission
     found = results.table.filter(pc.equal(results.table["run"], number))["state_hash"]
-    return PlannedRun(
-        loaded, mission, planned["seed"], loaded.settings, found[0].as_py() if len(found) else ""
-    )
+    return PlannedRun(loaded, mission, planned["seed"], found[0].as_py() if len(found) else "")
 
 
 def _inside(path: Path, name: str) -> Path:

@@ -29,7 +29,7 @@ from tussle.cli.batch_summary import compare_hash, show_batch
 from tussle.cli.interrupt import Interrupt
 from tussle.cli.play import FOR_VIEWER, Source, simulate
 from tussle.cli.progress import BAR_EVERY, LINE_EVERY, clock, compiling, text_column, times
-from tussle.cli.settings import ending_by_time, read_end
+from tussle.cli.settings import ending_by_time
 from tussle.cli.terminal import err, say, say_note
 from tussle.errors import BatchError, ParameterError, RecordError
 from tussle.record import Recorder, load_run
@@ -89,7 +89,6 @@ class Asked:
         if sweep.points is not None and own:
             raise ParameterError(f"{self.sweep} lists its points, so --vary means nothing beside it")
         names = [v.name for v in own]
-        end = {} if self.source.end is None else {"run.end": repr(read_end(self.source.end))}
 
         def first(*values: Any) -> Any:
             return next((v for v in values if v is not None), None)
@@ -104,14 +103,14 @@ class Asked:
             sample_seed=first(self.sample_seed, sweep.sample_seed, 0),
             first_seed=first(self.source.seed, sweep.first_seed, 1),
             independent=self.independent,
-            settings={**self.source.settings, **end},
+            settings=self.source.given,
             plugin_files=tuple(self.source.plugin_files),
-            ends_by_time=bool(end),
+            ends_by_time=self.source.end is not None,
             run_timeout=self.run_timeout,
             strict=self.source.strict,
             allow_large=self.source.allow_large,
         )
-        if end:
+        if self.source.end is not None:
             ending_by_time(batch.mission)
         for note in batch.loaded.notes if batch.loaded is not None else ():
             if FOR_VIEWER not in note:
@@ -211,7 +210,9 @@ def record_run(batch: Batch, source: Source, directory: Path, number: int, inter
     )
     with (
         simulate(run.loaded, run.mission, run.seed) as simulation,
-        Recorder(simulation, target, mission_text=run.loaded.text, parameters=run.settings) as recorder,
+        Recorder(
+            simulation, target, mission_text=run.loaded.text, parameters=run.loaded.settings
+        ) as recorder,
     ):
         simulation.run_until(lambda _: bool(interrupt.code))
         if interrupt.code:

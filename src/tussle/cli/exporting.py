@@ -13,10 +13,10 @@ from typing import Any
 import typer
 
 from tussle.cli.progress import home_short
+from tussle.cli.settings import read_time
 from tussle.cli.tally import Tally
 from tussle.cli.terminal import INTERRUPTED, NOT_WRITTEN, OK, out, say, say_error, say_note
 from tussle.errors import ParameterError, ViewError
-from tussle.units import parse
 from tussle.view.export.film import FilmOptions
 from tussle.view.recording import Recording
 
@@ -65,18 +65,6 @@ def film_options(**asked: Any) -> FilmOptions:
         return FilmOptions(**given)
     except ParameterError as error:
         raise typer.BadParameter(str(error)) from None
-
-
-def read_time(option: str, text: str) -> float:
-    """The time of an option [s].
-
-    Raises:
-        ParameterError: It is no time.
-    """
-    try:
-        return parse(text, "s")
-    except ParameterError as error:
-        raise ParameterError(f"{option}: {error}") from None
 
 
 def read_size(text: str) -> tuple[int, int]:

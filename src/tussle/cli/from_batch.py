@@ -58,11 +58,6 @@ class FromBatch:
                 return typer.confirm("Run it?", err=True)
         return self._trusts
 
-    @property
-    def given(self) -> dict[str, str]:
-        """All that was set."""
-        return self._run.settings
-
     def read(self, tells_all: bool = True) -> tuple[Loaded, Mission, int]:
         """The file as read, the mission, and the seed."""
         return self._run.loaded, self._run.mission, self._run.seed

@@ -21,7 +21,6 @@ from tussle.cli.interrupt import Interrupt
 from tussle.cli.optimize_summary import interval, play_again, show_study
 from tussle.cli.play import FOR_VIEWER, Source
 from tussle.cli.progress import BAR_EVERY, LINE_EVERY, clock, compiling, text_column
-from tussle.cli.settings import read_end
 from tussle.cli.terminal import err, say, say_note
 
 
@@ -65,7 +64,6 @@ class Asked:
         Raises:
             TussleError: Something in it is not allowed.
         """
-        end = {} if self.source.end is None else {"run.end": repr(read_end(self.source.end))}
         optimization = Optimization(
             self.source.mission,
             self.objective,
@@ -76,9 +74,9 @@ class Asked:
             sampler=self.sampler,
             sample_seed=self.sample_seed,
             first_seed=1 if self.source.seed is None else self.source.seed,
-            settings={**self.source.settings, **end},
+            settings=self.source.given,
             plugin_files=tuple(self.source.plugin_files),
-            ends_by_time=bool(end),
+            ends_by_time=self.source.end is not None,
             run_timeout=self.run_timeout,
             strict=self.source.strict,
             allow_large=self.source.allow_large,

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from tussle.cli.interrupt import Interrupt
 from tussle.cli.progress import Meter, compiling
-from tussle.cli.settings import ending_by_time, read_end
+from tussle.cli.settings import ending_by_time, read_time
 from tussle.cli.summary import Speed, show_summary
 from tussle.cli.terminal import say, say_note
 from tussle.engine.simulation import Simulation
@@ -53,10 +53,9 @@ class Source:
 
     def read(self, tells_all: bool = True) -> tuple[Loaded, Mission, int]:
         """The file as read, the mission, and the seed. Without `tells_all`, nothing is said of settings kept for the viewer."""
-        end = {} if self.end is None else {"run.end": repr(read_end(self.end))}
         loaded = read_mission(
             self.mission,
-            {**self.settings, **end},
+            self.given,
             strict=self.strict,
             plugin_files=tuple(self.plugin_files),
             allow_large=self.allow_large,
@@ -65,12 +64,12 @@ class Source:
             if tells_all or FOR_VIEWER not in note:
                 say_note(note)
         seed = self.seed if self.seed is not None else loaded.seed if loaded.seed is not None else 1
-        return loaded, ending_by_time(loaded.mission) if end else loaded.mission, seed
+        return loaded, loaded.mission if self.end is None else ending_by_time(loaded.mission), seed
 
     @property
-    def given(self) -> dict[str, str]:
-        """All that was set, for the run directory."""
-        return self.settings if self.end is None else {**self.settings, "run.end": self.end}
+    def given(self) -> dict[str, Any]:
+        """All that is set."""
+        return self.settings | ({} if self.end is None else {"run.end": read_time("--end", self.end)})
 
     def ended(self, state_hash: str) -> None:
         """The game has come to its end, whatever it is."""
@@ -102,10 +101,6 @@ class Record:
 class Game(Protocol):
     """What is to be played: a mission with settings, or a run of a batch."""
 
-    @property
-    def given(self) -> dict[str, str]:
-        """All that was set, for the run directory."""
-
     def read(self, tells_all: bool = True) -> tuple[Loaded, Mission, int]:
         """The file as read, the mission, and the seed."""
 
@@ -133,7 +128,7 @@ def play(source: Game, record: Record, pace: float | None, start_from: Path | No
         with compiling():
             simulation = stack.enter_context(simulate(loaded, mission, seed, **more))
             interrupt = stack.enter_context(Interrupt())
-            recorder = _recorder(simulation, record, loaded, seed, source.given) if record.is_on else None
+            recorder = _recorder(simulation, record, loaded, seed) if record.is_on else None
             simulation.step()  # loads or compiles what the game needs, and so counts as preparation
         speed = Speed(began)
         _run(simulation, loaded.path.stem, speed, pace, interrupt)
@@ -180,13 +175,13 @@ def _wait(until: float, meter: Meter, t: float, interrupt: Interrupt) -> None:
         meter.show(t)
 
 
-def _recorder(
-    simulation: Simulation, record: Record, loaded: Loaded, seed: int, given: dict[str, str]
-) -> Recorder:
+def _recorder(simulation: Simulation, record: Record, loaded: Loaded, seed: int) -> Recorder:
     from tussle.record import Recorder
 
     directory = record.directory or _new_directory(loaded.path.stem, seed)
-    return Recorder(simulation, directory, period=record.period, mission_text=loaded.text, parameters=given)
+    return Recorder(
+        simulation, directory, period=record.period, mission_text=loaded.text, parameters=loaded.settings
+    )
 
 
 def _new_directory(name: str, seed: int) -> Path:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated
 
@@ -70,32 +71,16 @@ def plot(
     """Write plots of a recorded run: ways, speed, altitude, who is left, captures, where they were."""
     with told(debug):
         from tussle.cli.progress import home_short
+        from tussle.cli.settings import read_time
         from tussle.view.plots import Choice, write_plots
         from tussle.view.recording import Recording
 
-        choice = Choice(
-            tuple(teams or ()), tuple(entities or ()), _time("--from", start, -1.0), _time("--to", end, 1.0)
-        )
+        first = -math.inf if start is None else read_time("--from", start)
+        last = math.inf if end is None else read_time("--to", end)
+        choice = Choice(tuple(teams or ()), tuple(entities or ()), first, last)
         recording = Recording(run, world, tuple(plugin_files or ()))
         written = write_plots(recording, directory or run / PLOTS, kinds or (), choice, between, form)
         for note in written.notes:
             say_note(note)
         for file in written.files:
             out().print(home_short(file), soft_wrap=True)
-
-
-def _time(option: str, text: str | None, sign: float) -> float:
-    """The time of an option [s]; without one, before or after all others.
-
-    Raises:
-        ParameterError: It is no time.
-    """
-    from tussle.errors import ParameterError
-    from tussle.units import parse
-
-    if text is None:
-        return sign * float("inf")
-    try:
-        return parse(text, "s")
-    except ParameterError as error:
-        raise ParameterError(f"{option}: {error}") from None

@@ -1,4 +1,4 @@
-"""`--set name=value` and `--end`: what the command line changes in a mission."""
+"""`--set name=value` and times: what the command line changes in a mission."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ def read_settings(texts: Iterable[str]) -> dict[str, str]:
     return settings
 
 
-def read_end(text: str) -> float:
-    """The time of `--end` [s].
+def read_time(option: str, text: str) -> float:
+    """The time of an option [s].
 
     Raises:
         ParameterError: It is no time.
@@ -39,7 +39,7 @@ def read_end(text: str) -> float:
     try:
         return parse(text, "s")
     except ParameterError as error:
-        raise ParameterError(f"--end: {error}") from None
+        raise ParameterError(f"{option}: {error}") from None
 
 
 def ending_by_time(mission: Mission) -> Mission:

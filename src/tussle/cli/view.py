@@ -121,7 +121,7 @@ def play_live(
 
             # Closed last, and whatever ends the game.
             recorder = stack.enter_context(
-                Recorder(simulation, record, mission_text=loaded.text, parameters=source.given)
+                Recorder(simulation, record, mission_text=loaded.text, parameters=loaded.settings)
             )
         live = Live(
             simulation, pace=_warp_of(viewer) if pace == 0.0 else pace, viewer=viewer,

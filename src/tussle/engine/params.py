@@ -39,17 +39,12 @@ class Overrides:
         checked = []  # all of them before any is set
         for path, value in values.items():
             key, column = self._find(path)
-            many = (
-                isinstance(value, (list, np.ndarray))
-                and len(value) == len(worlds)
-                and np.ndim(value) > len(column.shape)
-            )
-            is_list = isinstance(value, (list, np.ndarray)) and np.ndim(value) > len(column.shape)
-            if is_list and not many and not column.is_text:
+            is_many = isinstance(value, (list, np.ndarray)) and np.ndim(value) > len(column.shape)
+            if is_many and len(value) != len(worlds):
                 raise ParameterError(
                     f"{path!r} has {len(value)} values for {len(worlds)} worlds; it takes one value, or one per world"
                 )
-            items = [column.convert(v, path) for v in (value if many else [value] * len(worlds))]
+            items = [column.convert(v, path) for v in (value if is_many else [value] * len(worlds))]
             checked.append((key, column, items))
         for key, column, items in checked:
             if column.structural:

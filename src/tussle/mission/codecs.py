@@ -12,7 +12,7 @@ import numpy as np
 
 from tussle import units
 from tussle.columns import MOST_INTEGER
-from tussle.errors import MissionError, ParameterError, listed, nearest_name
+from tussle.errors import MissionError, ParameterError
 from tussle.texts import shown
 
 RATIO = re.compile(r"\s*([-+.\deE]+)\s*/\s*([-+.\deE]+)\s*", re.ASCII)
@@ -68,24 +68,6 @@ def fraction(text: str, unit: str) -> float:
     if not math.isfinite(value):
         raise MissionError(f"{shown(text)} is not allowed: it divides by zero")
     return value
-
-
-def words(text: str) -> list[str]:
-    """Words between commas and blanks."""
-    return [word for word in re.split(r"[,\s]+", text.strip()) if word]
-
-
-def chosen(text: str, choices: tuple[str, ...]) -> str:
-    """One of some words.
-
-    Raises:
-        MissionError: It is another.
-    """
-    if text.strip() in choices:
-        return text.strip()
-    raise MissionError(
-        f"{shown(text)} is not allowed{nearest_name(text.strip()[:80], choices)}; {listed(choices)}"
-    )
 
 
 def told(text: str) -> Told:

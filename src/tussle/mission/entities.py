@@ -15,7 +15,7 @@ from tussle.mission.limits import Limits
 from tussle.mission.node import Budget, Node
 from tussle.mission.plugin_tags import PluginReader, Written
 from tussle.mission.problems import Place, Problems
-from tussle.mission.spec import PLACEMENTS, RUN, Block
+from tussle.mission.spec import BLOCK_VALUES, RUN, Block
 from tussle.mission.tags import BASE, ENTITY, ENTITY_ATTRIBUTES, MANY, Known
 from tussle.scene import Base, Origin
 from tussle.texts import FALSE, shown, truth
@@ -127,7 +127,9 @@ class Fields:
             try:
                 return codec(self.found[name].text)
             except TussleError as error:
-                self.problems.error(self.found[name].place, f"{name}: {error}")
+                self.problems.error(
+                    self.found[name].place, f"{name}: {str(error).removeprefix(f'{name} = ')}"
+                )
         default = self.known[name].default
         return codec(default) if default and default != "none" else None
 
@@ -278,7 +280,9 @@ class EntityReader:
             "climb": -fields.number("pitch", "rad"),
             "velocity": velocity if any(velocity) else None,
             "speed": fields.number("speed"),
-            "placement": fields.read("placement", lambda text: codecs.chosen(text, PLACEMENTS)),
+            "placement": fields.read(
+                "placement", lambda text: BLOCK_VALUES["placement"].convert(text, "placement")
+            ),
             "variance": fields.vector("variance_x", "variance_y", "variance_z"),
             "half_width": fields.vector("half_width_x", "half_width_y", "half_width_z"),
             "heading_variance": fields.number("variance_heading", "rad^2"),

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from tussle.api.plugin import Plugin
+from tussle.columns import Param
 from tussle.errors import MissionError, TussleError
 from tussle.mission import codecs
 from tussle.mission.catalogue import KINDS, AbsentPluginError, Catalogue, historic
@@ -17,6 +19,7 @@ from tussle.texts import shown
 
 MOST_NESTED = 4
 """Behaviours in behaviours."""
+LOOP_RATE = Param(0.0, unit="1/s", ge=0.0, lt=math.inf)
 RATED = ("autonomy", "controller", "sensor", "behaviors")
 
 
@@ -171,15 +174,10 @@ class PluginReader:
             self.problems.note(place, f"loop_rate of a {written.tag} is ignored; it acts in every step")
             return None
         try:
-            rate = codecs.number(text, "1/s")
-            if rate < 0.0:
-                raise MissionError(
-                    f"{shown(text)} is not allowed; it takes a number of calls per second >= 0"
-                )
+            return LOOP_RATE.convert(text, "loop_rate") or None
         except TussleError as error:
-            self.problems.error(place, f"loop_rate: {error}")
+            self.problems.error(place, str(error))
             return None
-        return rate or None
 
     def _join(self, written: Written, cls: type[Plugin]) -> None:
         """Put attributes that are components of one parameter into it."""

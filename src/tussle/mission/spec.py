@@ -22,6 +22,7 @@ from tussle.scene import Scene
 T = TypeVar("T")
 
 END_CONDITIONS = ("time", "one_team", "all_dead", "none")
+END = Param("time", choices=END_CONDITIONS)
 RUN = "run"
 """What paths to times and steps begin with."""
 UPDATES = ("synchronous", "sequential")
@@ -52,11 +53,18 @@ def _declared(kind: type, **columns: Any) -> dict[str, Param]:
     return declared
 
 
-def _items(where: str, value: Any, what: str) -> tuple[Any, ...]:
+def end_conditions(value: Any, where: str) -> tuple[str, ...]:
+    """What ends a mission, each once.
+
+    Raises:
+        MissionError: It is neither a list of conditions nor a text of them.
+    """
+    words = value.replace(",", " ").split() if isinstance(value, str) else value
     try:
-        return tuple(value)
-    except TypeError:
-        raise MissionError(f"{where} = {value!r} is not allowed; it takes {what}") from None
+        return tuple(dict.fromkeys(END.convert(word, where) for word in words))
+    except (TypeError, ParameterError) as error:
+        said = "" if isinstance(error, ParameterError) else f"{where} = {value!r} is not allowed: "
+        raise MissionError(f"{said}{error}") from None
 
 
 def _plugins(where: str, value: Any, kind: type) -> tuple[Any, ...]:
@@ -260,7 +268,9 @@ class Mission:
     limits: Limits = field(default=Limits(), repr=False)  # no part of the game, and so not of its text
 
     def __post_init__(self) -> None:
-        _set(self, "blocks", _items("mission: blocks", self.blocks, "a list of Block"))
+        if not isinstance(self.blocks, Iterable):
+            raise MissionError(f"mission: blocks = {self.blocks!r} is not allowed; it takes a list of Block")
+        _set(self, "blocks", tuple(self.blocks))
         for block in self.blocks:
             if not isinstance(block, Block):
                 raise MissionError(f"mission: {block!r} is not a Block")
@@ -275,19 +285,7 @@ class Mission:
             raise MissionError(
                 f"mission: end = {self.end!r} with dt = {self.dt!r} is not allowed; that many steps cannot be counted"
             )
-        conditions = self.end_conditions
-        conditions = (
-            tuple(conditions.replace(",", " ").split())
-            if isinstance(conditions, str)
-            else _items("mission: end_conditions", conditions, f"a list; {listed(END_CONDITIONS)}")
-        )
-        for condition in conditions:
-            if condition not in END_CONDITIONS:
-                raise MissionError(
-                    f"mission: end condition {condition!r} is not allowed{nearest_name(str(condition), END_CONDITIONS)}; "
-                    f"{listed(END_CONDITIONS)}"
-                )
-        _set(self, "end_conditions", conditions)
+        _set(self, "end_conditions", end_conditions(self.end_conditions, "mission: end_conditions"))
         for name, kind in (("interactions", Interaction), ("metrics", Metric), ("networks", Network)):
             _set(self, name, _plugins(f"mission: {name}", getattr(self, name), kind))
         given = [p.instance_name for p in self.networks]

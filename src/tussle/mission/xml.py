@@ -21,7 +21,7 @@ from tussle.mission.plugin_files import PluginFile
 from tussle.mission.plugin_tags import PluginReader
 from tussle.mission.problems import Place, Problems
 from tussle.mission.source import Reader, Source, find_mission
-from tussle.mission.spec import END_CONDITIONS, UPDATES, Mission
+from tussle.mission.spec import MISSION_VALUES, Mission, end_conditions
 from tussle.mission.tags import RUN, SEED_ATTRIBUTES, WORLD, Known
 from tussle.scene import Scene
 from tussle.texts import shown, truth
@@ -211,7 +211,7 @@ class _WorldReader:
                 fields.place("end"),
                 f"end {end:g} s is not a whole number of steps of {dt:g} s; the last ends at {last:g} s",
             )
-        update = fields.read("update", lambda text: codecs.chosen(text, UPDATES))
+        update = fields.read("update", lambda text: MISSION_VALUES["update"].convert(text, "update"))
         return {"dt": dt, "start": start, "end": end, "motion_multiplier": substeps, "update": update}
 
     def _origin(self) -> Origin:
@@ -238,15 +238,14 @@ class _WorldReader:
         node = self._last("end_condition")
         if node is None:
             return ("time",)
-        found = []
-        for word in codecs.words(node.text):
-            try:
-                found.append(codecs.chosen(word, END_CONDITIONS))
-            except MissionError as error:
-                self.problems.error(node.place, f"end_condition: {error}")
+        try:
+            found = end_conditions(node.text, "end_condition")
+        except MissionError as error:
+            self.problems.error(node.place, str(error))
+            return ("time",)
         if not found:
             self.problems.note(node.place, "<end_condition> is empty; the mission ends by time")
-        return tuple(dict.fromkeys(found)) or ("time",)
+        return found or ("time",)
 
     def _seed(self) -> int | None:
         node = self._last("seed")

@@ -104,7 +104,7 @@ def test_values_are_taken_in_si(name, given, value):
             5,
             r"Sample has no parameter 'sped' \(did you mean 'speed'\?\); there are: speed, count, is_on",
         ),
-        ("rate", 0, r"Sample: rate = 0 is not allowed; it takes a number of calls per second > 0, or None"),
+        ("rate", 0, r"Sample: rate = 0 is not allowed; it takes a finite number in 1/s > 0"),
         ("rate", math.nan, r"Sample: rate = nan"),
         ("rate", math.inf, r"Sample: rate = inf"),
         ("rate", "often", r"Sample: rate = 'often'"),

@@ -170,7 +170,7 @@ def test_blocks_that_cannot_be(values, message):
         ),
         (
             {"end_conditions": "time, one_taem"},
-            r"mission: end condition 'one_taem' is not allowed \(did you mean 'one_team'\?\); there are: time, one_team",
+            r"mission: end_conditions = 'one_taem' is not allowed \(did you mean 'one_team'\?\); it takes one of 'time', 'one_team'",
         ),
         ({"end_conditions": 5}, r"mission: end_conditions = 5 is not allowed"),
         (
