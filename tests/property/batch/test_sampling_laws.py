@@ -34,7 +34,7 @@ def ranges(draw, name="x"):
         bounds = st.floats(1e-300 if is_log else -1.7e308, 1.7e308)
     low, high = sorted((draw(bounds), draw(bounds)))
     assume(low < high)
-    return Range(name, low, high, is_int, is_log, unit=draw(st.sampled_from(["", "kt"])))
+    return Range(name, low, high, is_int, is_log, unit=draw(st.sampled_from(["", "kt"])), is_text=True)
 
 
 def choices(name):

@@ -132,5 +132,6 @@ def test_it_is_json_without_numbers_that_json_does_not_have():
     assert again["points"][1]["means"][0]["quantiles"]["0.5"] == found.points[1].means[0].quantiles[0.5]
     assert again["shares"][0]["name"] == "prey"
     assert again["variables"][1] == {
-        "kind": "range", "name": "speed", "low": 20.0, "high": 30.0, "is_int": False, "is_log": False, "levels": 2, "unit": "",
+        "kind": "range", "is_text": False, "name": "speed",
+        "low": 20.0, "high": 30.0, "is_int": False, "is_log": False, "levels": 2, "unit": "",
     }  # fmt: skip

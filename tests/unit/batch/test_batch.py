@@ -410,6 +410,7 @@ def test_what_batch_json_says(mission, tmp_path):
         "is_log": False,
         "levels": None,
         "unit": "",
+        "is_text": True,
     }
     expected = {
         "format": 1, "name": "A game of chance", "fingerprint": batch.fingerprint, "variables": [odds], "sample": "lhs", "sample_seed": 4,

@@ -270,7 +270,7 @@ def test_values_that_can_never_be_played_are_an_error(game):
         ({"vary": {"Bowl.x": [1, "1", "a"]}}, "Bowl.x: the choices 1 and '1' are written alike"),
         ({"objective": "Bowl.hight"}, "there is no 'Bowl.hight' .did you mean 'Bowl.height'"),
         ({"objective": "Bowl.height["}, "cannot be read"),
-        ({"vary": {"Bowl.z": (0.0, 1.0)}}, "'Bowl.z': Bowl has no parameter 'z'"),
+        ({"vary": {"Bowl.z": (0.0, 1.0)}}, "'Bowl.z': Bowl has no 'z'"),
     ],
 )
 def test_what_means_nothing_is_refused(arguments, message):

@@ -52,12 +52,12 @@ def test_a_sweep_file(read):
     )
     assert sweep == Sweep(
         variables=(
-            Range("prey_speed", 20, 30, unit="kt"),
+            Range("prey_speed", 20, 30, unit="kt", is_text=True),
             Range("prey.count", 50, 100, is_int=True),
             Range("gain", 1e-3, 10, is_log=True, levels=5, unit="m"),
             Choice("tactic", ("keep", "switch", 3, True)),
-            Choice("prey.Boids.max_speed", (20, 25)),
-            Range("prey.motion.vel_max", 30, 40),
+            Choice("prey.Boids.max_speed", (20, 25), is_text=True),
+            Range("prey.motion.vel_max", 30, 40, is_text=True),
             Range("prey.motion.turn.rate", 1, 2),
             Choice("fixed", (4,)),
         ),
@@ -70,11 +70,13 @@ def test_a_sweep_file(read):
 
 
 def test_what_a_file_does_not_say_is_none(read):
-    assert read('[vary]\nx = "0:1"') == Sweep((Range("x", 0, 1),), None, None, None, None, None, None)
+    assert read('[vary]\nx = "0:1"') == Sweep(
+        (Range("x", 0, 1, is_text=True),), None, None, None, None, None, None
+    )
 
 
 def test_a_mark_that_editors_put_before_a_text_is_no_part_of_it(read):
-    assert read('\ufeff[vary]\nx = "0:1"').variables == (Range("x", 0, 1),)
+    assert read('\ufeff[vary]\nx = "0:1"').variables == (Range("x", 0, 1, is_text=True),)
 
 
 def test_texts_of_a_list_stay_texts(read):
@@ -213,13 +215,13 @@ def test_a_ranges_file(read):
     sweep = read(RANGES, "ranges.xml")
     assert sweep == Sweep(
         (
-            Range("max_speed", 15, 25),
-            Range("count", 10, 10000, is_int=True, is_log=True, levels=12),
-            Choice("radius", (1, 2, 5)),
-            Choice("gain", (1.0, 2.5)),
-            Range("heading", 0, 360, levels=5, unit="deg"),
-            Choice("fixed", (3.0,)),
-            Choice("first", (3,)),
+            Range("max_speed", 15, 25, is_text=True),
+            Range("count", 10, 10000, is_int=True, is_log=True, levels=12, is_text=True),
+            Choice("radius", (1, 2, 5), is_text=True),
+            Choice("gain", (1.0, 2.5), is_text=True),
+            Range("heading", 0, 360, levels=5, unit="deg", is_text=True),
+            Choice("fixed", (3.0,), is_text=True),
+            Choice("first", (3,), is_text=True),
         )
     )
     assert all(type(v) is float for v in sweep.variables[3].values)
@@ -228,7 +230,7 @@ def test_a_ranges_file(read):
 
 def test_a_ranges_file_is_known_by_its_content_as_well(read):
     assert read(RANGES, "ranges.txt") == read(RANGES, "ranges.XML")
-    assert read('[vary]\nx = "0:1"', "sweep.txt").variables == (Range("x", 0, 1),)
+    assert read('[vary]\nx = "0:1"', "sweep.txt").variables == (Range("x", 0, 1, is_text=True),)
 
 
 def test_problems_of_a_ranges_file_have_lines(problems):

@@ -248,7 +248,7 @@ def test_easy_mode_has_the_dt_of_its_period():
         ),
         (
             lambda: mission(metrics=[Tally(rate=50)]),
-            r"mission: Tally: rate = 50 Hz cannot be honoured.*10 Hz",
+            r"mission: Tally: rate = 50.0 Hz cannot be honoured.*10 Hz",
         ),
         (lambda: mission(metrics=[Tally(rate=1e308)], dt=10, end=20), r"rate = 1e\+308 Hz cannot be.*0.1 Hz"),
         (lambda: mission(metrics=[Tally(rate=1e-6)]), r"the smallest that can is 1e-05 Hz"),

@@ -210,9 +210,7 @@ def test_what_is_called_run_is_the_times_and_steps(file):
 
 
 WRONG = "prey.Boid.fov_az"
-SAID = (
-    r"prey has no 'Boid' \(did you mean 'Boids'\?\); there are: Boids, DirectController, SingleIntegrator"
-)
+SAID = r"prey has no 'Boid' \(did you mean 'Boids'\?\); there are: Boids, DirectController, SingleIntegrator"
 
 
 @pytest.mark.parametrize("door", [k for k in EITHER if k not in ("constructor", "replace")])
@@ -266,7 +264,11 @@ def test_a_text_is_written_to_any_column(path, text, value):
             [["1", "2", "3"]],
             r"'prey.pos': values are <U1; needed are numbers, or one text for all",
         ),
-        ("GlobalNetwork.comm_delay", -1.0, r"GlobalNetwork.comm_delay: Network.comm_delay = -1.0 is not allowed"),
+        (
+            "GlobalNetwork.comm_delay",
+            -1.0,
+            r"GlobalNetwork.comm_delay: Network.comm_delay = -1.0 is not allowed",
+        ),
         ("GlobalNetwork.comm_delay", [1.0, 2.0], r"values have shape \(2,\); needed is \(1,\)"),
     ],
 )

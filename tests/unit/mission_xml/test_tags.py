@@ -60,7 +60,8 @@ def test_end_conditions_are_words_of_a_list(files):
         "one_team",
     )
     with pytest.raises(
-        MissionError, match=r"m\.xml:2: end_condition = 'all_ded' is not allowed \(did you mean 'all_dead'\?\)"
+        MissionError,
+        match=r"m\.xml:2: end_condition = 'all_ded' is not allowed \(did you mean 'all_dead'\?\)",
     ):
         files.world("<end_condition>time, all_ded</end_condition>")
 
