@@ -22,5 +22,5 @@ def test_no_kernel_takes_more_than_eight_arguments():
 
 
 def test_nor_does_the_walk_that_is_written_for_neighbour_laws():
-    text = next(path for path in python_files("src") if path.name == "walk.py").read_text()
+    text = next(path for path in python_files("src") if path.name == "walk_text.py").read_text()
     assert len(text.split('"def walk(')[1].split(")")[0].split(",")) <= MOST
