@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from tussle.batch.cluster_course import Course
+from tussle.batch.tasks import Beat, Finished, Package, Run
 from tussle.errors import BatchError, MissingExtraError, ParameterError
-
-if TYPE_CHECKING:
-    from tussle.batch.executors import Executor
-    from tussle.batch.tasks import Beat, Finished, Package, Run
 
 Client = Any
 """That of `distributed`, which annotates a part of itself."""
@@ -22,33 +19,6 @@ def missing_extra(package: str) -> MissingExtraError:
     return MissingExtraError(
         f"several machines need {package}, which is not installed: pip install 'tussle[cluster]'"
     )
-
-
-@contextmanager
-def executor_for(scheduler: str | None, slurm: str | None, stack: int | None) -> Iterator[Executor]:
-    """Who plays where the command line names another place; it is left when the context ends.
-
-    Args:
-        scheduler: Address of a Dask scheduler.
-        slurm: What to ask of Slurm, see `cluster_slurm.Jobs`.
-        stack: Worlds side by side; None chooses by the mission.
-
-    Raises:
-        ParameterError: Neither is named, or both are.
-        BatchError: Nobody answers there.
-        MissingExtraError: A package is not installed.
-    """
-    if (scheduler is None) == (slurm is None):
-        raise ParameterError("a batch is played by a scheduler or by Slurm; give one of the two")
-    if slurm is not None:
-        from tussle.batch.cluster_slurm import Jobs, on_slurm
-
-        with on_slurm(Jobs.parse(slurm), stack) as executor:
-            yield executor
-    else:
-        assert scheduler is not None
-        with connect(scheduler) as client:
-            yield OnDask(client, stack)
 
 
 @contextmanager
@@ -122,7 +92,7 @@ class OnDask:
             raise ParameterError(
                 "run_timeout is for processes of this machine; on a cluster, limit the time of the jobs"
             )
-        course = Course(self, package, runs)
+        course = Course(package, runs, self.client, self.stack, self.n_workers, self.patience, self.look)
         try:
             yield from course.play()
         finally:

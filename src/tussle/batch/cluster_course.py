@@ -11,7 +11,7 @@ from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from tussle.batch.cluster_script import travelling
 from tussle.batch.cluster_worker import SOURCE, TOPIC, about, keep, packages_of, play_chunk
@@ -19,9 +19,6 @@ from tussle.batch.executors import Waiting, even_size
 from tussle.batch.stack import stack_size
 from tussle.batch.tasks import Beat, Finished, Package, Run
 from tussle.errors import BatchError
-
-if TYPE_CHECKING:
-    from tussle.batch.cluster import OnDask
 
 Future = Any
 """That of `distributed`, which annotates a part of itself."""
@@ -67,8 +64,18 @@ class Course:
     threads does not take chunks that others could play, and only as many chunks as there are workers are under way.
     """
 
-    def __init__(self, executor: OnDask, package: Package, runs: Sequence[Run]) -> None:
-        self.executor, self.client, self.package = executor, executor.client, package
+    def __init__(
+        self,
+        package: Package,
+        runs: Sequence[Run],
+        client: Any,
+        stack: int | None,
+        n_workers: int,
+        patience: float | None,
+        look: Callable[[float], None] | None,
+    ) -> None:
+        self.package, self.client, self.stack = package, client, stack
+        self.n_workers, self.patience, self.look = n_workers, patience, look
         self.sent = travelling(package)
         self.address = str(self.client.scheduler.address)
         self.plugin_packages = packages_of(package)
@@ -190,9 +197,9 @@ class Course:
         if self.known:
             self.deserted_at = time.monotonic()
             return
-        patience, waited = self.executor.patience, time.monotonic() - self.deserted_at
-        if self.executor.look is not None:
-            self.executor.look(waited)
+        patience, waited = self.patience, time.monotonic() - self.deserted_at
+        if self.look is not None:
+            self.look(waited)
         if patience is not None and waited > patience:
             raise BatchError(
                 f"{self.address}: the Dask scheduler has had no worker for {patience:g} s; "
@@ -238,11 +245,11 @@ class Course:
 
     def _size(self, group: int) -> int:
         """Runs of a chunk: a stack, but so that workers are busy to the end. Groups share the workers by their numbers of runs."""
-        n_workers = max(len(self.known), self.executor.n_workers)
+        n_workers = max(len(self.known), self.n_workers)
         if self.sized_for != n_workers:
             self.sized_for, self.sizes = n_workers, {}
         if group not in self.sizes:
-            full = self.executor.stack or stack_size(self.package.mission(group))
+            full = self.stack or stack_size(self.package.mission(group))
             n_runs, n_all = len(self.waiting.groups[group]), len(self.waiting)
             self.sizes[group] = even_size(full, n_runs, -(-n_workers * n_runs // n_all))
         return self.sizes[group]

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from tussle.batch.cluster import OnDask, connect, missing_extra
+from tussle.batch.executors import Executor
 from tussle.documents import size_of
 from tussle.errors import BatchError, ParameterError, listed, nearest_name
 
@@ -94,6 +95,31 @@ def _count(text: str, name: str, value: str) -> int:
     if not value.isdigit() or int(value) < 1:
         raise ParameterError(f"--slurm {text!r}: {name} is {value!r}, but is a whole number >= 1; {TAKES}")
     return int(value)
+
+
+@contextmanager
+def executor_for(scheduler: str | None, slurm: str | None, stack: int | None) -> Iterator[Executor]:
+    """Who plays where the command line names another place; it is left when the context ends.
+
+    Args:
+        scheduler: Address of a Dask scheduler.
+        slurm: What to ask of Slurm, see `Jobs`.
+        stack: Worlds side by side; None chooses by the mission.
+
+    Raises:
+        ParameterError: Neither is named, or both are.
+        BatchError: Nobody answers there.
+        MissingExtraError: A package is not installed.
+    """
+    if (scheduler is None) == (slurm is None):
+        raise ParameterError("a batch is played by a scheduler or by Slurm; give one of the two")
+    if slurm is not None:
+        with on_slurm(Jobs.parse(slurm), stack) as executor:
+            yield executor
+    else:
+        assert scheduler is not None
+        with connect(scheduler) as client:
+            yield OnDask(client, stack)
 
 
 @contextmanager

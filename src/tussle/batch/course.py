@@ -6,30 +6,25 @@ import dataclasses
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
 from tussle.batch import store as files
-from tussle.batch.executors import InProcess, Processes
+from tussle.batch.executors import Executor, InProcess, Processes
 from tussle.batch.plan import Plan
 from tussle.batch.progress import Progress
 from tussle.batch.results import Results
 from tussle.batch.stopping import Stop
 from tussle.batch.store import Store, Stored
-from tussle.batch.tasks import Finished
+from tussle.batch.tasks import Finished, Package, Run
 from tussle.batch.trust import remember
+from tussle.batch.until import Until
 from tussle.batch.varied import said
 from tussle.errors import BatchError
 from tussle.record.run_file import Timings, plain, versions
-
-if TYPE_CHECKING:
-    from tussle.batch.batch import Batch
-    from tussle.batch.executors import Executor
-    from tussle.batch.tasks import Run
-    from tussle.batch.until import Until
 
 MOST_AT_ONCE = 100_000
 """Runs that are handed to those who play at once, about: more would only lie in memory."""
@@ -41,6 +36,22 @@ IDENTITY = (
     "tussle", "name", "mission", "variables", "sample", "sample_seed", "n_points", "first_seed", "independent", "dt", "start", "end",
 )  # fmt: skip
 """What `batch.json` says that tells one batch from another, for people: the fingerprint decides."""
+
+
+class Playable(Protocol):
+    """What is asked of a `Batch`, which stands above this module."""
+
+    plan: Plan
+    package: Package
+    plugin_files: Any
+
+    @property
+    def fingerprint(self) -> str: ...
+    def info(self) -> dict[str, Any]: ...
+    def mission_files(self) -> dict[str, bytes]: ...
+    def run(self, number: int) -> Run: ...
+    def check(self, until: Until | None = None) -> None: ...
+    def executor(self, *, n_runs: int) -> Executor: ...
 
 
 class _Course:
@@ -57,7 +68,7 @@ class _Course:
 
     def __init__(
         self,
-        batch: Batch,
+        batch: Playable,
         plan: Plan,
         keep: Callable[[Finished], None],
         stop: Stop | None,
@@ -142,7 +153,7 @@ class _Course:
 
 
 def play_in_memory(
-    batch: Batch,
+    batch: Playable,
     executor: Executor | None,
     until: Until | None,
     on_progress: Callable[[Progress], None] | None,
@@ -159,7 +170,7 @@ def play_in_memory(
 
 
 def play_in_directory(
-    batch: Batch,
+    batch: Playable,
     path: Path,
     executor: Executor | None,
     until: Until | None,
@@ -205,7 +216,7 @@ def play_in_directory(
     return Results(files.load(path))
 
 
-def is_played(batch: Batch, path: Path, until: Until | None) -> bool:
+def is_played(batch: Playable, path: Path, until: Until | None) -> bool:
     """All of a batch is in a directory already.
 
     Raises:
@@ -218,7 +229,7 @@ def is_played(batch: Batch, path: Path, until: Until | None) -> bool:
     return _has_all(info, batch.plan, until)
 
 
-def _check_same(batch: Batch, path: Path, before: dict[str, Any]) -> None:
+def _check_same(batch: Playable, path: Path, before: dict[str, Any]) -> None:
     """See that a directory holds this batch, whatever its number of seeds.
 
     Raises:
@@ -273,7 +284,7 @@ def _seeds_to_keep(path: Path, played: pa.Table, before: dict[str, Any], until: 
 
 def _begin(
     store: Store,
-    batch: Batch,
+    batch: Playable,
     plan: Plan,
     n_kept: int,
     before: dict[str, Any] | None,
@@ -301,7 +312,7 @@ def _begin(
 
 def _end(
     store: Store,
-    batch: Batch,
+    batch: Playable,
     course: _Course,
     timings: Timings,
     command: Sequence[str],
@@ -321,7 +332,7 @@ def _end(
 
 
 def _final_info(
-    batch: Batch,
+    batch: Playable,
     course: _Course,
     timings: Timings,
     command: Sequence[str],

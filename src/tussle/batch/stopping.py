@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from tussle.batch.plan import Plan
 from tussle.batch.quantities import column_name
 from tussle.batch.tasks import Finished
-
-if TYPE_CHECKING:
-    from tussle.batch.until import Until
+from tussle.batch.until import Until
 
 ROUND = 10
 """Seeds between two looks at whether enough has been played."""

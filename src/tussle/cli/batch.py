@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 from rich.console import Group
 from rich.live import Live
@@ -18,6 +18,7 @@ from rich.text import Text
 
 from tussle.batch import store
 from tussle.batch.batch import Batch
+from tussle.batch.executors import Executor
 from tussle.batch.progress import Progress as BatchProgress
 from tussle.batch.reload import planned_run
 from tussle.batch.statistics import running_result
@@ -33,9 +34,6 @@ from tussle.cli.settings import ending_by_time
 from tussle.cli.terminal import err, say, say_note
 from tussle.errors import BatchError, ParameterError, RecordError
 from tussle.record import Recorder, load_run
-
-if TYPE_CHECKING:
-    from tussle.batch.executors import Executor
 
 
 @dataclass(frozen=True)
@@ -120,7 +118,7 @@ class Asked:
     def executor(self, batch: Batch) -> AbstractContextManager[Executor | None]:
         """Who plays."""
         if self.scheduler is not None or self.slurm is not None:
-            from tussle.batch.cluster import executor_for
+            from tussle.batch.cluster_slurm import executor_for
 
             return executor_for(self.scheduler, self.slurm, self.stack)
         if self.processes is None and self.stack is None:

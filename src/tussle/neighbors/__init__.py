@@ -1,7 +1,7 @@
 """Range and nearest-neighbour queries over all worlds of a stack, and the block loop for kernels."""
 
 from tussle.neighbors.index import Blocks, Index
-from tussle.neighbors.lanes import LANES
+from tussle.neighbors.lane_count import LANES
 from tussle.neighbors.queries import Pairs, nearest, pairs
 
 __all__ = ["LANES", "Blocks", "Index", "Pairs", "nearest", "pairs"]

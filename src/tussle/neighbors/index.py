@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tussle.neighbors import kernels
-from tussle.neighbors.lanes import LANES
+from tussle.neighbors.lane_count import LANES
 
 Floats = NDArray[np.float64]
 Longs = NDArray[np.int64]

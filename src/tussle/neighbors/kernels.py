@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from tussle.neighbors.lanes import LANES
+from tussle.neighbors.lane_count import LANES
 from tussle.neighbors.sort import sort_keys
 from tussle.numeric.kernel import device, kernel
 

@@ -26,6 +26,7 @@ import numpy as np
 from tussle import numeric
 from tussle.errors import DeclarationError
 from tussle.neighbors import lanes
+from tussle.neighbors.lane_count import LANES
 from tussle.numeric.kernel import Device, device
 from tussle.numeric.rk4 import label
 
@@ -383,7 +384,7 @@ class Writer:
         """A call of a compiled function, eight times."""
         name = f"each_{len(self.scope)}"
         self.scope[name] = function
-        one = (f"{name}({', '.join(f'lane_of({a}, {k})' for a in names)})" for k in range(lanes.LANES))
+        one = (f"{name}({', '.join(f'lane_of({a}, {k})' for a in names)})" for k in range(LANES))
         return self.new(f"joined({', '.join(one)})")
 
 

@@ -19,12 +19,8 @@ from typing import Any
 
 import numpy as np
 
+from tussle.neighbors.lane_count import LANES, RSQRT_MAGIC
 from tussle.numeric.kernel import device
-
-LANES = 8
-"""Agents per block. Eight doubles are one AVX-512 register; on narrower CPUs eight still amortise the candidate's loads."""
-
-RSQRT_MAGIC = 0x5FE6EB50C7B537A9
 
 
 @cache

@@ -1,4 +1,4 @@
-"""The instructions of each function on lanes: types, typing rules and LLVM code, registered with Numba on import."""
+"""The instructions of each function on lanes: types, typing rules and LLVM code for Numba."""
 
 # Numba has no type annotations.
 # mypy: disable-error-code="no-untyped-call,attr-defined"
@@ -6,7 +6,9 @@
 from __future__ import annotations
 
 import operator
+from collections import defaultdict
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 from llvmlite import ir
@@ -17,8 +19,7 @@ from numba.core.registry import cpu_target
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import lower_builtin
 
-from tussle.neighbors import lanes
-from tussle.neighbors.lanes import LANES
+from tussle.neighbors.lane_count import LANES, RSQRT_MAGIC
 
 _DOUBLES = ir.VectorType(ir.DoubleType(), LANES)
 _LONGS = ir.VectorType(ir.IntType(64), LANES)
@@ -55,17 +56,28 @@ class _MaskModel(models.PrimitiveModel):
         super().__init__(manager, numba_type, _BITS)
 
 
+_BY_NAME: dict[str, list[tuple[Any, tuple[Any, ...], Any]]] = defaultdict(list)
+"""Function on lanes -> result, arguments and code generator of each way to call it."""
+
+
+@cache
 def type_of(function: Callable[..., Any]) -> Any:
     """Numba's type of a function on lanes, its code generators made known."""
+    for result, arguments, generate in _BY_NAME[function.__name__]:
+        _implement(function, result, *arguments)(generate)
     cpu_target.typing_context.refresh()
     cpu_target.target_context.refresh()
     return cpu_target.typing_context.resolve_value_type(function)
 
 
-def _implement(function: Callable[..., Any], result: Any, *arguments: Any) -> Callable[[Any], Any]:
-    """Register the code generator that follows as `function(*arguments) -> result`."""
+def _implement(function: Any, result: Any, *arguments: Any) -> Callable[[Any], Any]:
+    """Register the code generator that follows as `function(*arguments) -> result`; one known by name when it is first asked for."""
 
     def register(generate: Any) -> Any:
+        if isinstance(function, str):
+            _BY_NAME[function].append((result, arguments, generate))
+            return generate
+
         class Template(AbstractTemplate):
             key = function
 
@@ -167,18 +179,18 @@ def _negative(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return builder.fneg(args[0])
 
 
-@_implement(lanes.truth.py_func, MASK_TYPE, LANES_TYPE)
+@_implement("truth", MASK_TYPE, LANES_TYPE)
 def _generate_truth(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return builder.fcmp_unordered("!=", args[0], ir.Constant(_DOUBLES, [0.0] * LANES))
 
 
-@_implement(lanes.number.py_func, LANES_TYPE, MASK_TYPE)
+@_implement("number", LANES_TYPE, MASK_TYPE)
 def _generate_number(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     one, zero = ir.Constant(_DOUBLES, [1.0] * LANES), ir.Constant(_DOUBLES, [0.0] * LANES)
     return builder.select(args[0], one, zero)
 
 
-@_implement(lanes.joined.py_func, LANES_TYPE, *[types.float64] * LANES)
+@_implement("joined", LANES_TYPE, *[types.float64] * LANES)
 def _generate_joined(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     lanes = ir.Constant(_DOUBLES, ir.Undefined)
     for k, value in enumerate(args):
@@ -186,22 +198,22 @@ def _generate_joined(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return lanes
 
 
-@_implement(lanes.lanes_abs.py_func, LANES_TYPE, LANES_TYPE)
+@_implement("lanes_abs", LANES_TYPE, LANES_TYPE)
 def _generate_abs(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return _call_llvm(builder, f"llvm.fabs.v{LANES}f64", _DOUBLES, [args[0]])
 
 
-@_implement(lanes.splat.py_func, LANES_TYPE, types.float64)
+@_implement("splat", LANES_TYPE, types.float64)
 def _generate_splat(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return _splat(builder, args[0])
 
 
-@_implement(lanes.load.py_func, LANES_TYPE, types.Array, types.int64)
+@_implement("load", LANES_TYPE, types.Array, types.int64)
 def _generate_load(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return builder.load(_pointer(context, builder, sig.args[0], *args), align=8)
 
 
-@_implement(lanes.store.py_func, types.void, types.Array, types.int64, LANES_TYPE)
+@_implement("store", types.void, types.Array, types.int64, LANES_TYPE)
 def _generate_store(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     builder.store(args[2], _pointer(context, builder, sig.args[0], args[0], args[1]), align=8)
     return context.get_dummy_value()
@@ -218,7 +230,7 @@ def _first_lanes(builder: Any, count: Any) -> Any:
     )
 
 
-@_implement(lanes.load_some.py_func, LANES_TYPE, types.Array, types.int64, types.int64)
+@_implement("load_some", LANES_TYPE, types.Array, types.int64, types.int64)
 def _generate_load_some(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     pointer = _pointer(context, builder, sig.args[0], args[0], args[1])
     align = ir.Constant(ir.IntType(32), 8)
@@ -227,7 +239,7 @@ def _generate_load_some(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return _call_llvm(builder, f"llvm.masked.load.v{LANES}f64.p0", _DOUBLES, arguments)
 
 
-@_implement(lanes.store_some.py_func, types.void, types.Array, types.int64, types.int64, LANES_TYPE)
+@_implement("store_some", types.void, types.Array, types.int64, types.int64, LANES_TYPE)
 def _generate_store_some(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     pointer = _pointer(context, builder, sig.args[0], args[0], args[1])
     align = ir.Constant(ir.IntType(32), 8)
@@ -246,46 +258,46 @@ for _yes, _no in (
     (types.float64, LANES_TYPE),
     (types.float64, types.float64),
 ):
-    _implement(lanes.choose.py_func, LANES_TYPE, MASK_TYPE, _yes, _no)(_generate_choose)
+    _implement("choose", LANES_TYPE, MASK_TYPE, _yes, _no)(_generate_choose)
 
 
-@_implement(lanes.choose.py_func, MASK_TYPE, MASK_TYPE, MASK_TYPE, MASK_TYPE)
+@_implement("choose", MASK_TYPE, MASK_TYPE, MASK_TYPE, MASK_TYPE)
 def _choose_mask(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return builder.select(*args)
 
 
-@_implement(lanes.bits.py_func, types.int64, MASK_TYPE)
+@_implement("bits", types.int64, MASK_TYPE)
 def _generate_bits(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return builder.zext(builder.bitcast(args[0], ir.IntType(LANES)), ir.IntType(64))
 
 
-@_implement(lanes.lane_of.py_func, types.float64, LANES_TYPE, types.int64)
+@_implement("lane_of", types.float64, LANES_TYPE, types.int64)
 def _generate_lane_of(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return builder.extract_element(*args)
 
 
-@_implement(lanes.below.py_func, MASK_TYPE, types.int64)
+@_implement("below", MASK_TYPE, types.int64)
 def _generate_below(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return _first_lanes(builder, args[0])
 
 
-@_implement(lanes.lowest.py_func, types.int64, types.int64)
+@_implement("lowest", types.int64, types.int64)
 def _generate_lowest(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return _call_llvm(builder, "llvm.cttz.i64", ir.IntType(64), [args[0], ir.Constant(ir.IntType(1), 1)])
 
 
-@_implement(lanes.ones.py_func, types.int64, types.int64)
+@_implement("ones", types.int64, types.int64)
 def _generate_ones(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return _call_llvm(builder, "llvm.ctpop.i64", ir.IntType(64), [args[0]])
 
 
-@_implement(lanes.lanes_sqrt.py_func, LANES_TYPE, LANES_TYPE)
+@_implement("lanes_sqrt", LANES_TYPE, LANES_TYPE)
 def _generate_sqrt(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return _call_llvm(builder, f"llvm.sqrt.v{LANES}f64", _DOUBLES, [args[0]])
 
 
-@_implement(lanes.rsqrt_guess.py_func, LANES_TYPE, LANES_TYPE)
+@_implement("rsqrt_guess", LANES_TYPE, LANES_TYPE)
 def _generate_guess(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    magic = ir.Constant(_LONGS, [lanes.RSQRT_MAGIC] * LANES)
+    magic = ir.Constant(_LONGS, [RSQRT_MAGIC] * LANES)
     half = builder.lshr(builder.bitcast(args[0], _LONGS), ir.Constant(_LONGS, [1] * LANES))
     return builder.bitcast(builder.sub(magic, half), _DOUBLES)

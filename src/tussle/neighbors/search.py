@@ -11,7 +11,8 @@ import math
 import numpy as np
 
 from tussle.neighbors.kernels import KEY_BITS, cell_of, lower_bound, rank_bits
-from tussle.neighbors.lanes import LANES, below, bits, choose, lane_of, load, lowest, ones, splat
+from tussle.neighbors.lane_count import LANES
+from tussle.neighbors.lanes import below, bits, choose, lane_of, load, lowest, ones, splat
 from tussle.numeric.kernel import device, kernel
 
 ANY, SAME, DIFFERENT = 0, 1, 2

@@ -16,7 +16,8 @@ import numpy as np
 from tussle.errors import DeclarationError
 from tussle.neighbors import lanes
 from tussle.neighbors.lane_code import lane_code
-from tussle.neighbors.lanes import LANES, bits, choose, load
+from tussle.neighbors.lane_count import LANES
+from tussle.neighbors.lanes import bits, choose, load
 from tussle.neighbors.law import Law
 from tussle.neighbors.walk_text import Part, WalkText
 from tussle.numeric.kernel import Kernel, device, kernel

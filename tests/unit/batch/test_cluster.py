@@ -17,8 +17,9 @@ import pytest
 
 import tussle
 from tussle.batch import Batch, InProcess
-from tussle.batch.cluster import OnDask, connect, executor_for
+from tussle.batch.cluster import OnDask, connect
 from tussle.batch.cluster_course import Course, check_same
+from tussle.batch.cluster_slurm import executor_for
 from tussle.batch.cluster_worker import about
 from tussle.batch.tasks import Beat, Finished
 from tussle.errors import BatchError, MissingExtraError, ParameterError

@@ -5,8 +5,7 @@ from importlib.util import find_spec
 
 import pytest
 
-from tussle.batch.cluster import executor_for
-from tussle.batch.cluster_slurm import Jobs, on_slurm
+from tussle.batch.cluster_slurm import Jobs, executor_for, on_slurm
 from tussle.errors import BatchError, MissingExtraError, ParameterError
 
 needs_jobqueue = pytest.mark.skipif(

@@ -10,7 +10,8 @@ import math
 
 import numpy as np
 
-from tussle.neighbors.lanes import LANES, choose, inverse_sqrt, load_some, splat, store_some
+from tussle.neighbors.lane_count import LANES
+from tussle.neighbors.lanes import choose, inverse_sqrt, load_some, splat, store_some
 from tussle.numeric import atan2, cos, sin, wrap
 from tussle.numeric.kernel import device, kernel
 
