@@ -84,7 +84,7 @@ def laws(n: int) -> tuple[dict[str, Callable[[], Any]], float]:
         )  # fmt: skip
         sim = Simulation(Mission(blocks=[block], dt=0.1, end=10.0))
         sim.step()
-        group = sim.population.groups[0]
+        group = sim.state.population.groups[0]
         plugin, g = group.autonomies[0].plugin, group.autonomies[0].view
         law = {"Boids": "seen", "Vicsek": "aligned", "Social": "force"}[type(autonomy).__name__]
         made[type(autonomy).__name__] = lambda plugin=plugin, g=g, law=law: getattr(plugin, law)(g)

@@ -40,7 +40,7 @@ def play(make: Callable[[], Simulation]) -> tuple[float, float, int, Simulation]
     while cpu < LEAST_CPU:
         sim = make()
         while not sim.is_over:
-            n, k = sim.population.bodies.n, int(sim.steps.sum())
+            n, k = sim.state.population.bodies.n, int(sim.steps.sum())
             begin = time.process_time()
             sim.step(10)
             cpu += time.process_time() - begin
@@ -55,9 +55,9 @@ def mean_pairs(mission: Mission, radius: float, every: int = 20) -> float:
     sim = Simulation(mission)
     counts: list[float] = []
     while not sim.is_over:
-        bodies = sim.population.bodies
+        bodies = sim.state.population.bodies
         if bodies.n:
-            counts.append(len(sim.world_view.near(radius)) / bodies.n)
+            counts.append(len(sim.state.world_view.near(radius)) / bodies.n)
         sim.step(every)
     return float(np.mean(counts))
 

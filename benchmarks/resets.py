@@ -40,7 +40,7 @@ def row(n_worlds: int) -> dict[str, Any]:
         costs.append((end - middle) / bare - 1.0)
     return {
         "worlds": n_worlds,
-        "rows": sim.population.bodies.n,
+        "rows": sim.state.population.bodies.n,
         "step_ms": 1e3 * statistics.median(steps),
         "reset": statistics.median(costs),
     }

@@ -71,8 +71,8 @@ def measure(n: int, threads: int = 1) -> dict[str, Any]:
         "state": state[:8],
         "cpu_s": cpu,
     }
-    row |= {"alive": sim.population.bodies.n, "captures": 0, "resident_mb": _resident_mb()}
-    return row | {"pairs": len(sim.world_view.near(200.0)) / n}
+    row |= {"alive": sim.state.population.bodies.n, "captures": 0, "resident_mb": _resident_mb()}
+    return row | {"pairs": len(sim.state.world_view.near(200.0)) / n}
 
 
 def _resident_mb() -> float:

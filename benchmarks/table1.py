@@ -83,7 +83,11 @@ def measure(model: str, n: int) -> dict[str, Any]:
         "sim_per_cpu": simulated / cpu,
         "us_per_step": 1e6 * cpu / simulated * game.dt,
     }
-    row |= {"ns_per_agent_step": 1e9 * cpu / agent_steps, "cpu_s": cpu, "alive": sim.population.bodies.n}
+    row |= {
+        "ns_per_agent_step": 1e9 * cpu / agent_steps,
+        "cpu_s": cpu,
+        "alive": sim.state.population.bodies.n,
+    }
     original = ORIGINAL.get(model, {}).get(n)
     if original:
         row |= {"original": original, "ratio": simulated / cpu / original}

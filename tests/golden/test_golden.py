@@ -71,7 +71,7 @@ def test_threads_take_part_and_change_nothing(name):
     seeds = range(1, 81)
     with simulation(name, seeds, threads=3) as sim:
         sim.step(STEPS[name])
-        assert sim.context._pool is not None  # there was enough for several threads
+        assert sim.state.context._pool is not None  # there was enough for several threads
         agree(name, seeds, hashes_now(sim))
 
 

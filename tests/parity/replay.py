@@ -44,7 +44,7 @@ def fly(mission: Mission, recording: Recording) -> Flight:
 
     def look(sim: Simulation) -> None:
         frame = int(sim.steps[0])
-        bodies = sim.population.bodies
+        bodies = sim.state.population.bodies
         flight.last_frame.update(dict.fromkeys(bodies.id.tolist(), frame))
         if frame in wanted:
             _compare(flight, recording, frame, bodies)
@@ -52,7 +52,7 @@ def fly(mission: Mission, recording: Recording) -> Flight:
     with Simulation(mission, start_from=recording.first_states) as sim:
         sim.observers.append(look)
         flight.result = sim.run()[0]
-        frame, bodies = int(sim.steps[0]), sim.parked[0].bodies
+        frame, bodies = int(sim.steps[0]), sim.state.parked[0].bodies
     flight.last_frame.update(dict.fromkeys(bodies.id.tolist(), frame))
     if frame in wanted:
         _compare(flight, recording, frame, bodies)

@@ -43,10 +43,10 @@ class Context:
     teams: np.ndarray
     running: np.ndarray
     services: dict[str, Callable[..., Any]] = field(default_factory=dict)
-    topic: Callable[..., Any] | None = None
+    topic: Callable[..., Any] = field(init=False)
     threads: int = 1
     draw: Draw = field(default_factory=Draw)
-    fail: Callable[[int, PluginError], None] | None = None
+    fail: Callable[[int, PluginError], None] = field(init=False)
     _pool: ThreadPoolExecutor | None = None
 
     def __post_init__(self) -> None:

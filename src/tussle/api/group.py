@@ -183,7 +183,6 @@ class GroupView:
         world = int(self.world[row])
         step, plugin = int(self.context.clock.step[world]), self._caller.instance_name
         name = self.context.block_names[int(self.block[row])]
-        assert self.context.fail is not None
         self.context.fail(
             world,
             PluginError(why, where=f"{name} {int(self.id[row])}", step=step, world=world, plugin=plugin),
@@ -248,11 +247,12 @@ class GroupView:
             radius: One number or (n,) [m].
             teams: "own", "other", a team number, or None for all.
         """
-        return find_pairs(self, radius, teams)
+        rows = self.first, self.last
+        return find_pairs(self.index(radius), rows, self.pos, radius, teams, self.bodies)
 
     def nearest(self, k: int = 1, teams: str | int | np.ndarray | None = None) -> Nearest:
         """The k nearest other entities of each row, at any distance; `teams` as in `near`, or one team per row."""
-        return find_nearest(self, k, teams)
+        return find_nearest(self._bodies, (self.first, self.last), self.pos, k, teams)
 
     # -- chance and services ------------------------------------------------------------------------------------------------
 

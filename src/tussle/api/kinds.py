@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
+from tussle.api.group import GroupView
 from tussle.api.plugin import HistoricAttributes, Plugin
+from tussle.api.world import WorldView
 from tussle.columns import Output, Param
-
-if TYPE_CHECKING:
-    from tussle.api.group import GroupView
-    from tussle.api.world import WorldView
 
 
 class EntityPlugin(Plugin):

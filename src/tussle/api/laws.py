@@ -6,20 +6,18 @@ import inspect
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache, partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from tussle.api.bodies import DERIVED, FLOATS, INTS
+from tussle.api.group import GroupView
 from tussle.columns import Channel, Numbers, Param
 from tussle.errors import DeclarationError, listed, nearest_name
 from tussle.neighbors.law import OTHER, PAIR, Law
 from tussle.neighbors.walk import make_walk
 from tussle.numeric.kernel import Kernel
 from tussle.numeric.rk4 import label
-
-if TYPE_CHECKING:
-    from tussle.api.group import GroupView
 
 COMPONENTS = {3: "xyz", 4: "wxyz", 2: "xy"}
 CODES = {"f": "F", "i": "I", "b": "B"}

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from tussle.api.bodies import Bodies, BodyView
 from tussle.errors import ParameterError
 from tussle.lists import Segments
 from tussle.neighbors import queries, search
-
-if TYPE_CHECKING:
-    from tussle.api.bodies import BodyView
-    from tussle.api.group import GroupView
-    from tussle.neighbors.index import Index
+from tussle.neighbors.index import Index
 
 
 class Pairs(Segments):
@@ -80,15 +77,31 @@ class Nearest:
         self.other, self.distance, self.offset = other, distance, offset
 
 
-def find_pairs(g: GroupView, radius: float | np.ndarray, teams: str | int | None) -> Pairs:
-    """See `GroupView.near`."""
-    index = g.index(radius)
-    x, y, z = g.pos
-    reach = (
-        np.full(g.n, radius) if not isinstance(radius, np.ndarray) else np.ascontiguousarray(radius, float)
-    )
-    found = queries.pairs(index, g.first, g.last, x, y, z, reach, g.bodies.team, _checked(teams))
-    return Pairs(found, g.bodies)
+def find_pairs(
+    index: Index, rows: tuple[int, int], pos: np.ndarray, radius: Any, teams: Any, bodies: BodyView
+) -> Pairs:
+    """See `GroupView.near`; rows [first, last) of the table are at pos [m], (3, n)."""
+    x, y, z = pos
+    reach = np.ascontiguousarray(radius, float) if isinstance(radius, np.ndarray) else np.full(len(x), radius)
+    return Pairs(queries.pairs(index, *rows, x, y, z, reach, bodies.team, _checked(teams)), bodies)
+
+
+def find_nearest(bodies: Bodies, rows: tuple[int, int], pos: np.ndarray, k: int, teams: Any) -> Nearest:
+    """See `GroupView.nearest`; rows [first, last) of the table are at pos [m], (3, n)."""
+    index, (x, y, z) = bodies.any_index(), pos
+    if isinstance(teams, np.ndarray):
+        other, square = np.empty((k, len(x)), np.int64), np.empty((k, len(x)))
+        order = index.row_world, index.place, index.order
+        table = (*index.table, bodies.by_place(index, "team")[0])
+        search.nearest_rows(
+            (x, y, z, teams.astype(float)), k, search.SAME, order, rows[0], table, other, square
+        )
+        distance = np.sqrt(square)
+    else:
+        other, distance = queries.nearest(index, *rows, x, y, z, k, bodies.team, _checked(teams))
+    there = other >= 0
+    offset = np.where(there, bodies.pos[:, np.where(there, other, 0)] - pos[:, None, :], 0.0)
+    return Nearest(other, distance, offset)
 
 
 def _checked(teams: Any) -> Any:
@@ -99,27 +112,3 @@ def _checked(teams: Any) -> Any:
     ):
         return int(teams) if isinstance(teams, np.integer) else teams
     raise ParameterError(f"teams = {teams!r} is not allowed; it is 'own', 'other', a team number or None")
-
-
-def find_nearest(g: GroupView, k: int, teams: Any) -> Nearest:
-    """See `GroupView.nearest`."""
-    index = g.any_index()
-    x, y, z = g.pos
-    if isinstance(teams, np.ndarray):
-        other, square = np.empty((k, g.n), np.int64), np.empty((k, g.n))
-        _search(g, index, (x, y, z, teams.astype(float)), k, search.SAME, g.first, other, square)
-        distance = np.sqrt(square)
-    else:
-        other, distance = queries.nearest(index, g.first, g.last, x, y, z, k, g.bodies.team, _checked(teams))
-    there = other >= 0
-    offset = np.where(there, g.bodies.pos[:, np.where(there, other, 0)] - g.pos[:, None, :], 0.0)
-    return Nearest(other, distance, offset)
-
-
-def _search(
-    g: GroupView, index: Index, queries: tuple[np.ndarray, ...], k: int, mode: int, first: int, other: np.ndarray, square: np.ndarray
-) -> None:  # fmt: skip
-    table = (*index.table, g.by_place(index, "team")[0])
-    search.nearest_rows(
-        queries, k, mode, (index.row_world, index.place, index.order), first, table, other, square
-    )

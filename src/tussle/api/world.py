@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,9 +14,6 @@ from tussle.api.group import GOLDEN, LAWS, GroupView
 from tussle.comms import TopicBuffer
 from tussle.errors import MissionError, ParameterError, listed, nearest_name
 from tussle.messages import Batch, Message
-
-if TYPE_CHECKING:
-    pass
 
 WRITABLE = ("health", "force", "torque")
 
@@ -55,7 +52,7 @@ class WorldView(GroupView):
         self.births: list[dict[str, Any]] = []
         self.templates: list[str] = []
         self.by_type: dict[type[Message], list[TopicBuffer]] = {}
-        self.publish_to: Callable[[type[Message], str], TopicBuffer] | None = None
+        self.publish_to: Callable[[type[Message], str], TopicBuffer]
 
     def reset(self, bodies: Bodies, first: int, last: int) -> None:
         super().reset(bodies, first, last)
@@ -185,7 +182,6 @@ class WorldView(GroupView):
         """Send one message per item of `world` in the name of the world (sender 0)."""
         world = np.atleast_1d(np.asarray(world, np.int64))
         if len(world):
-            assert self.publish_to is not None
             batch = Batch.make(type_, world, np.zeros(len(world), np.int64), fields)
             self.publish_to(type_, network).add(
                 batch if self.only is None else batch.take(self._spoken_for(world))

@@ -18,12 +18,11 @@ from typing import TYPE_CHECKING, Any, Protocol
 from tussle.batch.stack import BEAT_EVERY, play, stack_size
 from tussle.batch.tasks import Beat, Finished, Package, Run
 from tussle.errors import BatchError, ParameterError
+from tussle.mission import Mission
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
     from multiprocessing.context import SpawnProcess
-
-    from tussle.mission import Mission
 
 
 OVERDUE = "it took longer"

@@ -6,19 +6,17 @@ import platform
 import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from tussle.api import Plugin
 from tussle.batch.tasks import Beat, Finished, Run
 from tussle.columns import Handle
+from tussle.engine.result import WorldResult
 from tussle.engine.simulation import Simulation
 from tussle.errors import PluginError, TussleError
-
-if TYPE_CHECKING:
-    from tussle.api import Plugin
-    from tussle.engine.result import WorldResult
-    from tussle.mission import Mission
+from tussle.mission import Mission
 
 ROWS = 8192
 """Entities that a stack holds, about: more rows cost no less each, and fall out of the cache."""
@@ -131,26 +129,32 @@ class _Stack:
     def play(self) -> Iterator[Finished | Beat]:
         """Play runs side by side, and all that follow them."""
         sim, teams = self._begin(self.under_way())
-        rows, counts, n_before = sim.population.bodies.ints, self._count(), self.size
+        rows, counts, n_before = sim.state.population.bodies.ints, self._count(), self.size
         n_steps, beat_at = max(1, self.mission.steps), time.monotonic() + BEAT_EVERY
         has_end = "time" in self.mission.end_conditions
         while True:
-            while sim.n_running < n_before:  # again after a refill: a run may fail before its first step
+            while (
+                sim.state.n_running < n_before
+            ):  # again after a refill: a run may fail before its first step
                 self._cpu.spent_by(n_before)
                 yield from self._refill(teams)
-                rows, counts, n_before = sim.population.bodies.ints, self._count(), len(self.under_way())
+                rows, counts, n_before = (
+                    sim.state.population.bodies.ints,
+                    self._count(),
+                    len(self.under_way()),
+                )
             if not n_before:
                 return
             sim.step()
-            now = sim.population.bodies.ints
+            now = sim.state.population.bodies.ints
             if now is not rows:
                 rows, left = now, self._count()
-                changed = np.flatnonzero((left != counts).any(axis=1) & sim.running)
+                changed = np.flatnonzero((left != counts).any(axis=1) & sim.state.running)
                 self._note_alive(changed, left, teams, counts)
                 counts = left
             if time.monotonic() >= beat_at:
                 beat_at = time.monotonic() + BEAT_EVERY
-                yield Beat(float(sim.steps[sim.running].sum()) / n_steps if has_end else 0.0)
+                yield Beat(float(sim.steps[sim.state.running].sum()) / n_steps if has_end else 0.0)
 
     def _begin(self, runs: Sequence[Run]) -> tuple[Simulation, list[int]]:
         """The simulation, before its first step, and its teams."""
@@ -159,7 +163,7 @@ class _Stack:
         self._alive: list[list[tuple[int, float, int]]] = [[] for _ in runs]
         on_error = "record" if len(runs) == 1 else None  # by default, what raises ends the stack
         self.sim = Simulation(self.mission, [r.seed for r in runs], _by_path(runs), on_error=on_error)
-        teams = [int(team) for team in self.sim.context.teams]
+        teams = [int(team) for team in self.sim.state.context.teams]
         self._start = self._count()
         self._note_alive(range(self.size), self._start, teams)
         return self.sim, teams
@@ -167,7 +171,7 @@ class _Stack:
     def _count(self) -> np.ndarray:
         """Entities by world and team, (n_worlds, n_teams)."""
         assert self.sim is not None
-        bodies, teams = self.sim.population.bodies, self.sim.context.teams
+        bodies, teams = self.sim.state.population.bodies, self.sim.state.context.teams
         cell = bodies.world * len(teams) + np.searchsorted(teams, bodies.team)
         return np.bincount(cell, minlength=self.size * len(teams)).reshape(self.size, len(teams))
 
@@ -186,7 +190,7 @@ class _Stack:
         assert self.sim is not None
         free = []
         for world, run in enumerate(self.slots):
-            if run is None or self.sim.running[world]:
+            if run is None or self.sim.state.running[world]:
                 continue
             finished = self._finished(world, run, teams)
             self.slots[world] = None
@@ -208,7 +212,7 @@ class _Stack:
 
     def _finished(self, world: int, run: Run, teams: Sequence[int]) -> Finished:
         assert self.sim is not None
-        result = self.sim.results[world]
+        result = self.sim.state.results[world]
         assert result is not None
         alive = self._alive[world]
         if alive and result.t > alive[0][1]:

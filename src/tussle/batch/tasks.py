@@ -7,12 +7,9 @@ import pickle
 import platform
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from tussle.mission import PluginFile
-
-if TYPE_CHECKING:
-    from tussle.mission import Mission
+from tussle.mission import Mission, PluginFile
 
 
 @dataclass(frozen=True)

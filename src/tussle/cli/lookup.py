@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from tussle.api import Plugin
 from tussle.cli.terminal import say_note
 from tussle.errors import MissionError, nearest_name
 from tussle.mission import Catalogue, PluginFile, shipped_missions
-
-if TYPE_CHECKING:
-    from tussle.api import Plugin
 
 
 def all_plugins(files: Iterable[Path]) -> tuple[dict[str, type[Plugin]], list[str], list[str]]:

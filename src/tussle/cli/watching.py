@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from tussle.cli.interrupt import Interrupt
 from tussle.cli.terminal import OK, TERMINATED, err, out, say, say_error, say_note
 
 if TYPE_CHECKING:
-    from tussle.cli.interrupt import Interrupt
     from tussle.view.page.server import Page
 
 NAP = 0.1  # [s] so that Ctrl-C is heard

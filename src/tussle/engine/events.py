@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tussle.api.bodies import Bodies
+from tussle.api.context import Context
+from tussle.api.world import WorldView
 from tussle.messages import EntityCaptured, EntityCollided, EntityHitGround, Message
 from tussle.record import Happenings
 from tussle.record.happenings import BIRTH, CAPTURE, COLLISION, DEATH, END
-
-if TYPE_CHECKING:
-    from tussle.api.bodies import Bodies
-    from tussle.engine.simulation import Simulation
 
 TOLD: dict[type[Message], tuple[str, str, str, str]] = {
     EntityCaptured: (CAPTURE, "source", "target", ""),
@@ -23,15 +21,18 @@ TOLD: dict[type[Message], tuple[str, str, str, str]] = {
 """Message types that are told of: kind, the fields that are its id and other ("" for nobody), and its text."""
 
 
-class Herald:
-    """Births, deaths, captures, collisions and ends, as `Happenings`; true while somebody listens.
+class Listeners:
+    """Who is told of births, deaths, captures, collisions and ends, as `Happenings`; true while somebody is.
 
-    Args:
-        sim: The simulation.
+    Attributes:
+        is_replaying: These steps have been told of, and are not told again.
+        on_change: Called when somebody begins or ends to listen.
     """
 
-    def __init__(self, sim: Simulation) -> None:
-        self._sim = sim
+    def __init__(self, context: Context) -> None:
+        self.is_replaying = False
+        self.on_change: Callable[[], None] = lambda: None
+        self._context = context
         self._listeners: list[Callable[[Happenings], None]] = []
         self._by: dict[tuple[int, int], int] = {}
 
@@ -41,13 +42,13 @@ class Herald:
     def listen(self, listener: Callable[[Happenings], None]) -> None:
         """Tell `listener` from now on."""
         self._listeners.append(listener)
-        self._sim.forget_schedule()  # a step has a call for messages only while somebody listens
+        self.on_change()
 
     def forget(self, listener: Callable[[Happenings], None]) -> None:
         """Tell it no more; nothing happens if it was not told."""
         if listener in self._listeners:
             self._listeners.remove(listener)
-            self._sim.forget_schedule()
+            self.on_change()
 
     def _tell(
         self,
@@ -58,7 +59,7 @@ class Herald:
         other: np.ndarray,
         text: list[str],
     ) -> None:
-        if self._sim.is_replaying:
+        if self.is_replaying:
             return
         happenings = Happenings(kind, world, step, ids, other, text)
         for listener in list(self._listeners):
@@ -66,27 +67,26 @@ class Herald:
 
     def births(self, new: Bodies) -> None:
         """Entities have come."""
-        names = self._sim.context.block_names
-        step = self._sim.context.clock.step[new.world]
+        names = self._context.block_names
+        step = self._context.clock.step[new.world]
         self._tell(BIRTH, new.world, step, new.id, np.zeros_like(new.id), [names[b] for b in new.block])
 
-    def messages(self) -> None:
+    def messages(self, view: WorldView) -> None:
         """Captures and collisions of this step, which lie in the outboxes."""
         if self._by:
             self._by.clear()
-        by_type = self._sim.world_view.by_type
         for type_ in TOLD:
-            for topic in by_type.get(type_, ()):
+            for topic in view.by_type.get(type_, ()):
                 if topic.sent:
-                    self._tell_messages(type_)
+                    self._tell_messages(view, type_)
                     break
 
-    def _tell_messages(self, type_: type[Message]) -> None:
+    def _tell_messages(self, view: WorldView, type_: type[Message]) -> None:
         kind, first, second, text = TOLD[type_]
-        batch = self._sim.world_view.inbox(type_)
+        batch = view.inbox(type_)
         one = batch.data[first]
         two = batch.data[second] if second else np.zeros_like(one)
-        self._tell(kind, batch.world, self._sim.context.clock.step[batch.world], one, two, [text] * batch.n)
+        self._tell(kind, batch.world, self._context.clock.step[batch.world], one, two, [text] * batch.n)
         if not second:
             return
         for world, a, b in zip(batch.world.tolist(), one.tolist(), two.tolist(), strict=True):
@@ -94,14 +94,14 @@ class Herald:
             if kind == COLLISION:
                 self._by.setdefault((world, a), b)
 
-    def deaths(self, deaths: list[tuple[np.ndarray, str]], step: np.ndarray) -> None:
+    def deaths(self, bodies: Bodies, deaths: list[tuple[np.ndarray, str]], step: np.ndarray) -> None:
         """Rows of the body table are about to go; the first reason counts.
 
         Args:
+            bodies: The table.
             deaths: (rows, why).
             step: Step of each world in which it happened, (n_worlds,).
         """
-        bodies = self._sim.population.bodies
         number = np.repeat(np.arange(len(deaths)), [len(rows) for rows, _ in deaths])
         rows, first = np.unique(np.concatenate([rows for rows, _ in deaths]), return_index=True)
         order = np.lexsort((bodies.id[rows], bodies.world[rows]))
@@ -113,4 +113,4 @@ class Herald:
     def end(self, world: int, reason: str) -> None:
         """A world has ended; its last rows are parked."""
         numbers, none = np.array([world]), np.zeros(1, np.int64)
-        self._tell(END, numbers, self._sim.context.clock.step[numbers], none, none, [reason])
+        self._tell(END, numbers, self._context.clock.step[numbers], none, none, [reason])

@@ -270,7 +270,6 @@ class Group:
         values = spec.values
         network = values[column.network_param] if column.network_param else column.network
         name = values[column.topic_param] if column.topic_param else column.topic
-        assert self.context.topic is not None
         return self.context.topic(
             network,
             name or column.message.__name__,

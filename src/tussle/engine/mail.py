@@ -1,37 +1,31 @@
-"""Topics and networks: from this step's outboxes to the receivers' next call."""
+"""All topics of a simulation: what was said, what is on its way, who has heard what."""
 
 from __future__ import annotations
 
-import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from tussle.comms import EVERYONE, SAME_ENTITY, TopicBuffer
-from tussle.engine import failure
-from tussle.engine.referees import Referee
-from tussle.errors import MissionError, PluginError, WiringError, listed, nearest_name
+from tussle.comms import TopicBuffer
+from tussle.errors import WiringError, listed, nearest_name
 from tussle.lists import RaggedColumn
-from tussle.messages import Batch, Message, SpawnEntity
+from tussle.messages import Batch, Message
 from tussle.stock import ALWAYS_THERE
-
-if TYPE_CHECKING:
-    from tussle.engine.simulation import Simulation
 
 
 class Mail:
     """All topics of a simulation.
 
     Attributes:
+        networks: Instance names of the networks.
         topics: (network, name) -> topic.
-        networks: Instance name -> network.
+        by_type: Message type -> its topics.
     """
 
-    def __init__(self, sim: Simulation) -> None:
-        self.sim = sim
+    def __init__(self, networks: list[str]) -> None:
+        self.networks = networks
         self.topics: dict[tuple[str, str], TopicBuffer] = {}
-        self.networks: dict[str, Referee] = {}
-        self.names: list[str] = []
+        self.by_type: dict[type[Message], list[TopicBuffer]] = {}
 
     def topic(self, network: str, name: str, type_: type[Message], where: str) -> TopicBuffer:
         """The topic of a network by its name; made when it is asked for first.
@@ -40,14 +34,14 @@ class Mail:
             WiringError: There is no such network, or the topic carries another type.
         """
         network = network or ALWAYS_THERE[0]
-        if network not in self.names:
+        if network not in self.networks:
             raise WiringError(
-                f"{where}: topic {name!r} is on network {network!r}{nearest_name(network, self.names)}; {listed(self.names)}"
+                f"{where}: topic {name!r} is on network {network!r}{nearest_name(network, self.networks)}; {listed(self.networks)}"
             )
         key = (network, name)
         if key not in self.topics:
             buffer = self.topics[key] = TopicBuffer(network, name, type_)
-            self.sim.world_view.by_type.setdefault(type_, []).append(buffer)
+            self.by_type.setdefault(type_, []).append(buffer)
         if self.topics[key].type is not type_:
             raise WiringError(
                 f"{where}: topic {name!r} on {network} carries {self.topics[key].type.__name__}, not {type_.__name__}"
@@ -72,69 +66,6 @@ class Mail:
             and said.is_published
             and not heard.is_published
         ]
-
-    def deliver(self) -> None:
-        """Route what was published in this step, and hand over what is due."""
-        step = self.sim.context.clock.step
-        for topic in self.topics.values():
-            if topic.sent:
-                if topic.type is SpawnEntity:
-                    self._ask_for_births(topic.outbox())
-                if topic.inboxes:
-                    self._post(topic)
-                topic.clear_outbox()
-            if topic.queue:
-                topic.deliver(step)
-
-    def _ask_for_births(self, batch: Batch) -> None:
-        """Turn `SpawnEntity` messages into births at the beginning of the next step, block by block in the mission's order."""
-        view = self.sim.world_view
-        has_attitude = (batch.quat != 0.0).any(axis=0)
-        known = {name: k for k, name in enumerate(view.templates)}
-        number = np.array([known.get(str(block), -1) for block in batch.block], np.int64)
-        for k, turned in sorted(set(zip(number.tolist(), has_attitude.tolist(), strict=True))):
-            index = np.flatnonzero((number == k) & (has_attitude == turned))
-            attitude = {"quat": batch.quat[:, index]} if turned else {}
-            if k >= 0:
-                where = {"pos": batch.pos[:, index], "vel": batch.vel[:, index], **attitude}
-                view.spawn(view.templates[k], batch.world[index], **where)
-        for i in np.flatnonzero(number < 0):
-            block, world = batch.block[i], int(batch.world[i])
-            if not self.sim.failed[world]:
-                error = MissionError(
-                    f"SpawnEntity: there is no block {block!r}{nearest_name(str(block), view.templates)}; {listed(view.templates)}"
-                )
-                self.sim.record_failure(
-                    world,
-                    PluginError(
-                        str(error),
-                        where=f"sent by entity {int(batch.sender[i])}",
-                        step=int(self.sim.steps[world]),
-                        world=world,
-                    ),
-                )
-
-    def _post(self, topic: TopicBuffer) -> None:
-        network, batch = self.networks[topic.network], topic.outbox()
-        try:
-            self._route(topic, network, batch)
-        except Exception as error:
-            raise failure.in_call(error, network.plugin, network.view) from error
-
-    def _route(self, topic: TopicBuffer, network: Referee, batch: Batch) -> None:
-        sim, clock, view = self.sim, self.sim.context.clock, network.view
-        view.begin(network.plugin, 1.0, clock.dt)
-        to = network.plugin.route(view, batch)
-        if not isinstance(to, str):
-            number, rows = to
-            to = (np.asarray(number, np.int64), sim.population.bodies.id[np.asarray(rows, np.int64)])
-        elif to not in (EVERYONE, SAME_ENTITY):
-            raise WiringError(
-                f"{topic.network}.route returned {to!r}; it is EVERYONE, SAME_ENTITY or (message numbers, rows)"
-            )
-        delay = network.plugin.comm_delay[batch.world]
-        steps = np.array([max(0, math.ceil(d / clock.dt - 1e-9)) for d in delay], np.int64)
-        topic.post(batch, to, clock.step[batch.world] + steps)
 
     def drop_worlds(self, gone: np.ndarray) -> None:
         for topic in self.topics.values():

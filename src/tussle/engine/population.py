@@ -43,40 +43,27 @@ class Population:
     Args:
         context: Shared by all views.
         overrides: Parameters per world.
-        n_worlds: Number of worlds.
-        substeps: Motion substeps per step.
-        is_sequential: One group per place in the order of ids.
         advise: See `Wiring`.
 
     Attributes:
         bodies: The body table.
         groups: Groups in the order of their rows.
-        changed: Counts repacks and writes; caches key on it.
+        is_sequential: One group per place in the order of ids.
+        on_new_group: Called when a group has come, or a block to one.
     """
 
-    def __init__(
-        self,
-        context: Context,
-        overrides: Overrides,
-        n_worlds: int,
-        substeps: int,
-        is_sequential: bool,
-        advise: Callable[..., list[str]],
-    ) -> None:
+    def __init__(self, context: Context, overrides: Overrides, advise: Callable[..., list[str]]) -> None:
         self.context = context
         self.overrides = overrides
-        self.substeps = substeps
-        self.is_sequential = is_sequential
         self.advise = advise
-        self.bodies = Bodies.empty(0, n_worlds)
-        self.bodies.scans = is_sequential
+        self.is_sequential = overrides.mission.update == "sequential"
+        self.bodies = Bodies.empty(0, overrides.n_worlds)
+        self.bodies.scans = self.is_sequential
         self.groups: list[Group] = []
         self._by_key: dict[Any, Group] = {}
         self._asked: dict[tuple[int, int, int], Group] = {}
         self._specs: dict[tuple[int, tuple[str, ...]], Any] = {}
-        self.changed = 0
         self.on_new_group: Callable[[], None] = lambda: None
-        self.on_failure: Callable[[int, PluginError], None] = lambda world, error: None
 
     # -- groups -------------------------------------------------------------------------------------------------------------
 
@@ -102,7 +89,7 @@ class Population:
                 self.context,
                 self.bodies,
                 self.context.clock.dt,
-                self.substeps,
+                self.overrides.mission.motion_multiplier,
                 self.advise,
             )
             self._by_key[key] = group
@@ -173,7 +160,6 @@ class Population:
             else:
                 group.shift(self.bodies, first)
             first += group.n
-        self.changed += 1
         return source
 
     def _fill_bodies(self, source: np.ndarray, new: Bodies) -> None:
@@ -279,7 +265,7 @@ class Population:
                 except Exception as error:
                     failed.append(row)
                     where, step = f"{group.name} {about.id}", int(self.context.clock.step[about.world])
-                    self.on_failure(
+                    self.context.fail(
                         about.world,
                         failure.raised(error, binding.plugin, where=where, step=step, world=about.world),
                     )

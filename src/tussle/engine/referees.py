@@ -64,7 +64,6 @@ class Referee:
                     "world" if column.per == "team" else column.per, name, column.dtype, k, column.default
                 )
             elif isinstance(column, Publish):
-                assert view.context.topic is not None
                 topic = view.context.topic(column.network, column.topic, column.message, spec.instance_name)
                 referee.plugin.__dict__[name] = Publisher(topic, view)
             elif isinstance(column, Subscribe):

@@ -5,21 +5,23 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import Any
 
 import numpy as np
 
 from tussle.api.kinds import WorldPlugin
 from tussle.columns import Subscribe
 from tussle.engine import failure
+from tussle.engine.delivery import deliver
 from tussle.engine.group import Binding, Group
 from tussle.engine.referees import Referee
+from tussle.engine.rows import take_over_moves
+from tussle.engine.state import SimulationState
+from tussle.engine.step_end import end_step
 from tussle.engine.subset import call_group, call_referee
 from tussle.errors import PluginError
 from tussle.mission.cadence import Cadence
-
-if TYPE_CHECKING:
-    from tussle.engine.simulation import Simulation
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,201 +32,194 @@ class Call:
     run: Callable[[], None]
 
 
-class Schedule:
-    """Composes the calls of one simulation's step.
+def compose(state: SimulationState) -> list[Call]:
+    """All calls of a step, in order.
 
     A plugin's call is made once for all rows of its group, or once for all worlds. Where worlds' clocks differ, a plugin with a rate is
     called for the worlds in which it is due. An exception ends the stack with a `PluginError`.
 
-    Args:
-        sim: The simulation.
-
     Raises:
         MissionError: A plugin has a rate that cannot be honoured.
     """
-
-    def __init__(self, sim: Simulation) -> None:
-        self.sim = sim
-
-    def compose(self) -> list[Call]:
-        """All calls of a step, in order."""
-        sim, calls = self.sim, []
-        groups = sim.population.groups
-        if sim.mission.update == "sequential":
-            for group in groups:
-                calls += [self._entity_call("autonomy", group, b) for b in group.autonomies]
-                calls += self._motion([group])
-        else:
-            for group in groups:
-                calls += [self._entity_call("autonomy", group, b) for b in group.autonomies]
-            calls += self._motion(groups)
+    calls: list[Call] = []
+    groups = state.population.groups
+    if state.mission.update == "sequential":
         for group in groups:
-            for binding in group.sensors:
-                calls.append(self._entity_call("sensor", group, binding))
-        if sim.interactions:
-            calls.append(Call("forces back to zero: they have acted", self._clear_forces))
-        calls += [self._world_call("interaction", r) for r in sim.interactions if steps(r)]
-        if sim.interactions:
-            calls.append(Call("take over what was moved", sim.take_over_moves))
-        calls += [self._world_call("metric", r) for r in sim.metrics if steps(r)]
-        if sim.events:
-            calls.append(Call("tell of captures and collisions", sim.events.messages))
-        calls.append(
-            Call("deliver messages", sim.mail.deliver)
-        )  # always: the world may speak first on topics of its own
-        calls.append(Call("check, remove, end", sim.step_end.run))
-        return calls
+            calls += [_entity_call(state, "autonomy", group, b) for b in group.autonomies]
+            calls += _motion(state, [group])
+    else:
+        for group in groups:
+            calls += [_entity_call(state, "autonomy", group, b) for b in group.autonomies]
+        calls += _motion(state, groups)
+    for group in groups:
+        calls += [_entity_call(state, "sensor", group, b) for b in group.sensors]
+    if state.interactions:
+        calls.append(Call("forces back to zero: they have acted", partial(_clear_forces, state)))
+    calls += [_world_call(state, "interaction", r) for r in state.interactions if steps(r)]
+    if state.interactions:
+        calls.append(Call("take over what was moved", partial(take_over_moves, state)))
+    calls += [_world_call(state, "metric", r) for r in state.metrics if steps(r)]
+    if state.events:
+        tell = partial(state.events.messages, state.world_view)
+        calls.append(Call("tell of captures and collisions", tell))
+    # Always: the world may speak first on topics of its own.
+    calls.append(Call("deliver messages", partial(deliver, state)))
+    calls.append(Call("check, remove, end", partial(end_step, state)))
+    return calls
 
-    def _clear_forces(self) -> None:
-        self.sim.population.bodies.loads.fill(0.0)
 
-    def _motion(self, groups: list[Group]) -> list[Call]:
-        sim = self.sim
-        dt, m = sim.mission.dt, sim.mission.motion_multiplier
-        calls = [self._advance_call(g, dt, m, 0.0) for g in groups if not g.controllers]
-        steered = [g for g in groups if g.controllers]
-        for s in range(m if steered else 0):
-            for group in steered:
-                calls += [self._entity_call("controller", group, b, s) for b in group.controllers]
-            calls += [self._advance_call(g, dt / m, 1, s / m) for g in steered]
-        return calls
+def _clear_forces(state: SimulationState) -> None:
+    state.population.bodies.loads.fill(0.0)
 
-    def _due(self, cadence: Cadence, substep: int = 0) -> Iterator[tuple[int, np.ndarray | None]]:
-        """Grid points since the last call, and the worlds, (n_worlds,), in which a plugin is due; None for all that run."""
-        clock, running = self.sim.context.clock, self.sim.running
-        if clock.common >= 0:
-            if since := cadence.since(clock.common, substep):
-                yield since, None
-            return
-        found: dict[int, np.ndarray] = {}
-        for step in np.unique(clock.step[running]):
-            if since := cadence.since(int(step), substep):
-                found.setdefault(since, np.zeros(len(running), bool))[running & (clock.step == step)] = True
-        yield from sorted(found.items())
 
-    # -- plugins of entities ----------------------------------------------------------------------------------------------
+def _motion(state: SimulationState, groups: list[Group]) -> list[Call]:
+    dt, m = state.mission.dt, state.mission.motion_multiplier
+    calls = [_advance_call(state, g, dt, m, 0.0) for g in groups if not g.controllers]
+    steered = [g for g in groups if g.controllers]
+    for s in range(m if steered else 0):
+        for group in steered:
+            calls += [_entity_call(state, "controller", group, b, s) for b in group.controllers]
+        calls += [_advance_call(state, g, dt / m, 1, s / m) for g in steered]
+    return calls
 
-    def _advance_call(self, group: Group, dt: float, substeps: int, phase: float) -> Call:
-        view, plugin, await_ready = group.moving, group.motion.plugin, self._waits_for(group, group.motion)
 
-        def run() -> None:
-            if group.n:
-                if await_ready:
-                    await_ready()
-                # As `view.begin` does, here and below: the calls of it are 1 % of a small step.
-                view._caller, view.phase = plugin, phase
-                try:
-                    group.advance(dt, substeps)
-                except Exception as error:
-                    raise failure.in_call(error, plugin, view, group) from error
+def _due(
+    state: SimulationState, cadence: Cadence, substep: int = 0
+) -> Iterator[tuple[int, np.ndarray | None]]:
+    """Grid points since the last call, and the worlds, (n_worlds,), in which a plugin is due; None for all that run."""
+    clock, running = state.context.clock, state.running
+    if clock.common >= 0:
+        if since := cadence.since(clock.common, substep):
+            yield since, None
+        return
+    found: dict[int, np.ndarray] = {}
+    for step in np.unique(clock.step[running]):
+        if since := cadence.since(int(step), substep):
+            found.setdefault(since, np.zeros(len(running), bool))[running & (clock.step == step)] = True
+    yield from sorted(found.items())
 
-        return Call(self._label("motion", group, group.motion), run)
 
-    def _entity_call(self, kind: str, group: Group, binding: Binding, substep: int = 0) -> Call:
-        mission, path = self.sim.mission, binding.path
-        m = mission.motion_multiplier if kind == "controller" else 1
-        grid_dt = mission.dt / m
-        phase = substep / m if kind == "controller" else float(kind == "sensor")
-        cadence = Cadence.of(binding.spec, m / mission.dt, m, f"block {group.names[0]!r}")
-        inboxes = [
-            b.plugin.__dict__[k]
-            for b in binding.walk()
-            for k, c in type(b.spec).columns.items()
-            if isinstance(c, Subscribe)
-        ]
-        is_linked = any(b.links for b in binding.walk())
-        await_ready = self._waits_for(group, binding)
+def _advance_call(state: SimulationState, group: Group, dt: float, substeps: int, phase: float) -> Call:
+    view, plugin, await_ready = group.moving, group.motion.plugin, _waits_for(group, group.motion)
 
-        def call(some: Group, own: Binding, dt: float) -> None:
-            view = own.view
-            view._caller, view.substep, view.phase, view.dt = own.plugin, substep, phase, dt
-            try:
-                if is_linked:
-                    own.pull(some.table)
-                own.plugin.step(view)
-                if is_linked:
-                    own.push(some.table)
-            except Exception as error:
-                raise failure.in_call(error, own.plugin, view, some) from error
-
-        def call_part(dt: float) -> Callable[[Group], None]:
-            return lambda some: call(some, next(b for b in some.bindings if b.path == path), dt)
-
-        def run() -> None:
-            calls = [(1, None)] if cadence is None else list(self._due(cadence, substep))
-            if await_ready and group.n and calls:
+    def run() -> None:
+        if group.n:
+            if await_ready:
                 await_ready()
-            for since, worlds in calls:
-                if group.n:
-                    if worlds is None:
-                        call(group, binding, since * grid_dt)
-                    else:
-                        call_group(self.sim.population, group, worlds, call_part(since * grid_dt))
-                # Of a group without rows too: who comes later has not heard what was said before
-                for inbox in inboxes:
-                    inbox.clear(worlds)
-
-        def lean() -> None:
-            if group.n:
-                call(group, binding, grid_dt)
-
-        is_plain = cadence is None and not (inboxes or await_ready)
-        return Call(self._label(kind, group, binding, substep), lean if is_plain else run)
-
-    def _waits_for(self, group: Group, binding: Binding) -> Callable[[], None] | None:
-        """What waits until all that a plugin's handles stand for is ready; None where it never waits."""
-        waiting = [b for b in binding.walk() if b.handles and hasattr(type(b.spec), "ready")]
-
-        def wait() -> None:
-            for each in waiting:
-                longest = max(handle.ready_timeout for handle in type(each.spec).handles().values())
-                limit = time.monotonic() + longest
-                try:
-                    while not each.plugin.ready(each.view):
-                        if time.monotonic() > limit:
-                            raise PluginError(f"was not ready within {longest:g} s")
-                        time.sleep(0.001)
-                except Exception as error:
-                    raise failure.in_call(error, each.plugin, each.view, group) from error
-
-        return wait if waiting else None
-
-    # -- world plugins ----------------------------------------------------------------------------------------------------
-
-    def _world_call(self, kind: str, referee: Referee) -> Call:
-        sim, dt = self.sim, self.sim.mission.dt
-        cadence = Cadence.of(referee.spec, 1.0 / dt, 1, "mission")
-
-        def call(some: Referee, w: Any, dt: float) -> None:
-            w._caller, w.phase, w.dt = some.plugin, 1.0, dt
+            # As `view.begin` does, here and below: the calls of it are 1 % of a small step.
+            view._caller, view.phase = plugin, phase
             try:
-                some.plugin.step(w)
+                group.advance(dt, substeps)
             except Exception as error:
-                raise failure.in_call(error, some.plugin, w, None) from error
+                raise failure.in_call(error, plugin, view, group) from error
 
-        label = f"{kind:<12} {referee.spec.instance_name}{_rate_text(referee.spec)}"
-        if cadence is None:
-            return Call(label, lambda: call(referee, referee.view, dt))
+    return Call(_label(state, "motion", group, group.motion), run)
 
-        def call_part(dt: float) -> Callable[[Referee, Any], None]:
-            return lambda some, w: call(some, w, dt)
 
-        def run() -> None:
-            for since, worlds in self._due(cadence):
+def _entity_call(state: SimulationState, kind: str, group: Group, binding: Binding, substep: int = 0) -> Call:
+    mission, path = state.mission, binding.path
+    m = mission.motion_multiplier if kind == "controller" else 1
+    grid_dt = mission.dt / m
+    phase = substep / m if kind == "controller" else float(kind == "sensor")
+    cadence = Cadence.of(binding.spec, m / mission.dt, m, f"block {group.names[0]!r}")
+    inboxes = [
+        b.plugin.__dict__[k]
+        for b in binding.walk()
+        for k, c in type(b.spec).columns.items()
+        if isinstance(c, Subscribe)
+    ]
+    is_linked = any(b.links for b in binding.walk())
+    await_ready = _waits_for(group, binding)
+
+    def call(some: Group, own: Binding, dt: float) -> None:
+        view = own.view
+        view._caller, view.substep, view.phase, view.dt = own.plugin, substep, phase, dt
+        try:
+            if is_linked:
+                own.pull(some.table)
+            own.plugin.step(view)
+            if is_linked:
+                own.push(some.table)
+        except Exception as error:
+            raise failure.in_call(error, own.plugin, view, some) from error
+
+    def call_part(dt: float) -> Callable[[Group], None]:
+        return lambda some: call(some, next(b for b in some.bindings if b.path == path), dt)
+
+    def run() -> None:
+        calls = [(1, None)] if cadence is None else list(_due(state, cadence, substep))
+        if await_ready and group.n and calls:
+            await_ready()
+        for since, worlds in calls:
+            if group.n:
                 if worlds is None:
-                    call(referee, referee.view, since * dt)
+                    call(group, binding, since * grid_dt)
                 else:
-                    call_referee(sim.population, referee, worlds, call_part(since * dt))
+                    call_group(state.population, group, worlds, call_part(since * grid_dt))
+            # Of a group without rows too: who comes later has not heard what was said before
+            for inbox in inboxes:
+                inbox.clear(worlds)
 
-        return Call(label, run)
+    def lean() -> None:
+        if group.n:
+            call(group, binding, grid_dt)
 
-    # -- words ------------------------------------------------------------------------------------------------------------
+    is_plain = cadence is None and not (inboxes or await_ready)
+    return Call(_label(state, kind, group, binding, substep), lean if is_plain else run)
 
-    def _label(self, kind: str, group: Group, binding: Binding, substep: int = 0) -> str:
-        m = self.sim.mission.motion_multiplier
-        part = f" ({substep + 1}/{m})" if kind == "controller" and m > 1 else ""
-        place = f" {group.place}" if self.sim.mission.update == "sequential" else ""
-        return f"{kind:<12} {group.name}{place}: {binding.spec.instance_name}{_rate_text(binding.spec)}{part}"
+
+def _waits_for(group: Group, binding: Binding) -> Callable[[], None] | None:
+    """What waits until all that a plugin's handles stand for is ready; None where it never waits."""
+    waiting = [b for b in binding.walk() if b.handles and hasattr(type(b.spec), "ready")]
+
+    def wait() -> None:
+        for each in waiting:
+            longest = max(handle.ready_timeout for handle in type(each.spec).handles().values())
+            limit = time.monotonic() + longest
+            try:
+                while not each.plugin.ready(each.view):
+                    if time.monotonic() > limit:
+                        raise PluginError(f"was not ready within {longest:g} s")
+                    time.sleep(0.001)
+            except Exception as error:
+                raise failure.in_call(error, each.plugin, each.view, group) from error
+
+    return wait if waiting else None
+
+
+def _world_call(state: SimulationState, kind: str, referee: Referee) -> Call:
+    dt = state.mission.dt
+    cadence = Cadence.of(referee.spec, 1.0 / dt, 1, "mission")
+
+    def call(some: Referee, w: Any, dt: float) -> None:
+        w._caller, w.phase, w.dt = some.plugin, 1.0, dt
+        try:
+            some.plugin.step(w)
+        except Exception as error:
+            raise failure.in_call(error, some.plugin, w, None) from error
+
+    label = f"{kind:<12} {referee.spec.instance_name}{_rate_text(referee.spec)}"
+    if cadence is None:
+        return Call(label, lambda: call(referee, referee.view, dt))
+
+    def call_part(dt: float) -> Callable[[Referee, Any], None]:
+        return lambda some, w: call(some, w, dt)
+
+    def run() -> None:
+        for since, worlds in _due(state, cadence):
+            if worlds is None:
+                call(referee, referee.view, since * dt)
+            else:
+                call_referee(state.population, referee, worlds, call_part(since * dt))
+
+    return Call(label, run)
+
+
+def _label(state: SimulationState, kind: str, group: Group, binding: Binding, substep: int = 0) -> str:
+    m = state.mission.motion_multiplier
+    part = f" ({substep + 1}/{m})" if kind == "controller" and m > 1 else ""
+    place = f" {group.place}" if state.mission.update == "sequential" else ""
+    return f"{kind:<12} {group.name}{place}: {binding.spec.instance_name}{_rate_text(binding.spec)}{part}"
 
 
 def steps(referee: Referee) -> bool:

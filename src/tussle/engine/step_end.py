@@ -3,139 +3,158 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from tussle.api import kernels
-from tussle.engine import access, failure
+from tussle.api.bodies import Bodies
+from tussle.engine import failure
+from tussle.engine.result import WorldResult
+from tussle.engine.rows import repack
+from tussle.engine.snapshot import state_hash
+from tussle.engine.state import Parked, SimulationState
 
-if TYPE_CHECKING:
-    from tussle.engine.simulation import Simulation
+
+def end_step(state: SimulationState) -> None:
+    """Check all states, remove who is gone, advance the clocks, end worlds."""
+    if kernels.check(*state.checked):
+        _take_note_of_faults(state)
+    clock = state.context.clock
+    if state.n_running == state.n_worlds:
+        clock.step += 1
+    else:
+        clock.step += state.running
+    if state.world_view.deaths or state.has_failures:
+        take_out_dead(state)
+    if clock.common >= 0:
+        clock.common += 1
+    if state.has_changed or clock.common < 0 or clock.common >= state.n_steps:
+        _end_worlds(state)
 
 
-class StepEnd:
-    """The last call of a simulation's step.
+def _take_note_of_faults(state: SimulationState) -> None:
+    """States that are not finite are failures of their worlds; who has no health left is dead."""
+    bodies, faulty = state.population.bodies, state.checked[-1]
+    for row in map(int, np.flatnonzero(faulty)):
+        world = int(bodies.world[row])
+        if not state.failed[world]:
+            group = next(g for g in state.population.groups if g.first <= row < g.last)
+            step = int(state.context.clock.step[world])
+            state.record_failure(world, failure.not_finite(group, bodies, row, step))
+    state.world_view.kill(~faulty & ~(bodies.health > 0.0), "health")
 
-    Attributes:
-        has_failures: A plugin has failed since the last look.
-    """
 
-    def __init__(self, sim: Simulation) -> None:
-        self.sim = sim
-        self.has_failures = False
-        self._steps = sim.mission.steps
-        self._has_changed = True
-        self._checked: tuple[Any, ...] | None = None
+def take_out_dead(state: SimulationState) -> None:
+    """Remove who is dead, and all of the worlds in which a plugin has failed."""
+    view, bodies = state.world_view, state.population.bodies
+    if not view.deaths and not state.has_failures:
+        return
+    ended = state.failed & state.running
+    state.has_failures = False
+    gone = np.zeros(bodies.n, bool)
+    for rows, _ in view.deaths:
+        gone[rows] = True
+    if state.events and view.deaths:
+        state.events.deaths(bodies, view.deaths, np.maximum(state.context.clock.step - 1, 0))
+    view.deaths = []
+    for world in np.flatnonzero(ended):
+        _end(state, int(world), "error")
+        gone |= bodies.world == world
+    repack(state, gone, None)
 
-    def rows_changed(self) -> None:
-        """The table has been repacked or restored."""
-        self._checked = None
-        self._has_changed = True
 
-    def run(self) -> None:
-        """Check all states, remove who is gone, advance the clocks, end worlds."""
-        self._check_states()
-        clock = self.sim.context.clock
-        if self.sim.n_running == self.sim.n_worlds:
-            clock.step += 1
-        else:
-            clock.step += self.sim.running
-        if self.sim.world_view.deaths or self.has_failures:
-            self.take_out_dead()
-        if clock.common >= 0:
-            clock.common += 1
-        if self._has_changed or clock.common < 0 or clock.common >= self._steps:
-            self._end_worlds()
+def _end_worlds(state: SimulationState) -> None:
+    over: dict[int, str] = {}
+    if "time" in state.mission.end_conditions:
+        for world in np.flatnonzero(state.running & (state.context.clock.step >= state.n_steps)):
+            over[int(world)] = "time"
+    # Who is there has changed since the last look: births count too, since the last one may decide
+    if state.has_changed:
+        state.has_changed = False
+        for number, reason in _lost_teams(state):
+            over.setdefault(number, reason)
+    if over:
+        _end_and_park(state, over)
 
-    def _check_states(self) -> None:
-        if self._checked is None:
-            b = self.sim.population.bodies
-            self._checked = (b.pos, b.quat, b.health, np.empty(b.n, bool))
-        if kernels.check(*self._checked):
-            bodies, faulty = self.sim.population.bodies, self._checked[-1]
-            for row in np.flatnonzero(faulty):
-                world = int(bodies.world[row])
-                if not self.sim.failed[world]:
-                    group = next(g for g in self.sim.population.groups if g.first <= row < g.last)
-                    self.sim.record_failure(
-                        world,
-                        failure.not_finite(group, bodies, int(row), int(self.sim.context.clock.step[world])),
-                    )
-            self.sim.world_view.kill(~faulty & ~(bodies.health > 0.0), "health")
 
-    def take_out_dead(self) -> None:
-        """Remove who is dead, and all of the worlds in which a plugin has failed."""
-        view, bodies = self.sim.world_view, self.sim.population.bodies
-        if not view.deaths and not self.has_failures:
-            return
-        ended = self.sim.failed & self.sim.running
-        self.has_failures = False
-        gone = np.zeros(bodies.n, bool)
-        for rows, _ in view.deaths:
-            gone[rows] = True
-        if self.sim.events and view.deaths:
-            self.sim.events.deaths(view.deaths, np.maximum(self.sim.context.clock.step - 1, 0))
-        view.deaths = []
-        for world in np.flatnonzero(ended):
-            self._end(int(world), "error")
-            gone |= bodies.world == world
-        self.sim.repack(gone, None)
+def _lost_teams(state: SimulationState) -> Iterable[tuple[int, str]]:
+    conditions = state.mission.end_conditions
+    if "none" in conditions or not {"one_team", "all_dead"} & set(conditions):
+        return
+    bodies, teams = state.population.bodies, state.context.teams
+    number = np.searchsorted(teams, bodies.team)
+    shape = state.n_worlds, len(teams) + 1
+    counts = np.bincount(bodies.world * shape[1] + number, minlength=shape[0] * shape[1]).reshape(shape)
+    left = (counts > 0).sum(axis=1)
+    for world in np.flatnonzero(state.running & (left <= 1)):
+        if not state.births.is_over(int(world)):
+            continue
+        if left[world] == 0:
+            yield int(world), "all_dead"
+        elif "one_team" in conditions and len(teams) > 1:
+            yield int(world), "one_team"
 
-    def _end_worlds(self) -> None:
-        mission, clock = self.sim.mission, self.sim.context.clock
-        conditions = mission.end_conditions
-        over: dict[int, str] = {}
-        if "time" in conditions:
-            for world in np.flatnonzero(self.sim.running & (clock.step >= self._steps)):
-                over[int(world)] = "time"
-        # Who is there has changed since the last look: births count too, since the last one may decide
-        if self._has_changed:
-            self._has_changed = False
-            for number, reason in self._lost_teams():
-                over.setdefault(number, reason)
-        if over:
-            self._end_and_park(over)
 
-    def _lost_teams(self) -> Iterable[tuple[int, str]]:
-        conditions = self.sim.mission.end_conditions
-        if "none" in conditions or not {"one_team", "all_dead"} & set(conditions):
-            return
-        bodies = self.sim.population.bodies
-        number = np.searchsorted(self.sim.context.teams, bodies.team)
-        n_teams = len(self.sim.context.teams) + 1
-        counts = np.bincount(bodies.world * n_teams + number, minlength=self.sim.n_worlds * n_teams).reshape(
-            self.sim.n_worlds, n_teams
-        )
-        left = (counts > 0).sum(axis=1)
-        for world in np.flatnonzero(self.sim.running & (left <= 1)):
-            if not self.sim.births.is_over(int(world)):
+def _end_and_park(state: SimulationState, over: Mapping[int, str]) -> None:
+    bodies = state.population.bodies
+    for world, reason in over.items():
+        _end(state, world, reason)
+    if state.n_running:
+        repack(state, np.isin(bodies.world, list(over)), None)
+        mask = np.zeros(state.n_worlds, bool)
+        mask[list(over)] = True
+        state.mail.drop_worlds(mask)
+    else:
+        state.population.close_handles()
+
+
+def _end(state: SimulationState, world: int, reason: str) -> None:
+    result = world_result(state, world, reason)
+    previous = state.results[world]
+    if previous is not None:
+        result.error = previous.error
+    state.results[world] = result
+    state.parked[world] = _park(state, world)
+    state.running[world] = False
+    state.n_running = int(state.running.sum())
+    if state.events:
+        state.events.end(world, reason)
+
+
+def _park(state: SimulationState, world: int) -> Parked:
+    """Keep a world's rows before they leave the table."""
+    bodies = state.population.bodies
+    rows = np.flatnonzero(bodies.world == world)
+    tables = {}
+    for group in state.population.groups:
+        mine = np.flatnonzero((rows >= group.first) & (rows < group.last))
+        if len(mine):
+            tables[group.key] = mine, group.table.take(rows[mine] - group.first)
+    return Parked(Bodies(bodies.floats[:, rows].copy(), bodies.ints[:, rows].copy(), bodies.n_worlds), tables)
+
+
+def world_result(state: SimulationState, world: int, reason: str, is_hashed: bool = True) -> WorldResult:
+    """What a world's game has come to by now; without the state hash where that is not wanted, which takes longer than the rest."""
+    bodies = state.population.bodies
+    here = bodies.team[bodies.world == world]
+    alive = {int(team): int((here == team).sum()) for team in state.context.teams}
+    clock = state.context.clock
+    steps = int(clock.step[world])
+    result = WorldResult(world, int(state.context.seeds[world]), reason, steps, float(clock.t[world]), alive)
+    scores: dict[int, float] = {}
+    for referee in [*state.interactions, *state.metrics]:
+        referee.view.begin(referee.plugin)
+        try:
+            found = referee.plugin.result_of(referee.view, world)
+        except Exception as error:
+            if reason == "error":  # something has failed already, and this may come of it
                 continue
-            if left[world] == 0:
-                yield int(world), "all_dead"
-            elif "one_team" in conditions and len(self.sim.context.teams) > 1:
-                yield int(world), "one_team"
-
-    def _end_and_park(self, over: Mapping[int, str]) -> None:
-        bodies = self.sim.population.bodies
-        for world, reason in over.items():
-            self._end(world, reason)
-        if self.sim.n_running:
-            self.sim.repack(np.isin(bodies.world, list(over)), None)
-            mask = np.zeros(self.sim.n_worlds, bool)
-            mask[list(over)] = True
-            self.sim.mail.drop_worlds(mask)
-        else:
-            self.sim.population.close_handles()
-
-    def _end(self, world: int, reason: str) -> None:
-        result = access.world_result(self.sim, world, reason)
-        previous = self.sim.results[world]
-        if previous is not None:
-            result.error = previous.error
-        self.sim.results[world] = result
-        self.sim.parked[world] = access.park(self.sim, world)
-        self.sim.running[world] = False
-        self.sim.n_running = int(self.sim.running.sum())
-        if self.sim.events:
-            self.sim.events.end(world, reason)
+            raise failure.raised(error, referee.plugin, where="result", step=steps, world=world) from error
+        if found:
+            result.metrics[referee.spec.instance_name] = found
+        for team, score in (found.get("score") or {}).items() if referee in state.metrics else ():
+            scores[team] = scores.get(team, 0.0) + score
+    result.scores = scores
+    if is_hashed:
+        result.state_hash = state_hash(state, world)
+    return result

@@ -6,11 +6,12 @@ import time
 from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, Self
+from typing import Any, Protocol, Self
 
 import numpy as np
 import pyarrow as pa
 
+from tussle.api.bodies import Bodies
 from tussle.errors import ParameterError, RecordError
 from tussle.record import run_file
 from tussle.record.happenings import BIRTH, END, Happenings
@@ -18,21 +19,15 @@ from tussle.record.row_buffer import RowBuffer, Rows
 from tussle.record.schema import EVENTS, EVENTS_FILE, FILES, MISSION_FILE, TRAJECTORY, TRAJECTORY_FILE
 from tussle.record.stream import Stream
 
-if TYPE_CHECKING:
-    from tussle.api.bodies import Bodies
-
 
 class Recorded(Protocol):
     """What the recorder asks of a simulation; the engine stands above this package and is not imported here."""
 
     mission: Any
     n_worlds: int
-    running: np.ndarray
-    parked: dict[int, Any]
     observers: list[Any]
-    context: Any
-    population: Any
     events: Any
+    state: Any
 
     @property
     def grade(self) -> str: ...
@@ -77,7 +72,7 @@ class Recorder:
         self.parameters = dict(parameters or {})
         self.is_closed = False
         self._timings = run_file.Timings()
-        clock, mission = sim.context.clock, sim.mission
+        clock, mission = sim.state.context.clock, sim.mission
         per_step = 1 if period is None else Fraction(str(mission.dt)) / Fraction(str(period))
         # Steps are 64 bits wide, and so is their product with what stands in the fraction.
         least = Fraction(1, 10**9)
@@ -112,9 +107,9 @@ class Recorder:
     def _begin(self) -> None:
         """Attach, and tell of those who are there."""
         sim = self.sim
-        bodies, clock = sim.population.bodies, sim.context.clock
-        names = sim.context.block_names
-        rows = Rows(bodies.ints, sim.running)
+        bodies, clock = sim.state.population.bodies, sim.state.context.clock
+        names = sim.state.context.block_names
+        rows = Rows(bodies.ints, sim.state.running)
         world, ids, _, block = rows.columns
         nobody = np.zeros(rows.n, np.int64)
         self._events.append(
@@ -130,7 +125,7 @@ class Recorder:
 
     def _observe(self, sim: Recorded) -> None:
         """Record the beginning of a step."""
-        clock = sim.context.clock
+        clock = sim.state.context.clock
         step = clock.common
         if step < 0:
             self._observe_apart(sim)
@@ -144,7 +139,7 @@ class Recorder:
                 or (step * due.numerator) // due.denominator
                 != ((step - 1) * due.numerator) // due.denominator
             ):
-                bodies = sim.population.bodies
+                bodies = sim.state.population.bodies
                 if bodies.ints is not self._seen:
                     self._seen, self._rows = bodies.ints, Rows(bodies.ints)
                 self._add(bodies.floats, self._rows, step)
@@ -153,16 +148,16 @@ class Recorder:
 
     def _observe_apart(self, sim: Recorded) -> None:
         """Record the worlds that are due, each in a step of its own."""
-        step = sim.context.clock.step
+        step = sim.state.context.clock.step
         last = np.maximum(self._steps, self._common_step)
-        if (step <= last)[sim.running].any():
+        if (step <= last)[sim.state.running].any():
             self._refuse_past()
-        self._steps = np.where(sim.running, step, last)
-        due = sim.running.copy()
+        self._steps = np.where(sim.state.running, step, last)
+        due = sim.state.running.copy()
         if self._per_step is not None:
             p, q = self._per_step.numerator, self._per_step.denominator
             due &= (step * p) // q != ((step - 1) * p) // q
-        bodies = sim.population.bodies
+        bodies = sim.state.population.bodies
         rows = Rows(bodies.ints, due)
         self._add(bodies.floats, rows, step[rows.world])
 
@@ -183,7 +178,7 @@ class Recorder:
         self._events.append(happenings)
         if happenings.kind == END:
             for world, step in zip(happenings.world, happenings.step, strict=True):
-                self._add_last(self.sim.parked[int(world)].bodies, int(step))
+                self._add_last(self.sim.state.parked[int(world)].bodies, int(step))
 
     def _add_last(self, bodies: Bodies, step: int) -> None:
         self._add(bodies.floats, Rows(bodies.ints), step)
@@ -208,7 +203,7 @@ class Recorder:
 
     def _take_events(self) -> pa.RecordBatch:
         events, self._events = self._events, []
-        clock = self.sim.context.clock
+        clock = self.sim.state.context.clock
         step = np.concatenate([e.step for e in events])
         columns: dict[str, Any] = {
             "world": np.concatenate([e.world for e in events]).astype(np.int32),
@@ -237,12 +232,12 @@ class Recorder:
             return
         self.is_closed = True
         self._detach()
-        sim, step = self.sim, self.sim.context.clock.step
+        sim, step = self.sim, self.sim.state.context.clock.step
         last = np.maximum(self._steps, self._common_step)
-        going_on = sim.running & (step > last)
+        going_on = sim.state.running & (step > last)
         if going_on.any():
-            rows = Rows(sim.population.bodies.ints, going_on)
-            self._add(sim.population.bodies.floats, rows, step[rows.world])
+            rows = Rows(sim.state.population.bodies.ints, going_on)
+            self._add(sim.state.population.bodies.floats, rows, step[rows.world])
         self.flush()
         for stream in (self._trajectory, self._happened):
             stream.close()

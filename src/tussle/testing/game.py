@@ -140,7 +140,7 @@ def _asked(mission: Mission) -> list[type[Message]]:
     """Message types that the world plugins read in the first steps: these are not declared."""
     asked: dict[type[Message], None] = {}
     with Simulation(mission, 1) as sim:
-        view, inbox = sim.world_view, sim.world_view.inbox
+        view, inbox = sim.state.world_view, sim.state.world_view.inbox
         view.__dict__["inbox"] = lambda type_: (asked.setdefault(type_), inbox(type_))[1]
         sim.step(3)
     return [message for message in asked if can_say(message)]
@@ -150,9 +150,8 @@ def _told(mission: Mission) -> list[type[Message]]:
     """Message types that the world plugins send in the first steps."""
     told: dict[type[Message], None] = {}
     with Simulation(mission, 1) as sim:
-        publish_to = sim.world_view.publish_to
-        assert publish_to is not None
-        sim.world_view.publish_to = lambda type_, network: (
+        publish_to = sim.state.world_view.publish_to
+        sim.state.world_view.publish_to = lambda type_, network: (
             told.setdefault(type_),
             publish_to(type_, network),
         )[1]

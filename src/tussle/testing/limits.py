@@ -115,7 +115,7 @@ def _not_finite(sim: Simulation) -> tuple[int, str]:
         bad = np.flatnonzero(~np.isfinite(line.values))
         if line.is_made and len(bad):
             return int(line.world[bad[0]]), f"{line.name} is {line.values[bad[0]]}"
-    for group in sim.population.groups:
+    for group in sim.state.population.groups:
         for binding in group.walk():
             for name in binding.ragged:
                 items = binding.plugin.__dict__[name]
@@ -123,5 +123,7 @@ def _not_finite(sim: Simulation) -> tuple[int, str]:
                 if len(bad) and name in binding.writable:
                     row = group.first + int(items.row[bad[0]])
                     where = f"an item of {'.'.join(binding.path)}.{name}"
-                    return int(sim.population.bodies.world[row]), f"{where} is {items.data[..., bad[0]]}"
+                    return int(
+                        sim.state.population.bodies.world[row]
+                    ), f"{where} is {items.data[..., bad[0]]}"
     return 0, ""

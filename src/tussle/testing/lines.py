@@ -42,13 +42,13 @@ def keys_of(table: Table, place: Place) -> list[Key]:
 
 def lines_of(sim: Simulation) -> dict[Key, Line]:
     """All lines; a channel's is named after who writes it."""
-    bodies, worlds = sim.population.bodies, np.arange(len(sim.running))
+    bodies, worlds = sim.state.population.bodies, np.arange(len(sim.state.running))
     found: dict[Key, Line] = {
         ("body", i): Line(k, bodies.floats[i], bodies.world, True) for i, k in enumerate(BODY_ROWS)
     }
     found |= {("body", k): Line(k, bodies.ints[i], bodies.world, False) for i, k in enumerate(STORED_INTS)}
-    found["clock",] = Line("the clock", sim.context.clock.step, worlds, False)
-    found["seeds",] = Line("the seeds", sim.context.seeds, worlds, False)
+    found["clock",] = Line("the clock", sim.state.context.clock.step, worlds, False)
+    found["seeds",] = Line("the seeds", sim.state.context.seeds, worlds, False)
 
     def add(table: Table, place: Place, column: Column, name: str, world: np.ndarray) -> None:
         is_made = isinstance(column, (State, Output)) and bool(np.isfinite(column.default).all())
@@ -56,13 +56,13 @@ def lines_of(sim: Simulation) -> dict[Key, Line]:
             if key not in found or isinstance(column, Output):
                 found[key] = Line(name, table.arrays[place.dtype][key[2]], world, is_made)
 
-    for group in sim.population.groups:
+    for group in sim.state.population.groups:
         for binding in group.walk():
             for name, place in binding.places.items():
                 label = f"{group.name}.{'.'.join(binding.path)}.{name}"
                 world = bodies.world[group.first : group.last]
                 add(group.table, place, type(binding.spec).columns[name], label, world)
-    for referee in sim.referees:
+    for referee in sim.state.referees:
         for name, (per, place) in referee.places.items():
             label = f"{referee.spec.instance_name}.{name}"
             world = bodies.world if per == "entity" else worlds

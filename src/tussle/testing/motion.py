@@ -45,7 +45,9 @@ class Flight:
 
     def __init__(self, game: Game) -> None:
         self.sim = sim = Simulation(game.quiet, [11, 12], on_error="raise")
-        self.group: Group = next(g for g in sim.population.groups if type(g.motion.spec) is type(game.plugin))
+        self.group: Group = next(
+            g for g in sim.state.population.groups if type(g.motion.spec) is type(game.plugin)
+        )
         states, inputs = [self.group.x.copy()], []
         integrate = self.group.integrate
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from tussle.engine import access
 from tussle.engine.simulation import Simulation
+from tussle.engine.snapshot import hashed
 from tussle.errors import ConformanceError
 from tussle.testing.game import SEEDS, STEPS, Game
 
@@ -16,13 +16,13 @@ Columns = list[tuple[str, Any]]
 
 def columns_of(sim: Simulation, world: int) -> Columns:
     """All that belongs to one world now: (name, values); of a world that has ended, its result."""
-    done = sim.results[world]
-    if done is not None and not sim.running[world]:
+    done = sim.state.results[world]
+    if done is not None and not sim.state.running[world]:
         parts = (done.end, done.steps, done.t, done.alive, done.metrics, done.scores, done.state_hash)
         return [("result", repr(parts).encode())]
     return [
         (name, values if isinstance(values, bytes) else np.array(values))
-        for name, values in access._hashed(sim, world)
+        for name, values in hashed(sim.state, world)
     ]
 
 

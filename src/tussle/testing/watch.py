@@ -75,11 +75,11 @@ def check_class_values(cls: type[Plugin], before: dict[str, Any]) -> None:
 
 def _bound(sim: Simulation, cls: type[Plugin]) -> Iterator[tuple[Any, Callable[[str], Own]]]:
     """The bound plugins of a class, each with what its hooks may write."""
-    for group in sim.population.groups:
+    for group in sim.state.population.groups:
         for binding in group.walk():
             if type(binding.spec) is cls:
                 yield binding.plugin, partial(_own, group, binding)
-    for referee in sim.referees:
+    for referee in sim.state.referees:
         if type(referee.spec) is cls:
             yield referee.plugin, partial(_own_of_world, sim, referee)
 
@@ -135,7 +135,7 @@ class Watch:
 
         def draw(*args: Any, **kwargs: Any) -> Any:
             given = inspect.signature(law).bind(view, *args, **kwargs).arguments
-            label, step = given["label"], self.sim.context.clock.step.tobytes()
+            label, step = given["label"], self.sim.state.context.clock.step.tobytes()
             keys = [v for k, v in given.items() if k not in {"self", "label", "law", "k"}]
             of = [v.other.tobytes() if isinstance(v, Pairs) else np.asarray(v).tobytes() for v in keys]
             key, now = (
@@ -175,7 +175,7 @@ def _own_of_world(sim: Simulation, referee: Referee, hook: str) -> Own:
     places = [referee.places[name] for name in type(referee.spec).states()]
     own: Own = {key: slice(None) for per, place in places for key in keys_of(referee.tables[per], place)}
     if isinstance(referee.spec, Interaction):
-        view: WorldView = sim.world_view
+        view: WorldView = sim.state.world_view
         moved = np.unique(np.concatenate([np.zeros(0, np.int64), *view.moved]))
         own |= {("body", i): moved for i, k in enumerate(BODY_ROWS) if k in {"pos", "vel", "quat"}}
         own |= {

@@ -154,7 +154,7 @@ class Conductor:
 
     def _play(self) -> bool:
         player = self.player
-        clock = player.simulation.context.clock
+        clock = player.simulation.state.context.clock
         until = time.perf_counter() + BURST
         while True:
             left = self.pace.wait(float(clock.start + player.step * clock.dt), clock.dt)

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from tussle.engine.simulation import Simulation
+from tussle.engine.simulation import Simulation
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,13 +45,13 @@ class Sketchbook:
     def open(self) -> None:
         """Collect from now on."""
         if not self.is_open:
-            self._simulation.context.draw.sinks.append(self._add)
+            self._simulation.state.context.draw.sinks.append(self._add)
             self.is_open = True
 
     def close(self) -> None:
         """Collect no more, and forget what there is."""
         if self.is_open:
-            self._simulation.context.draw.sinks.remove(self._add)
+            self._simulation.state.context.draw.sinks.remove(self._add)
             self.is_open = False
         self.clear()
 

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from tussle.api.bodies import BODY_UNITS, DERIVED, FLOATS, derive
 from tussle.columns import Subscribe
 from tussle.comms import EVERYONE, SAME_ENTITY
+from tussle.comms.topic import Parcel, TopicBuffer
+from tussle.engine.group import Group
+from tussle.engine.simulation import Simulation
+from tussle.engine.table import Stored, Table
 from tussle.lists import RaggedColumn
-
-if TYPE_CHECKING:
-    from tussle.comms.topic import Parcel, TopicBuffer
-    from tussle.engine.group import Group
-    from tussle.engine.simulation import Simulation
-    from tussle.engine.table import Stored, Table
 
 MOST_MESSAGES = 50
 """Messages that are listed, of those heard and of those said."""
@@ -84,13 +82,13 @@ class EntityState:
 
 def entity_state(simulation: Simulation, world: int, who: int) -> EntityState | None:
     """The entity with an id; None where it is not there (any more). Of a world that has ended, as it was at the end."""
-    parked = simulation.parked.get(world)
-    bodies = simulation.population.bodies if parked is None else parked.bodies
+    parked = simulation.state.parked.get(world)
+    bodies = simulation.state.population.bodies if parked is None else parked.bodies
     found = np.flatnonzero((bodies.id == who) & (bodies.world == world))
     if not len(found):
         return None
     row = int(found[0])
-    clock = simulation.context.clock
+    clock = simulation.state.context.clock
     body = {name: Reading(_plain(getattr(bodies, name)[..., row]), BODY_UNITS[name]) for name in FLOATS}
     for name in ("yaw", "climb", "roll"):
         angle = np.empty(1)
@@ -102,10 +100,10 @@ def entity_state(simulation: Simulation, world: int, who: int) -> EntityState | 
         step=int(clock.step[world]),
         id=who,
         team=int(bodies.team[row]),
-        block=simulation.context.block_names[int(bodies.block[row])],
+        block=simulation.state.context.block_names[int(bodies.block[row])],
         body=body,
     )
-    for group in simulation.population.groups:
+    for group in simulation.state.population.groups:
         if parked is None:
             if group.first <= row < group.last:
                 _read_plugins(group, row - group.first, group.table, state.plugins)
@@ -166,7 +164,7 @@ def _for_whom(parcel: Parcel, world: int, who: int) -> np.ndarray:
 
 def _said(simulation: Simulation, world: int, who: int) -> list[Letter]:
     letters: list[Letter] = []
-    for topic in simulation.topics.values():
+    for topic in simulation.state.mail.topics.values():
         for parcel in _under_way(topic):
             mine = (parcel.batch.world == world) & (parcel.batch.sender == who)
             letters += _letters(topic, parcel, np.flatnonzero(mine))

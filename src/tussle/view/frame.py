@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tussle.api.bodies import FLOATS, OFFSETS
-
-if TYPE_CHECKING:
-    from tussle.engine.simulation import Simulation
+from tussle.engine.simulation import Simulation
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,8 +89,8 @@ class Lens:
 
         `order` then has their rows in that table; None when these are all rows as they lie.
         """
-        parked = self._simulation.parked.get(self._world)
-        bodies = self._simulation.population.bodies if parked is None else parked.bodies
+        parked = self._simulation.state.parked.get(self._world)
+        bodies = self._simulation.state.population.bodies if parked is None else parked.bodies
         if bodies.ints is not self._seen:
             self._seen = bodies.ints
             rows = np.flatnonzero(bodies.world == self._world)
@@ -108,7 +105,7 @@ class Lens:
     def frame(self) -> Frame:
         """A copy of what is there now; of a world that has ended, its last state."""
         floats, who = self.look()
-        clock = self._simulation.context.clock
+        clock = self._simulation.state.context.clock
         step = int(clock.step[self._world])
         columns = []
         for name in ("pos", "quat", "vel", "health"):

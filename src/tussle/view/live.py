@@ -7,12 +7,13 @@ import threading
 from collections.abc import Callable, Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import numpy as np
 
-from tussle.engine.access import world_result
 from tussle.engine.result import WorldResult
+from tussle.engine.simulation import Simulation
+from tussle.engine.step_end import world_result
 from tussle.errors import ParameterError, PluginError
 from tussle.messages import CustomKeyPress, Message, WorldPointClicked
 from tussle.view.conductor import Conductor, Order
@@ -24,9 +25,6 @@ from tussle.view.offers import LINGER, Offer
 from tussle.view.pacing import Pace, checked_warp, faster, slower
 from tussle.view.player import Injection, Player
 from tussle.view.scenery import Scenery, scenery_of
-
-if TYPE_CHECKING:
-    from tussle.engine.simulation import Simulation
 
 FRAME_PERIOD = 1.0 / 30.0
 """Least time between two frames [s]: browsers are sent no more."""
@@ -87,7 +85,7 @@ class Live:
             )
         self.simulation, self.world, self.viewer = simulation, world, dict(viewer or {})
         self._folder = folder
-        self._clock = simulation.context.clock
+        self._clock = simulation.state.context.clock
         self._sketchbook = Sketchbook(simulation, world)
         self._pace = Pace(checked_warp(pace))
         self._player = Player(simulation, world, snapshot_every, 1e6 * memory)
@@ -248,7 +246,7 @@ class Live:
 
     @property
     def seed(self) -> int:
-        return int(self.simulation.context.seeds[self.world])
+        return int(self.simulation.state.context.seeds[self.world])
 
     @property
     def is_paused(self) -> bool:
@@ -272,7 +270,7 @@ class Live:
     @property
     def error(self) -> Exception | None:
         """What stopped the game; None while nothing has. It still can be wound back."""
-        ended = self.simulation.results[self.world]
+        ended = self.simulation.state.results[self.world]
         return self._conductor.error or (ended.error if ended is not None and self.is_over else None)
 
     @property
@@ -361,11 +359,11 @@ class Live:
                 self._entities.pop(who, None)
 
     def _make_result(self) -> WorldResult | None:
-        ended = self.simulation.results[self.world]
-        if ended is not None and not self.simulation.running[self.world]:
+        ended = self.simulation.state.results[self.world]
+        if ended is not None and not self.simulation.state.running[self.world]:
             return ended
         try:
-            return world_result(self.simulation, self.world, "", is_hashed=False)
+            return world_result(self.simulation.state, self.world, "", is_hashed=False)
         except PluginError as error:
             self._player.note(str(error))
             return None

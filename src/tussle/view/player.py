@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tussle.messages import Batch
+from tussle.engine.simulation import Simulation
+from tussle.messages import Batch, Message
 from tussle.record import Happenings
 from tussle.view.frame import Happening, frame_of
 from tussle.view.timeline import History, Timeline
 
 if TYPE_CHECKING:
-    from tussle.engine.simulation import Simulation
-    from tussle.messages import Message
     from tussle.record import Recorder
 
 MOST_HAPPENINGS = 100_000
@@ -83,7 +82,7 @@ class Player:
         self.simulation.events.forget(self._hear)
 
     def _read_step(self) -> int:
-        return int(self.simulation.context.clock.step[self.world])
+        return int(self.simulation.state.context.clock.step[self.world])
 
     @property
     def last_step(self) -> int:
@@ -93,7 +92,7 @@ class Player:
     @property
     def is_over(self) -> bool:
         """The world has ended, or broken."""
-        return self.is_broken or not self.simulation.running[self.world]
+        return self.is_broken or not self.simulation.state.running[self.world]
 
     # -- forwards ---------------------------------------------------------------------------------------------------------------
 
@@ -102,7 +101,7 @@ class Player:
         if self.is_over:
             return
         sim, step = self.simulation, self.step
-        sim.is_replaying = step < self._told
+        sim.events.is_replaying = step < self._told
         self._told = max(self._told, step + 1)
         try:
             for said in self.injections and [said for said in self.injections if said.step == step]:
@@ -112,7 +111,7 @@ class Player:
             self.is_broken = True
             raise
         finally:
-            sim.is_replaying = False
+            sim.events.is_replaying = False
         self.step = self._read_step()
         self._remember()
 
@@ -224,14 +223,14 @@ class Player:
 
     def _tell_of_those_who_are_there(self) -> None:
         frame = frame_of(self.simulation, self.world)
-        names = self.simulation.context.block_names
+        names = self.simulation.state.context.block_names
         self.happenings += [
             Happening(frame.t, "birth", int(who), 0, names[block])
             for who, block in zip(frame.id, frame.block, strict=True)
         ]
 
     def _hear(self, told: Happenings) -> None:
-        clock = self.simulation.context.clock
+        clock = self.simulation.state.context.clock
         for i in range(len(told)):
             if told.world[i] != self.world:
                 continue
@@ -242,6 +241,6 @@ class Player:
             self.happenings.append(Happening(t, told.kind, int(told.id[i]), int(told.other[i]), told.text[i]))
 
     def _forget_happenings(self, step: int) -> None:
-        clock = self.simulation.context.clock
+        clock = self.simulation.state.context.clock
         limit = clock.start + (step - 0.5) * clock.dt
         self.happenings[:] = [h for h in self.happenings if h.t < limit]

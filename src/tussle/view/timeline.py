@@ -5,22 +5,21 @@ from __future__ import annotations
 import math
 import time
 from bisect import bisect_right
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from tussle.api.bodies import FLOATS, OFFSETS
 from tussle.comms.topic import Parcel
-from tussle.engine.access import Parked, Snapshot
+from tussle.engine.simulation import Simulation
+from tussle.engine.snapshot import Snapshot
+from tussle.engine.state import Parked
 from tussle.engine.table import Stored
 from tussle.errors import SnapshotError
 from tussle.lists import RaggedColumn
 from tussle.messages import Batch
 from tussle.view.frame import Frame, Lens
 from tussle.view.pacing import Allowance
-
-if TYPE_CHECKING:
-    from tussle.engine.simulation import Simulation
 
 SNAPSHOT_SHARE = 0.01
 """Share of the CPU time that goes into snapshots. To replay from one to the next then takes some 100 times as long as to take one."""
@@ -130,7 +129,7 @@ class History:
     """
 
     def __init__(self, simulation: Simulation, world: int, limit: float) -> None:
-        self._clock = simulation.context.clock
+        self._clock = simulation.state.context.clock
         self._lens = Lens(simulation, world)
         self._limit = limit
         self._allowance = Allowance(HISTORY_SHARE)

@@ -31,7 +31,7 @@ def alone(name: str, seed: int) -> list[str]:
     """Hash of a world that plays alone, after 0, 1, 2 ... steps; one more where nothing happens any more."""
     sim = Simulation(short(name), seeds=seed)
     hashes = [sim.state_hash()]
-    while sim.running.any():
+    while sim.state.running.any():
         sim.step()
         hashes.append(sim.state_hash())
     return hashes
@@ -164,7 +164,7 @@ def test_threads_in_a_large_world_change_nothing():
         prey = dataclasses.replace(game.blocks[0], count=1500, half_width=(900.0, 900.0, 60.0))
         with Simulation(game.replace(blocks=[prey, *blocks]), seeds=1, threads=threads) as sim:
             sim.step(4)
-            assert (sim.context._pool is not None) == (threads > 1)
+            assert (sim.state.context._pool is not None) == (threads > 1)
             hashes.append(sim.state_hash())
     assert len(set(hashes)) == 1
 

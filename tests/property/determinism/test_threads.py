@@ -32,7 +32,7 @@ def played(threads, autonomy, motion):
     crowd = Block(name="crowd", count=N, variance=(1e7, 1e7, 1e3), autonomy=autonomy, motion=motion)
     with Simulation(Mission(blocks=[crowd], end=10.0, motion_multiplier=2), threads=threads) as sim:
         sim.step(3)
-        return sim.state_hash(0), sim.context._pool is not None
+        return sim.state_hash(0), sim.state.context._pool is not None
 
 
 def test_motion_models_are_split_over_threads():

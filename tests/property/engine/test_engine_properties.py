@@ -97,8 +97,8 @@ def test_rows_stay_ordered_and_ids_are_used_once_whoever_comes_and_goes(salt, n_
     ever: dict[int, set[int]] = {w: set() for w in range(n_worlds)}
 
     def look(s):
-        bodies = s.population.bodies
-        for group in s.population.groups:
+        bodies = s.state.population.bodies
+        for group in s.state.population.groups:
             rows = slice(group.first, group.last)
             key = bodies.world[rows] * 10**6 + bodies.id[rows]
             assert (np.diff(key) > 0).all()

@@ -46,7 +46,7 @@ def played_alone(number: int, seed: int) -> Alone:
     """
     with Simulation(mission(number), seeds=seed, on_error="record") as sim:
         hashes = [sim.state_hash()]
-        while sim.running.any():
+        while sim.state.running.any():
             sim.step()
             hashes.append(sim.state_hash())
         error = sim.result()[0].error

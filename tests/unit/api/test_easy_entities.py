@@ -325,7 +325,7 @@ def test_drawings_belong_to_the_entitys_world():
         me.draw.vectors(pos=me.pos, direction=me.forward)
 
     sim = Simulation(mission(block(count=2, autonomy=[Drift(), does(draw)()])), seeds=[1, 2])
-    sim.context.draw.sinks.append(lambda kind, attributes: drawn.append((kind, attributes["world"])))
+    sim.state.context.draw.sinks.append(lambda kind, attributes: drawn.append((kind, attributes["world"])))
     sim.step()
     assert drawn == [("vectors", 0)] * 2 + [("vectors", 1)] * 2
 

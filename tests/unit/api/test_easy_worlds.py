@@ -92,7 +92,7 @@ def test_memory_is_per_world_team_and_entity():
     sim = played(referee(count, **columns)(), seeds=[1, 2], steps=3)
     assert sim.read("Judge.calls")[0].tolist() == [3, 3]
     assert sim.read("Judge.centre")[0][0] == pytest.approx([5.3, 0.0, 0.0])
-    plugin = sim.interactions[0].plugin
+    plugin = sim.state.interactions[0].plugin
     assert plugin.seen.tolist() == [[9, 9], [21, 21]]
     assert plugin.age == pytest.approx(np.full(8, 0.3))
 
@@ -236,7 +236,7 @@ def test_drawings_belong_to_their_world():
 
     game = mission(block(), interactions=[referee(draw)()])
     sim = Simulation(game, seeds=[1, 2])
-    sim.context.draw.sinks.append(lambda kind, attributes: drawn.append((kind, attributes["world"])))
+    sim.state.context.draw.sinks.append(lambda kind, attributes: drawn.append((kind, attributes["world"])))
     sim.step()
     assert drawn == [("sphere", 0), ("sphere", 1)]
 

@@ -72,8 +72,8 @@ def test_the_number_alive_is_kept_from_start_to_end(alone):
     for number, (_, t_end, *_, alive) in alone.items():
         counts = {}
         with Simulation(game(), number + 1) as simulation:
-            while simulation.n_running:
-                bodies = simulation.population.bodies
+            while simulation.state.n_running:
+                bodies = simulation.state.population.bodies
                 for team in (1, 2):
                     counts.setdefault(team, []).append(
                         (float(simulation.t[0]), int((bodies.team == team).sum()))

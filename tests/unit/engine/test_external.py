@@ -401,7 +401,7 @@ class Pen(Autonomy):
 def test_what_open_one_is_told():
     sim = Simulation(game(SingleIntegrator(), autonomy=Pen()), seeds=[11, 12])
     sim.step()
-    papers = sim.population.groups[0].autonomies[0].handles["paper"]
+    papers = sim.state.population.groups[0].autonomies[0].handles["paper"]
     first = papers[2]
     assert (first["id"], first["world"], first["seed"], first["team"], first["dt"]) == (1, 1, 12, 0, 0.1)
     assert first["pos"] == [1.0, 2.0, 3.0]

@@ -142,5 +142,5 @@ def test_groups_of_a_sequential_mission_are_not_sorted_anew_for_each_entity(monk
 
     monkeypatch.setattr(population, "Group", Watched)
     sim = Simulation(mission(block(count=200), update="sequential"))
-    assert [g.__dict__["place"] for g in sim.population.groups] == list(range(1, 201))
+    assert [g.__dict__["place"] for g in sim.state.population.groups] == list(range(1, 201))
     assert len(looked_at) < 200 * 12  # n log n comparisons, and a look for each label

@@ -299,7 +299,7 @@ def test_a_list_counts_in_the_hash():
         sim = Simulation(game)
         sim.step(4)
         if change is not None:
-            binding = next(b for b in sim.population.groups[0].walk() if b.path == ("Count",))
+            binding = next(b for b in sim.state.population.groups[0].walk() if b.path == ("Count",))
             binding.plugin.marks[0] = [change]
         hashed.append(sim.state_hash())
     assert len(set(hashed)) == 3

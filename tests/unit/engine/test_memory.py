@@ -65,7 +65,7 @@ def test_radii_that_change_at_each_reset_keep_no_index_each():
     for k in range(3 * MOST_INDEXES):
         sim.reset([k % 4], [k], {"boids.Boids.comms_range": 50.0 + k})
         sim.step()
-    kept = sim.population.bodies._indexes
+    kept = sim.state.population.bodies._indexes
     assert 0 < len(kept) <= MOST_INDEXES
 
 
@@ -78,7 +78,7 @@ def test_radii_that_change_at_each_step_keep_no_index_each():
         )
     )
     sim.step(3 * MOST_INDEXES)
-    bodies = sim.population.bodies
+    bodies = sim.state.population.bodies
     assert 0 < len(bodies._indexes) <= MOST_INDEXES
     assert len(bodies._laid_out) <= MOST_INDEXES
 
@@ -86,9 +86,9 @@ def test_radii_that_change_at_each_step_keep_no_index_each():
 def test_a_reset_in_place_leaves_the_ids_that_others_hold_as_they_were():
     block = Block(name="boids", team=1, count=5, autonomy=[Boids()], motion=Unicycle())
     sim = Simulation(Mission(blocks=[block], end=100.0, dt=0.1), seeds=range(3))
-    held = sim.population.bodies.ints
+    held = sim.state.population.bodies.ints
     before = held.copy()
     sim.step(2)
     sim.reset([1], [7])
-    assert sim.population.bodies.ints is not held
+    assert sim.state.population.bodies.ints is not held
     assert (held == before).all()

@@ -134,9 +134,9 @@ def test_steps_that_are_replayed_are_recorded_once(tmp_path):
         start = sim.snapshot()
         sim.step(60)
         sim.restore(start)
-        sim.is_replaying = True
+        sim.events.is_replaying = True
         sim.step(60)
-        sim.is_replaying = False
+        sim.events.is_replaying = False
         sim.run()
     one, two = load_run(tmp_path / "plain"), load_run(tmp_path / "back")
     assert one.trajectory_table == two.trajectory_table

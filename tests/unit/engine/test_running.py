@@ -294,7 +294,7 @@ def test_the_last_to_end_stay_as_they_are_when_another_begins_anew():
 def test_reset_gives_seeds_and_params_in_the_order_of_the_worlds():
     sim = Simulation(mission(), seeds=[1, 2, 3])
     sim.reset([2, 0], seeds=[30, 10], params={"a.Drift.to": [(3.0, 0, 0), (1.5, 0, 0)]})
-    assert sim.context.seeds.tolist() == [10, 2, 30]
+    assert sim.state.context.seeds.tolist() == [10, 2, 30]
     sim.step()
     assert sim.read("a.pos")[0][:, 0, 0].tolist() == pytest.approx([0.15, 0.1, 0.3])
     sim.reset(w for w in (0, 1))
@@ -318,7 +318,7 @@ def test_resets_that_cannot_be(arguments, message):
     sim.step()
     with pytest.raises(ParameterError, match=message):
         sim.reset(*arguments)
-    assert sim.context.seeds.tolist() == [1, 2]
+    assert sim.state.context.seeds.tolist() == [1, 2]
     assert sim.steps.tolist() == [1, 1]
 
 
@@ -343,7 +343,7 @@ def test_a_snapshot_fits_another_simulation_of_the_mission():
     saved = sim.snapshot()
     other = Simulation(rich(), seeds=[7, 8])
     other.restore(saved)
-    assert other.context.seeds.tolist() == [1, 2]
+    assert other.state.context.seeds.tolist() == [1, 2]
     assert [r.state_hash for r in other.run()] == hashes(rich(), [1, 2])
 
 
@@ -358,7 +358,7 @@ def test_a_snapshot_keeps_worlds_that_have_ended_and_clocks_that_differ():
     saved = sim.snapshot()
     first = [(r.end, r.steps, r.state_hash) for r in sim.run()]
     sim.restore(saved)
-    assert sim.running.tolist() == [False, True, True]
+    assert sim.state.running.tolist() == [False, True, True]
     assert [(r.end, r.steps, r.state_hash) for r in sim.run()] == first
 
 
@@ -576,7 +576,7 @@ def test_structural_params_split_groups_and_each_world_is_as_alone():
     sim = Simulation(
         game, seeds=[1, 2, 3], params={"a.Unicycle.enable_roll": roll, "a.Unicycle.vel_max": [1.0, 2.0, 3.0]}
     )
-    assert len([g for g in sim.population.groups if g.n]) == 2
+    assert len([g for g in sim.state.population.groups if g.n]) == 2
     sim.run()
     assert sim.read("a.pos")[1].all()
     for k in range(3):

@@ -123,7 +123,7 @@ def test_a_velocity_goes_before_a_speed(files):
 
 def test_the_initial_speed_points_along_the_heading(files):
     sim = Simulation(files.world(inside="<speed>10</speed><heading>90</heading>").mission)
-    assert sim.world_view.vel[:, 0] == pytest.approx([0.0, 10.0, 0.0])
+    assert sim.state.world_view.vel[:, 0] == pytest.approx([0.0, 10.0, 0.0])
 
 
 def test_uniform_placement(files):

@@ -37,7 +37,7 @@ def test_every_state_is_recorded_to_the_last_bit(tmp_path):
     seen = []
 
     def look(sim):
-        b = sim.population.bodies
+        b = sim.state.population.bodies
         order = np.lexsort((b.id, b.world))
         floats = np.concatenate([b.pos, b.quat, b.vel, b.health[None]])[:, order]
         seen.append(

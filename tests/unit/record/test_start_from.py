@@ -87,14 +87,14 @@ def test_without_blocks_entities_fill_those_of_their_team_in_order_of_ids():
     pos = np.arange(15.0).reshape(3, 5)
     table = FirstStates(np.zeros(5), ids, pos, quat, np.zeros((3, 5)), team)
     sim = Simulation(flock((1, 2), (2, 3), (1, 3)), start_from=table)
-    bodies = sim.population.bodies
+    bodies = sim.state.population.bodies
     found = {int(i): (int(b), list(p)) for i, b, p in zip(bodies.id, bodies.block, bodies.pos.T, strict=True)}
     block = {4: 0, 5: 0, 2: 1, 7: 2, 9: 2}
     assert found == {int(i): (block[int(i)], list(pos[:, k])) for k, i in enumerate(ids)}
     # who is born later has an id of its own
-    sim.world_view.spawn("block1", [0], pos=[0.0, 0.0, 500.0])
+    sim.state.world_view.spawn("block1", [0], pos=[0.0, 0.0, 500.0])
     sim.step()
-    assert sorted(sim.population.bodies.id) == [2, 4, 5, 7, 9, 10]
+    assert sorted(sim.state.population.bodies.id) == [2, 4, 5, 7, 9, 10]
 
 
 def test_a_world_begun_anew_and_a_snapshot_start_from_the_table_too(run):

@@ -206,7 +206,7 @@ def test_waypoints_on_top_of_the_one_before_are_dropped():
     points = [point(500.0), point(500.5), point(501.2), point(501.9), point(900.0)]
 
     def kept(**values):
-        groups = flight(points, (0.0, 0.0, 0.0), **values).population.groups
+        groups = flight(points, (0.0, 0.0, 0.0), **values).state.population.groups
         binding = next(b for g in groups for b in g.walk() if b.path == ("WaypointDispatcher",))
         return binding.plugin.points[0][0].tolist()
 

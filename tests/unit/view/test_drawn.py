@@ -48,7 +48,7 @@ def test_shapes_are_copies():
     sim.step(5)
     np.testing.assert_array_equal(arrows.attributes["pos"], before)
     book.close()
-    assert sim.context.draw.sinks == []
+    assert sim.state.context.draw.sinks == []
     book.close()
 
 
@@ -65,7 +65,7 @@ def test_only_what_is_of_the_world_is_seen():
         )
         assert "world" not in arrows.attributes
         assert text.kind == "text"  # said of no world: seen in all
-    draw = sim.context.draw
+    draw = sim.state.context.draw
     for book in books:
         book.turn_page()
         book.clear()
@@ -78,7 +78,7 @@ def test_a_lifetime_that_is_none_stops_no_game():
     sim = Simulation(clickable())
     book = Sketchbook(sim, 0)
     book.open()
-    sim.context.draw.text(pos=np.zeros(3), text="?", lifetime="long")
+    sim.state.context.draw.text(pos=np.zeros(3), text="?", lifetime="long")
     assert len(book.shapes()) == 1
     book.turn_page()
     assert book.shapes() == ()

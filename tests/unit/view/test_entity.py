@@ -19,7 +19,7 @@ def test_body_and_plugins_are_what_reading_by_path_gives(name):
     sim = Simulation(mission(name), seeds=[4, 5])
     sim.step(17)
     n_columns = 0
-    for block in sim.context.block_names:
+    for block in sim.state.context.block_names:
         ids, alive = sim.read(f"{block}.id")
         for place in np.flatnonzero(alive[1])[:3]:
             state = entity_state(sim, 1, int(ids[1, place]))
@@ -78,17 +78,17 @@ def test_who_is_not_there():
     assert entity_state(sim, 0, 99) is None
     assert entity_state(sim, 0, 0) is None
     sim.run()
-    gone = next(i for i in range(1, 16) if i not in sim.population.bodies.id)
+    gone = next(i for i in range(1, 16) if i not in sim.state.population.bodies.id)
     assert entity_state(sim, 0, gone) is None
 
 
 def test_of_a_world_that_has_ended_the_last_state_is_told():
     sim = Simulation(hunt(n_prey=3, end=30.0), seeds=[1, 3])
     before = {}
-    while sim.running[1]:
+    while sim.state.running[1]:
         before = {w: entity_state(sim, w, 5) for w in range(2)}
         sim.step()
-    assert sim.running[0]
+    assert sim.state.running[0]
     state = entity_state(sim, 1, 5)
     assert state.step == sim.steps[1] == before[1].step + 1
     assert set(state.plugins) == set(before[1].plugins)
@@ -107,14 +107,17 @@ def test_messages_that_were_heard_and_said():
         for who in range(1, 11):
             state = entity_state(sim, 1, who)
             expected = []
-            for group in sim.population.groups:
+            for group in sim.state.population.groups:
                 for binding in group.walk():
                     for value in binding.plugin.__dict__.values():
                         if hasattr(value, "pairs"):
                             rows, batch = value.pairs()
                             for row, i in zip(rows, range(batch.n), strict=True):
                                 at = group.first + row
-                                if (sim.population.bodies.world[at], sim.population.bodies.id[at]) == (
+                                if (
+                                    sim.state.population.bodies.world[at],
+                                    sim.state.population.bodies.id[at],
+                                ) == (
                                     1,
                                     who,
                                 ):

@@ -13,7 +13,7 @@ from tussle.view.frame import Lens
 def columns_of(sim, world):
     """What a frame is to hold, by another way: each block's columns by path."""
     found = {}
-    for number, name in enumerate(sim.context.block_names):
+    for number, name in enumerate(sim.state.context.block_names):
         ids, alive = sim.read(f"{name}.id")
         for place in np.flatnonzero(alive[world]):
             found[int(ids[world, place])] = (

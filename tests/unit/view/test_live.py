@@ -83,7 +83,7 @@ def test_nothing_is_made_while_nobody_asks():
         wait_for(lambda: live.step_number > 200)
         assert live._frame.n_made == 1  # the first
         assert live._result.n_made == live._shapes.n_made == 0
-        assert live.simulation.context.draw.sinks == []
+        assert live.simulation.state.context.draw.sinks == []
         live.frame()
         wait_for(lambda: live._frame.n_made >= 2)
 
@@ -316,7 +316,7 @@ def test_stopping_leaves_the_game_to_its_owner():
     assert not live._thread.is_alive()
     assert len(sim.schedule) == calls
     assert not sim.events
-    assert sim.context.draw.sinks == []
+    assert sim.state.context.draw.sinks == []
     sim.run()
     alone.run()
     assert sim.state_hash() == alone.state_hash()

@@ -178,7 +178,7 @@ def test_all_kinds_reach_a_browser():
         PageClient(page.url) as client,
     ):
         client.wait(page.visitors)
-        draw = simulation.context.draw
+        draw = simulation.state.context.draw
         client.wait(lambda: draw.sinks)
         for kind, given in EXAMPLES.items():
             getattr(draw, kind)(**given, lifetime=100.0)

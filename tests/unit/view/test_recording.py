@@ -26,7 +26,7 @@ def played(tmp_path_factory):
     frames = [[], [], []]
 
     def look(sim):
-        for world in np.flatnonzero(sim.running):
+        for world in np.flatnonzero(sim.state.running):
             frames[world].append(frame_of(sim, int(world)))
 
     with Recorder(sim, directory):

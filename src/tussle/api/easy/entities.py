@@ -9,11 +9,11 @@ from tussle.api.easy.looks import DrawIn, Look
 from tussle.api.easy.values import BODY, NUMBERS, VECTORS, Columns, Heard, Write, plain, write_number
 from tussle.columns import Publish
 from tussle.errors import ParameterError, listed, nearest_name
+from tussle.scene import Scene
 
 if TYPE_CHECKING:
     import numpy as np
 
-    from tussle.scene import Scene
 
 ROLES = {
     "autonomy": "an autonomy decides",

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from tussle.api.easy.search import Search
 from tussle.api.easy.values import Cells, Columns
+from tussle.api.group import GroupView
 from tussle.errors import ParameterError
-
-if TYPE_CHECKING:
-    from tussle.api.group import GroupView
 
 
 class Draws:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -11,14 +11,12 @@ from tussle.api.easy.entities import Me
 from tussle.api.easy.looks import Look
 from tussle.api.easy.values import make_type
 from tussle.api.easy.worlds import WorldLook, make_world_types
+from tussle.api.group import GroupView
 from tussle.api.kinds import Autonomy, Controller, EntityPlugin, Interaction, Metric, Sensor, WorldPlugin
 from tussle.api.plugin import Plugin
+from tussle.api.world import WorldView
 from tussle.columns import Param
 from tussle.errors import ParameterError, listed, nearest_name
-
-if TYPE_CHECKING:
-    from tussle.api.group import GroupView
-    from tussle.api.world import WorldView
 
 
 class EasyPlugin(Plugin):

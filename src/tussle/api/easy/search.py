@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from tussle.api.group import GroupView
 from tussle.errors import ParameterError
 from tussle.neighbors import queries
-
-if TYPE_CHECKING:
-    from tussle.api.group import GroupView
 
 Found = list[tuple[int, int]]
 """Id and body row of each."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, MutableMapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -21,9 +21,7 @@ from tussle.columns import (
     Subscribe,
 )
 from tussle.errors import DeclarationError, ParameterError
-
-if TYPE_CHECKING:
-    from tussle.messages import Batch
+from tussle.messages import Batch
 
 VECTORS = {
     "pos": "Position [m], (3,), world frame.",

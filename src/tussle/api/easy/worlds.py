@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -11,13 +11,11 @@ from tussle.api.easy.entities import Entity, Other, Seeing, offered, square_betw
 from tussle.api.easy.looks import DrawIn, Draws
 from tussle.api.easy.search import Search
 from tussle.api.easy.values import BODY, Cells, Columns, Heard, Write, make_type, plain
+from tussle.api.world import WorldView
 from tussle.columns import Column, State
 from tussle.errors import ParameterError, listed, nearest_name
-
-if TYPE_CHECKING:
-    from tussle.api.world import WorldView
-    from tussle.messages import Message
-    from tussle.scene import Scene
+from tussle.messages import Message
+from tussle.scene import Scene
 
 WRITABLE = ("health", "force", "torque")
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tussle.batch.batch import Batch
-from tussle.batch.executors import InProcess
+from tussle.batch.executors import Executor, InProcess
 from tussle.batch.quantities import Quantity
 from tussle.batch.search.searched_mission import Point, SearchedMission
 from tussle.batch.search.trials import Trial, key_of_values
@@ -18,7 +18,6 @@ from tussle.batch.statistics import Mean, means_of
 from tussle.errors import ParameterError, TussleError
 
 if TYPE_CHECKING:
-    from tussle.batch.executors import Executor
     from tussle.batch.progress import Progress
     from tussle.batch.results import Results
 

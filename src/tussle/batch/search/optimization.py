@@ -11,13 +11,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tussle.batch.executors import Executor
 from tussle.batch.quantities import Quantity
 from tussle.batch.search.evaluation import Crew, Evaluator
 from tussle.batch.search.proposals import Proposer
 from tussle.batch.search.searched_mission import SearchedMission
 from tussle.batch.search.study import Study, best_of
 from tussle.batch.search.study_store import StudyStore, notes_on_versions, read_trials, versions_of_samplers
-from tussle.batch.search.trials import MOST_TRIALS, column_type
+from tussle.batch.search.trials import MOST_TRIALS, Trial, column_type
 from tussle.batch.variables import Variable
 from tussle.batch.varied import about, as_variables
 from tussle.errors import ParameterError
@@ -25,9 +26,7 @@ from tussle.mission import Mission
 from tussle.record.run_file import versions
 
 if TYPE_CHECKING:
-    from tussle.batch.executors import Executor
     from tussle.batch.progress import Progress
-    from tussle.batch.search.trials import Trial
 
 
 @dataclass

@@ -7,13 +7,12 @@ import threading
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from tussle.view.frame import Frame
-    from tussle.view.scenery import Scenery
+from tussle.view.frame import Frame
+from tussle.view.scenery import Scenery
 
 MODES = ("free", "follow", "behind")
 FIELD_OF_VIEW = math.radians(50.0)

@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from tussle.view.frame import Frame, Happening
-    from tussle.view.page.failures import Safe
-    from tussle.view.page.source import Source
+from tussle.view.frame import Frame, Happening
+from tussle.view.page.failures import Safe
+from tussle.view.page.source import Source
 
 MARKED = ("capture", "collision", "death", "birth", "difference", "end")
 """Kinds of events on the time line; those before count for more where not all have room."""

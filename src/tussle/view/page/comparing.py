@@ -10,12 +10,12 @@ import numpy as np
 from tussle.errors import ViewError
 from tussle.view.entity import EntityState
 from tussle.view.frame import Frame, Happening
+from tussle.view.looks import Colour, Looks
 from tussle.view.page.colours import BACKGROUND, mixed
 from tussle.view.page.replaying import PlayHead, Replay, recorded_state
 from tussle.view.scenery import Scenery
 
 if TYPE_CHECKING:
-    from tussle.view.looks import Colour, Looks
     from tussle.view.recording import Recording
 
 PALE = 0.55

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-if TYPE_CHECKING:
-    from tussle.mission import Mission
-    from tussle.view.frame import Frame
-    from tussle.view.looks import Looks
-    from tussle.view.scenery import Scenery
+from tussle.mission import Mission
+from tussle.view.frame import Frame
+from tussle.view.looks import Looks
+from tussle.view.scenery import Scenery
 
 FEW = 30
 """As many entities are named from the beginning."""

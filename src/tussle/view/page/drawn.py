@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from tussle.view.drawn import Shape
 from tussle.view.page.reading import Drawing, read_drawing
 from tussle.view.shapes import Mesh, ball, box
-
-if TYPE_CHECKING:
-    from tussle.view.drawn import Shape
 
 MOST_TEXTS = 100
 MOST_MESHES = 50

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from tussle.view.looks import Looks
 from tussle.view.page.colours import BACKGROUND, GRID_LINE, GRID_SECTION, REGION, TERRAIN, WALL
+from tussle.view.scenery import Base, Region, Scenery
 from tussle.view.shapes import ball
-
-if TYPE_CHECKING:
-    from tussle.view.looks import Looks
-    from tussle.view.scenery import Base, Region, Scenery
 
 ROOM = 1.6
 """How much wider the grid is than what is shown."""

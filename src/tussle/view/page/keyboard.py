@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from tussle.view.live import Live
+from tussle.view.page.failures import Safe
 from tussle.view.page.keys import help_table, keys_of
-from tussle.view.page.panel import CUSTOM_KEY
-
-if TYPE_CHECKING:
-    from tussle.view.page.failures import Safe
-    from tussle.view.page.panel import Panel
-    from tussle.view.page.source import Source
-    from tussle.view.page.visitor import Visitor
+from tussle.view.page.panel import CUSTOM_KEY, Panel
+from tussle.view.page.source import Source
+from tussle.view.page.visitor import Visitor
 
 LARGER = 1.25
 LEAST, MOST = 0.1, 10.0

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from tussle.view.frame import Frame
-    from tussle.view.page.display import Display
+from tussle.view.frame import Frame
+from tussle.view.page.display import Display
 
 MOST_LABELS = 60
 """Each label is a message of its own in each frame, and more than these hide what they name."""

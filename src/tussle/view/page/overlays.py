@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
 
+from tussle.view.frame import Frame
+from tussle.view.looks import Looks
 from tussle.view.page.colours import LINK
+from tussle.view.page.display import Display
 from tussle.view.shapes import Mesh
-
-if TYPE_CHECKING:
-    from tussle.view.frame import Frame
-    from tussle.view.looks import Looks
-    from tussle.view.page.display import Display
 
 MOST_LINKS = 5_000
 """Lines between entities; of more, the shortest are drawn."""

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from tussle.view.frame import Frame
 from tussle.view.live import Live
 from tussle.view.page import words
 from tussle.view.page.clock import TimePanel
+from tussle.view.page.display import Display
+from tussle.view.page.failures import Safe
 from tussle.view.page.keys import help_table
-
-if TYPE_CHECKING:
-    from tussle.view.frame import Frame
-    from tussle.view.page.display import Display
-    from tussle.view.page.failures import Safe
-    from tussle.view.page.source import Source
-    from tussle.view.page.visitor import Visitor
+from tussle.view.page.source import Source
+from tussle.view.page.visitor import Visitor
 
 NUMBERS_ORDER, SHOW_ORDER, REACH_ORDER, GAME_ORDER, KEYS_ORDER = 0.0, 20.0, 21.0, 30.0, 40.0
 LARGEST_SEED = 2**31 - 1

@@ -7,20 +7,19 @@ import time
 from collections import deque
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from tussle.view.frame import Frame
-    from tussle.view.page.display import Display
-    from tussle.view.page.drawn import Drawn
-    from tussle.view.page.failures import Failures
-    from tussle.view.page.labels import Labels
-    from tussle.view.page.overlays import Overlays
-    from tussle.view.page.panel import Panel
-    from tussle.view.page.source import Source
-    from tussle.view.page.stage import Stage
-    from tussle.view.page.trails import Trails
-    from tussle.view.page.visitor import Visitor
+from tussle.view.frame import Frame
+from tussle.view.page.display import Display
+from tussle.view.page.drawn import Drawn
+from tussle.view.page.failures import Failures
+from tussle.view.page.labels import Labels
+from tussle.view.page.overlays import Overlays
+from tussle.view.page.panel import Panel
+from tussle.view.page.source import Source
+from tussle.view.page.stage import Stage
+from tussle.view.page.trails import Trails
+from tussle.view.page.visitor import Visitor
 
 PERIOD = 1.0 / 30.0
 """Least time between two frames [s]."""

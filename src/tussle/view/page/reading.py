@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from tussle.errors import ViewError, listed, nearest_name
+from tussle.view.drawn import Shape
 from tussle.view.page.colours import DRAWN
-
-if TYPE_CHECKING:
-    from tussle.view.drawn import Shape
 
 COMMON = ("colour", "color", "opacity", "lifetime")
 ATTRIBUTES: Mapping[str, tuple[str, ...]] = {

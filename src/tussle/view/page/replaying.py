@@ -11,17 +11,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tussle.api.bodies import BODY_UNITS
+from tussle.engine.result import WorldResult
+from tussle.mission import Mission
+from tussle.view.drawn import Shape
 from tussle.view.entity import EntityState, Reading
+from tussle.view.frame import Frame, Happening
+from tussle.view.looks import Looks
 from tussle.view.pacing import checked_warp, faster, slower
+from tussle.view.scenery import Scenery
 
 if TYPE_CHECKING:
-    from tussle.engine.result import WorldResult
-    from tussle.mission import Mission
-    from tussle.view.drawn import Shape
-    from tussle.view.frame import Frame, Happening
-    from tussle.view.looks import Looks
     from tussle.view.recording import Recording
-    from tussle.view.scenery import Scenery
 
 FASTEST = 1000.0
 """What "as fast as possible" is of a recorded run, in simulated seconds per second: there is nothing to compute."""

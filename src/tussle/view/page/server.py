@@ -6,9 +6,11 @@ import contextlib
 import ipaddress
 import threading
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 from tussle.errors import MissingExtraError, ViewError
+from tussle.mission import Mission
+from tussle.view.frame import Frame
 from tussle.view.live import Live
 from tussle.view.page.access import Access
 from tussle.view.page.camera import FIELD_OF_VIEW, opening
@@ -23,14 +25,10 @@ from tussle.view.page.labels import Labels
 from tussle.view.page.overlays import Overlays
 from tussle.view.page.panel import Panel
 from tussle.view.page.pusher import Parts, Pusher
+from tussle.view.page.source import Source
 from tussle.view.page.stage import Stage
 from tussle.view.page.trails import Trails
 from tussle.view.page.visitor import Visitor
-
-if TYPE_CHECKING:
-    from tussle.mission import Mission
-    from tussle.view.frame import Frame
-    from tussle.view.page.source import Source
 
 LOOPBACK = "127.0.0.1"
 MOST_PERIOD = 60.0

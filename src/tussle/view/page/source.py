@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
-if TYPE_CHECKING:
-    from tussle.engine.result import WorldResult
-    from tussle.view.drawn import Shape
-    from tussle.view.entity import EntityState
-    from tussle.view.frame import Frame, Happening
-    from tussle.view.looks import Looks
-    from tussle.view.scenery import Scenery
+from tussle.engine.result import WorldResult
+from tussle.view.drawn import Shape
+from tussle.view.entity import EntityState
+from tussle.view.frame import Frame, Happening
+from tussle.view.looks import Looks
+from tussle.view.scenery import Scenery
 
 
 class Source(Protocol):

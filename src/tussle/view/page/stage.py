@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from tussle.view.frame import Frame
+from tussle.view.looks import Looks
+from tussle.view.page.display import Display
+from tussle.view.page.failures import Safe
 from tussle.view.shapes import MODELS
-
-if TYPE_CHECKING:
-    from tussle.view.frame import Frame
-    from tussle.view.looks import Looks
-    from tussle.view.page.display import Display
-    from tussle.view.page.failures import Safe
 
 Clicked = Callable[[int, int], None]
 """Called with the number of a client and the id of the entity that it has clicked."""

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from tussle.view.frame import Frame
+from tussle.view.looks import Looks
 from tussle.view.page.colours import BACKGROUND
-
-if TYPE_CHECKING:
-    from tussle.view.frame import Frame
-    from tussle.view.looks import Looks
-    from tussle.view.page.display import Display
-    from tussle.view.page.source import Source
+from tussle.view.page.display import Display
+from tussle.view.page.source import Source
 
 MOST_LINES = 20_000
 """Lines of all trails together: what a browser rebuilds four times a second without a pause."""

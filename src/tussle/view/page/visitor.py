@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from tussle.view.frame import Frame
 from tussle.view.live import Live
 from tussle.view.page import words
 from tussle.view.page.camera import FARTHEST, MODES, Camera
-
-if TYPE_CHECKING:
-    from tussle.view.frame import Frame
-    from tussle.view.page.display import Display
-    from tussle.view.page.failures import Safe
-    from tussle.view.page.source import Source
+from tussle.view.page.display import Display
+from tussle.view.page.failures import Safe
+from tussle.view.page.source import Source
 
 CAMERA_ORDER, ENTITY_ORDER = 10.0, 11.0
 """Places in the panel, between the clock and what is shown."""

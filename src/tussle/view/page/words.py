@@ -6,16 +6,15 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from tussle.engine.result import WorldResult
-    from tussle.view.entity import EntityState, Letter, Reading
-    from tussle.view.frame import Frame, Happening
-    from tussle.view.looks import Colour, Looks
-    from tussle.view.page.source import Source
+from tussle.engine.result import WorldResult
+from tussle.view.entity import EntityState, Letter, Reading
+from tussle.view.frame import Frame, Happening
+from tussle.view.looks import Colour, Looks
+from tussle.view.page.source import Source
 
 MOST_ITEMS = 6
 """Of a list, in a reading or a message."""

@@ -8,13 +8,13 @@ import numpy as np
 
 from tussle.batch.report.drawing import INK, MUTED, colour_of, rule_y
 from tussle.errors import ParameterError
+from tussle.view.plots.choice import Tracks
 from tussle.view.plots.sheet import Handle, add_head, line_look, line_sign, mark_sign, sheet, time_axis
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from tussle.view.plots.choice import Tracks
 
 MOST_MARKS = 80
 """Deaths of one team that are marked one by one."""

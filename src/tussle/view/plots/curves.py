@@ -12,12 +12,12 @@ from tussle.batch.report.drawing import PALETTE as COLOURS
 from tussle.errors import ParameterError
 from tussle.view.plots.choice import Choice, Tracks
 from tussle.view.plots.sheet import Handle, add_head, line_look, line_sign, mark_sign, sheet, time_axis
+from tussle.view.recording import Recording
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from tussle.view.recording import Recording
 
 MANY = 12
 """Entities of a team from which on its curve is a band: more lines cannot be followed."""

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tussle.batch.report.drawing import INK, MUTED, PAPER, WIDTH, colour_of, marker_of, mixed
+from tussle.view.plots.choice import Tracks
 from tussle.view.plots.sheet import Handle, add_head, line_sign, mark_sign, sheet
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from tussle.view.plots.choice import Tracks
 
 MOST_TRACKS = 2000
 """Ways drawn in one plot: more cannot be told apart, and each costs time and bytes."""

@@ -20,12 +20,12 @@ from tussle.batch.report.drawing import (
     shortened,
 )
 from tussle.errors import ParameterError, ViewError, listed, nearest_name
+from tussle.view.plots.choice import Tracks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from tussle.view.plots.choice import Tracks
 
 FORMATS = tuple(UNDATED)
 """Kinds of files that are written."""

@@ -1,0 +1,151 @@
+"""Who comes: all entities of worlds that begin anew, those that are due later, and those that plugins ask for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from tussle.api.bodies import Bodies
+from tussle.api.kinds import Interaction, WorldPlugin
+from tussle.api.world import WorldView
+from tussle.engine import failure
+from tussle.engine.births import Room, joined
+from tussle.engine.referees import Referee
+from tussle.engine.rows import repack, take_over_moves
+from tussle.engine.state import SimulationState
+from tussle.engine.step_end import take_out_dead
+from tussle.engine.subset import call_referee
+from tussle.errors import MissionError
+
+
+def reset(
+    state: SimulationState,
+    worlds: Sequence[int],
+    seeds: Sequence[int] | None,
+    params: Mapping[str, Any] | None,
+) -> None:
+    """See `Simulation.reset`, which has checked worlds and seeds."""
+    numbers, chosen = np.array(worlds, np.int64), np.array(sorted(worlds), np.int64)
+    mask = np.zeros(state.n_worlds, bool)
+    mask[chosen] = True
+    if params:
+        state.overrides.set(params, numbers)
+    if seeds is not None:
+        state.context.seeds[numbers] = [s % 2**64 for s in seeds]
+    clock, view = state.context.clock, state.world_view
+    clock.step[chosen] = 0
+    state.running[chosen], state.failed[chosen] = True, False
+    state.n_running = int(state.running.sum())
+    for world in chosen:
+        state.results[world] = None
+        state.parked.pop(int(world), None)
+    state.mail.drop_worlds(mask)
+    view.births = [
+        {k: v if k == "block" else v[..., ~mask[b["world"]]] for k, v in b.items()} for b in view.births
+    ]
+    for referee in state.referees:
+        referee.reset(chosen)
+        if state.overrides.columns:
+            referee.fill_params(state.overrides, chosen)
+    due = state.births.begin(chosen)
+    gone = mask | ~state.running  # worlds that ended last keep their rows as long as nobody runs
+    repack(state, gone[state.population.bodies.world], _create(state, due, at_start=True))
+    steps = np.unique(clock.step[state.running])
+    clock.common = int(steps[0]) if len(steps) == 1 else -1
+    _start_referees(state, mask)
+    take_out_dead(state)
+
+
+def _start_referees(state: SimulationState, mask: np.ndarray) -> None:
+    for referee in state.referees:
+        if type(referee.plugin).start is WorldPlugin.start:
+            continue
+        if mask.all():
+            _start(referee, referee.view)
+        else:
+            call_referee(state.population, referee, mask, _start)
+    take_over_moves(state, 0.0)
+
+
+def _start(referee: Referee, view: WorldView) -> None:
+    view.begin(referee.plugin)
+    try:
+        referee.plugin.start(view)
+    except Exception as error:
+        raise failure.in_call(error, referee.plugin, view) from error
+
+
+def _create(state: SimulationState, due: Mapping[int, np.ndarray], at_start: bool = False) -> Bodies | None:
+    """Entities where interactions do not reject them; None where nobody is due.
+
+    Args:
+        state: The state; its table stays as it is.
+        due: Block number -> world of each entity, (m,).
+        at_start: Their worlds begin.
+    """
+    rejecting = [r for r in state.interactions if type(r.plugin).rejects is not Interaction.rejects]
+    placed: dict[int, list[np.ndarray]] = {}
+
+    def standing(world: int) -> np.ndarray:
+        bodies = state.population.bodies
+        # At a reset, the rows of the last game are still there.
+        here = [] if at_start else [bodies.pos[:, bodies.world == world]]
+        return np.concatenate([np.zeros((3, 0)), *here, *placed.get(world, [])], axis=1)
+
+    def rejects(world: int, pos: np.ndarray, others: np.ndarray) -> bool:
+        return any(r.plugin.rejects(r.view, world, pos, others) for r in rejecting)
+
+    def fail(world: int, error: MissionError) -> None:
+        if at_start and state.n_worlds == 1:
+            raise error
+        state.record_failure(world, state.error(world, str(error)))
+
+    room = Room(rejects, standing, fail) if rejecting else None
+    state.world_view.begin()
+    parts = []
+    for block, worlds in due.items():
+        part = state.births.create(block, worlds, room=room)
+        parts.append(part)
+        if rejecting:
+            for world in np.unique(worlds):
+                placed.setdefault(int(world), []).append(part.pos[:, part.world == world])
+    return joined(parts) if parts else None
+
+
+def give_birth(state: SimulationState) -> None:
+    """Add the entities that are due or were asked for at the beginning of a step."""
+    parts, births = [], state.births
+    asked, state.world_view.births = state.world_view.births, []
+    if asked:
+        _check_space(state, np.concatenate([wish["world"] for wish in asked]))
+    is_open = state.running & ~state.failed
+    for wish in asked:
+        where = {k: v for k, v in wish.items() if k not in ("block", "world")}
+        worlds = wish["world"]
+        order = np.argsort(worlds, kind="stable")
+        kept = order[is_open[worlds[order]]]
+        if len(kept):
+            where = {k: v[..., kept] for k, v in where.items()}
+            block = state.context.block_names.index(wish["block"])
+            parts.append(births.create(block, worlds[kept], where))
+    due = births.due(state.context.clock.t, state.running) if births.has_rates else {}
+    born = _create(state, due) if due else None
+    parts += [born] if born is not None else []
+    if parts:
+        repack(state, None, joined(parts))
+        take_out_dead(state)  # what an entity holds outside the arrays could not be opened
+
+
+def _check_space(state: SimulationState, worlds: np.ndarray) -> None:
+    """End the worlds that the births asked for in `worlds`, (m,), would make larger than they may be."""
+    n_asked = np.bincount(worlds, minlength=state.n_worlds)
+    space = state.births.space(np.bincount(state.population.bodies.world, minlength=state.n_worlds))
+    limits, update = state.mission.limits, state.mission.update
+    for world in map(int, np.flatnonzero(state.running & (n_asked > space))):
+        text = (
+            f"plugins ask for {n_asked[world]:,} more entities, and there is room for {max(0, space[world]):,}: with "
+            f"update={update!r} a world holds {limits.most_rows(update):,}; for a mission you trust there is allow_large"
+        )
+        state.record_failure(world, state.error(world, text))

@@ -1,0 +1,46 @@
+"""Rows of the body table that come, go or are moved: all that keeps to them follows."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tussle.api.bodies import Bodies
+from tussle.engine import failure
+from tussle.engine.state import SimulationState
+
+
+def repack(state: SimulationState, gone: np.ndarray | None, new: Bodies | None) -> None:
+    """Remove rows (gone, (n,), true) and add newborn ones."""
+    index = state.population.repack(gone, new)
+    rows_changed(state)
+    for referee in state.referees:
+        referee.rearrange(index)
+    if new is not None:
+        state.population.begin_rows(index)
+        if state.events:
+            state.events.births(new)
+
+
+def rows_changed(state: SimulationState) -> None:
+    """The table has been repacked or restored: views and checks look at it."""
+    b = state.population.bodies
+    state.world_view.reset(b, 0, b.n)
+    state.checked = b.pos, b.quat, b.health, np.empty(b.n, bool)
+    state.has_changed = True
+
+
+def take_over_moves(state: SimulationState, phase: float = 1.0) -> None:
+    """Motion models take over the rows that world plugins have moved; beliefs follow with the next reading of their sensor."""
+    view = state.world_view
+    if not view.moved:
+        return
+    rows = np.unique(np.concatenate(view.moved))
+    view.moved = []
+    for group in state.population.groups:
+        mine = rows[(rows >= group.first) & (rows < group.last)] - group.first
+        if len(mine):
+            group.moving.begin(group.motion.plugin, phase)
+            try:
+                group.from_body(mine)
+            except Exception as error:
+                raise failure.in_call(error, group.motion.plugin, group.moving, group) from error

@@ -1,0 +1,186 @@
+"""All columns of a simulation: put aside, put back, and hashed."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tussle.columns import EntityRef, Handle, Output, State
+from tussle.engine.group import Binding, Group
+from tussle.engine.rows import rows_changed
+from tussle.engine.state import SimulationState
+from tussle.errors import SnapshotError
+from tussle.record import hash_columns
+
+HASHED = ("id", "team", "block", "pos", "vel", "quat", "omega", "force", "torque", "health", "radius", "mass")
+
+
+@dataclass
+class Snapshot:
+    """All columns of a simulation at one instant."""
+
+    mission: Any
+    seeds: np.ndarray
+    groups: dict[Any, tuple[Any, ...]]
+    world: dict[str, Any]
+
+
+def snapshot(state: SimulationState) -> Snapshot:
+    """See `Simulation.snapshot`."""
+    population, births = state.population, state.births
+    groups = {}
+    for group in population.groups:
+        outside = [_save_handles(b) for b in group.walk()]
+        groups[group.key] = (group.first, group.table.copy(), outside)
+    world = {
+        "floats": population.bodies.floats.copy(),
+        "ints": population.bodies.ints.copy(),
+        "step": state.context.clock.step.copy(),
+        "common": state.context.clock.common,
+        "running": state.running.copy(),
+        "failed": state.failed.copy(),
+        "results": list(state.results),
+        "parked": dict(state.parked),
+        "births": [
+            births.next_id.copy(),
+            births.n_born.copy(),
+            births.n_left.copy(),
+            [a.copy() for a in births.next_time],
+        ],
+        "referees": [r.copy() for r in state.referees],
+        "mail": state.mail.save(),
+        "wishes": list(state.world_view.births),
+        "params": state.overrides.save(),
+    }
+    return Snapshot(state.mission, state.context.seeds.copy(), groups, world)
+
+
+def _save_handles(binding: Binding) -> dict[str, list[bytes]]:
+    name, saves = type(binding.spec).__name__, hasattr(type(binding.spec), "save_one")
+
+    def save(h: Any) -> bytes:
+        if h is not None and not saves:
+            raise SnapshotError(
+                f"{name} holds objects outside the arrays and cannot save them, so no snapshot can be taken"
+            )
+        return pickle.dumps((h is not None, None if h is None else binding.plugin.save_one(h)))
+
+    return {k: [save(h) for h in held] for k, held in binding.handles.items()}
+
+
+def restore(state: SimulationState, saved: Snapshot) -> None:
+    """See `Simulation.restore`."""
+    if saved.mission != state.mission or len(saved.seeds) != state.n_worlds:
+        raise SnapshotError(
+            f"the snapshot is of a stack of {len(saved.seeds)} worlds of {saved.mission.name or 'another mission'!r}, not of this"
+        )
+    population, births, world = state.population, state.births, saved.world
+    if not set(saved.groups) <= {g.key for g in population.groups}:
+        raise SnapshotError(
+            "the snapshot has entities of blocks that this simulation has never had; restore it into the simulation it was taken from"
+        )
+    state.context.seeds[:] = saved.seeds
+    population.close_handles()
+    population.bodies.replace(world["floats"].copy(), world["ints"].copy())
+    for group in population.groups:
+        kept = saved.groups.get(group.key)
+        first, held, outside = kept or _no_rows(group, population.bodies.n)
+        group.table.restore(held)
+        for binding, handles in zip(group.walk(), outside, strict=True):
+            binding.handles = {k: [None] * len(held) for k, held in handles.items()}
+        group.attach(population.bodies, first)
+        _load_handles(state, group, outside)
+    births.next_id, births.n_born, births.n_left = (a.copy() for a in world["births"][:3])
+    births.next_time = [a.copy() for a in world["births"][3]]
+    clock = state.context.clock
+    clock.step[:], clock.common = world["step"], world["common"]
+    state.running[:], state.failed[:] = world["running"], world["failed"]
+    state.results, state.parked = list(world["results"]), dict(world["parked"])
+    state.world_view.births = list(world["wishes"])
+    state.world_view.deaths, state.world_view.moved = [], []  # of a step that was broken off
+    state.overrides.restore(world["params"])
+    state.n_running = int(state.running.sum())
+    rows_changed(state)
+    for referee, columns in zip(state.referees, world["referees"], strict=True):
+        referee.restore(columns)
+    state.mail.restore(world["mail"])
+
+
+def _no_rows(group: Group, first: int) -> tuple[Any, ...]:
+    none = group.table.take(np.zeros(0, np.int64))
+    return first, none, [{k: [] for k in b.handles} for b in group.walk()]
+
+
+def _load_handles(state: SimulationState, group: Group, outside: list[dict[str, list[bytes]]]) -> None:
+    for binding, handles in zip(group.walk(), outside, strict=True):
+        binding.view.begin(binding.plugin)
+        for name, held in handles.items():
+            for row, data in enumerate(held):
+                about = state.population.handle_row(group, binding, row)
+                is_open, kept = pickle.loads(data)
+                binding.handles[name][row] = _loaded(binding.plugin, about, kept) if is_open else None
+
+
+def _loaded(plugin: Any, about: Any, state: Any) -> Any:
+    return plugin.load_one(about, state) if hasattr(type(plugin), "load_one") else plugin.open_one(about)
+
+
+def state_hash(state: SimulationState, world: int) -> str:
+    """Hash of one running world's columns."""
+    return hash_columns(hashed(state, world))
+
+
+def hashed(state: SimulationState, world: int) -> Iterator[tuple[str, Any]]:
+    """Name and values of each column of one running world."""
+    bodies = state.population.bodies
+    members, world_start, _, _ = bodies.layout()
+    rows = members[world_start[world] : world_start[world + 1]]
+    yield "step", state.context.clock.step[world : world + 1]
+    births = state.births
+    counts = births.next_id[world : world + 1], births.n_born[:, world], births.n_left[:, world]
+    yield "births", np.concatenate(counts)
+    for times in births.next_time:
+        yield "births", times[world]
+    for wish in state.world_view.births:
+        mine = wish["world"] == world
+        if mine.any():
+            yield "wish", f"{wish['block']} {mine.sum()}".encode()
+            yield from (
+                (name, array[..., mine]) for name, array in wish.items() if name not in ("block", "world")
+            )
+    for name in HASHED:
+        yield name, getattr(bodies, name)[..., rows]
+    parts = []
+    for group in state.population.groups:
+        first, last = np.searchsorted(bodies.world[group.first : group.last], [world, world + 1])
+        if last > first:
+            parts.append((int(bodies.id[group.first + first]), group, np.arange(first, last)))
+    for _, group, mine in sorted(parts, key=lambda part: part[0]):
+        for binding in group.walk():
+            yield from _hashed_columns(group, binding, mine)
+    for referee in state.referees:
+        for name in type(referee.spec).states():
+            per, place = referee.places[name]
+            array = referee.tables[per].array(place)
+            mine = rows if per == "entity" else slice(world, world + 1)
+            yield f"{referee.spec.instance_name}.{name}", array[..., mine]
+    for part in state.mail.columns(world):
+        yield "mail", part
+
+
+def _hashed_columns(group: Group, binding: Binding, rows: np.ndarray) -> Iterator[tuple[str, Any]]:
+    for name, column in type(binding.spec).columns.items():
+        is_memory = isinstance(column, (State, EntityRef)) or (
+            isinstance(column, Output) and name in binding.plugin.wired
+        )
+        label = ".".join((*binding.path, name))
+        if is_memory and name in binding.ragged:
+            lists = group.table.lists[binding.ragged[name]].take(rows)
+            yield label, np.concatenate([lists.start.view(np.float64), lists.data.astype(np.float64).ravel()])
+        elif is_memory:
+            yield label, group.table.array(binding.places[name])[..., rows]
+        assert not isinstance(column, Handle) or name in binding.handles
