@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 import tomllib
+from graphlib import CycleError, TopologicalSorter
 
 import pytest
 from tree import ROOT, imported_modules, parsed, python_files, relative
@@ -57,6 +58,24 @@ def third_party(tree: str) -> dict[str, str]:
             if package not in own and package not in sys.stdlib_module_names and package != "None":
                 found[package] = f"{relative(path)}:{line}"
     return found
+
+
+def test_imports_make_no_circle():
+    """Those for the type checker and those inside functions count: what names another module has it in mind."""
+    files = {}
+    for path in python_files("src"):
+        parts = path.relative_to(ROOT / "src").with_suffix("").parts
+        files[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    graph = {
+        module: {
+            name if name in files else name.rpartition(".")[0] for _, name in imported_modules(parsed(path))
+        }
+        for module, path in files.items()
+    }
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        pytest.fail(f"imports make a circle: {' <- '.join(error.args[1])}")
 
 
 @pytest.mark.parametrize("path", [p for p in python_files("src") if p.name == "kernels.py"], ids=relative)
