@@ -16,7 +16,6 @@ from tussle.columns import Channel, Numbers, Param
 from tussle.errors import DeclarationError, listed, nearest_name
 from tussle.neighbors.law import OTHER, PAIR, Law
 from tussle.neighbors.walk import make_walk
-from tussle.numeric.kernel import Kernel
 from tussle.numeric.rk4 import label
 
 COMPONENTS = {3: "xyz", 4: "wxyz", 2: "xy"}
@@ -224,8 +223,8 @@ class Plan:
         lists: It gives one value for each pair, instead of one for each row.
     """
 
-    run: Kernel
-    run_alone: Kernel
+    run: Callable[..., Any]
+    run_alone: Callable[..., Any]
     names: tuple[str, ...]
     columns: Callable[[GroupView, dict[str, Any]], tuple[Any, tuple[np.ndarray, ...]]]
     other: tuple[tuple[str, tuple[int, ...]], ...]

@@ -19,8 +19,9 @@ from tussle.neighbors.lane_code import lane_code
 from tussle.neighbors.lane_count import LANES
 from tussle.neighbors.lanes import bits, choose, load
 from tussle.neighbors.law import Law
+from tussle.neighbors.walk_python import walk_in_python
 from tussle.neighbors.walk_text import Part, WalkText
-from tussle.numeric.kernel import Kernel, device, kernel
+from tussle.numeric.kernel import Kernel, device, is_interpreted, kernel
 from tussle.numeric.rk4 import label
 
 
@@ -38,8 +39,8 @@ class Walk:
 
     own: tuple[str, ...]
     other: tuple[str, ...]
-    run: Kernel
-    run_alone: Kernel
+    run: Callable[..., Any]
+    run_alone: Callable[..., Any]
     n_out: int
 
 
@@ -136,6 +137,9 @@ def make_walk(laws: Sequence[Law], where: Law | None, code_of: Callable[[str], s
         parts.append(part_of(law, at, scope))
         at += len(law.reductions)
     text = WalkText(parts, part_of(where, at, scope) if where else None, at)
+    if any(is_interpreted(law.function) for law in laws):
+        run = walk_in_python(laws, where, text.own, text.other)
+        return Walk(text.own, text.other, run, run, at)
     other, own = " ".join("F" * len(text.other)), " ".join(code_of(name) for name in text.own)
     out = "(I2w F2w) i8 (i8 i8) i8 -> i8" if text.lists_pairs else "F2w i8 (i8 i8) i8"
     signature = f"(I2 I2 I) (F2 F2) ({other}) ({own}) {out}"
@@ -148,9 +152,9 @@ def make_walk(laws: Sequence[Law], where: Law | None, code_of: Callable[[str], s
         made.__qualname__ = "+".join(names) + suffix
         return kernel(signature)(made)
 
-    run = written(text.lines(), "")
-    alone = run if text.lists_pairs else written(text.lines_alone(), " alone")
-    return Walk(text.own, text.other, run, alone, at)
+    lanes_are_agents = written(text.lines(), "")
+    alone = lanes_are_agents if text.lists_pairs else written(text.lines_alone(), " alone")
+    return Walk(text.own, text.other, lanes_are_agents, alone, at)
 
 
 def part_of(law: Law, at: int, scope: dict[str, Any]) -> Part:

@@ -5,7 +5,7 @@ import sys
 import numpy as np
 
 from tussle import Block, Mission, Simulation
-from tussle.api import Autonomy, Input, MotionModel, Output, Param, State
+from tussle.api import Autonomy, Input, MotionModel, Output, Param, State, neighbors, together
 from tussle.numeric import cos, sin
 from tussle.numeric.kernel import device, kernel
 
@@ -46,18 +46,44 @@ class Driver(Autonomy):
     """Drive as the kernel says."""
 
     speed = Output(unit="m/s")
+    sight = Param(30.0, unit="m")
+
+    @neighbors("sight", teams="own", n="count", gap="mean", push="sum", low="min", mate="nearest")
+    @staticmethod
+    def law(offset_x, distance, inverse_distance, other_id, other_vel_y):
+        if distance > 25.0:
+            return None
+        return offset_x > 0.0, distance, inverse_distance * other_vel_y, offset_x, other_id
+
+    @neighbors("sight", other="each")
+    @staticmethod
+    def pairs(id, other_id):  # noqa: A002 - a column
+        if id > other_id:
+            return None
+        return other_id
+
+    @staticmethod
+    def ahead(offset_x, offset_y):
+        return offset_x + offset_y > -10.0
+
+    seen = together(law, where=ahead)
 
     def step(self, g):
         drive(g.pos[0], g.yaw, self.speed)
+        found, pairs = self.seen(g), self.pairs(g)
+        self.speed += (
+            found.law_gap + found.law_push + np.maximum(found.law_low, -5.0) + np.nan_to_num(found.law_mate)
+        )
+        self.speed += found.law_n + np.bincount(pairs.row, pairs.other, g.n)
 
 
 seen = set()
 sys.setprofile(
     lambda frame, event, _: seen.add(frame.f_code.co_name) if frame.f_code.co_filename == __file__ else None
 )
-block = Block(name="cars", team=1, count=3, variance=(100.0, 100.0, 0.0), autonomy=Driver(), motion=Car())
+block = Block(name="cars", team=1, count=12, variance=(100.0, 100.0, 0.0), autonomy=Driver(), motion=Car())
 simulation = Simulation(Mission(blocks=[block], end=1.0))
 simulation.run()
 sys.setprofile(None)
-print(" ".join(sorted(seen & {"half", "drive", "derivative"})))
+print(" ".join(sorted(seen & {"half", "drive", "derivative", "law", "pairs", "ahead"})))
 print(simulation.state_hash())

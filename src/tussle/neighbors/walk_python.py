@@ -1,0 +1,110 @@
+"""The pair loop in Python: laws are called for one pair after the other, to be debugged. The bits are the kernels'."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from tussle.neighbors.lane_count import LANES
+from tussle.neighbors.lanes import inverse_sqrt
+from tussle.neighbors.law import OTHER, Law
+from tussle.neighbors.walk_text import START
+
+Values = Mapping[str, Any]
+
+
+def walk_in_python(
+    laws: Sequence[Law], where: Law | None, own_names: Sequence[str], other_names: Sequence[str]
+) -> Callable[..., int]:
+    """A function that takes what the kernel of these laws takes; see `make_walk`."""
+
+    def walk(
+        longs: Any, points: Any, other: Any, own: Any, out: Any, first: int, part: Any, most: int
+    ) -> int:
+        cuts, spans, order = longs
+        n_listed = 0
+        for b in range(*part):
+            for q in range(cuts[1, b], cuts[1, b + 1]):
+                me = cuts[0, q]
+                i = order[me] - first
+                mine = {name: np.float64(column[i]) for name, column in zip(own_names, own, strict=True)}
+                totals = [Totals(law, mine) for law in laws]
+                places = (p for s in range(*cuts[2, b : b + 2]) for p in range(*spans[:, s]) if p != me)
+                for p in places:
+                    theirs = {name: column[p] for name, column in zip(other_names, other, strict=True)}
+                    pair = {**mine, **theirs, **between(points[1][:, p] - points[0][:, q])}
+                    for each in totals if where is None or call(where, pair) else ():
+                        values = each.add(pair)
+                        if values is not None and each.law.lists:
+                            if n_listed < out[1].shape[1]:
+                                out[0][:, n_listed], out[1][:, n_listed] = (i, order[p]), values
+                            n_listed += 1
+                if not laws[0].lists:
+                    out[:, i] = [value for each in totals for value in each.results()]
+        return n_listed
+
+    return walk
+
+
+def between(offset: np.ndarray) -> dict[str, Any]:
+    """What belongs to a pair, of the offset [m], (3,)."""
+    x, y, z = offset
+    square = x * x + y * y + z * z
+    return {
+        "offset_x": x, "offset_y": y, "offset_z": z, "distance": np.sqrt(square), "distance_squared": square,
+        "inverse_distance": inverse_sqrt.py_func(np.full(LANES, square))[0],
+    }  # fmt: skip
+
+
+def call(law: Law, pair: Values) -> Any:
+    """What a law makes of a pair."""
+    with np.errstate(all="ignore"):  # as in compiled code
+        return law.function(*[pair[name] for name in law.arguments])
+
+
+class Totals:
+    """Contributions of one entity's neighbours to a law.
+
+    Args:
+        law: The law.
+        mine: The entity's columns.
+    """
+
+    def __init__(self, law: Law, mine: Values) -> None:
+        self.law, self.n, self.closest = law, 0, (np.inf, np.inf)
+        self.sums = [float(START.get(each, "0").removeprefix("np.")) for each in law.reductions.values()]
+        radii = [mine[radius] if isinstance(radius, str) else radius for radius in law.radii]
+        self.limit = min(radius * radius if radius > 0.0 else -1.0 for radius in radii)
+
+    def add(self, pair: Values) -> tuple[Any, ...] | None:
+        """Take a pair in; returns what the law makes of it, None where it does not count."""
+        law = self.law
+        if not pair["distance_squared"] < self.limit:
+            return None
+        if law.teams and (pair["team"] == pair[OTHER + "team"]) != (law.teams == "own"):
+            return None
+        result = call(law, pair)
+        if result is None:
+            return None
+        values: tuple[Any, ...] = result if isinstance(result, tuple) else (result,)
+        rank = pair["distance_squared"], pair.get(OTHER + "id", np.inf)
+        is_closer = rank < self.closest
+        self.closest = min(rank, self.closest)
+        self.n += 1
+        for k, (value, reduction) in enumerate(zip(values, law.reductions.values(), strict=True)):
+            if reduction in ("sum", "mean"):
+                self.sums[k] += value
+            elif reduction == "count":
+                self.sums[k] += bool(value)
+            elif {"min": value < self.sums[k], "max": value > self.sums[k], "nearest": is_closer}.get(
+                reduction
+            ):
+                self.sums[k] = value
+        return values
+
+    def results(self) -> Iterator[float]:
+        """The contributions in order."""
+        for total, reduction in zip(self.sums, self.law.reductions.values(), strict=True):
+            yield total / max(self.n, 1) if reduction == "mean" else total
