@@ -306,23 +306,30 @@ class Kernel(Device):
         """Numba's dispatcher and its compile result, from disk or compiled."""
         main = self._new_dispatcher(key)
         result = None if reached.opaque else load(self.name, key, main.targetctx)
+        if result is None and not reached.opaque:
+            with store.making(self.name, key):
+                result = load(self.name, key, main.targetctx)
+                if result is None:
+                    save(self.name, key, self._compile(main, reached))
+        elif result is None:
+            self._compile(main, reached)
         if result is not None:
             main.add_overload(result)
             stats.loaded += 1
-        else:
-            if stats.on_compile is not None:
-                stats.on_compile(self.name)
-            for holder in reached.holders:
-                if isinstance(holder, Device):
-                    holder.refresh()
-            with compiling():
-                main.compile(self.types)
-            result = next(iter(main.overloads.values()))
-            stats.compiled += 1
-            if not reached.opaque:
-                save(self.name, key, result)
         main._compile_for_args = self._accept
-        return main, result
+        return main, next(iter(main.overloads.values()))
+
+    def _compile(self, main: Any, reached: Fingerprint) -> Any:
+        """Have the dispatcher compile; returns Numba's compile result."""
+        if stats.on_compile is not None:
+            stats.on_compile(self.name)
+        for holder in reached.holders:
+            if isinstance(holder, Device):
+                holder.refresh()
+        with compiling():
+            main.compile(self.types)
+        stats.compiled += 1
+        return next(iter(main.overloads.values()))
 
     def _accept(self, *args: Any) -> Any:
         """Called by the dispatcher for types it has not met: register them if they fit the one signature, and never compile."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import fcntl
 import hashlib
 import os
 import pickle
@@ -11,7 +12,8 @@ import shutil
 import tempfile
 import time
 import warnings
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -109,6 +111,24 @@ def save(name: str, key: str, data: bytes) -> None:
         )
         return
     remove_old(folder, stem)
+
+
+@contextmanager
+def making(name: str, key: str) -> Iterator[None]:
+    """While one process makes what is kept under the name and key, others that want it wait here."""
+    path = directory() / f".{file_stem(name)}-{key}.lock"
+    try:
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        handle = os.open(path, os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o600)
+    except OSError:  # nothing can be kept, and `save` says so
+        yield
+        return
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX)  # of a process that ends, the system takes it back
+        yield
+    finally:
+        path.unlink(missing_ok=True)  # those who wait hold it open
+        os.close(handle)
 
 
 def remove_old(folder: Path, stem: str) -> None:
