@@ -18,6 +18,7 @@ SEARCH = (
     *("--set", "n=40", "--set", "hunters.Unicycle.vel_max=60", "--end", "20"),
     *("-n", "6", "--trials", "12", "--per-round", "6", "--processes", "1"),
 )
+SMALL = (*SEARCH, "-n", "2", "--trials", "4", "--per-round", "2")
 
 FAILS = '''\
 """Fails."""
@@ -83,24 +84,24 @@ def test_faster_hunters_catch_more_and_the_best_can_be_played_again(tussle, fold
 
 
 def test_the_same_command_goes_on(tussle, folder):
-    first = tussle(*SEARCH, "--out", "out")
+    first = tussle(*SMALL, "--out", "out")
     seen = (folder / "out" / "trials.parquet").stat().st_mtime_ns
-    again = tussle(*SEARCH, "--out", "out")
-    assert "note: 12 of 12 trials were there already, in out" in again.stderr
+    again = tussle(*SMALL, "--out", "out")
+    assert "note: 4 of 4 trials were there already, in out" in again.stderr
     assert (folder / "out" / "trials.parquet").stat().st_mtime_ns == seen
     assert "searched" in first.stdout
     assert "searched" not in again.stdout
-    more = tussle(*SEARCH, "--trials", "18", "--out", "out")
-    assert "note: 12 of 18 trials were there already, in out" in more.stderr
-    assert "6 trials in" in row(more, "searched")
-    error = tussle(*SEARCH, "--minimize", "--out", "out", code=4).stderr
+    more = tussle(*SMALL, "--trials", "6", "--out", "out")
+    assert "note: 4 of 6 trials were there already, in out" in more.stderr
+    assert "2 trials in" in row(more, "searched")
+    error = tussle(*SMALL, "--minimize", "--out", "out", code=4).stderr
     assert "out: holds another search (its direction is 'maximize', not 'minimize')" in error
     assert json.loads((folder / "out" / "study.json").read_text())["command"][0] != ""
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_ctrl_c_keeps_whole_rounds(tussle, folder, number, code):
-    arguments = [*SEARCH, "--trials", "5000", "--out", "out"]
+    arguments = [*SMALL, "--trials", "5000", "--out", "out"]
     process = subprocess.Popen(
         [*COMMAND, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=folder, env=environment()
     )  # fmt: skip
@@ -115,11 +116,11 @@ def test_ctrl_c_keeps_whole_rounds(tussle, folder, number, code):
         process.kill()
     assert process.returncode == code
     n = pq.read_table(folder / "out" / "trials.parquet").num_rows
-    assert n % 6 == 0
+    assert n % 2 == 0
     assert f"interrupted: {n} trials are kept in out; the same command goes on" in err
     assert out == ""
-    done = tussle(*SEARCH, "--trials", str(n + 6), "--out", "out")
-    assert f"note: {n} of {n + 6} trials were there already" in done.stderr
+    done = tussle(*SMALL, "--trials", str(n + 2), "--out", "out")
+    assert f"note: {n} of {n + 2} trials were there already" in done.stderr
 
 
 def test_failed_trials_are_told(tussle, folder):
