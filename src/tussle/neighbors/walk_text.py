@@ -240,7 +240,7 @@ class WalkText:
         yield "            me = queries[q]"
         yield "            i = order[me] - first"
         for name in self.taken:
-            yield f"            {name}_ = splat(float(by_row_{name}[i]))"
+            yield f"            {name}_ = splat(1.0 * by_row_{name}[i])"  # of a flag too
         for at, radii in enumerate(self.limits):
             yield f"            limit2_{at} = {square(radii)}"
         for part in self.parts:

@@ -26,18 +26,19 @@ class Every(Autonomy):
     grade = "portable"
     sight = State(unit="m")
     gain = Param(0.5)
+    drops = Param(True)
     seen = State("n total mean low high near_id", dtype=float)
     velocity = Output("velocity_x velocity_y velocity_z", unit="m/s")
 
     @neighbors("sight", n="count", total="sum", mean="mean", low="min", high="max", near_id="nearest")
     @staticmethod
-    def law(offset_x, distance, other_id, team, other_team, other_vel_y, gain):
+    def law(offset_x, distance, other_id, team, other_team, other_vel_y, gain, drops):
         if other_id == 13.0:
             return None
         amount = gain * offset_x
         if team != other_team and distance < 6.0:
             amount = amount * 2 + other_vel_y
-        elif distance > 9.0:
+        elif distance > 9.0 and drops:
             amount -= 1
         return team == other_team, amount, distance, amount, amount, other_id
 
@@ -51,7 +52,7 @@ class Every(Autonomy):
         near_id, near_team, near_vel, table = near.id, near.team, near.vel, [[] for _ in range(g.n)]
         for k, i in enumerate(near.row):
             values = law(
-                near.offset[0, k], near.distance[k], near_id[k], g.team[i], near_team[k], near_vel[1, k], self.gain[i]
+                near.offset[0, k], near.distance[k], near_id[k], g.team[i], near_team[k], near_vel[1, k], self.gain[i], self.drops[i],
             )  # fmt: skip
             if values is not None:
                 table[i].append((*values, near.distance[k]))
