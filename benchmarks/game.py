@@ -1,6 +1,6 @@
 """The 500 s predator/prey game: CPU seconds a world, alone and in a stack.
 
-    python benchmarks/game.py [--sizes 1 64] [--repeats 3] [--json FILE]
+    python benchmarks/game.py [--update sequential] [--sizes 1 64] [--repeats 3] [--json FILE]
 
 100 prey, 5 + 5 predators, dt 0.1 s, 12 motion substeps, captures on; sizes are worlds in the stack. The original takes 2.5 CPU s.
 """
@@ -15,6 +15,7 @@ from tussle import Block, Mission, Simulation
 from tussle.stock import Boids, Predator, SimpleCapture, SimpleCaptureMetrics, Unicycle
 
 SIZES = (1, 8, 64, 256)
+UPDATES = ("synchronous", "sequential")
 ORIGINAL = 2.5
 
 
@@ -56,8 +57,8 @@ def mission(motion_multiplier: int = 12, end: float = 500.0, **changes: Any) -> 
     ).replace(**changes)
 
 
-def measure(n_worlds: int) -> dict[str, Any]:
-    game = mission()
+def measure(n_worlds: int, update: str) -> dict[str, Any]:
+    game = mission(update=update)
     runs = 0
 
     def make() -> Simulation:
@@ -78,8 +79,11 @@ def measure(n_worlds: int) -> dict[str, Any]:
 
 
 def main() -> None:
-    args = measuring.arguments(__doc__.splitlines()[0], SIZES)
-    rows = [measuring.median_of(args.repeats, lambda n=n: measure(n), "cpu_s_per_world") for n in args.sizes]
+    args = measuring.arguments(__doc__.splitlines()[0], SIZES, update=UPDATES)
+    rows = [
+        measuring.median_of(args.repeats, lambda n=n: measure(n, args.update), "cpu_s_per_world")
+        for n in args.sizes
+    ]
     measuring.report("The 500 s game, CPU seconds a world by worlds in the stack (n)", rows, args.json)
 
 

@@ -18,14 +18,16 @@ LEAST_CPU = 2.0
 """CPU seconds of stepping behind every figure, at least."""
 
 
-def arguments(description: str, sizes: Sequence[int]) -> argparse.Namespace:
-    """The options of all benchmarks: --sizes, --repeats, --json."""
+def arguments(description: str, sizes: Sequence[int], **choices: Sequence[str]) -> argparse.Namespace:
+    """The options of all benchmarks: --sizes, --repeats, --json; and choices of a benchmark's own, the first by default."""
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--sizes", type=int, nargs="+", default=list(sizes), help="which sizes to measure")
     parser.add_argument(
         "--repeats", type=int, default=3, help="measurements of each row, of which the median counts"
     )
     parser.add_argument("--json", type=Path, help="write the rows to this file")
+    for name, allowed in choices.items():
+        parser.add_argument(f"--{name}", choices=allowed, default=allowed[0])
     return parser.parse_args()
 
 

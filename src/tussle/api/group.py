@@ -232,8 +232,8 @@ class GroupView:
         return self._bodies.any_index()
 
     @property
-    def is_alone(self) -> bool:
-        """Entities move one after the other: each row of a group is in a world of its own."""
+    def one_per_world(self) -> bool:
+        """Each row is in a world of its own, since entities move one after the other."""
         return self._bodies.scans
 
     def by_place(self, index: Index, name: str) -> tuple[np.ndarray, ...]:

@@ -216,7 +216,7 @@ class Plan:
 
     Attributes:
         run: The walk's kernel.
-        run_alone: The same for views whose rows are each in a world of their own.
+        run_single: The same for views whose rows are each in a world of their own.
         names: Names of the contributions.
         columns: Gives, of a view and a plugin's attributes, how far to look [m] and the columns by row.
         other: Its columns by place: of the body table, and which components.
@@ -224,7 +224,7 @@ class Plan:
     """
 
     run: Callable[..., Any]
-    run_alone: Callable[..., Any]
+    run_single: Callable[..., Any]
     names: tuple[str, ...]
     columns: Callable[[GroupView, dict[str, Any]], tuple[Any, tuple[np.ndarray, ...]]]
     other: tuple[tuple[str, tuple[int, ...]], ...]
@@ -244,7 +244,7 @@ class Plan:
         if self.lists:
             return self.listed(g, blocks.n_blocks, lambda *last: self.run(*arrays, *last, blocks.most))
         out = np.empty((len(self.names), g.n))
-        run = self.run_alone if g.is_alone else self.run
+        run = self.run_single if g.one_per_world else self.run
         if g.context.threads == 1:
             run(*arrays, out, g.first, (0, blocks.n_blocks), blocks.most)
         else:
@@ -298,7 +298,7 @@ def make_plan(g: GroupView, plugin: Any, declared: NeighborLaw) -> Plan:
     by_row = "".join(f"{columns[name]}, " for name in made.own)
     return Plan(
         made.run,
-        made.run_alone,
+        made.run_single,
         declared.names,
         evaluated(f"({farthest}, ({by_row}))"),
         tuple(other.items()),

@@ -168,9 +168,7 @@ class Population:
         if kernels.stays(source, 0, old.n):
             fresh = np.flatnonzero(source < 0)
             old.floats[:, fresh] = new.floats[:, -1 - source[fresh]]
-            ints = (
-                old.ints.copy()
-            )  # who has seen the old ones, as a recorder, knows by it that others have come
+            ints = old.ints.copy()  # a recorder knows by the new array that other entities have come
             ints[:, fresh] = new.ints[:, -1 - source[fresh]]
             old.replace(old.floats, ints)
             return

@@ -32,15 +32,15 @@ class Walk:
     Attributes:
         own: Columns by row that its kernel takes, in order; "team" among them where laws tell teams apart.
         other: Columns by place.
-        run: The kernel; eight agents at a time are the lanes.
-        run_alone: The same for agents that have no other near them in the rows asked for: eight neighbours at a time are the lanes.
+        run: The kernel; eight agents are its lanes.
+        run_single: The same for agents that are each in a world of their own; eight neighbours of one agent are its lanes.
         n_out: Number of contributions in all.
     """
 
     own: tuple[str, ...]
     other: tuple[str, ...]
     run: Callable[..., Any]
-    run_alone: Callable[..., Any]
+    run_single: Callable[..., Any]
     n_out: int
 
 
@@ -127,6 +127,8 @@ def make_walk(laws: Sequence[Law], where: Law | None, code_of: Callable[[str], s
     scope: dict[str, Any] = {name: getattr(lanes, name) for name in FROM_LANES}
     scope |= {
         "np": np,
+        "inf": np.inf,
+        "nan": np.nan,
         "LANES": LANES,
         "square_of": square_of,
         "find_near": find_near,
@@ -152,9 +154,9 @@ def make_walk(laws: Sequence[Law], where: Law | None, code_of: Callable[[str], s
         made.__qualname__ = "+".join(names) + suffix
         return kernel(signature)(made)
 
-    lanes_are_agents = written(text.lines(), "")
-    alone = lanes_are_agents if text.lists_pairs else written(text.lines_alone(), " alone")
-    return Walk(text.own, text.other, lanes_are_agents, alone, at)
+    kernel_of_blocks = written(text.lines(), "")
+    single = kernel_of_blocks if text.lists_pairs else written(text.single_lines(), " single")
+    return Walk(text.own, text.other, kernel_of_blocks, single, at)
 
 
 def part_of(law: Law, at: int, scope: dict[str, Any]) -> Part:

@@ -74,7 +74,7 @@ class Totals:
 
     def __init__(self, law: Law, mine: Values) -> None:
         self.law, self.n, self.closest = law, 0, (np.inf, np.inf)
-        self.sums = [float(START.get(each, "0").removeprefix("np.")) for each in law.reductions.values()]
+        self.sums = [START.get(each, 0.0) for each in law.reductions.values()]
         radii = [mine[radius] if isinstance(radius, str) else radius for radius in law.radii]
         self.limit = min(radius * radius if radius > 0.0 else -1.0 for radius in radii)
 

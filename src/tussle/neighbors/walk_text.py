@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from tussle.neighbors.law import OTHER, Law
 
-START = {"min": "np.inf", "max": "-np.inf", "nearest": "np.nan"}
+START = {"min": math.inf, "max": -math.inf, "nearest": math.nan}
 """What a reduction of nobody is, other than 0."""
 
 
@@ -42,7 +43,7 @@ class Part:
         if self.law.lists:
             return
         for k, reduction in self.reductions:
-            yield f"a_{k} = splat({START.get(reduction, '0.0')})"
+            yield f"a_{k} = splat({START.get(reduction, 0.0)})"
         if "mean" in self.law.reductions.values():
             yield f"n_{self.at} = splat(0.0)"
         if "nearest" in self.law.reductions.values():
@@ -98,15 +99,16 @@ class Part:
             yield f"        out[1][{k}, n_listed] = lane[(results_at + {k}) * LANES + k]"
         yield "    n_listed += 1"
 
-    def begin_alone(self) -> Iterator[str]:
+    def single_begin(self) -> Iterator[str]:
         """What stands before the loop over one agent's neighbours."""
         for k, reduction in self.reductions:
-            yield f"a_{k} = {START.get(reduction, '0.0')}"
-        yield f"n_{self.at} = 0"
+            yield f"a_{k} = {START.get(reduction, 0.0)}"
+        if "mean" in self.law.reductions.values():
+            yield f"n_{self.at} = 0"
         if "nearest" in self.law.reductions.values():
             yield f"best_{self.at}, best_id_{self.at} = np.inf, np.inf"
 
-    def step_alone(self, limit: int) -> Iterator[str]:
+    def single_step(self, limit: int) -> Iterator[str]:
         """Eight neighbours of one agent."""
         at, values = self.at, [(k, r) for k, r in self.reductions if r != "count"]
         yield f"hits = near_{limit} & {self.law.teams or 'all'}_"
@@ -114,7 +116,8 @@ class Part:
         yield from indented(1, self.contributions())
         if self.can_skip:
             yield f"    hits &= bits(counts_{at})"
-        yield f"    n_{at} += ones(hits)"
+        if "mean" in self.law.reductions.values():
+            yield f"    n_{at} += ones(hits)"
         for k, reduction in self.reductions:
             if reduction == "count":
                 yield f"    a_{k} += float(ones(hits & bits(v_{k})))"
@@ -142,7 +145,7 @@ class Part:
             yield f"        if {'closer' if reduction == 'nearest' else f'{value} {sign} a_{k}'}:"
             yield f"            a_{k} = {value}"
 
-    def end_alone(self) -> Iterator[str]:
+    def single_end(self) -> Iterator[str]:
         """One agent's contributions to its row."""
         for k, reduction in self.reductions:
             if reduction == "mean":
@@ -228,7 +231,7 @@ class WalkText:
         if self.lists_pairs:
             yield "    return n_listed"
 
-    def lines_alone(self) -> Iterator[str]:
+    def single_lines(self) -> Iterator[str]:
         """The kernel that has neighbours in the lanes; they are added one by one, in the order of the other kernel."""
         every = [*self.parts, *([self.where] if self.where else [])]
         names = sorted({name for part in every for name in part.law.names})
@@ -244,16 +247,16 @@ class WalkText:
         for at, radii in enumerate(self.limits):
             yield f"            limit2_{at} = {square(radii)}"
         for part in self.parts:
-            yield from indented(3, part.begin_alone())
+            yield from indented(3, part.single_begin())
         yield "            for s in range(span_first[b], span_first[b + 1]):"
         yield "                for p in range(span_start[s], span_end[s], LANES):"
-        yield from indented(5, self.neighbors_alone(names))
+        yield from indented(5, self.single_neighbors(names))
         for part in self.parts:
-            yield from indented(5, part.step_alone(self.limits.index(part.law.radii)))
+            yield from indented(5, part.single_step(self.limits.index(part.law.radii)))
         for part in self.parts:
-            yield from indented(3, part.end_alone())
+            yield from indented(3, part.single_end())
 
-    def neighbors_alone(self, names: Sequence[str]) -> Iterator[str]:
+    def single_neighbors(self, names: Sequence[str]) -> Iterator[str]:
         """Eight neighbours of one agent, and which of them there are, are of its team, and near enough."""
         for axis in "xyz":
             yield f"offset_{axis}_ = load(s{axis}, p) - q{axis}[q]"
@@ -391,9 +394,7 @@ def square(radii: tuple[str | float, ...]) -> str:
     """Squared smallest of the radii of the row i."""
     text = ""
     for radius in radii:
-        value = (
-            f"by_row_{radius}[i]" if isinstance(radius, str) else repr(float(radius)).replace("inf", "np.inf")
-        )
+        value = f"by_row_{radius}[i]" if isinstance(radius, str) else repr(float(radius))
         text = f"min({text}, square_of({value}))" if text else f"square_of({value})"
     return text
 

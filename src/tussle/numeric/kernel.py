@@ -307,7 +307,7 @@ class Kernel(Device):
         main = self._new_dispatcher(key)
         result = None if reached.opaque else load(self.name, key, main.targetctx)
         if result is None and not reached.opaque:
-            with store.making(self.name, key):
+            with store.compile_lock(self.name, key):
                 result = load(self.name, key, main.targetctx)
                 if result is None:
                     save(self.name, key, self._compile(main, reached))

@@ -114,8 +114,8 @@ def save(name: str, key: str, data: bytes) -> None:
 
 
 @contextmanager
-def making(name: str, key: str) -> Iterator[None]:
-    """While one process makes what is kept under the name and key, others that want it wait here."""
+def compile_lock(name: str, key: str) -> Iterator[None]:
+    """A lock between processes: one compiles what is kept under the name and key, the others wait and load it."""
     path = directory() / f".{file_stem(name)}-{key}.lock"
     try:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
