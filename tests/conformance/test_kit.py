@@ -7,7 +7,6 @@ import random
 
 import numpy as np
 import pytest
-from numba import njit
 
 from tussle.api import (
     Autonomy,
@@ -32,7 +31,6 @@ from tussle.api import (
     Sensor,
     State,
     Subscribe,
-    neighbors,
 )
 from tussle.errors import ConformanceError, TussleError
 from tussle.messages import CaptureEntity
@@ -418,63 +416,6 @@ class NothingToDo(Interaction):
     """Neither starts nor steps."""
 
 
-class UsesSine(SoundAutonomy):
-    """NumPy's sine differs from machine to machine."""
-
-    def step(self, g: GroupView) -> None:
-        self.speed[:] = np.sin(g.yaw)
-
-
-class UsesMathInAnotherFunction(SoundAutonomy):
-    """So does that of the C library, wherever it is called."""
-
-    def step(self, g: GroupView) -> None:
-        self.speed[:] = [wobble(x) for x in g.yaw]
-
-
-def wobble(x: float) -> float:
-    return math.sin(x)
-
-
-class UsesPower(SoundAutonomy):
-    """Powers are not correctly rounded."""
-
-    def step(self, g: GroupView) -> None:
-        self.speed[:] = np.abs(g.pos[0]) ** 0.3
-
-
-class UsesLibmInDerivative(SoundMotion):
-    """A compiled cosine of the C library."""
-
-    @staticmethod
-    def derivative(yaw, v, speed, turn_rate, lag):
-        return v * math.cos(yaw), v * math.sin(yaw), 0.0, turn_rate, (speed - v) / lag
-
-
-@njit("f8(f8)")
-def compiled_exp(x):  # pragma: no cover
-    return math.exp(x)
-
-
-class UsesLibmInKernel(SoundAutonomy):
-    """A compiled exponential of the C library."""
-
-    def step(self, g: GroupView) -> None:
-        self.speed[:] = [compiled_exp(-abs(x)) for x in g.vel[0]]
-
-
-class UsesLibmInLaw(SoundAutonomy):
-    """A cosine of the C library in a neighbour law."""
-
-    @neighbors(10.0, ahead="sum")
-    @staticmethod
-    def law(other_yaw):
-        return math.cos(other_yaw)
-
-    def step(self, g: GroupView) -> None:
-        self.speed[:] = self.law(g).ahead
-
-
 class UsesChance(SoundAutonomy):
     """Draws from one generator for all."""
 
@@ -730,13 +671,6 @@ class DrawsTwiceForWorlds(SoundReferee):
         self.claims[:] = (w.uniform("luck") + w.uniform("luck")).astype(int)
 
 
-class EasySine(SoundEasyChooser):
-    """The sine of `math` differs from machine to machine."""
-
-    def step_one(self, me) -> None:
-        me.speed = math.sin(me.yaw)
-
-
 class EasyChance(SoundEasySensor):
     """Asks Python's random module."""
 
@@ -875,17 +809,6 @@ BROKEN = {
         NothingToDo,
         DeclaresPos,
     ],
-    "grade": [
-        *(
-            UsesSine,
-            UsesMathInAnotherFunction,
-            UsesPower,
-            UsesLibmInDerivative,
-            UsesLibmInKernel,
-            UsesLibmInLaw,
-            EasySine,
-        ),
-    ],
     "stack invariance": [
         CountsRows,
         KnowsItsRow,
@@ -947,8 +870,6 @@ def test_evidence_says_seed_step_and_column() -> None:
         check_plugin(CountsRows)
     with pytest.raises(ConformanceError, match=r"with gain = 0\.0, "):
         check_plugin(NanAtBound)
-    with pytest.raises(ConformanceError, match=r"step uses numpy\.sin,"):
-        check_plugin(UsesSine)
     with pytest.raises(ConformanceError, match=r"step has written into vel, which is not its own"):
         check_plugin(WritesAroundView)
 

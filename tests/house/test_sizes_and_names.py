@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 
-import pytest
 from tree import SOURCE_TREES, parsed, python_files, relative
 
 MOST_LINES_OF_A_FILE = 600
@@ -24,34 +23,36 @@ def lines_of_code(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
     return (function.end_lineno or 0) - function.lineno + 1 - docstring
 
 
-@pytest.mark.parametrize("path", python_files("src"), ids=relative)
-def test_file_is_short(path):
-    n_lines = len(path.read_text().splitlines())
-    assert n_lines <= MOST_LINES_OF_A_FILE, (
-        f"{relative(path)} has {n_lines} lines; give its second idea a file of its own"
-    )
+def test_files_are_short():
+    lengths = {relative(path): len(path.read_text().splitlines()) for path in python_files("src")}
+    too_long = [f"{name} has {n} lines" for name, n in lengths.items() if n > MOST_LINES_OF_A_FILE]
+    assert not too_long, "give the second idea of each a file of its own"
 
 
-@pytest.mark.parametrize("path", python_files("src"), ids=relative)
-def test_functions_are_short(path):
-    for function in functions(parsed(path)):
-        n_lines = lines_of_code(function)
-        place = f"{relative(path)}:{function.lineno}: {function.name}"
-        assert n_lines <= MOST_LINES_OF_A_FUNCTION, f"{place} has {n_lines} lines; give a part of it a name"
+def test_functions_are_short():
+    too_long = [
+        f"{relative(path)}:{function.lineno}: {function.name} has {lines_of_code(function)} lines"
+        for path in python_files("src")
+        for function in functions(parsed(path))
+        if lines_of_code(function) > MOST_LINES_OF_A_FUNCTION
+    ]
+    assert not too_long, "give a part of each a name"
 
 
-@pytest.mark.parametrize("path", python_files(*SOURCE_TREES), ids=relative)
-def test_module_has_a_name_that_says_something(path):
-    parts = {part.strip("_").lower() for part in (*path.parent.parts, path.stem)}
-    assert not parts & NAMES_THAT_SAY_NOTHING
+def test_modules_have_names_that_say_something():
+    parts = {path: (*path.parent.parts, path.stem) for path in python_files(*SOURCE_TREES)}
+    assert not [
+        relative(path)
+        for path, names in parts.items()
+        if NAMES_THAT_SAY_NOTHING & {name.strip("_").lower() for name in names}
+    ]
 
 
-@pytest.mark.parametrize("path", python_files("src"), ids=relative)
-def test_module_changes_no_globals_and_leaves_nothing_unimplemented(path):
-    for node in ast.walk(parsed(path)):
-        place = f"{relative(path)}:{getattr(node, 'lineno', 0)}"
-        assert not isinstance(node, ast.Global), (
-            f"{place}: a module variable changes; two simulations would share it"
-        )
-        is_stub = isinstance(node, ast.Name) and node.id == "NotImplementedError"
-        assert not is_stub, f"{place}: an abstract method is abstract (abc.abstractmethod)"
+def test_modules_change_no_globals_and_leave_nothing_unimplemented():
+    """Two simulations would share a global that changes; an abstract method is abstract (abc.abstractmethod)."""
+    assert not [
+        f"{relative(path)}:{node.lineno}"
+        for path in python_files("src")
+        for node in ast.walk(parsed(path))
+        if isinstance(node, ast.Global) or (isinstance(node, ast.Name) and node.id == "NotImplementedError")
+    ]

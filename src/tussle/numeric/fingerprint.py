@@ -9,7 +9,6 @@ module attributes and overloads.
 from __future__ import annotations
 
 import builtins
-import dis
 import hashlib
 import os
 import sys
@@ -26,26 +25,16 @@ import numpy as np
 FIXED_PACKAGES = frozenset({"numba", "llvmlite", "numpy", "builtins"}) | sys.stdlib_module_names
 STANDARD_LIBRARY = sysconfig.get_paths()["stdlib"] + os.sep
 
-EXACT = frozenset(
-    "sqrt fabs floor ceil trunc copysign isnan isinf isfinite radians degrees gcd lcm fmod remainder modf frexp ldexp "
-    "absolute abs minimum maximum fmin fmax sign rint square negative positive add subtract multiply divide "
-    "true_divide floor_divide less less_equal greater greater_equal equal not_equal "
-    "logical_and logical_or logical_not logical_xor "
-    "bitwise_and bitwise_or bitwise_xor invert left_shift right_shift signbit nextafter spacing".split()
-)
-
 
 class Fingerprint:
     """A walk over all that a function reaches.
 
     Attributes:
-        functions: The Python functions reached, the first one included.
         holders: The objects with a `py_func` (devices, kernels, Numba's dispatchers) that stand for some of them.
         opaque: What was reached and cannot be described; code that depends on it must not be kept.
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
-        self.functions: list[Any] = []
         self.holders: list[Any] = []
         self.opaque: list[str] = []
         self._hash = hashlib.blake2b(digest_size=16)
@@ -94,7 +83,6 @@ class Fingerprint:
         if is_fixed(function):
             self._write("fixed", f"{function.__module__}.{function.__qualname__}")
             return
-        self.functions.append(function)
         code = function.__code__
         self._write("function", code_text(code, function.__doc__))
         self._visit(function.__defaults__, frozenset())
@@ -198,23 +186,6 @@ def code_text(code: types.CodeType, doc: str | None) -> str:
     return repr(parts)
 
 
-@cache
-def has_power(code: types.CodeType) -> bool:
-    """Whether the code raises to a power that is not a whole number written down (those become products)."""
-    for each in codes_of(code):
-        previous: Any = None
-        for instruction in dis.get_instructions(each):
-            if instruction.opname == "BINARY_OP" and instruction.argrepr.startswith("**"):
-                whole = previous.opname in ("LOAD_CONST", "LOAD_SMALL_INT") and isinstance(
-                    previous.argval, int
-                )
-                if not whole:
-                    return True
-            if instruction.opname != "CACHE":
-                previous = instruction
-    return False
-
-
 def is_fixed(function: types.FunctionType) -> bool:
     """Whether a Python function belongs to a package whose version is in every key."""
     if package(function) in {"numba", "llvmlite", "numpy"}:
@@ -251,37 +222,3 @@ def overload_table(n_entries: int) -> dict[int, list[Any]]:
             if implementation is not None:
                 table.setdefault(id(value), []).append(implementation)
     return table
-
-
-def libm_names(function: Callable[..., Any]) -> list[str]:
-    """What the machine's mathematical library computes for a function or any that it reaches, as "math.cos": it is not portable.
-
-    Read from the bytecode: the key's walk takes every name for an attribute of every module that a function mentions, which would find
-    math.atan2 where tussle.numeric's atan2 stands beside math.sqrt.
-    """
-    if isinstance(function, np.ufunc):
-        return [] if function.__name__ in EXACT else [f"numpy.{function.__name__}"]
-    return sorted({name for each in Fingerprint(function).functions for name in libm_in(each)})
-
-
-def libm_in(function: types.FunctionType) -> Iterator[str]:
-    """The same for the function's own code alone."""
-    cells = dict(zip(function.__code__.co_freevars, function.__closure__ or (), strict=True))
-    for code in codes_of(function.__code__):
-        if has_power(code):
-            yield "**"
-        value: Any = None
-        for instruction in dis.get_instructions(code):
-            if instruction.opname == "LOAD_GLOBAL":
-                value = function.__globals__.get(instruction.argval)
-            elif instruction.opname == "LOAD_DEREF" and instruction.argval in cells:
-                value = cells[instruction.argval].cell_contents
-            elif instruction.opname in {"LOAD_ATTR", "LOAD_METHOD"} and isinstance(value, types.ModuleType):
-                value = getattr(value, instruction.argval, None)
-            elif instruction.opname not in {"CACHE", "PUSH_NULL"}:
-                value = None
-            name = getattr(value, "__name__", "")
-            if isinstance(value, np.ufunc) and name not in EXACT:
-                yield f"numpy.{name}"
-            elif package(value) in {"math", "cmath"} and callable(value) and name not in EXACT:
-                yield f"{package(value)}.{name}"

@@ -9,7 +9,6 @@ from tussle.api import MotionModel, Plugin
 from tussle.errors import ConformanceError, TussleError, WiringError
 from tussle.testing.declarations import check_declarations
 from tussle.testing.game import build
-from tussle.testing.grade import check_grade
 from tussle.testing.limits import check_limits
 from tussle.testing.motion import check_motion
 from tussle.testing.stacks import check_reset, check_snapshot, check_stacks
@@ -23,7 +22,6 @@ def check_plugin(cls: type[Plugin], *, companions: Sequence[Any] | None = None, 
     The rules, by the names that errors give them:
 
     * declarations: a docstring, no lists or dicts on the class, hooks only, SI units, defaults that are allowed.
-    * grade: what is "portable" takes no sine or power from NumPy or `math`.
     * own columns, memory in columns: calls change the plugin's own columns and nothing else, and leave nothing elsewhere.
     * draws: no label is drawn twice in a step, which gives the same numbers.
     * stack invariance: a world alone is the same, bit for bit, in stacks of 1, 2, 7 and 64, in another order, with threads, deaths,
@@ -53,7 +51,6 @@ def check_plugin(cls: type[Plugin], *, companions: Sequence[Any] | None = None, 
         )
     before = class_values(cls)
     check_declarations(cls)
-    check_grade(cls)
     plugin = cls(**params)
     for number, variant in enumerate([plugin, *_variants(plugin)]):
         try:

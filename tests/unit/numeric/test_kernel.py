@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tussle.numeric import atan2, store
-from tussle.numeric.fingerprint import Fingerprint, libm_names
+from tussle.numeric import store
+from tussle.numeric.fingerprint import Fingerprint
 from tussle.numeric.kernel import built, device, kernel, stats
 
 GAIN = 2.0
@@ -270,25 +270,6 @@ def test_object_that_cannot_be_described_is_reported():
 
     assert Fingerprint(f).opaque
     assert not Fingerprint(scaled.py_func).opaque
-
-
-def test_libm_is_found_through_callees():
-    import math
-
-    def sine(x):
-        return math.sin(x)
-
-    def caller(x):
-        return sine(x) + math.sqrt(x)
-
-    assert libm_names(caller)
-    assert libm_names(device(caller))
-    assert libm_names(np.exp)
-    assert libm_names(lambda x, y: x**y)
-    assert libm_names(caller) == ["math.sin"]
-    assert not libm_names(lambda y, x: atan2(y, x) + math.sqrt(x))
-    assert not libm_names(scaled)
-    assert not libm_names(lambda x: x**2 + math.sqrt(x) + np.floor(x) + math.pi)
 
 
 def test_global_redefined_at_the_prompt_is_seen_by_new_kernels(own_cache):
