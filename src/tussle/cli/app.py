@@ -10,6 +10,7 @@ import typer
 import tussle
 from tussle.cli.analyze import analyze
 from tussle.cli.batch_commands import batch
+from tussle.cli.doctor import doctor
 from tussle.cli.export import ExportCommand, export
 from tussle.cli.optimize import optimize
 from tussle.cli.options import (
@@ -283,7 +284,7 @@ def new(
 
 
 app.command(epilog=EPILOG, cls=ExportCommand)(export)
-for command in (view, replay, plot, batch, analyze, report, optimize):
+for command in (view, replay, plot, batch, analyze, report, optimize, doctor):
     app.command(epilog=EPILOG)(command)
 
 

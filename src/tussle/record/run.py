@@ -169,7 +169,12 @@ def load_run(path: str | Path, frames: str = "") -> Run:
         )
     place = Path(path)
     if not any((place / name).exists() for name in FILES):
-        raise RecordError(
-            f"{place}: no run has been recorded there; {'it is a file' if place.is_file() else listed(FILES)}"
+        reason = (
+            "the path does not exist"
+            if not place.exists()
+            else "it is a file"
+            if place.is_file()
+            else listed(FILES)
         )
+        raise RecordError(f"{place}: no run has been recorded there; {reason}")
     return Run(place, frames)
