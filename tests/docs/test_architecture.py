@@ -1,0 +1,23 @@
+"""The map of the code names what is there."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+TEXT = (ROOT / "docs/architecture.md").read_text()
+
+
+def test_every_file_and_folder_that_it_names_exists():
+    named = set(re.findall(r"(?:src|tests)/[\w/.]+", TEXT))
+    named |= {
+        f"src/tussle/{name}" for name in re.findall(r"(?<![\w/])(?:engine|api|stock|numeric)/[\w./]+", TEXT)
+    }
+    assert len(named) > 20
+    assert not [name for name in named if not (ROOT / name.rstrip(".")).exists()]
+
+
+def test_every_package_is_on_it():
+    packages = {path.parent.name for path in (ROOT / "src/tussle").glob("*/__init__.py")}
+    assert not [name for name in packages if f"| `{name}` |" not in TEXT]
