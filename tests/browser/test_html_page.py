@@ -391,7 +391,7 @@ def test_a_run_that_was_cut_short_says_so(watched, tmp_path):
     page = opened(watched, write_html(Recording(run), tmp_path / "page.html").path)
     assert "cut short" in page.locator("#notice").inner_text()
     page.locator("#notice").click()
-    assert "run.json is not there" in page.locator("#info .notes").inner_text()
+    assert "run.json is missing" in page.locator("#info .notes").inner_text()
 
 
 HARBOUR = """<?xml version="1.0"?>

@@ -10,8 +10,8 @@ from tussle.api.bodies import Bodies
 from tussle.api.context import Context
 from tussle.api.world import WorldView
 from tussle.messages import EntityCaptured, EntityCollided, EntityHitGround, Message
-from tussle.record import Happenings
-from tussle.record.happenings import BIRTH, CAPTURE, COLLISION, DEATH, END
+from tussle.record import Events as Happenings
+from tussle.record.events import BIRTH, CAPTURE, COLLISION, DEATH, END
 
 TOLD: dict[type[Message], tuple[str, str, str, str]] = {
     EntityCaptured: (CAPTURE, "source", "target", ""),

@@ -1,12 +1,12 @@
-"""What a run leaves behind: the run directory, its loading, the state hash, and first states for another run.
+"""Recording of runs: the run directory, its loading, the state hash, and first states for another run.
 
-All that needs Arrow is loaded when it is first asked for, so that playing without recording does not wait for it.
+Modules that need Arrow are imported on first use, so that a simulation without recording does not load it.
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from tussle.record.happenings import Happenings
+from tussle.record.events import Events
 from tussle.record.state_hash import hash_columns
 
 if TYPE_CHECKING:
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from tussle.record.recorder import Recorder
     from tussle.record.run import Run, load_run
 
-__all__ = ["FirstStates", "Happenings", "Recorder", "Run", "hash_columns", "load_run", "read_table"]
+__all__ = ["Events", "FirstStates", "Recorder", "Run", "hash_columns", "load_run", "read_table"]
 
 _LAZY = {
     "FirstStates": "first_states",

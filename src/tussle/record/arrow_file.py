@@ -1,4 +1,4 @@
-"""Reads Arrow streams that anybody may have written: what a message says of its size is compared with the file before it is believed."""
+"""Reader for untrusted Arrow streams: the sizes that a message declares are checked against the file before Arrow reads it."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from tussle.errors import TussleError
 from tussle.record.table_values import Rules, check_values
 
 MOST_HEAD = 1 << 24
-"""Bytes of what a message says of itself."""
+"""Maximum size of a message's metadata [B]."""
 MOST_BODY = 1 << 29
-"""Bytes of the rows of a message; tussle writes some 5 MB at a time."""
+"""Maximum size of a message's body [B]; tussle writes about 5 MB at a time."""
 MOST_WORDS = 1 << 26
-"""Bytes of a batch's column that counts in words, were each written out, and the longest in all rows: names take some 2 MB."""
+"""Maximum size of a dictionary column if every row held its longest entry [B]; block names take about 2 MB."""
 DICTIONARY, BATCH = 2, 3
-"""Kinds of messages that have a body, in Arrow's Message.fbs."""
+"""Message types with a body, from Arrow's Message.fbs."""
 
 
-class _LyingError(Exception):
-    """A message says what cannot be."""
+class _InvalidStreamError(Exception):
+    """The stream is not one that tussle writes, or its metadata is inconsistent."""
 
 
 def read_batches(
@@ -35,26 +35,26 @@ def read_batches(
     schema: pa.Schema | None = None,
     rules: Rules | None = None,
 ) -> Iterator[pa.RecordBatch]:
-    """All whole batches of a file, one after another; what is missing of it is added to `notes`.
+    """Yield the complete batches of a file, in order.
 
     Args:
         path: The file.
-        notes: Receives what is missing.
-        error: What is raised.
-        schema: The columns that it must have; None for any.
-        rules: What their values may be.
+        notes: Receives a line for each part that is missing.
+        error: Class of the errors that are raised.
+        schema: Required columns; None for any.
+        rules: Allowed values by column.
 
     Raises:
-        TussleError: It is no regular file, has other columns, is compressed, or a batch does not hold what it says.
+        TussleError: As `error`: the file is not a regular file, has other columns, is compressed, or a batch is invalid.
     """
     if not path.exists():
-        notes.append(f"{path.name} is not there")
+        notes.append(f"{path.name} is missing")
         return
     n = 0
     try:
-        end, cut = _whole(path)
+        end, is_truncated = _complete_part(path)
         if not end:
-            notes.append(f"{path.name} is cut before its first batch")
+            notes.append(f"{path.name} is truncated before its first batch")
             return
         with pa.OSFile(str(path), "rb") as file, pa.ipc.open_stream(file.get_stream(0, end)) as reader:
             if schema is not None:
@@ -66,10 +66,10 @@ def read_batches(
                 check_values(zip(batch.schema.names, batch.columns, strict=True), rules or {}, path, error)
                 n += 1
                 yield batch
-    except (_LyingError, pa.ArrowException, OSError, ValueError) as reason:
+    except (_InvalidStreamError, pa.ArrowException, OSError, ValueError) as reason:
         raise error(f"{path}: cannot be read: {reason}") from None
-    if cut:
-        notes.append(f"{path.name} is cut after {n} whole batches")
+    if is_truncated:
+        notes.append(f"{path.name} is truncated after {n} complete batches")
 
 
 def _next(reader: pa.RecordBatchReader) -> pa.RecordBatch | None:
@@ -80,45 +80,45 @@ def _next(reader: pa.RecordBatchReader) -> pa.RecordBatch | None:
 
 
 def same_columns(found: pa.Schema, wanted: pa.Schema) -> str:
-    """Which column of a schema is another one, or missing; "" for none."""
+    """Describe the first column that is missing or has another type; "" if there is none."""
     types = dict(zip(found.names, found.types, strict=True))
     wrong = [column for column in wanted if types.get(column.name) != column.type]
     return f"it has no column {wrong[0].name!r} of {wrong[0].type}" if wrong else ""
 
 
 def _check_schema(found: pa.Schema, wanted: pa.Schema) -> None:
-    said = same_columns(found, wanted)
-    if not said and found.names != wanted.names:
-        said = "it has other columns than a table of tussle"
-    if said:
-        raise _LyingError(said)
+    difference = same_columns(found, wanted)
+    if not difference and found.names != wanted.names:
+        difference = "it has other columns than a table of tussle"
+    if difference:
+        raise _InvalidStreamError(difference)
 
 
 def _check_batch(batch: pa.RecordBatch) -> None:
-    """See that offsets, numbers of words and texts are those of the batch."""
+    """Check that a batch is valid, has no nulls where none are allowed, and stays small when its dictionaries are decoded."""
     batch.validate(full=True)
     for field, column in zip(batch.schema, batch.columns, strict=True):
         if not field.nullable and column.null_count:
-            raise _LyingError(f"column {field.name!r} lacks values")
+            raise _InvalidStreamError(f"column {field.name!r} has nulls")
         if pa.types.is_dictionary(column.type):
             column.dictionary.validate(full=True)
             longest = pc.max(pc.binary_length(column.dictionary)).as_py() or 0
             if longest * len(column) > MOST_WORDS:
-                raise _LyingError(
-                    f"column {field.name!r} holds a word of {longest:,} bytes in {len(column):,} rows, "
-                    f"which may be {MOST_WORDS:,} bytes in all"
+                raise _InvalidStreamError(
+                    f"column {field.name!r} has {len(column):,} rows and a text of {longest:,} bytes; "
+                    f"the limit of their product is {MOST_WORDS:,} bytes"
                 )
 
 
 # -- messages -----------------------------------------------------------------------------------------------------------------
 
 
-def _whole(path: Path) -> tuple[int, bool]:
-    """Where the last whole message ends, and whether a part of another is behind it.
+def _complete_part(path: Path) -> tuple[int, bool]:
+    """End of the last complete message [B], and whether a part of another message follows.
 
     Raises:
-        OSError: It is no regular file.
-        _LyingError: A message says what cannot be.
+        OSError: It is not a regular file.
+        _InvalidStreamError: A message's metadata is invalid.
     """
     size, end = size_of(path), 0
     with path.open("rb") as file:
@@ -129,29 +129,29 @@ def _whole(path: Path) -> tuple[int, bool]:
             mark, length = struct.unpack("<Ii", head)
             if mark != 0xFFFFFFFF:
                 if not end:
-                    raise _LyingError("this is no stream of Arrow's format")
+                    raise _InvalidStreamError("it is not an Arrow stream")
                 return end, True
             if length == 0:
                 return end + 8, False
             if not 0 < length <= MOST_HEAD or end + 8 + length > size:
-                return _refused_or_cut(end, length, MOST_HEAD)
+                return _refused_or_truncated(end, length, MOST_HEAD)
             body = _body(file, length)
             if body > MOST_BODY or end + 8 + length + body > size:
-                return _refused_or_cut(end, body, MOST_BODY)
+                return _refused_or_truncated(end, body, MOST_BODY)
             end += 8 + length + body
             file.seek(end)
 
 
-def _refused_or_cut(end: int, length: int, most: int) -> tuple[int, bool]:
+def _refused_or_truncated(end: int, length: int, most: int) -> tuple[int, bool]:
     if not 0 <= length <= most:
-        raise _LyingError(f"a message says that it has {length:,} bytes; allowed are {most:,}")
+        raise _InvalidStreamError(f"a message declares {length:,} bytes; the limit is {most:,}")
     return end, True
 
 
 def _body(file: BinaryIO, length: int) -> int:
-    """Bytes of a message's body, after the sizes that it names have been checked.
+    """Size of a message's body [B]; checks the sizes that the metadata declares.
 
-    The offsets are those of FlatBuffers: a table begins with the way back to the list of where its fields are.
+    The metadata is a FlatBuffer: a table begins with the offset back to its vtable, which holds the offsets of its fields.
     """
     data = file.read(length)
     try:
@@ -168,24 +168,24 @@ def _body(file: BinaryIO, length: int) -> int:
                 header = place + _u32(data, place)
             _check_rows(data, header, body)
     except (struct.error, IndexError):
-        raise _LyingError("what a message says of itself is damaged") from None
+        raise _InvalidStreamError("the metadata of a message is damaged") from None
     if body < 0:
-        raise _LyingError(f"a message says that it has {body:,} bytes")
+        raise _InvalidStreamError(f"a message declares {body:,} bytes")
     return body
 
 
 def _check_rows(data: bytes, header: int, body: int) -> None:
-    """See that a batch is not compressed, and has no more rows than bits."""
+    """Check that a batch is not compressed, and that its body has at least one bit per row."""
     place = _field(data, header, 0)
     rows = struct.unpack_from("<q", data, place)[0] if place else 0
     if _field(data, header, 3):
-        raise _LyingError("it is compressed, which tables of tussle are not")
+        raise _InvalidStreamError("it is compressed, which is not supported")
     if not 0 <= rows <= 8 * body:
-        raise _LyingError(f"a batch of {body:,} bytes says that it has {rows:,} rows")
+        raise _InvalidStreamError(f"a batch of {body:,} bytes declares {rows:,} rows")
 
 
 def _field(data: bytes, table: int, number: int) -> int:
-    """Where a field of a table lies; 0 where the table does not have it."""
+    """Position of a table's field; 0 if the table does not have it."""
     fields = table - struct.unpack_from("<i", data, table)[0]
     at = 4 + 2 * number
     if fields < 0 or table < 0:

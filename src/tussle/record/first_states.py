@@ -1,4 +1,4 @@
-"""First states of the entities of a recorded run, from which another run can start."""
+"""First states of the entities of a recorded run, for starting another run from them."""
 
 from __future__ import annotations
 
@@ -25,15 +25,17 @@ SUFFIXES = (".arrow", ".parquet", ".csv", ".csv.gz")
 
 @dataclass(frozen=True)
 class FirstStates:
-    """Who enters a game when and where, ordered by (t, id).
+    """Birth times and first states of entities, ordered by (t, id).
 
     Attributes:
         t: Time of birth [s], (m,).
-        id: (m,), unique.
-        pos: [m], (3, m); quat (4, m); vel [m/s], (3, m); world frame.
-        team: (m,); None where the table has no such column.
-        block: Names; None where the table has no such column.
-        source: Where it is from, for messages.
+        id: Entity ids, unique, (m,).
+        pos: Position [m], (3, m), world frame.
+        quat: Attitude, body to world, (4, m).
+        vel: Ground velocity [m/s], (3, m), world frame.
+        team: Team numbers, (m,); None if the table has no such column.
+        block: Block names; None if the table has no such column.
+        source: File name, for messages.
     """
 
     t: np.ndarray
@@ -51,35 +53,35 @@ class FirstStates:
         for name, shape in shapes.items():
             values = np.asarray(getattr(self, name), float)
             if values.shape != shape:
-                raise ParameterError(f"{self.source}: {name} has shape {values.shape}; needed is {shape}")
+                raise ParameterError(f"{self.source}: {name} has shape {values.shape}; expected {shape}")
             wrong = ~np.isfinite(np.atleast_2d(values)).all(axis=0)
             if wrong.any():
                 raise ParameterError(f"{self.source}: {name} of entity {self.id[wrong][0]} is not finite")
         length = np.sqrt((self.quat**2).sum(axis=0))
-        wrong = np.abs(length - 1.0) > 1e-6  # a table in plain text rounds, but not more than this
+        wrong = np.abs(length - 1.0) > 1e-6  # a text table rounds, but less than this
         if wrong.any():
             raise ParameterError(
                 f"{self.source}: the quaternion of entity {self.id[wrong][0]} has length {length[wrong][0]:g}, not 1"
             )
         if len(np.unique(self.id)) < m or (m and self.id.min() < 1):
-            raise ParameterError(f"{self.source}: ids are whole numbers >= 1, each once")
+            raise ParameterError(f"{self.source}: ids must be unique integers >= 1")
 
     def __len__(self) -> int:
         return len(self.id)
 
 
 def read_table(path: str | Path, *, world: int = 0) -> FirstStates:
-    """First row of each entity in a recorded table.
+    """Read the first row of each entity in a recorded table.
 
-    The table has columns id, x y z [m], qw qx qy qz, vx vy vz [m/s] and t (or time) [s]; team, block and world where there are such.
+    The table has columns id, x y z [m], qw qx qy qz, vx vy vz [m/s] and t (or time) [s]; team, block and world are optional.
 
     Args:
-        path: A run directory, or a file: Arrow stream, Parquet, or CSV, compressed or not.
-        world: Which world of a stack.
+        path: A run directory, or a file: Arrow stream, Parquet, CSV or gzipped CSV.
+        world: Number of the world in its stack.
 
     Raises:
         RecordError: The file cannot be read, or lacks a column.
-        ParameterError: Its states cannot be first states.
+        ParameterError: A state is not finite, a quaternion is not of length 1, or an id is not allowed.
     """
     place = Path(path)
     place = place / TRAJECTORY_FILE if place.is_dir() else place
@@ -106,7 +108,7 @@ def read_table(path: str | Path, *, world: int = 0) -> FirstStates:
     team = _whole(place, table, "team")[rows] if "team" in table.column_names else None
     block = tuple(table["block"].take(rows).to_pylist()) if "block" in table.column_names else None
     if block is not None and not all(isinstance(name, str) for name in block):
-        raise RecordError(f"{place}: column 'block' holds something other than names")
+        raise RecordError(f"{place}: column 'block' must hold names")
     return FirstStates(t[rows], ids[rows], take(*POS), take(*QUAT), take(*VEL), team, block, str(place))
 
 
@@ -114,15 +116,13 @@ def _numbers(place: Path, table: pa.Table, name: str) -> np.ndarray:
     try:
         return np.asarray(table[name].to_numpy(), float)
     except (ValueError, TypeError):
-        raise RecordError(f"{place}: column {name!r} holds something other than numbers") from None
+        raise RecordError(f"{place}: column {name!r} must hold numbers") from None
 
 
 def _whole(place: Path, table: pa.Table, name: str) -> np.ndarray:
     numbers = _numbers(place, table, name)
-    if not (np.abs(numbers) < 2**31).all():  # what is no number is not either
-        raise RecordError(
-            f"{place}: column {name!r} holds something other than whole numbers from -2^31 to 2^31"
-        )
+    if not (np.abs(numbers) < 2**31).all():  # false for NaN too
+        raise RecordError(f"{place}: column {name!r} must hold integers between -2^31 and 2^31")
     return numbers.astype(np.int64)
 
 
@@ -130,34 +130,34 @@ def _read(place: Path) -> pa.Table:
     name = place.name.lower()
     if not name.endswith(SUFFIXES):
         raise RecordError(
-            f"{place}: a table to start from is a run directory or ends in {', '.join(SUFFIXES)}"
+            f"{place}: a table to start from must be a run directory or a file ending in {', '.join(SUFFIXES)}"
         )
     if not place.exists():
         raise RecordError(f"{place}: there is no such file")
     try:
-        if name.endswith(".arrow"):  # of a run that was cut, the first states may well be there
+        if name.endswith(".arrow"):  # a truncated table may hold all first states
             batches = list(read_batches(place, [], RecordError))
             return _columns(pa.Table.from_batches(batches, None if batches else TRAJECTORY))
         if name.endswith(".parquet"):
             return read_parquet(place, pa.schema([]), RecordError, READ)
         most = MARGIN + MOST_EXPANSION * size_of(place)
-        return _columns(pyarrow.csv.read_csv(_unpacked(place, most) if name.endswith(".gz") else place))
+        return _columns(pyarrow.csv.read_csv(_decompressed(place, most) if name.endswith(".gz") else place))
     except (pa.ArrowException, OSError, ValueError) as error:
         raise RecordError(f"{place}: cannot be read: {error}") from error
 
 
-def _unpacked(place: Path, most: int) -> pa.BufferReader:
-    """The text of a compressed file.
+def _decompressed(place: Path, most: int) -> pa.BufferReader:
+    """The decompressed content of a file.
 
     Raises:
-        OSError: It is longer than `most` bytes.
+        OSError: It is larger than `most` bytes.
     """
     parts: list[bytes] = []
     with pa.input_stream(str(place)) as file:
         while sum(map(len, parts)) <= most and (part := file.read(MARGIN)):
             parts.append(part)
     if sum(map(len, parts)) > most:
-        raise OSError(f"unpacked it takes more than {most:,} bytes")
+        raise OSError(f"its decompressed size exceeds the limit of {most:,} bytes")
     return pa.BufferReader(b"".join(parts))
 
 

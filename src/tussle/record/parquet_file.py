@@ -1,4 +1,4 @@
-"""Reads Parquet tables that anybody may have written: what a table says it takes in memory is bounded by the size of its file."""
+"""Reader for untrusted Parquet tables: the memory that a table takes is bounded by the size of its file."""
 
 from __future__ import annotations
 
@@ -15,12 +15,13 @@ from tussle.record.arrow_file import same_columns
 from tussle.record.parquet_sizes import Sizes, sizes_of
 
 MOST_EXPANSION = 1000
-"""Bytes in memory for each byte of a table's file, besides those that any table may take. In the results of a batch all that is of a run
-stands in each of its rows, which Parquet packs a hundred times smaller; a file that is a bomb goes to some millions."""
+"""Maximum memory for each byte of a file, in addition to MARGIN. The results of a batch repeat a run's values in each of its rows,
+which Parquet compresses about a hundredfold; a decompression bomb reaches millions."""
 MARGIN = 1 << 26
+"""Memory that any table may take [B]."""
 MOST_COLUMNS = 10_000
 AT_ONCE = 65_536
-"""Rows that are unpacked before their size is looked at."""
+"""Rows that are decoded before their size is checked."""
 
 
 def read_parquet(
@@ -30,50 +31,51 @@ def read_parquet(
     only: Collection[str] | None = None,
     most_rows: int = 2**40,
 ) -> pa.Table:
-    """A table.
+    """Read a table.
 
     Args:
         path: The file.
-        wanted: Columns that it has at least.
-        error: What is raised.
-        only: Columns that are read, so far as they are there; None for all.
-        most_rows: Rows that it may have.
+        wanted: Required columns.
+        error: Class of the errors that are raised.
+        only: Names of the columns to read, if present; None for all.
+        most_rows: Maximum number of rows.
 
     Raises:
-        TussleError: It is no regular file, no such table, damaged, or takes far more memory than its size lets expect.
+        TussleError: As `error`: the file is not a regular file, is not such a table, is damaged, or takes too much memory for its
+            size.
     """
     try:
         size = size_of(path)
         most = MARGIN + MOST_EXPANSION * size
         with path.open("rb") as opened:
             sizes = sizes_of(opened, size)
-        if said := _too_large(sizes, most, most_rows):
-            raise error(f"{path}: {said}")
+        if problem := _too_large(sizes, most, most_rows):
+            raise error(f"{path}: {problem}")
         with pq.ParquetFile(path) as file:
             schema = file.schema_arrow
-        if said := same_columns(schema, wanted):
-            raise error(f"{path}: is another table; {said}")
+        if difference := same_columns(schema, wanted):
+            raise error(f"{path}: is another table; {difference}")
         names = [name for name in schema.names if only is None or name in only]
-        if said := _against(schema, names):
-            raise error(f"{path}: {said}")
+        if problem := _columns_problem(schema, names):
+            raise error(f"{path}: {problem}")
         texts = [name for name in names if _is_text(schema.field(name).type)]
         with pq.ParquetFile(path, read_dictionary=texts, page_checksum_verification=True) as file:
-            return _unpacked(file, pa.schema([schema.field(name) for name in names]), most)
+            return _decoded(file, pa.schema([schema.field(name) for name in names]), most)
     except (OSError, ValueError, TypeError, KeyError, pa.ArrowException) as reason:
         raise error(f"{path}: cannot be read: {reason}") from None
 
 
-def _against(schema: pa.Schema, names: list[str]) -> str:
-    """What is wrong with the columns; "" for nothing."""
+def _columns_problem(schema: pa.Schema, names: list[str]) -> str:
+    """Describe what is wrong with the columns; "" if nothing is."""
     if len(schema) > MOST_COLUMNS or len(set(schema.names)) < len(schema):
-        return f"it has {len(schema):,} columns; allowed are {MOST_COLUMNS:,}, each with a name of its own"
-    odd = [schema.field(name) for name in names if not _is_plain(schema.field(name).type)]
-    return f"column {odd[0].name!r} holds {odd[0].type}, which is not read" if odd else ""
+        return f"it has {len(schema):,} columns; at most {MOST_COLUMNS:,} with unique names are allowed"
+    other = [schema.field(name) for name in names if not _is_supported(schema.field(name).type)]
+    return f"column {other[0].name!r} has type {other[0].type}, which is not supported" if other else ""
 
 
-def _is_plain(kind: pa.DataType) -> bool:
-    is_packed, is_list = pa.types.is_dictionary(kind), kind == pa.list_(pa.float64())
-    inner = kind.value_type if is_packed else kind
+def _is_supported(kind: pa.DataType) -> bool:
+    is_encoded, is_list = pa.types.is_dictionary(kind), kind == pa.list_(pa.float64())
+    inner = kind.value_type if is_encoded else kind
     is_number = pa.types.is_integer(inner) or pa.types.is_floating(inner) or pa.types.is_boolean(inner)
     return is_list or is_number or _is_text(inner)
 
@@ -83,21 +85,21 @@ def _is_text(kind: pa.DataType) -> bool:
 
 
 def _too_large(sizes: Sizes, most: int, most_rows: int) -> str:
-    """What is wrong with the sizes that a file names; "" for nothing."""
+    """Describe the size that exceeds its limit; "" if none does."""
     if not 0 <= sizes.rows <= most_rows:
-        return f"it has {sizes.rows:,} rows; allowed are {most_rows:,}"
+        return f"it has {sizes.rows:,} rows; the limit is {most_rows:,}"
     if sizes.largest > MARGIN:
-        return f"it has a page of {sizes.largest:,} bytes; allowed are {MARGIN:,}"
+        return f"it has a page of {sizes.largest:,} bytes; the limit is {MARGIN:,}"
     n_bytes = max(8 * sizes.rows, 8 * sizes.values, sizes.bytes)
     return (
         ""
         if n_bytes <= most
-        else f"unpacked it takes {n_bytes:,} bytes; a file of its size may take {most:,}"
+        else f"it takes {n_bytes:,} bytes in memory; the limit for a file of its size is {most:,}"
     )
 
 
-def _unpacked(file: pq.ParquetFile, schema: pa.Schema, most: int) -> pa.Table:
-    """The rows of a table, some at a time; texts stay packed until it is known how long they are.
+def _decoded(file: pq.ParquetFile, schema: pa.Schema, most: int) -> pa.Table:
+    """Decode the rows in batches; texts stay dictionary-encoded until their size is known.
 
     Raises:
         ValueError: They take too much memory.
@@ -107,14 +109,14 @@ def _unpacked(file: pq.ParquetFile, schema: pa.Schema, most: int) -> pa.Table:
         batch.validate(full=True)
         left -= sum(_length(column) for column in batch.columns)
         if left < 0:
-            raise ValueError(f"unpacked it takes more than {most:,} bytes")
+            raise ValueError(f"it takes more than {most:,} bytes in memory")
         columns = [column.cast(field.type) for column, field in zip(batch.columns, schema, strict=True)]
         batches.append(pa.RecordBatch.from_arrays(columns, schema=schema))
     return pa.Table.from_batches(batches, schema).combine_chunks()
 
 
 def _length(column: pa.Array) -> int:
-    """Bytes of a column once it is unpacked."""
+    """Size of a decoded column [B]."""
     if not pa.types.is_dictionary(column.type):
         return int(column.nbytes)
     lengths = pc.binary_length(column.dictionary).take(column.indices)

@@ -1,7 +1,7 @@
-"""The sizes that a Parquet file names, before Arrow reads it.
+"""The sizes that a Parquet file declares, read before Arrow opens it.
 
-Arrow takes as much memory as a page says that it needs, and ends the process where it is asked for the sizes of a damaged footer. The
-numbers of fields are those of parquet.thrift (Apache Parquet 2.9), written in Thrift's compact protocol.
+Arrow allocates as much memory as a page declares, and aborts the process on the sizes of a damaged footer. The field numbers are
+those of parquet.thrift (Apache Parquet 2.9), encoded in Thrift's compact protocol.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any, BinaryIO
 MOST_FOOTER = 1 << 22
 MOST_PAGES = 300_000
 MOST_HEAD = 1 << 16
-"""Bytes of what a page says of itself."""
+"""Maximum size of a page header [B]."""
 MOST_DEPTH = 16
 TRUE, FALSE, BYTE, DOUBLE, BINARY, LIST, SET, STRUCT = 1, 2, 3, 7, 8, 9, 10, 12
 ROWS, GROUPS = 3, 4
@@ -26,13 +26,13 @@ PAGE_SIZE, PAGE_PACKED, PAGE_KINDS, PAGE_VALUES = 2, 3, (5, 7, 8), 1
 
 @dataclass
 class Sizes:
-    """What a file says that it takes.
+    """Sizes that a file declares.
 
     Attributes:
-        rows: Rows of the table, and of its groups together, whichever is more.
-        values: Values of the column that has most.
-        bytes: Of all pages, unpacked.
-        largest: Bytes of the largest page, unpacked.
+        rows: Rows of the table, or of its row groups together if these are more.
+        values: Values of the column that has the most.
+        bytes: Decompressed size of all pages [B].
+        largest: Decompressed size of the largest page [B].
     """
 
     rows: int
@@ -42,20 +42,20 @@ class Sizes:
 
 
 def sizes_of(file: BinaryIO, size: int) -> Sizes:
-    """The sizes that a file names.
+    """Read the sizes that a file declares.
 
     Args:
         file: The file.
-        size: Its length [B].
+        size: Its size [B].
 
     Raises:
-        ValueError: It is no Parquet file, or is damaged.
+        ValueError: It is not a Parquet file, or is damaged.
     """
     try:
         file.seek(max(0, size - 8))
         length, mark = struct.unpack("<I4s", file.read(8))
         if mark != b"PAR1" or not 0 < length <= min(MOST_FOOTER, size - 8):
-            raise ValueError("this is no Parquet file")
+            raise ValueError("it is not a Parquet file")
         file.seek(size - 8 - length)
         footer, _ = _value(STRUCT, file.read(length), 0, 0)
         groups = footer.get(GROUPS, [])
@@ -72,25 +72,25 @@ def sizes_of(file: BinaryIO, size: int) -> Sizes:
                     found.bytes, found.largest = found.bytes + page, max(found.largest, page)
         found.values = max(values.values(), default=0)
     except (struct.error, LookupError, TypeError, AttributeError, OverflowError) as error:
-        raise ValueError(f"what it says of its sizes is damaged ({type(error).__name__})") from None
+        raise ValueError(f"its metadata is damaged ({type(error).__name__})") from None
     return found
 
 
 def _pages(file: BinaryIO, column: dict[int, Any], size: int) -> Iterator[tuple[int, int]]:
-    """Values of each page of a column, and its bytes unpacked."""
+    """Number of values and decompressed size [B] of each page of a column."""
     about = column[ABOUT]
-    if about[VALUES] == 0:  # Arrow reads no page then, and writes no places
+    if about[VALUES] == 0:  # Arrow writes no offsets then, and reads no page
         return
     at = min(about[DATA_AT], about.get(DICTIONARY_AT) or about[DATA_AT])
     end = at + about[PACKED]
     if ELSEWHERE in column or not 0 < at < end <= size:
-        raise ValueError("a column lies outside of the file")
+        raise ValueError("a column lies outside the file")
     while at < end:
         file.seek(at)
         page, length = _value(STRUCT, file.read(min(MOST_HEAD, end - at)), 0, 0)
         n = max((page[kind][PAGE_VALUES] for kind in PAGE_KINDS if kind in page), default=0)
         if min(n, page[PAGE_SIZE], page[PAGE_PACKED]) < 0:
-            raise ValueError("a page says that it has less than nothing")
+            raise ValueError("a page declares a negative size")
         yield n, page[PAGE_SIZE]
         at += length + page[PAGE_PACKED]
 
@@ -99,9 +99,9 @@ def _pages(file: BinaryIO, column: dict[int, Any], size: int) -> Iterator[tuple[
 
 
 def _value(kind: int, data: bytes, at: int, depth: int) -> tuple[Any, int]:
-    """A value, and where the next one begins; of a struct its fields by number."""
+    """Decode a value; also return the position behind it. A struct is a dict from field numbers to values."""
     if depth > MOST_DEPTH:
-        raise ValueError("what it says of its sizes is nested too deep")
+        raise ValueError("its metadata is nested too deeply")
     if kind == BYTE:
         return data[at], at + 1
     if kind == DOUBLE:
@@ -118,7 +118,7 @@ def _value(kind: int, data: bytes, at: int, depth: int) -> tuple[Any, int]:
     if kind in (4, 5, 6):
         number, at = _varint(data, at)
         return (number >> 1) ^ -(number & 1), at
-    raise ValueError(f"what it says of its sizes is damaged (a field of kind {kind})")
+    raise ValueError(f"its metadata is damaged (a field of type {kind})")
 
 
 def _struct(data: bytes, at: int, depth: int) -> tuple[dict[int, Any], int]:
@@ -140,8 +140,8 @@ def _list(data: bytes, at: int, depth: int) -> tuple[list[Any], int]:
     if n == 15:
         n, at = _varint(data, at)
     kind = head & 15
-    if n > len(data) - at:  # each takes a byte at least
-        raise ValueError("a list says that it is longer than the file")
+    if n > len(data) - at:  # each item takes at least a byte
+        raise ValueError("a list declares more items than the file has bytes")
     found = []
     for _ in range(n):
         item, at = _value(BYTE if kind in (TRUE, FALSE) else kind, data, at, depth + 1)

@@ -1,4 +1,4 @@
-"""Records a simulation into a run directory while it plays."""
+"""Records a simulation into a run directory while it runs."""
 
 from __future__ import annotations
 
@@ -11,17 +11,16 @@ from typing import Any, Protocol, Self
 import numpy as np
 import pyarrow as pa
 
-from tussle.api.bodies import Bodies
 from tussle.errors import ParameterError, RecordError
 from tussle.record import run_file
-from tussle.record.happenings import BIRTH, END, Happenings
+from tussle.record.events import BIRTH, END, Events
 from tussle.record.row_buffer import RowBuffer, Rows
 from tussle.record.schema import EVENTS, EVENTS_FILE, FILES, MISSION_FILE, TRAJECTORY, TRAJECTORY_FILE
 from tussle.record.stream import Stream
 
 
 class Recorded(Protocol):
-    """What the recorder asks of a simulation; the engine stands above this package and is not imported here."""
+    """The part of a simulation that the recorder uses. The engine is a higher layer, so its class cannot be imported here."""
 
     mission: Any
     n_worlds: int
@@ -36,22 +35,22 @@ class Recorded(Protocol):
 
 
 class Recorder:
-    """Writes what happens in a simulation into a directory, from now until it is closed.
+    """Records states and events of a simulation into a directory, until it is closed.
 
-    What has been flushed is with the operating system: killing the process loses at most what came after. The state of each recorded
-    step is that of its beginning; the last state of each world is always recorded. `run.json` is written last.
+    Flushed data is with the operating system: killing the process loses at most what was recorded since the last flush. The state
+    of a step is recorded at its beginning; the last state of each world is always recorded. `run.json` is written last.
 
     Args:
-        sim: The simulation; it is recorded from its present state on.
-        directory: Made if need be; holds no run yet.
+        sim: The simulation; recording starts with its present state.
+        directory: Run directory; created if it does not exist. It must not hold a run.
         period: Time between recorded states [s]; None records every step.
-        mission_text: Mission file with all its values, to be kept as `mission.xml`.
-        parameters: What was set beside the mission, for `run.json`.
+        mission_text: Mission file with all its values, saved as `mission.xml`.
+        parameters: Values that were set in addition to the mission, for `run.json`.
         flush_every: Wall time between flushes [s].
 
     Raises:
         RecordError: The directory holds a run, or cannot be written.
-        ParameterError: A period is not allowed.
+        ParameterError: `period` or `flush_every` is not positive and finite.
     """
 
     def __init__(
@@ -74,12 +73,12 @@ class Recorder:
         self._timings = run_file.Timings()
         clock, mission = sim.state.context.clock, sim.mission
         per_step = 1 if period is None else Fraction(str(mission.dt)) / Fraction(str(period))
-        # Steps are 64 bits wide, and so is their product with what stands in the fraction.
+        # A step times the numerator or denominator must fit into 64 bits.
         least = Fraction(1, 10**9)
         self._per_step = None if per_step >= 1 else max(Fraction(per_step).limit_denominator(10**9), least)
         self._buffer = RowBuffer([b.name for b in mission.blocks], clock.start, clock.dt)
-        self._events: list[Happenings] = []
-        self._seen: np.ndarray | None = None
+        self._events: list[Events] = []
+        self._rows_source: np.ndarray | None = None
         self._rows: Rows
         self._common_step = -1
         self._steps = np.full(sim.n_worlds, -1, np.int64)
@@ -99,32 +98,30 @@ class Recorder:
                 (self.directory / MISSION_FILE).write_text(mission_text, encoding="utf-8")
         except OSError as error:
             raise RecordError(
-                f"{self.directory}: no run can be recorded there: {error.strerror or error}"
+                f"{self.directory}: cannot record a run there: {error.strerror or error}"
             ) from error
         self._trajectory = Stream(self.directory / TRAJECTORY_FILE, TRAJECTORY)
-        self._happened = Stream(self.directory / EVENTS_FILE, EVENTS)
+        self._event_stream = Stream(self.directory / EVENTS_FILE, EVENTS)
 
     def _begin(self) -> None:
-        """Attach, and tell of those who are there."""
+        """Attach to the simulation, and record the births of the entities that exist."""
         sim = self.sim
         bodies, clock = sim.state.population.bodies, sim.state.context.clock
         names = sim.state.context.block_names
         rows = Rows(bodies.ints, sim.state.running)
         world, ids, _, block = rows.columns
         nobody = np.zeros(rows.n, np.int64)
-        self._events.append(
-            Happenings(BIRTH, world, clock.step[world], ids, nobody, [names[b] for b in block])
-        )
-        # A batch without rows too: it brings the heads of the files, and a full disk shows now rather than in the game.
-        self._write(self._happened, self._take_events())
+        self._events.append(Events(BIRTH, world, clock.step[world], ids, nobody, [names[b] for b in block]))
+        # Written even without rows: this writes the file headers, so that a full disk is noticed before the game starts.
+        self._write(self._event_stream, self._take_events())
         self._write(self._trajectory, self._buffer.take())
         sim.observers.append(self._observe)
-        sim.events.listen(self._hear)
+        sim.events.listen(self._on_events)
 
-    # -- while the game is played ---------------------------------------------------------------------------------------------
+    # -- during the game ------------------------------------------------------------------------------------------------------
 
     def _observe(self, sim: Recorded) -> None:
-        """Record the beginning of a step."""
+        """Record the states at the beginning of a step, if it is due."""
         clock = sim.state.context.clock
         step = clock.common
         if step < 0:
@@ -140,14 +137,14 @@ class Recorder:
                 != ((step - 1) * due.numerator) // due.denominator
             ):
                 bodies = sim.state.population.bodies
-                if bodies.ints is not self._seen:
-                    self._seen, self._rows = bodies.ints, Rows(bodies.ints)
+                if bodies.ints is not self._rows_source:
+                    self._rows_source, self._rows = bodies.ints, Rows(bodies.ints)
                 self._add(bodies.floats, self._rows, step)
         if time.monotonic() >= self._flush_at:
             self.flush()
 
     def _observe_apart(self, sim: Recorded) -> None:
-        """Record the worlds that are due, each in a step of its own."""
+        """Record the worlds that are due, if their step numbers differ."""
         step = sim.state.context.clock.step
         last = np.maximum(self._steps, self._common_step)
         if (step <= last)[sim.state.running].any():
@@ -162,9 +159,9 @@ class Recorder:
         self._add(bodies.floats, rows, step[rows.world])
 
     def _refuse_past(self) -> None:
-        self.close("a world was begun anew, or put back to an earlier step, while it was recorded")
+        self.close("a world was reset or restored to an earlier step during the recording")
         raise RecordError(
-            f"{self.directory}: a world has been begun anew or put back to an earlier step, and a run directory holds one game per world; "
+            f"{self.directory}: a world was reset or restored to an earlier step, but a run directory holds one game per world; "
             "close the recorder before `reset` or `restore`, and make another"
         )
 
@@ -173,15 +170,13 @@ class Recorder:
             self._write(self._trajectory, self._buffer.take())
         self._buffer.add(floats, rows, step)
 
-    def _hear(self, happenings: Happenings) -> None:
-        """Take note of events; the end of a world is also its last state."""
-        self._events.append(happenings)
-        if happenings.kind == END:
-            for world, step in zip(happenings.world, happenings.step, strict=True):
-                self._add_last(self.sim.state.parked[int(world)].bodies, int(step))
-
-    def _add_last(self, bodies: Bodies, step: int) -> None:
-        self._add(bodies.floats, Rows(bodies.ints), step)
+    def _on_events(self, events: Events) -> None:
+        """Keep events; at the end of a world, also record its last state."""
+        self._events.append(events)
+        if events.kind == END:
+            for world, step in zip(events.world, events.step, strict=True):
+                bodies = self.sim.state.parked[int(world)].bodies
+                self._add(bodies.floats, Rows(bodies.ints), int(step))
 
     def _write(self, stream: Stream, batch: pa.RecordBatch) -> None:
         try:
@@ -189,14 +184,14 @@ class Recorder:
         except RecordError:
             self._detach()
             self.is_closed = True
-            for other in (self._trajectory, self._happened):
+            for other in (self._trajectory, self._event_stream):
                 other.abandon()
             raise
 
     def flush(self) -> None:
-        """Hand all that was recorded so far to the operating system."""
+        """Write everything recorded so far to the operating system."""
         if self._events:
-            self._write(self._happened, self._take_events())
+            self._write(self._event_stream, self._take_events())
         if self._buffer.n:
             self._write(self._trajectory, self._buffer.take())
         self._flush_at = time.monotonic() + self.flush_every
@@ -223,7 +218,7 @@ class Recorder:
         """Record the last states, and write the summary and `run.json`. A second call does nothing.
 
         Args:
-            interrupted: Why the game stops before it should; the run then counts as incomplete.
+            interrupted: Why the game stops early; the run then counts as incomplete.
 
         Raises:
             RecordError: The files cannot be written.
@@ -234,25 +229,25 @@ class Recorder:
         self._detach()
         sim, step = self.sim, self.sim.state.context.clock.step
         last = np.maximum(self._steps, self._common_step)
-        going_on = sim.state.running & (step > last)
-        if going_on.any():
-            rows = Rows(sim.state.population.bodies.ints, going_on)
+        unrecorded = sim.state.running & (step > last)
+        if unrecorded.any():
+            rows = Rows(sim.state.population.bodies.ints, unrecorded)
             self._add(sim.state.population.bodies.floats, rows, step[rows.world])
         self.flush()
-        for stream in (self._trajectory, self._happened):
+        for stream in (self._trajectory, self._event_stream):
             stream.close()
         run_file.write(
             self.directory,
             sim,
             self._timings,
-            [self._trajectory, self._happened],
+            [self._trajectory, self._event_stream],
             {"period": self.period, "parameters": self.parameters, "interrupted": interrupted},
         )
 
     def _detach(self) -> None:
         if self._observe in self.sim.observers:
             self.sim.observers.remove(self._observe)
-        self.sim.events.forget(self._hear)
+        self.sim.events.forget(self._on_events)
 
     def __enter__(self) -> Self:
         return self

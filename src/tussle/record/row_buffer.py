@@ -1,4 +1,4 @@
-"""Rows of the body table on their way to a file."""
+"""Buffer for rows of the body table that are written to a file."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from tussle.api.bodies import FLOATS, STORED_INTS
 from tussle.record.schema import FLOAT_COLUMNS, INT_COLUMNS, TRAJECTORY
 
 CAPACITY = 32_768
-"""Rows that are kept before a batch is written: at 5 MB, Arrow's overhead per batch is lost in the writing of it."""
+"""Rows in a batch: 5 MB, where Arrow's overhead per batch is negligible."""
 
 _FIRST = {name: sum(list(FLOATS.values())[:i]) for i, name in enumerate(FLOATS)}
 _N_STATE = FLOATS["pos"] + FLOATS["vel"] + FLOATS["quat"]
-assert (_FIRST["vel"], _FIRST["quat"]) == (3, 6), "pos, vel and quat are copied as one piece"
+assert (_FIRST["vel"], _FIRST["quat"]) == (3, 6), "pos, vel and quat are copied as one block"
 
 
 class Rows:
-    """Who is in a body table, as long as nobody comes or goes.
+    """Selected rows of a body table in the order of the file; valid until entities are added or removed.
 
     Args:
-        ints: Whole-number columns of the table, (6, n).
-        worlds: Worlds whose rows are wanted, (n_worlds,); None for all.
+        ints: Integer columns of the table, (6, n).
+        worlds: Mask of the worlds to select, (n_worlds,); None for all.
 
     Attributes:
-        order: Rows in the order (world, id), (m,); None when that is all rows as they lie.
+        order: Rows ordered by (world, id), (m,); None if these are all rows as they are stored.
         columns: INT_COLUMNS of these rows, (4, m).
         world: World of each, (m,).
     """
@@ -51,6 +51,7 @@ class RowBuffer:
         blocks: Names of the blocks, by number.
         start: Time of step 0 [s].
         dt: Length of a step [s].
+        capacity: Rows in a batch.
     """
 
     def __init__(self, blocks: Sequence[str], start: float, dt: float, capacity: int = CAPACITY) -> None:
@@ -68,12 +69,12 @@ class RowBuffer:
         return self.n + n <= self.capacity
 
     def add(self, floats: np.ndarray, rows: Rows, step: int | np.ndarray) -> None:
-        """Copy rows of a body table; the buffer is empty or has room.
+        """Copy rows of a body table. The buffer must be empty or have room.
 
         Args:
-            floats: Real columns of the table, (22, n).
-            rows: Which rows.
-            step: Step of all, or of each, (m,).
+            floats: Float columns of the table, (22, n).
+            rows: Rows to copy.
+            step: Step of all rows, or of each row, (m,).
         """
         if not self.has_room(rows.n):
             assert self.n == 0
@@ -91,16 +92,13 @@ class RowBuffer:
         self.n = last
 
     def take(self) -> pa.RecordBatch:
-        """All rows as a batch that looks into the buffer: it is to be written before the next `add`."""
+        """Empty the buffer; the returned batch is a view of it and must be written before the next `add`."""
         n = self.n
         self.n = 0
         step = self._step[:n]
         columns = dict(zip(FLOAT_COLUMNS, self._floats[:, :n], strict=True))
         columns |= dict(zip(INT_COLUMNS, self._ints[:, :n], strict=True))
-        columns |= {
-            "step": step,
-            "t": self.start + step.astype(np.int64) * self.dt,
-        }  # as the clock computes it
+        columns |= {"step": step, "t": self.start + step.astype(np.int64) * self.dt}  # as in the clock
         arrays = {name: pa.array(column) for name, column in columns.items()}
         arrays["block"] = pa.DictionaryArray.from_arrays(arrays["block"], self._blocks)
         return pa.RecordBatch.from_arrays([arrays[name] for name in TRAJECTORY.names], schema=TRAJECTORY)

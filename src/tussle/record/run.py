@@ -1,4 +1,4 @@
-"""A recorded run, as frames."""
+"""Loading of recorded runs."""
 
 from __future__ import annotations
 
@@ -45,14 +45,14 @@ SUMMARY = pyarrow.csv.ConvertOptions(
 
 
 class Run:
-    """A run directory, whole or cut.
+    """A run directory, complete or not.
 
     Args:
         path: The directory.
         frames: "pandas", "polars", or "" for the first of them that is installed.
 
     Attributes:
-        info: What `run.json` says; empty without it.
+        info: Content of `run.json`; empty if it is missing.
         notes: What is missing, one line each; empty for a complete run.
     """
 
@@ -69,14 +69,14 @@ class Run:
         path = self.path / RUN_FILE
         if not path.exists():
             self.notes.append(
-                f"{RUN_FILE} is not there: the run goes on, or was cut short; the tables hold what had been written"
+                f"{RUN_FILE} is missing: the run is still going on or was killed; the tables hold what was written"
             )
             return
         try:
             self.info = RUN.read(path)
         except RecordError as error:
             raise RecordError(
-                f"{error}; without the file, the tables are read as of a run that was cut"
+                f"{error}; if the file is removed, the tables are read as those of an incomplete run"
             ) from None
         if self.info["interrupted"]:
             self.notes.append(f"the run was interrupted: {self.info['interrupted']}")
@@ -84,19 +84,20 @@ class Run:
     def _read_table(self, name: str, schema: pa.Schema, rules: Rules) -> pa.Table:
         path, notes = self.path / name, list[str]()
         table = pa.Table.from_batches(read_batches(path, notes, RecordError, schema, rules), schema)
-        said = self.info.get("files", {}).get(name)
-        if (
-            not notes
-            and said is not None
-            and (path.stat().st_size, table.num_rows) != (said["bytes"], said["rows"])
-        ):
-            notes = [f"{name} has {table.num_rows} rows, {said['rows']} were written"]
+        written = self.info.get("files", {}).get(name)
+        if not notes and written is not None:
+            found = {"bytes": path.stat().st_size, "rows": table.num_rows}
+            notes = [
+                f"{name} has {n:,} {unit}, but {written[unit]:,} were written"
+                for unit, n in found.items()
+                if n != written[unit]
+            ]
         self.notes += notes
         return table
 
     @property
     def is_complete(self) -> bool:
-        """All that was to be played has been, and all of it is here."""
+        """Whether the run was played to its end and no part of it is missing."""
         return bool(self.info.get("is_complete")) and not self.notes
 
     @cached_property
@@ -114,11 +115,11 @@ class Run:
         """One row per world and team, as a frame.
 
         Raises:
-            RecordError: The run has none, since it did not come to its end, or it cannot be read.
+            RecordError: The summary cannot be read, or is missing because the run was not closed.
         """
         path = self.path / SUMMARY_FILE
         if not path.exists():
-            raise RecordError(f"{path} is not there: {'; '.join(self.notes) or 'it has been removed'}")
+            raise RecordError(f"{path} is missing: {'; '.join(self.notes) or 'it was removed'}")
         text = read_text(path, RecordError)
         try:
             table = pyarrow.csv.read_csv(io.BytesIO(text.encode()), convert_options=SUMMARY)
@@ -138,7 +139,7 @@ class Run:
         name = self._frames or next((f for f in FRAMES if find_spec(f)), "")
         if not name or find_spec(name) is None:
             raise MissingExtraError(
-                f"frames need {name or 'pandas or polars'}, which is not installed: pip install 'tussle[frames]' brings pandas; "
+                f"frames need {name or 'pandas or polars'}, which is not installed: pip install 'tussle[frames]' installs pandas; "
                 "`trajectory_table` and `events_table` are Arrow tables and need neither"
             )
         return import_module(name)
@@ -153,15 +154,15 @@ class Run:
 
 
 def load_run(path: str | Path, frames: str = "") -> Run:
-    """Load a run directory; a run that goes on or was killed gives what had been written.
+    """Load a run directory. Of a run that is still going on or was killed, load what was written.
 
     Args:
         path: The directory.
         frames: "pandas" or "polars"; by default the first of them that is installed.
 
     Raises:
-        RecordError: It is no run directory.
-        ParameterError: `frames` names something else.
+        RecordError: It is not a run directory.
+        ParameterError: `frames` is neither of these.
     """
     if frames not in ("", *FRAMES):
         raise ParameterError(
@@ -174,7 +175,7 @@ def load_run(path: str | Path, frames: str = "") -> Run:
             if not place.exists()
             else "it is a file"
             if place.is_file()
-            else listed(FILES)
+            else f"it has none of {', '.join(FILES)}"
         )
-        raise RecordError(f"{place}: no run has been recorded there; {reason}")
+        raise RecordError(f"{place}: it is not a run directory; {reason}")
     return Run(place, frames)

@@ -1,4 +1,4 @@
-"""The end of a record: `summary.csv`, and `run.json`, whose presence says that all before it is there."""
+"""The last files of a run directory: `summary.csv`, then `run.json`, whose presence means that all other files are written."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ PACKAGES = ("tussle", "numpy", "numba", "pyarrow")
 
 
 class Timings:
-    """When recording began, in wall and CPU time."""
+    """Wall and CPU time since the beginning of the recording."""
 
     def __init__(self) -> None:
         self.began = dt.datetime.now(dt.UTC)
         self._wall, self._cpu = time.perf_counter(), time.process_time()
 
     def so_far(self) -> dict[str, Any]:
-        """Wall and CPU seconds since then."""
+        """Date of the beginning, and wall and CPU time since then [s]."""
         return {
             "began": self.began.isoformat(timespec="seconds"),
             "wall_s": round(time.perf_counter() - self._wall, 6),
@@ -43,7 +43,7 @@ class Timings:
 
 
 def versions() -> dict[str, str]:
-    """Of Python and of the packages that a result may depend on."""
+    """Versions of Python and of the packages that a result may depend on."""
     return {"python": platform.python_version()} | {name: _version(name) for name in PACKAGES}
 
 
@@ -64,8 +64,8 @@ def write(
         directory: The run directory.
         sim: The simulation, see `recorder.Recorded`.
         timings: Of the recording.
-        streams: The files whose sizes are kept.
-        about: Further values of `run.json`; "interrupted" says why it is incomplete.
+        streams: Files whose sizes are listed in `run.json`.
+        about: Further values of `run.json`; "interrupted" is the reason why the run is incomplete, or "".
 
     Raises:
         RecordError: They cannot be written.
@@ -96,10 +96,10 @@ def write(
 
 
 def put_whole(path: Path, text: str) -> None:
-    """Write a file so that it is there whole or not at all."""
+    """Write a file atomically: it is there completely or not at all."""
     draft = path.with_name(path.name + ".part")
     try:
-        draft.unlink(missing_ok=True)  # what a link leads to is not ours
+        draft.unlink(missing_ok=True)  # never write through a link
         draft.write_text(text, encoding="utf-8")
         draft.replace(path)
     except OSError:
@@ -135,7 +135,7 @@ def _world(result: Any) -> dict[str, Any]:
 
 
 def _summary(results: Sequence[Any]) -> str:
-    """One line per world and team; what a metric says of the world stands in the lines of all its teams."""
+    """One line per world and team; a metric of the whole world is repeated for each of its teams."""
     columns = {(plugin, name): None for r in results for plugin, found in r.metrics.items() for name in found}
     out = io.StringIO()
     lines = csv.writer(out, lineterminator="\n")
@@ -152,7 +152,7 @@ def _summary(results: Sequence[Any]) -> str:
 
 
 def plain(value: Any) -> Any:
-    """A value as JSON has it; numbers that it does not know (inf, nan) become their names."""
+    """Convert a value to JSON types; inf and nan become strings, as does anything else that JSON lacks."""
     if isinstance(value, Mapping):
         return {str(k): plain(v) for k, v in value.items()}
     if isinstance(value, (list, tuple, set, np.ndarray)):

@@ -1,4 +1,4 @@
-"""The columns of the recorded tables, and the names of the files of a run directory."""
+"""Columns of the recorded tables, and names of the files in a run directory."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from tussle.errors import RecordError
 from tussle.record.table_values import COUNT, NUMBER, TEXT, Rules
 
 FORMAT = 1
-"""Version of the run directory; the loader refuses those it does not know."""
+"""Version of the run directory's format; the loader refuses others."""
 
 TRAJECTORY_FILE = "trajectory.arrow"
 EVENTS_FILE = "events.arrow"
@@ -19,7 +19,7 @@ RUN_FILE = "run.json"
 FILES = (TRAJECTORY_FILE, EVENTS_FILE, SUMMARY_FILE, MISSION_FILE, RUN_FILE)
 
 FLOAT_COLUMNS = ("x", "y", "z", "vx", "vy", "vz", "qw", "qx", "qy", "qz", "health")
-"""Real columns in the order in which they lie in the body table."""
+"""Float columns in the order of the body table."""
 INT_COLUMNS = ("world", "id", "team", "block")
 
 
@@ -41,7 +41,7 @@ TRAJECTORY = pa.schema(
         *(_field(c, _F, "position [m], East North Up") for c in ("x", "y", "z")),
         *(_field(c, _F, "attitude, body to world") for c in ("qw", "qx", "qy", "qz")),
         *(_field(c, _F, "ground velocity [m/s], East North Up") for c in ("vx", "vy", "vz")),
-        _field("health", _F, "what is left before it is removed at 0"),
+        _field("health", _F, "health; the entity is removed at 0"),
     ]
 )
 """One row per entity and recorded step, ordered by step, world and id."""
@@ -49,16 +49,16 @@ TRAJECTORY = pa.schema(
 EVENTS = pa.schema(
     [
         _field("world", _I, "number of the world in its stack"),
-        _field(
-            "t",
-            _F,
-            "time of the beginning of the step in which it happened; of a birth or an end, its time [s]",
-        ),
+        _field("t", _F, "time of the beginning of the event's step; of a birth or an end, its own time [s]"),
         _field("step", _I, "that step"),
         _field("kind", pa.string(), "birth, death, capture, collision or end"),
-        _field("id", _I, "who was born, died, captured, or has the smaller id of two that met"),
-        _field("other", _I, "who was captured, or who captured or met the dead; 0 for nobody"),
-        _field("text", pa.string(), "block of the born, why one died, why a world ended"),
+        _field("id", _I, "entity that was born, died or captured, or the smaller id of a collision"),
+        _field(
+            "other",
+            _I,
+            "entity that was captured, captured or hit the dead one, or the larger id; 0 for none",
+        ),
+        _field("text", pa.string(), "block of a birth, cause of a death, reason of an end"),
     ]
 )
 
@@ -100,4 +100,4 @@ RUN = Document(
     },
     RecordError,
 )
-"""What `run.json` says."""
+"""Schema of `run.json`."""

@@ -9,7 +9,7 @@ import numpy as np
 
 
 def hash_columns(columns: Iterable[tuple[str, np.ndarray | bytes]]) -> str:
-    """32 hexadecimal digits for named columns in the order given; the sign of zero and every last bit count.
+    """Hash named columns in the given order to 32 hexadecimal digits; every bit counts, the sign of zero included.
 
     Args:
         columns: (name, array or bytes).

@@ -1,4 +1,4 @@
-"""A table on its way to a file."""
+"""Writer of a table to a file."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from tussle.errors import RecordError
 
 
 class Stream:
-    """An Arrow stream in a file. What `write` has returned from is with the operating system.
+    """An Arrow stream in a file. When `write` returns, the batch is with the operating system.
 
     Raises:
-        RecordError: The file cannot be made or written. What was written before stays whole.
+        RecordError: The file cannot be created or written. Batches written before stay intact.
     """
 
     def __init__(self, path: Path, schema: pa.Schema) -> None:
         self.path = path
         self.rows = 0
-        self.whole = 0
+        self._end = 0
         try:
             self._file = pa.OSFile(str(path), "wb")
             self._writer = pa.ipc.new_stream(self._file, schema)  # writes nothing before the first batch
@@ -31,9 +31,9 @@ class Stream:
         """Append a batch."""
         try:
             self._writer.write_batch(batch)
-            self.whole = self._file.tell()
+            self._end = self._file.tell()
         except OSError as error:
-            self._drop()
+            self._truncate()
             raise self._failed(error) from error
         self.rows += batch.num_rows
 
@@ -45,24 +45,24 @@ class Stream:
             self._writer.close()
             self._file.close()
         except OSError as error:
-            self._drop()
+            self._truncate()
             raise self._failed(error) from error
 
     @property
     def size(self) -> int:
-        """Length of the file [B]."""
+        """Size of the file [B]."""
         return self.path.stat().st_size
 
     def abandon(self) -> None:
-        """Close the file as it is, without the end mark. A second call does nothing."""
+        """Close the file without writing the end mark. A second call does nothing."""
         self._file.close()
 
-    def _drop(self) -> None:
-        """Leave the file with its whole batches only: half a batch is of no use to anybody."""
+    def _truncate(self) -> None:
+        """Cut the file after its last complete batch."""
         self.abandon()
-        os.truncate(self.path, self.whole)
+        os.truncate(self.path, self._end)
 
     def _failed(self, error: OSError) -> RecordError:
         reason = os.strerror(error.errno) if error.errno else str(error)
-        kept = f"; the {self.rows} rows written before are whole" if self.rows else ""
+        kept = f"; the {self.rows} rows written before are intact" if self.rows else ""
         return RecordError(f"{self.path}: cannot be written: {reason}{kept}")

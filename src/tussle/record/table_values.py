@@ -1,4 +1,4 @@
-"""What the values of a table may be, column by column."""
+"""Checks of the values of a table, by column."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ INT32 = 2**31 - 1
 
 
 class Bounds(NamedTuple):
-    """What a number of a column may be.
+    """Bounds of the numbers in a column.
 
     Attributes:
-        least: Smallest.
-        most: Largest.
-        may_miss: It may be null, or not a number.
+        least: Smallest allowed value.
+        most: Largest allowed value.
+        may_miss: Whether null and NaN are allowed.
     """
 
     least: float = -sys.float_info.max
@@ -33,10 +33,10 @@ class Bounds(NamedTuple):
 NUMBER = Bounds()
 COUNT = Bounds(0, INT32)
 TEXT = None
-"""A text that is there."""
+"""Rule of a text column: no nulls."""
 
 Rules = Mapping[str, Bounds | None]
-"""Column -> what its values may be. Columns without a rule are not looked at."""
+"""Column -> rule for its values. Columns without a rule are not checked."""
 
 
 def check_values(
@@ -45,23 +45,21 @@ def check_values(
     path: Path | str,
     error: type[TussleError],
 ) -> None:
-    """See that the values of some columns are allowed.
+    """Check the values of columns.
 
     Raises:
-        TussleError: As `error`: one is not; the message names file, column and row.
+        TussleError: As `error`: a value is not allowed; the message names file, column and row.
     """
     for name, column in columns:
         if name not in rules or pa.types.is_nested(column.type):
             continue
         rule = rules[name]
         if column.null_count and not (rule and rule.may_miss):
-            raise error(
-                f"{path}: column {name!r} lacks a value in row {pc.index(pc.is_null(column), value=True)}"
-            )
+            raise error(f"{path}: column {name!r} is null in row {pc.index(pc.is_null(column), value=True)}")
         if rule is None or column.null_count == len(column):
             continue
         if not rule.may_miss and pa.types.is_floating(column.type) and pc.any(pc.is_nan(column)).as_py():
-            raise error(f"{path}: column {name!r} holds something that is no number")
+            raise error(f"{path}: column {name!r} holds NaN")
         for value in pc.min_max(column).values():
             if not rule.least <= value.as_py() <= rule.most and not math.isnan(value.as_py()):
                 raise error(

@@ -9,7 +9,7 @@ import numpy as np
 
 from tussle.engine.simulation import Simulation
 from tussle.messages import Batch, Message
-from tussle.record import Happenings
+from tussle.record import Events as Happenings
 from tussle.view.frame import Happening, frame_of
 from tussle.view.timeline import History, Timeline
 

@@ -34,7 +34,7 @@ def test_what_is_asked_for_is_plotted_where_it_is_asked_for(tussle, played, fold
 
 def test_what_it_cannot_do_is_told_in_one_line(tussle, played, folder):
     for arguments, code, words in (
-        (("nowhere",), 4, "nowhere: no run has been recorded there"),
+        (("nowhere",), 4, "nowhere: it is not a run directory"),
         (("played", "--entity", "40"), 1, "played: there is no entity 40; there are 1 to 12"),
         (
             ("played", "--from", "1 h"),
@@ -56,7 +56,7 @@ def test_what_it_cannot_do_is_told_in_one_line(tussle, played, folder):
 def test_a_run_that_was_cut_is_plotted_and_it_is_said(tussle, played):
     (played / "run.json").unlink()
     said = tussle("plot", "played", "--kind", "left")
-    assert "note: run.json is not there: the run goes on, or was cut short" in said.stderr
+    assert "note: run.json is missing" in said.stderr
     assert said.stdout == "played/plots/left.png\n"
 
 

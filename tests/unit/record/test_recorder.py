@@ -12,7 +12,7 @@ import tussle
 from tussle import Block, Mission, Recorder, Simulation, load_run
 from tussle.api import Autonomy, Output
 from tussle.errors import ParameterError, RecordError
-from tussle.record.happenings import Happenings
+from tussle.record.events import Events
 from tussle.stock import GroundCollision, SingleIntegrator
 
 FILES = {"trajectory.arrow", "events.arrow", "summary.csv", "run.json"}
@@ -247,11 +247,11 @@ def test_a_world_that_is_begun_anew_ends_the_recording(tmp_path, seeds):
     recorder = Recorder(sim, tmp_path / "run")
     sim.step(5)
     sim.reset([0])
-    with pytest.raises(RecordError, match="begun anew"):
+    with pytest.raises(RecordError, match="reset or restored"):
         sim.step()
     run = load_run(tmp_path / "run")
     assert not run.is_complete
-    assert "begun anew" in run.notes[0]
+    assert "reset or restored" in run.notes[0]
     assert run.trajectory["step"].max() <= 5
     assert recorder.is_closed
     sim.step()  # the simulation itself is none the worse
@@ -280,9 +280,9 @@ def test_a_directory_holds_one_run(tmp_path):
 def test_where_nothing_can_be_written_nothing_begins(tmp_path):
     (tmp_path / "file").write_text("in the way")
     sim = Simulation(hunt())
-    with pytest.raises(RecordError, match="no run can be recorded"):
+    with pytest.raises(RecordError, match="cannot record a run"):
         Recorder(sim, tmp_path / "file" / "run")
-    with pytest.raises(RecordError, match="no run can be recorded"):
+    with pytest.raises(RecordError, match="cannot record a run"):
         Recorder(sim, "/proc/no_such_run")
     assert not sim.observers
     assert not sim.events
@@ -294,7 +294,7 @@ def test_listeners_hear_while_they_listen():
     sim.events.listen(heard.append)
     sim.step(10)
     assert heard
-    assert all(isinstance(h, Happenings) and len(h) for h in heard)
+    assert all(isinstance(e, Events) and len(e) for e in heard)
     sim.events.forget(heard.append)
     sim.events.forget(heard.append)
     n = len(heard)

@@ -122,11 +122,11 @@ def states(**changes):
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"pos": np.zeros((3, 3))}, r"pos has shape \(3, 3\); needed is \(3, 2\)"),
+        ({"pos": np.zeros((3, 3))}, r"pos has shape \(3, 3\); expected \(3, 2\)"),
         ({"vel": np.array([[0.0, np.nan]] * 3)}, "vel of entity 2 is not finite"),
         ({"quat": np.full((4, 2), 0.4)}, "quaternion of entity 1 has length 0.8"),
-        ({"id": np.array([3, 3])}, "each once"),
-        ({"id": np.array([0, 3])}, "each once"),
+        ({"id": np.array([3, 3])}, "unique"),
+        ({"id": np.array([0, 3])}, "unique"),
     ],
 )
 def test_states_that_cannot_be_are_refused(changes, words):
@@ -149,7 +149,7 @@ def test_tables_that_do_not_fit_the_mission_are_refused(mission, changes, words)
 
 
 def test_files_that_are_no_tables_are_refused(tmp_path, run):
-    with pytest.raises(RecordError, match="run directory or ends in"):
+    with pytest.raises(RecordError, match="must be a run directory"):
         read_table(tmp_path / "table.xlsx")
     for suffix in (".arrow", ".csv"):
         with pytest.raises(RecordError, match="no such file"):
@@ -158,7 +158,7 @@ def test_files_that_are_no_tables_are_refused(tmp_path, run):
     for name, table, words in [
         ("a", frame.drop(columns="qz"), "column 'qz' is missing"),
         ("b", frame.drop(columns="t"), "column 't' is missing"),
-        ("c", frame.assign(x="east"), "column 'x' holds something other than numbers"),
+        ("c", frame.assign(x="east"), "column 'x' must hold numbers"),
         ("d", frame.iloc[:0], "there are no rows"),
     ]:
         table.to_csv(tmp_path / f"{name}.csv", index=False)

@@ -53,7 +53,7 @@ def test_a_whole_stream_and_a_cut_one(tmp_path):
     path = put(tmp_path / "events.arrow", events())
     batches, notes = read(path)
     assert (batches[0].num_rows, notes) == (3, [])
-    assert read(tmp_path / "none.arrow") == ([], ["none.arrow is not there"])
+    assert read(tmp_path / "none.arrow") == ([], ["none.arrow is missing"])
     whole = path.read_bytes()
     for size in range(0, len(whole), 7):
         path.write_bytes(whole[:size])
@@ -85,11 +85,11 @@ def test_a_stream_that_lies_in_any_of_its_words_takes_no_memory(tmp_path, number
         (events().drop_columns(["kind"]), "it has no column 'kind' of string"),
         (events().select(EVENTS.names[::-1]), "other columns than a table of tussle"),
         (events().append_column("more", pa.array([1, 2, 3])), "other columns than a table of tussle"),
-        (events(t=math.nan), "column 't' holds something that is no number"),
+        (events(t=math.nan), "column 't' holds NaN"),
         (events(t=math.inf), "t = inf in row 0 is not allowed"),
         (events(step=-1), "step = -1 in row 0 is not allowed; it takes 0 to 2147483647"),
         (events().cast(pa.schema([f.with_nullable(True) for f in EVENTS])).set_column(0, "world", pa.nulls(3, pa.int32())),
-         "column 'world' lacks values"),
+         "column 'world' has nulls"),
     ],
 )  # fmt: skip
 def test_a_stream_of_something_else_is_refused(tmp_path, table, said):
@@ -99,13 +99,13 @@ def test_a_stream_of_something_else_is_refused(tmp_path, table, said):
 
 def test_a_stream_that_is_compressed_or_no_stream_is_refused(tmp_path):
     zeros = pa.table({"id": np.zeros(10_000_000, np.int64)})
-    with pytest.raises(RecordError, match="it is compressed, which tables of tussle are not"):
+    with pytest.raises(RecordError, match="it is compressed"):
         read(put(tmp_path / "a.arrow", zeros, compression="zstd"), None, None)
     (tmp_path / "b.arrow").write_bytes(b"something else " * 9)
-    with pytest.raises(RecordError, match="this is no stream of Arrow's format"):
+    with pytest.raises(RecordError, match="it is not an Arrow stream"):
         read(tmp_path / "b.arrow")
     os.mkfifo(tmp_path / "c.arrow")
-    with pytest.raises(RecordError, match="this is not a regular file"):
+    with pytest.raises(RecordError, match="not a regular file"):
         read(tmp_path / "c.arrow")
 
 
@@ -113,7 +113,7 @@ def test_a_long_word_in_many_rows_is_refused(tmp_path):
     words = pa.DictionaryArray.from_arrays(np.zeros(1000, np.int32), pa.array(["x" * 1_000_000]))
     columns = [words if f.name == "block" else pa.array(np.ones(1000)).cast(f.type) for f in TRAJECTORY]
     path = put(tmp_path / "trajectory.arrow", pa.Table.from_arrays(columns, schema=TRAJECTORY))
-    with pytest.raises(RecordError, match="column 'block' holds a word of 1,000,000 bytes in 1,000 rows"):
+    with pytest.raises(RecordError, match="column 'block' has 1,000 rows and a text of 1,000,000 bytes"):
         read(path, TRAJECTORY, TRAJECTORY_RULES)
 
 
@@ -124,10 +124,10 @@ def test_a_long_word_in_many_rows_is_refused(tmp_path):
     ("table", "said"),
     [
         (pa.table({"a": [1]}), "is another table; it has no column 'run' of int64"),
-        (pa.table({"run": [1], "a": [{"b": 1}]}), "column 'a' holds struct"),
-        (pa.table([[1], [2]], names=["run", "run"]), "each with a name of its own"),
-        (pa.table({"run": pa.array(np.zeros(20_000_000, np.int64))}), "unpacked it takes 160,[0-9,]+ bytes; a file of its size may take"),
-        (pa.table({"run": [1], "a": [[1]]}), "column 'a' holds list"),
+        (pa.table({"run": [1], "a": [{"b": 1}]}), "column 'a' has type struct"),
+        (pa.table([[1], [2]], names=["run", "run"]), "unique names"),
+        (pa.table({"run": pa.array(np.zeros(20_000_000, np.int64))}), "takes 160,[0-9,]+ bytes in memory"),
+        (pa.table({"run": [1], "a": [[1]]}), "column 'a' has type list"),
     ],
 )  # fmt: skip
 def test_a_parquet_table_of_something_else_is_refused(tmp_path, table, said):
@@ -140,9 +140,9 @@ def test_a_parquet_table_whose_texts_are_a_bomb_is_refused(tmp_path):
     text = pa.DictionaryArray.from_arrays(np.zeros(100_000, np.int32), pa.array(["x" * 100_000]))
     pq.write_table(pa.table({"a": text}), tmp_path / "a.parquet", compression="zstd", store_schema=False)
     assert (tmp_path / "a.parquet").stat().st_size < 10_000
-    with pytest.raises(RecordError, match="unpacked it takes more than"):
+    with pytest.raises(RecordError, match="it takes more than"):
         read_parquet(tmp_path / "a.parquet", pa.schema([]), RecordError)
-    with pytest.raises(RecordError, match="it has 100,000 rows; allowed are 99,999"):
+    with pytest.raises(RecordError, match="it has 100,000 rows; the limit is 99,999"):
         read_parquet(tmp_path / "a.parquet", pa.schema([]), RecordError, most_rows=99_999)
 
 
@@ -150,7 +150,7 @@ def test_a_parquet_table_with_one_very_long_list_is_refused(tmp_path):
     zeros = pa.array(np.zeros(20_000_000))
     table = pa.table({"a": pa.ListArray.from_arrays(pa.array([0, len(zeros)], pa.int32()), zeros)})
     pq.write_table(table, tmp_path / "a.parquet", compression="zstd")
-    with pytest.raises(RecordError, match=r"unpacked it takes 160,[0-9,]+ bytes"):
+    with pytest.raises(RecordError, match=r"takes 160,[0-9,]+ bytes"):
         read_parquet(tmp_path / "a.parquet", pa.schema([]), RecordError)
 
 
@@ -163,7 +163,7 @@ def test_a_parquet_table_with_a_very_large_page_is_refused(tmp_path):
         use_dictionary=False,
         write_statistics=False,
     )
-    with pytest.raises(RecordError, match=r"it has a page of 100,000,[0-9]+ bytes; allowed are 67,108,864"):
+    with pytest.raises(RecordError, match=r"it has a page of 100,000,[0-9]+ bytes; the limit is 67,108,864"):
         read_parquet(tmp_path / "a.parquet", pa.schema([]), RecordError)
 
 
@@ -215,17 +215,17 @@ def test_a_csv_that_is_a_bomb_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr("tussle.record.first_states.MOST_EXPANSION", 10)
     with pa.output_stream(str(tmp_path / "a.csv.gz"), compression="gzip") as file:
         file.write(b"id,t\n" + b"\n" * 10_000_000)
-    with pytest.raises(RecordError, match=r"a.csv.gz: cannot be read: unpacked it takes more than"):
+    with pytest.raises(RecordError, match=r"a.csv.gz: cannot be read: its decompressed size exceeds"):
         read_table(tmp_path / "a.csv.gz")
 
 
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"id": [1.5e300]}, "column 'id' holds something other than whole numbers"),
-        ({"team": [math.nan]}, "column 'team' holds something other than whole numbers"),
-        ({"world": ["a"]}, "column 'world' holds something other than numbers"),
-        ({"block": [1]}, "column 'block' holds something other than names"),
+        ({"id": [1.5e300]}, "column 'id' must hold integers"),
+        ({"team": [math.nan]}, "column 'team' must hold integers"),
+        ({"world": ["a"]}, "column 'world' must hold numbers"),
+        ({"block": [1]}, "column 'block' must hold names"),
     ],
 )
 def test_a_table_to_start_from_with_odd_columns_is_refused(tmp_path, change, said):

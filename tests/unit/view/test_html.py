@@ -141,7 +141,7 @@ def test_of_a_run_that_was_cut_short_there_is_what_there_is(tmp_path):
     assert_same(page, recording, export)
     assert page.layer["isComplete"] is False
     assert page.layer["notes"] == list(export.notes)
-    assert any("run.json is not there" in note for note in export.notes)
+    assert any("run.json is missing" in note for note in export.notes)
     assert 20 < export.n_frames < 31
 
 

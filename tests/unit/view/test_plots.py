@@ -482,7 +482,7 @@ def test_a_cut_run_is_plotted_as_far_as_it_goes_and_it_is_said(tmp_path):
     written = write_plots(Recording(cut), tmp_path / "plots")
     assert 2.0 < Tracks(Recording(cut)).frame_times[-1] < 4.5
     assert len(written.files) == 7
-    assert any("run.json is not there" in note for note in written.notes)
+    assert any("run.json is missing" in note for note in written.notes)
     assert any("trajectory.arrow" in note for note in written.notes)
 
 

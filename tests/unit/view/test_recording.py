@@ -162,7 +162,7 @@ def test_a_run_that_was_cut_in_the_midst_of_a_batch(tmp_path, played):
     whole = (directory / "trajectory.arrow").read_bytes()
     (directory / "trajectory.arrow").write_bytes(whole[: len(whole) - 500])
     recording = Recording(directory)
-    assert any("run.json is not there" in note for note in recording.notes)
+    assert any("run.json is missing" in note for note in recording.notes)
     assert any("trajectory.arrow is cut" in note for note in recording.notes)
     assert recording.n_frames == 0
     with pytest.raises(IndexError):
@@ -172,7 +172,7 @@ def test_a_run_that_was_cut_in_the_midst_of_a_batch(tmp_path, played):
 
 
 def test_what_is_no_run_and_worlds_that_are_not_there(tmp_path, played):
-    with pytest.raises(RecordError, match="no run has been recorded there"):
+    with pytest.raises(RecordError, match="not a run directory"):
         Recording(tmp_path)
     for world in (3, -1):
         with pytest.raises(RecordError, match=f"there is no world {world}; there are worlds 0 to 2"):

@@ -1,4 +1,4 @@
-"""What happens in a game besides motion: who came, who went and why, who met whom, how it ended."""
+"""Events of a game: births, deaths, captures, collisions and ends."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ END: Final = "end"
 
 
 @dataclass(frozen=True)
-class Happenings:
+class Events:
     """Events of one kind in one step, ordered by world.
 
     Attributes:
         kind: "birth", "death", "capture", "collision" or "end".
         world: World of each, (m,).
-        step: Step in which it happened, (m,): that of the trajectory row before it; for births and ends that of the row with it.
-        id: Who was born, died, captured, or has the smaller id of two that met; 0 for ends, (m,).
-        other: Who was captured; who captured the dead or met it; the larger id of two that met; 0 for nobody, (m,).
-        text: Block of the born; "ground" where one met that; why one died; why a world ended, (m,).
+        step: Step of the event, (m,): that of the last trajectory row before it; for births and ends, that of the row with it.
+        id: Entity that was born, died or captured, or the smaller id of a collision; 0 for ends, (m,).
+        other: Entity that was captured, that captured or hit the dead one, or the larger id of a collision; 0 for none, (m,).
+        text: Block of a birth, "ground" for a collision with it, cause of a death, or reason of an end, (m,).
     """
 
     kind: str
