@@ -1,4 +1,4 @@
-"""Messages on their way: outboxes, queues and inboxes."""
+"""Message delivery: outboxes, queues and inboxes."""
 
 from tussle.comms.topic import EVERYONE, SAME_ENTITY, Inbox, Publisher, TopicBuffer
 

@@ -1,4 +1,4 @@
-"""A topic: what was published in this step, what is on its way, and who has heard what."""
+"""A topic: the outbox of a step, the queue of messages that are not yet delivered, and the inboxes."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ SAME_ENTITY: Final = "same entity"
 
 @dataclass(slots=True)
 class Parcel:
-    """Messages with their receivers and the step in which they are due.
+    """Messages with their receivers and delivery times.
 
     Attributes:
         batch: The messages.
-        due: Step at whose end each is delivered, (n,).
+        due: Step at whose end each message is delivered, (n,).
         to: EVERYONE, SAME_ENTITY, or (message numbers, receivers' ids), each (m,).
     """
 
@@ -46,8 +46,8 @@ class TopicBuffer:
         network: Instance name of the network that carries it.
         name: The topic's name.
         type: The message type.
-        inboxes: Receiving ends.
-        is_published: Some plugin of the mission publishes it.
+        inboxes: The receiving ends.
+        is_published: Whether a plugin of the mission publishes it.
     """
 
     def __init__(self, network: str, name: str, type_: type[Message]) -> None:
@@ -67,7 +67,7 @@ class TopicBuffer:
             self._joined = None
 
     def outbox(self) -> Batch:
-        """All that was published in this step, ordered by (world, sender)."""
+        """All messages published in this step, ordered by (world, sender)."""
         if self._joined is None or self._joined.n == 0:
             self._joined = Batch.concatenate(self.sent) if self.sent else Batch.empty(self.type)
         return self._joined
@@ -81,7 +81,7 @@ class TopicBuffer:
         self.queue.append(Parcel(batch, due, to))
 
     def deliver(self, step: np.ndarray) -> None:
-        """Hand over all messages that are due at the end of the worlds' steps, (n_worlds,)."""
+        """Deliver all messages that are due at the end of the worlds' steps, (n_worlds,)."""
         waiting: list[Parcel] = []
         for parcel in self.queue:
             is_due = parcel.due <= step[parcel.batch.world]
@@ -94,7 +94,7 @@ class TopicBuffer:
         self.queue = waiting
 
     def drop_worlds(self, gone: np.ndarray) -> None:
-        """Forget all messages of the worlds where gone, (n_worlds,), is true."""
+        """Discard all messages of the worlds where gone, (n_worlds,), is true."""
         self.sent = [batch.take(np.flatnonzero(~gone[batch.world])) for batch in self.sent]
         self.sent = [batch for batch in self.sent if batch.n]
         self._joined = None
@@ -115,7 +115,7 @@ def _without(parcels: list[Parcel], gone: np.ndarray) -> list[Parcel]:
 
 
 class Inbox:
-    """The receiving end of a topic at one plugin: what has arrived since the plugin's last call."""
+    """The receiving end of a topic at one plugin: the messages that arrived since the plugin's last call."""
 
     def __init__(self, topic: TopicBuffer, view: Any = None) -> None:
         self.topic = topic
@@ -129,7 +129,7 @@ class Inbox:
 
     @property
     def messages(self) -> Batch:
-        """All messages that arrived, without regard to who hears them."""
+        """All messages that arrived, for any receiver."""
         return (
             Batch.concatenate([p.batch for p in self.parcels])
             if self.parcels
@@ -137,13 +137,13 @@ class Inbox:
         )
 
     def pairs(self) -> tuple[np.ndarray, Batch]:
-        """(row, messages): one item per receiving row of the group and message, by row, then arrival, then sender.
+        """(row, messages): one item per receiving row of the group and message, ordered by row, arrival and sender.
 
-        Messages to everyone make rows x messages items; `latest` and `by_row` make none of these.
+        Messages to everyone make rows x messages items; `latest` and `by_row` avoid this.
         """
         rows, batches = [], []
         for parcel in self.parcels:
-            row, number = self._receivers(parcel) if parcel.to != EVERYONE else self._everyone(parcel)
+            row, number = self._receivers(parcel) if parcel.to != EVERYONE else self._broadcast_pairs(parcel)
             rows.append(row)
             batches.append(parcel.batch.take(number))
         if not rows:
@@ -153,19 +153,19 @@ class Inbox:
         return row[order], Batch.join(batches).take(order)
 
     def latest(self) -> tuple[np.ndarray, Batch]:
-        """(row, messages): the last message of each row that has heard one."""
+        """(row, messages): the last message of each row that received one."""
         view = self.view
         found_in, number = np.full(view.n, -1), np.zeros(view.n, np.int64)
         for k in range(len(self.parcels) - 1, -1, -1):
             parcel = self.parcels[k]
             if parcel.to == EVERYONE:
-                first, last = self._heard_by_all(parcel)
+                first, last = self._broadcast_range(parcel)
                 rows, numbers = np.flatnonzero(last > first), last[last > first] - 1
             else:
                 rows, numbers = self._receivers(parcel)
             is_new = found_in[rows] < 0
             found_in[rows[is_new]] = k
-            number[rows[is_new]] = numbers[is_new]  # of several for one row, the last is written last
+            number[rows[is_new]] = numbers[is_new]  # of several for one row, the last one stays
         rows = np.flatnonzero(found_in >= 0)
         parts = [(rows[found_in[rows] == k], p.batch) for k, p in enumerate(self.parcels)]
         parts = [(mine, batch) for mine, batch in parts if len(mine)]
@@ -175,11 +175,11 @@ class Inbox:
         return rows, together.take(np.argsort(np.concatenate([mine for mine, _ in parts])))
 
     def by_row(self) -> Callable[[int], list[tuple[Batch, int]]]:
-        """What gives the messages of one row, by arrival, then sender, each as (messages, number)."""
+        """A function that returns the messages of a row, ordered by arrival and sender, each as (batch, message number)."""
         parts: list[tuple[Batch, np.ndarray, np.ndarray, np.ndarray | None]] = []
         for parcel in self.parcels:
             if parcel.to == EVERYONE:
-                parts.append((parcel.batch, *self._heard_by_all(parcel), None))
+                parts.append((parcel.batch, *self._broadcast_range(parcel), None))
             else:
                 row, number = self._receivers(parcel)
                 edges = np.searchsorted(row, np.arange(self.view.n + 1))
@@ -194,23 +194,23 @@ class Inbox:
 
         return of
 
-    def _heard_by_all(self, parcel: Parcel) -> tuple[np.ndarray, np.ndarray]:
-        """First and last of the messages to everyone that each row hears, (n,): those of its world, if it was born by then."""
+    def _broadcast_range(self, parcel: Parcel) -> tuple[np.ndarray, np.ndarray]:
+        """Range of the messages to everyone that each row receives, (n,): those of its world, if it was born by then."""
         view, sent = self.view, parcel.batch.world
         first, last = np.searchsorted(sent, view.world), np.searchsorted(sent, view.world, side="right")
-        # Those of one world in one parcel were delivered together.
+        # The messages of one world in one parcel were delivered together.
         was_born = (last > first) & (view.born <= parcel.due[np.minimum(first, len(sent) - 1)])
         return first, np.where(was_born, last, first)
 
-    def _everyone(self, parcel: Parcel) -> tuple[np.ndarray, np.ndarray]:
-        """(row, message number) of all rows that hear a message to everyone."""
-        first, last = self._heard_by_all(parcel)
+    def _broadcast_pairs(self, parcel: Parcel) -> tuple[np.ndarray, np.ndarray]:
+        """(row, message number) for each row and message to everyone that it receives, by row."""
+        first, last = self._broadcast_range(parcel)
         n = last - first
         row = np.repeat(np.arange(len(n)), n)
         return row, np.arange(len(row)) - np.repeat(np.cumsum(n) - n - first, n)
 
     def _receivers(self, parcel: Parcel) -> tuple[np.ndarray, np.ndarray]:
-        """(row, message number) of messages with receivers of their own, by row."""
+        """(row, message number) of messages that are not to everyone, by row."""
         view, batch = self.view, parcel.batch
         number, ids = (np.arange(batch.n), batch.sender) if isinstance(parcel.to, str) else parcel.to
         row = view.bodies_rows(batch.world[number], ids) - view.first
@@ -219,7 +219,7 @@ class Inbox:
         return row[here], number[here]
 
     def clear(self, heard: np.ndarray | None = None) -> None:
-        """Forget what was read; `heard`, (n_worlds,), names the worlds whose call has been made, all of them by default."""
+        """Discard the messages that were read: those of the worlds where `heard`, (n_worlds,), is true, by default of all."""
         self.parcels = [] if heard is None or heard.all() else _without(self.parcels, heard)
 
 

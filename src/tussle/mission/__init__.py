@@ -1,4 +1,4 @@
-"""What is played: a mission as data, and the files it is read from."""
+"""Missions as data, and the reading of mission files."""
 
 from tussle.mission.catalogue import Catalogue
 from tussle.mission.limits import Limits

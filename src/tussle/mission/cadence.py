@@ -1,4 +1,4 @@
-"""When a plugin with a rate is due."""
+"""Call schedules of plugins with a rate."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from typing import Any, Self
 from tussle.errors import MissionError
 
 FINEST = 1_000_000
-"""Largest denominator of calls per grid point. 10 Hz at dt = 1/120 is 1/12 of a call per step, though neither number is exact."""
+"""Largest denominator of calls per grid point. 10 Hz at dt = 1/120 becomes exactly 1/12, although 1/120 is not exact in float64."""
 
 
 @dataclass(frozen=True)
 class Cadence:
-    """The k-th point of the grid on which a plugin is called is due where floor(k p / q) grows, in whole numbers: exact for ever.
+    """Schedule on a grid of points (steps or substeps): point k is due where floor(k p / q) grows. Integers keep it exact.
 
     Attributes:
         per_point: Calls per point of the grid, p / q < 1.
@@ -26,16 +26,16 @@ class Cadence:
 
     @classmethod
     def of(cls, plugin: Any, most: float, n_substeps: int, where: str) -> Self | None:
-        """The cadence of a plugin; None where it is called at every point.
+        """The cadence of a plugin; None if it is called at every point.
 
         Args:
             plugin: The plugin, with its `rate` [Hz].
             most: Points of its grid per second [Hz].
             n_substeps: Points of its grid per step.
-            where: What it belongs to, for the message.
+            where: Block or "mission", for the error message.
 
         Raises:
-            MissionError: The rate is higher than that of the grid, or so low that it cannot be told from never.
+            MissionError: The rate is higher than that of the grid, or lower than `FINEST` can represent.
         """
         if plugin.rate is None:
             return None
@@ -43,15 +43,15 @@ class Cadence:
         name = f"{where}: {plugin.instance_name}: rate = {plugin.rate!r} Hz"
         if per_point > 1:
             raise MissionError(
-                f"{name} cannot be honoured; the largest that can is {most:g} Hz, one call in every "
+                f"{name} is too high; the maximum is {most:g} Hz, one call per "
                 + ("step" if n_substeps == 1 else "substep")
             )
         if per_point == 0:
-            raise MissionError(f"{name} cannot be honoured; the smallest that can is {most / FINEST:g} Hz")
+            raise MissionError(f"{name} is too low; the minimum is {most / FINEST:g} Hz")
         return None if per_point == 1 else cls(per_point, n_substeps)
 
     def since(self, step: int, substep: int = 0) -> int:
-        """Points of the grid since the last call where this one is due (before the first call, a whole period's), else 0."""
+        """Grid points since the previous call if a call is due, else 0; the first call counts a full period."""
         p, q = self.per_point.numerator, self.per_point.denominator
         k = step * self.n_substeps + substep
         number = k * p // q

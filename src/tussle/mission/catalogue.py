@@ -1,4 +1,4 @@
-"""Plugins by name: those that ship, those of installed packages, and those of files that were named."""
+"""Plugins by name: shipped plugins, those of installed packages, and those of plugin files."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ KINDS: dict[str, type] = {
     "network": Network,
     "behaviors": Behavior,
 }
-"""What each tag names."""
+"""Tag -> kind of the plugin that it names."""
 
 
 @cache
 def historic() -> dict[str, Any]:
-    """What is known of the existing system's plugins."""
+    """Names and attributes of the existing system's plugins."""
     return tomllib.loads((Path(stock.__file__).parent / "historic.toml").read_text(encoding="utf-8"))
 
 
@@ -41,12 +41,12 @@ class AbsentPluginError(MissionError):
 
 
 @dataclass(frozen=True)
-class Offer:
-    """Where a plugin is to be had.
+class PluginSource:
+    """Where a plugin class comes from.
 
     Attributes:
-        place: In words.
-        load: Gives the class.
+        place: Description for messages.
+        load: Returns the class.
     """
 
     place: str
@@ -54,70 +54,70 @@ class Offer:
 
 
 class Catalogue:
-    """Finds plugin classes by name. Plugins of files win over those of installed packages, and these over those that ship.
+    """Finds plugin classes by name. Plugin files take precedence over installed packages, and these over shipped plugins.
 
     Args:
-        plugin_files: Python files whose plugins can be named too; of two with the same name the later file's wins.
+        plugin_files: Python files with further plugins; later files take precedence.
 
     Attributes:
-        names: All that can be named.
+        names: Names of all plugins, sorted.
 
     Raises:
-        MissionError: A file cannot be imported, or holds no plugin.
+        MissionError: A file cannot be imported, or defines no plugin.
     """
 
     def __init__(self, plugin_files: Iterable[str | Path | PluginFile] = ()) -> None:
-        self._offers: dict[str, list[Offer]] = {
-            name: [Offer("that ships", partial(stock.load, name))] for name in stock.manifest()
+        self._sources: dict[str, list[PluginSource]] = {
+            name: [PluginSource("that ships", partial(stock.load, name))] for name in stock.manifest()
         }
         for point in installed():
             place = f"of the package {point.dist.name if point.dist else '?'} ({point.value})"
-            self._offers.setdefault(point.name, []).append(Offer(place, point.load))
+            self._sources.setdefault(point.name, []).append(PluginSource(place, point.load))
         for given in plugin_files:
             file = given if isinstance(given, PluginFile) else PluginFile.of(given)
             found = file.load()
             for name in found:
-                offer = Offer(f"of {file.path}", partial(found.__getitem__, name))
-                others = [o for o in self._offers.get(name, ()) if o.place != offer.place]
-                self._offers[name] = [*others, offer]
-        self.names = sorted(self._offers)
+                source = PluginSource(f"of {file.path}", partial(found.__getitem__, name))
+                others = [s for s in self._sources.get(name, ()) if s.place != source.place]
+                self._sources[name] = [*others, source]
+        self.names = sorted(self._sources)
 
     def load(self, name: str) -> type[Plugin]:
-        """The class of this name.
+        """The plugin class with this name.
 
         Raises:
-            AbsentPluginError: The existing system has it, tussle not yet.
-            MissionError: There is none, or its module cannot be imported.
+            AbsentPluginError: It is a plugin of the existing system that tussle does not have yet.
+            MissionError: There is no such plugin, or it cannot be imported.
         """
-        if name not in self._offers:
+        if name not in self._sources:
             if name in historic()["plugins"]["names"]:
                 raise AbsentPluginError(f"{name} is not in tussle yet")
             raise MissionError(
                 f"there is no plugin {name[:80]!r}{nearest_name(name[:80], self.names)}; `tussle plugins` lists them, "
-                "and --plugin-path FILE brings those of a file"
+                "and --plugin-path FILE adds those of a file"
             )
-        offer = self._offers[name][-1]
+        source = self._sources[name][-1]
         try:
-            found = offer.load()
+            found = source.load()
         except (Exception, SystemExit) as error:
             text = f"{type(error).__name__}: {' '.join(str(error).split())}"
-            raise MissionError(f"plugin {name!r} {offer.place} cannot be imported: {text}") from error
+            raise MissionError(f"plugin {name!r} {source.place} cannot be imported: {text}") from error
         if not (isinstance(found, type) and issubclass(found, Plugin)):
-            raise MissionError(f"plugin {name!r} {offer.place} is {found!r}, which is no plugin class")
+            raise MissionError(f"plugin {name!r} {source.place} is {found!r}, which is not a plugin class")
         return found
 
     def hides(self, name: str) -> str:
-        """Which plugin a name means that several have, in words; "" where there is one only."""
-        *others, winner = (f"the one {offer.place}" for offer in self._offers[name])
+        """Note for a name that several plugins have: which of them is used; "" if there is only one."""
+        *others, winner = (f"the one {source.place}" for source in self._sources[name])
         return f"{name} is {winner}; it hides {' and '.join(others)}" if others else ""
 
 
 def installed() -> tuple[EntryPoint, ...]:
-    """What other installed packages offer under the entry point `tussle.plugins`; who is first on the import path comes last."""
+    """Entry points `tussle.plugins` of the installed packages; those of packages earlier on the import path come later."""
     return _installed(tuple(sys.path))
 
 
 @cache
 def _installed(_path: tuple[str, ...]) -> tuple[EntryPoint, ...]:
-    """What the packages on an import path offer: looking through them takes longer than reading a mission."""
+    """The entry points, cached for an import path: searching the packages takes longer than reading a mission."""
     return tuple(reversed(tuple(entry_points(group="tussle.plugins"))))

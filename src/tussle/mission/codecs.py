@@ -1,4 +1,4 @@
-"""What mission files write besides the values of parameters: whole numbers, ratios, plugins on one line."""
+"""Values in mission files other than parameters: integers, ratios and inline plugins."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ RATIO = re.compile(r"\s*([-+.\deE]+)\s*/\s*([-+.\deE]+)\s*", re.ASCII)
 BEHAVIOR = re.compile(r"\s*\[\s*([^\s\[\]='\"]+)")
 PAIR = re.compile(r"\s*([^\s\[\]='\"]+)\s*=\s*(?:'([^']*)'|\"([^\"]*)\"|([^\s\[\]'\"]+))")
 MOST_PLUGINS = 1000
-"""In one parameter."""
+"""Maximum number of plugins in one parameter."""
 
 
-class Told(NamedTuple):
+class InlinePlugin(NamedTuple):
     """A plugin written on one line: its name and attributes."""
 
     name: str
@@ -30,10 +30,11 @@ class Told(NamedTuple):
 
 
 def number(text: str, unit: str = "", text_unit: str = "") -> float:
-    """A finite quantity; a bare number is in `text_unit`, else in `unit`.
+    """Parse a finite quantity to SI units; a bare number is in `text_unit`, else in `unit`.
 
     Raises:
-        ParameterError: It is no number, has a wrong unit, or is not finite.
+        ParameterError: It is not a number, or has a wrong unit.
+        MissionError: It is not finite.
     """
     value = units.parse(text, unit, text_unit)
     if not math.isfinite(value):
@@ -42,10 +43,11 @@ def number(text: str, unit: str = "", text_unit: str = "") -> float:
 
 
 def whole(text: str, least: int = -MOST_INTEGER, most: int = MOST_INTEGER) -> int:
-    """A whole number.
+    """Parse an integer.
 
     Raises:
-        MissionError: It is none, or out of bounds.
+        ParameterError: It is not a number, or has a unit.
+        MissionError: It is not an integer, or is out of bounds.
     """
     value = number(text)
     if value != int(value) or not least <= value <= most:
@@ -55,10 +57,11 @@ def whole(text: str, least: int = -MOST_INTEGER, most: int = MOST_INTEGER) -> in
 
 
 def fraction(text: str, unit: str) -> float:
-    """A number, or two with a solidus: "1 / 2".
+    """Parse a number, or a ratio such as "1 / 2".
 
     Raises:
-        MissionError: It is neither, or the second is zero.
+        ParameterError: It is neither, or has a wrong unit.
+        MissionError: It is not finite, or divides by zero.
     """
     match = RATIO.fullmatch(text)
     if match is None:
@@ -70,23 +73,23 @@ def fraction(text: str, unit: str) -> float:
     return value
 
 
-def told(text: str) -> Told:
-    """One plugin: "Name key='value' key='value'".
+def inline_plugin(text: str) -> InlinePlugin:
+    """Parse one plugin: "Name key='value' key='value'".
 
     Raises:
-        MissionError: It is not written so.
+        MissionError: The text has another form.
     """
-    found = behaviors(f"[ {text} ]")
+    found = inline_plugins(f"[ {text} ]")
     if len(found) != 1:
         raise MissionError(f"{shown(text)} is not one plugin; it takes NAME key='value' ...")
     return found[0]
 
 
-def behaviors(text: str) -> list[Told]:
-    """Plugins in a parameter: "[ AvoidEntityMS gain='1.0' ] [ MoveToGoalMS goal='1,2,3' ]".
+def inline_plugins(text: str) -> list[InlinePlugin]:
+    """Parse the plugins in a parameter: "[ AvoidEntityMS gain='1.0' ] [ MoveToGoalMS goal='1,2,3' ]".
 
     Raises:
-        MissionError: It is not written so.
+        MissionError: The text has another form.
     """
     found, place = [], 0
     while match := BEHAVIOR.match(text, place):
@@ -99,19 +102,19 @@ def behaviors(text: str) -> list[Told]:
         end = re.compile(r"\s*\]").match(text, place)
         if end is None:
             raise MissionError(
-                f"{shown(text[place:])} is not understood behind {shown(match[1])}; it takes key='value' ... ]"
+                f"{shown(text[place:])} after {shown(match[1])} is not allowed; it takes key='value' ... ]"
             )
         place = end.end()
-        found.append(Told(match[1], attributes))
+        found.append(InlinePlugin(match[1], attributes))
         if len(found) > MOST_PLUGINS:
-            raise MissionError(f"there are more than {MOST_PLUGINS:,} plugins in it")
+            raise MissionError(f"there are more than {MOST_PLUGINS:,} plugins in one parameter")
     if text[place:].strip(" \t\n,"):
         raise MissionError(f"{shown(text[place:])} is not a plugin; it takes [ NAME key='value' ... ]")
     return found
 
 
-def told_text(name: str, attributes: Mapping[str, str]) -> str:
-    """One plugin as `behaviors` reads it.
+def inline_text(name: str, attributes: Mapping[str, str]) -> str:
+    """Write one plugin in the form that `inline_plugins` reads.
 
     Raises:
         MissionError: A value has both kinds of quotes.
@@ -121,22 +124,22 @@ def told_text(name: str, attributes: Mapping[str, str]) -> str:
         quote = "'" if "'" not in value else '"'
         if quote in value:
             raise MissionError(
-                f"{shown(value)} has both kinds of quotes and cannot stand in a plugin within a plugin"
+                f"{shown(value)} has both kinds of quotes and cannot be written in an inline plugin"
             )
         parts.append(f" {key}={quote}{value}{quote}")
     return f"[ {name}{''.join(parts)} ]"
 
 
 def written(value: Any, si: Sequence[str] = ("",), bare: Sequence[str] = ("",)) -> str:
-    """A value as a file has it, with all digits, so that it is read as what it is: a text is as it stands there, a number is SI.
+    """Write a value as in a mission file, with all digits, so that it is read back unchanged. A text is written as it is.
 
     Args:
-        value: A text, a number, a truth value, or a sequence of numbers or of sequences of numbers.
+        value: A text, an SI number, a boolean, or a sequence of numbers or of sequences of numbers.
         si: SI unit of each component.
-        bare: Unit of each component's bare number; where it is another, the SI unit is written.
+        bare: Unit of a bare number in the file, for each component; where it differs, the SI unit is written.
 
     Raises:
-        ParameterError: It is something else.
+        ParameterError: The value has another type.
     """
     if isinstance(value, str):
         return value
@@ -147,7 +150,7 @@ def written(value: Any, si: Sequence[str] = ("",), bare: Sequence[str] = ("",)) 
         return number if si[0] == bare[0] else f"{number} {si[0] or '1'}"
     if not isinstance(value, (Sequence, np.ndarray)):
         raise ParameterError(
-            f"{value!r} is not allowed; a file takes a number, a text, true or false, or a list of numbers"
+            f"{value!r} is not allowed; a mission file takes a number, a text, true or false, or a list of numbers"
         )
     if any(isinstance(item, (Sequence, np.ndarray)) and not isinstance(item, str) for item in value):
         return " ".join(f"[ {written(row, si, bare)} ]" for row in value)

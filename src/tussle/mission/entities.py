@@ -1,4 +1,4 @@
-"""Entities' tags: what they take from <entity_common>, and a block of each."""
+"""Reading of <entity> tags into blocks, with the tags that they take from <entity_common>."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tussle.errors import MissionError, TussleError
 from tussle.mission import codecs
 from tussle.mission.limits import Limits
 from tussle.mission.node import Budget, Node
-from tussle.mission.plugin_tags import PluginReader, Written
+from tussle.mission.plugin_tags import PluginReader, PluginTag
 from tussle.mission.problems import Place, Problems
 from tussle.mission.spec import BLOCK_VALUES, RUN, Block
 from tussle.mission.tags import BASE, ENTITY, ENTITY_ATTRIBUTES, MANY, Known
@@ -23,17 +23,17 @@ from tussle.texts import FALSE, shown, truth
 MOST_TEAM = 2**31 - 1
 
 
-def expanded(root: Node, problems: Problems, budget: Budget) -> None:
-    """Give each <entity> of a mission the tags of its <entity_common>, which then goes away.
+def expand_entity_common(root: Node, problems: Problems, budget: Budget) -> None:
+    """Copy the tags of <entity_common> into each <entity> that takes them, and remove <entity_common>.
 
     Raises:
-        MissionError: With what is given to each there is too much.
+        MissionError: The copies exceed the budget.
     """
     shared: dict[str, Node] = {}
     for node in root.find_all("entity_common"):
         name = node.attributes.get("name", "")
         if not name:
-            problems.error(node.place, "entity_common has no name, by which entities take it")
+            problems.error(node.place, "entity_common has no name; entities take it by its name")
         shared[name] = node
     for node in root.find_all("entity"):
         wanted = node.attributes.pop("entity_common", None)
@@ -47,7 +47,7 @@ def expanded(root: Node, problems: Problems, budget: Budget) -> None:
 
 
 def _merged(common: Iterable[Node], own: list[Node], budget: Budget) -> list[Node]:
-    """The shared tags but for those that the entity has itself, then its own; plugins of both act, the shared ones first."""
+    """The shared tags that the entity does not have itself, then its own; plugins of both are kept, the shared ones first."""
     by_tag: dict[str, list[Node]] = {}
     for mine in own:
         by_tag.setdefault(mine.tag, []).append(mine)
@@ -67,7 +67,7 @@ def _merged(common: Iterable[Node], own: list[Node], budget: Budget) -> list[Nod
 
 
 def block_names(nodes: Iterable[Node]) -> list[str]:
-    """Name of each entity's block: its tag, else its name, else "team_ID"; a second one of a name is "NAME_2"."""
+    """Name of each entity's block: its `tag`, else its name, else "team_ID". The second block of a name is called "NAME_2"."""
     taken = {RUN}
     last: dict[str, int] = {}
     names = []
@@ -86,12 +86,12 @@ def block_names(nodes: Iterable[Node]) -> list[str]:
 
 @dataclass
 class Fields:
-    """The tags in a tag that hold one value each, read on demand; what is wrong goes to the problems.
+    """The tags in a tag that hold one value each, read on demand.
 
     Attributes:
         node: The tag.
-        known: What may be in it.
-        problems: Receives what is wrong.
+        known: Tags that it may contain.
+        problems: Receives errors and notes.
         found: The last tag of each name.
     """
 
@@ -110,9 +110,7 @@ class Fields:
             if child.tag not in self.known:
                 self.problems.unknown(child.place, f"tag in <{self.node.tag}>", child.tag, self.known)
             elif child.tag in self.found and child.tag not in MANY:
-                self.problems.note(
-                    child.place, f"<{child.tag}> stands here for the second time; the last one counts"
-                )
+                self.problems.note(child.place, f"<{child.tag}> occurs more than once; the last one is used")
             self.found[child.tag] = child
 
     def has(self, *names: str) -> bool:
@@ -122,7 +120,7 @@ class Fields:
         return self.found[name].place if name in self.found else self.node.place
 
     def read(self, name: str, codec: Callable[[str], Any]) -> Any:
-        """Value of a tag, or its default where it is absent or wrong."""
+        """Value of a tag; its default if the tag is missing or wrong."""
         if name in self.found:
             try:
                 return codec(self.found[name].text)
@@ -134,7 +132,7 @@ class Fields:
         return codec(default) if default and default != "none" else None
 
     def number(self, name: str, unit: str = "") -> float:
-        """A number in SI units, 0 where there is neither a right one nor a default; a bare one is in the tag's unit."""
+        """A number in SI units, 0 without a valid value or default; a bare number is in the tag's unit."""
         text_unit, bound = self.known[name].unit, self.known[name].bound
 
         def codec(text: str) -> float:
@@ -161,17 +159,17 @@ class Fields:
         return found[0], found[1]
 
     def position(self, origin: Origin) -> tuple[float, ...]:
-        """x, y, z, or what latitude, longitude and altitude say where all three are given."""
+        """Position [m] from latitude, longitude and altitude if all three are given, else from x, y, z."""
         geodetic = ("latitude", "longitude", "altitude")
         given = [name for name in geodetic if self.has(name)]
         if len(given) == len(geodetic):
             angles = self.angles("latitude", "longitude")
             return tuple(float(v) for v in origin.from_geodetic(np.array([*angles, self.number("altitude")])))
         for name in given:
-            others = ", ".join(geodetic)
-            self.problems.note(
-                self.place(name), f"<{name}> counts for nothing without the others of {others}; x, y, z hold"
+            text = (
+                f"<{name}> is ignored: {', '.join(geodetic)} have an effect only together; x, y, z are used"
             )
+            self.problems.note(self.place(name), text)
         return self.vector("x", "y", "z")
 
 
@@ -181,13 +179,13 @@ class EntityReader:
 
     Attributes:
         plugins: Makes the plugins.
-        problems: Receives what is wrong.
-        origin: Where the mission lies.
-        limits: How many entities there may be.
-        update: The mission's; "sequential" bears fewer.
+        problems: Receives errors and notes.
+        origin: Geographic origin of the mission.
+        limits: Limits on the number of entities.
+        update: The mission's update order; the limit is lower for "sequential".
         rows: Entities so far.
-        bases: Homes of the teams so far.
-        drawn: Block name -> settings kept for the viewer.
+        bases: Bases so far.
+        viewer: Block name -> settings for the viewer.
         places: Block name -> its place.
     """
 
@@ -198,11 +196,11 @@ class EntityReader:
     update: str
     rows: int = 0
     bases: list[Base] = field(default_factory=list)
-    drawn: dict[str, dict[str, str]] = field(default_factory=dict)
+    viewer: dict[str, dict[str, str]] = field(default_factory=dict)
     places: dict[str, Place] = field(default_factory=dict)
 
     def block(self, node: Node, name: str) -> Block | None:
-        """The block of one <entity>; None where it is wrong, and the problems say why."""
+        """The block of one <entity>; None if it is wrong, which `problems` receives."""
         for attribute in node.attributes:
             if attribute not in ENTITY_ATTRIBUTES:
                 self.problems.unknown(
@@ -210,7 +208,7 @@ class EntityReader:
                 )
         fields = Fields(node, ENTITY, self.problems)
         self.places[name] = node.place
-        self._remarks(fields)
+        self._note_differences(fields)
         team = fields.read("team_id", lambda text: codecs.whole(text, -MOST_TEAM, MOST_TEAM))
         values: dict[str, Any] = {"name": name, "team": team, "count": self._count(fields)}
         values |= self._body(fields) | self._births(fields, values["count"])
@@ -220,11 +218,11 @@ class EntityReader:
         values["motion"] = self._motion(fields, taken)
         for base in node.find_all("base"):
             self._base(base, team)
-        drawn = {
+        viewer = {
             key: fields.found[key].text for key, known in ENTITY.items() if known.kept_for and fields.has(key)
         }
-        if drawn:
-            self.drawn[name] = drawn
+        if viewer:
+            self.viewer[name] = viewer
         if values["motion"] is None:
             return None
         try:
@@ -233,10 +231,10 @@ class EntityReader:
             self.problems.error(node.place, str(error))
             return None
 
-    def _remarks(self, fields: Fields) -> None:
-        """Say what the format has and tussle does otherwise."""
+    def _note_differences(self, fields: Fields) -> None:
+        """Note the tags that tussle treats differently from the format."""
         if not fields.has("team_id"):
-            self.problems.note(fields.node.place, "the entity has no <team_id>; it is of team 0")
+            self.problems.note(fields.node.place, "the entity has no <team_id>; its team is 0")
         if fields.has("id"):
             self.problems.note(
                 fields.place("id"), "<id> is ignored: ids count up from 1 in the order of the file"
@@ -247,7 +245,7 @@ class EntityReader:
             )
         if fields.has("connect_entity") and fields.found["connect_entity"].text.lower() in FALSE:
             self.problems.note(
-                fields.place("connect_entity"), "<connect_entity> is ignored: wires are always checked"
+                fields.place("connect_entity"), "<connect_entity> is ignored: wiring is always checked"
             )
         for tag, node in fields.found.items():
             if tag in ENTITY and tag not in MANY and tag != "motion_model":
@@ -262,13 +260,13 @@ class EntityReader:
             how = f" with update={self.update!r}" if most < self.limits.rows else ""
             self.problems.error(
                 fields.place("count"),
-                f"count: with these there are {self.rows:,} entities, more than {most:,}{how}; "
-                f"for a file you trust there is allow_large",
+                f"count: the mission has {self.rows:,} entities up to here; the limit{how} is {most:,}; "
+                f"use allow_large for a file that you trust",
             )
         return min(count, most)
 
     def _body(self, fields: Fields) -> dict[str, Any]:
-        """Where the entities are and how they move at first."""
+        """Initial states, and the values of the body."""
         velocity = fields.vector("vx", "vy", "vz")
         return {
             "health": fields.number("health"),
@@ -290,7 +288,7 @@ class EntityReader:
         }
 
     def _births(self, fields: Fields, count: int) -> dict[str, Any]:
-        """When they are born; empty where all are there from the start."""
+        """Times of birth; empty if all entities exist from the start."""
         if not fields.has("generate_rate"):
             return {}
         rate = fields.read("generate_rate", lambda text: codecs.fraction(text, "1/s")) or 0.0
@@ -301,21 +299,21 @@ class EntityReader:
             or 0
         )
         if not (rate > 0.0 and slots > 0):
-            text = "<generate_rate> counts only with a rate > 0 and <generate_count> > 0; all entities are there from the start"
+            text = "<generate_rate> is ignored without a rate > 0 and <generate_count> > 0; all entities exist from the start"
             self.problems.note(fields.place("generate_rate"), text)
             return {}
         return {
             "rate": rate,
-            "slots": min(slots, max(1, count)),  # more never have a birth
+            "slots": min(slots, max(1, count)),  # further slots would have no births
             "first_birth": fields.number("generate_start_time"),
             "interval_sd": fields.number("generate_time_variance"),
         }
 
     def _motion(self, fields: Fields, taken: set[str]) -> Any:
         if fields.has("motion_model"):
-            return self.plugins.make(Written.of(fields.found["motion_model"]), taken)
-        still = Written("motion_model", ENTITY["motion_model"].default, {}, lambda _: fields.node.place)
-        return self.plugins.make(still, taken)
+            return self.plugins.make(PluginTag.of(fields.found["motion_model"]), taken)
+        default = PluginTag("motion_model", ENTITY["motion_model"].default, {}, lambda _: fields.node.place)
+        return self.plugins.make(default, taken)
 
     def _base(self, node: Node, team: int) -> None:
         fields = Fields(node, BASE, self.problems)

@@ -1,4 +1,4 @@
-"""How much a mission may ask for: its file is input from outside, and reading and playing it take bounded time and memory."""
+"""Limits on missions: a mission file is untrusted input, so reading and running it take bounded time and memory."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Limits:
-    """Largest sizes; `Limits.large()` is what `allow_large` stands for.
+    """Maximum sizes; `allow_large` selects `Limits.large()`.
 
     Attributes:
         text: Characters of one file, and of all files with their includes and replaced placeholders.
-        nodes: Tags of all files together, and what <entity_common> and <param_common> give to each that takes them.
-        depth: Tags inside tags.
+        nodes: Tags of all files together, including the copies that are taken from <entity_common> and <param_common>.
+        depth: Nesting of tags.
         blocks: <entity> tags.
         plugins: Plugins of one entity, and of the world.
         files: Files that one mission includes.
-        include_depth: Files that include files.
-        rows: Entities of all blocks together, unborn ones included; in play, those of one world.
-        sequential: The same with update="sequential", where each entity that ever lived takes calls and columns of its own.
-        tries: Places drawn anew for the entities of one world that are born at one moment, where referees reject them.
+        include_depth: Nesting of includes.
+        rows: Entities of all blocks together, unborn ones included; while running, entities of one world.
+        sequential: The same with update="sequential", where each entity that ever lived needs its own calls and columns.
+        tries: Positions redrawn for the entities of one world that are born at the same time, where interactions reject them.
         substeps: motion_multiplier.
         steps: Steps until the end.
     """
@@ -39,12 +39,12 @@ class Limits:
 
     @classmethod
     def large(cls) -> Limits:
-        """For whoever trusts the file: still finite, since what is refused says more than a machine without memory."""
+        """Limits for trusted files; still finite, since an error message helps more than running out of memory."""
         return cls(
             text=256_000_000, nodes=10_000_000, files=4096, rows=50_000_000, sequential=50_000_000, tries=10**12,
             substeps=10_000_000, steps=10**15,
         )  # fmt: skip
 
     def most_rows(self, update: str) -> int:
-        """Entities that a mission with this `update` may have."""
+        """Maximum number of entities of a mission with this `update`."""
         return self.sequential if update == "sequential" else self.rows

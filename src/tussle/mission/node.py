@@ -1,7 +1,7 @@
-"""XML text to a plain tree with the file and line of each tag and attribute.
+"""Parsing of XML text to a tree of nodes, with the file and line of each tag and attribute.
 
-The parser is expat from the standard library: it tells where a tag begins (libxml2 tells where it ends), and every construct that
-could reach outside the text or grow is seen before it acts, so it can be refused.
+The parser is expat from the standard library: it reports where a tag begins (libxml2 reports where it ends), and it reports every
+construct that could read other files or grow before it takes effect, so it can be refused.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ class Node:
     """A tag.
 
     Attributes:
-        tag: Its name; one of a namespace is written "{address}name".
-        attributes: As written, in order.
+        tag: Its name; with a namespace, "ADDRESS}NAME".
+        attributes: Attributes in order, as written.
         text: Its own text without that of its children, stripped.
         children: The tags in it.
-        place: Where it begins.
+        place: File and line where it begins.
         lines: Line of each attribute.
     """
 
@@ -49,7 +49,7 @@ class Node:
         return (child for child in self.children if child.tag == tag)
 
     def copied(self) -> Node:
-        """A copy that shares nothing that changes."""
+        """A deep copy."""
         return Node(
             self.tag,
             dict(self.attributes),
@@ -60,7 +60,7 @@ class Node:
         )
 
     def to_text(self, indent: str = "") -> str:
-        """The tree as XML again."""
+        """Write the tree as XML."""
         attributes = "".join(f" {_local(k)}={quoteattr(v)}" for k, v in self.attributes.items())
         start = f"{indent}<{_local(self.tag)}{attributes}"
         if not self.children:
@@ -76,7 +76,7 @@ def _local(name: str) -> str:
 
 @dataclass
 class Budget:
-    """What is left of the limits that all files of a mission share."""
+    """Counts of tags and characters that all files of a mission share, checked against the limits."""
 
     limits: Limits
     nodes: int = 0
@@ -91,15 +91,15 @@ class Budget:
         self.nodes += amount
         if self.nodes > self.limits.nodes:
             raise MissionError(
-                f"{place}: there are more than {self.limits.nodes:,} tags, counted again wherever they are taken from; "
-                f"for a file you trust there is allow_large"
+                f"{place}: there are more than {self.limits.nodes:,} tags, copies of shared tags included; "
+                f"use allow_large for a file that you trust"
             )
 
     def spend_copy(self, node: Node) -> None:
-        """Count a tag, with all in it, that is taken from elsewhere in the file.
+        """Count a tag and its content, which are copied from elsewhere in the file.
 
         Raises:
-            MissionError: There is too much by now.
+            MissionError: There are too many tags or characters.
         """
         self.spend_nodes(1, node.place)
         size = len(node.tag) + len(node.text) + sum(len(k) + len(v) for k, v in node.attributes.items())
@@ -116,7 +116,7 @@ class Budget:
         self.text += amount
         if self.text > self.limits.text:
             raise MissionError(
-                f"{file}: the mission is longer than {self.limits.text:,} characters; for a file you trust there is allow_large"
+                f"{file}: the mission is longer than {self.limits.text:,} characters; use allow_large for a file that you trust"
             )
 
 
@@ -148,7 +148,7 @@ class _Builder:
         place = Place(self.file, self.line_of(line))
         self.budget.spend_nodes(1, place)
         if len(self.stack) >= self.budget.limits.depth:
-            raise self.refuse(f"tags stand in one another more than {self.budget.limits.depth} deep")
+            raise self.refuse(f"tags are nested more than {self.budget.limits.depth} deep")
         names = flat[::2]
         node = Node(tag, dict(zip(names, flat[1::2], strict=True)), "", [], place)
         if names:
@@ -160,7 +160,7 @@ class _Builder:
         self.stack.append((node, []))
 
     def lines_of_attributes(self, line: int) -> dict[str, int]:
-        """Line of each attribute of the tag that begins here; expat tells that of the tag only."""
+        """Line of each attribute of the tag that begins here; expat reports only the line of the tag."""
         place, lines = self.parser.CurrentByteIndex, {}
         name = re.compile(rb"<[^\s<>/]+").match(self.data, place)
         place = name.end() if name else place
@@ -182,13 +182,13 @@ class _Builder:
 
 
 def parse(text: str, file: str, budget: Budget, line_of: Callable[[int], int] = int) -> Node:
-    """The root tag of an XML text.
+    """Parse an XML text to its root tag.
 
     Args:
-        text: Of the whole file.
+        text: Text of the whole file.
         file: Its name, for messages.
         budget: Limits that it shares with the mission's other files.
-        line_of: From a line of `text` to the line of the file that it was made from.
+        line_of: Maps a line of `text` to the line of the original file.
 
     Raises:
         MissionError: It is malformed, has a DOCTYPE, or is too large.
@@ -208,8 +208,8 @@ def parse(text: str, file: str, budget: Budget, line_of: Callable[[int], int] = 
 
 def _hint(error: expat.ExpatError) -> str:
     hints = {
-        expat.errors.XML_ERROR_TAG_MISMATCH: " (a tag is closed by another name, or not at all, before here)",
-        expat.errors.XML_ERROR_UNDEFINED_ENTITY: " (there are &lt; &gt; &amp; &quot; and &apos; only)",
+        expat.errors.XML_ERROR_TAG_MISMATCH: " (a tag above is not closed, or is closed by another name)",
+        expat.errors.XML_ERROR_UNDEFINED_ENTITY: " (only &lt; &gt; &amp; &quot; and &apos; are defined)",
         expat.errors.XML_ERROR_INVALID_TOKEN: " (in text, & is written &amp; and < is written &lt;)",
     }
     return hints.get(expat.ErrorString(error.code), "")

@@ -1,4 +1,4 @@
-"""Settings from outside: values of placeholders, and by path (`tussle.mission.paths`) of tags and attributes."""
+"""Settings from outside a mission file: values of placeholders, and of tags and attributes by path (`tussle.mission.paths`)."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ ENTITY_PLUGINS = ("autonomy", "controller", "sensor", "motion_model")
 
 
 def as_texts(settings: Mapping[str, Any]) -> dict[str, str]:
-    """Settings as placeholders take them: a number is put into the file bare, and has the unit of its place there.
+    """Convert settings to the texts that replace placeholders. A number is inserted bare, in the unit of its place in the file.
 
     Raises:
         MissionError: A value cannot be written.
@@ -42,26 +42,26 @@ class Overrides:
 
     Args:
         root: The tree; it is changed.
-        catalogue: Finds the classes of plugins, whose declarations say what a number is.
-        known: Names of the placeholders, which have been set.
+        catalogue: Finds the plugin classes, whose declarations give the units.
+        known: Names of the placeholders, which are set already.
     """
 
     def __init__(self, root: Node, catalogue: Catalogue, known: Iterable[str]) -> None:
         self.root, self.catalogue, self.known = root, catalogue, sorted(known)
 
     def set(self, path: str, value: Any) -> str:
-        """Set one value: a number is SI, a text is as in the file.
+        """Set one value: a number is SI, a text is read as in the file.
 
         Returns:
-            The value as the file has it now.
+            The value as written in the file.
 
         Raises:
-            MissionError: The path leads nowhere, or the value cannot be written.
+            MissionError: The path does not exist, or the value cannot be written.
         """
         if "." not in path:
             raise MissionError(
                 f"the mission has no setting {path[:80]!r}{nearest_name(path[:80], self.known)}; {listed(self.known)}; "
-                f"also by path: run.dt, BLOCK.TAG, BLOCK.PLUGIN.ATTRIBUTE, PLUGIN.ATTRIBUTE"
+                f"allowed are also paths: run.dt, BLOCK.TAG, BLOCK.PLUGIN.ATTRIBUTE, PLUGIN.ATTRIBUTE"
             )
         try:
             owners, name = follow(path, self.root, self._inside, self._values)
@@ -73,17 +73,17 @@ class Overrides:
                 _set_tag(owner, name, text)
             else:
                 owner.attributes[name] = text
-                # Not of the file: what is wrong with it is an error even where the file's own would be a note.
+                # Line 0 marks a value set from outside: a problem with it is an error, where it could be a note in the file.
                 owner.lines[name] = 0
             for outer in reversed(owners[1:-1]):
                 _write_inner(outer)
         except TussleError as error:
-            said = str(error).removeprefix(f"{shown(path)}: ")
-            raise MissionError(f"setting {path[:200]}={str(value)[:80]}: {said}") from None
+            reason = str(error).removeprefix(f"{shown(path)}: ")
+            raise MissionError(f"setting {path[:200]}={str(value)[:80]}: {reason}") from None
         return text
 
     def _inside(self, node: Node) -> dict[str, Node]:
-        """The run, blocks and plugins of the world in all; plugins in a block; plugins in a plugin."""
+        """Members of a node: run, blocks and world plugins of the root; plugins of a block; plugins inside a plugin."""
         if node is self.root:
             entities = list(node.find_all("entity"))
             blocks = dict(zip(block_names(entities), entities, strict=True))
@@ -97,14 +97,14 @@ class Overrides:
         renamed = cls.historic_attributes.renamed
         inner = [key for key in node.attributes if renamed.get(key, key) in cls.children()]
         node.children = [
-            Node(key, told.attributes, told.name, [], node.place)
+            Node(key, plugin.attributes, plugin.name, [], node.place)
             for key in inner
-            for told in codecs.behaviors(node.attributes[key])
+            for plugin in codecs.inline_plugins(node.attributes[key])
         ]
         return _named(node, inner)
 
     def _values(self, node: Node) -> Collection[str] | None:
-        """Names of what can be set; of a plugin the reader says what it does not know."""
+        """Names of the values of a node; None for a plugin, whose attributes are checked when it is read."""
         if node is self.root:
             return ()
         tags = {
@@ -114,7 +114,7 @@ class Overrides:
         return tags.get(node.tag)
 
     def _units(self, node: Node, name: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """SI unit and unit of a bare number, of each component of a value."""
+        """SI unit, and unit of a bare number, of each component of a value."""
         known = (PLUGIN | {"run": RUN_ATTRIBUTES, "entity": ENTITY}.get(node.tag, {})).get(name)
         if known is None:
             return _units_of(self.catalogue.load(node.text), name)
@@ -132,27 +132,26 @@ def _units_of(cls: type[Plugin], attribute: str) -> tuple[tuple[str, ...], tuple
 
 
 def _named(node: Node, tags: Iterable[str]) -> dict[str, Node]:
-    """Plugins in a tag by the names that they get when they are read."""
+    """Plugins in a tag by instance name."""
     taken: set[str] = set()
     plugins = [child for tag in tags for child in node.find_all(tag)]
     return {free_name(n.attributes.get("name", n.text).strip(), taken): n for n in plugins}
 
 
 def _write_inner(node: Node) -> None:
-    """Write the plugins within a plugin back into its attributes."""
+    """Write the plugins inside a plugin back into its attributes."""
     for key in dict.fromkeys(child.tag for child in node.children):
-        inner = (codecs.told_text(n.text, n.attributes) for n in node.find_all(key))
+        inner = (codecs.inline_text(n.text, n.attributes) for n in node.find_all(key))
         node.attributes[key], node.lines[key] = " ".join(inner), 0
     node.children = []
 
 
 def _set_tag(block: Node, tag: str, value: str) -> None:
-    """Put one tag in the place of all of its name; a plugin may bring attributes: "Unicycle vel_max='30'"."""
+    """Replace all tags of a name by one; a plugin may have attributes: "Unicycle vel_max='30'"."""
     block.children = [child for child in block.children if child.tag != tag]
     if tag not in ENTITY_PLUGINS:
         block.children.append(Node(tag, {}, value.strip(), [], block.place))
     elif value.strip():
-        told = codecs.told(value)
-        block.children.append(
-            Node(tag, told.attributes, told.name, [], block.place, dict.fromkeys(told.attributes, 0))
-        )
+        plugin = codecs.inline_plugin(value)
+        lines = dict.fromkeys(plugin.attributes, 0)
+        block.children.append(Node(tag, plugin.attributes, plugin.name, [], block.place, lines))

@@ -1,7 +1,7 @@
-"""The path language: names with dots between them, as in "run.dt", "prey.count", "prey.Boids.max_speed", "SimpleCapture.capture_range".
+"""The path language: names joined by dots, as in "run.dt", "prey.count", "prey.Boids.max_speed", "SimpleCapture.capture_range".
 
-A path names an owner (the run, a block, a plugin of the world), then plugins within it, then one value of the last. What values an
-owner has depends on what is asked for: what can be set in a mission, the columns of a simulation, the tags of a file.
+A path names an owner (the run, a block, a world plugin), then plugins inside it, then one value of the last owner. The values of an
+owner depend on the use: settings of a mission, columns of a simulation, tags of a file.
 """
 
 from __future__ import annotations
@@ -23,38 +23,38 @@ def follow(
     inside: Callable[[Any], Mapping[str, Any]],
     values: Callable[[Any], Collection[str] | None],
 ) -> tuple[list[Any], str]:
-    """The owners along a path, from the outermost to that of the value, and the value's name.
+    """Resolve a path to its owners, from the outermost to that of the value, and the value's name.
 
     Args:
-        path: As written.
-        start: What all paths begin in.
-        inside: What is in an owner, by name.
-        values: Names of an owner's values; None where any may be meant.
+        path: The path.
+        start: Owner that all paths start from.
+        inside: Returns the members of an owner, by name.
+        values: Returns the names of an owner's values; None if any name is allowed.
 
     Raises:
-        ParameterError: A name is not found; the message says which, what there is, and what may have been meant.
+        ParameterError: A name is not found; the message names it, the existing names and the nearest one.
     """
     *names, last = path.split(".")
-    owners, owner, said = [], start, "the mission"
+    owners, owner, label = [], start, "the mission"
     for name in names:
-        there = inside(owner)
-        if name not in there:
-            raise _absent(path, said, name, there)
-        owner, said = there[name], name
+        members = inside(owner)
+        if name not in members:
+            raise _absent(path, label, name, members)
+        owner, label = members[name], name
         owners.append(owner)
-    allowed, there = values(owner), inside(owner)
+    allowed, members = values(owner), inside(owner)
     if allowed is not None and last not in allowed:
-        if last in there:
+        if last in members:
             raise ParameterError(
-                f"{shown(path)} names no value of {last}; {listed(values(there[last]) or ())}"
+                f"{shown(path)} is not a value; in {last} {listed(values(members[last]) or ())}"
             )
-        raise _absent(path, said, last, (*allowed, *there))
+        raise _absent(path, label, last, (*allowed, *members))
     return owners, last
 
 
-def _absent(path: str, owner: str, name: str, there: Collection[str]) -> ParameterError:
+def _absent(path: str, owner: str, name: str, known: Collection[str]) -> ParameterError:
     return ParameterError(
-        f"{shown(path)}: {owner[:80]} has no {name[:80]!r}{nearest_name(name[:80], there)}; {listed(there)}"
+        f"{shown(path)}: {owner[:80]} has no {name[:80]!r}{nearest_name(name[:80], known)}; {listed(known)}"
     )
 
 
@@ -62,13 +62,13 @@ def _absent(path: str, owner: str, name: str, there: Collection[str]) -> Paramet
 
 
 class Whole(NamedTuple):
-    """What paths into a mission begin in; the mission itself is what "run" names."""
+    """Owner that paths into a mission start from; the name "run" in it is the mission itself."""
 
     mission: Mission
 
 
 def inside(owner: Any) -> dict[str, Any]:
-    """Blocks, plugins of the world and the run in all; plugins in a block; plugins in a plugin."""
+    """Members of an owner: run, blocks and world plugins of the root; plugins of a block; plugins inside a plugin."""
     if isinstance(owner, Whole):
         mission = owner.mission
         return {
@@ -85,25 +85,25 @@ def inside(owner: Any) -> dict[str, Any]:
 
 
 def settable(owner: Any) -> tuple[str, ...]:
-    """What can be set in an owner: attributes of `Mission` and `Block`, parameters of plugins."""
+    """Names that can be set in an owner: attributes of `Mission` and `Block`, parameters of plugins."""
     if isinstance(owner, Plugin):
         return (*owner.params(), *owner.children(), *RESERVED)
     return () if isinstance(owner, Whole) else tuple(f.name for f in fields(owner))
 
 
 def declared(owner: Any, name: str) -> Param | None:
-    """The declaration of a value; None of what is no number or text."""
+    """The declaration of a value; None if it is neither a number nor a text."""
     if isinstance(owner, Plugin):
         return owner.params().get(name)
     return (MISSION_VALUES if isinstance(owner, Mission) else BLOCK_VALUES).get(name)
 
 
 def with_value(mission: Mission, path: str, value: Any) -> Mission:
-    """A mission with one value changed: a number is SI, a text is read as in a mission file.
+    """A copy of a mission with one value changed: a number is SI, a text is read as in a mission file.
 
     Raises:
-        ParameterError: The path leads nowhere, or the value is not allowed.
-        MissionError: The mission cannot be with it.
+        ParameterError: The path does not exist, or the value is not allowed.
+        MissionError: The mission is invalid with this value.
     """
     owners, name = follow(path, Whole(mission), inside, settable)
     try:
@@ -116,7 +116,7 @@ def with_value(mission: Mission, path: str, value: Any) -> Mission:
 
 
 def _with_member(outer: Any, old: Any, new: Any) -> Any:
-    """A mission, a block or a plugin with another of what is in it."""
+    """A copy of a mission, block or plugin with one member replaced."""
     for name, value in (outer.values if isinstance(outer, Plugin) else vars(outer)).items():
         if value is old:
             return outer.replace(**{name: new})

@@ -1,4 +1,4 @@
-"""`${name=default}` in the text of a mission."""
+"""Replacement of placeholders, `${name=default}`, in the text of a mission."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ PLACEHOLDER = re.compile(r"\$\{([^=${}\s]{1,200})(?:=([^{}]*))?\}")
 
 @dataclass
 class Replaced:
-    """A text without placeholders.
+    """A text whose placeholders are replaced.
 
     Attributes:
-        text: What is parsed.
+        text: The text to parse.
         names: Placeholders outside comments, with their defaults.
-        ends: Line of `text` behind each replacement that changed the number of lines.
-        shifts: Lines to add from there on to get the line of the file.
+        ends: Line of `text` at the end of each replacement that changed the number of lines.
+        shifts: Number to add to lines from there on to get the line of the file.
     """
 
     text: str
@@ -33,7 +33,7 @@ class Replaced:
 
     @property
     def line_of(self) -> Callable[[int], int]:
-        """From a line of the new text to that of the file."""
+        """Maps a line of the new text to the line of the file."""
 
         def shifted(line: int) -> int:
             i = bisect_right(self.ends, line)
@@ -43,7 +43,7 @@ class Replaced:
 
 
 def _comments(text: str) -> Iterator[tuple[int, int]]:
-    """Begin and end of each comment; not by one expression, which is quadratic where many begin and none ends."""
+    """Begin and end of each comment. A regular expression would take quadratic time if many comments begin and none ends."""
     begin = text.find("<!--")
     while begin >= 0 and (end := text.find("-->", begin)) >= 0:
         yield begin, end
@@ -53,9 +53,9 @@ def _comments(text: str) -> Iterator[tuple[int, int]]:
 def replace_placeholders(
     text: str, file: str, overrides: Mapping[str, str], problems: Problems, budget: Budget
 ) -> Replaced:
-    """The text with every placeholder replaced by its override or else its default.
+    """Replace every placeholder by its override, or else by its default.
 
-    An override is a value, never markup: its <, > and & and quotes are escaped.
+    An override is a value, never markup: <, >, & and quotes in it are escaped.
 
     Raises:
         MissionError: The result is too long.

@@ -1,8 +1,8 @@
-"""Plugin files: Python files that are named, with the files beside them that they import.
+"""Plugin files: Python files with plugins, and the files in the same folder that they import.
 
-A folder that holds plugin files is a package of its own, called after a hash of its path, and so two folders may each have a
-`geometry.py`. In it `from . import geometry` means the neighbour, and so does a plain `import geometry`, as in a script: the files
-are run with an `__import__` of their own, which looks beside them first. Nothing is put on `sys.path`, and nobody else notices.
+A folder with plugin files is a separate package, named by a hash of its path, so two folders may each have a `geometry.py`. In a
+plugin file, `from . import geometry` and, as in a script, plain `import geometry` import the neighbour: the files run with their
+own `__import__`, which looks in their folder first. `sys.path` and the imports of other modules do not change.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ from tussle.api.plugin import Plugin
 from tussle.errors import MissionError
 
 PREFIX = "tussle_plugins_"
-"""Begins the names of the packages that folders with plugin files are."""
+"""Prefix of the package names of folders with plugin files."""
 DIGEST = "__plugin_file_digest__"
-"""In the module of a file: hash of the texts that it was made from, its own and those that it imports."""
+"""Attribute of a file's module: hash of the texts that it was made from, its own and those that it imports."""
 INIT = "__init__"
 
 
 @dataclass(frozen=True)
 class PluginFile:
-    """A Python file with plugins as it was when it was read, and all in its folder that it imports.
+    """A Python file with plugins, and all files in its folder that it imports, as they were when they were read.
 
     Attributes:
         folder: The folder.
@@ -49,18 +49,20 @@ class PluginFile:
 
     @classmethod
     def of(cls, path: str | Path) -> PluginFile:
-        """The file as it is now; nothing of it is run.
+        """Read the file without running it.
 
         Raises:
-            MissionError: It is not there, cannot be read, or is no Python file.
+            MissionError: It does not exist, cannot be read, or is not a Python file.
         """
         file = Path(path).expanduser()
         if not file.is_file():
             raise MissionError(f"{path}: there is no such plugin file")
         if file.suffix != ".py":
-            raise MissionError(f"{path}: this is not a Python file (its name ends with .py)")
+            raise MissionError(f"{path}: it is not a Python file (the name must end with .py)")
         file = file.resolve()
-        return cls(str(file.parent), file.name, _reached(file.name, lambda name: _read(file.parent / name)))
+        return cls(
+            str(file.parent), file.name, _with_imports(file.name, lambda name: _read(file.parent / name))
+        )
 
     @property
     def path(self) -> str:
@@ -68,24 +70,24 @@ class PluginFile:
 
     @cached_property
     def package(self) -> str:
-        """Name of the package that the folder is."""
+        """Name of the folder's package."""
         return PREFIX + hashlib.blake2b(self.folder.encode(), digest_size=4).hexdigest()
 
     @property
     def module(self) -> str:
-        """Name of the module that the file is: one of its own, so that plugins of two files called alike pickle."""
+        """Name of the file's module; unique, so that plugins of two files with the same name can be pickled."""
         return self._module(self.name)
 
     def load(self) -> dict[str, type[Plugin]]:
-        """The plugins that it defines, by the names of their classes. The file is run, as an import does.
+        """Import the file and return the plugins that it defines, by class name.
 
-        What has not changed since it was loaded is not run again: its classes stay the same ones. Of the files on the disk nothing
-        is read, so that it may be loaded on a machine that does not have them.
+        Files that have not changed since they were loaded are not run again, so their classes stay the same. Nothing is read from
+        disk, so the plugins can be loaded on a machine that does not have the files.
 
         Raises:
-            MissionError: It cannot be imported, or defines no plugin; the message has the file's own line.
+            MissionError: It cannot be imported, or defines no plugin; the message has the file's line.
         """
-        self._offer()
+        self._register()
         try:
             module = importlib.import_module(self.module)
         except (Exception, SystemExit) as error:
@@ -109,8 +111,8 @@ class PluginFile:
         parts = parts[:-1] if len(parts) > 1 and parts[-1] == INIT else parts
         return ".".join((self.package, *(part.replace(".", "_") for part in parts)))
 
-    def _offer(self) -> None:
-        """Have the modules found by imports, and those forgotten that were made from other texts."""
+    def _register(self) -> None:
+        """Make the modules importable, and remove modules that were made from other texts."""
         finder = _finder()
         loaders: dict[str, _Loader] = {}
         for folder in {parent for name in self.texts for parent in PurePosixPath(name).parents}:
@@ -118,8 +120,8 @@ class PluginFile:
             module = self._module(path) if folder.parts else self.package
             loaders[module] = _Loader(str(Path(self.folder, path)), "", "", True, self.package)
         for name, text in self.texts.items():
-            reached = _reached(name, self.texts.get)
-            digest = hashlib.blake2b(repr(sorted(reached.items())).encode(), digest_size=16).hexdigest()
+            texts = _with_imports(name, self.texts.get)
+            digest = hashlib.blake2b(repr(sorted(texts.items())).encode(), digest_size=16).hexdigest()
             is_package = name.endswith(f"/{INIT}.py")
             path = str(Path(self.folder, name))
             loaders[self._module(name)] = _Loader(path, text, digest, is_package, self.package)
@@ -135,7 +137,7 @@ class PluginFile:
         finder.loaders.update(loaders)
 
     def _line(self, error: BaseException) -> str:
-        """The last line of the file, or of a neighbour, that the error passed through."""
+        """The last line of the file, or of a neighbour, in the error's traceback."""
         if isinstance(error, SyntaxError) and error.lineno:
             return f"{error.filename or self.path}:{error.lineno}"
         files = {str(Path(self.folder, name)) for name in self.texts}
@@ -144,7 +146,7 @@ class PluginFile:
 
 
 def load_plugin_file(path: str | Path) -> dict[str, type[Plugin]]:
-    """The plugins that a Python file defines, by the names of their classes (see `PluginFile.load`).
+    """Import a Python file and return the plugins that it defines, by class name (see `PluginFile.load`).
 
     Raises:
         MissionError: It cannot be read or imported, or defines no plugin.
@@ -152,7 +154,7 @@ def load_plugin_file(path: str | Path) -> dict[str, type[Plugin]]:
     return PluginFile.of(path).load()
 
 
-# -- which files belong together ----------------------------------------------------------------------------------------------
+# -- imported neighbours ------------------------------------------------------------------------------------------------------
 
 
 def _read(file: Path) -> str | None:
@@ -166,8 +168,8 @@ def _read(file: Path) -> str | None:
         raise MissionError(f"{file}: it cannot be read: {error}") from error
 
 
-def _reached(first: str, read: Callable[[str], str | None]) -> dict[str, str]:
-    """Path within the folder -> text, of a file and of all there that it imports, and these in turn."""
+def _with_imports(first: str, read: Callable[[str], str | None]) -> dict[str, str]:
+    """Path within the folder -> text, of a file and of all files there that it imports, directly or indirectly."""
     found: dict[str, str] = {}
     names = [first]
     while names:
@@ -181,10 +183,10 @@ def _reached(first: str, read: Callable[[str], str | None]) -> dict[str, str]:
 
 @lru_cache(maxsize=1000)
 def _imported(name: str, text: str) -> tuple[str, ...]:
-    """Paths within the folder that import statements of a file may mean, whether or not they are there."""
+    """Paths within the folder that import statements of a file may refer to, whether or not they exist."""
     try:
         statements = list(ast.walk(ast.parse(text)))
-    except (SyntaxError, ValueError):  # told, with its line, when it is run
+    except (SyntaxError, ValueError):  # reported with its line when the file is run
         return ()
     own, found = PurePosixPath(name).parent.parts, list[str]()
     for node in statements:
@@ -201,11 +203,11 @@ def _imported(name: str, text: str) -> tuple[str, ...]:
     return tuple(found)
 
 
-# -- importing them -----------------------------------------------------------------------------------------------------------
+# -- importing ----------------------------------------------------------------------------------------------------------------
 
 
 def _finder() -> _Finder:
-    """The one of this process; put in place when it is asked for first."""
+    """The finder of this process; installed on first use."""
     found = next((f for f in sys.meta_path if isinstance(f, _Finder)), None)
     if found is None:
         found = _Finder({})
@@ -225,7 +227,7 @@ class _Finder(MetaPathFinder):
         loader = self.loaders.get(fullname)
         spec = None if loader is None else spec_from_loader(fullname, loader)
         if spec is not None and spec.submodule_search_locations is not None:
-            spec.submodule_search_locations.clear()  # what is not in the texts would not be there on another machine
+            spec.submodule_search_locations.clear()  # do not search the disk, which differs on another machine
         return spec
 
 
@@ -234,11 +236,11 @@ class _Loader(ExecutionLoader):
     """Makes one module from its text.
 
     Attributes:
-        path: Of the file, which need not be there.
+        path: Path of the file, which need not exist.
         text: The text.
         digest: See `DIGEST`.
-        is_folder: It is a package.
-        package: The package of all neighbours.
+        is_folder: Whether the module is a package.
+        package: Package of the folder.
     """
 
     path: str
@@ -270,7 +272,7 @@ class _Loader(ExecutionLoader):
         fromlist: Any = (),
         level: int = 0,
     ) -> Any:
-        """What an import statement of the file does: a plain name is looked for beside it first."""
+        """Import for the file's statements: a plain name is looked up in its folder first."""
         neighbour = f"{self.package}.{name.partition('.')[0]}"
         if level == 0 and neighbour in _finder().loaders:
             found = builtins.__import__(f"{self.package}.{name}", globals, locals, fromlist)

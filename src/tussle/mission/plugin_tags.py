@@ -1,4 +1,4 @@
-"""A plugin's tag, or a behaviour in a parameter, to the plugin."""
+"""Reading of plugin tags, and of behaviors in a parameter, into plugins."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from tussle.mission.tags import PLUGIN
 from tussle.texts import shown
 
 MOST_NESTED = 4
-"""Behaviours in behaviours."""
+"""Maximum nesting of behaviors."""
 LOOP_RATE = Param(0.0, unit="1/s", ge=0.0, lt=math.inf)
 RATED = ("autonomy", "controller", "sensor", "behaviors")
 
 
 def free_name(wanted: str, taken: set[str]) -> str:
-    """The name that a plugin gets: the wanted one, or with a number behind it where that is taken; then it is taken."""
+    """The wanted name, with a number appended if it is taken; the name is added to `taken`."""
     name, n = wanted, 2
     while name in taken:
         name, n = f"{wanted}_{n}", n + 1
@@ -33,14 +33,14 @@ def free_name(wanted: str, taken: set[str]) -> str:
 
 
 @dataclass
-class Written:
-    """A plugin as it stands in the file.
+class PluginTag:
+    """A plugin as written in the file.
 
     Attributes:
-        tag: What kind is wanted: a key of KINDS.
-        plugin: Its name.
-        attributes: As written.
-        where: Place of an attribute, of the tag for "".
+        tag: Tag, which gives the kind: a key of KINDS.
+        plugin: Name of the plugin class.
+        attributes: Attributes as written.
+        where: Returns the place of an attribute; of the tag for "".
     """
 
     tag: str
@@ -49,21 +49,21 @@ class Written:
     where: Callable[[str], Place]
 
     @classmethod
-    def of(cls, node: Node) -> Written:
+    def of(cls, node: Node) -> PluginTag:
         return cls(node.tag, node.text, dict(node.attributes), node.where)
 
 
 @dataclass
 class PluginReader:
-    """Makes plugins.
+    """Makes plugins from tags.
 
     Attributes:
         catalogue: Finds the classes.
-        problems: Receives what is wrong.
+        problems: Receives errors and notes.
         budget: Limits that it shares with the mission's files.
         shared: <param_common> name -> attributes.
-        from_geodetic: Latitude, longitude [rad], altitude [m], (3,), to world positions [m].
-        drawn: Receives attributes that are kept for the viewer: "plugin@attribute" -> text.
+        from_geodetic: Converts latitude, longitude [rad], altitude [m], (3,), to a world position [m].
+        viewer: Receives attributes for the viewer: "plugin@attribute" -> text.
     """
 
     catalogue: Catalogue
@@ -71,20 +71,20 @@ class PluginReader:
     budget: Budget
     shared: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     from_geodetic: Callable[..., Any] | None = None
-    drawn: dict[str, str] = field(default_factory=dict)
+    viewer: dict[str, str] = field(default_factory=dict)
 
     def many(self, nodes: Iterable[Node], taken: set[str] | None = None) -> list[Any]:
-        """The plugins of several tags; those that are wrong are missing in it.
+        """The plugins of several tags, without those that are wrong.
 
         Args:
             nodes: The tags.
-            taken: Instance names that are in use, to which theirs are added.
+            taken: Instance names in use; the new ones are added.
         """
-        made = (self.make(Written.of(node), set() if taken is None else taken) for node in nodes)
+        made = (self.make(PluginTag.of(node), set() if taken is None else taken) for node in nodes)
         return [plugin for plugin in made if plugin is not None]
 
-    def make(self, written: Written, taken: set[str], depth: int = 0) -> Plugin | None:
-        """One plugin; None where it is wrong, and the problems say why."""
+    def make(self, written: PluginTag, taken: set[str], depth: int = 0) -> Plugin | None:
+        """The plugin of a tag; None if it is wrong, which `problems` receives."""
         cls = self._class_of(written)
         if cls is None:
             return None
@@ -101,7 +101,7 @@ class PluginReader:
                 try:
                     values[parameter] = self._value(cls, parameter, text, written, depth)
                 except TussleError as error:
-                    self._say(written.where(attribute), cls, parameter, error)
+                    self._report(written.where(attribute), cls, parameter, error)
                     is_right = False
             else:
                 self._not_a_parameter(written, cls, attribute)
@@ -116,7 +116,7 @@ class PluginReader:
             self.problems.error(written.where(""), str(error))
             return None
 
-    def _class_of(self, written: Written) -> type[Plugin] | None:
+    def _class_of(self, written: PluginTag) -> type[Plugin] | None:
         place, tag = written.where(""), "behavior" if written.tag == "behaviors" else written.tag
         if not written.plugin:
             self.problems.error(place, f"<{tag}> is empty; it takes the name of a plugin")
@@ -135,11 +135,11 @@ class PluginReader:
             its = next(
                 (t for t, kind in KINDS.items() if issubclass(cls, kind) and t != "behaviors"), "no tag"
             )
-            self.problems.error(place, f"{written.plugin} does not go into {tag}; it goes into {its}")
+            self.problems.error(place, f"{written.plugin} is not allowed in {tag}; it belongs in {its}")
             return None
         return cls
 
-    def _add_shared(self, written: Written) -> None:
+    def _add_shared(self, written: PluginTag) -> None:
         name = written.attributes.get("param_common")
         if name is None:
             return
@@ -152,7 +152,7 @@ class PluginReader:
         for key, text in shared.items():
             written.attributes.setdefault(key, text)
 
-    def _name(self, written: Written, taken: set[str]) -> str:
+    def _name(self, written: PluginTag, taken: set[str]) -> str:
         wanted = written.attributes.get("name", written.plugin).strip()
         if not wanted or "." in wanted:
             text = f"name {shown(wanted)} is not allowed: a name is not empty and has no dot, since paths such as prey.Boids.gain use dots"
@@ -161,17 +161,18 @@ class PluginReader:
         name = free_name(wanted, taken)
         if name != wanted:
             self.problems.note(
-                written.where("name"), f"a second {wanted} is called {name}; give it a name='...' of its own"
+                written.where("name"),
+                f"a second {wanted} is called {name}; give it another name with name='...'",
             )
         return name
 
-    def _rate(self, written: Written) -> float | None:
+    def _rate(self, written: PluginTag) -> float | None:
         text = written.attributes.get("loop_rate")
         if text is None:
             return None
         place = written.where("loop_rate")
         if written.tag not in RATED:
-            self.problems.note(place, f"loop_rate of a {written.tag} is ignored; it acts in every step")
+            self.problems.note(place, f"loop_rate of a {written.tag} is ignored; it runs in every step")
             return None
         try:
             return LOOP_RATE.convert(text, "loop_rate") or None
@@ -179,8 +180,8 @@ class PluginReader:
             self.problems.error(place, str(error))
             return None
 
-    def _join(self, written: Written, cls: type[Plugin]) -> None:
-        """Put attributes that are components of one parameter into it."""
+    def _join(self, written: PluginTag, cls: type[Plugin]) -> None:
+        """Combine attributes that are components of one parameter."""
         for parameter, parts in cls.historic_attributes.joined.items():
             if any(part in written.attributes for part in parts):
                 column = cls.params()[parameter]
@@ -188,32 +189,34 @@ class PluginReader:
                 text = ", ".join(written.attributes.pop(part, repr(default)) for part, default in components)
                 written.attributes.setdefault(parameter, text)
 
-    def _value(self, cls: type[Plugin], parameter: str, text: str, written: Written, depth: int) -> Any:
+    def _value(self, cls: type[Plugin], parameter: str, text: str, written: PluginTag, depth: int) -> Any:
         if parameter not in cls.children():
             if parameter in cls.historic_attributes.least_zero and text.strip().startswith("-"):
                 text = "0"
             return cls.params()[parameter].convert(text, from_geodetic=self.from_geodetic)
         if depth >= MOST_NESTED:
-            raise MissionError(f"plugins stand in one another more than {MOST_NESTED} deep")
+            raise MissionError(f"plugins are nested more than {MOST_NESTED} deep")
         place = written.where(parameter)
         taken: set[str] = set()
         made = [
-            self.make(Written("behaviors", told.name, told.attributes, lambda _: place), taken, depth + 1)
-            for told in codecs.behaviors(text)
+            self.make(PluginTag("behaviors", name, attributes, lambda _: place), taken, depth + 1)
+            for name, attributes in codecs.inline_plugins(text)
         ]
         return [plugin for plugin in made if plugin is not None]
 
-    def _not_a_parameter(self, written: Written, cls: type[Plugin], attribute: str) -> None:
+    def _not_a_parameter(self, written: PluginTag, cls: type[Plugin], attribute: str) -> None:
         viewer, place, known = historic()["viewer"], written.where(attribute), cls.historic_attributes
         if attribute.startswith(tuple(viewer["prefixes"])) or attribute in viewer["names"]:
-            self.drawn[f"{written.plugin}@{attribute}"] = written.attributes[attribute]
+            self.viewer[f"{written.plugin}@{attribute}"] = written.attributes[attribute]
         elif attribute in known.unread or attribute in historic()["unread"]["names"]:
-            self.problems.note(place, f"{attribute} of {written.plugin} has no meaning here; it is ignored")
+            self.problems.note(
+                place, f"{attribute} of {written.plugin} has no effect in tussle; it is ignored"
+            )
         else:
             allowed = [*cls.params(), *cls.children(), *known.renamed, *PLUGIN]
             self.problems.unknown(place, f"attribute of {cls.__name__}", attribute, allowed, lists=True)
 
-    def _say(self, place: Place, cls: type[Plugin], parameter: str, error: TussleError) -> None:
+    def _report(self, place: Place, cls: type[Plugin], parameter: str, error: TussleError) -> None:
         name = f"{cls.__name__}.{parameter}"
         text = str(error)
         self.problems.error(place, text if text.startswith(name) else f"{name}: {text}")

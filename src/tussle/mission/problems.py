@@ -1,4 +1,4 @@
-"""What is wrong with a mission file, and what is worth saying about it: collected, so that all of it is told at once."""
+"""Errors and notes about a mission file, collected so that they are reported together."""
 
 from __future__ import annotations
 
@@ -10,49 +10,49 @@ from tussle.errors import MissionError, listed, nearest_name
 from tussle.texts import LONGEST_SHOWN, shown
 
 MOST_LINES = 100
-"""Errors told at once, and notes; a file with more is most likely not a mission."""
+"""Maximum number of errors, and of notes; a file with more is most likely not a mission."""
 
 MOST_GUESSED = 1000
-"""Names of a file among which the right one is looked for."""
+"""Maximum number of names that are searched for the nearest one."""
 
 
 class Place(NamedTuple):
-    """A file and a line of it; line 0 is what was set from outside."""
+    """A file and a line; line 0 is a value that was set from outside the file."""
 
     file: str
     line: int
 
     def __str__(self) -> str:
-        return f"{self.file}:{self.line}" if self.line else f"{self.file}, as set"
+        return f"{self.file}:{self.line}" if self.line else f"{self.file}, value set from outside"
 
 
 class Problems:
     """Errors and notes of one reading.
 
     Args:
-        strict: What is unknown is an error instead of a note.
+        strict: Unknown tags and attributes are errors instead of notes.
     """
 
     def __init__(self, *, strict: bool = False) -> None:
         self.strict = strict
         self._errors: dict[str, list[Place]] = {}
         self._notes: dict[str, list[Place]] = {}
-        self._n_unsaid = 0
+        self._n_omitted = 0
         self._absent: dict[tuple[str, str], str] = {}
 
     def error(self, place: Place, text: str) -> None:
-        """Something that keeps the mission from being played.
+        """Add an error: the mission cannot be run.
 
         Raises:
-            MissionError: There are too many by now.
+            MissionError: There are too many errors.
         """
         self._errors.setdefault(text, []).append(place)
         if len(self._errors) >= MOST_LINES:
-            self._errors["there may be more: reading stopped here"] = [place]
+            self._errors["reading stopped here; there may be more errors"] = [place]
             self.check()
 
     def absent(self, place: Place, what: str, name: str, known: Collection[str]) -> None:
-        """A name that the file does not explain; the guess at the right one, which takes a while, is made once for each name."""
+        """Add an error about a name that the file does not define; the nearest name, which is slow to find, is searched once."""
         if (what, name) not in self._absent:
             some = list(islice(known, MOST_GUESSED))
             more = ", ..." if len(known) > len(some) else ""
@@ -61,18 +61,18 @@ class Problems:
         self.error(place, self._absent[what, name])
 
     def note(self, place: Place, text: str) -> None:
-        """Something that the reader of the file should know."""
+        """Add a note: something that the user should know."""
         if len(self._notes) < MOST_LINES or text in self._notes:
             self._notes.setdefault(text, []).append(place)
         else:
-            self._n_unsaid += 1
+            self._n_omitted += 1
 
     def unknown(
         self, place: Place, what: str, name: str, allowed: Iterable[str], *, lists: bool = False
     ) -> None:
-        """A tag or attribute that means nothing: a note, or with `strict` or where it was set from outside an error."""
+        """Add a note about an unknown tag or attribute; an error with `strict`, or if it was set from outside."""
         if not self.strict and len(self._notes) >= MOST_LINES:
-            self._n_unsaid += 1  # without the guess at the right name, which takes a while
+            self._n_omitted += 1  # skips the search for the nearest name, which is slow
             return
         known = sorted(allowed)
         text = f"{what} {shown(name)} is unknown{nearest_name(name[:LONGEST_SHOWN], known)}"
@@ -83,15 +83,15 @@ class Problems:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """One line each, in the order of the file."""
-        more = [f"... and {self._n_unsaid} notes more"] if self._n_unsaid else []
+        """The notes, one line each, in the order of the file."""
+        more = [f"... and {self._n_omitted} more notes"] if self._n_omitted else []
         return (*_lines(self._notes), *more)
 
     def check(self) -> None:
-        """Raise what there is.
+        """Raise the collected errors.
 
         Raises:
-            MissionError: There are errors; one line each.
+            MissionError: There are errors; the message has one line for each.
         """
         if not self._errors:
             return
@@ -99,13 +99,13 @@ class Problems:
 
 
 def _lines(found: dict[str, list[Place]]) -> list[str]:
-    """Each text once, with all its places; ordered by file and line of the first."""
+    """Each text once with its places, ordered by the line of the first."""
     order = sorted(found.items(), key=lambda item: item[1][0].line)
     return [f"{_places(places)}: {text}" for text, places in order]
 
 
 def _places(places: list[Place]) -> str:
-    """For instance "a.xml:12", or "a.xml:12, 40, 41" for the same thing at several lines."""
+    """Places as text, such as "a.xml:12", or "a.xml:12, 40, 41" for several lines."""
     first = places[0]
     lines = list(dict.fromkeys(p.line for p in places if p.file == first.file))
     rest = f", {', '.join(str(line) for line in lines[1:6])}" if len(lines) > 1 else ""

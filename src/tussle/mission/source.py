@@ -1,4 +1,4 @@
-"""From a file name to one tree: reading, decoding, placeholders, and includes that stay where they may."""
+"""Reading of a mission's files into one tree: decoding, placeholders and includes, which are confined to allowed folders."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ TITLE = re.compile(r"<runscript[^>]{0,2000}?\sname\s*=\s*(?:\"([^\"]{0,200})\"|'
 
 
 def shipped_missions() -> dict[str, tuple[Path, str]]:
-    """Missions that come with tussle: name -> (file, title)."""
+    """Missions shipped with tussle: name -> (file, title)."""
     found = {}
     for path in sorted(LIBRARY.glob("*.xml")):
         title = TITLE.search(path.read_text(encoding="utf-8"))
@@ -34,10 +34,10 @@ def shipped_missions() -> dict[str, tuple[Path, str]]:
 
 
 def find_mission(source: str | Path, search: Sequence[str | Path] = ()) -> Path:
-    """The file that is meant: a shipped mission's name, a path, or a path below one of the search paths.
+    """Find a mission's file by the name of a shipped mission, by path, or by path relative to one of the search paths.
 
     Raises:
-        MissionError: There is none.
+        MissionError: There is no such file.
     """
     shipped = shipped_missions()
     if isinstance(source, str) and source in shipped:
@@ -50,9 +50,9 @@ def find_mission(source: str | Path, search: Sequence[str | Path] = ()) -> Path:
         if _is_file(candidate):
             return candidate
     is_folder = os.path.isdir(path)  # noqa: PTH112  it is False where Path.is_dir raises, as for a name too long
-    why = "is a folder, not a mission file" if is_folder else "is no file and no mission that ships"
+    why = "is a folder, not a mission file" if is_folder else "is neither a file nor a shipped mission"
     raise MissionError(
-        f"{shown(str(source))} {why}{nearest_name(path.stem[:80], shipped)}; shipped {listed(shipped)}"
+        f"{shown(str(source))} {why}{nearest_name(path.stem[:80], shipped)}; of shipped missions {listed(shipped)}"
     )
 
 
@@ -71,15 +71,15 @@ def _is_file(path: Path) -> bool:
 
 
 def read_text(path: Path, budget: Budget) -> str:
-    """A file's text.
+    """Read a file's text.
 
     Raises:
         MissionError: It cannot be read or decoded, or is too long.
     """
     try:
-        # Opening a pipe or a device could wait for ever.
+        # Opening a pipe or a device can block forever.
         if not stat.S_ISREG(path.stat().st_mode):
-            raise MissionError(f"{path}: this is not a regular file")
+            raise MissionError(f"{path}: it is not a regular file")
         with path.open("rb") as file:
             data = file.read(budget.limits.text + 1)
     except (OSError, ValueError) as error:
@@ -90,7 +90,7 @@ def read_text(path: Path, budget: Budget) -> str:
     declared = ENCODING.match(data)
     name = declared[1].decode("ascii").lower() if declared else "utf-8"
     if name not in ENCODINGS:
-        raise MissionError(f"{path}:1: encoding {name!r} is not read; {listed(ENCODINGS)}")
+        raise MissionError(f"{path}:1: encoding {name!r} is not supported; {listed(ENCODINGS)}")
     try:
         text = data.decode("utf-8-sig" if name == "utf-8" else name)
         if declared and name != "utf-8":
@@ -104,12 +104,12 @@ def read_text(path: Path, budget: Budget) -> str:
 
 @dataclass
 class Source:
-    """A mission's tree and what it was made from.
+    """A mission's tree and its sources.
 
     Attributes:
         path: The mission's file.
-        root: Its tree, with what it includes.
-        text: Its text with placeholders replaced; with includes, the tree written out.
+        root: Its tree, includes resolved.
+        text: Its text with placeholders replaced; if there are includes, the tree written as XML.
         placeholders: Names that can be set, with their defaults.
         files: All files that were read.
     """
@@ -126,8 +126,8 @@ class Reader:
 
     Args:
         overrides: Values of placeholders.
-        problems: Receives what is wrong but does not end the reading.
-        budget: Limits on how much it may be.
+        problems: Receives errors and notes that do not stop the reading.
+        budget: Limits on the size of the files.
         search: Folders from which files may be included, besides the mission's own.
     """
 
@@ -146,7 +146,7 @@ class Reader:
         self.files: list[Path] = []
 
     def read(self, path: Path, text: str | None = None) -> Source:
-        """All of a mission.
+        """Read a mission with its includes.
 
         Raises:
             MissionError: It cannot be read.
@@ -154,7 +154,7 @@ class Reader:
         root, resolved = self._file(path, text)
         roots = [path.parent.resolve(), *(s.resolve() for s in self.search)]
         if root.tag.startswith(XINCLUDE):
-            raise MissionError(f"{root.place}: the outermost tag is runscript, not an include")
+            raise MissionError(f"{root.place}: the root tag must be <runscript>, not an include")
         n_before = len(self.files)
         self._include_all(root, [path.resolve()], roots)
         if len(self.files) > n_before:
@@ -170,7 +170,7 @@ class Reader:
         return parse(replaced.text, str(path), self.budget, replaced.line_of), replaced.text
 
     def _include_all(self, node: Node, inside: list[Path], roots: list[Path]) -> None:
-        """Put what is included in the place of each include below a node."""
+        """Replace each include below a node by the tags that it includes."""
         if not any(child.tag.startswith(XINCLUDE) for child in node.children):
             for child in node.children:
                 self._include_all(child, inside, roots)
@@ -191,21 +191,21 @@ class Reader:
             chain = " -> ".join(p.name for p in [*inside[inside.index(path) :], path])
             raise MissionError(f"{node.place}: a file includes itself: {chain}")
         if len(inside) > limits.include_depth:
-            raise MissionError(f"{node.place}: files include files more than {limits.include_depth} deep")
+            raise MissionError(f"{node.place}: includes are nested more than {limits.include_depth} deep")
         if len(self.files) > limits.files:
             raise MissionError(
-                f"{node.place}: more than {limits.files} files are included; for a file you trust there is allow_large"
+                f"{node.place}: more than {limits.files} files are included; use allow_large for a file that you trust"
             )
         root, _ = self._file(path)
         holder = Node("", {}, "", [root], root.place)
         self._include_all(holder, [*inside, path], roots)
-        return self._pointed(node, holder)
+        return self._selected(node, holder)
 
     def _target(self, node: Node, including: Path, roots: list[Path]) -> Path:
         """The file that an include names, if it may be read.
 
         Raises:
-            MissionError: It may not, or the include asks for more than a file.
+            MissionError: The file may not be included, or the include uses features that are not supported.
         """
         place = node.where("href")
         allowed = {"href", "xpointer", "parse", XML + "base"}
@@ -214,7 +214,7 @@ class Reader:
                 raise MissionError(f"{node.where(name)}: include takes href and xpointer, not {shown(name)}")
         if node.tag != XINCLUDE + "include" or node.children or node.attributes.get("parse", "xml") != "xml":
             raise MissionError(
-                f"{node.place}: of XInclude, only <xi:include href=... xpointer=.../> is read, without fallback or parse='text'"
+                f"{node.place}: of XInclude, only <xi:include href=... xpointer=.../> is supported, without fallback or parse='text'"
             )
         href, base = node.attributes.get("href", ""), node.attributes.get(XML + "base", "")
         for part in (href, base):
@@ -239,15 +239,15 @@ class Reader:
             )
         raise MissionError(f"{place}: there is no file {shown(base + href)} to include")
 
-    def _pointed(self, node: Node, holder: Node) -> list[Node]:
-        """What an include's xpointer selects; all without one."""
+    def _selected(self, node: Node, holder: Node) -> list[Node]:
+        """The tags that an include's xpointer selects; all tags without one."""
         pointer = node.attributes.get("xpointer")
         if pointer is None:
             return holder.children
         match = POINTER.fullmatch(pointer.strip())
         if match is None:
             raise MissionError(
-                f"{node.where('xpointer')}: xpointer {shown(pointer)} is not read; it takes xpointer(/NAME/NAME/*)"
+                f"{node.where('xpointer')}: xpointer {shown(pointer)} is not supported; it takes xpointer(/NAME/NAME/*)"
             )
         found = [holder]
         for step in match[1].strip("/").split("/"):

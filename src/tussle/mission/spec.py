@@ -1,4 +1,4 @@
-"""A mission as frozen data: who is there, with which plugins, in which world, for how long."""
+"""A mission as frozen data: blocks of entities with their plugins, world plugins, scene, times and end conditions."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ T = TypeVar("T")
 END_CONDITIONS = ("time", "one_team", "all_dead", "none")
 END = Param("time", choices=END_CONDITIONS)
 RUN = "run"
-"""What paths to times and steps begin with."""
+"""First name of paths to the mission's times and steps."""
 UPDATES = ("synchronous", "sequential")
 PLACEMENTS = ("normal", "uniform")
 
 
 def _converted(where: str, frozen: Any, columns: Mapping[str, Param]) -> None:
-    """Convert what is declared, in place; None stays where it is the default."""
+    """Convert declared values in place; None is kept where it is the default."""
     for name, column in columns.items():
         value = getattr(frozen, name)
         if value is None and getattr(type(frozen), name) is None:
@@ -46,33 +46,33 @@ def _converted(where: str, frozen: Any, columns: Mapping[str, Param]) -> None:
 def _declared(kind: type, **columns: Any) -> dict[str, Param]:
     """Declarations of a dataclass's values; the defaults are those of its fields."""
     declared = {}
-    for name, said in columns.items():
-        default = said.pop("default", getattr(kind, name))
+    for name, options in columns.items():
+        default = options.pop("default", getattr(kind, name))
         is_number = not isinstance(default, (bool, str))
-        declared[name] = Param(default, **({"gt": -math.inf, "lt": math.inf} if is_number else {}) | said)
+        declared[name] = Param(default, **({"gt": -math.inf, "lt": math.inf} if is_number else {}) | options)
     return declared
 
 
 def end_conditions(value: Any, where: str) -> tuple[str, ...]:
-    """What ends a mission, each once.
+    """Parse end conditions from a list or a text; duplicates are dropped.
 
     Raises:
-        MissionError: It is neither a list of conditions nor a text of them.
+        MissionError: It is neither a list nor a text of end conditions.
     """
     words = value.replace(",", " ").split() if isinstance(value, str) else value
     try:
         return tuple(dict.fromkeys(END.convert(word, where) for word in words))
     except (TypeError, ParameterError) as error:
-        said = "" if isinstance(error, ParameterError) else f"{where} = {value!r} is not allowed: "
-        raise MissionError(f"{said}{error}") from None
+        prefix = "" if isinstance(error, ParameterError) else f"{where} = {value!r} is not allowed: "
+        raise MissionError(f"{prefix}{error}") from None
 
 
 def _plugins(where: str, value: Any, kind: type) -> tuple[Any, ...]:
     plugins = tuple(value) if isinstance(value, (list, tuple)) else () if value is None else (value,)
     for plugin in plugins:
         if not isinstance(plugin, kind):
-            hint = " (an instance is needed: write it with parentheses)" if isinstance(plugin, type) else ""
-            raise MissionError(f"{where}: {plugin!r} is no {kind.__name__}{hint}")
+            hint = " (it is a class; call it to make an instance)" if isinstance(plugin, type) else ""
+            raise MissionError(f"{where}: {plugin!r} is not of kind {kind.__name__}{hint}")
     names = [p.instance_name for p in plugins]
     for name in names:
         if names.count(name) > 1:
@@ -101,7 +101,7 @@ def _check_names(where: str, kind: Any, given: Iterable[str]) -> None:
 
 
 def _named(kind: type[T]) -> type[T]:
-    """Tell an unknown argument of a dataclass with the nearest right name."""
+    """Decorator of a dataclass: an unknown argument raises a MissionError with the nearest right name."""
     construct = kind.__init__
 
     @functools.wraps(construct)
@@ -116,32 +116,32 @@ def _named(kind: type[T]) -> type[T]:
 @_named
 @dataclass(frozen=True, kw_only=True)
 class Block:
-    """Entities of one make: how many, where, with which plugins.
+    """A block of entities with the same plugins: their number, initial states and times of birth.
 
     Attributes:
         name: Name of the block, unique in its mission.
         team: Team number.
-        count: How many there will be in all.
-        position: Start position of the first [m], world frame.
-        variance: Placement "normal": variance of the others' positions around it [m^2].
-        half_width: Placement "uniform": the others lie within this of it [m].
+        count: Total number of entities, later births included.
+        position: Start position of the first entity [m], (3,), world frame.
+        variance: Placement "normal": variance of the other entities' positions around it [m^2], (3,).
+        half_width: Placement "uniform": largest distance of the other entities from it along each axis [m], (3,).
         placement: "normal" or "uniform".
-        scatter_first: The first is scattered like the others.
-        heading: Counter-clockwise from East [rad]; "180 deg" is understood here as in all numbers with units.
+        scatter_first: Whether the first entity is placed like the others.
+        heading: Counter-clockwise from East [rad]; a text with a unit, "180 deg", is accepted here as for all numbers with units.
         heading_variance: Variance of the heading [rad^2].
         climb: Elevation of the nose, up positive [rad].
         roll: Bank, right wing down positive [rad].
-        velocity: Initial velocity [m/s], world frame; None is `speed` along the body x axis.
+        velocity: Initial velocity [m/s], (3,), world frame; None for `speed` along the body x axis.
         speed: Initial speed [m/s].
-        health: What is left before it is removed at 0.
-        radius: Of its body [m].
-        mass: [kg].
-        rate: Births per second [1/s]; None places all at the start.
-        slots: With a rate: births that run side by side.
+        health: Initial health; an entity is removed when it reaches 0.
+        radius: Body radius [m].
+        mass: Mass [kg].
+        rate: Births per second in each slot [1/s]; None if all entities exist from the start.
+        slots: With a rate: number of birth sequences that run in parallel.
         first_birth: With a rate: time of the first birth [s].
         interval_sd: With a rate: standard deviation of the time between births [s].
         autonomy: One or several autonomies.
-        controller: One or several controllers, from the autonomy towards the motion model.
+        controller: One or several controllers, in order from the autonomy to the motion model.
         motion: The motion model.
         sensor: One or several sensors.
     """
@@ -175,10 +175,10 @@ class Block:
     def __post_init__(self) -> None:
         where = f"block {self.name!r}"
         if not isinstance(self.name, str):
-            raise MissionError(f"{where}: a block's name is a text")
+            raise MissionError(f"{where}: the name of a block must be a text")
         if not self.name or "." in self.name:
             raise MissionError(
-                f"{where}: a block's name is not empty and has no dot, since paths such as prey.Boids.gain use dots"
+                f"{where}: the name of a block must not be empty or contain a dot, since paths such as prey.Boids.gain use dots"
             )
         _converted(where, self, BLOCK_VALUES)
         _set(self, "autonomy", _plugins(f"{where}: autonomy", self.autonomy, Autonomy))
@@ -192,7 +192,7 @@ class Block:
         _refuse_rate(where, self.motion, "is integrated over every step")
 
     def replace(self, **changes: Any) -> Block:
-        """A copy with other values."""
+        """A copy with changed values."""
         _check_names("Block", Block, changes)
         return dataclasses.replace(self, **changes)
 
@@ -225,32 +225,32 @@ BLOCK_VALUES = _declared(
     first_birth={"unit": "s"},
     interval_sd={"unit": "s", "ge": 0.0},
 )
-"""What the values of a block are, as parameters of plugins are declared."""
+"""Declarations of a block's values, as of plugin parameters."""
 WORLD_VALUES = ("heading", "climb", "roll", "speed", "health", "radius", "mass")
-"""Those that may differ from world to world of a stack."""
+"""Values of a block that may differ between the worlds of a stack."""
 
 
 @_named
 @dataclass(frozen=True, kw_only=True)
 class Mission:
-    """A game: its entities, its world, its referees, its end.
+    """A mission: entities, world plugins, scene, times and end conditions.
 
     Attributes:
-        blocks: The entities.
+        blocks: The blocks of entities.
         dt: Length of a step [s].
-        end: Time at which it ends, with the condition "time" [s].
+        end: End time with the end condition "time" [s].
         start: Time of step 0 [s].
         motion_multiplier: Substeps of controllers and motion per step.
-        update: "synchronous": all decide on the states of the step's start. "sequential": one entity after another in order of id
-            decides and moves.
-        end_conditions: Which of time, one_team, all_dead, none end a world.
-        interactions: Referees and fields, in order.
-        metrics: What is counted, in order.
-        networks: What carries messages; GlobalNetwork and LocalNetwork are always there.
-        scene: Origin, ground, boundaries, bases.
+        update: "synchronous": all entities decide on the states at the start of the step. "sequential": the entities decide and
+            move one after another, in order of id.
+        end_conditions: Conditions that end a world, of time, one_team, all_dead, none.
+        interactions: Interaction plugins, in order.
+        metrics: Metric plugins, in order.
+        networks: Networks; GlobalNetwork and LocalNetwork are added if they are missing.
+        scene: Origin, ground, walls, boundaries, bases.
         name: Title.
-        limits: How many entities a world may come to hold, and how often their places are drawn. The blocks' own are always let in;
-            `Limits.large()` is for plugins that ask for very many more.
+        limits: Limits on the entities that a world may hold, and on the positions drawn for them. The blocks' own entities are
+            always accepted; `Limits.large()` is for plugins that spawn very many more.
     """
 
     blocks: Sequence[Block]
@@ -265,7 +265,7 @@ class Mission:
     networks: Any = ()
     scene: Scene = field(default_factory=Scene)
     name: str = ""
-    limits: Limits = field(default=Limits(), repr=False)  # no part of the game, and so not of its text
+    limits: Limits = field(default=Limits(), repr=False)  # not part of the game, so not of its repr
 
     def __post_init__(self) -> None:
         if not isinstance(self.blocks, Iterable):
@@ -278,12 +278,12 @@ class Mission:
         for name in names:
             if names.count(name) > 1:
                 raise MissionError(
-                    f"mission: two blocks are called {name!r}; paths and random numbers need their names to differ"
+                    f"mission: two blocks are called {name!r}; paths and random numbers need unique names"
                 )
         _converted("mission", self, MISSION_VALUES)
         if not math.isfinite((self.end - self.start) / self.dt):
             raise MissionError(
-                f"mission: end = {self.end!r} with dt = {self.dt!r} is not allowed; that many steps cannot be counted"
+                f"mission: end = {self.end!r} with dt = {self.dt!r} is not allowed; the number of steps must be finite"
             )
         _set(self, "end_conditions", end_conditions(self.end_conditions, "mission: end_conditions"))
         for name, kind in (("interactions", Interaction), ("metrics", Metric), ("networks", Network)):
@@ -294,12 +294,12 @@ class Mission:
         _plugins("mission", self.world_plugins, object)
         if RUN in [*names, *(p.instance_name for p in self.world_plugins)]:
             raise MissionError(
-                f"mission: {RUN!r} is no name of a block or plugin; paths such as run.dt begin with it"
+                f"mission: {RUN!r} is not allowed as the name of a block or plugin; it is reserved for paths such as run.dt"
             )
         for plugin in self.world_plugins:
             if plugin.instance_name in names:
                 raise MissionError(
-                    f"mission: {plugin.instance_name!r} is the name of a block and of a plugin; paths need them to differ"
+                    f"mission: {plugin.instance_name!r} is the name of a block and of a plugin; paths need unique names"
                 )
         self._check_rates()
         if not isinstance(self.scene, Scene):
@@ -319,7 +319,7 @@ class Mission:
 
     @property
     def steps(self) -> int:
-        """Number of steps until the end time: the step nearest to it is the last."""
+        """Number of steps until the end time, rounded to the nearest integer."""
         return max(0, math.ceil((self.end - self.start) / self.dt - 0.5))
 
     @property
@@ -332,12 +332,12 @@ class Mission:
         return (*self.interactions, *self.metrics, *self.networks)
 
     def replace(self, **changes: Any) -> Mission:
-        """A copy with other values."""
+        """A copy with changed values."""
         _check_names("Mission", Mission, changes)
         return dataclasses.replace(self, **changes)
 
     def ending_by_time(self) -> Mission:
-        """A copy that ends at its end time, whatever else ends it."""
+        """A copy with the end condition "time" in addition to its own."""
         conditions = tuple(self.end_conditions)
         return self if "time" in conditions else self.replace(end_conditions=(*conditions, "time"))
 
@@ -350,4 +350,4 @@ MISSION_VALUES = _declared(
     motion_multiplier={"ge": 1},
     update={"choices": UPDATES},
 )
-"""What the numbers and words of a mission are; in paths they follow "run"."""
+"""Declarations of a mission's values; their paths begin with "run"."""

@@ -1,4 +1,4 @@
-"""Mission files: `read_mission(file)` gives the mission as data, and all that is wrong with the file at once."""
+"""Mission files: `read_mission(file)` returns the mission as data, or raises all errors of the file at once."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tussle.errors import MissionError, TussleError
 from tussle.geodesy import Origin
 from tussle.mission import codecs
 from tussle.mission.catalogue import KINDS, Catalogue
-from tussle.mission.entities import EntityReader, Fields, block_names, expanded
+from tussle.mission.entities import EntityReader, Fields, block_names, expand_entity_common
 from tussle.mission.limits import Limits
 from tussle.mission.node import Budget, Node
 from tussle.mission.overrides import Overrides, as_texts
@@ -32,21 +32,21 @@ PLUGIN_TAGS = {"entity_interaction": "interactions", "metrics": "metrics", "netw
 
 @dataclass(frozen=True)
 class Loaded:
-    """A mission file as it was read.
+    """The content of a mission file.
 
     Attributes:
-        mission: What is played.
+        mission: The mission.
         seed: The file's seed; None without one.
         name: The mission's title, else the file's name.
         path: The file.
-        text: The mission as one XML text: placeholders and settings replaced, includes in place. Reading it gives the same mission.
-        notes: What the reader should know, one line each: what is unknown or ignored, and where tussle does something else.
-        viewer: Settings kept for the viewer: attributes of <run> and tags by name, "entities" by block, "plugins" by "plugin@attribute".
-        log: Settings about output, by tag.
-        placeholders: Names that can be set, with their defaults.
+        text: The mission as one XML text: placeholders and settings replaced, includes resolved. Reading it gives the same mission.
+        notes: Notes about the file, one line each: what is unknown or ignored, and where tussle differs from the format.
+        viewer: Settings for the viewer: attributes of <run> and tags by name, "entities" by block, "plugins" by "plugin@attribute".
+        log: Settings of the output, by tag.
+        placeholders: Names of the placeholders, with their defaults.
         places: Block name -> "file:line", for messages about it.
         files: All files that were read: the mission's and those it includes.
-        settings: What was set, as texts that the file takes.
+        settings: Values set from outside, as texts of the file.
     """
 
     mission: Mission
@@ -75,17 +75,17 @@ def read_mission(
     """Read a mission.
 
     Args:
-        source: A file, or the name of a mission that ships, such as "predator_prey".
-        overrides: Values of the file's `${name=default}`, and of anything in it by path: "run.dt", "prey.count",
-            "prey.Boids.max_speed", "SimpleCapture.capture_range", "prey.motion_model" ("Unicycle vel_max='30'"). By path a number
-            is SI and a text is as in the file; the value of a placeholder is put into the file as it is.
-        strict: Tags and attributes that mean nothing are errors instead of notes.
-        plugin_files: Python files whose plugins the mission may name.
-        search: Folders in which missions and included files are looked for, besides the mission's own.
-        allow_large: Lift the limits that keep a hostile file from taking all memory, while it is read and while it is played.
+        source: A file, or the name of a shipped mission, such as "predator_prey".
+        overrides: Values of the file's placeholders, `${name=default}`, and of anything in it by path: "run.dt", "prey.count",
+            "prey.Boids.max_speed", "SimpleCapture.capture_range", "prey.motion_model" ("Unicycle vel_max='30'"). By path, a number
+            is SI and a text is read as in the file; the value of a placeholder is inserted into the file as it is.
+        strict: Unknown tags and attributes are errors instead of notes.
+        plugin_files: Python files with further plugins for the mission.
+        search: Folders that are searched for missions and included files, besides the mission's own.
+        allow_large: Raise the limits that keep a hostile file from taking all memory, for reading and for running.
 
     Raises:
-        MissionError: It cannot be read or played. One line for each thing that is wrong, beginning with file and line.
+        MissionError: The mission cannot be read or is invalid. The message has one line for each error, with file and line.
     """
     budget = Budget(Limits.large() if allow_large else Limits())
     given = {str(name): value for name, value in (overrides or {}).items()}
@@ -96,9 +96,9 @@ def read_mission(
     read = Reader(settings, problems, budget, search).read(path)
     if read.root.tag != "runscript":
         raise MissionError(
-            f"{read.root.place}: the outermost tag is <{read.root.tag[:80]}>; a mission's is <runscript>"
+            f"{read.root.place}: the root tag is <{read.root.tag[:80]}>; it must be <runscript>"
         )
-    expanded(read.root, problems, budget)
+    expand_entity_common(read.root, problems, budget)
     tree = Overrides(read.root, catalogue, read.placeholders)
     paths = {name: tree.set(name, value) for name, value in given.items() if name not in read.placeholders}
     if paths:
@@ -138,11 +138,11 @@ class _WorldReader:
         blocks = [entities.block(node, name) for node, name in zip(nodes, block_names(nodes), strict=True)]
         conditions, seed = self._end_conditions(), self._seed()
         self._settings()
-        if entities.drawn:
-            self.viewer["entities"] = entities.drawn
-        if plugins.drawn:
-            self.viewer["plugins"] = plugins.drawn
-        self._say_what_is_kept(plugins.drawn)
+        if entities.viewer:
+            self.viewer["entities"] = entities.viewer
+        if plugins.viewer:
+            self.viewer["plugins"] = plugins.viewer
+        self._note_viewer_settings(plugins.viewer)
         problems.check()
         name = root.attributes.get("name", "").strip()
         settings: dict[str, Any] = {**times, **world}
@@ -164,12 +164,12 @@ class _WorldReader:
         )  # fmt: skip
 
     def _count_tags(self, entities: list[Node]) -> None:
-        """Refuse what would take a while only to be compared.
+        """Check the number of blocks and plugins before they are compared with one another, which takes quadratic time.
 
         Raises:
-            MissionError: There are too many blocks, or plugins in one place.
+            MissionError: There are too many blocks, or plugins in one tag.
         """
-        hint = "for a file you trust there is allow_large"
+        hint = "use allow_large for a file that you trust"
         if len(entities) > self.limits.blocks:
             raise MissionError(
                 f"{entities[-1].place}: there are more than {self.limits.blocks:,} <entity>; {hint}"
@@ -181,29 +181,27 @@ class _WorldReader:
                 )
 
     def _last(self, tag: str) -> Node | None:
-        """The last tag of a name, which counts."""
+        """The last tag of a name, which is the one in effect."""
         return next((child for child in reversed(self.root.children) if child.tag == tag), None)
 
     def _run(self) -> dict[str, Any]:
-        """Times and steps, checked against each other; the viewer's settings are put aside."""
+        """Read and check times and steps, and store the settings of the viewer."""
         node = self._last("run") or Node("run", {}, "", [], self.root.place)
         for attribute in node.attributes:
             if attribute not in RUN:
                 self.problems.unknown(node.where(attribute), "attribute of <run>", attribute, RUN)
-        # The attributes are read as if they were tags, so that one reader serves both.
+        # Attributes are read as if they were tags, so that `Fields` reads both.
         children = [Node(k, {}, v, [], node.where(k)) for k, v in node.attributes.items() if k in RUN]
         fields = Fields(Node("run", {}, "", children, node.place), RUN, self.problems)
         for name, known in RUN.items():
             if known.kept_for and fields.has(name):
                 self._keep(self.viewer, name, fields.found[name], known, f"run@{name}")
-        # Where one is wrong that has been told, and its default stands in for it.
+        # A wrong value has been reported and is replaced by its default.
         dt, start, end = fields.number("dt"), fields.number("start"), fields.number("end")
         most = self.limits.substeps
         substeps = fields.read("motion_multiplier", lambda text: codecs.whole(text, 1, most))
         if not abs((end - start) / dt) <= self.limits.steps:
-            text = (
-                f"from {start:g} to {end:g} s in steps of {dt:g} s are more than {self.limits.steps:,} steps"
-            )
+            text = f"there are more than {self.limits.steps:,} steps of {dt:g} s from {start:g} to {end:g} s"
             self.problems.error(fields.place("end"), text)
         elif abs((n := max(0.0, (end - start) / dt)) - round(n)) > 0.01:
             last = start + math.ceil(n - 0.5) * dt
@@ -226,7 +224,7 @@ class _WorldReader:
         for node in self.root.find_all("param_common"):
             name = node.attributes.get("name", "")
             if not name:
-                self.problems.error(node.place, "param_common has no name, by which plugins take it")
+                self.problems.error(node.place, "param_common has no name; plugins take it by its name")
             shared[name] = {child.tag: child.text for child in node.children}
         return shared
 
@@ -253,9 +251,7 @@ class _WorldReader:
             return None
         for attribute in node.attributes:
             if attribute in SEED_ATTRIBUTES:
-                self.problems.note(
-                    node.where(attribute), f"seed@{attribute} is ignored: one seed holds for a whole run"
-                )
+                self.problems.note(node.where(attribute), f"seed@{attribute} is ignored: a run has one seed")
             else:
                 self.problems.unknown(
                     node.where(attribute), "attribute of <seed>", attribute, SEED_ATTRIBUTES
@@ -267,7 +263,7 @@ class _WorldReader:
         return int(node.text)
 
     def _settings(self) -> None:
-        """Put aside what is for the viewer and the log, and name what is unknown."""
+        """Store the settings of the viewer and the log, and report unknown tags."""
         for node in self.root.children:
             known = WORLD.get(node.tag)
             if known is None:
@@ -281,7 +277,7 @@ class _WorldReader:
                     self.problems.unknown(node.where(attribute), f"attribute of <{node.tag}>", attribute, ())
 
     def _keep(self, into: dict[str, Any], name: str, node: Node, known: Known, label: str) -> None:
-        """A setting that no game depends on; attributes of its own make it a dict, its text under "value"."""
+        """Store a setting that the game does not depend on; with attributes it is a dict, with its text under "value"."""
         try:
             value: Any = node.text
             if known.reads == "truth":
@@ -295,12 +291,12 @@ class _WorldReader:
         if known.kept_for == "viewer":
             self.kept.append(label)
 
-    def _say_what_is_kept(self, drawn: Mapping[str, str]) -> None:
+    def _note_viewer_settings(self, of_plugins: Mapping[str, str]) -> None:
         names = sorted(
             {
                 *self.kept,
                 *(f"entity {key}" for e in self.viewer.get("entities", {}).values() for key in e),
-                *drawn,
+                *of_plugins,
             }
         )
         if names:

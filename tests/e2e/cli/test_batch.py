@@ -236,7 +236,7 @@ def test_a_batch_that_was_made_in_python_is_replayed_there(here, folder):
 # -- what goes wrong ------------------------------------------------------------------------------------------------------------
 
 WRONG = {
-    "no mission": (["nothing.xml"], 1, "'nothing.xml' is no file and no mission that ships"),
+    "no mission": (["nothing.xml"], 1, "'nothing.xml' is neither a file nor a shipped mission"),
     "unknown placeholder": (["chance.xml", "--vary", "odd=0.1:0.3"], 1, "(did you mean 'odds'?)"),
     "unknown block": (["chance.xml", "--vary", "red.count=1,2"], 1, "(did you mean 'reds'?)"),
     "unknown plugin": (["chance.xml", "--vary", "reds.Nervos.how=a,b"], 1, "(did you mean 'Nervous'?)"),

@@ -63,7 +63,7 @@ def test_a_broken_plugin_is_one_line_and_the_others_are_listed(tussle, folder, m
         f"error: {folder.resolve()}/wrong.py:1: it cannot be imported: ZeroDivisionError: division by zero",
         f"error: plugin 'Gone' of the package broken (no_such_package:Gone) cannot be imported: {lacks}",
         "error: plugin 'Loud' of the package broken (loud:Loud) cannot be imported: RuntimeError: two lines",
-        "error: plugin 'None' of the package broken (math:pi) is 3.141592653589793, which is no plugin class",
+        "error: plugin 'None' of the package broken (math:pi) is 3.141592653589793, which is not a plugin class",
         "note: Boids is the one of the package broken (my_boids:Boids); it hides the one that ships",
         f"note: Predator is the one of {mine}; it hides the one that ships",
     ]

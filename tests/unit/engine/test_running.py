@@ -489,7 +489,7 @@ def test_world_columns_are_read_and_written_by_world():
     [
         ("a.pso", 0.0, r"'a.pso': a has no 'pso' \(did you mean 'pos'\?\)"),
         ("c.pos", 0.0, r"'c.pos': the mission has no 'c'; there are: run, a, GlobalNetwork"),
-        ("a", 0.0, r"'a' names no value of a; there are: pos, vel"),
+        ("a", 0.0, r"'a' is not a value; in a there are: pos, vel"),
         ("a.Drft.to", 0.0, r"'a.Drft.to': a has no 'Drft' \(did you mean 'Drift'\?\)"),
         (
             "a.Drift.too",
@@ -597,7 +597,7 @@ def test_structural_params_split_groups_and_each_world_is_as_alone():
             r"'a.Drift.two': Drift has no 'two' \(did you mean 'to'\?\); there are: to",
         ),
         ({"a.sped": 1}, r"'a.sped': a has no 'sped' .did you mean 'speed'"),
-        ({"a": 1}, r"'a' names no value of a; there are: name, team"),
+        ({"a": 1}, r"'a' is not a value; in a there are: name, team"),
         ({"a.speed": "3 kg"}, r"a.speed = '3 kg'"),
         ({"a.speed": -1.0}, r"a.speed = -1.0 is not allowed"),
         ({"a.health": 0.0}, r"a.health = 0.0 is not allowed"),

@@ -155,9 +155,7 @@ def test_the_file_is_kept_as_text_that_is_read_again_as_it_was(file, tmp_path):
 
 
 def test_a_value_that_no_file_holds_is_refused(file):
-    with pytest.raises(
-        MissionError, match=r"setting prey.motion_model: Unicycle\(\) is not allowed; a file takes"
-    ):
+    with pytest.raises(MissionError, match=r"setting prey.motion_model: Unicycle\(\) is not allowed"):
         read_mission(file, {"prey.motion_model": Unicycle()})
 
 
@@ -179,9 +177,7 @@ def test_a_path_leads_into_a_plugin_within_a_plugin(file):
     assert gains(loaded.mission) == gains(with_value(read_mission(file).mission, path, "5")) == [1.0, 5.0]
     file.write_text(loaded.text)
     assert gains(read_mission(file).mission) == [1.0, 5.0]
-    with pytest.raises(
-        MissionError, match="has both kinds of quotes and cannot stand in a plugin within a plugin"
-    ):
+    with pytest.raises(MissionError, match="has both kinds of quotes"):
         read_mission(file, {path: "'\""})
 
 
@@ -205,7 +201,7 @@ def test_what_is_called_run_is_the_times_and_steps(file):
         "run_2",
         4,
     )
-    with pytest.raises(MissionError, match="'run' is no name of a block or plugin"):
+    with pytest.raises(MissionError, match="'run' is not allowed as the name of a block or plugin"):
         game().replace(blocks=[game().blocks[0].replace(name="run")])
 
 
@@ -258,7 +254,7 @@ def test_a_text_is_written_to_any_column(path, text, value):
 @pytest.mark.parametrize(
     ("path", "value", "said"),
     [
-        ("prey.radius", "3 kg", r"'prey.radius': '3 kg' is in kg, which cannot become m"),
+        ("prey.radius", "3 kg", r"'prey.radius': '3 kg' is in kg, not convertible to m"),
         (
             "prey.pos",
             [["1", "2", "3"]],

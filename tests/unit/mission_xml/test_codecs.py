@@ -51,7 +51,7 @@ def test_a_row_of_numbers():
     assert texts.row("1, 0.5 rad", parts) == (1.0, 0.5)
     with pytest.raises(ParameterError, match=r"'1 2 3' has 3 numbers; it takes 2 \(kp, band\)"):
         texts.row("1 2 3", parts)
-    with pytest.raises(ParameterError, match="which cannot become rad"):
+    with pytest.raises(ParameterError, match="not convertible to rad"):
         texts.row("1, 3 m", parts)
 
 
@@ -64,12 +64,12 @@ def test_rows():
 
 
 def test_behaviors():
-    found = codecs.behaviors("""[ A gain='1.0' goal="1,2" ]\n [B n=3]  [ C ]""")
+    found = codecs.inline_plugins("""[ A gain='1.0' goal="1,2" ]\n [B n=3]  [ C ]""")
     assert found == [("A", {"gain": "1.0", "goal": "1,2"}), ("B", {"n": "3"}), ("C", {})]
-    assert codecs.behaviors("[ Outer inner='[ Inner a=1 ]' ]") == [("Outer", {"inner": "[ Inner a=1 ]"})]
+    assert codecs.inline_plugins("[ Outer inner='[ Inner a=1 ]' ]") == [("Outer", {"inner": "[ Inner a=1 ]"})]
     for wrong in ("A gain='1'", "[ A gain='1'", "[ A gain= ]", "[ ]", "[ A a='1' a='2' ]", "[A] b"):
         with pytest.raises(MissionError):
-            codecs.behaviors(wrong)
+            codecs.inline_plugins(wrong)
 
 
 @pytest.mark.parametrize(

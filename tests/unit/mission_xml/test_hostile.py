@@ -38,13 +38,13 @@ def soon():
         ("<runscript a='1' a='2'/>", "duplicate attribute"),
         ("<x:runscript/>", "unbound prefix"),
         ("<runscript>\x00</runscript>", "not well-formed"),
-        ("<mission/>", "the outermost tag is <mission>"),
+        ("<mission/>", "the root tag is <mission>"),
         ("<runscript/>", "the mission has no <entity>"),
         (BOMB, r"m\.xml:1: a DOCTYPE is not allowed"),
         ("<!DOCTYPE r SYSTEM 'http://example.org/x.dtd'><runscript/>", "a DOCTYPE is not allowed"),
         ("<!DOCTYPE r [<!ENTITY x SYSTEM 'file:///etc/passwd'>]><runscript>&x;</runscript>", "a DOCTYPE is not allowed"),
         ("<!DOCTYPE r><runscript/>", "a DOCTYPE is not allowed"),
-        ("<a>" * 5000, "tags stand in one another more than 32 deep"),
+        ("<a>" * 5000, "nested more than 32 deep"),
         ("<runscript>" + "<a/>" * 200_000 + "</runscript>", "more than 100,000 tags"),
         ("<runscript>" + " " * 5_000_000 + "</runscript>", "longer than 4,000,000 characters"),
         ("<runscript>" + "<entity/>" * 6000 + "</runscript>", "more than 5,000 <entity>"),
@@ -65,7 +65,7 @@ def test_no_missions(files, text, said):
 @pytest.mark.parametrize(
     ("tags", "inside", "said"),
     [
-        ("", "<count>1000000000</count>", r"count: with these there are 1,000,000,000 entities, more than 200,000"),
+        ("", "<count>1000000000</count>", r"count: .* 1,000,000,000 entities .* 200,000"),
         ("", "<count>1e300</count>", "count: '1e300' is not allowed"),
         ("", "<count>-1</count>", "count: '-1' is not allowed"),
         ("", "<count>1.5</count>", "count: '1.5' is not allowed"),
@@ -76,7 +76,7 @@ def test_no_missions(files, text, said):
         ("", f"<x>{'9' * 100_000}</x>", "is not a number"),
         ("", "<health>0</health>", "health: '0' is not allowed; it takes a number > 0"),
         ("", "<variance_x>-1</variance_x>", "variance_x: '-1' is not allowed; it takes a number >= 0"),
-        ("", "<heading>90 m</heading>", "heading: '90 m' is in m, which cannot become rad"),
+        ("", "<heading>90 m</heading>", "heading: '90 m' is in m, not convertible to rad"),
         ("", "<latitude>95</latitude><longitude>0</longitude><altitude>0</altitude>", "latitude: 95 deg is not allowed"),
         ("", "<latitude>x</latitude><longitude>0</longitude><altitude>0</altitude>", "latitude: 'x' is not a number"),
         ("", "<placement>square</placement>", "placement: 'square' is not allowed; it takes one of 'normal', 'uniform'"),
@@ -89,7 +89,7 @@ def test_no_missions(files, text, said):
         ("", "<autonomy loop_rate='inf'>Boids</autonomy>", "loop_rate"),
         ("", "<autonomy behaviors=\"[ NoSuch ]\">MotorSchemas</autonomy>", "behavior: there is no plugin 'NoSuch'"),
         ("", "<autonomy behaviors=\"[ TrailMS ]\">MotorSchemas</autonomy>", "behavior TrailMS is not in tussle yet"),
-        ("", "<autonomy behaviors=\"[ Boids ]\">MotorSchemas</autonomy>", "Boids does not go into behavior"),
+        ("", "<autonomy behaviors=\"[ Boids ]\">MotorSchemas</autonomy>", "Boids is not allowed in behavior"),
         ("", f"<autonomy behaviors=\"{'[ AvoidEntityMS ]' * 5000}\">MotorSchemas</autonomy>", "more than 1,000 plugins"),
         ("", f"<autonomy behaviors=\"{'[' * 100_000}\">MotorSchemas</autonomy>", "is not a plugin"),
         ("", f"<autonomy goal=\"{'1 ' * 500_000}\">Boids</autonomy>", "has more than 100,000 numbers"),
@@ -174,7 +174,7 @@ def test_includes_cannot_grow_beyond_the_limit(files):
 
 
 def test_update_sequential_bears_fewer_entities(files):
-    said = r"20,000 entities, more than 10,000 with update='sequential'; for a file you trust there is allow_large"
+    said = r"20,000 entities .* with update='sequential' is 10,000; .*allow_large"
     for inside, settings in (("<run update='sequential'/>", {}), ("", {"run.update": "sequential"})):
         with pytest.raises(MissionError, match=said):
             files.world(inside, "<count>20000</count>", settings)
@@ -196,7 +196,7 @@ def test_encodings(files):
         assert loaded.name == "é"
         assert files.read(loaded.text).name == "é"
     assert read_mission(files.write(b"\xef\xbb\xbf" + text.format("utf-8").encode())).name == "é"
-    with pytest.raises(MissionError, match=r"m\.xml:1: encoding 'utf-16' is not read"):
+    with pytest.raises(MissionError, match=r"m\.xml:1: encoding 'utf-16' is not supported"):
         read_mission(files.write(text.format("utf-16").encode()))
     with pytest.raises(MissionError, match=r"m\.xml:2: byte 0xff is not utf-8 text"):
         read_mission(files.write(b"<runscript>\n\xff</runscript>"))
@@ -212,14 +212,14 @@ def test_line_ends(files):
 )
 def test_missions_that_are_not_there(name):
     with pytest.raises(
-        MissionError, match=r"no file and no mission that ships|is not a file name|is a folder"
+        MissionError, match=r"neither a file nor a shipped mission|is not a file name|is a folder"
     ):
         read_mission(name)
 
 
 def test_what_is_no_file_is_not_opened(files, tmp_path):
     os.mkfifo(tmp_path / "pipe.xml")
-    with pytest.raises(MissionError, match="is no file"):
+    with pytest.raises(MissionError, match="is neither a file"):
         read_mission(tmp_path / "pipe.xml")
     with pytest.raises(MissionError, match="is a folder"):
         read_mission(tmp_path)

@@ -72,7 +72,7 @@ def test_a_pointer_that_selects_nothing_is_said(files):
         ('<xi:include href="e.xml"><xi:fallback/></xi:include>', "of XInclude, only"),
         ('<xi:fallback href="e.xml"/>', "of XInclude, only"),
         ('<xi:include href="e.xml" accept="text/xml"/>', "include takes href and xpointer, not 'accept'"),
-        ('<xi:include href="e.xml" xpointer="element(/1)"/>', "is not read; it takes xpointer"),
+        ('<xi:include href="e.xml" xpointer="element(/1)"/>', "is not supported; it takes xpointer"),
         ('<xi:include href="m.xml"/>', r"m\.xml:2: a file includes itself: m\.xml -> m\.xml"),
         (
             '<xi:include href="loop1.xml"/>',
@@ -81,7 +81,7 @@ def test_a_pointer_that_selects_nothing_is_said(files):
         ('<xi:include href="bad.xml"/>', r"bad\.xml:1: this is not well-formed XML"),
         ('<xi:include href="doctype.xml"/>', r"doctype\.xml:1: a DOCTYPE is not allowed"),
         ("\n".join(['<xi:include href="e.xml"/>'] * 70), "more than 64 files are included"),
-        ('<xi:include href="d0.xml"/>', "files include files more than 8 deep"),
+        ('<xi:include href="d0.xml"/>', "nested more than 8 deep"),
     ],
 )
 def test_what_is_refused(files, include, said):

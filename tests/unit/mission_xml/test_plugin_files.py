@@ -202,7 +202,7 @@ def test_an_installed_plugin_that_cannot_be_imported(files, distribution):
             "Elsewhere",
             r"of the package broken \(no_such_package:Elsewhere\) cannot be imported: ModuleNotFoundError",
         ),
-        ("Wrong", r"of the package broken \(math:pi\) is 3\.14.*, which is no plugin class"),
+        ("Wrong", r"of the package broken \(math:pi\) is 3\.14.*, which is not a plugin class"),
         ("Exits", r"of .* cannot be imported: SystemExit: 3"),
     ):
         with pytest.raises(MissionError, match=rf"m\.xml:1: autonomy: plugin '{name}' {said}"):

@@ -148,7 +148,7 @@ def test_geodetic_positions(files):
 def test_one_of_latitude_longitude_altitude_counts_for_nothing(files):
     loaded = files.world(inside="<altitude>200</altitude><z>5</z>")
     assert loaded.mission.blocks[0].position == (0.0, 0.0, 5.0)
-    assert "<altitude> counts for nothing" in "\n".join(loaded.notes)
+    assert "<altitude> is ignored" in "\n".join(loaded.notes)
 
 
 def test_bases(files):
@@ -183,7 +183,7 @@ def test_births(files):
 def test_births_without_slots_or_rate_are_none(files, tags):
     loaded = files.world(inside=tags)
     assert loaded.mission.blocks[0].rate is None
-    assert "<generate_rate> counts only" in "\n".join(loaded.notes)
+    assert "<generate_rate> is ignored" in "\n".join(loaded.notes)
 
 
 def test_plugins_of_the_world(files):
@@ -313,7 +313,7 @@ def test_settings_for_the_viewer_and_the_log_are_kept(files):
         ("<id>7</id>", "<id> is ignored"),
         ("<connect_entity>0</connect_entity>", "<connect_entity> is ignored"),
         ("<script_name>x.xml</script_name>", "<script_name> is ignored"),
-        ("<x>1</x><x>2</x>", "<x> stands here for the second time"),
+        ("<x>1</x><x>2</x>", "<x> occurs more than once"),
         ("stray words", "text between the tags of <entity> is ignored: 'stray words'"),
         (
             "<hedding>9</hedding>",
@@ -376,10 +376,10 @@ def test_all_that_is_wrong_is_told_at_once(files):
     assert found[2][0].startswith("end: 'x' is not a number")
     assert "there is no plugin 'SimpleCaptur' (did you mean 'SimpleCapture'?)" in found[3][0]
     assert found[5][0].startswith("count: '-3' is not allowed; it takes a whole number from 0")
-    assert "'5 kt' is in kt, which cannot become m" in found[5][1]
+    assert "'5 kt' is in kt, not convertible to m" in found[5][1]
     assert found[7] == ["Boids.max_speed = -1.0 is not allowed; it takes a finite number in m/s >= 0"]
     assert found[8][0].startswith("Boids.comms_range = 'abc' is not allowed; it takes a finite number in m")
     assert set(found[9]) == {
         "motion_model JSBSimModel is not in tussle yet",
-        "Boids does not go into controller; it goes into autonomy",
+        "Boids is not allowed in controller; it belongs in autonomy",
     }
