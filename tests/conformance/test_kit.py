@@ -866,11 +866,11 @@ def test_variants_are_named() -> None:
 
 
 def test_evidence_says_seed_step_and_column() -> None:
-    with pytest.raises(ConformanceError, match=r"step \d+ of the world with seed \d+, .*: .* against "):
+    with pytest.raises(ConformanceError, match=r"step \d+ of the world with seed \d+, .*: .* versus "):
         check_plugin(CountsRows)
     with pytest.raises(ConformanceError, match=r"with gain = 0\.0, "):
         check_plugin(NanAtBound)
-    with pytest.raises(ConformanceError, match=r"step has written into vel, which is not its own"):
+    with pytest.raises(ConformanceError, match=r"step wrote into vel, which is not its own"):
         check_plugin(WritesAroundView)
 
 

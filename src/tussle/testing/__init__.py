@@ -1,4 +1,4 @@
-"""For an author's own tests: `check_plugin(MyPlugin)` holds a plugin to the contract."""
+"""For a plugin author's own tests: `check_plugin(MyPlugin)` checks a plugin against the contract."""
 
 from tussle.testing.check import check_plugin
 

@@ -1,4 +1,4 @@
-"""The conformance kit: `check_plugin(MyPlugin)` in a test holds a plugin to the contract."""
+"""The conformance kit: `check_plugin(MyPlugin)` in a test checks a plugin against the contract."""
 
 from __future__ import annotations
 
@@ -17,32 +17,31 @@ from tussle.testing.watch import check_calls, check_class_values, class_values
 
 
 def check_plugin(cls: type[Plugin], *, companions: Sequence[Any] | None = None, **params: Any) -> None:
-    """Hold a plugin class to the contract, in small games that are made up around it.
+    """Check a plugin class against the contract, in small games that are built around it.
 
     The rules, by the names that errors give them:
 
-    * declarations: a docstring, no lists or dicts on the class, hooks only, SI units, defaults that are allowed.
-    * own columns, memory in columns: calls change the plugin's own columns and nothing else, and leave nothing elsewhere.
-    * draws: no label is drawn twice in a step, which gives the same numbers.
-    * stack invariance: a world alone is the same, bit for bit, in stacks of 1, 2, 7 and 64, in another order, with threads, deaths,
-      births in mid-run, moves, and worlds that end apart.
-    * reset: some worlds begin as if new while the others do not notice. snapshot: after restore the same future follows.
-    * finite: at every finite bound, and at a tenth and ten times each default.
+    * declarations: a docstring, no lists or dicts on the class, hooks only, SI units, valid defaults.
+    * own columns, memory in columns: calls change the plugin's own columns only, and store nothing elsewhere.
+    * draws: no label is drawn twice in a step, which would give the same numbers.
+    * stack invariance: a world is bit-identical alone and in stacks of 1, 2, 7 and 64, in another order, with threads, deaths,
+      births during the run, moved entities, and worlds that end at different times.
+    * reset: reset worlds equal new ones, and the other worlds do not change. snapshot: the same future follows after a restore.
+    * finite: all numbers stay finite at every finite bound, and at 0.1 and 10 times each default.
     * velocity, rollout, rows, body round trip, from_body, order of convergence, convergence, advance: for motion models. vel is the
-      rate of pos; a rollout is the flight; a kernel solves its equation.
-    * idle: a world plugin that says so has nothing to do.
-    * runs: it fits the game and raises no error.
+      rate of pos; a rollout equals the flight; a kernel solves its equation.
+    * runs: the plugin fits the game and raises no error.
 
-    Each structural switch and each choice of a text parameter is tried as well, where it fits the companions. With grade "external"
-    nothing is promised of the bits, and only the rest is checked.
+    Each value of a structural boolean and each choice of a text parameter is checked too, if it fits the companions. For grade
+    "external", the rules that need repeatable runs are skipped.
 
     Args:
         cls: The class.
-        companions: Plugins as data that it needs beside it, in place of the kit's own: a motion model, a referee, a network ...
+        companions: Plugins as data that it needs, in place of the kit's own: a motion model, an interaction, a network ...
         **params: Parameters other than the defaults.
 
     Raises:
-        ConformanceError: The plugin breaks a rule; the message names the plugin, the rule and what was seen.
+        ConformanceError: The plugin breaks a rule; the message names the plugin, the rule and what was observed.
     """
     given: Any = cls
     if not (isinstance(given, type) and issubclass(given, Plugin)):
@@ -63,9 +62,9 @@ def check_plugin(cls: type[Plugin], *, companions: Sequence[Any] | None = None, 
             raise
         except TussleError as error:
             if number and companions and isinstance(error, WiringError):
-                continue  # the companions go with another variant
+                continue  # the companions do not fit this variant
             cause = error.__cause__
-            if isinstance(cause, ConformanceError):  # found inside a call, and told as that call's failure
+            if isinstance(cause, ConformanceError):  # raised inside a call and wrapped as its failure
                 raise cause from None
             raise ConformanceError(
                 cls.__name__, "runs", f"as {variant!r} in the kit's game: {error}"
@@ -87,7 +86,7 @@ def _play(plugin: Plugin, companions: Sequence[Any], is_first: bool) -> None:
 
 
 def _variants(plugin: Plugin) -> Iterator[Plugin]:
-    """The plugin with one structural switch or choice changed."""
+    """The plugin with one structural boolean or one choice changed."""
     for name, column in plugin.params().items():
         value = plugin.values[name]
         if column.structural and column.dtype is bool and not column.is_text:

@@ -1,4 +1,4 @@
-"""Rules of the conformance kit that need no game: what a class declares, and what it overrides."""
+"""Rules of the conformance kit that need no game: declarations and overridden methods of a class."""
 
 from __future__ import annotations
 
@@ -33,17 +33,17 @@ MAGIC = frozenset(MAGIC_NAMES.split())
 
 
 def own_classes(cls: type) -> Iterator[type]:
-    """The class and those of its bases that are not the package's kinds, the class first."""
+    """The class and its bases outside `tussle.api`, the class first."""
     return (
         base for base in cls.__mro__ if base is not object and not base.__module__.startswith("tussle.api.")
     )
 
 
 def check_declarations(cls: type[Plugin]) -> None:
-    """The class is documented, holds nothing that changes, overrides hooks only, and its columns make sense.
+    """The class is documented, holds no mutable values, overrides only hooks, and has valid columns.
 
     Raises:
-        ConformanceError: It is not, or they do not.
+        ConformanceError: It breaks one of these rules.
     """
     problem = next(_problems(cls), None)
     if problem:
@@ -52,13 +52,13 @@ def check_declarations(cls: type[Plugin]) -> None:
 
 def _problems(cls: type[Plugin]) -> Iterator[str]:
     if not (vars(cls).get("__doc__") or "").strip():
-        yield "the class has no docstring; its page begins with it"
+        yield "the class has no docstring, which its page begins with"
     yield from _attributes(cls)
     yield from _hooks(cls)
     for name, column in cls.columns.items():
         yield from _column(name, column)
         if issubclass(cls, MotionModel) and name in WRITABLE:
-            yield f"{name} is a column of the body table, which to_body writes as body.{name}; call the model's own otherwise"
+            yield f"{name} is a column of the body table, which to_body writes as body.{name}; give the model's column another name"
     yield from _beliefs(cls)
     yield from _as_data(cls)
 
@@ -71,7 +71,7 @@ def _attributes(cls: type[Plugin]) -> Iterator[str]:
             if isinstance(value, MUTABLE) and not name.startswith("__"):
                 yield f"{name} is a {type(value).__name__} on the class, which all simulations share; declare a column, or make it a tuple"
             if name in MAGIC and not (name == "__hash__" and value is None):
-                yield f"it defines {name}; only hooks are filled in ({listed(sorted(HOOKS & set(dir(cls))))})"
+                yield f"it defines {name}; only hooks may be defined ({listed(sorted(HOOKS & set(dir(cls))))})"
             kind = next(
                 (b for b in cls.__mro__ if b.__module__.startswith("tussle.api.") and name in vars(b)), None
             )
@@ -80,7 +80,7 @@ def _attributes(cls: type[Plugin]) -> Iterator[str]:
 
 
 def _hooks(cls: type[Plugin]) -> Iterator[str]:
-    """Who has nothing to do; what the engine calls it asks for itself, when the kit's game is built."""
+    """Finds a class without any hook that does work; the engine reports missing required hooks when the kit's game is built."""
     if issubclass(cls, MotionModel):
         if not cls.derivative and cls.advance is MotionModel.advance:
             yield "it has neither derivative nor advance"
@@ -97,21 +97,21 @@ def _column(name: str, column: Column) -> Iterator[str]:
     if isinstance(column, Param):
         for unit, text_unit in zip(column.units, column.text_units, strict=True):
             if units.unit_of(unit).dimension != units.unit_of(text_unit).dimension:
-                yield f"{name} is in {unit!r} but in mission files in {text_unit!r}, which measures something else"
+                yield f"{name} has unit {unit!r} but text_unit {text_unit!r}, which has another dimension"
     elif isinstance(column, (State, Input, Output)):
         default: Any = column.default
         parts = default if isinstance(default, tuple) else (default,)
         if isinstance(default, tuple) and len(parts) != len(column.fields):
             yield f"{name} has {len(column.fields)} fields and {len(parts)} defaults"
         if any(isinstance(v, float) and math.isnan(v) for v in parts):
-            yield f"{name} begins as NaN, which no rule can tell from a mistake"
+            yield f"{name} has the default NaN, which cannot be distinguished from an error"
 
 
 def _beliefs(cls: type[Plugin]) -> Iterator[str]:
     for name, (body, k, unit) in BELIEF.items():
         column = cls.outputs().get(name)
         if column is not None and not all(units.compatible(u, unit) for u in column.units):
-            yield f"{name} is what the entity believes its {body} is: {k} channels in {unit or 'no unit'}"
+            yield f"{name} is the entity's belief of its {body}; it needs {k} channels in {unit or 'no unit'}"
 
 
 def _as_data(cls: type[Plugin]) -> Iterator[str]:
@@ -123,4 +123,4 @@ def _as_data(cls: type[Plugin]) -> Iterator[str]:
     if plugin != cls() or plugin.replace() != plugin:
         yield f"two {cls.__name__}() are not equal, so some parameter does not compare by value"
     if "<locals>" not in cls.__qualname__ and pickle.loads(pickle.dumps(plugin)) != plugin:  # noqa: S301 - our own bytes
-        yield "it is another one after pickling"
+        yield "it is not equal to its pickled copy"

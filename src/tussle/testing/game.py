@@ -26,17 +26,17 @@ from tussle.mission import Block, Mission
 from tussle.stock import ALWAYS_THERE, GlobalNetwork, MotorSchemas
 from tussle.testing.partners import (
     Driver,
+    KitMessage,
     Reaper,
-    Wisher,
-    Word,
-    can_say,
+    SignalBehavior,
+    can_fill,
     driver,
-    feeler,
+    signal_sensor,
     sink,
 )
 
 SEEDS = (11, 12, 13, 14, 15)
-"""Worlds that are followed. 13 dies out early (see `Reaper`)."""
+"""Seeds of the compared worlds. World 13 dies out early (see `Reaper`)."""
 STEPS = 20
 
 
@@ -46,9 +46,9 @@ class Game:
 
     Attributes:
         plugin: The plugin as data.
-        mission: With deaths, births, a move, and worlds that end apart.
-        quiet: The same without these.
-        paths: Where the plugin's parameters are, such as "red.Boids".
+        mission: A mission with deaths, births, a moved entity, and worlds that end at different times.
+        quiet: The same mission without these.
+        paths: Paths of the plugin, such as "red.Boids".
     """
 
     plugin: Any
@@ -57,7 +57,7 @@ class Game:
     paths: tuple[str, ...]
 
     def params(self, seeds: Sequence[int]) -> dict[str, list[Any]]:
-        """Parameters that differ from world to world, by the worlds' seeds."""
+        """Parameters that differ between worlds, depending on the worlds' seeds."""
         out: dict[str, list[Any]] = {}
         for name in self.plugin.params():
             values = [scaled(self.plugin, name, 1.03 - 0.02 * (seed % 3)) for seed in seeds]
@@ -66,12 +66,12 @@ class Game:
         return out
 
     def play(self, seeds: Sequence[int], threads: int = 1) -> Simulation:
-        """The mission's worlds of these seeds."""
+        """A simulation of the mission with these seeds."""
         return Simulation(self.mission, seeds, self.params(seeds), threads=threads, on_error="raise")
 
 
 def scaled(plugin: Any, name: str, factor: float) -> Any:
-    """A parameter's value times a factor where it is a real number of its own row and allows that, else as it is."""
+    """A parameter's value, multiplied by a factor if it is a real number per row and the product is within its bounds."""
     column, value = plugin.params()[name], plugin.values[name]
     if not column.is_row_data or column.dtype is not float or column.choices:
         return value
@@ -84,20 +84,20 @@ def scaled(plugin: Any, name: str, factor: float) -> Any:
 
 
 def build(plugin: Any, companions: Sequence[Any] = ()) -> Game:
-    """A game around a plugin, with partners that feed it, read it and speak with it.
+    """Build a game around a plugin, with partners that write its inputs, read its outputs and exchange messages with it.
 
     Args:
         plugin: The plugin as data.
-        companions: Plugins as data that take the place of the kit's own where the plugin needs particular ones.
+        companions: Plugins as data that replace the kit's own, if the plugin needs particular ones.
     """
     plugin = _with_children(plugin)
-    says, hears = _topics(plugin)
+    sent, received = _topics(plugin)
     if isinstance(plugin, WorldPlugin):
-        for message in _asked(_missions(plugin, companions, says, hears).quiet):
-            says.add((message, message.__name__, "GlobalNetwork"))
-        for message in _told(_missions(plugin, companions, says, hears).quiet):
-            hears.add((message, message.__name__, "GlobalNetwork"))
-    return _missions(plugin, companions, says, hears)
+        for message in _types_read(_missions(plugin, companions, sent, received).quiet):
+            sent.add((message, message.__name__, "GlobalNetwork"))
+        for message in _types_published(_missions(plugin, companions, sent, received).quiet):
+            received.add((message, message.__name__, "GlobalNetwork"))
+    return _missions(plugin, companions, sent, received)
 
 
 def _with_children(plugin: Any) -> Any:
@@ -105,70 +105,71 @@ def _with_children(plugin: Any) -> Any:
     for name, column in plugin.children().items():
         if not plugin.values[name]:
             inner[name] = [
-                Wisher()
-                if issubclass(Wisher, column.kind) and column.kind is not Autonomy
+                SignalBehavior()
+                if issubclass(SignalBehavior, column.kind) and column.kind is not Autonomy
                 else driver((), (), (), ())
             ]
     return plugin.replace(**inner) if inner else plugin
 
 
 def _topics(plugin: Any) -> tuple[set[Any], set[Any]]:
-    """What the driver is to say, and to hear: (message, topic, network)."""
-    says: set[Any] = set()
-    hears: set[Any] = set()
+    """The topics that the driver publishes, and those that it subscribes to: (message, topic, network)."""
+    sent: set[Any] = set()
+    received: set[Any] = set()
     for name, column in plugin.topics().items():
         assert isinstance(column, Topic), name
         topic = plugin.values[column.topic_param] if column.topic_param else column.topic
         network = plugin.values[column.network_param] if column.network_param else column.network
         network = network or ALWAYS_THERE[0]
-        (hears if isinstance(column, Publish) else says).add(
+        (received if isinstance(column, Publish) else sent).add(
             (column.message, topic or column.message.__name__, network)
         )
     for name in plugin.children():
         for child in plugin.values[name]:
-            its_says, its_hears = _topics(child)
-            says |= its_says
-            hears |= its_hears
+            its_sent, its_received = _topics(child)
+            sent |= its_sent
+            received |= its_received
     if isinstance(plugin, Network):
-        word = Word, Word.__name__, plugin.__dict__["instance_name"]
-        says.add(word)
-        hears.add(word)
-    return says, hears
+        topic = KitMessage, KitMessage.__name__, plugin.__dict__["instance_name"]
+        sent.add(topic)
+        received.add(topic)
+    return sent, received
 
 
-def _asked(mission: Mission) -> list[type[Message]]:
-    """Message types that the world plugins read in the first steps: these are not declared."""
-    asked: dict[type[Message], None] = {}
+def _types_read(mission: Mission) -> list[type[Message]]:
+    """Message types that the world plugins read in the first steps, since these are not declared."""
+    found: dict[type[Message], None] = {}
     with Simulation(mission, 1) as sim:
         view, inbox = sim.state.world_view, sim.state.world_view.inbox
-        view.__dict__["inbox"] = lambda type_: (asked.setdefault(type_), inbox(type_))[1]
+        view.__dict__["inbox"] = lambda type_: (found.setdefault(type_), inbox(type_))[1]
         sim.step(3)
-    return [message for message in asked if can_say(message)]
+    return [message for message in found if can_fill(message)]
 
 
-def _told(mission: Mission) -> list[type[Message]]:
-    """Message types that the world plugins send in the first steps."""
-    told: dict[type[Message], None] = {}
+def _types_published(mission: Mission) -> list[type[Message]]:
+    """Message types that the world plugins publish in the first steps."""
+    found: dict[type[Message], None] = {}
     with Simulation(mission, 1) as sim:
         publish_to = sim.state.world_view.publish_to
         sim.state.world_view.publish_to = lambda type_, network: (
-            told.setdefault(type_),
+            found.setdefault(type_),
             publish_to(type_, network),
         )[1]
         sim.step(8)
-    return list(told)
+    return list(found)
 
 
-def _missions(plugin: Any, companions: Sequence[Any], says: Iterable[Any], hears: Iterable[Any]) -> Game:
-    said = sorted((t for t in says if can_say(t[0])), key=_topic_order)
-    heard = sorted(hears, key=_topic_order)
+def _missions(plugin: Any, companions: Sequence[Any], sent: Iterable[Any], received: Iterable[Any]) -> Game:
+    publishes = sorted((t for t in sent if can_fill(t[0])), key=_topic_order)
+    subscribes = sorted(received, key=_topic_order)
     all_: list[Any] = [plugin, *companions]
     networks: list[Any] = [p for p in all_ if isinstance(p, Network)]
     there = {"GlobalNetwork", *(n.instance_name for n in networks)}
-    networks += [GlobalNetwork(name=name) for name in sorted({t[2] for t in (*said, *heard)} - there)]
+    missing = sorted({topic[2] for topic in (*publishes, *subscribes)} - there)
+    networks += [GlobalNetwork(name=name) for name in missing]
     varied = plugin.replace(**{name: scaled(plugin, name, 0.9) for name in plugin.params()})
-    # Partners are made once, so that all blocks have the same: then their entities are rows of one group.
-    slots = _slots(plugin, companions, said, heard)
+    # Partners are made once for all blocks, so that their entities are rows of one group.
+    slots = _slots(plugin, companions, publishes, subscribes)
     mixed = {name: _swapped(value, plugin, varied) for name, value in slots.items()}
     blocks = [_block("red", 1, slots), _block("blue", 2, mixed), _block("late", 1, slots)]
     path = plugin.instance_name
@@ -196,7 +197,7 @@ def _topic_order(topic: Any) -> tuple[str, str, str]:
 
 def _block(name: str, team: int, slots: dict[str, Any]) -> Block:
     late: dict[str, Any] = {"rate": 10.0, "first_birth": 0.3} if name == "late" else {}
-    # Near each other and the origin, where what has a place by default has it.
+    # Near each other and near the origin, which is the default of most positions.
     x, count = {"red": (0.0, 5), "blue": (5.0, 4), "late": (-5.0, 2)}[name]
     return Block(
         name=name, team=team, count=count, position=(x, 0.0, 4.0), variance=(30.0, 30.0, 10.0), scatter_first=True,
@@ -205,27 +206,26 @@ def _block(name: str, team: int, slots: dict[str, Any]) -> Block:
 
 
 def _slots(
-    plugin: Any, companions: Sequence[Any], says: Sequence[Any], hears: Sequence[Any]
+    plugin: Any, companions: Sequence[Any], publishes: Sequence[Any], subscribes: Sequence[Any]
 ) -> dict[str, Any]:
-    """Plugins of a block, by their place in it."""
+    """Plugins of a block, by argument of `Block`."""
     holder = MotorSchemas(behaviors=[plugin]) if isinstance(plugin, Behavior) else plugin
     kinds = (Autonomy, Controller, Sensor, MotionModel)
     given: list[Any] = [holder, *companions]
     places: list[list[Any]] = [[p for p in given if isinstance(p, kind)] for kind in kinds]
     autonomies, controllers, sensors, motions = places
     inner = [*autonomies, *(b for a in autonomies for b in a.values.get("behaviors", ()))]
-    fed = [c for a in inner for _, c in read_channels(a)]
     measured = [c for s in sensors for name, c in type(s).outputs().items() if name not in BELIEF]
-    fed = _without(fed, measured)
+    missing = _without([c for a in inner for _, c in read_channels(a)], measured)
     readers = [[c for _, c in read_channels(p)] for p in (*controllers, *motions)]
     wanted = next((columns for columns in readers if columns), [])
     written = [c for a in autonomies for c in type(a).outputs().values()]
-    pilot = driver(_without(wanted, written), measured, says, hears)
+    pilot = driver(_without(wanted, written), measured, publishes, subscribes)
     if not motions:
         last = [c for c in controllers if not c.passthrough] or controllers
         end = list(type(last[-1]).outputs().values()) if last else []
         motions = [sink(end or [*Driver.outputs().values(), *_without(written, [])])]
-    sensors = [*sensors, *([feeler(fed)] if fed else [])]
+    sensors = [*sensors, *([signal_sensor(missing)] if missing else [])]
     return {
         "autonomy": [pilot, *autonomies],
         "controller": controllers,
@@ -235,7 +235,7 @@ def _slots(
 
 
 def _swapped(value: Any, old: Any, new: Any) -> Any:
-    """The plugins of a slot with another one in the place of `old`."""
+    """The plugins of a slot, with `old` replaced by `new`."""
     if isinstance(value, list):
         return [_swapped(v, old, new) for v in value]
     if value is old:
@@ -248,7 +248,7 @@ def _swapped(value: Any, old: Any, new: Any) -> Any:
 
 
 def _without(columns: Iterable[Channel], others: Iterable[Channel]) -> list[Channel]:
-    """The columns, each once, that have a channel which no other has."""
+    """The columns that have a channel which neither `others` nor earlier columns have."""
     there = {channel for c in others for channel in c.channels}
     kept = []
     for column in columns:

@@ -1,4 +1,4 @@
-"""A rule of the conformance kit: whatever its parameters, a plugin's numbers stay finite."""
+"""Rule of the conformance kit: a plugin's numbers stay finite for all allowed parameters."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from tussle.testing.lines import lines_of
 RULE = "finite"
 STEPS = 8
 NEAR = 1e-6
-"""How near to a bound that it must not reach a parameter is set, as a part of its default's distance."""
+"""Distance to an exclusive bound at which a parameter is tried, relative to its default's distance."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """One parameter set to a value that is allowed but unusual; `words` say which."""
+    """One parameter with an allowed but unusual value; `words` describe it."""
 
     name: str
     value: Any
@@ -32,10 +32,10 @@ class Case:
 
 
 def check_limits(game: Game) -> None:
-    """Each parameter at its finite bounds and at a tenth and ten times its default: all columns and bodies stay finite.
+    """With each parameter at its finite bounds, and at 0.1 and 10 times its default, all columns and bodies stay finite.
 
     Raises:
-        ConformanceError: One does not, or the plugin raises an error.
+        ConformanceError: A number is not finite, or the plugin raises an error.
     """
     cls = type(game.plugin)
     cases = [Case("", None, "with the default parameters"), *_cases(game)]
@@ -44,7 +44,7 @@ def check_limits(game: Game) -> None:
         some = cases[first : first + most]
         try:
             _play(game, some)
-        except MissionError:  # such as no room to place anybody: refused in words, which is allowed
+        except MissionError:  # such as no room to place an entity, which is a valid refusal
             for case in some:
                 with contextlib.suppress(MissionError):
                     _play(game, [case])
@@ -63,7 +63,7 @@ def _cases(game: Game) -> Iterator[Case]:
 
 
 def _values(column: Param, default: Any) -> Iterator[Any]:
-    """Values worth trying for one number; the default is tried anyway."""
+    """Values to try for one number, without its default."""
     if column.dtype is bool:
         yield not default
         return
@@ -89,7 +89,7 @@ def _play(game: Game, cases: list[Case]) -> None:
             values = [case.value if case.name == name else plugin.values[name] for case in cases]
             params |= {f"{path}.{name}": values for path in game.paths}
     seeds = range(1, len(cases) + 1)
-    # Extremes may divide by zero on the way to a number; what counts is the number.
+    # Extreme parameters may divide by zero in between; only the results must be finite.
     with np.errstate(all="ignore"):
         try:
             with Simulation(game.quiet, seeds, params, on_error="raise") as sim:
@@ -103,14 +103,14 @@ def _play(game: Game, cases: list[Case]) -> None:
                             f"{cases[world].words}, {text} after {step + 1} steps",
                         )
         except PluginError as error:
-            if not error.plugin:  # no plugin has raised it: the mission asks for what cannot be
+            if not error.plugin:  # not raised by a plugin: the mission is impossible
                 raise MissionError(error.message) from error
             words = cases[error.world].words if error.world is not None else "with unusual parameters"
             raise ConformanceError(type(plugin).__name__, RULE, f"{words}, {error}") from error
 
 
 def _not_finite(sim: Simulation) -> tuple[int, str]:
-    """World and words of the first number that is not finite; "" when all are."""
+    """World and description of the first number that is not finite; "" if all are finite."""
     for line in lines_of(sim).values():
         bad = np.flatnonzero(~np.isfinite(line.values))
         if line.is_made and len(bad):

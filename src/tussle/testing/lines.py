@@ -1,4 +1,4 @@
-"""All numbers of a simulation, line by line."""
+"""All numbers of a simulation, by line of its arrays."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ class Line:
     """One line of an array.
 
     Attributes:
-        name: Whose it is.
+        name: Owner and column, for messages.
         values: The line itself, (n,).
         world: World of each value, (n,).
-        is_made: Somebody computes it, beginning with a finite number.
+        is_made: Whether it is computed and starts with a finite number.
     """
 
     name: str
@@ -41,7 +41,7 @@ def keys_of(table: Table, place: Place) -> list[Key]:
 
 
 def lines_of(sim: Simulation) -> dict[Key, Line]:
-    """All lines; a channel's is named after who writes it."""
+    """All lines; the line of a channel is named after its writer."""
     bodies, worlds = sim.state.population.bodies, np.arange(len(sim.state.running))
     found: dict[Key, Line] = {
         ("body", i): Line(k, bodies.floats[i], bodies.world, True) for i, k in enumerate(BODY_ROWS)

@@ -1,4 +1,4 @@
-"""Rules of the conformance kit for motion models: rollouts are flights, kernels solve their equation, bodies go in and out."""
+"""Rules of the conformance kit for motion models: rollouts equal flights, kernels solve their equation, body states round-trip."""
 
 from __future__ import annotations
 
@@ -18,29 +18,29 @@ EPS = float(np.finfo(float).eps)
 STEPS = 10
 ORDER = 4.0
 SLACK = 0.5
-"""How far below its order a method may seem to be at a step where higher terms are not yet small."""
+"""How far the observed order may be below the nominal one, at a step where higher-order terms are not yet small."""
 WORST_ANGLE = 64.0 * EPS
-"""Error of an attitude that went through three angles and back: each of a dozen functions and products errs by up to 2 ulp of pi."""
+"""Error of an attitude converted to three angles and back: a dozen functions and products, each with an error up to 2 ulp of pi."""
 
 VELOCITY = 1e-4
-"""Part of the largest speed by which vel may be beside the rate of pos; what counts is whether that vanishes with the step."""
+"""Allowed difference between vel and the rate of pos, relative to the largest speed; a larger one must vanish with the step."""
 FEW = 0.1
-"""Part of rows and steps in which vel may jump, as on the ground or at a limit."""
+"""Fraction of rows and steps in which vel may jump, as on the ground or at a limit."""
 
 Integrator = Callable[..., None]
 
 
 class Flight:
-    """A quiet game of a motion model, with what was integrated in each step.
+    """A quiet game of a motion model, with the recorded integration of each step.
 
     Attributes:
-        sim: After the last step.
+        sim: The simulation, after the last step.
         group: The group of the model.
         x: States before each step and after the last, (steps + 1, m, n).
         u: Inputs in each step, (steps, k, n).
         p: Parameters, (q, n).
-        dt: Length of a step [s]; where a controller works between the substeps, these are the steps.
-        substeps: Of each step.
+        dt: Length of a step [s]. If a controller runs between the substeps, each substep counts as a step here.
+        substeps: Substeps per step.
     """
 
     def __init__(self, game: Game) -> None:
@@ -52,7 +52,7 @@ class Flight:
         integrate = self.group.integrate
 
         def recorded(x: np.ndarray, u: np.ndarray, p: np.ndarray, dt: float, substeps: int) -> None:
-            self.dt, self.substeps = dt, substeps  # of a substep each, where a controller works between them
+            self.dt, self.substeps = dt, substeps
             inputs.append(np.array(u))
             integrate(x, u, p, dt, substeps)
             states.append(np.array(x))
@@ -67,11 +67,11 @@ def check_motion(game: Game, is_default: bool) -> None:
     """All rules for motion models.
 
     Args:
-        game: Around the model.
-        is_default: The model is as its class is by default; `derivative` describes that variant.
+        game: The game around the model.
+        is_default: Whether the model is the default variant of its class, which `derivative` describes.
 
     Raises:
-        ConformanceError: The model breaks one.
+        ConformanceError: The model breaks a rule.
     """
     model: Any = game.plugin
     flight = Flight(game)
@@ -105,7 +105,7 @@ def _check_rollout(model: Any, flight: Flight) -> None:
 
 
 def _check_rows(model: Any, flight: Flight) -> None:
-    """A row's path must not depend on where it stands, or on how many others there are."""
+    """A row's path must not depend on its position, or on the number of other rows."""
     integrate = model.advance
     whole = flight.x[0].copy()
     integrate(whole, flight.u[0], flight.p, flight.dt, flight.substeps)
@@ -118,11 +118,11 @@ def _check_rows(model: Any, flight: Flight) -> None:
             raise ConformanceError(
                 type(model).__name__,
                 "rows",
-                f"rows {a} to {b} of {n} fly otherwise on their own than among the others",
+                f"rows {a} to {b} of {n} take another path alone than among all rows",
             )
 
 
-# -- the equation and who solves it -----------------------------------------------------------------------------------------------
+# -- the equation and its solvers -------------------------------------------------------------------------------------------------
 
 
 def _solved(integrate: Integrator, flight: Flight, step: int, dt: float, substeps: int) -> np.ndarray:
@@ -132,13 +132,13 @@ def _solved(integrate: Integrator, flight: Flight, step: int, dt: float, substep
 
 
 def _rounding(flight: Flight, step: int, end: np.ndarray, substeps: int) -> np.ndarray:
-    """What rounding alone may add up to: a few units in the last place of everything that is added, per substep."""
+    """Bound of the rounding error: a few units in the last place of all summands, per substep."""
     size = np.abs(flight.x[step]) + np.abs(end) + np.abs(end - flight.x[step])
     return np.asarray(16.0 * EPS * substeps * np.maximum(size, 1e-3).max(axis=1, keepdims=True))
 
 
 def _check_order(model: Any, flight: Flight, equation: Integrator) -> None:
-    """Halving the step divides the driver's error by 2^4 on a smooth equation; what does not is not one."""
+    """Halving the step divides the driver's error by 2^4 if the equation is smooth."""
     dt = 5.0 * flight.dt
     best = _solved(equation, flight, 0, dt, 64)
     errors = [np.abs(_solved(equation, flight, 0, dt, n) - best).max(axis=0) for n in (2, 4)]
@@ -146,14 +146,14 @@ def _check_order(model: Any, flight: Flight, equation: Integrator) -> None:
     tells = errors[1] > 64.0 * noise
     if tells.any():
         order = np.log2(errors[0][tells] / errors[1][tells])
-        # A clamp or a sign inside the equation costs the order of single rows; a wrong equation that of all.
+        # A clamp or a sign function in the equation lowers the order of single rows; a wrong equation that of all rows.
         if np.median(order) < ORDER - SLACK:
-            text = f"halving the step lowers the error of the derivative's path by 2^{np.median(order):.2f}, not 2^4: it is not smooth in x"
+            text = f"halving the step divides the error of the derivative's path by 2^{np.median(order):.2f}, not 2^4; is it smooth in x?"
             raise ConformanceError(type(model).__name__, "order of convergence", text)
 
 
 def _check_kernel(model: Any, flight: Flight, equation: Integrator) -> None:
-    """The model's own kernel stays as near to the driver's path as both are to the truth (Richardson's estimate of the driver's error)."""
+    """The model's kernel agrees with the driver within the error of both (Richardson's estimate of the driver's error)."""
     angles = np.array([unit == "rad" for unit in model.state().units])
     for step in (0, STEPS // 2):
         path = _solved(model.advance, flight, step, flight.dt, flight.substeps)
@@ -176,27 +176,25 @@ def _check_kernel(model: Any, flight: Flight, equation: Integrator) -> None:
 
 
 def _check_convergence(model: Any, flight: Flight) -> None:
-    """A kernel without an equation to hold it to: finer substeps must at least lead somewhere."""
+    """A kernel without an equation to compare with must at least converge with finer substeps."""
     integrate = model.advance
     ends = [_solved(integrate, flight, 0, flight.dt, n) for n in (8, 16, 32, 64)]
     gaps = [float(np.abs(b - a).max()) for a, b in pairwise(ends)]
     noise = float(_rounding(flight, 0, ends[-1], 64).max())
     if gaps[2] > 0.75 * gaps[0] + 4.0 * noise:
         changes = ", ".join(f"{gap:.1e}" for gap in gaps)
-        text = (
-            f"halving the substeps three times changes the end of a step by {changes}; it does not converge"
-        )
+        text = f"halving the substeps three times changes the result of a step by {changes}; it does not converge"
         raise ConformanceError(type(model).__name__, "convergence", text)
 
 
-# -- in and out of the body table -------------------------------------------------------------------------------------------------
+# -- conversion to and from the body table ----------------------------------------------------------------------------------------
 
 
 def _check_velocity(model: MotionModel, flight: Flight) -> None:
-    """`to_body` writes vel, which is the rate of pos: over shorter and shorter steps, the mean of vel becomes that of the way.
+    """`to_body` writes vel as the rate of pos: the gap between the mean of vel and the rate of pos vanishes with the step.
 
-    A smooth path halves the gap four times for half the step, one with kinks twice, a jump in vel shows in few rows. What
-    stays is a wrong vel, or a derivative that moves pos otherwise.
+    Half the step divides the gap by four on a smooth path and by two on a path with kinks; a jump in vel shows in few rows. A gap
+    that does not vanish means that vel is wrong, or that the derivative moves pos differently.
     """
     if model.reads_all:
         return  # its states come from outside
@@ -205,12 +203,12 @@ def _check_velocity(model: MotionModel, flight: Flight) -> None:
     stays = (near > 0.5 * far) & (near > VELOCITY * fastest)
     step, axis, row = (int(i) for i in np.unravel_index(np.argmax(np.where(stays, near, 0.0)), near.shape))
     if stays.any(axis=1).mean() > FEW:
-        text = f"pos changes at another rate than vel says: by {near[step, axis, row]:.3g} m/s along {'xyz'[axis]}"
+        text = f"the rate of pos differs from vel by {near[step, axis, row]:.3g} m/s along {'xyz'[axis]}"
         raise ConformanceError(type(model).__name__, "velocity", text)
 
 
 def _velocity_gap(model: MotionModel, flight: Flight, h: float) -> np.ndarray:
-    """How far the rate of pos over h [s] is from the mean of vel, after each step of a flight with its inputs held, (steps, 3, n)."""
+    """Gap between the rate of pos over h [s] and the mean of vel, after each step of a flight with constant inputs, (steps, 3, n)."""
     group, body = flight.group, flight.group.moving
     bound: Any = group.motion.plugin
     columns = group.table.arrays[float]
@@ -233,7 +231,7 @@ def _velocity_gap(model: MotionModel, flight: Flight, h: float) -> np.ndarray:
 
 
 def _check_bodies(model: MotionModel, flight: Flight) -> None:
-    """What a model has published it takes over unchanged, and it goes on from where it is put."""
+    """A model reads back unchanged what it wrote to the body table, and continues from where it is placed."""
     name = type(model).__name__
     group, body = flight.group, flight.group.moving
     bound: Any = group.motion.plugin
@@ -249,7 +247,7 @@ def _check_bodies(model: MotionModel, flight: Flight) -> None:
             "body round trip",
             f"from_body and to_body move entities by {np.abs(body.pos - before['pos']).max():.1e} m",
         )
-    steep = np.abs(np.cos(body.climb)) < 0.05  # there yaw and roll are one angle
+    steep = np.abs(np.cos(body.climb)) < 0.05  # gimbal lock: yaw and roll are not unique
     turned = np.minimum(np.abs(body.quat - before["quat"]), np.abs(body.quat + before["quat"])).max(axis=0)
     if (turned[~steep] > 20.0 * WORST_ANGLE).any():
         raise ConformanceError(
@@ -264,11 +262,9 @@ def _check_bodies(model: MotionModel, flight: Flight) -> None:
     others = group.x[:, 3:].copy()
     bound.from_body(body, rows[:3])
     if group.x[:, 3:].tobytes() != others.tobytes():
-        raise ConformanceError(
-            name, "from_body", "it sets the state of rows that it was not asked for; index with `rows`"
-        )
+        raise ConformanceError(name, "from_body", "it changes the state of rows that are not in `rows`")
     bound.to_body(body)
     if not np.allclose(body.pos[:, :3], wanted[:, :3], rtol=4.0 * EPS, atol=4.0 * EPS * size):
         raise ConformanceError(
-            name, "from_body", f"an entity put at {wanted[:, 0]} goes on from {body.pos[:, 0]}"
+            name, "from_body", f"an entity placed at {wanted[:, 0]} continues from {body.pos[:, 0]}"
         )

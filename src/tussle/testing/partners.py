@@ -1,4 +1,4 @@
-"""The other plugins of the conformance kit's game: they feed, read and hear the plugin under test, and trouble its worlds."""
+"""Partner plugins of the conformance kit's game: they exchange values and messages with the tested plugin and disturb its worlds."""
 
 from __future__ import annotations
 
@@ -33,29 +33,29 @@ from tussle.columns import Channel, Numbers
 from tussle.numeric.quaternion import quat_from_euler
 
 AMPLITUDES = {"m": 40.0, "m/s": 8.0, "rad": 1.0, "rad/s": 0.8, "m/s^2": 3.0}
-"""What is usual for small robots, by unit; 1 for all others."""
+"""Typical values of small robots, by unit; 1 for all other units."""
 
 
-class Word(Message):
-    """A message of the kit."""
+class KitMessage(Message):
+    """Message type of the kit."""
 
     number = Field(doc="Any number.")
-    target = EntityRef(doc="The sender's nearest.")
+    target = EntityRef(doc="Entity nearest to the sender.")
 
 
 def signal(entity: Any, step: Any, number: Any) -> np.ndarray:
-    """A number in [-1, 1) that differs from entity to entity, step to step and number to number; exact on every machine."""
+    """A number in [-1, 1) that differs between entities, steps and numbers; bit-identical on every machine."""
     phase = 0.6180339887498949 * entity + 0.1357913579 * step + 0.3819660112501051 * number
     return np.asarray(2.0 * (phase - np.floor(phase)) - 1.0)
 
 
 def squash(x: np.ndarray) -> np.ndarray:
-    """Into (-1, 1), each last bit of x counting; NaN where x is not finite, so that nobody overlooks it."""
+    """Map x to (-1, 1), so that every bit of x has an effect; NaN where x is not finite, so that it is noticed."""
     return np.asarray(x / (1.0 + np.abs(x)))
 
 
-def write_signals(plugin: Any, g: GroupView, feel: np.ndarray) -> None:
-    """Fill all outputs with signals of their units' size, changed a little by `feel` (n,)."""
+def write_signals(plugin: Any, g: GroupView, variation: np.ndarray) -> None:
+    """Fill all outputs with signals of the amplitudes of their units, plus a small part of `variation`, (n,)."""
     number = 0
     for name, column in plugin.outputs().items():
         if column.ragged:
@@ -65,33 +65,33 @@ def write_signals(plugin: Any, g: GroupView, feel: np.ndarray) -> None:
         for values, unit in zip(np.atleast_2d(plugin.__dict__[name]), column.units, strict=True):
             number += 1
             size = AMPLITUDES.get(unit, 1.0)
-            values[:] = size * (0.8 * signal(g.id, g.step_count, number) + 0.1 * squash(feel))
+            values[:] = size * (0.8 * signal(g.id, g.step_count, number) + 0.1 * squash(variation))
 
 
 def _made_lists(column: Channel, g: GroupView, number: float) -> tuple[np.ndarray, np.ndarray]:
-    """Start and items of lists of 0 to 2 signals for each row."""
+    """Start and items of lists with 0 to 2 signals per row."""
     row = np.repeat(np.arange(g.n), (g.id + g.step_count) % 3)
     size = np.array([AMPLITUDES.get(unit, 1.0) for unit in column.units])[:, None]
     items = size * signal(g.id[row], g.step_count[row], number + 0.1 * np.arange(len(size))[:, None])
     return np.searchsorted(row, np.arange(g.n + 1)), items if column.fields else items[0]
 
 
-def felt(values: Any) -> np.ndarray:
-    """One number per row that depends on all numbers of an input, (n,)."""
+def row_signal(values: Any) -> np.ndarray:
+    """A number per row that depends on all numbers of an input, (n,)."""
     if isinstance(values, RaggedColumn):
         values = values.sum(squash(values.data))
     return np.asarray(sum(squash(line) for line in np.atleast_2d(values)))
 
 
-def can_say(message: type[Message]) -> bool:
-    """Whether the kit can make up messages of this type: an opaque object it cannot."""
+def can_fill(message: type[Message]) -> bool:
+    """Whether the kit can fill messages of this type: not if they hold opaque objects."""
     return not any(isinstance(column, Handle) for column in message.fields.values())
 
 
-def made_up(message: type[Message], g: GroupView, rows: np.ndarray, nearest: np.ndarray) -> dict[str, Any]:
-    """Fields of one message of each of `rows` about the entity in body row `nearest`, (m,).
+def filled(message: type[Message], g: GroupView, rows: np.ndarray, nearest: np.ndarray) -> dict[str, Any]:
+    """Fields of one message from each of `rows` about the entity in body row `nearest`, (m,).
 
-    The first of several references, and of several teams, is the sender's own.
+    The first of several references, and of several teams, is that of the sender.
     """
     refs = [name for name, column in message.fields.items() if isinstance(column, EntityRef)]
     teams = [name for name in message.fields if "team" in name]
@@ -114,15 +114,15 @@ def made_up(message: type[Message], g: GroupView, rows: np.ndarray, nearest: np.
     return out
 
 
-def weigh(batch: Batch) -> np.ndarray:
-    """One number per message that depends on all of its numbers, (n,)."""
+def message_signal(batch: Batch) -> np.ndarray:
+    """A number per message that depends on all of its numbers, (n,)."""
     total = signal(batch.sender, 0.0, 1.0)
     for name, column in batch.type.fields.items():
         if isinstance(column, Field) and column.ragged:
             lists = batch.data[name]
-            total = total + felt(
+            total = total + row_signal(
                 lists.sum(squash(np.clip(lists.data, -1e300, 1e300)))
-            )  # inf may mean something
+            )  # inf may be a valid value
         elif isinstance(column, (Field, EntityRef)):
             for values in np.atleast_2d(batch.data[name]):
                 total = total + squash(values.astype(float))
@@ -130,38 +130,36 @@ def weigh(batch: Batch) -> np.ndarray:
 
 
 class Driver(Autonomy):
-    """Writes values that vary with time and entity into its outputs, says and hears messages; abstract: `driver` adds the columns."""
+    """Writes values that vary with time and entity, publishes and receives messages; abstract: `driver` adds the columns."""
 
     grade = "portable"
-    heard = State(doc="Sum over all that was heard.")
-    own = Output(
-        "kit_x kit_y kit_z", unit="m/s", doc="Moves the entity when it is moved by the kit's own model."
-    )
+    heard = State(doc="Sum over all received messages.")
+    own = Output("kit_x kit_y kit_z", unit="m/s", doc="Moves the entity if it has the kit's motion model.")
 
     def step(self, g: GroupView) -> None:
         for name in self.topics():
             inbox = self.__dict__[name]
             if isinstance(type(self).columns[name], Subscribe) and inbox:
                 rows, batch = inbox.pairs()
-                np.add.at(self.heard, rows, weigh(batch))
-        feel = squash(g.pos[0]) + squash(g.vel[1]) + squash(g.yaw) + squash(self.heard)
+                np.add.at(self.heard, rows, message_signal(batch))
+        variation = squash(g.pos[0]) + squash(g.vel[1]) + squash(g.yaw) + squash(self.heard)
         for name in self.inputs():
-            feel = feel + felt(self.__dict__[name])
-        write_signals(self, g, feel)
-        self._speak(g)
+            variation = variation + row_signal(self.__dict__[name])
+        write_signals(self, g, variation)
+        self._publish_all(g)
 
-    def _speak(self, g: GroupView) -> None:
-        mouths = [name for name, column in self.topics().items() if isinstance(column, Publish)]
-        if mouths:
+    def _publish_all(self, g: GroupView) -> None:
+        names = [name for name, column in self.topics().items() if isinstance(column, Publish)]
+        if names:
             nearest = g.nearest().other[0]
             rows = np.flatnonzero(((g.id + g.step_count) % 3 == 0) & (nearest >= 0))
-            for name in mouths if len(rows) else ():
+            for name in names if len(rows) else ():
                 message = type(self).columns[name].message  # type: ignore[attr-defined]
-                self.__dict__[name].publish(rows, **made_up(message, g, rows, nearest[rows]))
+                self.__dict__[name].publish(rows, **filled(message, g, rows, nearest[rows]))
 
 
-class Feeler(Sensor):
-    """Writes values that vary with time and entity for autonomies that read them; abstract: `sensor` adds the columns."""
+class SignalSensor(Sensor):
+    """Writes values that vary with time and entity, for autonomies to read; abstract: `signal_sensor` adds the columns."""
 
     grade = "portable"
 
@@ -170,7 +168,7 @@ class Feeler(Sensor):
 
 
 def drift(x: np.ndarray, u: np.ndarray, p: np.ndarray, dt: float, substeps: int) -> None:
-    """The kit's motion: every input pushes, none can push far."""
+    """The kit's motion: every input accelerates by a bounded amount."""
     turn = np.zeros(x.shape[1])
     x[3:6] *= 0.8
     for j in range(u.shape[0]):
@@ -184,7 +182,7 @@ def drift(x: np.ndarray, u: np.ndarray, p: np.ndarray, dt: float, substeps: int)
 
 
 class Sink(MotionModel):
-    """Reads everything that is written for a motion model and moves by it; abstract: `sink` adds the inputs."""
+    """Motion model that reads all channels written for it and moves by them; abstract: `sink` adds the inputs."""
 
     grade = "portable"
     x = State("x y z vx vy vz yaw climb", unit="m m m m/s m/s m/s rad rad")
@@ -199,8 +197,8 @@ class Sink(MotionModel):
         body.set_attitude(0.0, self.x[7], self.x[6])
 
 
-class Wisher(Behavior):
-    """A behaviour for plugins that are made of behaviours."""
+class SignalBehavior(Behavior):
+    """A behavior for plugins that contain behaviors."""
 
     grade = "portable"
 
@@ -209,11 +207,11 @@ class Wisher(Behavior):
 
 
 class Reaper(Interaction):
-    """Deaths, births, a move, and worlds that end apart; all by the world's seed alone."""
+    """Deaths, births, a moved entity, and worlds that end at different times; all depend only on the world's seed."""
 
     grade = "portable"
-    chance = Param(0.03, ge=0.0, le=1.0, doc="That an entity dies in a step.")
-    last_step = Param(12, doc="When every third world dies out.")
+    chance = Param(0.03, ge=0.0, le=1.0, doc="Probability that an entity dies in a step.")
+    last_step = Param(12, doc="Step from which all entities of every third world die.")
 
     def step(self, w: WorldView) -> None:
         step = w.step_count[w.world]
@@ -228,7 +226,7 @@ class Reaper(Interaction):
         w.move(rows, pos=w.pos[:, rows] + 3.0, quat=quat_from_euler(level + 0.1, level - 0.2, level + 1.0))
 
 
-# -- classes made to fit ----------------------------------------------------------------------------------------------------------
+# -- classes made for a plugin ----------------------------------------------------------------------------------------------------
 
 
 def _inputs(channels: Iterable[Channel], optional: bool) -> dict[str, Any]:
@@ -253,25 +251,25 @@ def _made(base: type, name: str, columns: dict[str, Any]) -> Any:
 
 
 def driver(
-    writes: Iterable[Channel], reads: Iterable[Channel], says: Iterable[Any], hears: Iterable[Any]
+    writes: Iterable[Channel], reads: Iterable[Channel], publishes: Iterable[Any], subscribes: Iterable[Any]
 ) -> Driver:
-    """An autonomy that writes and reads these channels, and has the other end of these topics: (message, topic, network)."""
+    """An autonomy that writes and reads these channels, and publishes and subscribes to these topics: (message, topic, network)."""
     columns = {**_outputs(writes), **_inputs(reads, optional=True)}
-    for i, (message, topic, network) in enumerate(says):
-        columns[f"says_{i}"] = Publish(message, topic=topic, network=network)
-    for i, (message, topic, network) in enumerate(hears):
-        columns[f"hears_{i}"] = Subscribe(message, topic=topic, network=network)
+    for i, (message, topic, network) in enumerate(publishes):
+        columns[f"publish_{i}"] = Publish(message, topic=topic, network=network)
+    for i, (message, topic, network) in enumerate(subscribes):
+        columns[f"subscribe_{i}"] = Subscribe(message, topic=topic, network=network)
     made: Driver = _made(Driver, "Driver", columns)
     return made
 
 
 def sink(reads: Iterable[Channel]) -> Sink:
-    """A motion model that reads those of these channels that are numbers."""
+    """A motion model that reads these channels, except lists."""
     made: Sink = _made(Sink, "Sink", _inputs([c for c in reads if not c.ragged], optional=False))
     return made
 
 
-def feeler(writes: Iterable[Channel]) -> Feeler:
+def signal_sensor(writes: Iterable[Channel]) -> SignalSensor:
     """A sensor that writes these channels."""
-    made: Feeler = _made(Feeler, "Feeler", _outputs(writes))
+    made: SignalSensor = _made(SignalSensor, "SignalSensor", _outputs(writes))
     return made

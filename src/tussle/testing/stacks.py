@@ -1,4 +1,4 @@
-"""Rules of the conformance kit: a world is the same alone and in every stack, after a reset, and after a restore."""
+"""Rules of the conformance kit: a world is bit-identical alone and in every stack, after a reset, and after a restore."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ STACKS: tuple[tuple[int, int], ...] = ((1, 2), (2, 1), (7, 1), (64, 2))
 
 
 def order_of(n: int) -> list[int]:
-    """Seeds of a stack of n worlds: the followed ones in another order, strangers among them."""
+    """Seeds of a stack of n worlds: the compared ones in another order, with other seeds between them."""
     if n == 1:
         return [SEEDS[2]]
     if n == 2:
@@ -27,7 +27,7 @@ def order_of(n: int) -> list[int]:
 
 
 def check_stacks(game: Game, traces: Traces) -> None:
-    """World k of a stack is world k alone, bit for bit.
+    """World k of a stack is bit-identical to world k alone.
 
     Raises:
         ConformanceError: It is not.
@@ -37,18 +37,16 @@ def check_stacks(game: Game, traces: Traces) -> None:
         if most is not None and n > most:
             continue
         seeds = order_of(n)
-        where = f"world alone against the same in a stack of {n}" + (
-            f" with {threads} threads" if threads > 1 else ""
-        )
+        where = f"world alone versus in a stack of {n}" + (f" with {threads} threads" if threads > 1 else "")
         with game.play(seeds, threads) as sim:
             _follow(sim, traces, seeds, range(STEPS + 1), "stack invariance", where)
 
 
 def check_reset(game: Game, traces: Traces) -> None:
-    """Worlds that are reset begin as if new, and the others do not notice.
+    """Reset worlds equal new ones, and the other worlds do not change.
 
     Raises:
-        ConformanceError: They do not, or do.
+        ConformanceError: A reset world differs, or another world changes.
     """
     most = Handle.most_worlds(game.plugin)
     if most is not None and most < 4:
@@ -61,28 +59,28 @@ def check_reset(game: Game, traces: Traces) -> None:
         for _ in range(STEPS - 14 + 1):
             for world, age in enumerate(ages):
                 where = (
-                    "fresh start against reset"
+                    "new world versus reset world"
                     if world
-                    else "world alone against one whose neighbours were reset"
+                    else "world alone versus in a stack whose other worlds were reset"
                 )
-                traces.hold(sim, world, seeds[world], age, "reset", where)
+                traces.compare(sim, world, seeds[world], age, "reset", where)
             sim.step()
             ages = [age + 1 for age in ages]
     with game.play([SEEDS[0]]) as sim:
         sim.step(6)
         sim.reset([0])
-        _follow(sim, traces, [SEEDS[0]], range(8), "reset", "fresh start against a reset of all worlds")
+        _follow(sim, traces, [SEEDS[0]], range(8), "reset", "new world versus a reset of all worlds")
 
 
 def check_snapshot(game: Game, traces: Traces) -> None:
-    """After a restore the same future follows, in the same simulation and in another.
+    """The same future follows after a restore, in the same simulation and in another.
 
     Raises:
-        ConformanceError: Another one does.
+        ConformanceError: The future differs.
     """
     cls = type(game.plugin)
     if cls.handles() and not hasattr(cls, "save_one"):
-        return  # it holds objects outside the arrays and refuses, which is allowed
+        return  # it has handles and refuses snapshots, which is allowed
     n = min(3, Handle.most_worlds(cls) or 3)
     seeds = list(SEEDS[:n])
     with game.play(seeds) as sim:
@@ -94,10 +92,10 @@ def check_snapshot(game: Game, traces: Traces) -> None:
             seeds,
             range(7, STEPS + 1),
             "snapshot",
-            "world alone against one of which a snapshot was taken",
+            "world alone versus after taking a snapshot",
         )
         sim.restore(saved)
-        _follow(sim, traces, seeds, range(7, STEPS + 1), "snapshot", "before against after restore")
+        _follow(sim, traces, seeds, range(7, STEPS + 1), "snapshot", "before versus after restore")
     with game.play(seeds) as other:
         other.step(2)
         other.restore(saved)
@@ -107,7 +105,7 @@ def check_snapshot(game: Game, traces: Traces) -> None:
             seeds,
             range(7, STEPS + 1),
             "snapshot",
-            "before against after restore into another simulation",
+            "before versus after restore into another simulation",
         )
 
 
@@ -115,5 +113,5 @@ def _follow(sim: Simulation, traces: Traces, seeds: list[int], steps: range, rul
     followed = [(world, seed) for world, seed in enumerate(seeds) if seed in traces.steps]
     for step in steps:
         for world, seed in followed:
-            traces.hold(sim, world, seed, step, rule, where)
+            traces.compare(sim, world, seed, step, rule, where)
         sim.step()

@@ -1,4 +1,4 @@
-"""What becomes of each world of the conformance kit's game, step by step."""
+"""The states of each world of the conformance kit's game, step by step."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Columns = list[tuple[str, Any]]
 
 
 def columns_of(sim: Simulation, world: int) -> Columns:
-    """All that belongs to one world now: (name, values); of a world that has ended, its result."""
+    """All data of one world: (name, values); of a world that has ended, its result."""
     done = sim.state.results[world]
     if done is not None and not sim.state.running[world]:
         parts = (done.end, done.steps, done.t, done.alive, done.metrics, done.scores, done.state_hash)
@@ -27,19 +27,19 @@ def columns_of(sim: Simulation, world: int) -> Columns:
 
 
 def first_difference(expected: Columns, found: Columns) -> str:
-    """The first column that differs in a bit, in words; "" when all are equal."""
+    """Description of the first column that differs in a bit; "" if all are equal."""
     for (name, a), (_, b) in zip(expected, found, strict=False):
         if name == "result" and a != b:
-            return f"{name}: {a.decode()} against {b.decode() if isinstance(b, bytes) else b}"
+            return f"{name}: {a.decode()} versus {b.decode() if isinstance(b, bytes) else b}"
         data = [v if isinstance(v, bytes) else v.tobytes() for v in (a, b)]
         if data[0] != data[1]:
             if isinstance(a, bytes) or isinstance(b, bytes) or a.shape != b.shape or a.dtype != b.dtype:
-                return f"{name}: {_shape(a)} against {_shape(b)}"
+                return f"{name}: {_shape(a)} versus {_shape(b)}"
             items = [np.frombuffer(d, np.uint8).reshape(a.size, -1) for d in data]
             item = int(np.flatnonzero((items[0] != items[1]).any(axis=1))[0])
-            return f"{name}: {a.ravel()[item]!r} against {b.ravel()[item]!r}"
+            return f"{name}: {a.ravel()[item]!r} versus {b.ravel()[item]!r}"
     if len(expected) != len(found):
-        return f"{len(expected)} columns against {len(found)}"
+        return f"{len(expected)} columns versus {len(found)}"
     return ""
 
 
@@ -48,7 +48,7 @@ def _shape(values: Any) -> str:
 
 
 class Traces:
-    """What each followed world is alone, after every step: the standard that all stacks are held to."""
+    """The states of each compared world alone, after every step: the reference for all stacks."""
 
     def __init__(self, game: Game) -> None:
         self.game = game
@@ -61,11 +61,11 @@ class Traces:
                     states.append(columns_of(sim, 0))
             self.steps[seed] = states
 
-    def hold(self, sim: Simulation, world: int, seed: int, step: int, rule: str, where: str) -> None:
-        """A world of a stack must be now what it is alone after `step` steps.
+    def compare(self, sim: Simulation, world: int, seed: int, step: int, rule: str, where: str) -> None:
+        """Compare a world of a stack with the same world alone after `step` steps.
 
         Raises:
-            ConformanceError: It is not.
+            ConformanceError: They differ.
         """
         difference = first_difference(self.steps[seed][step], columns_of(sim, world))
         if difference:

@@ -1,4 +1,4 @@
-"""Rules of the conformance kit about single calls: a plugin writes its own columns, remembers nothing elsewhere, draws no number twice."""
+"""Rules of the conformance kit for single calls: a plugin writes only its own columns, stores nothing elsewhere, and repeats no draw."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ HOOKS = ("spawn", "step", "from_body", "to_body", "start", "route", "result_of",
 DRAWS = ("uniform", "normal", "normal_pairs", "uniform_pairs", "uniform_by")
 
 Own = dict[Key, Any]
-"""Lines that a hook may write -> which rows of them."""
+"""Lines that a hook may write -> their rows that it may write."""
 
 
 def check_calls(game: Game) -> None:
-    """In a short game, everything is compared before and after each call of the plugin, and its draws are noted.
+    """Play a short game; compare all data before and after each call of the plugin, and record its draws.
 
     Raises:
-        ConformanceError: The plugin has written into what is not its own, holds what is not declared, or has drawn a number twice.
+        ConformanceError: The plugin wrote into a column of others, stores an undeclared attribute, or repeated a draw.
     """
     cls = type(game.plugin)
     with game.play(SEEDS[:1]) as sim:
@@ -43,15 +43,15 @@ def check_calls(game: Game) -> None:
             own = watch.plugin.__dict__
             own = (
                 {**own, **own["_look"].author.__dict__} if "_look" in own else own
-            )  # easy mode: what its author knows as self
+            )  # easy mode: the author's `self`
             extra = sorted(set(own) - set(cls.columns) - BOUND - set(HOOKS))
             if extra:
-                text = f"{extra[0]} is held by the plugin object, which serves all entities; declare a State"
+                text = f"{extra[0]} is stored on the plugin object, which all entities share; declare a State"
                 raise ConformanceError(cls.__name__, MEMORY, text)
 
 
 def class_values(cls: type[Plugin]) -> dict[str, Any]:
-    """What stands on the class and its own bases now."""
+    """Attributes of the class and its own bases."""
     return {
         f"{base.__name__}.{k}": v
         for base in own_classes(cls)
@@ -61,20 +61,20 @@ def class_values(cls: type[Plugin]) -> dict[str, Any]:
 
 
 def check_class_values(cls: type[Plugin], before: dict[str, Any]) -> None:
-    """Nothing on the class has changed while it was played.
+    """No attribute of the class changed during a game.
 
     Raises:
-        ConformanceError: Something has.
+        ConformanceError: An attribute changed.
     """
     after = class_values(cls)
     changed = [k for k in after if k not in before or after[k] is not before[k]]
     if changed:
-        text = f"{changed[0]} has changed during a game; all simulations share the class, so declare a State"
+        text = f"{changed[0]} changed during a game; all simulations share the class, so declare a State"
         raise ConformanceError(cls.__name__, MEMORY, text)
 
 
 def _bound(sim: Simulation, cls: type[Plugin]) -> Iterator[tuple[Any, Callable[[str], Own]]]:
-    """The bound plugins of a class, each with what its hooks may write."""
+    """The bound plugins of a class, each with a function that returns what a hook may write."""
     for group in sim.state.population.groups:
         for binding in group.walk():
             if type(binding.spec) is cls:
@@ -85,12 +85,12 @@ def _bound(sim: Simulation, cls: type[Plugin]) -> Iterator[tuple[Any, Callable[[
 
 
 class Watch:
-    """Stands around each hook of a bound plugin.
+    """Wraps each hook of a bound plugin with checks.
 
     Args:
-        sim: Its simulation.
+        sim: The simulation.
         plugin: The plugin.
-        own: What a hook may write.
+        own: Returns what a hook may write.
     """
 
     def __init__(self, sim: Simulation, plugin: Any, own: Callable[[str], Own]) -> None:
@@ -109,7 +109,7 @@ class Watch:
             self.calls += 1
             for law in DRAWS:
                 if hasattr(view, law):
-                    view.__dict__[law] = self._noted(view, hook, getattr(type(view), law))
+                    view.__dict__[law] = self._recorded(view, hook, getattr(type(view), law))
             lines = lines_of(self.sim)
             before = {key: line.values.copy() for key, line in lines.items()}
             try:
@@ -124,14 +124,14 @@ class Watch:
                 changed[own.get(key, slice(0))] = False
                 if changed.any():
                     row = int(np.flatnonzero(changed)[0])
-                    text = f"{hook} has written into {line.name}, which is not its own: {old[row]!r} became {new[row]!r}"
+                    text = f"{hook} wrote into {line.name}, which is not its own: {old[row]!r} became {new[row]!r}"
                     raise self._error("own columns", text)
             return out
 
         return watched
 
-    def _noted(self, view: GroupView, hook: str, law: Callable[..., Any]) -> Callable[..., Any]:
-        """A law of chance that refuses to give the numbers again which it, or the other law, has given in the same step."""
+    def _recorded(self, view: GroupView, hook: str, law: Callable[..., Any]) -> Callable[..., Any]:
+        """A draw function that refuses to repeat the numbers that it, or another one, gave in the same step."""
 
         def draw(*args: Any, **kwargs: Any) -> Any:
             given = inspect.signature(law).bind(view, *args, **kwargs).arguments
@@ -143,7 +143,7 @@ class Watch:
                 (hook, self.calls),
             )
             first = self.drawn.setdefault(key, now)
-            # A hook may be called for some rows now and for others later in a step.
+            # A hook may be called several times in a step, for different rows.
             if first is not now and (first == now or first[0] != hook):
                 raise self._error(
                     "draws",
@@ -155,7 +155,7 @@ class Watch:
 
 
 def _own(group: Group, binding: Binding, hook: str) -> Own:
-    """What a plugin of an entity may write."""
+    """What an entity's plugin may write."""
     own: Own = {
         key: slice(None)
         for b in binding.walk()
@@ -169,7 +169,7 @@ def _own(group: Group, binding: Binding, hook: str) -> Own:
 
 
 def _own_of_world(sim: Simulation, referee: Referee, hook: str) -> Own:
-    """What a world plugin may write: its memory, and as an interaction health and forces, and places by `w.move`."""
+    """What a world plugin may write: its states; an interaction also health, forces, and the bodies that it moves by `w.move`."""
     if hook not in {"start", "step"}:
         return {}
     places = [referee.places[name] for name in type(referee.spec).states()]
