@@ -1,4 +1,4 @@
-"""tussle: thousands of robots in one 3D world, played fast and repeatably."""
+"""tussle: fast, deterministic simulation of thousands of robots in one 3D world."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -28,7 +28,7 @@ __version__ = "0.1.0.dev0"
 
 
 def __getattr__(name: str) -> Any:
-    # Recording needs Arrow, whose import takes as long as all the rest: it is loaded when it is first asked for.
+    # Recording needs Arrow, which takes as long to import as the rest of tussle: it is imported on first use.
     if name in ("Recorder", "load_run", "read_table"):
         from tussle import record
 

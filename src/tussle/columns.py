@@ -1,8 +1,8 @@
-"""The declarations: each array of a plugin is stated once, as a class attribute.
+"""Columns: each array of a plugin is declared once, as a class attribute.
 
-On the class an attribute is the declaration (unit, shape, default, bounds, a line of doc); on a plugin that lives in a simulation
-the same name is the array. Allocation, constructors, sweeps, wiring checks, reset, snapshot, hashing and the plugin's page all
-read this one declaration.
+On the class, the attribute is the declaration (unit, shape, default, bounds, one line of documentation). On a plugin inside a
+simulation, the same name is the array. Allocation, constructors, sweeps, wiring checks, reset, snapshots, hashing and the plugin's
+page all read this declaration.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from tussle.errors import DeclarationError, ParameterError, UnitError, nearest_n
 
 PER = ("entity", "world", "team")
 MOST_INTEGER = 2**53
-"""Beyond it a double skips whole numbers."""
+"""All integers up to this magnitude are exact in float64."""
 
 
 class Column:
@@ -27,7 +27,7 @@ class Column:
     Attributes:
         name: The attribute's name on the class, set by Python.
         owner: Name of the class that declares it.
-        doc: One line that says what it is.
+        doc: One-line description.
     """
 
     name: str = ""
@@ -41,11 +41,11 @@ class Column:
         self.owner = owner.__name__
 
     def __get__(self, instance: object | None, owner: type) -> Any:
-        # Not a data descriptor on purpose: arrays of a bound plugin sit in its __dict__ and are found first, in 30 ns.
+        # Not a data descriptor, so that Python finds the array in the bound plugin's __dict__ first, in 30 ns.
         if instance is None:
             return self
         raise AttributeError(
-            f"{type(instance).__name__}.{self.name} is an array only inside a simulation; this {type(instance).__name__} is unbound data"
+            f"{type(instance).__name__}.{self.name} is an array only inside a simulation; this plugin is not bound to one"
         )
 
     def __eq__(self, other: object) -> bool:
@@ -58,9 +58,9 @@ def _fields(text: str, what: str) -> tuple[str, ...]:
     names = tuple(text.split())
     for name in names:
         if not name.isidentifier():
-            raise DeclarationError(f"{what}: {name!r} is not a name; write the names separated by blanks")
+            raise DeclarationError(f"{what}: {name!r} is not a valid name; separate names by spaces")
     if len(set(names)) != len(names):
-        raise DeclarationError(f"{what}: a name stands twice in {text!r}")
+        raise DeclarationError(f"{what}: duplicate name in {text!r}")
     return names
 
 
@@ -68,11 +68,11 @@ class Numbers(Column):
     """A column of numbers; abstract.
 
     Attributes:
-        fields: Names of the components; empty for a column that is one number a row.
+        fields: Names of the components; empty for one number per row.
         units: Unit of each component.
-        text_units: Unit of a number without one in a text, of each component.
+        text_units: Unit of a bare number in a text, for each component.
         dtype: float, int or bool.
-        ragged: It is a list per row, of any length, of items with these components; its array is a `RaggedColumn`.
+        ragged: Whether each row holds a list, of any length, of items with these components; the array is a `RaggedColumn`.
     """
 
     def __init__(
@@ -88,8 +88,8 @@ class Numbers(Column):
         for each in self.units:
             if not units.is_si(each):
                 raise DeclarationError(
-                    f"{type(self).__name__}: unit {each!r} is not SI, and numbers inside a simulation are; declare the SI unit"
-                    + (" and text_unit for mission files" if isinstance(self, Param) else "")
+                    f"{type(self).__name__}: {each!r} is not an SI unit; declare the SI unit"
+                    + (", and text_unit for mission files" if isinstance(self, Param) else "")
                 )
         if dtype not in (float, int, bool):
             raise DeclarationError(f"{type(self).__name__}: dtype {dtype!r} is not one of float, int, bool")
@@ -97,14 +97,14 @@ class Numbers(Column):
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Shape of one row's value, of a list of each item: () or (k,)."""
+        """Shape of one row's value, or of one item if ragged: () or (k,)."""
         return (len(self.fields),) if self.fields else ()
 
     def read(self, text: str, from_geodetic: Callable[..., Any] | None = None) -> Any:
-        """What a text means here, in SI units, as a mission file writes it; see `Param.convert`.
+        """Parse a value of this column, written as in a mission file, to SI units; see `Param.convert`.
 
         Raises:
-            ParameterError: It is not written as values of this column are.
+            ParameterError: The text is not a value of this column.
         """
         if len(text.replace(",", " ").split()) > texts.MOST_ITEMS:
             raise ParameterError(f"{texts.shown(text)} has more than {texts.MOST_ITEMS:,} numbers")
@@ -117,21 +117,21 @@ class Numbers(Column):
 
 
 class Param(Numbers):
-    """A parameter: a number per row, or with `structural` (and for text) one Python value for the plugin.
+    """A parameter: one value per row, or one Python value per plugin if it is `structural` or a text.
 
     Args:
         default: Value in SI units; its type (float, int, bool, str, tuple of floats) is the parameter's type.
         unit: SI unit, or one per field.
         ge: Smallest allowed value.
-        gt: Value that it must exceed.
+        gt: Lower bound, not allowed itself.
         le: Largest allowed value.
-        lt: Value that it must stay below.
-        choices: Allowed values, for text.
+        lt: Upper bound, not allowed itself.
+        choices: Allowed values.
         fields: Names of the components of a tuple.
-        text_unit: Unit of a bare number in a mission file where that is historically not SI.
-        structural: It changes code path or shape, so entities that differ in it live in different groups.
+        text_unit: Unit of a bare number in a mission file, where the format's unit is not SI.
+        structural: The value changes the code path or array shapes, so entities with different values are in different groups.
         ragged: A list of rows of `fields` instead of one value.
-        doc: One line that says what it is.
+        doc: One-line description.
     """
 
     def __init__(
@@ -153,7 +153,7 @@ class Param(Numbers):
         self.is_text = isinstance(default, str)
         dtype: type = bool if isinstance(default, bool) else int if isinstance(default, int) else float
         if dtype is int and unit:
-            dtype = float  # whoever writes Param(35, unit="m/s") does not mean that 35.5 is not a speed
+            dtype = float  # Param(35, unit="m/s") accepts 35.5
         super().__init__(fields, unit, dtype, doc, ragged, text_unit)
         self.ge, self.gt, self.le, self.lt = ge, gt, le, lt
         self.choices = tuple(choices)
@@ -162,11 +162,11 @@ class Param(Numbers):
 
     @property
     def is_row_data(self) -> bool:
-        """One number (or tuple) per row, so a column of the group's table."""
+        """Whether there is one number (or tuple) per row, stored as a column of the group's table."""
         return not self.structural and not self.ragged
 
     def allowed(self) -> str:
-        """What values it takes, in words, for messages and pages."""
+        """Describe the allowed values, for messages and pages."""
         if self.choices:
             return "one of " + ", ".join(repr(c) for c in self.choices)
         bounds = [(self.ge, ">="), (self.gt, ">"), (self.le, "<="), (self.lt, "<")]
@@ -182,30 +182,32 @@ class Param(Numbers):
         return f"{kind}{unit}{' ' + text if text else ''}"
 
     def read(self, text: str, from_geodetic: Callable[..., Any] | None = None) -> Any:
-        """As of any column of numbers; a text parameter is the text itself."""
+        """Parse a value as `Numbers.read` does; the value of a text parameter is the text itself."""
         return text.strip() if self.is_text and not self.ragged else super().read(text, from_geodetic)
 
     def convert(self, value: Any, where: str = "", from_geodetic: Callable[..., Any] | None = None) -> Any:
-        """Value in SI units as plain Python, checked: a number is SI, a text is read as a mission file reads it, everywhere.
+        """Check a value and convert it to plain Python in SI units. A number is SI; a text is parsed as in a mission file.
 
         Args:
             value: A number; a text: "40 kt", "40" in `text_unit`, "1, 0.2, 1, 45" for several fields, "[ 0 1 ] [ 2 3 ]" for a list,
                 "true"; or a sequence of numbers and texts.
-            where: Place for the message.
-            from_geodetic: Latitude, longitude [rad], altitude [m], (3,), to world positions [m], for rows of a text that begin with GPS.
+            where: Place for the error message.
+            from_geodetic: Converts latitude, longitude [rad], altitude [m], (3,), to a world position [m]; used for rows that begin
+                with GPS.
 
         Raises:
-            ParameterError: It has another type or unit, is not finite, or is out of bounds.
+            ParameterError: The value has the wrong type or unit, is NaN, or is out of bounds.
         """
         if isinstance(value, str):
-            value = self._told(value, where, lambda: self.read(value, from_geodetic))
+            value = self._parsed(value, where, lambda: self.read(value, from_geodetic))
         if self.ragged:
             if not isinstance(value, Iterable):
                 raise self._error(where, value, f"a list of {self.allowed()}")
             return tuple(self._item(item, where) for item in value)
         return self._item(value, where)
 
-    def _told(self, text: str, where: str, read: Callable[[], Any]) -> Any:
+    def _parsed(self, text: str, where: str, read: Callable[[], Any]) -> Any:
+        """Result of `read`; its errors get the place and the text."""
         try:
             return read()
         except UnitError as error:
@@ -216,7 +218,7 @@ class Param(Numbers):
             raise self._error(where, text, self.allowed()) from None
 
     def _item(self, value: Any, where: str) -> Any:
-        """One number, or one of each field."""
+        """Convert one number, or one per field."""
         if not self.fields:
             return self._number(value, 0, where)
         try:
@@ -234,7 +236,7 @@ class Param(Numbers):
             return value
         if isinstance(value, str):
             text = value
-            value = self._told(text, where, lambda: units.parse(text, self.units[i], self.text_units[i]))
+            value = self._parsed(text, where, lambda: units.parse(text, self.units[i], self.text_units[i]))
         if self.dtype is bool and isinstance(value, (bool, np.bool_, int, float)) and value in (0, 1):
             return bool(value)
         if self.dtype is bool or isinstance(value, (bool, np.bool_)):
@@ -250,7 +252,7 @@ class Param(Numbers):
         return number
 
     def is_within(self, number: float) -> bool:
-        """Whether a number is within the bounds."""
+        """Whether a number is within the bounds and one of the choices."""
         return (
             (self.ge is None or number >= self.ge)
             and (self.gt is None or number > self.gt)
@@ -276,16 +278,16 @@ class Param(Numbers):
 
 
 class State(Numbers):
-    """Memory of a plugin: all that it remembers from one call to the next.
+    """State of a plugin: everything that it keeps from one call to the next.
 
     Args:
-        fields: Names of the components; none for one number a row.
+        fields: Names of the components; empty for one number per row.
         unit: SI unit, or one per field.
         default: Value of a new row.
         dtype: float, int or bool.
         per: "entity"; for world plugins also "world" or "team".
-        ragged: A list per entity, which begins empty; `fields` are those of an item.
-        doc: One line that says what it is.
+        ragged: One list per entity, initially empty; `fields` are the components of an item.
+        doc: One-line description.
     """
 
     def __init__(
@@ -303,32 +305,32 @@ class State(Numbers):
             raise DeclarationError(f"State: per={per!r} is not one of {', '.join(PER)}")
         if ragged and (per != "entity" or default):
             raise DeclarationError(
-                "State: a list (ragged=True) is one per entity and begins empty; it takes no per or default"
+                "State: a ragged column is per entity and initially empty; it takes neither per nor default"
             )
         self.default = default
         self.per = per
 
 
 class Channel(Numbers):
-    """A column that is wired to other plugins by the names of its channels; abstract."""
+    """A column that is connected to other plugins by channel names; abstract."""
 
     def __init__(self, channels: str, unit: str, ragged: bool, fields: str, doc: str) -> None:
         kind = type(self).__name__
         names = _fields(channels, kind)
         if fields and not ragged:
             raise DeclarationError(
-                f"{kind}: fields={fields!r} are the components of a list's items and need ragged=True; channels are named first"
+                f"{kind}: fields={fields!r} needs ragged=True; channel names are the first argument"
             )
         if ragged and len(names) > 1:
             raise DeclarationError(
-                f"{kind}: a list is one channel, not {len(names)}; name the components of its items with fields={channels!r}"
+                f"{kind}: a ragged column is one channel, not {len(names)}; name the components of an item with fields={channels!r}"
             )
         super().__init__(fields if ragged else channels, unit, float, doc, ragged)
         self._names = names
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Names of the channels: those given, else the attribute's own name."""
+        """Channel names; by default the attribute's name."""
         return self._names or (self.name,)
 
 
@@ -336,13 +338,13 @@ class Input(Channel):
     """Values that another plugin of the entity writes: `Input(unit="m/s")`, or `Input("velocity_x velocity_y", unit="m/s")`.
 
     Args:
-        channels: Names of the channels where they differ from the attribute or are several.
+        channels: Channel names, separated by spaces; by default the attribute's name.
         unit: SI unit, or one per channel or field.
-        optional: Nobody need write it; then it stays at `default`, a list empty.
-        default: Value until somebody writes it; lists take none.
+        optional: No plugin needs to write it; without a writer it stays at `default`, or empty if ragged.
+        default: Value before the first write; not for ragged inputs.
         ragged: One channel whose value is a list per entity, (k, m).
-        fields: Names of the k components of a list's items; none for a list of numbers.
-        doc: One line that says what it is.
+        fields: Names of the k components of an item; empty for a list of numbers.
+        doc: One-line description.
     """
 
     def __init__(
@@ -351,13 +353,13 @@ class Input(Channel):
     ) -> None:  # fmt: skip
         super().__init__(channels, unit, ragged, fields, doc)
         if ragged and default:
-            raise DeclarationError("Input: a list (ragged=True) begins empty; it takes no default")
+            raise DeclarationError("Input: a ragged column is initially empty; it takes no default")
         self.optional = optional
         self.default = default
 
 
 class Output(Channel):
-    """Values that this plugin writes for others of its entity; same arguments as `Input`."""
+    """Values that this plugin writes for the other plugins of its entity; arguments as those of `Input`."""
 
     def __init__(
         self, channels: str = "", unit: str = "", ragged: bool = False, fields: str = "", doc: str = ""
@@ -367,7 +369,7 @@ class Output(Channel):
 
 
 class EntityRef(Numbers):
-    """Reference to another entity: its id, which survives any change of rows; 0 is none."""
+    """Reference to another entity by its id, which stays valid when rows change; 0 is no entity."""
 
     def __init__(self, doc: str = "") -> None:
         super().__init__("", "", int, doc)
@@ -378,18 +380,18 @@ class EntityRef(Numbers):
 class Handle(Column):
     """An opaque object per row: a process, a socket, a flight model.
 
-    Its plugin may have these methods:
+    The plugin may define these methods:
 
-    * open_one(row): The object of a new row, which `row` names (world, id, seed, position); None without it.
-    * close_one(handle): Release one row's object; called exactly once for each that was opened.
+    * open_one(row): Create the object of a new row; `row` has world, id, seed and position. Without it the object is None.
+    * close_one(handle): Release one row's object; called exactly once for each opened object.
     * save_one(handle): Picklable state of one row's object. Without it snapshots are refused.
-    * load_one(row, state): An object like the one that was saved; `open_one` without it.
-    * ready(g): Whether what the objects stand for is ready for the next step; asked until true or until `ready_timeout`.
+    * load_one(row, state): Recreate a saved object. Without it `open_one` is called.
+    * ready(g): Whether the external side is ready for the next step; called until it is true or until `ready_timeout`.
 
     Args:
-        max_worlds: Largest stack of worlds that the objects allow; None is any.
+        max_worlds: Largest stack of worlds that the objects allow; None for no limit.
         ready_timeout: Longest wait for `ready` [s of wall time].
-        doc: One line that says what it is.
+        doc: One-line description.
     """
 
     def __init__(self, max_worlds: int | None = None, ready_timeout: float = 10.0, doc: str = "") -> None:
@@ -398,13 +400,13 @@ class Handle(Column):
 
     @staticmethod
     def most_worlds(plugin: Any) -> int | None:
-        """The largest stack of worlds that all handles of a plugin allow; None is any."""
+        """The largest stack of worlds that all handles of a plugin allow; None for no limit."""
         limits = [h.max_worlds for h in plugin.handles().values() if h.max_worlds is not None]
         return min(limits, default=None)
 
 
 class Children(Column):
-    """Plugins inside a plugin: its value is a list of plugins of one kind, bound with channels of their own."""
+    """Plugins inside a plugin: a list of plugins of one kind, bound with private channels."""
 
     def __init__(self, kind: type, doc: str = "") -> None:
         super().__init__(doc=doc)
@@ -426,11 +428,11 @@ class Topic(Column):
 
     Args:
         message: The message type.
-        topic: Name; the type's name unless given.
-        network: Instance name of the network that carries it; by default the one that reaches everyone.
-        topic_param: Name of a text Param of the plugin that holds the topic's name.
-        network_param: Name of a text Param of the plugin that holds the network's name.
-        doc: One line that says what it is.
+        topic: Topic name; by default the type's name.
+        network: Instance name of the network that carries it; by default the network that reaches everyone.
+        topic_param: Name of a text Param of the plugin that gives the topic's name.
+        network_param: Name of a text Param of the plugin that gives the network's name.
+        doc: One-line description.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Files that anybody may have written: read only where they are files, only so much of them, and JSON only as its schema says."""
+"""Reading of untrusted files: regular files only, of limited size, and JSON documents checked against a schema."""
 
 from __future__ import annotations
 
@@ -13,29 +13,29 @@ from typing import Any
 from tussle.errors import TussleError, listed, nearest_name
 
 MOST_BYTES = 1 << 25
-"""Of a document. Python takes some twenty times as much for what JSON can say in it."""
+"""Maximum size of a document. Parsed JSON takes up to about twenty times as much memory."""
 LONGEST_SHOWN = 80
 
 
 def size_of(path: Path, most: int | None = None) -> int:
-    """Length of a file [B]; a pipe or a device, opening which could wait for ever, is none.
+    """Size of a regular file [B]. Pipes and devices are refused, since opening them can block forever.
 
     Raises:
-        OSError: There is no such file, it is something else, or it is longer than `most`.
+        OSError: The file does not exist, is not a regular file, or is larger than `most`.
     """
     about = path.stat()
     if not stat.S_ISREG(about.st_mode):
-        raise OSError("this is not a regular file")
+        raise OSError("it is not a regular file")
     if most is not None and about.st_size > most:
-        raise OSError(f"it has {about.st_size:,} bytes; allowed are {most:,}")
+        raise OSError(f"its size is {about.st_size:,} bytes; the limit is {most:,}")
     return about.st_size
 
 
 def read_text(path: Path, error: type[TussleError], most: int = MOST_BYTES) -> str:
-    """A file's text.
+    """Read a UTF-8 text file.
 
     Raises:
-        TussleError: As `error`: it is no regular file, is longer than `most` bytes, or is not text in UTF-8.
+        TussleError: As `error`: the file is not a regular file, is larger than `most` bytes, or is not UTF-8 text.
     """
     try:
         size_of(path, most)
@@ -48,13 +48,13 @@ def read_text(path: Path, error: type[TussleError], most: int = MOST_BYTES) -> s
 # -- schemas ------------------------------------------------------------------------------------------------------------------
 
 Rule = Any
-"""What a value may be: `bool` or `str`, one of the rules below, a tuple of the values that are allowed, [rule] for a list, or a dict
-from the names of an object's fields to their rules. An object may have further fields; nothing reads them."""
+"""Schema of a value: `bool` or `str`, one of the rules below, a tuple of the allowed values, [rule] for a list, or for an object a
+dict from field names to rules. Further fields of an object are ignored."""
 
 
 @dataclass(frozen=True)
 class Whole:
-    """A whole number within bounds."""
+    """An integer within bounds."""
 
     least: int = 0
     most: int = 2**63 - 1
@@ -62,7 +62,7 @@ class Whole:
 
 @dataclass(frozen=True)
 class Real:
-    """A number within bounds; with `is_any`, also one of those that JSON does not know, which stand there by name."""
+    """A number within bounds; with `is_any`, also the strings "inf", "-inf" and "nan", which stand for numbers JSON lacks."""
 
     least: float = -1.7976931348623157e308
     most: float = 1.7976931348623157e308
@@ -71,7 +71,7 @@ class Real:
 
 @dataclass(frozen=True)
 class Map:
-    """An object whose names are not known before, but how they are written."""
+    """An object with any field names that match the regular expression `names`; all values follow one rule."""
 
     rule: Rule
     names: str = r"[\s\S]*"
@@ -79,14 +79,14 @@ class Map:
 
 @dataclass(frozen=True)
 class Maybe:
-    """A field that may be null, or not there."""
+    """A field that may be null or missing."""
 
     rule: Rule
 
 
 @dataclass(frozen=True)
 class Either:
-    """What keeps one of some rules; `allowed` says them in words."""
+    """A value that follows at least one of several rules; `allowed` describes them in messages."""
 
     rules: tuple[Rule, ...]
     allowed: str
@@ -94,33 +94,35 @@ class Either:
 
 @dataclass(frozen=True)
 class Checked:
-    """What keeps a rule, and a function then says nothing against; the function takes value and place, as `problem` does."""
+    """A value that follows a rule and passes a further check, which takes value and place and returns as `problem` does."""
 
     rule: Rule
     problem: Callable[[Any, str], str]
 
 
-def _against_path(text: str, where: str) -> str:
+def _path_problem(text: str, where: str) -> str:
     path = PurePosixPath(text)
     is_inside = text and "\0" not in text and not path.is_absolute() and ".." not in path.parts
     return "" if is_inside else _refused(where, text, "a path inside the directory")
 
 
-Inside = Checked(str, _against_path)
-"""A relative path that stays below where it begins."""
+Inside = Checked(str, _path_problem)
+"""A relative path that stays inside its base directory."""
 Team = r"-?\d{1,10}"
-"""How the number of a team is written as a name."""
+"""Pattern of a team number as a field name."""
 
 
 def problem(value: Any, rule: Rule, where: str = "") -> str:
-    """What is wrong with a value, beginning with which it is: "worlds[0].steps = -1 is not allowed; ..."; "" for nothing."""
+    """Describe what is wrong with a value: "worlds[0].steps = -1 is not allowed; ..."; "" if it follows the rule."""
     match rule:
         case dict():
-            return _against_fields(value, rule, where)
+            return _object_problem(value, rule, where)
         case Map():
             if not isinstance(value, dict):
                 return _refused(where, value, "an object")
-            if wrong := [name for name in value if not re.fullmatch(rule.names, name) or _against_text(name)]:
+            if wrong := [
+                name for name in value if not re.fullmatch(rule.names, name) or _has_surrogates(name)
+            ]:
                 return f"{where}: the name {_shown(wrong[0])} is not allowed"
             return _first(problem(inner, rule.rule, f"{where}.{name:.80}") for name, inner in value.items())
         case [inside]:
@@ -134,21 +136,21 @@ def problem(value: Any, rule: Rule, where: str = "") -> str:
             return "" if is_kept else _refused(where, value, rule.allowed)
         case Checked():
             return problem(value, rule.rule, where) or rule.problem(value, where)
-    return _against_plain(value, rule, where)
+    return _scalar_problem(value, rule, where)
 
 
-def _against_fields(value: Any, rule: Mapping[str, Rule], where: str) -> str:
+def _object_problem(value: Any, rule: Mapping[str, Rule], where: str) -> str:
     if not isinstance(value, dict):
         return _refused(where, value, "an object")
     missing = [name for name, inner in rule.items() if name not in value and not isinstance(inner, Maybe)]
     if missing:
-        return f"{where or 'it'} says nothing of {', '.join(missing)}"
+        return f"{where or 'the document'} lacks {', '.join(missing)}"
     above = f"{where}." if where else ""
     return _first(problem(value.get(name), inner, above + name) for name, inner in rule.items())
 
 
-def _against_plain(value: Any, rule: Rule, where: str) -> str:
-    """What is wrong with a value that holds no others."""
+def _scalar_problem(value: Any, rule: Rule, where: str) -> str:
+    """Describe what is wrong with a value that is not a container."""
     if isinstance(rule, tuple):
         is_there = any(type(value) is type(one) and value == one for one in rule)
         guess = nearest_name(value[:LONGEST_SHOWN], rule) if isinstance(value, str) else ""
@@ -158,7 +160,9 @@ def _against_plain(value: Any, rule: Rule, where: str) -> str:
     if rule is bool:
         return "" if isinstance(value, bool) else _refused(where, value, "true or false")
     if rule is str:
-        return _refused(where, value, "a text") if not isinstance(value, str) or _against_text(value) else ""
+        return (
+            _refused(where, value, "a text") if not isinstance(value, str) or _has_surrogates(value) else ""
+        )
     if isinstance(rule, Whole):
         is_good = type(value) is int and rule.least <= value <= rule.most
         return "" if is_good else _refused(where, value, f"a whole number from {rule.least} to {rule.most}")
@@ -167,8 +171,8 @@ def _against_plain(value: Any, rule: Rule, where: str) -> str:
     return "" if is_good else _refused(where, value, f"a number from {rule.least:g} to {rule.most:g}")
 
 
-def _against_text(text: str) -> bool:
-    """JSON can name halves of characters, which nothing can write."""
+def _has_surrogates(text: str) -> bool:
+    """Whether a text holds surrogates, which JSON can escape but UTF-8 cannot encode."""
     return any("\ud800" <= letter <= "\udfff" for letter in text)
 
 
@@ -177,7 +181,7 @@ def _refused(where: str, value: Any, allowed: str) -> str:
 
 
 def _shown(value: Any) -> str:
-    """A value for a message, which is not longer than a message bears: of what holds others, how many."""
+    """A value as shortened text for a message; of a list or an object, only the number of items."""
     if isinstance(value, (list, dict)) and value:
         return f"{'a list' if isinstance(value, list) else 'an object'} of {len(value)}"
     text = (
@@ -188,8 +192,8 @@ def _shown(value: Any) -> str:
     return text if len(text) <= LONGEST_SHOWN else text[:LONGEST_SHOWN] + "..."
 
 
-def _first(said: Iterable[str]) -> str:
-    return next((text for text in said if text), "")
+def _first(problems: Iterable[str]) -> str:
+    return next((text for text in problems if text), "")
 
 
 @dataclass(frozen=True)
@@ -197,10 +201,10 @@ class Document:
     """A kind of JSON document.
 
     Attributes:
-        noun: What it describes: "the batch".
-        version: Its `format`.
+        noun: What it describes, such as "the batch".
+        version: Required value of its field `format`.
         rule: Its schema.
-        error: What is raised.
+        error: Class of the errors that are raised.
     """
 
     noun: str
@@ -209,30 +213,27 @@ class Document:
     error: type[TussleError]
 
     def read(self, path: Path) -> dict[str, Any]:
-        """The document in a file.
+        """Read a document and check it against its schema.
 
         Raises:
-            TussleError: As `error`: it cannot be read, has another version, or breaks its schema; the message names file and field.
+            TussleError: As `error`: the file cannot be read, has another format version, or violates the schema; the message names
+                file and field.
         """
         text = read_text(path, self.error)
         try:
             found = json.loads(text, parse_constant=_no_number)
         except (ValueError, RecursionError) as reason:
-            why = (
-                "lists or objects stand in one another too deep"
-                if isinstance(reason, RecursionError)
-                else reason
-            )
+            why = "lists or objects are nested too deeply" if isinstance(reason, RecursionError) else reason
             raise self.error(f"{path}: cannot be read: {why}") from None
         version = found.get("format") if isinstance(found, dict) else None
         if type(version) is not int or version != self.version:
             raise self.error(
-                f"{path}: {self.noun} has format {_shown(version)}; this tussle reads format {self.version}"
+                f"{path}: {self.noun} has format {_shown(version)}; this version of tussle reads format {self.version}"
             )
-        if said := problem(found, self.rule):
-            raise self.error(f"{path}: {said}")
+        if violation := problem(found, self.rule):
+            raise self.error(f"{path}: {violation}")
         return dict(found)
 
 
 def _no_number(name: str) -> None:
-    raise ValueError(f"{name} is no number in JSON")
+    raise ValueError(f"{name} is not a JSON number")

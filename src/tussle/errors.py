@@ -1,4 +1,4 @@
-"""The errors of tussle, and how names and texts from outside stand in what is said."""
+"""Error classes, and the formatting of names and external text in messages."""
 
 from __future__ import annotations
 
@@ -8,56 +8,56 @@ from collections.abc import Iterable
 
 
 class TussleError(Exception):
-    """Any error that tussle itself raises about what it was given; abstract."""
+    """Base class of the errors that tussle raises about its input; abstract."""
 
 
 class DeclarationError(TussleError, TypeError):
-    """A plugin class declares something unsound. Raised where the class is defined or checked, never in a step."""
+    """A plugin class has an invalid declaration. Raised when the class is defined or checked, never during a step."""
 
 
 class ParameterError(TussleError, ValueError):
-    """A parameter is unknown, of the wrong type, or outside what is allowed."""
+    """A parameter is unknown, has the wrong type, or is out of bounds."""
 
 
 class UnitError(ParameterError):
-    """A value carries a unit that is unknown or measures something else."""
+    """A value has an unknown unit, or a unit of another quantity."""
 
 
 class WiringError(TussleError):
-    """Plugins do not fit together: a channel or topic that nobody writes, or that has another unit or type."""
+    """Plugins do not fit together: a channel or topic has no writer, or has another unit or type."""
 
 
 class MissionError(TussleError, ValueError):
-    """A mission says something impossible; the message begins with file and line where there is one."""
+    """A mission is invalid; the message begins with file and line if it was read from a file."""
 
 
 class SnapshotError(TussleError):
-    """A snapshot cannot be taken, or does not belong to the simulation it is restored into."""
+    """A snapshot cannot be taken, or does not fit the simulation it is restored into."""
 
 
 class RecordError(TussleError):
-    """A run cannot be recorded, or what is there is no recorded run; what had been written before stays whole."""
+    """A run cannot be recorded or read. Data written before the error stays intact."""
 
 
 class BatchError(TussleError):
-    """A batch cannot be played, or what is there is no batch or another one; what had been played before stays whole."""
+    """A batch cannot be run or read, or the directory holds another batch. Earlier results stay intact."""
 
 
 class ViewError(TussleError):
-    """A game cannot be shown: a page cannot be served, or a picture or film cannot be made."""
+    """A page cannot be served, or a picture or film cannot be made."""
 
 
 class MissingExtraError(TussleError, ImportError):
-    """A feature needs a package that only an extra installs; the message names both."""
+    """A feature needs a package from an optional extra; the message names both."""
 
 
 class ConformanceError(TussleError):
-    """A plugin breaks a rule of the contract.
+    """A plugin breaks a rule of the plugin contract.
 
     Args:
-        plugin: Name of its class.
-        rule: What it breaks, such as "snapshot".
-        evidence: What was seen.
+        plugin: Name of the plugin class.
+        rule: Name of the rule, such as "snapshot".
+        evidence: What was observed.
     """
 
     def __init__(self, plugin: str, rule: str, evidence: str) -> None:
@@ -74,12 +74,12 @@ class PluginError(TussleError):
     """A plugin failed while the simulation ran.
 
     Args:
-        message: What happened, in words.
+        message: What happened.
         where: Entity or block, such as "predator 3".
-        step: Number of the step; None outside the loop.
-        world: Number of the world in its stack; None when all of them are concerned.
+        step: Number of the step; None outside the step loop.
+        world: Number of the world in its stack; None if all worlds are concerned.
         plugin: Name of the plugin instance.
-        cause: The exception that the plugin raised; None when it returned but left a value that is not allowed.
+        cause: Exception raised by the plugin; None if the plugin returned but left an invalid value.
     """
 
     def __init__(
@@ -108,12 +108,12 @@ class PluginError(TussleError):
         return f"{place}: {self.message}" if place else self.message
 
     def __reduce__(self) -> tuple[object, ...]:
-        # The default rebuilds an exception from its positional arguments only, and errors come back from worker processes.
+        # Errors are pickled by worker processes; the default would keep only the positional arguments.
         return (type(self), (self.message,), dict(self.__dict__))
 
 
 def nearest_name(wrong: str, allowed: Iterable[str]) -> str:
-    """A guess at what was meant, to be put behind the wrong name: " (did you mean 'max_speed'?)", or "" without a good guess."""
+    """Suggestion to append to a wrong name: " (did you mean 'max_speed'?)", or "" if no allowed name is close."""
     names = list(allowed)
     folded: dict[str, str] = {}
     for name in names:
@@ -123,15 +123,15 @@ def nearest_name(wrong: str, allowed: Iterable[str]) -> str:
 
 
 def listed(names: Iterable[str]) -> str:
-    """All that there is, in the given order: "there are: a, b, c", or "there are none"."""
+    """List names in the given order: "there are: a, b, c", or "there are none"."""
     text = ", ".join(names)
     return f"there are: {text}" if text else "there are none"
 
 
 def visible(text: str) -> str:
-    r"""A text in which what steers a terminal or turns the order of letters is shown as an escape: "\x1b", "\u202e".
+    r"""Escape control characters and invisible formatting characters: "\x1b", "\u202e".
 
-    Line ends and tabs stay, and so do the joiners that some scripts are written with.
+    Newlines, tabs and zero-width joiners, which some scripts need, are kept.
     """
     return text if text.isprintable() else "".join(map(_shown, text))
 

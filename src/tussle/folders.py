@@ -1,4 +1,4 @@
-"""Folders of the user's own, where the XDG base directory specification puts them, and whether nobody else writes into them."""
+"""Folders of the user (XDG base directory specification), and checks that no other user can write to them."""
 
 from __future__ import annotations
 
@@ -9,28 +9,28 @@ from pathlib import Path
 
 
 def user_folder(variable: str, usual: str) -> Path | None:
-    """Where all programs of the user keep things of a kind; None where the user has no home.
+    """Base folder for the user's files of one kind; None if the user has no home folder.
 
     Args:
-        variable: Of the environment, such as "XDG_CACHE_HOME". An empty or relative value is ignored, as the specification says.
-        usual: Otherwise, below the home.
+        variable: Environment variable, such as "XDG_CACHE_HOME". An empty or relative value is ignored, as the specification says.
+        usual: Default path, relative to the home folder.
     """
     chosen = Path(os.environ.get(variable, ""))
     if chosen.is_absolute():
         return chosen
-    with suppress(RuntimeError):  # a user without a name
+    with suppress(RuntimeError):  # the home folder cannot be determined
         home = Path.home()
         return home / usual if home.is_absolute() else None
     return None
 
 
 def is_own(found: os.stat_result) -> bool:
-    """It belongs to the user, and nobody else may write it."""
+    """Whether a file belongs to the user and no other user can write it."""
     return found.st_uid == os.geteuid() and not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
 
 
 def is_private(folder: Path) -> bool:
-    """It is a folder of the user's own, into which nobody else writes."""
+    """Whether a path is a folder that belongs to the user and that no other user can write to."""
     try:
         found = folder.stat()
     except OSError:
@@ -39,14 +39,14 @@ def is_private(folder: Path) -> bool:
 
 
 def read_own(path: Path) -> tuple[bytes, float]:
-    """Content of a file of the user's own, and when it was written [s].
+    """Content and modification time [s] of a file that only the user can write.
 
     Raises:
-        OSError: It cannot be read, is a link, or somebody else may have written it.
+        OSError: The file cannot be read, is a link, or can be written by another user.
     """
     handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
     with os.fdopen(handle, "rb") as file:
         found = os.fstat(handle)
         if not (stat.S_ISREG(found.st_mode) and is_own(found)):
-            raise PermissionError(f"{path}: it is no file of this user alone")
+            raise PermissionError(f"{path}: it is not a regular file that only this user can write")
         return file.read(), found.st_mtime

@@ -1,7 +1,7 @@
-"""Where the local frame lies on Earth: East-North-Up on the tangent plane at an origin, to and from WGS84 coordinates.
+"""Geographic origin: conversion between the local East-North-Up frame on its tangent plane and WGS84 coordinates.
 
-pymap3d would do the same with NumPy's sin and cos, whose last bits differ between machines; start positions given by latitude
-and longitude would then carry that difference into every later step.
+pymap3d does the same with NumPy's sin and cos, whose last bits differ between machines; start positions given by latitude and
+longitude would carry that difference into every later step.
 """
 
 from __future__ import annotations
@@ -16,24 +16,23 @@ import numpy as np
 from tussle.errors import ParameterError
 from tussle.numeric import atan2, cos, sin
 
-# NGA.STND.0036, Department of Defense World Geodetic System 1984 (2014), table 3.1: both defining, exact.
+# NGA.STND.0036, Department of Defense World Geodetic System 1984 (2014), table 3.1: both are defining and exact.
 SEMI_MAJOR = 6378137.0
 FLATTENING = 1.0 / 298.257223563
 
 SEMI_MINOR = SEMI_MAJOR * (1.0 - FLATTENING)
 ECCENTRICITY_SQUARED = FLATTENING * (2.0 - FLATTENING)
 SECOND_ECCENTRICITY_SQUARED = ECCENTRICITY_SQUARED / (1.0 - ECCENTRICITY_SQUARED)
-# Bowring's first step is good to 1e-9 rad from 100 km below the ground to far outside; each further one gains more digits than
-# that, so the second is at rounding and the third is margin for orbits.
+# Bowring's first step is accurate to 1e-9 rad from 100 km below the ground to far above it; each further step gains more digits
+# than that, so the second reaches rounding error and the third is a margin for orbits.
 LATITUDE_STEPS = 3
 
 
 @dataclass(frozen=True)
 class Origin:
-    """The point of Earth where the world's frame touches it; z counts from its altitude along its vertical.
+    """The point on Earth at which the world frame is tangent; z is measured from its altitude along its vertical.
 
-    The default lies in Houston: what the mission format's documented default (latitude -95, longitude 29) says with its two
-    numbers the right way round.
+    The default is in Houston: the mission format documents it as latitude -95, longitude 29, which swaps the two numbers.
 
     Args:
         latitude: Geodetic latitude on WGS84, north positive [rad].
@@ -41,7 +40,7 @@ class Origin:
         altitude: Height above the ellipsoid [m].
 
     Raises:
-        ParameterError: A value is not finite or the latitude is beyond a pole.
+        ParameterError: A value is not finite, or an angle is out of range.
     """
 
     latitude: float = math.radians(29.0)
@@ -60,16 +59,16 @@ class Origin:
             if abs(value) > limit:
                 raise ParameterError(
                     f"Origin.{name} = {value!r} is not allowed; it takes radians within +-{limit:.6g} "
-                    f"(for degrees there is Origin.from_degrees)"
+                    f"(use Origin.from_degrees for degrees)"
                 )
 
     @classmethod
     def from_degrees(cls, latitude: float, longitude: float, altitude: float = 0.0) -> Origin:
-        """An origin from latitude and longitude in degrees and altitude in metres."""
+        """Make an origin from latitude and longitude in degrees and altitude in metres."""
         return cls(math.radians(latitude), math.radians(longitude), altitude)
 
     def from_geodetic(self, geodetic: np.ndarray) -> np.ndarray:
-        """World positions of points of Earth.
+        """Convert geodetic coordinates to world positions.
 
         Args:
             geodetic: Latitude [rad], longitude [rad], altitude above the ellipsoid [m], (3, n) or (3,).
@@ -87,7 +86,7 @@ class Origin:
         )
 
     def to_geodetic(self, pos: np.ndarray) -> np.ndarray:
-        """Points of Earth of world positions; the inverse of `from_geodetic` down to 1000 km below the ground.
+        """Convert world positions to geodetic coordinates; the inverse of `from_geodetic` down to 1000 km below the ground.
 
         B. R. Bowring, The accuracy of geodetic latitude and height equations, Survey Review 28 (1985), 202-206.
 
@@ -104,7 +103,7 @@ class Origin:
         y = y0 + (sin_lon * outward + cos_lon * east)
         z = z0 + (cos_lat * north + sin_lat * up)
         axis = np.sqrt(x * x + y * y)
-        # Rise and run of the latitude; those of the parametric latitude are b rise and a run. Their ratio would fail at poles.
+        # tan(latitude) = rise / run, and b rise / (a run) for the parametric latitude; run = 0 at the poles rules out the ratio.
         rise, run = z * (1.0 + SECOND_ECCENTRICITY_SQUARED * SEMI_MINOR / np.sqrt(axis * axis + z * z)), axis
         for _ in range(LATITUDE_STEPS):
             length = np.sqrt(

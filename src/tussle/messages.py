@@ -1,4 +1,4 @@
-"""Message types that plugins share, and the columns that hold many messages at once."""
+"""Message types that plugins share, and batches of messages stored as columns."""
 
 from __future__ import annotations
 
@@ -15,8 +15,7 @@ from tussle.lists import RaggedColumn
 class Message:
     """A message type; abstract.
 
-    Fields are declared as class attributes: `Field`, at most one of them a list (`ragged=True`), `EntityRef`, or a `Handle` for any
-    picklable object.
+    Fields are declared as class attributes: `Field` (at most one of them ragged), `EntityRef`, or `Handle` for any picklable object.
     """
 
     fields: ClassVar[dict[str, Column]] = {}
@@ -28,23 +27,23 @@ class Message:
         for name, column in cls.fields.items():
             if not isinstance(column, (Field, EntityRef, Handle)):
                 raise DeclarationError(
-                    f"{cls.__name__}.{name}: a message holds Field, EntityRef or Handle, not {type(column).__name__}"
+                    f"{cls.__name__}.{name}: a message field is a Field, EntityRef or Handle, not {type(column).__name__}"
                 )
             if name in ("world", "sender", "n"):
                 raise DeclarationError(f"{cls.__name__}.{name}: the name is reserved in messages")
         if sum(isinstance(c, Field) and c.ragged for c in cls.fields.values()) > 1:
             raise DeclarationError(
-                f"{cls.__name__} has more than one ragged field; make two message types of it"
+                f"{cls.__name__} has more than one ragged field; split it into two message types"
             )
 
 
 class Batch:
-    """Messages of one type as columns, ordered by (world, sender, order of sending).
+    """Messages of one type as columns, ordered by (world, sender, send order).
 
     Attributes:
         type: The message type.
         world: World of each message, (n,).
-        sender: Id of the entity that sent it, 0 for the world, (n,).
+        sender: Id of the sending entity, 0 for the world, (n,).
         data: Field name -> array (n,) or (k, n), `RaggedColumn`, or list.
     """
 
@@ -73,7 +72,7 @@ class Batch:
             ) from None
 
     def take(self, index: np.ndarray) -> Batch:
-        """The messages `index`, in that order."""
+        """Select the messages `index`, in that order."""
         data: dict[str, Any] = {}
         for name, column in self.type.fields.items():
             values = self.data[name]
@@ -87,17 +86,17 @@ class Batch:
 
     @classmethod
     def empty(cls, type_: type[Message]) -> Batch:
-        """No messages; the one such batch of a type."""
+        """The empty batch of a type; one shared object per type."""
         return _empty(type_)  # type: ignore[arg-type]
 
     @classmethod
     def make(
         cls, type_: type[Message], world: np.ndarray, sender: np.ndarray, values: dict[str, Any]
     ) -> Batch:
-        """Columns from values by field name; scalars are repeated, missing numbers are 0.
+        """Make a batch from values by field name; scalars are repeated, missing numbers are 0.
 
         Raises:
-            ParameterError: A value belongs to no field, or has another shape.
+            ParameterError: A name is not a field, or a value has the wrong shape.
         """
         n = len(world)
         for name in values:
@@ -113,7 +112,7 @@ class Batch:
 
     @classmethod
     def join(cls, batches: list[Batch]) -> Batch:
-        """All messages in one, in the order given."""
+        """Concatenate batches in the given order."""
         first = batches[0]
         if len(batches) == 1:
             return first
@@ -135,7 +134,7 @@ class Batch:
 
     @classmethod
     def concatenate(cls, batches: list[Batch]) -> Batch:
-        """All messages in one, stably ordered by (world, sender)."""
+        """Concatenate batches and sort them by (world, sender); the sort is stable."""
         joined = cls.join(batches)
         order = np.lexsort((joined.sender, joined.world))
         return joined if (order[1:] > order[:-1]).all() else joined.take(order)
@@ -150,7 +149,7 @@ def _field_values(type_: type[Message], name: str, column: Column, value: Any, n
     where = f"{type_.__name__}.{name}"
     if isinstance(column, Handle):
         if isinstance(value, list) and len(value) != n:
-            raise ParameterError(f"{where}: {len(value)} objects; needed is one object, or a list of {n}")
+            raise ParameterError(f"{where}: {len(value)} objects; expected one object, or a list of {n}")
         return list(value) if isinstance(value, list) else [value] * n
     assert isinstance(column, Numbers)
     if column.ragged:
@@ -163,7 +162,7 @@ def _field_values(type_: type[Message], name: str, column: Column, value: Any, n
             source = source[:, None]
         if source.ndim > len(shape):
             raise ValueError
-        out = np.empty(shape, dtype)  # np.broadcast_to takes longer than all the rest of a message
+        out = np.empty(shape, dtype)  # np.broadcast_to would dominate the cost of a message
         out[...] = source
         return out
     except ValueError:
@@ -171,11 +170,12 @@ def _field_values(type_: type[Message], name: str, column: Column, value: Any, n
 
 
 def _list_values(where: str, column: Numbers, value: Any, n: int) -> RaggedColumn:
-    """A list per message, as a copy: what is sent does not change."""
+    """One list per message, copied, so that later writes do not change a sent message."""
     if isinstance(value, RaggedColumn):
         if len(value) != n or value.data.shape[:-1] != column.shape:
             raise ParameterError(
-                f"{where}: lists of {len(value)} rows, items of shape {value.data.shape[:-1]}; needed are {n} rows, {column.shape}"
+                f"{where}: {len(value)} lists with items of shape {value.data.shape[:-1]}; expected {n} lists with items of "
+                f"shape {column.shape}"
             )
         return value.copy()
     if value is None or isinstance(value, np.ndarray):
@@ -183,7 +183,7 @@ def _list_values(where: str, column: Numbers, value: Any, n: int) -> RaggedColum
     if not isinstance(value, (list, tuple)) or len(value) != n:
         shape = f"({len(column.fields)}, m)" if column.fields else "(m,)"
         raise ParameterError(
-            f"{where}: needed is an array {shape} for all messages, or a list of {n} such arrays"
+            f"{where}: expected an array {shape} for all messages, or a list of {n} such arrays"
         )
     try:
         return RaggedColumn.from_rows(value, column)
@@ -192,22 +192,22 @@ def _list_values(where: str, column: Numbers, value: Any, n: int) -> RaggedColum
 
 
 class CaptureEntity(Message):
-    """A claim by the sender to have captured another entity; a referee judges it in the same step."""
+    """The sender claims to have captured another entity; an interaction plugin decides in the same step."""
 
-    target = EntityRef(doc="Entity claimed.")
+    target = EntityRef(doc="Claimed entity.")
 
 
 class EntityCaptured(Message):
-    """A capture that held."""
+    """A confirmed capture."""
 
-    source = EntityRef(doc="Entity that captured.")
-    target = EntityRef(doc="Entity that was captured.")
+    source = EntityRef(doc="Capturing entity.")
+    target = EntityRef(doc="Captured entity.")
     source_team = Field(dtype=int)
     target_team = Field(dtype=int)
 
 
 class EntityCollided(Message):
-    """Two entities met; sent once per pair, the smaller id first."""
+    """Two entities collided; sent once per pair, the smaller id first."""
 
     first = EntityRef()
     second = EntityRef()
@@ -216,14 +216,14 @@ class EntityCollided(Message):
 
 
 class EntityHitGround(Message):
-    """An entity came down to the ground."""
+    """An entity hit the ground."""
 
     entity = EntityRef()
     team = Field(dtype=int)
 
 
 class BoundaryCrossed(Message):
-    """An entity left the boundary that contains it, or entered one that it had left."""
+    """An entity left the boundary that contained it, or entered it again."""
 
     entity = EntityRef()
     boundary = Field(dtype=int, doc="Id of the boundary.")
@@ -231,59 +231,59 @@ class BoundaryCrossed(Message):
 
 
 class Waypoint(Message):
-    """A point to go to."""
+    """A target position."""
 
     pos = Field("x y z", unit="m m m")
 
 
 WAYPOINT_MODES = ("follow_once", "back_and_forth", "loiter", "racetrack")
-"""What is done at the end of a list of waypoints; `WaypointList.mode` is a number of these."""
+"""Behavior at the end of a waypoint list; `WaypointList.mode` is an index into this tuple."""
 
 
 class WaypointList(Message):
-    """Points to go to one after the other."""
+    """Waypoints to visit in order."""
 
     points = Field(
         "x y z roll pitch yaw position_tolerance turn_tolerance",
         unit="m m m rad rad rad m rad",
         ragged=True,
-        doc="Places in the world frame, attitudes there, and how near is near enough.",
+        doc="Positions and attitudes in the world frame, and tolerances.",
     )
-    mode = Field(dtype=int, doc="Number in WAYPOINT_MODES.")
+    mode = Field(dtype=int, doc="Index into WAYPOINT_MODES.")
 
 
 class WaypointStatus(Message):
-    """A waypoint has been reached."""
+    """A waypoint was reached."""
 
-    index = Field(dtype=int, doc="Number of the waypoint that comes next.")
+    index = Field(dtype=int, doc="Index of the next waypoint.")
     n_waypoints = Field(dtype=int, doc="Length of the list.")
-    is_done = Field(dtype=bool, doc="Whether the list is at its end.")
+    is_done = Field(dtype=bool, doc="Whether the end of the list was reached.")
 
 
 class BoundaryShape(Message):
-    """The shape of a boundary, told once at the start."""
+    """The shape of a boundary, sent once at the start."""
 
     boundary = Field(dtype=int, doc="Id of the boundary.")
-    team = Field(dtype=int, doc="Team that it belongs to.")
+    team = Field(dtype=int, doc="Team that the boundary belongs to.")
     shape = Handle(doc="A shape of `tussle.scene`.")
 
 
 class WorldPointClicked(Message):
-    """Someone who watches has pointed at a place in the world; sender is 0."""
+    """A user of the viewer clicked on a point in the world; sender is 0."""
 
     pos = Field("x y z", unit="m m m")
 
 
 class CustomKeyPress(Message):
-    """Someone who watches has pressed the key that is kept for the plugins; sender is 0."""
+    """A user of the viewer pressed the key that is reserved for plugins; sender is 0."""
 
     key = Handle(doc="Name of the key.")
 
 
 class SpawnEntity(Message):
-    """Ask for a new entity of a block; it appears at the beginning of the next step."""
+    """Request a new entity of a block; it appears at the beginning of the next step."""
 
-    block = Handle(doc="Name of the block that serves as template.")
+    block = Handle(doc="Name of the template block.")
     pos = Field("x y z", unit="m m m")
     vel = Field("vx vy vz", unit="m/s m/s m/s")
     quat = Field("w qx qy qz")

@@ -1,11 +1,11 @@
-"""Counter-based random numbers: a draw is a function of who draws, what for and when, so nothing else can change it.
+"""Counter-based random numbers: a draw depends only on its key and counter, so no other draw can change it.
 
 Threefry2x64-20 (Salmon, Moraes, Dror, Shaw 2011, "Parallel Random Numbers: As Easy as 1, 2, 3", section 4.2). The key
 is the world's seed and the stream (a hash of block, plugin instance and label), the counter is the index within the
 block, the step, the substep and the draw. Adding a plugin, a block, more entities or more worlds changes no other
 draw. Uses integer arithmetic and `tussle.numeric` only: portable.
 
-In jitted code all six numbers that say which draw are uint64; from Python use `uniform` and `normal`.
+In jitted code all six numbers that identify a draw are uint64; from Python use `uniform` and `normal`.
 """
 
 from __future__ import annotations
@@ -29,11 +29,13 @@ MAX_SUBSTEP = 2**16
 
 
 def stream_key(*names: str) -> int:
-    """64-bit number of the stream with these names (block, plugin instance, label), the same in every process and version."""
+    """64-bit key of the stream with these names (block, plugin instance, label), the same in every process and version."""
     digest = hashlib.blake2b(digest_size=8)
     for name in names:
         data = name.encode()
-        digest.update(len(data).to_bytes(8, "little") + data)  # the lengths tell ("ab", "c") from ("a", "bc")
+        digest.update(
+            len(data).to_bytes(8, "little") + data
+        )  # lengths distinguish ("ab", "c") and ("a", "bc")
     return int.from_bytes(digest.digest(), "little")
 
 
@@ -119,7 +121,7 @@ def normal2(seed, stream, index, step, substep, draw):
 
 @kernel("U u8 I I i8 i8 F2w")
 def fill_uniform(seeds, stream, index, step, substep, k, out):
-    """Numbers in [0, 1) into out (k, n); seeds, index and step are per column. Lines 2 j and 2 j + 1 are draw j."""
+    """Fill out (k, n) with numbers in [0, 1); seeds, index and step are per column. Rows 2 j and 2 j + 1 are draw j."""
     n = out.shape[1]
     for j in range(k // 2):
         first = out[2 * j]
@@ -134,7 +136,7 @@ def fill_uniform(seeds, stream, index, step, substep, k, out):
 
 @kernel("U u8 I I i8 i8 F2w")
 def fill_normal(seeds, stream, index, step, substep, k, out):
-    """Standard normal numbers into out (k, n); seeds, index and step are per column. Lines 2 j and 2 j + 1 are draw j."""
+    """Fill out (k, n) with standard normal numbers; seeds, index and step are per column. Rows 2 j and 2 j + 1 are draw j."""
     n = out.shape[1]
     for j in range(k // 2):
         first = out[2 * j]
@@ -150,7 +152,7 @@ def fill_normal(seeds, stream, index, step, substep, k, out):
 def uniform(
     seeds: ArrayLike, stream: int, index: ArrayLike, step: ArrayLike, substep: int = 0, k: int = 1
 ) -> Floats:
-    """Random numbers in [0, 1), (k, n); a line's numbers do not depend on k, nor a column's on the other columns.
+    """Random numbers in [0, 1), (k, n). A row does not depend on k, and a column does not depend on the other columns.
 
     Args:
         seeds: Seeds of the worlds, per column or one for all.
@@ -182,7 +184,7 @@ def normal(
 def columns(
     seeds: ArrayLike, index: ArrayLike, step: ArrayLike, substep: int, k: int
 ) -> tuple[NDArray[np.uint64], NDArray[np.int64], NDArray[np.int64]]:
-    """Seeds, index and step as arrays of one length, checked: beyond its bits a number would be another entity's draw."""
+    """Seeds, index and step as arrays of one length. Values out of range are refused: they would repeat another entity's draw."""
     words = np.asarray(seeds, dtype=np.uint64)
     indices, steps = np.asarray(index, dtype=np.int64), np.asarray(step, dtype=np.int64)
     shape = np.broadcast_shapes((1,), words.shape, indices.shape, steps.shape)

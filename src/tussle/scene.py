@@ -1,4 +1,4 @@
-"""What stands still in a mission: where on Earth it is, the ground, walls, named regions and the teams' bases."""
+"""The static scene of a mission: origin on Earth, ground, walls, named regions and the teams' bases."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Base:
-    """A team's home.
+    """A team's base.
 
     Args:
         team: The team's id.
         position: Its centre [m], (3,), world frame.
         radius: Its radius [m].
-        opacity: How it is drawn, 0 to 1.
+        opacity: Opacity in the viewer, 0 to 1.
 
     Raises:
         ParameterError: A value is not finite or out of bounds.
@@ -67,13 +67,13 @@ class Base:
 
 @dataclass(frozen=True)
 class Scene:
-    """All that stands still in a mission.
+    """Everything in a mission that does not move.
 
     Args:
-        origin: Where the world's frame touches Earth.
-        ground: The ground; None for a world without.
+        origin: Point on Earth at which the world frame is tangent.
+        ground: The ground; None for a world without ground.
         walls: Solid shapes that stop rays.
-        boundaries: Named regions; they stop nothing by themselves.
+        boundaries: Named regions; they have no effect by themselves.
         bases: The teams' bases, in the mission's order.
     """
 
@@ -89,10 +89,10 @@ class Scene:
         object.__setattr__(self, "bases", tuple(self.bases))
 
     def boundary(self, name: int | str) -> Boundary:
-        """The region of this id or name.
+        """The region with this id or name.
 
         Raises:
-            ParameterError: There is none.
+            ParameterError: There is no such region.
         """
         try:
             return self.boundaries[name]
@@ -118,11 +118,11 @@ class Scene:
         """Distance along rays to the ground or the first wall.
 
         Args:
-            origin: Starts [m], (3, n).
+            origin: Starts of the rays [m], (3, n).
             direction: Directions of any length, (3, n).
 
         Returns:
-            Distance [m], (n,); inf where a ray meets nothing.
+            Distance [m], (n,); inf where a ray hits nothing.
         """
         distance = np.full(np.shape(origin)[1:], np.inf)
         for solid in (*self.walls, *((self.ground,) if self.ground else ())):

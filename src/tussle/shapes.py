@@ -1,8 +1,8 @@
-"""Convex shapes that stand still: ground, walls and regions; whether they contain points and where rays meet them.
+"""Static convex shapes (ground, walls, regions): containment of points and intersection with rays.
 
 A flat ground, a plane, a cuboid and a polyhedron are intersections of half-spaces, so one containment test and one ray test
 serve them all. Positions are (3, n) in the world frame (East, North, Up) [m]. Only + - * /, square roots, comparisons and
-`tussle.numeric` touch arrays: results are the same bits on every machine.
+`tussle.numeric` are applied to arrays: results are bit-identical on every machine.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ Vector = tuple[float, float, float]
 Matrix = tuple[Vector, Vector, Vector]
 IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 MOST_POINTS = 32
-"""Points of a polyhedron: its faces are sought among all triples of points, 4,960 of 32."""
+"""Maximum number of points of a polyhedron: faces are searched among all triples of points, 4,960 for 32."""
 
 
 class Boundary(ABC):
-    """A region of space; abstract. Its surface belongs to the outside."""
+    """A region of space; abstract. Its surface counts as outside."""
 
     @abstractmethod
     def contains(self, pos: np.ndarray) -> np.ndarray:
-        """Whether positions [m], (3, n), lie inside, (n,); NaN lies outside."""
+        """Whether positions [m], (3, n), lie inside, (n,); NaN counts as outside."""
 
     @abstractmethod
     def inward(self, pos: np.ndarray) -> np.ndarray:
@@ -39,14 +39,14 @@ class Boundary(ABC):
 
     @abstractmethod
     def ray(self, origin: np.ndarray, direction: np.ndarray) -> np.ndarray:
-        """Distance along rays to the first point of the surface, met from outside or from inside.
+        """Distance along rays to the first point of the surface, hit from outside or from inside.
 
         Args:
-            origin: Starts [m], (3, n).
-            direction: Directions of any length, (3, n); zero meets nothing.
+            origin: Starts of the rays [m], (3, n).
+            direction: Directions of any length, (3, n); a zero vector hits nothing.
 
         Returns:
-            Distance [m], (n,); inf where the ray meets nothing.
+            Distance [m], (n,); inf where the ray hits nothing.
         """
 
 
@@ -68,15 +68,15 @@ class Convex(Boundary):
         return inside
 
     def inward(self, pos: np.ndarray) -> np.ndarray:
-        """Against the normals of the faces that positions are beyond."""
+        """Opposite to the normals of the faces that a position lies beyond."""
         way = np.zeros(np.shape(pos))
         for normal, offset in self._faces:
             way -= np.array(normal)[:, None] * (_along(normal, pos) >= offset)
         return way
 
     def ray(self, origin: np.ndarray, direction: np.ndarray) -> np.ndarray:
-        # T. L. Kay and J. T. Kajiya, Ray tracing complex scenes, SIGGRAPH 1986: a line is inside between the last face that it
-        # enters by and the first that it leaves by.
+        # T. L. Kay and J. T. Kajiya, Ray tracing complex scenes, SIGGRAPH 1986: a line is inside between its last entry through
+        # a face and its first exit.
         direction, enter = _unit(direction), np.full(np.shape(origin)[1:], -np.inf)
         leave = np.full(np.shape(origin)[1:], np.inf)
         missed = np.zeros(np.shape(origin)[1:], np.bool_)
@@ -92,7 +92,7 @@ class Convex(Boundary):
 
 @dataclass(frozen=True)
 class FlatGround(Convex):
-    """Ground at one height; what it contains is below it.
+    """Ground at one height; it contains all space below.
 
     Args:
         height: z of its surface [m].
@@ -116,7 +116,7 @@ class Plane(Convex):
 
     Args:
         point: A point of the plane [m], (3,), world frame.
-        normal: Points away from what is contained, any length, (3,), world frame.
+        normal: Outward normal, any length, (3,), world frame.
 
     Raises:
         ParameterError: A value is not finite, or the normal is zero.
@@ -141,7 +141,7 @@ class Plane(Convex):
 
 @dataclass(frozen=True)
 class Cuboid(Convex):
-    """A box, turned by roll, pitch and yaw.
+    """A box, rotated by roll, pitch and yaw.
 
     Args:
         center: Its centre [m], (3,), world frame.
@@ -183,7 +183,7 @@ class Polyhedron(Convex):
     """The convex hull of points.
 
     Args:
-        points: Corners [m], four to 32 of them, each (3,), world frame, in any order. Points within the hull change nothing.
+        points: 4 to 32 corners [m], each (3,), world frame, in any order. Points inside the hull have no effect.
 
     Raises:
         ParameterError: A value is not finite, there are too few or too many points, or all lie in one plane.
@@ -203,8 +203,8 @@ class Polyhedron(Convex):
 
     def half_spaces(self) -> tuple[tuple[Vector, float], ...]:
         x, y, z = corners = np.array(self.points).T
-        # A corner counts as lying in a face within the rounding of the sums of products below, some ten operations on numbers
-        # as large as `scale`; thinner slivers have no face of their own.
+        # A corner counts as lying in a face within the rounding error of the sums of products below: about ten operations on
+        # numbers as large as `scale`. Thinner slivers get no face.
         scale = float(np.abs(corners).max() + np.abs(corners - corners[:, :1]).max())
         thickness = 64.0 * float(np.finfo(np.float64).eps) * scale
         faces: list[tuple[Vector, float]] = []
@@ -234,7 +234,7 @@ class Polyhedron(Convex):
 
 @dataclass(frozen=True)
 class Sphere(Boundary):
-    """A ball.
+    """A sphere.
 
     Args:
         center: Its centre [m], (3,), world frame.
@@ -265,7 +265,7 @@ class Sphere(Boundary):
         direction = _unit(direction)
         x, y, z = (c - p for p, c in zip(origin, self.center, strict=True))
         nearest = x * direction[0] + y * direction[1] + z * direction[2]
-        # From the ray's closest point rather than by the quadratic formula, whose discriminant cancels for a far, small ball.
+        # Uses the ray's closest point; the discriminant of the quadratic formula would cancel for a far, small sphere.
         dx, dy, dz = x - nearest * direction[0], y - nearest * direction[1], z - nearest * direction[2]
         inward = (self.radius - np.sqrt(dx * dx + dy * dy + dz * dz)) * (
             self.radius + np.sqrt(dx * dx + dy * dy + dz * dz)
@@ -277,7 +277,11 @@ class Sphere(Boundary):
 
 
 def checked_number(owner: object, name: str, above: float = -math.inf) -> float:
-    """An attribute as a float; ParameterError unless it is finite and above a bound."""
+    """An attribute as a float.
+
+    Raises:
+        ParameterError: It is not finite, or not above the bound.
+    """
     value = float(getattr(owner, name))
     if not (math.isfinite(value) and value > above):
         bound = f" > {above:g}" if math.isfinite(above) else ""
@@ -288,7 +292,11 @@ def checked_number(owner: object, name: str, above: float = -math.inf) -> float:
 
 
 def checked_vector(owner: object, name: str) -> Vector:
-    """An attribute as three floats; ParameterError unless they are finite."""
+    """An attribute as three floats.
+
+    Raises:
+        ParameterError: They are not three finite numbers.
+    """
     return _as_vector(getattr(owner, name), f"{type(owner).__name__}.{name}")
 
 
@@ -314,7 +322,7 @@ def _along(normal: Vector, pos: np.ndarray) -> np.ndarray:
 
 
 def _unit(direction: np.ndarray) -> np.ndarray:
-    """Directions (3, n) scaled to length one; zero stays zero."""
+    """Directions (3, n) scaled to unit length; zero stays zero."""
     x, y, z = direction
     length = np.sqrt(x * x + y * y + z * z)
     scaled: np.ndarray = direction / np.where(length > 0.0, length, 1.0)
@@ -322,7 +330,7 @@ def _unit(direction: np.ndarray) -> np.ndarray:
 
 
 def _axes(rpy: Vector) -> Matrix:
-    """The turned x, y and z axis in the world frame: columns of Rz(yaw) Ry(pitch) Rx(roll)."""
+    """The rotated x, y and z axes in the world frame: columns of Rz(yaw) Ry(pitch) Rx(roll)."""
     if rpy == (0.0, 0.0, 0.0):
         return IDENTITY
     (sr, cr), (sp, cp), (sy, cy) = ((float(sin(a)), float(cos(a))) for a in rpy)

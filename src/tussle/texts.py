@@ -1,4 +1,4 @@
-"""What a text means where a value is wanted: one reading for mission files, settings, sweeps and Python."""
+"""Parsing of values from text, the same for mission files, settings, sweeps and Python."""
 
 from __future__ import annotations
 
@@ -11,26 +11,26 @@ from tussle.errors import ParameterError
 
 TRUE, FALSE = ("true", "1", "yes", "on"), ("false", "0", "no", "off")
 MOST_ITEMS = 100_000
-"""Numbers in one value."""
+"""Maximum count of numbers in one value."""
 LONGEST_SHOWN = 80
 ROW = re.compile(r"\s*\[([^\[\]]*)\]")
 FRAMES = ("XYZ", "GPS")
 
 Part = tuple[str, str, str]
-"""Of one component: its name, its SI unit, and the unit of a number without one."""
+"""A component of a value: its name, its SI unit, and the unit of a bare number."""
 
 
 def shown(text: str) -> str:
-    """A text from outside for a message, on one line and not longer than a message bears."""
+    """Quote external text for a message, on one line and shortened."""
     flat = " ".join(text.split())
     return repr(flat if len(flat) <= LONGEST_SHOWN else flat[:LONGEST_SHOWN] + "...")
 
 
 def truth(text: str) -> bool:
-    """Whether a text says yes: true, 1, yes or on, in any case; false, 0, no or off is no.
+    """Parse a boolean: true, 1, yes, on or false, 0, no, off; case is ignored.
 
     Raises:
-        ParameterError: It is something else.
+        ParameterError: The text is none of these.
     """
     word = text.strip().lower()
     if word in TRUE:
@@ -41,10 +41,10 @@ def truth(text: str) -> bool:
 
 
 def row(text: str, parts: Sequence[Part]) -> tuple[float, ...]:
-    """One number for each part, SI: "1, 0.2, 1, 45", "0.0 5.0" or "[ 0 5 ]"; with commas, each may have its unit.
+    """Parse one number per component to SI units: "1, 0.2, 1, 45", "0.0 5.0" or "[ 0 5 ]"; with commas, each may have a unit.
 
     Raises:
-        ParameterError: There are more or fewer, or one of them is no number.
+        ParameterError: The count is wrong, or an item is not a number.
     """
     bare = text.strip()
     bare = bare[1:-1] if bare.startswith("[") and bare.endswith("]") else bare
@@ -58,10 +58,10 @@ def row(text: str, parts: Sequence[Part]) -> tuple[float, ...]:
 
 
 def rows(text: str) -> list[str]:
-    """What stands in each pair of brackets: "[ 0 1 2 ] [ 3 4 5 ]".
+    """The texts inside each pair of brackets: "[ 0 1 2 ] [ 3 4 5 ]".
 
     Raises:
-        ParameterError: Something stands outside, or a bracket is left open.
+        ParameterError: There is text outside the brackets, or a bracket is not closed.
     """
     found, place = [], 0
     while match := ROW.match(text, place):
@@ -75,16 +75,17 @@ def rows(text: str) -> list[str]:
 def items(
     text: str, parts: Sequence[Part], has_fields: bool, from_geodetic: Callable[..., Any] | None
 ) -> list[Any]:
-    """The items of a list, SI: numbers, or one row of numbers each.
+    """Parse the items of a list to SI units: numbers, or rows of numbers.
 
     Args:
-        text: As written.
+        text: The text.
         parts: The components of an item.
-        has_fields: An item is a row.
-        from_geodetic: Latitude, longitude [rad], altitude [m], (3,), to world positions [m], for rows that begin with GPS.
+        has_fields: Whether an item is a row.
+        from_geodetic: Converts latitude, longitude [rad], altitude [m], (3,), to a world position [m]; used for rows that begin
+            with GPS.
 
     Raises:
-        ParameterError: It is not written as a list is.
+        ParameterError: The text is not a list of such items.
     """
     if not has_fields:
         bare = " ".join(rows(text)) if "[" in text else text
@@ -93,7 +94,7 @@ def items(
 
 
 def _placed(text: str, parts: Sequence[Part], from_geodetic: Callable[..., Any] | None) -> tuple[float, ...]:
-    """Numbers of one row; a first word XYZ or GPS says how its fields x, y, z are meant."""
+    """Parse one row; a leading XYZ or GPS gives the frame of its fields x, y, z."""
     frame, _, rest = text.partition(" ")
     names = [name for name, _, _ in parts]
     if frame not in FRAMES or "frame" in names:
@@ -103,7 +104,7 @@ def _placed(text: str, parts: Sequence[Part], from_geodetic: Callable[..., Any] 
         return row(rest, parts)
     if from_geodetic is None:
         raise ParameterError(
-            f"{shown(text)} needs the origin of a mission file; here positions are x, y, z in m"
+            f"{shown(text)} needs the origin of a mission file; give positions here as x, y, z in m"
         )
     geodetic = list(parts)
     for i, (unit, bare) in zip(places, (("rad", "deg"), ("rad", "deg"), ("m", "m")), strict=True):

@@ -1,10 +1,10 @@
-"""Units: "40 kt" becomes 20.577... m/s here, at the edge; inside, everything is SI and radians.
+"""Units: converts input such as "40 kt" to SI (20.577... m/s); inside tussle all numbers are SI and radians.
 
-This is the only place that knows the names of units. The package pint would bring a registry, quantity arrays and some
-hundred milliseconds of import; what a mission file needs is the one table below.
+This is the only module that knows the names of units. The package pint would bring a registry, quantity arrays and some
+hundred milliseconds of import; a mission file needs only the table below.
 
-A unit is written as factors with whole powers: "m/s^2", "kg m^2", "N m", "1/s". A solidus divides by the one factor that
-follows it. An angle is a dimension of its own: "rad" is neither "" nor "1", so a heading cannot be wired to a ratio.
+A unit is written as factors with integer powers: "m/s^2", "kg m^2", "N m", "1/s". A slash divides by the single factor that
+follows it. Angle is a separate dimension: "rad" is neither "" nor "1", so a heading cannot be connected to a ratio.
 """
 
 from __future__ import annotations
@@ -38,10 +38,10 @@ VOLTAGE: Dimension = (2, 1, -3, -1, 0, 0)
 
 
 class Unit(NamedTuple):
-    """A unit: how many of the coherent SI unit it is, and of what.
+    """A unit: its size in the coherent SI unit, and its dimension.
 
-    Rational factors are fractions, so that a conversion rounds once. Those with pi in them are floats, so that "30 deg"
-    has the bits of `math.radians(30)`.
+    Rational factors are fractions, so that a conversion rounds once. Factors with pi are floats, so that "30 deg" equals
+    `math.radians(30)` bit for bit.
     """
 
     factor: Fraction | float
@@ -116,7 +116,7 @@ SPELLED_OUT = {
     "pound": "lb",
     "percent": "%",
 }
-"""Not understood, on purpose: one name a unit. They make the error message name the right one."""
+"""Spellings that are refused, since each unit has one name; the error message suggests that name."""
 
 COMPOUND_EXAMPLES = (
     "m/s",
@@ -137,8 +137,8 @@ COMPOUND_EXAMPLES = (
 FACTOR = re.compile(
     r"(?P<solidus>/?)\s*(?P<name>1(?=\s*/)|%|[A-Za-z]+)(?:\^(?P<power>-?[1-9]))?\s*(?:\*\s*(?=[A-Za-z%]))?"
 )
-# The bound on the exponent keeps a hostile "1e999999999" from becoming an exact fraction of a gigabyte; the look ahead keeps
-# the rest of such a text, or of "1.2.3", from being taken for a unit.
+# The bound on the exponent keeps a hostile "1e999999999" from becoming a fraction of a gigabyte; the lookahead keeps the rest of
+# such a text, or of "1.2.3", from being parsed as a unit.
 QUANTITY = re.compile(
     r"(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,3})?|[-+]?inf)(?![A-Za-z0-9.]*\d)\s*(?P<unit>.*)",
     re.ASCII,
@@ -148,10 +148,10 @@ LONGEST_TEXT = 200
 
 @lru_cache(maxsize=512)
 def unit_of(text: str) -> Unit:
-    """The unit that a text such as "kg m^2" or "m/s" names.
+    """Parse a unit such as "kg m^2" or "m/s".
 
     Raises:
-        UnitError: It is not written as a unit, or holds a name that the table does not have.
+        UnitError: The text is not a unit, or contains an unknown name.
     """
     factor: Fraction | float = Fraction(1)
     dimension = list(NONE)
@@ -162,7 +162,7 @@ def unit_of(text: str) -> Unit:
         match = FACTOR.match(rest, place)
         if match is None:
             raise UnitError(
-                f"{text!r} is not a unit; write factors with whole powers, as in 'm/s^2', 'kg m^2' or '1/s'"
+                f"{text!r} is not a unit; write factors with integer powers, as in 'm/s^2', 'kg m^2' or '1/s'"
             )
         unit = _named(match["name"])
         power = int(match["power"] or 1) * (-1 if match["solidus"] else 1)
@@ -185,19 +185,19 @@ def _named(name: str) -> Unit:
 
 @lru_cache(maxsize=4096)
 def parse(text: str, unit: str, text_unit: str = "") -> float:
-    """A quantity in SI units; a mission that is read a thousand times has few texts that differ, so they are kept.
+    """Parse a quantity to SI units. Results are cached: a mission that is read many times has few different texts.
 
     Args:
         text: Such as "12", "40 kt", "-1.5e3 m".
-        unit: Unit that is wanted, and the unit of a number without one.
-        text_unit: Unit of a number without one where that is historically another, such as "deg"; "" is `unit`.
+        unit: Unit of the wanted dimension, and default unit of a bare number.
+        text_unit: Unit of a bare number where the format has another one, such as "deg"; "" is `unit`.
 
     Returns:
         The value in the coherent SI unit (m, kg, s, A, K, rad and their products), rounded once.
 
     Raises:
-        UnitError: Its unit is unknown or measures something else.
-        ParameterError: It is not a number, or is too large for one.
+        UnitError: The unit is unknown or has another dimension.
+        ParameterError: The text is not a number, or is too large for a float.
     """
     wanted = unit_of(unit)
     number, written = _split(text)
@@ -210,11 +210,11 @@ def parse(text: str, unit: str, text_unit: str = "") -> float:
     try:
         return float(number * given.factor)
     except OverflowError:
-        raise ParameterError(f"{text!r} is too large for a number") from None
+        raise ParameterError(f"{text!r} is too large for a float") from None
 
 
 def _split(text: str) -> tuple[Fraction | float, str]:
-    """Number and unit of a text; the unit is "" where there is none."""
+    """Split a text into number and unit; the unit is "" if there is none."""
     match = QUANTITY.fullmatch(text.strip()) if len(text) <= LONGEST_TEXT else None
     if match is None:
         shown = text if len(text) <= LONGEST_TEXT else text[:40] + "..."
@@ -228,48 +228,48 @@ def _split(text: str) -> tuple[Fraction | float, str]:
 def _mismatch(value: str, given: str, wanted: str) -> str:
     allowed = spellings(wanted)
     if unit_of(wanted).dimension == NONE:
-        return f"{value!r} has a unit; this is a plain number (or '%'), without unit"
+        return f"{value!r} has a unit; expected is a number without unit (or with '%')"
     examples = " or ".join(repr(f"12 {name}") for name in allowed[:3])
-    return f"{value!r} is in {given or 'no unit'}, which cannot become {wanted}; write {examples} ({listed(allowed)})"
+    return f"{value!r} is in {given or 'no unit'}, not convertible to {wanted}; write {examples} ({listed(allowed)})"
 
 
 def spellings(unit: str) -> list[str]:
-    """Names of the same kind of quantity, those of `unit` itself first: for messages and pages."""
+    """Names of units of the same dimension, `unit` first; for messages and pages."""
     dimension = unit_of(unit).dimension
     names = [unit, *UNITS, *COMPOUND_EXAMPLES]
     return list(dict.fromkeys(n for n in names if n not in ("", "1") and unit_of(n).dimension == dimension))
 
 
 def compatible(unit_a: str, unit_b: str) -> bool:
-    """Whether numbers in one unit may be wired to an input in the other: same kind and same size, since a wire converts nothing.
+    """Whether a channel may connect two units: same dimension and same size, since channels do not convert.
 
     Raises:
-        UnitError: One of them is not a unit.
+        UnitError: A text is not a unit.
     """
     a, b = unit_of(unit_a), unit_of(unit_b)
     return a.dimension == b.dimension and float(a.factor) == float(b.factor)
 
 
 def split_units(text: str, n: int) -> tuple[str, ...]:
-    """Unit of each of n components, from a declaration.
+    """Units of n components, from a declaration.
 
     Args:
-        text: One unit for all, or n of them separated by blanks: "m m rad m/s". In a list, join the factors of one unit
-            by "*" ("kg*m^2") and write "1" for a component without unit.
+        text: One unit for all, or n units separated by spaces: "m m rad m/s". In a list, join the factors of one unit by "*"
+            ("kg*m^2") and write "1" for a component without unit.
         n: Number of components, at least 1.
 
     Returns:
-        n units; a component without unit has "".
+        n units; "" for a component without unit.
 
     Raises:
-        DeclarationError: There are neither one nor n units, or one is unknown.
+        DeclarationError: The number of units is neither one nor n, or a unit is unknown.
     """
     parts = text.split() if n > 1 else [text.strip()]
     if len(parts) <= 1:
         parts = (parts or [""]) * n
     if len(parts) != n:
         raise DeclarationError(
-            f"unit {text!r} names {len(parts)} units for {n} components; write one unit for all or one for each, with '*' "
+            f"unit {text!r} has {len(parts)} units for {n} components; write one unit for all or one for each, with '*' "
             f"inside a unit ('kg*m^2') and '1' for a component without unit"
         )
     for part in parts:
@@ -281,9 +281,9 @@ def split_units(text: str, n: int) -> tuple[str, ...]:
 
 
 def is_si(unit: str) -> bool:
-    """Whether numbers in this unit are numbers inside tussle: "m/s" and "" are, "kt", "deg" and "%" are not.
+    """Whether a unit is coherent SI, as used inside tussle: "m/s" and "" are, "kt", "deg" and "%" are not.
 
     Raises:
-        UnitError: It is not a unit.
+        UnitError: The text is not a unit.
     """
     return float(unit_of(unit).factor) == 1.0

@@ -34,21 +34,21 @@ POINTS = Field("x y", ragged=True)
     [
         (
             lambda: Output("range bearing", unit="m rad", ragged=True),
-            r"Output: a list is one channel, not 2; name the components of its items with fields='range bearing'",
+            r"Output: .*one channel, not 2.*fields='range bearing'",
         ),
         (
             lambda: Input(fields="x y"),
-            r"Input: fields='x y' are the components of a list's items and need ragged=True",
+            r"Input: fields='x y' needs ragged=True",
         ),
         (
             lambda: Input(ragged=True, default=1.0),
-            r"Input: a list \(ragged=True\) begins empty; it takes no default",
+            r"Input: a ragged column .* takes no default",
         ),
         (
             lambda: State(ragged=True, per="world"),
-            r"State: a list \(ragged=True\) is one per entity and begins empty",
+            r"State: a ragged column is per entity",
         ),
-        (lambda: State(ragged=True, default=2.0), r"it takes no per or default"),
+        (lambda: State(ragged=True, default=2.0), r"it takes neither per nor default"),
         (
             lambda: type("M", (MotionModel,), {"path": Input(fields="x y", ragged=True)}),
             r"M.path: a motion model has no lists but parameters",
@@ -94,11 +94,11 @@ def test_lists_of_single_rows_are_replaced():
 
 
 def test_a_list_of_another_shape_or_row_is_refused():
-    with pytest.raises(ParameterError, match=r"the list of row 1 has shape \(3, 2\); needed is \(2, m\)"):
+    with pytest.raises(ParameterError, match=r"row 1 has shape \(3, 2\); expected \(2, m\)"):
         column()[1] = np.zeros((3, 2))
-    with pytest.raises(ParameterError, match=r"has shape \(1, 2\); needed is \(m,\)"):
+    with pytest.raises(ParameterError, match=r"has shape \(1, 2\); expected \(m,\)"):
         RaggedColumn.from_rows([[(1, 2)]], Field(ragged=True))
-    with pytest.raises(IndexError, match="row 3 of 3 lists"):
+    with pytest.raises(IndexError, match=r"row 3 .* 3 lists"):
         column()[3]
 
 
@@ -122,7 +122,7 @@ def test_a_view_for_readers_shows_what_is_written_and_cannot_be():
     assert seen[1].tolist() == [[0.0], [1.0]]
     assert (len(seen), seen.count.tolist()) == (3, [2, 1, 1])
     for write in (lambda: seen.set(seen.start, seen.data), lambda: seen.__setitem__(0, [])):
-        with pytest.raises(ValueError, match="this list is read-only: an Input or a Param"):
+        with pytest.raises(ValueError, match="read-only"):
             write()
     for array in (seen.data, seen[0], seen.start):
         with pytest.raises(ValueError, match="read-only"):
@@ -135,9 +135,7 @@ def test_reductions_over_each_rows_items():
     assert lists.mean(lists.data[0]).tolist() == [2.0, 0.0, 5.0]
     assert lists.min(lists.data[0]).tolist() == [1.0, np.inf, 5.0]
     assert lists.argmin(-lists.data[0]).tolist() == [1, -1, 2]
-    with pytest.raises(
-        ParameterError, match=r"values of items have shape \(2,\); the last axis needs the 3 items"
-    ):
+    with pytest.raises(ParameterError, match=r"values of items have shape \(2,\); .*length 3"):
         lists.sum(np.zeros(2))
 
 

@@ -318,9 +318,9 @@ def test_a_table_that_is_missing_is_told(mission, reference, name, words):
     [
         ("", "batch.json: cannot be read"),
         ('{"format": 1, "name"', "batch.json: cannot be read"),
-        ("[1, 2]", "batch.json: the batch has format None; this tussle reads format 1"),
-        ('{"format": 2}', "batch.json: the batch has format 2; this tussle reads format 1"),
-        ('{"format": 1, "name": "x"}', "batch.json: it says nothing of mission, variables, n_points"),
+        ("[1, 2]", "batch.json: the batch has format None; this version of tussle reads format 1"),
+        ('{"format": 2}', "batch.json: the batch has format 2; this version of tussle reads format 1"),
+        ('{"format": 1, "name": "x"}', "batch.json: the document lacks mission, variables, n_points"),
         ("\udc80", "batch.json: cannot be read"),
     ],
 )

@@ -165,7 +165,7 @@ def test_all_problems_are_told_at_once_with_the_file(problems):
         ("runs = true", "runs = True is not allowed"),
         ("x = " + "[" * 100_000, "lists or tables stand in one another too deep"),
         (".".join(["vary", *"a" * 2000]) + " = 1", "lists or tables stand in one another too deep"),
-        ("#" * 4_000_001, "cannot be read: it has 4,000,001 bytes; allowed are 4,000,000"),
+        ("#" * 4_000_001, "cannot be read: its size is 4,000,001 bytes; the limit is 4,000,000"),
     ],
 )
 def test_one_problem(problems, text, said):
@@ -189,7 +189,7 @@ def test_a_file_of_nothing_but_mistakes_is_told_in_part(problems):
 def test_files_that_cannot_be_read(tmp_path):
     with pytest.raises(ParameterError, match=r"none.toml: cannot be read: No such file"):
         read_sweep(tmp_path / "none.toml")
-    with pytest.raises(ParameterError, match=r"cannot be read: this is not a regular file"):
+    with pytest.raises(ParameterError, match=r"cannot be read: it is not a regular file"):
         read_sweep(str(tmp_path))
     (tmp_path / "bad.toml").write_bytes(b"\xff\xfe")
     with pytest.raises(ParameterError, match=r"bad.toml: cannot be read: 'utf-8' codec"):
