@@ -163,7 +163,7 @@ def test_a_run_that_was_cut_in_the_midst_of_a_batch(tmp_path, played):
     (directory / "trajectory.arrow").write_bytes(whole[: len(whole) - 500])
     recording = Recording(directory)
     assert any("run.json is missing" in note for note in recording.notes)
-    assert any("trajectory.arrow is cut" in note for note in recording.notes)
+    assert any("trajectory.arrow is truncated" in note for note in recording.notes)
     assert recording.n_frames == 0
     with pytest.raises(IndexError):
         recording.at(0.0)
