@@ -41,28 +41,28 @@ def stream_key(*names: str) -> int:
 
 @device
 def mix(a, b, rotation):
-    """One round: add, rotate left, exclusive or."""
+    """One round: add, rotate left, exclusive or; all uint64."""
     a = a + b
-    b = (b << np.uint64(rotation)) | (b >> np.uint64(64 - rotation))
+    b = (b << rotation) | (b >> (np.uint64(64) - rotation))
     return a, a ^ b
 
 
 @device
 def four_rounds_even(a, b):
     """Rounds 1 to 4 of every eight."""
-    a, b = mix(a, b, 16)
-    a, b = mix(a, b, 42)
-    a, b = mix(a, b, 12)
-    return mix(a, b, 31)
+    a, b = mix(a, b, np.uint64(16))
+    a, b = mix(a, b, np.uint64(42))
+    a, b = mix(a, b, np.uint64(12))
+    return mix(a, b, np.uint64(31))
 
 
 @device
 def four_rounds_odd(a, b):
     """Rounds 5 to 8 of every eight."""
-    a, b = mix(a, b, 16)
-    a, b = mix(a, b, 32)
-    a, b = mix(a, b, 24)
-    return mix(a, b, 21)
+    a, b = mix(a, b, np.uint64(16))
+    a, b = mix(a, b, np.uint64(32))
+    a, b = mix(a, b, np.uint64(24))
+    return mix(a, b, np.uint64(21))
 
 
 @device

@@ -126,7 +126,7 @@ def test_callee_of_one_motion_model_reaches_no_other_module(edited, plain):
 
 @pytest.mark.slow
 def test_round_of_the_random_numbers_reaches_the_draws_only(edited, plain):
-    after = edited("rng.py", "mix(a, b, 42)", "mix(a, b, 43)")
+    after = edited("rng.py", "mix(a, b, np.uint64(42))", "mix(a, b, np.uint64(43))")
     assert after["hash"] != plain["hash"]
     assert after["made"]
     engine = {"tussle.engine.kernels.scatter", "tussle.engine.kernels.turn"}

@@ -70,18 +70,11 @@ CALL = re.compile(
 FUSED = re.compile(r"\bv?fn?m(?:add|sub)\w*", re.IGNORECASE)
 
 
-# Numba's text of the error "cannot assign slice of shape ..." counts decimal digits with log10; no result comes from there.
-ERROR_TEXT = "raise_with_shape_context"
-
-
 def suspicious(assembly: str) -> set[str]:
     """Calls of the mathematical library and fused multiply-adds in assembly text."""
-    found, symbol = set(), ""
+    found = set()
     for line in assembly.splitlines():
-        if line.endswith(":") and not line.startswith((".L", "\t")):
-            symbol = line
-        code = line.startswith("\t") and not line.startswith(("\t.asci", "\t.section", "\t.file"))
-        if code and ERROR_TEXT not in symbol:
+        if line.startswith("\t") and not line.startswith(("\t.asci", "\t.section", "\t.file")):
             found.update(match.group(0) for match in (CALL.search(line), FUSED.search(line)) if match)
     return found
 
@@ -109,6 +102,7 @@ def kernels_of(module: str) -> list[Kernel]:
 
 @pytest.mark.parametrize("module", kernel_modules())
 def test_no_kernel_of_the_package_calls_the_mathematical_library(module):
+    # Nor assigns an array to a slice: Numba's text for sizes that differ has log10 in it, and takes 4 s to compile.
     for each in kernels_of(module):
         assert not suspicious(each.assembly()), each.name
 

@@ -27,7 +27,9 @@ def hunt(points, teams, allow_switching, out, rows, first, arrays):
     row_id, row_world, place, order = rows
     table = table_of(arrays)
     best, ranks, places = np.empty(1), np.empty(1, np.int64), np.empty(1, np.int64)
-    n_claims = 0
+    n_claims = np.int64(
+        0
+    )  # a plain 0 is a type of its own to Numba, which would compile `in_range` for it as well
     room = claim_row.shape[0]
     for i in range(x.shape[0]):
         row = first + i

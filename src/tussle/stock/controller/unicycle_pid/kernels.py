@@ -71,4 +71,5 @@ def steer(wanted, motion, attitude, gains, memory, dt, commands):
                 out[i], integral[i] = pid(
                     error[k, l], change[k, l], dt, kp[i], ki[i], kd[i], band[i], integral[i]
                 )
-    out_speed[:] = speed
+    for i in range(n):
+        out_speed[i] = speed[i]

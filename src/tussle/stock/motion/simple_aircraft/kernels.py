@@ -132,7 +132,8 @@ def advance(x, u, p, dt, substeps):
                 middle = level_m[l] * (sine[m + l] + sine[2 * m + l])
                 north[first + l] += sixth_h * (level0[l] * sine[l] + middle + vm[l] * sine[3 * m + l])
                 v0[l], turn0[l], level0[l] = v1[l], turn1[l], vm[l]
-        speed[first:last] = v0[:m]
+        for l in range(m):
+            speed[first + l] = v0[l]
 
 
 @device
@@ -159,7 +160,9 @@ def to_body(x, rates, limits, circle, table, first_row):
     roll_max, pitch_max, roll_rate_max, pitch_rate_max = limits
     radius, slope, target = circle
     begin, end = first_row, first_row + x.shape[1]
-    table[:3, begin:end] = x[:3]
+    for k in range(3):
+        for i in range(x.shape[1]):
+            table[k, begin + i] = x[k, i]
     vx, vy, vz = table[3, begin:end], table[4, begin:end], table[5, begin:end]
     qw, qx, qy, qz = table[6, begin:end], table[7, begin:end], table[8, begin:end], table[9, begin:end]
     wx, wy, wz = table[10, begin:end], table[11, begin:end], table[12, begin:end]

@@ -80,8 +80,9 @@ def to_body(x, table, first_row):
         first_row: Where the rows begin in it.
     """
     body = table[:, first_row : first_row + x.shape[1]]
-    body[:3] = x[:3]
-    body[3:6] = x[3:6]
+    for k in range(6):
+        for i in range(x.shape[1]):
+            body[k, i] = x[k, i]
     yaw, climb = x[6], x[7]
     angle = np.empty(2 * BLOCK)
     sine = np.empty(2 * BLOCK)

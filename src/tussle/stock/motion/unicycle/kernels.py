@@ -246,7 +246,9 @@ def to_body(x, commands, limits, flags, h, table, first_row, part):
     speed, turn_rate, third = commands[0][begin:end], commands[1][begin:end], commands[2][begin:end]
     vel_max, turn_max, third_max = limits[0][begin:end], limits[1][begin:end], limits[2][begin:end]
     yaw, pitch = x[3, begin:end], x[4, begin:end]
-    table[:3, first_row + begin : first_row + end] = x[:3, begin:end]
+    for k in range(3):
+        for i in range(begin, end):
+            table[k, first_row + i] = x[k, i]
     half_h = 0.5 * h
     angle, sine, cosine = np.empty((5, BLOCK)), np.empty((5, BLOCK)), np.empty((5, BLOCK))
     held, made = (

@@ -109,11 +109,11 @@ def to_body(x, rates, limits, table, first_row):
     turn_rate, pitch_rate, roll_rate = rates
     turn_max, pitch_max, roll_max = limits
     body = table[:, first_row : first_row + x.shape[1]]
-    body[:3] = x[:3]
-    body[6:10] = x[3:7]
     for i in range(x.shape[1]):
         w, a, b, c, speed = x[3, i], x[4, i], x[5, i], x[6, i], x[7, i]
         fx, fy, fz = forward(w, a, b, c)
+        body[0, i], body[1, i], body[2, i] = x[0, i], x[1, i], x[2, i]
+        body[6, i], body[7, i], body[8, i], body[9, i] = w, a, b, c
         body[3, i], body[4, i], body[5, i] = speed * fx, speed * fy, speed * fz
         bank = clamp(roll_rate[i], roll_max[i])
         dive = -clamp(pitch_rate[i], pitch_max[i])
