@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import gc
 import hashlib
 import os
 import pickle
+import re
 import subprocess
 import sys
 import warnings
@@ -171,6 +173,32 @@ def test_who_waits_is_told_before_a_kernel_compiles(own_cache, monkeypatch):
         announced(np.ones(1), np.empty(1))
     assert told == [(announced.name, before)]
     assert stats.compiled == before + 1
+
+
+def test_a_device_gets_an_entry_for_python_when_python_calls_it():
+    scale_rows(np.ones(2), 0.0, np.empty(2))
+    scale_rows.assembly()
+    (inside,) = scaled.dispatcher.overloads.values()
+    assert not re.findall("cpython|cfunc", inside.library.get_llvm_str())
+    assert scaled(3.0) == 6.0
+
+
+def test_garbage_is_not_looked_for_while_a_kernel_compiles():
+    class Watched:
+        @property
+        def _numba_type_(self):
+            collecting.append(gc.isenabled())
+            return scaled._numba_type_
+
+    watched, collecting = Watched(), []
+
+    @kernel("f8 -> f8")
+    def watching(x):
+        return watched(x)
+
+    assert watching(3.0) == 6.0
+    assert set(collecting) == {False}
+    assert gc.isenabled()
 
 
 # What the key sees -----------------------------------------------------------------------------------------
