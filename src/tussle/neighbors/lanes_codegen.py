@@ -70,6 +70,28 @@ def type_of(function: Callable[..., Any]) -> Any:
     return cpu_target.typing_context.resolve_value_type(function)
 
 
+@cache
+def _template(function: Callable[..., Any]) -> Any:
+    """What Numba asks for the type of a call of a function; `ways` holds result and arguments of each way to call it."""
+
+    class Template(AbstractTemplate):
+        key = function
+        metadata = {"target": "cpu"}  # asked first: of an operator's own templates there are dozens  # noqa: RUF012
+        ways: list[tuple[Any, tuple[Any, ...]]] = []  # noqa: RUF012
+
+        def generic(self, args: Any, kws: Any) -> Any:
+            for result, arguments in self.ways:
+                if len(args) == len(arguments) and all(
+                    given == wanted or (isinstance(wanted, type) and isinstance(given, wanted))
+                    for given, wanted in zip(args, arguments, strict=True)
+                ):
+                    return None if kws else signature(result, *args)
+            return None
+
+    infer_global(function, types.Function(Template))
+    return Template
+
+
 def _implement(function: Any, result: Any, *arguments: Any) -> Callable[[Any], Any]:
     """Register the code generator that follows as `function(*arguments) -> result`; one known by name when it is first asked for."""
 
@@ -78,17 +100,7 @@ def _implement(function: Any, result: Any, *arguments: Any) -> Callable[[Any], A
             _BY_NAME[function].append((result, arguments, generate))
             return generate
 
-        class Template(AbstractTemplate):
-            key = function
-
-            def generic(self, args: Any, kws: Any) -> Any:
-                fits = len(args) == len(arguments) and all(
-                    given == wanted or (isinstance(wanted, type) and isinstance(given, wanted))
-                    for given, wanted in zip(args, arguments, strict=True)
-                )
-                return signature(result, *args) if fits and not kws else None
-
-        infer_global(function, types.Function(Template))
+        _template(function).ways.append((result, arguments))
         lower_builtin(function, *arguments)(generate)
         return generate
 

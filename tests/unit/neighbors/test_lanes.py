@@ -95,3 +95,22 @@ def test_kernels_are_keyed_by_the_code_generators(monkeypatch):
 def test_importing_the_package_does_not_import_numba():
     code = "import sys, tussle.neighbors; sys.exit('numba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_operations_on_lanes_are_found_before_those_on_anything_else(monkeypatch):
+    import operator
+
+    from numba.core.registry import cpu_target
+    from numba.core.types import float64
+    from numba.core.typing.templates import _OverloadFunctionTemplate
+
+    from tussle.neighbors.lanes_codegen import LANES_TYPE, MASK_TYPE
+
+    def asked(*_):
+        raise AssertionError("an overload for other types was asked first")
+
+    find = cpu_target.typing_context.resolve_function_type
+    cpu_target.typing_context.refresh()
+    monkeypatch.setattr(_OverloadFunctionTemplate, "generic", asked)
+    assert find(operator.add, (LANES_TYPE, float64), {}).return_type == LANES_TYPE
+    assert find(operator.lt, (LANES_TYPE, LANES_TYPE), {}).return_type == MASK_TYPE
