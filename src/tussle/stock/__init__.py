@@ -1,4 +1,4 @@
-"""The plugins that ship, by name: `from tussle.stock import Boids`. Each loads when it is asked for first."""
+"""Stock plugins, imported by name: `from tussle.stock import Boids`. A plugin's module is imported on first use."""
 
 from __future__ import annotations
 
@@ -12,34 +12,34 @@ from typing import Any
 from tussle.errors import ParameterError, listed, nearest_name
 
 ALWAYS_THERE = ("GlobalNetwork", "LocalNetwork")
-"""Networks of every mission: from everyone to everyone, which carries what names no other, and within one entity."""
+"""Networks that every mission has. GlobalNetwork is the default network of a message."""
 UNMOVED = "Still"
-"""The motion model of an entity that a mission file gives none."""
+"""Motion model of an entity for which the mission file names none."""
 
 
 @cache
 def manifest() -> dict[str, str]:
-    """Name -> "module:class" of every plugin that ships."""
+    """Map the name of each stock plugin to "module:class"."""
     text = (Path(__file__).parent / "manifest.toml").read_text(encoding="utf-8")
     return dict(tomllib.loads(text)["plugins"])
 
 
 def load(name: str) -> Any:
-    """A plugin class that ships, by its name.
+    """Return a stock plugin class.
 
     Raises:
-        ParameterError: There is none of this name.
+        ParameterError: No stock plugin has this name.
     """
     if name not in manifest():
         raise ParameterError(
-            f"there is no plugin {name!r}{nearest_name(name, manifest())}; {listed(manifest())}"
+            f"no stock plugin is named {name!r}{nearest_name(name, manifest())}; {listed(manifest())}"
         )
     module, _, attribute = manifest()[name].partition(":")
     return getattr(importlib.import_module(module), attribute)
 
 
 def advise_controllers(offered: Iterable[str], needed: Iterable[str]) -> list[str]:
-    """Controllers that take only offered channels and write all needed ones."""
+    """Return controllers whose required inputs are all offered and whose outputs include all needed channels."""
     offered, needed = set(offered), set(needed)
     found = []
     for name, path in manifest().items():

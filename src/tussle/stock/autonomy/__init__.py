@@ -1,1 +1,1 @@
-"""The autonomy plugins that ship, a folder each."""
+"""Stock autonomies, one folder per plugin."""

@@ -1,1 +1,1 @@
-"""Controllers that ship with tussle, a folder each."""
+"""Stock controllers, one folder per plugin."""

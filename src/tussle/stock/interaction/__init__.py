@@ -1,1 +1,1 @@
-"""The interaction plugins that ship, a folder each."""
+"""Stock interactions, one folder per plugin."""

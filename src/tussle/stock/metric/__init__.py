@@ -1,1 +1,1 @@
-"""The metric plugins that ship, a folder each."""
+"""Stock metrics, one folder per plugin."""

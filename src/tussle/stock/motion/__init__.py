@@ -1,1 +1,1 @@
-"""Motion models that ship with tussle, a folder each."""
+"""Stock motion models, one folder per plugin."""

@@ -1,1 +1,1 @@
-"""The network plugins that ship, a folder each."""
+"""Stock networks, one folder per plugin."""

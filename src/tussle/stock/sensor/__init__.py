@@ -1,1 +1,1 @@
-"""Sensors that ship with tussle, a folder each."""
+"""Stock sensors, one folder per plugin."""

@@ -1,4 +1,4 @@
-"""Keep away from others."""
+"""AvoidEntityMS: a behaviour that avoids other entities."""
 
 from tussle.stock.autonomy.avoid_entity_ms.plugin import AvoidEntityMS
 

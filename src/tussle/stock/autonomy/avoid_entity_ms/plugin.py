@@ -1,4 +1,4 @@
-"""Keep away from others."""
+"""A behaviour that avoids other entities."""
 
 from __future__ import annotations
 
@@ -7,31 +7,34 @@ import numpy as np
 from tussle.api import Behavior, GroupView, Input, Param, neighbors
 
 TOUCHING = 1e10
-"""Magnitude at or below the minimum range: stands for infinity (the existing system's number)."""
+"""Magnitude of the repulsion at or below the minimum range, in place of infinity (value of the existing system)."""
 
 
 class AvoidEntityMS(Behavior):
-    """Wish away from each entity in the sphere of influence, the more the nearer; at full length within `minimum_range`.
+    """Moves away from every entity inside the sphere of influence.
 
-    The magnitude is that of the Boids' repulsion, (S - r) / (S - m) between S and m, and overwhelming below m. With
-    `contacts="noisy"` the others are those that a sensor such as NoisyContacts reports, where it says they are.
+    At distance r the magnitude is (S - r) / (S - m) for m < r < S, as in Boids, and 1e10 for r <= m, with S =
+    `sphere_of_influence` and m = `minimum_range`. With `contacts="noisy"` the positions are those measured by a
+    sensor such as NoisyContacts.
     """
 
     grade = "portable"
 
-    sphere_of_influence = Param(10.0, unit="m", ge=0.0, doc="S: distance from which others are felt.")
-    minimum_range = Param(5.0, unit="m", ge=0.0, doc="m: distance below which nothing else counts.")
+    sphere_of_influence = Param(10.0, unit="m", ge=0.0, doc="S: distance below which other entities repel.")
+    minimum_range = Param(
+        5.0, unit="m", ge=0.0, doc="m: distance below which avoidance overrides other behaviours."
+    )
     avoid_non_team = Param(True, doc="Avoid entities of other teams too.")
     contacts = Param(
-        "truth", choices=("truth", "noisy"), doc="Everybody, or those in the channel 'contacts'."
+        "truth", choices=("truth", "noisy"), doc="Use true positions, or those of the channel 'contacts'."
     )
     seen = Input(
         "contacts", ragged=True, fields="id team x y z vx vy vz qw qx qy qz", unit="1 1 m m m m/s m/s m/s 1 1 1 1",
-        doc="Whom a sensor reports, with contacts='noisy'.",
+        doc="Measured states of other entities, with contacts='noisy'.",
     )  # fmt: skip
 
     def active_inputs(self) -> list[str]:
-        """Names of the inputs that this instance reads."""
+        """Return the inputs that this instance reads."""
         return ["seen"] if self.contacts == "noisy" else []
 
     @neighbors("sphere_of_influence", x="sum", y="sum", z="sum")
@@ -54,7 +57,7 @@ class AvoidEntityMS(Behavior):
         self.wish[:] = away * g.call("longest_wish")
 
     def _from_seen(self, g: GroupView) -> np.ndarray:
-        """The same law over what is reported, from where the entity believes itself, (3, n)."""
+        """Sum `push` over the measured entities, relative to the entity's believed position, (3, n)."""
         law, row = AvoidEntityMS.push.laws[0].function, self.seen.row
         offset = self.seen.data[2:5] - g.pos[:, row]
         x, y, z = offset

@@ -1,7 +1,7 @@
-"""Boids: what team mates and others do to one, the law, and what the controllers are told.
+"""Boids kernels: repulsion, the steering law and the command outputs.
 
-One step: the plugin's neighbour laws, with the historic means `historic_means`, then `law`, then what is wired of `velocity`,
-`rates` and `desired`.
+A step runs the plugin's neighbour laws, `historic_means` if selected, `law`, and those of `velocity`, `rates` and `desired`
+whose outputs are wired.
 """
 
 from __future__ import annotations
@@ -16,17 +16,20 @@ from tussle.numeric import atan2, cos, sin, wrap
 from tussle.numeric.kernel import device, kernel
 
 TOUCHING = 1e10
-"""Repulsion at or below the minimum range: stands for infinity (the existing system's number)."""
+"""Magnitude of the repulsion at or below the minimum range, in place of infinity (value of the existing system)."""
 
-# Rows of what the neighbours contribute, (13, n): offsets [m] and headings' unit vectors of the team mates, how many of them and of
-# others there are, and the repulsion from either.
+# Rows of the neighbour sums, (13, n): offsets [m] and horizontal heading vectors of team mates, number of team mates and of
+# others, repulsion from team mates and from others.
 OFFSET, HEADING, N_TEAM, N_OTHERS, TEAM_PUSH, OTHER_PUSH = 0, 3, 5, 6, 7, 10
 
 
 def push(
     x: float, y: float, z: float, square: float, inverse: float, sphere: float, least: float
 ) -> tuple[float, float, float]:
-    """Repulsion from an offset [m]: TOUCHING for r <= least, (S - r) / (S - least) up to the sphere S; 1 / r is `inverse`."""
+    """Repulsion from a neighbour at offset (x, y, z) [m] and distance r.
+
+    The magnitude is TOUCHING for r <= least, else (sphere - r) / (sphere - least). `square` is r^2, `inverse` is 1 / r.
+    """
     scale = 1.0 / (sphere - least)
     amount = TOUCHING * inverse if square <= least * least else scale * (sphere * inverse - 1.0)
     return -amount * x, -amount * y, -amount * z
@@ -34,10 +37,11 @@ def push(
 
 @kernel("(F F F) F2w")
 def historic_means(pos, seen):
-    """Turn offsets and headings of what is seen (13, n) into what the existing system takes for centroid and heading, in place.
+    """Convert the neighbour sums, (13, n), to the centroid and heading of the existing system, in place.
 
-    It divides by the number of all neighbours, others included, so the centroid is drawn to the world's origin and the
-    heading to East; and it averages yaw as a plain number (row `HEADING` is then the sum of yaw [rad]). Own positions [m].
+    The existing system divides by the number of all neighbours, other teams included, which biases the centroid towards
+    the world's origin and the heading towards East. It averages yaw as a plain number: on input, row `HEADING` is the
+    sum of yaw [rad]. pos: own positions [m], (n,) each.
     """
     x, y, z = pos
     for i in range(x.shape[0]):
@@ -53,13 +57,13 @@ def historic_means(pos, seen):
 
 @device
 def rows(array, first, i, m):
-    """Rows first ... first + 2 of an array at columns i ... i + m - 1."""
+    """Load rows first to first + 2 of an array at columns i to i + m - 1."""
     return load_some(array[first], i, m), load_some(array[first + 1], i, m), load_some(array[first + 2], i, m)
 
 
 @device
 def put_rows(array, i, m, x, y, z):
-    """Write the three rows of an array at columns i ... i + m - 1."""
+    """Store three rows of an array at columns i to i + m - 1."""
     store_some(array[0], i, m, x)
     store_some(array[1], i, m, y)
     store_some(array[2], i, m, z)
@@ -67,7 +71,7 @@ def put_rows(array, i, m, x, y, z):
 
 @device
 def shortened(x, y, z):
-    """Unit vector of (x, y, z), or zero of zero."""
+    """Unit vector of (x, y, z); zero for a zero vector."""
     inverse = inverse_sqrt(x * x + y * y + z * z)
     return x * inverse, y * inverse, z * inverse
 
@@ -81,7 +85,7 @@ def length(x, y, z):
 
 @kernel("F F -> b1")
 def sees_all(fov_az, fov_el):
-    """Whether fields of view [rad], (n,) each, leave nobody out, so that none has to be looked at."""
+    """Whether the fields of view [rad], (n,) each, exclude nobody."""
     for i in range(fov_az.shape[0]):
         if fov_az[i] < 2.0 * math.pi or fov_el[i] <= math.pi:
             return False
@@ -90,11 +94,19 @@ def sees_all(fov_az, fov_el):
 
 @kernel("(F F F) F2 F2 (F F F F F F) F2w (i8 i8)")
 def law(pos, goal, seen, weights, wanted, part):
-    """Velocity wanted [m/s], (3, n), of positions [m], goals (3, n) [m], and what is seen (13, n).
+    """Compute the desired velocity.
 
-    The weighted sum of the five unit or repulsion vectors over the sum of their lengths, times max_speed. The heading's length
-    enters that sum without its weight, as in the existing system. Without neighbours it is the goal's direction at 1 m/s.
-    weights: max_speed, goal, team mates, others, centroid, alignment, (n,) each; part: first row and end of those to do.
+    The weighted sum of the five unit or repulsion vectors, divided by the sum of their lengths, times max_speed. The length
+    of the heading enters the divisor without its weight, as in the existing system. Without neighbours the velocity is 1 m/s
+    in the direction of the goal.
+
+    Args:
+        pos: Positions [m], three (n,).
+        goal: Goals [m], (3, n).
+        seen: Neighbour sums, (13, n).
+        weights: max_speed [m/s] and the weights of goal, team mates, others, centroid and alignment, (n,) each.
+        wanted: Desired velocity [m/s], (3, n), written.
+        part: First row, and end of the rows to compute.
     """
     px, py, pz = pos
     max_speed, goal_weight, team_weight, other_weight, centroid_weight, align_weight = weights
@@ -124,7 +136,7 @@ def law(pos, goal, seen, weights, wanted, part):
 
 @kernel("F2 F F2w")
 def velocity(wanted, max_speed, out):
-    """Velocity command [m/s], (3, n): what is wanted, at most half of max_speed (n,) once that is above 1 m/s."""
+    """Velocity command [m/s], (3, n): the desired velocity, limited to max_speed / 2 where it exceeds 1 m/s."""
     for i in range(0, max_speed.shape[0], LANES):
         m = min(LANES, max_speed.shape[0] - i)
         vx, vy, vz = rows(wanted, 0, i, m)
@@ -136,7 +148,7 @@ def velocity(wanted, max_speed, out):
 
 @kernel("F2 F F F Fw Fw Fw (i8 i8)")
 def rates(wanted, yaw, climb, max_speed, speed, turn_rate, pitch_rate, part):
-    """Speed [m/s] and the rates [rad/s] that turn the body x axis (yaw, climb [rad], nose up positive) to the wanted velocity."""
+    """Speed [m/s] and the rates [rad/s] that turn the body x axis (yaw, climb [rad], nose up positive) towards the desired velocity."""
     begin, end = part
     vx, vy, vz = wanted[0, begin:end], wanted[1, begin:end], wanted[2, begin:end]
     yaw, climb, max_speed = yaw[begin:end], climb[begin:end], max_speed[begin:end]
@@ -151,7 +163,7 @@ def rates(wanted, yaw, climb, max_speed, speed, turn_rate, pitch_rate, part):
 
 @kernel("F2 F F Fw Fw Fw")
 def desired(wanted, z, max_speed, heading, speed, altitude):
-    """Heading of the wanted velocity [rad], max_speed [m/s], and the altitude [m] one second ahead at the wanted climb."""
+    """Heading of the desired velocity [rad], max_speed [m/s], and the altitude [m] after one second at the desired climb speed."""
     for i in range(z.shape[0]):
         heading[i] = atan2(wanted[1, i], wanted[0, i])
     for i in range(z.shape[0]):

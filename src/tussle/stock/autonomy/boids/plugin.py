@@ -1,4 +1,4 @@
-"""Flocking."""
+"""Flocking by repulsion, cohesion and alignment."""
 
 from __future__ import annotations
 
@@ -16,27 +16,29 @@ Contributed = tuple[float, ...]
 
 
 class Boids(Autonomy):
-    """Goal, repulsion, cohesion and alignment (Reynolds 1987), weighed as in equations (2) to (8) of the 2018 paper.
+    """Flocking (Reynolds 1987) with a goal, weighted as in equations (2) to (8) of the 2018 paper.
 
-    Each step sums over everyone nearer than `comms_range`, then `law`: the weighted sum of the five directions over the sum of their
-    lengths, times `max_speed`. Mean heading and centroid are those of the team mates. With `means="historic"` they are what the code
-    behind the paper computes: yaw averaged as a plain number (wrong across West) and both sums divided by the number of all
-    neighbours, other teams included, which draws the centroid to the world's origin and the heading to East.
+    The neighbours are all entities nearer than `comms_range`. The desired velocity is the weighted sum of five vectors (goal,
+    repulsion from team mates, repulsion from others, centroid of the team mates, mean heading of the team mates), divided by the sum
+    of their lengths, times `max_speed`. With `means="historic"` centroid and heading are computed as in the code of the paper: yaw is
+    averaged as a plain number (wrong near West), and both sums are divided by the number of all neighbours, other teams included,
+    which biases the centroid towards the world's origin and the heading towards East.
 
-    Outputs suit a unicycle (speed, turn_rate, pitch_rate), an integrator (velocity) and heading controllers (desired_...); only what
-    somebody reads is computed. The historic desired altitude was the climb speed; here it is the altitude one second ahead.
+    The outputs fit a unicycle (speed, turn_rate, pitch_rate), an integrator (velocity) and heading controllers (desired_...). Only
+    outputs that are wired are computed. In the existing system the desired altitude was the climb speed; here it is the altitude one
+    second ahead.
     """
 
     grade = "portable"
 
-    max_speed = Param(30.0, unit="m/s", ge=0.0, doc="Wanted speed.")
-    comms_range = Param(200.0, unit="m", ge=0.0, doc="Distance up to which others count.")
+    max_speed = Param(30.0, unit="m/s", ge=0.0, doc="Desired speed.")
+    comms_range = Param(200.0, unit="m", ge=0.0, doc="Distance below which entities are neighbours.")
     fov_el = Param(
         2.0 * math.pi,
         unit="rad",
         text_unit="deg",
         ge=0.0,
-        doc="Field of view in elevation; a full circle has no edge.",
+        doc="Field of view in elevation; at 360 degrees nobody is excluded.",
     )
     fov_az = Param(2.0 * math.pi, unit="rad", text_unit="deg", ge=0.0, doc="Field of view in azimuth.")
     goal_weight = Param(0.1, ge=0.0, doc="Weight of the direction to the goal.")
@@ -44,18 +46,18 @@ class Boids(Autonomy):
     avoid_nonteam_weight = Param(10.0, ge=0.0, doc="Weight of the repulsion from others.")
     centroid_weight = Param(1.0, ge=0.0, doc="Weight of the direction to the team mates' centroid.")
     align_weight = Param(0.5, ge=0.0, doc="Weight of the team mates' mean heading.")
-    sphere_of_influence = Param(100.0, unit="m", ge=0.0, doc="Distance from which others repel.")
+    sphere_of_influence = Param(100.0, unit="m", ge=0.0, doc="Distance below which neighbours repel.")
     minimum_team_range = Param(
-        2.0, unit="m", ge=0.0, doc="Distance to team mates below which nothing else counts."
+        2.0, unit="m", ge=0.0, doc="Distance to team mates below which the repulsion overrides all else."
     )
     minimum_nonteam_range = Param(
-        20.0, unit="m", ge=0.0, doc="Distance to others below which nothing else counts."
+        20.0, unit="m", ge=0.0, doc="Distance to others below which the repulsion overrides all else."
     )
-    use_initial_heading = Param(True, doc="The goal lies `goal_distance` ahead of where the entity begins.")
-    goal_distance = Param(AHEAD, unit="m", ge=0.0, doc="How far.")
-    goal = Param((1e6, 1e6, 1e3), fields="x y z", unit="m", doc="The goal otherwise.")
-    means = Param("team", choices=("team", "historic"), doc="How heading and centroid are averaged.")
-    target = State("x y z", unit="m", doc="The goal in force.")
+    use_initial_heading = Param(True, doc="Place the goal `goal_distance` ahead of the initial position.")
+    goal_distance = Param(AHEAD, unit="m", ge=0.0, doc="Distance to the goal, with use_initial_heading.")
+    goal = Param((1e6, 1e6, 1e3), fields="x y z", unit="m", doc="Goal without use_initial_heading.")
+    means = Param("team", choices=("team", "historic"), doc="How mean heading and centroid are computed.")
+    target = State("x y z", unit="m", doc="Current goal.")
     speed = Output(unit="m/s")
     turn_rate = Output(unit="rad/s")
     pitch_rate = Output(unit="rad/s")
@@ -108,7 +110,8 @@ class Boids(Autonomy):
     ) -> bool:  # fmt: skip
         """Whether azimuth and elevation of an offset [m] in body axes are inside the fields of view [rad].
 
-        |angle| < half is cos(angle) > cos(half) up to pi, and a full circle has no edge: someone exactly astern is seen.
+        For angles up to pi, |angle| < half is equivalent to cos(angle) > cos(half). A field of view of 2 pi has no edge: an entity
+        exactly astern is seen.
         """
         w, i, j, k = quat_w, quat_x, quat_y, quat_z
         ahead = (

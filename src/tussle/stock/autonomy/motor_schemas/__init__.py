@@ -1,4 +1,4 @@
-"""The weighted mean of behaviours."""
+"""MotorSchemas: the weighted mean of behaviours."""
 
 from tussle.stock.autonomy.motor_schemas.plugin import MotorSchemas
 

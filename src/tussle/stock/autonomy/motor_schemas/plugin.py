@@ -1,4 +1,4 @@
-"""The weighted mean of behaviours."""
+"""An autonomy that combines behaviours by their weighted mean."""
 
 from __future__ import annotations
 
@@ -9,11 +9,10 @@ from tussle.numeric import atan2
 
 
 class MotorSchemas(Autonomy):
-    """Adds up what its behaviours wish, each by its gain, over the gains of those that wish anything (Arkin 1989).
+    """Combines the velocities of its behaviours (Arkin 1989): their sum weighted by gain, over the gains of those that are not zero.
 
-    So a behaviour that wishes nothing, such as avoidance with nobody near, does not dilute the others. With no wish at all the entity
-    goes straight on at full speed. The sum is written as heading, altitude and speed, and as `velocity`: the motion model or controller
-    takes what it reads.
+    A behaviour whose velocity is zero, such as avoidance with nobody near, therefore does not dilute the others. If all are zero, the
+    entity flies straight on at `max_speed`. The result is written as heading, altitude and speed, and as `velocity`.
     """
 
     grade = "portable"
@@ -21,14 +20,16 @@ class MotorSchemas(Autonomy):
         unread=("state_topic_name", "network_name", "pub_vel_vec"),
         differs={
             "behaviors": "MotorSchemas without behaviors flies straight on; "
-            "in the existing system it then avoids others and goes to (100, 0, 0)"
+            "in the existing system it avoids others and goes to (100, 0, 0)"
         },
     )
 
-    max_speed = Param(21.0, unit="m/s", gt=0.0, doc="Longest wish, and speed when there is none.")
-    add_lower_bound_to_vz = Param(False, doc="Bound the vertical part of the wanted velocity from below.")
-    vz_lower_bound = Param(-1.0, unit="m/s", doc="That bound.")
-    behaviors = Children(Behavior, doc="What it is made of.")
+    max_speed = Param(
+        21.0, unit="m/s", gt=0.0, doc="Largest speed of a behaviour, and speed without behaviours."
+    )
+    add_lower_bound_to_vz = Param(False, doc="Limit the vertical velocity to at least vz_lower_bound.")
+    vz_lower_bound = Param(-1.0, unit="m/s", doc="Lowest vertical velocity, with add_lower_bound_to_vz.")
+    behaviors = Children(Behavior, doc="The combined behaviours.")
     desired_heading = Output(unit="rad")
     desired_altitude = Output(unit="m")
     desired_speed = Output(unit="m/s")
@@ -54,5 +55,5 @@ class MotorSchemas(Autonomy):
 
     @service
     def longest_wish(self, g: GroupView) -> np.ndarray:
-        """Length that a behaviour's wish should not exceed [m/s], (n,)."""
+        """Return the largest speed of a behaviour [m/s], (n,)."""
         return np.asarray(self.max_speed)

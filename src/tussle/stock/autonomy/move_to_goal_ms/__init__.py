@@ -1,4 +1,4 @@
-"""Go to a point."""
+"""MoveToGoalMS: a behaviour that goes to a point."""
 
 from tussle.stock.autonomy.move_to_goal_ms.plugin import MoveToGoalMS
 

@@ -1,4 +1,4 @@
-"""Go to a point."""
+"""A behaviour that goes to a point."""
 
 from __future__ import annotations
 
@@ -11,25 +11,23 @@ AHEAD = 1e6  # [m]
 
 
 def length(v: np.ndarray) -> np.ndarray:
-    """Lengths of vectors (3, n), (n,)."""
+    """Lengths, (n,), of vectors, (3, n)."""
     return np.asarray(np.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]))
 
 
 class MoveToGoalMS(Behavior):
-    """Wish towards the goal, at a speed that a PID on the distance gives; a `Waypoint` message replaces the goal."""
+    """Moves towards the goal; a PID on the distance gives the speed. A `Waypoint` message replaces the goal."""
 
     grade = "portable"
     historic_attributes = HistoricAttributes(
         joined={"distance_pid": ("p_gain", "i_gain", "d_gain", "integral_band")}
     )
 
-    goal = Param((0.0, 0.0, 0.0), fields="x y z", unit="m", doc="Where to.")
-    use_initial_heading = Param(False, doc="The goal lies 1000 km ahead of where the entity begins.")
-    distance_pid = Param(
-        (0.5, 0.0, 0.0, 0.0), fields="kp ki kd band", doc="Gains of the speed on the distance."
-    )
-    target = State("x y z", unit="m", doc="Where it is going to.")
-    integral = State(unit="m s", doc="Of the distance.")
+    goal = Param((0.0, 0.0, 0.0), fields="x y z", unit="m", doc="Point to go to.")
+    use_initial_heading = Param(False, doc="Place the goal 1000 km ahead of the initial position.")
+    distance_pid = Param((0.5, 0.0, 0.0, 0.0), fields="kp ki kd band", doc="Gains from distance to speed.")
+    target = State("x y z", unit="m", doc="Current goal.")
+    integral = State(unit="m s", doc="Integral of the distance.")
     previous = State(unit="m", doc="Distance at the last call.")
     waypoints = Subscribe(Waypoint, network_param="network_name")
     network_name = Param("LocalNetwork", doc="Network that carries the waypoints.")
@@ -37,9 +35,8 @@ class MoveToGoalMS(Behavior):
     def spawn(self, g: GroupView, rows: np.ndarray) -> None:
         ahead = g.pos + AHEAD * g.forward
         self.target[:, rows] = np.where(self.use_initial_heading, ahead, self.goal)[:, rows]
-        self.previous[rows] = length(self.target - g.pos)[
-            rows
-        ]  # so that the first call has no change to answer
+        # The derivative term is zero at the first call.
+        self.previous[rows] = length(self.target - g.pos)[rows]
 
     def step(self, g: GroupView) -> None:
         if self.waypoints:

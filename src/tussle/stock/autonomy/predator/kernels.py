@@ -1,4 +1,4 @@
-"""Predator: whom to hunt, whom to claim, and pure pursuit with unit gain."""
+"""Predator kernels: target choice, capture claims, and pure pursuit with unit gain."""
 
 from __future__ import annotations
 
@@ -15,11 +15,21 @@ from tussle.numeric.kernel import kernel
 def hunt(points, teams, allow_switching, out, rows, first, arrays):
     """Choose targets and collect claims for the rows of a group that begins at row `first` of the table.
 
-    By row of the group (n,): points x, y, z and capture_range [m]; own team and prey_team; allow_switching; target, the id hunted
-    or 0, and target_row, its row of the table or -1, are kept while it lives and switching is not allowed, else become those of the
-    nearest of prey_team (of equals the smaller id). rows: by row of the table id, world and place; order. Claims, everyone of another
-    team nearer than capture_range: claim_row (row of the group) and claim_place, which becomes the row of the table, as far as there
-    is room. Returns how many claims there are.
+    A target is kept while it lives and switching is not allowed; else the nearest entity of prey_team is chosen (on ties the
+    smaller id). Every entity of another team nearer than capture_range is claimed.
+
+    Args:
+        points: x, y, z and capture_range [m], (n,) each, by row of the group.
+        teams: Own team and prey_team, (n,).
+        allow_switching: Whether the nearest prey is chosen in every step, (n,).
+        out: target, the id of the prey or 0, (n,); target_row, its row of the body table or -1, (n,); claim_row, row of the group,
+            and claim_place, row of the body table, per claim, as many as fit; written.
+        rows: id, world and place of each row of the body table; row of each place.
+        first: First row of the group in the body table.
+        arrays: Neighbour index, and team of each place.
+
+    Returns:
+        Number of claims, which may exceed the room for them.
     """
     x, y, z, capture_range = points
     own_team, prey_team = teams
@@ -63,9 +73,15 @@ def hunt(points, teams, allow_switching, out, rows, first, arrays):
 
 @kernel("(F F F) (F F F F) F I F2 (Fw Fw Fw)")
 def pursue(pos, quat, max_speed, target_row, table_pos, commands):
-    """Speed [m/s] and rates [rad/s] towards the target's position; rows without a target keep their last commands.
+    """Command speed [m/s] and rates [rad/s] towards the target; rows without a target keep their last commands.
 
-    pos [m], quat (w, x, y, z), max_speed [m/s], target_row (n,) of the rows; table_pos (N,) [m].
+    Args:
+        pos: Positions x, y, z [m], (n,) each.
+        quat: Quaternion w, x, y, z, body to world, (n,) each.
+        max_speed: Commanded speed [m/s], (n,).
+        target_row: Row of the target in the body table, or -1, (n,).
+        table_pos: Positions of the body table [m], (3, N).
+        commands: Speed, turn rate and pitch rate, (n,) each, written.
     """
     x, y, z = pos
     qw, qx, qy, qz = quat
@@ -86,7 +102,7 @@ def pursue(pos, quat, max_speed, target_row, table_pos, commands):
 
 @kernel("F F F I F2 Fw Fw")
 def point(x, y, max_speed, target_row, table_pos, heading, speed):
-    """Desired heading [rad] and speed [m/s] towards the target; rows without a target keep their last commands."""
+    """Command heading [rad] and speed [m/s] towards the target; rows without a target keep their last commands."""
     for i in range(x.shape[0]):
         row = target_row[i]
         if row >= 0:

@@ -1,4 +1,4 @@
-"""Hunting."""
+"""Pursuit and capture of prey."""
 
 from __future__ import annotations
 
@@ -10,16 +10,18 @@ from tussle.stock.autonomy.predator import kernels
 
 
 class Predator(Autonomy):
-    """Pure pursuit of the nearest prey, and a claim on everyone of another team within `capture_range`.
+    """Pursues the nearest prey (pure pursuit) and claims every entity of another team within `capture_range`.
 
-    Without `allow_prey_switching` a target is kept until it is gone; with it the nearest is chosen anew in every step. Claims go to
-    every entity of another team, rival predators too, as in the paper's code. Without any prey left the last commands persist.
+    Without `allow_prey_switching` a target is kept until it is removed. Claims include rival predators, as in the paper's code.
+    When no prey is left, the last commands persist.
     """
 
     grade = "portable"
 
-    max_speed = Param(30.0, unit="m/s", ge=0.0, doc="Wanted speed.")
-    capture_range = Param(5.0, unit="m", ge=0.0, doc="Distance below which others are claimed.")
+    max_speed = Param(30.0, unit="m/s", ge=0.0, doc="Desired speed.")
+    capture_range = Param(
+        5.0, unit="m", ge=0.0, doc="Distance below which entities of other teams are claimed."
+    )
     allow_prey_switching = Param(True, doc="Choose the nearest prey in every step.")
     prey_team_id = Param(1, doc="Team that is hunted.")
     target = EntityRef(doc="Prey being hunted.")
@@ -38,9 +40,7 @@ class Predator(Autonomy):
         table = (*index.table, g.by_place(index, "team")[0])
         target_row = g.rows_of(self.target)
         room, n_claims = 0, 16 * g.n + 64
-        while (
-            n_claims > room
-        ):  # again, where there are more claims than expected; targets stay as they are then
+        while n_claims > room:  # repeat with more room if the claims did not fit; the targets do not change
             room = n_claims
             claim_row, claimed = np.empty(room, np.int64), np.empty(room, np.int64)
             n_claims = kernels.hunt(

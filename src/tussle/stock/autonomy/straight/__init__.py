@@ -1,4 +1,4 @@
-"""Fly straight on."""
+"""Straight: an autonomy that flies straight on."""
 
 from tussle.stock.autonomy.straight.plugin import Straight
 

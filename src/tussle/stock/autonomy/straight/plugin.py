@@ -1,4 +1,4 @@
-"""Fly straight on."""
+"""An autonomy that flies straight on."""
 
 from __future__ import annotations
 
@@ -22,31 +22,31 @@ from tussle.messages import BoundaryShape, SpawnEntity
 from tussle.numeric import atan2
 from tussle.numeric.quaternion import quat_from_euler
 
-AHEAD = 1e6  # [m]: so far that the direction does not change in a run
+AHEAD = 1e6  # [m]: far enough that the direction does not change during a run
 SPAWN_PERIOD = 2.0  # [s]
 
 
 class Straight(Autonomy):
-    """Hold the initial heading, altitude and speed, on the state that the entity believes itself in.
+    """Holds the initial heading, altitude and speed.
 
-    With `enable_boundary_control` an entity outside the boundary it has last heard of turns back: to its centre, or straight back
-    across a plane. It keeps its altitude, so where no heading leads back, as at a level plane, it flies on.
+    With `enable_boundary_control` an entity outside the boundary that it last received turns back: towards the centre, or straight
+    across a plane. It keeps its altitude. If no heading leads back, as at a horizontal plane, it flies on.
     """
 
     grade = "portable"
     historic_attributes = HistoricAttributes(unread=("save_camera_images",))
 
-    speed = Param(21.0, unit="m/s", ge=0.0, doc="Wanted speed.")
-    enable_boundary_control = Param(False, structural=True, doc="Turn back at a boundary.")
+    speed = Param(21.0, unit="m/s", ge=0.0, doc="Desired speed.")
+    enable_boundary_control = Param(False, structural=True, doc="Turn back outside a boundary.")
     generate_entities = Param(
         False,
         structural=True,
-        doc="Every 2 s ask for a new entity 10 m to the left, turned left by 90 degrees.",
+        doc="Spawn an entity every 2 s, 10 m to the left, heading 90 degrees to the left.",
     )
-    template = Param("gen_straight", doc="Block of the new entities.")
+    template = Param("gen_straight", doc="Entity block of the new entities.")
     goal = State("x y z", unit="m", doc="Point far ahead.")
-    is_fenced = State(dtype=bool, doc="Whether it has heard of a boundary.")
-    fence = Handle(doc="The boundary last heard of.")
+    is_fenced = State(dtype=bool, doc="Whether a boundary was received.")
+    fence = Handle(doc="The boundary received last.")
     fences = Subscribe(BoundaryShape)
     births = Publish(SpawnEntity)
     desired_altitude = Output(unit="m")
@@ -65,24 +65,24 @@ class Straight(Autonomy):
         self.desired_speed[:] = self.speed
         self.desired_heading[:] = atan2(direction[1], direction[0])
         if self.generate_entities:
-            self._ask_for_another(g)
+            self._request_spawns(g)
 
     def _turn_back(self, g: GroupView) -> None:
         if self.fences:
             rows, heard = self.fences.latest()
-            for row, told in zip(rows, heard.shape, strict=True):
-                self.fence[row] = told
+            for row, shape in zip(rows, heard.shape, strict=True):
+                self.fence[row] = shape
                 self.is_fenced[row] = True
         for row in np.flatnonzero(self.is_fenced):
-            shape: Any = self.fence[row]
+            fence: Any = self.fence[row]
             pos = g.pos[:, row : row + 1]
-            if not shape.contains(pos)[0]:
-                way = shape.inward(pos)
+            if not fence.contains(pos)[0]:
+                way = fence.inward(pos)
                 way[2] = 0.0
                 if way.any():
                     self.goal[:2, row : row + 1] = (pos + AHEAD * unit(way))[:2]
 
-    def _ask_for_another(self, g: GroupView) -> None:
+    def _request_spawns(self, g: GroupView) -> None:
         elapsed = g.t - g.context.clock.start + 1e-6 * g.dt
         rows = np.flatnonzero(
             np.floor(elapsed / SPAWN_PERIOD) > np.maximum(0.0, np.floor((elapsed - g.dt) / SPAWN_PERIOD))

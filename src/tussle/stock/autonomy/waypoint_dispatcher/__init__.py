@@ -1,4 +1,4 @@
-"""Leads along a list of waypoints."""
+"""WaypointDispatcher: follows a list of waypoints."""
 
 from tussle.stock.autonomy.waypoint_dispatcher.plugin import WaypointDispatcher
 

@@ -1,4 +1,4 @@
-"""Says where to go, when it is time."""
+"""WaypointGenerator: publishes waypoints at given times."""
 
 from tussle.stock.autonomy.waypoint_generator.plugin import WaypointGenerator
 

@@ -1,4 +1,4 @@
-"""Says where to go, when it is time."""
+"""An autonomy that publishes waypoints at given times."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ NEVER = -1e300
 
 
 class WaypointGenerator(Autonomy):
-    """Publishes its waypoints when their times have come, all that are due in one list.
+    """Publishes each waypoint at its time; waypoints that are due in the same step form one list.
 
-    A waypoint is the time at which it is told, its place, roll, pitch and yaw there, and how near is near enough; a negative tolerance
-    is any distance. Places are in the world frame: a mission file may write them as latitude, longitude and altitude, which its origin
-    turns into that. The third default waypoint lies at the origin, which the existing system wrote as a place in California.
+    A waypoint is a publication time, a position, roll, pitch and yaw, and the tolerances of position and turn; a negative tolerance
+    accepts any distance. Positions are in the world frame. A mission file may give them as latitude, longitude and altitude, which are
+    converted with the mission's origin. The third default waypoint lies at the origin; in the existing system it was a place in
+    California.
     """
 
     grade = "portable"
@@ -31,16 +32,16 @@ class WaypointGenerator(Autonomy):
         unit="s m m m rad rad rad m rad",
         text_unit="s m m m deg deg deg m rad",
         ragged=True,
-        doc="What it tells, in order.",
+        doc="Waypoints, in the order of publication.",
     )
-    mode = Param("follow_once", choices=WAYPOINT_MODES, doc="What is to be done at the end of the list.")
-    network_name = Param("GlobalNetwork", doc="Network that carries the lists.")
+    mode = Param("follow_once", choices=WAYPOINT_MODES, doc="What to do at the end of the list.")
+    network_name = Param("GlobalNetwork", doc="Network of the lists.")
     topic_name = Param("WaypointList", doc="Topic of the lists.")
-    told = State(unit="s", default=NEVER, doc="Time up to which it has told everything.")
+    told = State(unit="s", default=NEVER, doc="Time up to which waypoints have been published.")
     lists = Publish(WaypointList, network_param="network_name", topic_param="topic_name")
 
     def step(self, g: GroupView) -> None:
-        now = g.t + 1e-6 * g.dt  # a time that was written as a decimal number may lie just above a step's
+        now = g.t + 1e-6 * g.dt  # a time written as a decimal number may lie just above that of the step
         start, data = self.waypoints.start, self.waypoints.data
         owner = np.repeat(np.arange(g.n), np.diff(start))
         is_due = (data[0] > self.told[owner]) & (data[0] <= now[owner])
@@ -48,6 +49,6 @@ class WaypointGenerator(Autonomy):
         if is_due.any():
             count = np.bincount(owner[is_due], minlength=g.n)
             rows = np.flatnonzero(count)
-            told = np.concatenate([data[1:7], np.where(data[7:] < 0.0, np.inf, data[7:])])[:, is_due]
-            points = RaggedColumn(np.concatenate([[0], np.cumsum(count[rows])]), np.ascontiguousarray(told))
+            due = np.concatenate([data[1:7], np.where(data[7:] < 0.0, np.inf, data[7:])])[:, is_due]
+            points = RaggedColumn(np.concatenate([[0], np.cumsum(count[rows])]), np.ascontiguousarray(due))
             self.lists.publish(rows, points=points, mode=WAYPOINT_MODES.index(self.mode))

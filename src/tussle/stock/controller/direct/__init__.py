@@ -1,4 +1,4 @@
-"""DirectController: autonomy and motion model joined without a controller."""
+"""DirectController: connects an autonomy directly to a motion model."""
 
 from tussle.stock.controller.direct.plugin import DirectController
 

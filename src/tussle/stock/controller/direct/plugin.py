@@ -1,4 +1,4 @@
-"""Wiring for motion models that autonomies command directly."""
+"""A pass-through controller."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from tussle.api import Controller
 
 
 class DirectController(Controller):
-    """Joins what comes before it to what comes after it, channel by channel, unchanged.
+    """Passes every channel from the autonomies to the motion model unchanged.
 
-    It has no channels of its own and is never called: the reader's inputs are the writer's outputs. The existing
-    system copied value by value in every substep, to the same end.
+    It declares no channels and is never called: the inputs of the motion model are the outputs of the autonomies. The
+    existing system copied the values in every substep, with the same result.
     """
 
     grade = "portable"

@@ -1,4 +1,4 @@
-"""A constant push on an oscillator."""
+"""HarmonicOscillatorConstController: a constant acceleration command."""
 
 from tussle.stock.controller.harmonic_oscillator_const_controller.plugin import (
     HarmonicOscillatorConstController,

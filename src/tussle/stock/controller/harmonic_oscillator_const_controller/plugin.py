@@ -1,4 +1,4 @@
-"""A constant push on an oscillator."""
+"""A constant acceleration command for an oscillator."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ from tussle.api import Controller, GroupView, Output, Param
 
 
 class HarmonicOscillatorConstController(Controller):
-    """Writes a constant `acceleration_z`; an oscillator settles at that over its natural frequency squared."""
+    """Commands a constant `acceleration_z`. An oscillator settles at `acceleration_z` over its natural frequency squared."""
 
     grade = "portable"
 
-    acceleration_z = Param(0.0, unit="m/s^2", doc="Push upwards, per mass.")
-    push = Output("acceleration_z", unit="m/s^2", doc="The same at every call.")
+    acceleration_z = Param(0.0, unit="m/s^2", doc="Vertical acceleration, up positive.")
+    push = Output("acceleration_z", unit="m/s^2", doc="Commanded acceleration, up positive.")
 
     def step(self, g: GroupView) -> None:
-        """Write the push."""
+        """Write the command."""
         self.push[:] = self.acceleration_z

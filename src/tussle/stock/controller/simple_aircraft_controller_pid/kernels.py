@@ -1,4 +1,4 @@
-"""The law of SimpleAircraftControllerPID."""
+"""The control law of SimpleAircraftControllerPID."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ BLOCK = 128  # rows
 
 @kernel("(F F F) (F F F F) F (b1 b1) (F2 F2 F2) F2w f8 (Fw Fw Fw)")
 def steer(wanted, motion, angle, flags, gains, memory, dt, commands):
-    """One call of the three loops.
+    """Run the lateral, vertical and speed loops once.
 
     Args:
-        wanted: Heading, or with use_roll bank (right wing down) [rad]; altitude [m], or with use_glide_slope slope of the descent
-            [rad]; speed [m/s], (n,).
-        motion: Altitude [m] and velocity [m/s], world frame, (n,).
+        wanted: Desired heading, or with use_roll bank (right wing down) [rad]; altitude [m], or with use_glide_slope slope of the
+            descent [rad]; speed [m/s], (n,) each.
+        motion: Altitude [m] and velocity [m/s], world frame, (n,) each.
         angle: Heading, or with use_roll bank (right wing down) [rad], (n,).
         flags: use_roll, whether the lateral loop holds a bank; use_glide_slope, whether the vertical loop holds a slope.
-        gains: Of the lateral, vertical and speed loop: kp, ki, kd, band, (4, n).
-        memory: Integral and last error of the lateral, vertical and speed loop; 1.0 once there is a last error, (7,
+        gains: kp, ki, kd and band of the lateral, vertical and speed loop, (4, n) each.
+        memory: Integral and last error of the lateral, vertical and speed loop, and 1.0 once the last errors are valid, (7,
             n), updated in place.
         dt: Time since the last call [s].
-        commands: Throttle [-], roll rate [rad/s], positive banks into a left turn, pitch rate [rad/s], nose up, (n,), written.
+        commands: Throttle [-]; roll rate [rad/s], positive into a left turn; pitch rate [rad/s], nose up; (n,) each, written.
     """
     lateral, vertical, speed = wanted
     z, vx, vy, vz = motion
@@ -35,7 +35,7 @@ def steer(wanted, motion, angle, flags, gains, memory, dt, commands):
     throttle, roll_rate, pitch_rate = commands
     error = np.empty((3, BLOCK))
     change = np.empty((3, BLOCK))
-    # A bank to the right needs a negative roll rate of the model; a steeper descent a lower nose.
+    # A bank to the right needs a negative roll rate of the model, a steeper descent a negative pitch rate.
     lateral_sign = -1.0 if use_roll else 1.0
     vertical_sign = -1.0 if use_glide_slope else 1.0
     seen = memory[6]

@@ -11,17 +11,17 @@ GAINS = "kp ki kd band"
 
 
 class SimpleAircraftControllerPID(Controller):
-    """Flies a SimpleAircraft to a heading (or bank), an altitude (or slope of descent) and a speed, with one PID loop each.
+    """Controls heading (or bank), altitude (or slope of descent) and speed of a SimpleAircraft with one PID loop each.
 
-    The heading error drives the rate of the bank, so that loop is of third order and lives by its derivative gain. A
-    PID's integral is emptied while its error exceeds `band`. desired_roll is right wing down, desired_glide_slope
+    The heading error commands the roll rate; that loop is of third order and needs its derivative gain to be stable. The
+    integral of a loop is zero while its error exceeds `band`. desired_roll is right wing down, desired_glide_slope is
     positive downwards.
 
-    Other than in the existing system, a positive pitch_rate raises the nose, the measured slope is that of the true
-    velocity (whose z had the wrong sign there, so the loops act as before); each loop's time step is that of the call
-    (there, the full step even when called once per substep); the first call has no derivative kick, which there
-    banked every aircraft at its largest rate at the start; and the derivative of the heading error does not jump
-    where the error passes from +pi to -pi.
+    Differences from the existing system: a positive pitch_rate raises the nose; the measured slope is that of the true
+    velocity (there the sign of its z was wrong, so the loops act as before); the time step of each loop is that of the
+    call (there, the full step even when called once per substep); the first call has no derivative kick, which there
+    rolled every aircraft at its largest rate at the start; and the derivative of the heading error does not jump where
+    the error passes from +pi to -pi.
     """
 
     grade = "portable"
@@ -41,13 +41,13 @@ class SimpleAircraftControllerPID(Controller):
     use_glide_slope = Param(
         False, structural=True, doc="Hold desired_glide_slope instead of desired_altitude."
     )
-    desired_heading = Input(unit="rad", doc="Wanted heading, counter-clockwise from East.")
-    desired_roll = Input(unit="rad", doc="Wanted bank, right wing down, with use_roll.")
-    desired_altitude = Input(unit="m", doc="Wanted height above the origin's tangent plane.")
-    desired_glide_slope = Input(unit="rad", doc="Wanted slope of the descent, with use_glide_slope.")
-    desired_speed = Input(unit="m/s", doc="Wanted speed.")
+    desired_heading = Input(unit="rad", doc="Desired heading, counter-clockwise from East.")
+    desired_roll = Input(unit="rad", doc="Desired bank, right wing down, with use_roll.")
+    desired_altitude = Input(unit="m", doc="Desired height above the origin's tangent plane.")
+    desired_glide_slope = Input(unit="rad", doc="Desired slope of the descent, with use_glide_slope.")
+    desired_speed = Input(unit="m/s", doc="Desired speed.")
     throttle = Output(doc="Throttle; five times the acceleration [m/s^2].")
-    roll_rate = Output(unit="rad/s", doc="Rate of the bank; positive banks into a left turn.")
+    roll_rate = Output(unit="rad/s", doc="Rate of the bank, positive into a left turn.")
     pitch_rate = Output(unit="rad/s", doc="Rate of the elevation, nose up positive.")
     memory = State(
         "lateral_integral lateral_error vertical_integral vertical_error speed_integral speed_error has_error",
@@ -55,13 +55,13 @@ class SimpleAircraftControllerPID(Controller):
     )
 
     def active_inputs(self) -> list[str]:
-        """Heading or bank, altitude or slope, and speed."""
+        """Return heading or bank, altitude or slope, and speed."""
         lateral = "desired_roll" if self.use_roll else "desired_heading"
         vertical = "desired_glide_slope" if self.use_glide_slope else "desired_altitude"
         return [lateral, vertical, "desired_speed"]
 
     def step(self, g: GroupView) -> None:
-        """All loops of all rows."""
+        """Run all loops of all rows."""
         lateral, angle = (self.desired_roll, g.roll) if self.use_roll else (self.desired_heading, g.yaw)
         vertical = self.desired_glide_slope if self.use_glide_slope else self.desired_altitude
         kernels.steer(

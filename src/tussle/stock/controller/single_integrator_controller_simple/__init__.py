@@ -1,4 +1,4 @@
-"""SingleIntegratorControllerSimple: a wanted velocity handed through."""
+"""SingleIntegratorControllerSimple: passes a desired velocity through."""
 
 from tussle.stock.controller.single_integrator_controller_simple.plugin import (
     SingleIntegratorControllerSimple,

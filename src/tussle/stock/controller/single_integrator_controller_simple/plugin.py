@@ -1,4 +1,4 @@
-"""A wanted velocity handed to a single integrator."""
+"""A pass-through controller for a single integrator."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from tussle.api import Controller, Input, Output
 
 
 class SingleIntegratorControllerSimple(Controller):
-    """Hands a wanted velocity through, unchanged: wiring, never called."""
+    """Passes a desired velocity through unchanged. It is wiring only and is never called."""
 
     grade = "portable"
     passthrough: ClassVar[bool] = True
 
-    wanted = Input("velocity_x velocity_y velocity_z", unit="m/s", doc="Wanted velocity, world frame.")
-    velocity = Output("velocity_x velocity_y velocity_z", unit="m/s", doc="The same.")
+    wanted = Input("velocity_x velocity_y velocity_z", unit="m/s", doc="Desired velocity, world frame.")
+    velocity = Output("velocity_x velocity_y velocity_z", unit="m/s", doc="Commanded velocity, world frame.")

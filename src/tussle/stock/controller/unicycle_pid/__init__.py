@@ -1,4 +1,4 @@
-"""UnicyclePID: flies a unicycle to a heading, an altitude and a speed."""
+"""UnicyclePID: controls heading, altitude and speed of a unicycle."""
 
 from tussle.stock.controller.unicycle_pid.plugin import UnicyclePID
 

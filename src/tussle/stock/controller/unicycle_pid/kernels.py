@@ -1,4 +1,4 @@
-"""The law of UnicyclePID. Rows go through scratch arrays in blocks so that the arc tangents and wraps run in SIMD lanes."""
+"""The control law of UnicyclePID. Rows are processed in blocks of scratch so that arc tangents and wraps are vectorised."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ BLOCK = 128  # rows
 
 @kernel("(F F F) (F F F F) (F F F) (F2 F2 F2 F2) F2w f8 (Fw Fw Fw Fw Fw)")
 def steer(wanted, motion, attitude, gains, memory, dt, commands):
-    """One call of the four loops.
+    """Run the heading, pitch, roll and speed loops once.
 
     Args:
-        wanted: Altitude [m], speed [m/s], heading [rad], (n,).
-        motion: Altitude [m] and velocity [m/s], world frame, (n,).
-        attitude: Heading, elevation (nose up), bank (right wing down) [rad], (n,).
-        gains: Of heading, pitch, roll and speed: kp, ki, kd, band, (4, n).
-        memory: Integral and last error of heading, pitch, roll, speed; 1.0 once there is a last error, (9, n),
+        wanted: Desired altitude [m], speed [m/s] and heading [rad], (n,) each.
+        motion: Altitude [m] and velocity [m/s], world frame, (n,) each.
+        attitude: Heading, elevation (nose up), bank (right wing down) [rad], (n,) each.
+        gains: kp, ki, kd and band of heading, pitch, roll and speed, (4, n) each.
+        memory: Integral and last error of heading, pitch, roll and speed, and 1.0 once the last errors are valid, (9, n),
             updated in place.
         dt: Time since the last call [s].
-        commands: The wanted speed, handed through [m/s], command of the speed loop [m/s^2], turn, pitch and roll rate [rad/s],
-            (n,), written.
+        commands: Desired speed, passed through [m/s], acceleration of the speed loop [m/s^2], turn, pitch and roll rate [rad/s],
+            (n,) each, written.
     """
     altitude, speed, heading = wanted
     z, vx, vy, vz = motion

@@ -11,14 +11,14 @@ GAINS = "kp ki kd band"
 
 
 class UnicyclePID(Controller):
-    """Flies a unicycle to a heading, an altitude and a speed, with one PID loop each for heading, elevation, bank and speed.
+    """Controls heading, altitude and speed of a unicycle with one PID loop each for heading, elevation, bank and speed.
 
-    The wanted elevation is that of the direction (speed forwards, altitude error upwards); for a vehicle that flies
-    backwards it is the other way up. Speed is handed through, and as `acceleration_x` for models that take one comes
-    from the speed loop. A PID's integral is emptied while its error exceeds `band`.
+    The desired elevation is that of the vector (speed forwards, altitude error upwards), with the opposite sign for a
+    vehicle that flies backwards. The desired speed is passed through as `speed`; the speed loop commands `acceleration_x`
+    for models that take an acceleration. The integral of a loop is zero while its error exceeds `band`.
 
-    Other than in the existing system, elevation is nose up and a positive pitch_rate raises the nose; each loop's
-    time step is that of the call (there, the full step even when called once per substep); the first call has no
+    Differences from the existing system: elevation is nose up and a positive pitch_rate raises the nose; the time step
+    of each loop is that of the call (there, the full step even when called once per substep); the first call has no
     derivative kick; and the derivative of an angle's error does not jump where the error passes from +pi to -pi.
     """
 
@@ -38,15 +38,15 @@ class UnicyclePID(Controller):
         (1.0, 0.0, 0.0, 10.0),
         fields=GAINS,
         unit="1/s 1/s^2 1 rad",
-        doc="Bank to roll rate; levels the wings.",
+        doc="Bank to roll rate; keeps the wings level.",
     )
     speed_pid = Param(
         (1.0, 0.1, 0.03, 10.0), fields=GAINS, unit="1/s 1/s^2 1 m/s", doc="Speed to acceleration_x."
     )
-    desired_altitude = Input(unit="m", doc="Wanted height above the origin's tangent plane.")
-    desired_speed = Input(unit="m/s", doc="Wanted speed.")
-    desired_heading = Input(unit="rad", doc="Wanted heading, counter-clockwise from East.")
-    speed = Output(unit="m/s", doc="Wanted speed, handed through.")
+    desired_altitude = Input(unit="m", doc="Desired height above the origin's tangent plane.")
+    desired_speed = Input(unit="m/s", doc="Desired speed.")
+    desired_heading = Input(unit="rad", doc="Desired heading, counter-clockwise from East.")
+    speed = Output(unit="m/s", doc="Desired speed, passed through.")
     acceleration_x = Output(unit="m/s^2", doc="Acceleration along the body x axis.")
     turn_rate = Output(unit="rad/s", doc="Turn rate, counter-clockwise positive.")
     pitch_rate = Output(unit="rad/s", doc="Rate of the elevation, nose up positive.")
@@ -58,7 +58,7 @@ class UnicyclePID(Controller):
     )
 
     def step(self, g: GroupView) -> None:
-        """All loops of all rows."""
+        """Run all loops of all rows."""
         kernels.steer(
             (self.desired_altitude, self.desired_speed, self.desired_heading), (g.pos[2], *g.vel), (g.yaw, g.climb, g.roll),
             (self.heading_pid, self.pitch_pid, self.roll_pid, self.speed_pid), self.memory, g.dt,

@@ -1,4 +1,4 @@
-"""A region and who crosses its edge."""
+"""Boundary: a region that reports crossings."""
 
 from tussle.stock.interaction.boundary.plugin import Boundary
 

@@ -1,4 +1,4 @@
-"""A region and who crosses its edge."""
+"""A region that reports which entities cross its boundary."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from tussle.scene import Cuboid, Plane, Sphere
 
 
 class Boundary(Interaction):
-    """A cuboid, sphere or half-space that tells its shape once (`BoundaryShape`), and who enters or leaves it (`BoundaryCrossed`).
+    """A cuboid, sphere or half-space. Publishes its shape once (`BoundaryShape`) and each entry and exit (`BoundaryCrossed`).
 
-    Rotation is honoured; the historic one ignored it.
+    The existing system ignored the rotation.
     """
 
     grade = "portable"
@@ -21,26 +21,28 @@ class Boundary(Interaction):
         unread=("network_name", "polyhedron_points"),
     )
 
-    boundary_id = Param(0, structural=True, doc="Number that others know it by.")
-    team = Param(0, structural=True, doc="Team that it belongs to.")
+    boundary_id = Param(0, structural=True, doc="Id of the boundary in its messages.")
+    team = Param(0, structural=True, doc="Team that owns the boundary.")
     shape = Param("cuboid", choices=("cuboid", "sphere", "plane"), doc="Kind of region.")
     center = Param(
         (0.0, 0.0, 0.0), fields="x y z", unit="m", structural=True, doc="Centre; of a plane, a point on it."
     )
     lengths = Param(
-        (10.0, 10.0, 10.0), fields="x y z", unit="m", gt=0.0, structural=True, doc="Edges of a cuboid."
+        (10.0, 10.0, 10.0), fields="x y z", unit="m", gt=0.0, structural=True, doc="Edge lengths of a cuboid."
     )
-    rpy = Param((0.0, 0.0, 0.0), fields="roll pitch yaw", unit="rad", structural=True, doc="Its attitude.")
-    radius = Param(500.0, unit="m", gt=0.0, structural=True, doc="Of a sphere.")
-    normal = Param((0.0, 0.0, 1.0), fields="x y z", structural=True, doc="Of a plane; points to the outside.")
+    rpy = Param(
+        (0.0, 0.0, 0.0), fields="roll pitch yaw", unit="rad", structural=True, doc="Attitude of a cuboid."
+    )
+    radius = Param(500.0, unit="m", gt=0.0, structural=True, doc="Radius of a sphere.")
+    normal = Param((0.0, 0.0, 1.0), fields="x y z", structural=True, doc="Outward normal of a plane.")
     was_inside = State(
         dtype=bool, per="entity", doc="Whether an entity was inside at the end of the last step."
     )
-    is_known = State(dtype=bool, per="entity", doc="Whether it has been looked at before.")
+    is_known = State(dtype=bool, per="entity", doc="Whether `was_inside` of the entity is valid.")
     is_told = State(dtype=bool, per="world", doc="Whether the shape has been published.")
 
     def region(self) -> Cuboid | Sphere | Plane:
-        """The region as a shape of the scene."""
+        """Return the region as a shape of the scene."""
         if self.shape == "sphere":
             return Sphere(center=self.center, radius=self.radius)
         if self.shape == "plane":
@@ -67,5 +69,5 @@ class Boundary(Interaction):
 
     @service
     def is_inside(self, pos: np.ndarray) -> np.ndarray:
-        """Whether points [m], (3, n), lie inside, (n,)."""
+        """Return whether points [m], (3, n), lie inside, (n,)."""
         return np.asarray(self.region().contains(pos))

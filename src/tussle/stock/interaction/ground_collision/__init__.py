@@ -1,4 +1,4 @@
-"""The ground as the end of a flight, or as what carries a vehicle."""
+"""GroundCollision: removes or supports entities that reach the ground."""
 
 from tussle.stock.interaction.ground_collision.plugin import GroundCollision
 

@@ -1,4 +1,4 @@
-"""The ground as the end of a flight, or as what carries a vehicle."""
+"""Collisions of entities with the ground."""
 
 from __future__ import annotations
 
@@ -13,33 +13,30 @@ GRAVITY = 9.81  # [m/s^2]
 
 
 class GroundCollision(Interaction):
-    """What comes down to the level of the ground is removed, or carried by a force that is its weight.
+    """Removes entities that reach the ground level, or supports them by an upward force equal to their weight.
 
-    It says so (`EntityHitGround`) when an entity touches; the existing system said it again in every step of a stay on the ground. It
-    also keeps entities from being placed in the ground.
+    Publishes `EntityHitGround` when an entity touches the ground; the existing system published it in every step on the ground. It
+    also rejects initial positions at or below the ground.
     """
 
     grade = "portable"
 
-    ground_collision_z = Param(0.0, unit="m", doc="Level of the ground above the origin's tangent plane.")
+    ground_collision_z = Param(0.0, unit="m", doc="Ground level above the origin's tangent plane.")
     ground_collision_altitude = Param(
         "",
-        doc="That level as an altitude above the ellipsoid, such as '300 m'; where given it goes before ground_collision_z.",
+        doc="Ground level as an altitude above the ellipsoid, such as '300 m'; if given, it replaces ground_collision_z.",
     )
-    enable_startup_collisions = Param(True, doc="Nobody is placed at or below the level.")
-    remove_on_collision = Param(True, doc="Remove what touches; else push it up by its weight.")
-    team = Param("all", doc="Number of the team that the ground is there for, or 'all'.")
+    enable_startup_collisions = Param(True, doc="Reject initial positions at or below the ground.")
+    remove_on_collision = Param(True, doc="Remove entities on the ground; else support their weight.")
+    team = Param("all", doc="Number of the team that collides with the ground, or 'all'.")
     is_down = State(
-        dtype=bool, per="entity", doc="Whether an entity was at or below the level in the last step."
+        dtype=bool, per="entity", doc="Whether an entity was at or below the ground level in the last step."
     )
 
     def start(self, w: WorldView) -> None:
-        self._touch(w)
+        self.step(w)
 
     def step(self, w: WorldView) -> None:
-        self._touch(w)
-
-    def _touch(self, w: WorldView) -> None:
         is_down = w.pos[2] <= self._level(w)[w.world]
         if self.team != "all":
             is_down &= w.team == self._team()
@@ -55,7 +52,7 @@ class GroundCollision(Interaction):
             w.bodies.force[2, carried] += w.mass[carried] * GRAVITY
 
     def _level(self, w: WorldView) -> np.ndarray:
-        """Height of the ground [m], (n_worlds,)."""
+        """Return the ground level [m], (n_worlds,)."""
         if not self.ground_collision_altitude:
             return np.asarray(self.ground_collision_z)
         altitude = units.parse(self.ground_collision_altitude, "m")
@@ -66,7 +63,7 @@ class GroundCollision(Interaction):
             return int(self.team)
         except ValueError:
             raise ParameterError(
-                f"GroundCollision.team = {self.team!r} is not allowed; it takes the number of a team, or 'all'"
+                f"GroundCollision.team = {self.team!r} is not allowed; allowed are the number of a team and 'all'"
             ) from None
 
     def rejects(self, w: WorldView, world: int, pos: np.ndarray, taken: np.ndarray) -> bool:

@@ -1,4 +1,4 @@
-"""The referee of captures."""
+"""SimpleCapture: decides capture claims."""
 
 from tussle.stock.interaction.simple_capture.plugin import SimpleCapture
 

@@ -1,4 +1,4 @@
-"""The referee of captures."""
+"""Decisions on capture claims."""
 
 from __future__ import annotations
 
@@ -9,30 +9,30 @@ from tussle.messages import Batch, CaptureEntity, EntityCaptured
 
 
 class SimpleCapture(Interaction):
-    """Judges claims (`CaptureEntity`) in the step they are made, after all have moved: one holds within `capture_range`.
+    """Decides capture claims (`CaptureEntity`) at the end of the step in which they are made. A claim is valid within `capture_range`.
 
-    By default each capture is credited once, to the nearest claimant (the smaller id when equally near). With `credit="each"` every
-    claim that holds counts, as the code of the 2018 paper did: a prey claimed by k predators in one step scores k. The historic
-    referee judged one step late and made a target whose claim had failed immune for the rest of the run; here it can be claimed again.
+    By default each capture is credited once, to the nearest claimant (on ties the smaller id). With `credit="each"` every valid claim
+    counts, as in the code of the 2018 paper: a prey claimed by k predators in one step scores k. The existing system decided one step
+    late and made a target immune for the rest of the run after a failed claim; here it can be claimed again.
     """
 
     grade = "portable"
 
-    capture_range = Param(5.0, unit="m", ge=0.0, doc="Largest distance at which a claim holds.")
-    enable_team_captures = Param(True, doc="Team mates can be captured.")
-    enable_non_team_captures = Param(True, doc="Others can be captured.")
-    credit = Param(
-        "once", choices=("once", "each"), doc="Whether a capture counts once, or once per claim that holds."
+    capture_range = Param(5.0, unit="m", ge=0.0, doc="Largest distance of a valid claim.")
+    enable_team_captures = Param(True, doc="Allow captures of team mates.")
+    enable_non_team_captures = Param(True, doc="Allow captures of entities of other teams.")
+    credit = Param("once", choices=("once", "each"), doc="Count a capture once, or once per valid claim.")
+    effect = Param("remove", choices=("remove", "teleport", "heal"), doc="What happens to captured entities.")
+    teleport_to = Param(
+        (0.0, 0.0, 0.0), fields="x y z", unit="m", doc="New position, with effect='teleport'."
     )
-    effect = Param("remove", choices=("remove", "teleport", "heal"), doc="What becomes of the captured.")
-    teleport_to = Param((0.0, 0.0, 0.0), fields="x y z", unit="m", doc="With teleport: where they are put.")
-    healed_health = Param(1.0, gt=0.0, doc="With heal: their health afterwards.")
+    healed_health = Param(1.0, gt=0.0, doc="New health, with effect='heal'.")
 
     def step(self, w: WorldView) -> None:
         claims = w.inbox(CaptureEntity)
         if not claims.n:
             return
-        source, target, world = self._holding(w, claims)
+        source, target, world = self._valid(w, claims)
         if not len(source):
             return
         w.publish(
@@ -41,8 +41,8 @@ class SimpleCapture(Interaction):
         )  # fmt: skip
         self._apply(w, np.unique(target))
 
-    def _holding(self, w: WorldView, claims: Batch) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Rows of captor and captured, and world, of the claims that hold and are credited."""
+    def _valid(self, w: WorldView, claims: Batch) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the rows of captor and captured, and the world, of each valid and credited claim."""
         source, target = w.rows_at(claims.world, claims.sender), w.rows_at(claims.world, claims.target)
         is_there = (source >= 0) & (target >= 0)
         source, target, world = source[is_there], target[is_there], claims.world[is_there]
@@ -50,13 +50,13 @@ class SimpleCapture(Interaction):
         distance = np.sqrt(dx * dx + dy * dy + dz * dz)
         is_team = w.team[source] == w.team[target]
         allowed = np.where(is_team, self.enable_team_captures[world], self.enable_non_team_captures[world])
-        holds = np.flatnonzero((distance <= self.capture_range[world]) & allowed)
+        valid = np.flatnonzero((distance <= self.capture_range[world]) & allowed)
         if self.credit == "once":
-            best = holds[np.lexsort((w.id[source[holds]], distance[holds], target[holds]))]
+            best = valid[np.lexsort((w.id[source[valid]], distance[valid], target[valid]))]
             is_first = np.ones(len(best), bool)
             is_first[1:] = target[best[1:]] != target[best[:-1]]
-            holds = np.sort(best[is_first])
-        return source[holds], target[holds], world[holds]
+            valid = np.sort(best[is_first])
+        return source[valid], target[valid], world[valid]
 
     def _apply(self, w: WorldView, rows: np.ndarray) -> None:
         if self.effect == "remove":

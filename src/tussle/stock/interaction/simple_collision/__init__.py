@@ -1,4 +1,4 @@
-"""Entities that meet are gone."""
+"""SimpleCollision: removes entities that collide."""
 
 from tussle.stock.interaction.simple_collision.plugin import SimpleCollision
 

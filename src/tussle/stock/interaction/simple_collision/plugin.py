@@ -1,4 +1,4 @@
-"""Entities that meet are gone."""
+"""Collisions between entities."""
 
 from __future__ import annotations
 
@@ -9,19 +9,20 @@ from tussle.messages import EntityCollided
 
 
 class SimpleCollision(Interaction):
-    """Removes every two entities that are nearer than `collision_range`, and keeps that much room when entities are placed.
+    """Removes both entities of each pair nearer than `collision_range`.
 
-    All pairs of a step count; the historic one took the first pair of a cluster and spared the rest.
+    Initial positions nearer than `startup_collision_range` to another entity are rejected. All pairs of a step collide; the existing
+    system took the first pair of a cluster and spared the rest.
     """
 
     grade = "portable"
 
-    collision_range = Param(2.0, unit="m", ge=0.0, doc="Distance below which two collide.")
-    startup_collision_range = Param(2.0, unit="m", ge=0.0, doc="Room around each entity when it is placed.")
-    startup_collisions_only = Param(False, structural=True, doc="Look after placement only.")
-    init_alt_deconflict = Param(False, doc="Keep the room in height alone when placing.")
+    collision_range = Param(2.0, unit="m", ge=0.0, doc="Distance below which two entities collide.")
+    startup_collision_range = Param(2.0, unit="m", ge=0.0, doc="Least distance of initial positions.")
+    startup_collisions_only = Param(False, structural=True, doc="Check at the start only.")
+    init_alt_deconflict = Param(False, doc="Measure startup_collision_range in altitude only.")
     enable_team_collisions = Param(True, doc="Team mates collide.")
-    enable_non_team_collisions = Param(True, doc="Others collide.")
+    enable_non_team_collisions = Param(True, doc="Entities of different teams collide.")
 
     def start(self, w: WorldView) -> None:
         self._collide(w)

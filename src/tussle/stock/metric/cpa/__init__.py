@@ -1,4 +1,4 @@
-"""The closest point of approach."""
+"""CPA: closest point of approach."""
 
 from tussle.stock.metric.cpa.plugin import CPA
 

@@ -1,4 +1,4 @@
-"""The closest point of approach."""
+"""Closest point of approach."""
 
 from __future__ import annotations
 
@@ -8,30 +8,28 @@ from tussle.api import HistoricAttributes, Metric, Param, State, WorldView
 
 
 class CPA(Metric):
-    """How near entities of each team have come to another: the least distance of the run, between whom, and when.
+    """Closest point of approach of each team: the smallest distance to another entity in the run, the two entities, and the time.
 
-    Looked at after each step's motion. With `team_cpa` or a `team_id` only the others of the own team count, with a `team_id` only
-    entities of that team. The existing system wrote the least distance of each entity into a file of its own and reported nothing;
-    the columns `closest`, `other` and `when` hold that for entities that live. Times are those at which the distance was so (there,
-    those of the step's beginning).
+    Distances are measured after the motion of each step. With `team_cpa` or a `team_id` only distances to team mates count, with a
+    `team_id` only entities of that team. The existing system wrote the smallest distance of each entity to a file and reported no
+    metric; here the columns `closest`, `other` and `when` hold it for living entities. Times are those of the measurement (in the
+    existing system, of the start of the step).
     """
 
     grade = "portable"
     historic_attributes = HistoricAttributes(unread=("ground_collisions",))
 
-    team_cpa = Param(False, structural=True, doc="Only team mates count.")
-    team_id = Param(0, structural=True, doc="Only entities of this team, when > 0.")
-    min_time_s = Param(-1.0, unit="s", doc="Look from this time on; negative is always.")
-    max_time_s = Param(-1.0, unit="s", doc="Look up to this time; 0 or negative is always.")
-    cpa = State(
-        unit="m", default=np.inf, per="team", doc="Least distance so far; infinite before there is one."
-    )
-    cpa_entity = State(dtype=int, per="team", doc="Id of the team's entity that was so near; 0 is none.")
-    cpa_other = State(dtype=int, per="team", doc="Id of the other.")
-    cpa_time = State(unit="s", per="team", doc="When.")
-    closest = State(unit="m", default=np.inf, per="entity", doc="Least distance of an entity so far.")
-    other = State(dtype=int, per="entity", doc="Id of the other.")
-    when = State(unit="s", per="entity", doc="When.")
+    team_cpa = Param(False, structural=True, doc="Measure distances to team mates only.")
+    team_id = Param(0, structural=True, doc="If > 0, measure entities of this team only.")
+    min_time_s = Param(-1.0, unit="s", doc="Start of the measurement; negative for no limit.")
+    max_time_s = Param(-1.0, unit="s", doc="End of the measurement; 0 or negative for no limit.")
+    cpa = State(unit="m", default=np.inf, per="team", doc="Smallest distance so far; infinite if none.")
+    cpa_entity = State(dtype=int, per="team", doc="Id of the team's entity at `cpa`; 0 if none.")
+    cpa_other = State(dtype=int, per="team", doc="Id of the other entity at `cpa`.")
+    cpa_time = State(unit="s", per="team", doc="Time of `cpa`.")
+    closest = State(unit="m", default=np.inf, per="entity", doc="Smallest distance of the entity so far.")
+    other = State(dtype=int, per="entity", doc="Id of the other entity at `closest`.")
+    when = State(unit="s", per="entity", doc="Time of `closest`.")
 
     def step(self, w: WorldView) -> None:
         t = w.t
@@ -52,7 +50,7 @@ class CPA(Metric):
             self._compare(w, rows)
 
     def _compare(self, w: WorldView, rows: np.ndarray) -> None:
-        """Take over into the teams' columns what is nearer than anything before; of equals the smaller id."""
+        """Update the teams' columns with new smallest distances; on ties the smaller id is taken."""
         team, world = w.team_numbers(w.team[rows]), w.world[rows]
         is_record = self.closest[rows] < self.cpa[team, world]
         rows, team, world = rows[is_record], team[is_record], world[is_record]

@@ -1,4 +1,4 @@
-"""Counts captures."""
+"""Capture counts."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from tussle.messages import EntityCaptured
 
 
 class SimpleCaptureMetrics(Metric):
-    """Captures of team mates and of others, credited to the captor's team; the score is their weighted sum."""
+    """Counts captures of team mates and of others, credited to the captor's team; the score is their weighted sum."""
 
     grade = "portable"
 
     TeamCapture_weight = Param(1.0, doc="Score for capturing a team mate.")
-    NonTeamCapture_weight = Param(1.0, doc="Score for capturing another.")
+    NonTeamCapture_weight = Param(1.0, doc="Score for capturing an entity of another team.")
     team_captures = State(dtype=int, per="team", doc="Team mates captured so far.")
-    non_team_captures = State(dtype=int, per="team", doc="Others captured so far.")
+    non_team_captures = State(dtype=int, per="team", doc="Entities of other teams captured so far.")
 
     def step(self, w: WorldView) -> None:
         captured = w.inbox(EntityCaptured)

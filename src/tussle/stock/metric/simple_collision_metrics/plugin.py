@@ -1,4 +1,4 @@
-"""Counts collisions and time in the air."""
+"""Collision counts and flight time."""
 
 from __future__ import annotations
 
@@ -9,28 +9,27 @@ from tussle.messages import EntityCollided, EntityHitGround
 
 
 class SimpleCollisionMetrics(Metric):
-    """Collisions with team mates, with others and with the ground, and the time in the air, by team; the score is their weighted sum.
+    """Counts collisions with team mates, other teams and the ground, and sums the flight time, by team.
 
-    Both of those that meet count one. The flight time of an entity ends with the step in which it is removed, and that of a survivor
-    with the run; flight_time_norm is the team's sum over the time since the first entity of all appeared.
+    A collision counts once for each of the two entities. The flight time of an entity ends with the step in which it is removed or
+    with the run; flight_time_norm is the team's sum divided by the time since the first entity appeared. The score is the weighted
+    sum of flight_time_norm, team collisions and non-team collisions.
 
-    In the existing system no survivor was ever credited beyond the last death of the run, everybody's time ended a step early, and a
-    team that appeared after the first step scored NaN.
+    In the existing system survivors were not credited beyond the last removal of the run, flight times ended one step early, and
+    a team that appeared after the first step scored NaN.
     """
 
     grade = "portable"
 
     flight_time_w = Param(0.0, doc="Score per flight_time_norm.")
     team_collisions_w = Param(-1.0, doc="Score per collision with a team mate.")
-    non_team_collisions_w = Param(-1.0, doc="Score per collision with another.")
-    n_entities = State(dtype=int, per="team", doc="Entities seen so far.")
-    n_steps = State(dtype=int, per="team", doc="Steps flown, over all entities.")
-    n_team = State(dtype=int, per="team", doc="Entities that met a team mate.")
-    n_non_team = State(dtype=int, per="team", doc="Entities that met another.")
-    n_ground = State(dtype=int, per="team", doc="Entities that came down.")
-    first_step = State(
-        dtype=int, per="world", default=-1, doc="Step in which the first entity was there; -1 before."
-    )
+    non_team_collisions_w = Param(-1.0, doc="Score per collision with an entity of another team.")
+    n_entities = State(dtype=int, per="team", doc="Entities counted so far.")
+    n_steps = State(dtype=int, per="team", doc="Steps flown, summed over all entities.")
+    n_team = State(dtype=int, per="team", doc="Collisions with team mates.")
+    n_non_team = State(dtype=int, per="team", doc="Collisions with entities of other teams.")
+    n_ground = State(dtype=int, per="team", doc="Collisions with the ground.")
+    first_step = State(dtype=int, per="world", default=-1, doc="Step of the first entity; -1 before.")
     is_known = State(dtype=bool, per="entity", doc="Whether an entity has been counted.")
 
     def start(self, w: WorldView) -> None:

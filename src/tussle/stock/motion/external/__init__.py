@@ -1,4 +1,4 @@
-"""A body that is moved from outside."""
+"""External: a body whose state is set from outside."""
 
 from tussle.stock.motion.external.plugin import External
 

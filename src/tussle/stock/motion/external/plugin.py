@@ -1,4 +1,4 @@
-"""A body whose state comes from outside."""
+"""A body whose state is set from outside."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from tussle.api import MotionBody, MotionModel, State
 
 
 class External(MotionModel):
-    """No motion of its own: position, velocity, attitude and angular velocity stay as `Simulation.write` sets them.
+    """A body without motion: position, velocity, attitude and angular velocity are set by `Simulation.write`.
 
-    For a real robot, a tracked object or another simulator: write their states, make a step, and read what sensors, autonomies and
-    controllers make of them. Channels that nobody in the simulation takes are outputs to be read.
+    Use it for a real robot, a tracked object or another simulator: write the states, step, and read the outputs of sensors,
+    autonomies and controllers. Channels that no plugin reads can be read with `Simulation.read`.
     """
 
     grade = "portable"
@@ -21,12 +21,12 @@ class External(MotionModel):
 
     @staticmethod
     def derivative() -> tuple[float, float, float]:
-        """State equation: nothing changes."""
+        """State equation: the state is constant."""
         return 0.0, 0.0, 0.0
 
     def from_body(self, body: MotionBody, rows: np.ndarray) -> None:
-        """Take the position over."""
+        """Copy the position."""
         self.x[:, rows] = body.pos[:, rows]
 
     def to_body(self, body: MotionBody) -> None:
-        """Nothing to publish: the table holds what was written."""
+        """Do nothing: the body table already holds what was written."""

@@ -1,4 +1,4 @@
-"""A damped spring along the vertical."""
+"""HarmonicOscillator: a mass on a damped vertical spring."""
 
 from tussle.stock.motion.harmonic_oscillator.plugin import HarmonicOscillator
 

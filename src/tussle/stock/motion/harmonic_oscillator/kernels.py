@@ -1,21 +1,28 @@
-"""The oscillator's equation is linear, so Runge-Kutta steps too short to be made one by one can be made at once."""
+"""HarmonicOscillator kernel: RK4 for a linear equation. A stiff substep is split into many short steps by doubling."""
 
 from __future__ import annotations
 
 from tussle.numeric.kernel import kernel
 
 COARSEST = 0.25
-"""Length of a step times the equation's fastest rate, up to which it is one Runge-Kutta step: its phase errs by 0.25^4 / 120 of
-itself, and the method is stable up to ten times that."""
+"""Largest step length times fastest rate of the equation for one RK4 step. The relative phase error is 0.25^4 / 120, and RK4 is
+stable up to ten times this value."""
 
 
 @kernel("F2w F2 F2 f8 i8")
 def advance(states, inputs, params, dt, substeps):
-    """Advance (z [m], z_rate [m/s]) by dt [s] under the push inputs[0] [m/s^2]; params: damping ratio, natural frequency [rad/s].
+    """Advance all rows, in place.
 
-    One Runge-Kutta step of fourth order takes (z, v) under a push a to (z + v s + p (a - w^2 z), v + s (a - w^2 z) - (w^2 p + 2 d w s) v)
-    where s and p are the Taylor polynomials of fourth order of the answers to a unit kick and to a unit push. Two such steps are
-    one of twice the length with s' and p' as below: a substep that is too coarse is made of 2^k finer ones in k doublings.
+    One RK4 step maps (z, v) under an acceleration a to (z + v s + p (a - w^2 z), v + s (a - w^2 z) - (w^2 p + 2 d w s) v), where
+    s and p are the fourth-order Taylor polynomials of the impulse and step responses. Two equal steps are one of twice the length
+    with new s and p, so a substep that is too coarse is composed of 2^k finer ones in k doublings.
+
+    Args:
+        states: z [m], z_rate [m/s], (2, n).
+        inputs: Acceleration [m/s^2], (1, n).
+        params: Damping ratio d, natural frequency w [rad/s], (2, n).
+        dt: Duration [s].
+        substeps: Number of equal substeps in dt.
     """
     for i in range(states.shape[1]):
         z, v, push = states[0, i], states[1, i], inputs[0, i]
@@ -24,7 +31,8 @@ def advance(states, inputs, params, dt, substeps):
         while (drag + params[1, i]) * h > COARSEST:
             h *= 0.5
             doublings += 1
-        term, before = h, 0.0  # h^k / k! of the kick's k-th derivative, and the one before
+        # h^k / k! times the k-th derivative of the impulse response, and the previous term
+        term, before = h, 0.0
         s, p = h, 0.5 * h * h
         for k in range(2, 5):
             term, before = -h * (drag * term + spring * h * before / (k - 1)) / k, term

@@ -1,4 +1,4 @@
-"""A damped spring along the vertical."""
+"""A mass on a damped vertical spring."""
 
 from __future__ import annotations
 
@@ -9,19 +9,18 @@ from tussle.stock.motion.harmonic_oscillator import kernels
 
 
 class HarmonicOscillator(MotionModel):
-    """A mass on a damped spring between it and the ground plane: z'' = -w^2 z - 2 d w z' + acceleration_z.
+    """A mass on a damped vertical spring: z'' = -w^2 z - 2 d w z' + acceleration_z.
 
-    w is `natural_frequency`, d `damping_ratio`. It moves along the vertical only; position and attitude stay as they were placed
-    otherwise. Its solution is known in closed form, which makes it the test of integrators and of wiring. However stiff it is, no
-    step is too long for it.
+    w is `natural_frequency`, d is `damping_ratio`. The horizontal position and the attitude do not change. The closed-form solution
+    makes it a test of integrators and wiring. It is stable for any stiffness and time step.
     """
 
     grade = "portable"
 
-    damping_ratio = Param(0.707, ge=0.0, doc="d: 1 is critical damping.")
+    damping_ratio = Param(0.707, ge=0.0, doc="d: damping ratio; 1 is critical damping.")
     natural_frequency = Param(1.0, unit="rad/s", ge=0.0, doc="w: angular frequency without damping.")
     x = State("z z_rate", unit="m m/s", doc="Height above the origin's tangent plane and its rate.")
-    acceleration_z = Input(unit="m/s^2", doc="Push upwards, per mass.")
+    acceleration_z = Input(unit="m/s^2", doc="Vertical acceleration, up positive.")
 
     advance = kernels.advance
 
@@ -35,12 +34,12 @@ class HarmonicOscillator(MotionModel):
         return z_rate, spring + damping + acceleration_z
 
     def from_body(self, body: MotionBody, rows: np.ndarray) -> None:
-        """Take height and vertical velocity over."""
+        """Copy height and vertical velocity."""
         self.x[0, rows] = body.pos[2, rows]
         self.x[1, rows] = body.vel[2, rows]
 
     def to_body(self, body: MotionBody) -> None:
-        """Publish height and velocity."""
+        """Write height and velocity."""
         body.pos[2] = self.x[0]
         body.vel[:2] = 0.0
         body.vel[2] = self.x[1]

@@ -1,4 +1,4 @@
-"""SimpleAircraft: an aircraft that turns by its bank, flown by roll rate, pitch rate and throttle."""
+"""SimpleAircraft: a banking aircraft commanded by throttle, roll rate and pitch rate."""
 
 from tussle.stock.motion.simple_aircraft.plugin import SimpleAircraft
 

@@ -1,9 +1,9 @@
-"""SimpleAircraft kernels: RK4 with what repeats left out, and the state made public.
+"""SimpleAircraft kernels: RK4 without repeated evaluations, and conversion to the body table.
 
-Roll, pitch and speed have constant rates in a substep, so RK4's second and third stage see the same bank, elevation
-and speed, and the last stage of one substep is the first of the next. Eight sine-cosine pairs a substep remain of
-sixteen. Rows go through scratch arrays in blocks, with the substeps outside the loop over rows, because LLVM
-vectorises loops over few arrays only.
+Roll, pitch and speed have constant rates in a substep, so the second and third stage of RK4 see the same bank, elevation
+and speed, and the last stage of one substep is the first of the next. This leaves eight of sixteen sine-cosine pairs per
+substep. Rows are processed in blocks of scratch, with the substeps outside the loop over rows, because LLVM vectorises
+only loops over few arrays.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ import numpy as np
 from tussle.numeric import sincos, tan
 from tussle.numeric.kernel import device, kernel
 
-BLOCK = 64  # rows; the scratch of a block stays in the first-level cache
+BLOCK = 64  # rows; the scratch of a block fits into the L1 cache
 THROTTLE_MAX = 100.0
 ACCELERATION = 0.2  # m/s^2 per unit of throttle
 
 
 @device
 def hold(value, low, high):
-    """Value held within [low, high]."""
+    """Value clamped to [low, high]."""
     return min(max(value, low), high)
 
 
@@ -32,7 +32,7 @@ def turning(sine, cosine, speed, radius, slope, target):
 
 @device
 def state_equation(roll, pitch, yaw, speed, throttle, roll_rate, pitch_rate, radius, slope, target):
-    """(x', y', z' [m/s], roll', pitch', yaw' [rad/s], speed' [m/s^2]) away from the limits; what `advance` integrates."""
+    """(x', y', z' [m/s], roll', pitch', yaw' [rad/s], speed' [m/s^2]), the state equation of `advance` inside the limits."""
     sp, cp = sincos(pitch)
     sy, cy = sincos(yaw)
     turn = speed / (radius + slope * (speed - target)) * tan(roll)
@@ -42,7 +42,7 @@ def state_equation(roll, pitch, yaw, speed, throttle, roll_rate, pitch_rate, rad
 
 @device
 def stepped(value, rate, rate_max, h, limit):
-    """Value after h at a rate held within its limit, itself held within [-limit, limit]."""
+    """Value after h at a rate clamped to rate_max; the result is clamped to [-limit, limit]."""
     return hold(value + h * hold(rate, -rate_max, rate_max), -limit, limit)
 
 
@@ -57,7 +57,7 @@ def sincos_rows(angle, sine, cosine, n):
 def advance(x, u, p, dt, substeps):
     """Advance all rows, in place.
 
-    A rate that would end the substep beyond a limit of roll, pitch or speed is lowered so that it ends on the limit.
+    If a substep would end beyond a limit of roll, pitch or speed, the rate is reduced so that it ends at the limit.
 
     Args:
         x: x, y, z [m], roll, pitch, yaw [rad], speed [m/s], (7, n), world frame; positive roll turns left,
@@ -71,7 +71,7 @@ def advance(x, u, p, dt, substeps):
     east, north, up, roll, pitch, yaw, speed = x[0], x[1], x[2], x[3], x[4], x[5], x[6]
     h = dt / substeps
     half_h, sixth_h = 0.5 * h, dt / substeps / 6.0
-    # 0, m, 1: at the beginning, in the middle and at the end of the substep; "level" is the horizontal speed.
+    # 0, m, 1: start, middle and end of the substep; "level" is the horizontal speed.
     rows = np.empty((9, BLOCK))
     v0, vm, v1, turn0, turn_m, turn1 = rows[0], rows[1], rows[2], rows[3], rows[4], rows[5]
     rise0, level0, level_m = rows[6], rows[7], rows[8]
@@ -116,7 +116,7 @@ def advance(x, u, p, dt, substeps):
                 up[first + l] += sixth_h * (rise0[l] + 4.0 * (vm[l] * sine[2 * m + l]) + rise1)
                 rise0[l] = rise1
                 level_m[l] = 2.0 * (vm[l] * cosine[2 * m + l])
-                vm[l] = v1[l] * cosine[3 * m + l]  # from here on the horizontal speed at the end
+                vm[l] = v1[l] * cosine[3 * m + l]  # from here on, vm holds the horizontal speed at the end
             for l in range(m):
                 now = yaw[first + l]
                 angle[l] = now
@@ -138,23 +138,23 @@ def advance(x, u, p, dt, substeps):
 
 @device
 def effective(value, rate, rate_max, limit):
-    """The rate [rad/s] at which a value goes on: none beyond its limit."""
+    """Effective rate [rad/s]: clamped to rate_max, and zero where the value is at its limit."""
     held = hold(rate, -rate_max, rate_max)
     return 0.0 if (value >= limit and held > 0.0) or (value <= -limit and held < 0.0) else held
 
 
 @kernel("F2 (F F) (F F F F) (F F F) F2w i8")
 def to_body(x, rates, limits, circle, table, first_row):
-    """Publish position, attitude, velocity and turn rate.
+    """Write position, attitude, velocity and angular velocity to the body table.
 
     Args:
         x: State as in `advance`, (7, n).
         rates: roll_rate, pitch_rate [rad/s], (n,) each.
         limits: max_roll, max_pitch [rad], max_roll_rate, max_pitch_rate [rad/s], (n,) each.
         circle: turning_radius [m], radius_slope_per_speed [s], speed_target [m/s], (n,) each.
-        table: Body table: position [m], velocity [m/s], quaternion body to world, turn rate [rad/s], world frame, (>= 13, N);
+        table: Body table: position [m], velocity [m/s], quaternion body to world, angular velocity [rad/s], world frame, (>= 13, N);
             written.
-        first_row: Where the rows begin in it.
+        first_row: First row of the group in the table.
     """
     roll_rate, pitch_rate = rates
     roll_max, pitch_max, roll_rate_max, pitch_rate_max = limits
@@ -197,7 +197,7 @@ def to_body(x, rates, limits, circle, table, first_row):
             vx[i] = level * (cy * cy - sy * sy)
             vy[i] = level * (2.0 * sy * cy)
             vz[i] = speed[i] * (-2.0 * sp * cp)
-        for l in range(m):  # turns about the vertical, the level left axis and the body x axis
+        for l in range(m):  # rotations about the vertical, the horizontal left axis and the body x axis
             i = first + l
             sr, cr = sine[l], cosine[l]
             sp, cp = (

@@ -11,24 +11,21 @@ from tussle.stock.motion.simple_aircraft import kernels
 
 
 class SimpleAircraft(MotionModel):
-    """An aircraft without aerodynamics: it turns at the rate of its bank and flies where its nose points.
+    """A kinematic fixed-wing aircraft: it flies where its nose points, and its turn rate depends on bank and speed.
 
     x' = V cos(pitch) cos(yaw), y' = V cos(pitch) sin(yaw), z' = V sin(pitch), yaw' = V tan(roll) / L with the radius
     L = turning_radius + radius_slope_per_speed (V - speed_target), roll' = roll_rate, pitch' = pitch_rate, V' =
-    throttle / 5; pitch is nose up. As in the existing system a positive roll (and roll_rate) turns to the left, so
-    the published attitude, in which a positive bank is right wing down, has its negative.
+    throttle / 5; pitch is nose up. As in the existing system, a positive roll (and roll_rate) turns to the left. The
+    roll of the body attitude is positive right wing down, so it has the opposite sign.
 
-    Limits hold at the end of every substep: a rate that would go beyond is lowered so that it ends there. The
-    existing system clamped before each step, and what it published and flew could exceed a limit by one step's worth.
-    Its z velocity had the wrong sign and its positive pitch_rate put the nose down; its initial public velocity was
-    level whatever the pitch.
+    Limits hold at the end of every substep: a rate that would exceed a limit is reduced so that the substep ends at it.
+    The existing system clamped before each step, so its state could exceed a limit by one step. There, the z velocity
+    had the wrong sign, a positive pitch_rate lowered the nose, and the initial velocity was horizontal for any pitch.
     """
 
     grade = "portable"
 
-    turning_radius = Param(
-        13.0, unit="m", gt=0.0, doc="Radius of a turn at 45 degrees of bank and speed_target."
-    )
+    turning_radius = Param(13.0, unit="m", gt=0.0, doc="Turn radius at 45 degrees of bank and speed_target.")
     min_velocity = Param(15.0, unit="m/s", ge=0.0, doc="Lowest speed.")
     max_velocity = Param(40.0, unit="m/s", ge=0.0, doc="Highest speed.")
     max_roll = Param(
@@ -43,21 +40,21 @@ class SimpleAircraft(MotionModel):
     max_pitch_rate = Param(
         math.radians(57.3), unit="rad/s", text_unit="deg/s", ge=0.0, doc="Limit of pitch_rate."
     )
-    speed_target = Param(50.0, unit="m/s", doc="Speed at which the radius is turning_radius.")
-    radius_slope_per_speed = Param(0.0, unit="s", doc="Growth of the radius with speed.")
+    speed_target = Param(50.0, unit="m/s", doc="Speed at which L is turning_radius.")
+    radius_slope_per_speed = Param(0.0, unit="s", doc="Change of L with speed.")
     x = State(
         "x y z roll pitch yaw speed",
         unit="m m m rad rad rad m/s",
-        doc="Position, bank (turns left), elevation (nose up), heading, speed.",
+        doc="Position, bank (positive turns left), elevation (nose up), heading, speed.",
     )
-    throttle = Input(doc="Five times the acceleration [m/s^2], within 100 either way.")
-    roll_rate = Input(unit="rad/s", doc="Rate of the bank; positive banks into a left turn.")
+    throttle = Input(doc="Five times the acceleration [m/s^2], clamped to [-100, 100].")
+    roll_rate = Input(unit="rad/s", doc="Rate of the bank, positive into a left turn.")
     pitch_rate = Input(unit="rad/s", doc="Rate of the elevation, nose up positive.")
 
     advance = kernels.advance
 
     def from_body(self, body: MotionBody, rows: np.ndarray) -> None:
-        """Take position, attitude and speed over, within the limits."""
+        """Copy position, attitude and speed, clamped to the limits."""
         vx, vy, vz = body.vel[:, rows]
         speed = np.sqrt(vx * vx + vy * vy + vz * vz)
         x = self.x
@@ -68,7 +65,7 @@ class SimpleAircraft(MotionModel):
         x[6, rows] = np.clip(speed, self.min_velocity[rows], self.max_velocity[rows])
 
     def to_body(self, body: MotionBody) -> None:
-        """Publish position, attitude, velocity and turn rate."""
+        """Write position, attitude, velocity and angular velocity."""
         rates = self.roll_rate, self.pitch_rate
         limits = self.max_roll, self.max_pitch, self.max_roll_rate, self.max_pitch_rate
         circle = self.turning_radius, self.radius_slope_per_speed, self.speed_target

@@ -1,4 +1,4 @@
-"""SingleIntegrator kernels. Rows go through scratch arrays in blocks, because LLVM vectorises loops over few arrays only."""
+"""SingleIntegrator kernels. Rows are processed in blocks of scratch, because LLVM vectorises only loops over few arrays."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ BLOCK = 128  # rows
 
 @kernel("F2w F2 F2 f8 i8")
 def advance(x, u, p, dt, substeps):
-    """Advance all rows, in place: exact for a held velocity, so the number of substeps does not matter.
+    """Advance all rows, in place. The result is exact for a constant velocity and does not depend on the number of substeps.
 
     Args:
         x: x, y, z [m], vx, vy, vz [m/s], yaw, climb [rad], (8, n), world frame.
         u: velocity_x, velocity_y, velocity_z [m/s] and, where the heading is commanded, desired_heading [rad], (3 or
             4, n).
-        p: max_speed [m/s], negative for the commanded speed, (1, n).
+        p: max_speed [m/s], negative to use the commanded speed, (1, n).
         dt: Duration [s].
         substeps: Number of steps in dt; unused.
     """
@@ -72,12 +72,12 @@ def advance(x, u, p, dt, substeps):
 
 @kernel("F2 F2w i8")
 def to_body(x, table, first_row):
-    """Publish position, attitude (no bank) and velocity.
+    """Write position, attitude (no bank) and velocity to the body table.
 
     Args:
         x: State as in `advance`, (8, n).
         table: Body table: position [m], velocity [m/s], quaternion body to world, world frame, (>= 10, N); written.
-        first_row: Where the rows begin in it.
+        first_row: First row of the group in the table.
     """
     body = table[:, first_row : first_row + x.shape[1]]
     for k in range(6):

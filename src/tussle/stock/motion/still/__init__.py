@@ -1,4 +1,4 @@
-"""What stands where it is put."""
+"""Still: a body that does not move."""
 
 from tussle.stock.motion.still.plugin import Still
 

@@ -1,4 +1,4 @@
-"""What stands where it is put."""
+"""A body that does not move."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from tussle.api import MotionBody, MotionModel, State
 
 
 class Still(MotionModel):
-    """No motion: a ground station, a target, a landmark. It has no inputs, so whatever it decides goes out by message.
+    """A body that does not move: a ground station, a target, a landmark. It has no inputs.
 
-    Missions of the existing system write no motion model at all for such entities.
+    Missions of the existing system name no motion model for such entities.
     """
 
     grade = "portable"
@@ -19,13 +19,13 @@ class Still(MotionModel):
 
     @staticmethod
     def derivative() -> tuple[float, float, float]:
-        """State equation: nothing changes."""
+        """State equation: the state is constant."""
         return 0.0, 0.0, 0.0
 
     def from_body(self, body: MotionBody, rows: np.ndarray) -> None:
-        """Take the position over."""
+        """Copy the position."""
         self.x[:, rows] = body.pos[:, rows]
 
     def to_body(self, body: MotionBody) -> None:
-        """Publish a velocity of zero; position and attitude are in the table already."""
+        """Write zero velocity; position and attitude are already in the body table."""
         body.vel[:] = 0.0

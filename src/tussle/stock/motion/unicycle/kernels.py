@@ -1,18 +1,18 @@
-"""Unicycle kernels: RK4 over any number of substeps in closed form, and the state made public.
+"""Unicycle kernels: RK4 over any number of substeps in closed form, and conversion to the body table.
 
-With speed and rates held over a step the derivative depends on time only, so RK4 is Simpson's rule, and its sum over
-N substeps of h is geometric. For an angle a with rate w and delta = h w / 2:
+With constant speed and rates the derivative depends on time only, so RK4 is Simpson's rule, and its sum over N substeps
+of length h is geometric. For an angle a with rate w and delta = h w / 2:
 
     h/6 sum_s [cos a_s + 4 cos(a_s + delta) + cos(a_s + 2 delta)] = N h g(delta) cos(a + N delta),
     g(delta) = (2 + cos delta)/3 * sin(N delta) / (N sin delta),
 
 and the same for sin. With pitch, cos(pitch) cos(yaw) is split into the angles yaw + pitch and yaw - pitch. The result
-is RK4's up to rounding (and with less of it), and 12 substeps cost as much as one. Advancing cosine and sine by a
-rotation per substep was the alternative: as exact, but its cost grows with the substeps.
+equals RK4 up to rounding (with smaller rounding errors), and 12 substeps cost as much as one. The alternative, rotating
+cosine and sine once per substep, is as accurate, but its cost grows with the number of substeps.
 
-Rows are worked in blocks through one scratch array each for angles, sines and cosines, because LLVM vectorises loops over
-few arrays only; at fixed distances in one array it sees that columns do not overlap. Each row sees the same operations wherever
-it stands.
+Rows are processed in blocks, with one scratch array each for angles, sines and cosines, because LLVM vectorises only loops over
+few arrays, and columns at fixed distances in one array are known not to overlap. The operations on a row do not depend on its
+index.
 """
 
 from __future__ import annotations
@@ -24,23 +24,23 @@ import numpy as np
 from tussle.numeric import atan2, sincos
 from tussle.numeric.kernel import device, kernel
 
-BLOCK = 128  # rows; the scratch of a block (some 32 kB) stays in the first-level cache
+BLOCK = 128  # rows; the scratch of a block (about 32 kB) fits into the L1 cache
 INVERSE_PI = 1.0 / math.pi
-ROUNDER = 6755399441055744.0  # 1.5 * 2**52: added and taken away again, it rounds to a whole number
+ROUNDER = 6755399441055744.0  # 1.5 * 2**52: adding and subtracting it rounds to an integer
 PI_HIGH = 2.0 * 1.57079632673412561417  # 33 bits of pi: k * PI_HIGH is exact for |k| < 2**20
-PI_LOW = math.pi - PI_HIGH  # exact; together they miss pi by 1e-16
+PI_LOW = math.pi - PI_HIGH  # exact; the sum of both differs from pi by 1e-16
 GRAVITY = 9.81
 
 
 @device
 def clamp(value, limit):
-    """Value held within [-limit, limit]."""
+    """Value clamped to [-limit, limit]."""
     return min(max(value, -limit), limit)
 
 
 @device
 def fold(delta):
-    """(delta - k pi in [-pi/2, pi/2], 1.0 if k is odd else 0.0), so that sin(N d)/sin(d) stays away from 0/0 beside k pi."""
+    """(delta - k pi in [-pi/2, pi/2], 1.0 if k is odd else 0.0), which avoids 0/0 in sin(N d)/sin(d) near multiples of pi."""
     k = (delta * INVERSE_PI + ROUNDER) - ROUNDER
     odd = abs(k - 2.0 * ((0.5 * k + ROUNDER) - ROUNDER))
     return (delta - k * PI_HIGH) - k * PI_LOW, odd
@@ -48,7 +48,7 @@ def fold(delta):
 
 @device
 def simpson_gain(sin_delta, cos_delta, sin_n_delta, odd, n, n_is_even):
-    """g(delta) of the module's docstring from sines of the folded delta; `odd` is the parity of the folding, n the substeps."""
+    """g(delta) of the module docstring, from sines of the folded delta; `odd` is the parity of k, n the number of substeps."""
     cosine = cos_delta - 2.0 * odd * cos_delta
     ratio = sin_n_delta / (n * sin_delta)
     ratio = 1.0 if sin_delta == 0.0 else ratio
@@ -58,7 +58,7 @@ def simpson_gain(sin_delta, cos_delta, sin_n_delta, odd, n, n_is_even):
 
 @device
 def simpson_gain_once(cos_delta, odd):
-    """The gain of one substep: the ratio of the sines is 1."""
+    """g(delta) for one substep, where the ratio of the sines is 1."""
     return (2.0 + (cos_delta - 2.0 * odd * cos_delta)) * (1.0 / 3.0)
 
 
@@ -71,7 +71,10 @@ def put_sincos(angle, m, sine, cosine):
 
 @device
 def turn_and_rise(yaw, pitch, first, m, rates, dt, half_h, work):
-    """Turn a block of rows; columns of `work`: middle yaw and pitch, half turns per substep of yaw + pitch, yaw - pitch, pitch."""
+    """Advance yaw and pitch of a block of rows.
+
+    Writes to `work`: mid-step yaw and pitch, and half the change per substep of yaw + pitch, yaw - pitch and pitch.
+    """
     turn_rate, turn_max, pitch_rate, pitch_max = rates
     for l in range(m):
         work[3, l] = clamp(turn_rate[first + l], turn_max[first + l])
@@ -92,7 +95,7 @@ def turn_and_rise(yaw, pitch, first, m, rates, dt, half_h, work):
 
 @kernel("F2w F2 F2 f8 i8")
 def advance_pitch(x, u, p, dt, substeps):
-    """Advance the unicycle that pitches, in place.
+    """Advance unicycles whose pitch rate is commanded, in place.
 
     Args:
         x: x, y, z [m], yaw, pitch [rad], (5, n), world frame, pitch nose up.
@@ -148,7 +151,7 @@ def advance_pitch(x, u, p, dt, substeps):
 
 @kernel("F2w F2 F2 f8 i8")
 def advance_level(x, u, p, dt, substeps):
-    """Advance the unicycle whose pitch is held and whose climb speed is an input, in place.
+    """Advance unicycles with constant pitch and commanded climb speed, in place.
 
     Args:
         x: x, y, z [m], yaw, pitch [rad], (5, n), world frame.
@@ -209,9 +212,9 @@ def from_half_angles(sr, cr, sp, cp, sy, cy):
 
 @device
 def mean_direction(sy, cy, sp, cp, sd, cd, se, ce):
-    """Simpson's mean direction (three numbers) over the substep that ends at a yaw and pitch.
+    """Mean direction (x, y, z) by Simpson's rule over the substep that ends at a yaw and pitch.
 
-    From sine and cosine of yaw, of pitch (nose up), and of half of what yaw and pitch turned in the substep.
+    The arguments are sine and cosine of yaw, of pitch (nose up), and of half the change of yaw and of pitch in the substep.
     """
     sa, ca = sy * cd - cy * sd, cy * cd + sy * sd
     sb, cb = sp * ce - cp * se, cp * ce + sp * se
@@ -224,21 +227,21 @@ def mean_direction(sy, cy, sp, cp, sd, cd, se, ce):
 
 @kernel("F2 (F F F) (F F F) (b1 b1) f8 F2w i8 (i8 i8)")
 def to_body(x, commands, limits, flags, h, table, first_row, part):
-    """Publish position, velocity, attitude and turn rate.
+    """Write position, velocity, attitude and angular velocity to the body table.
 
-    The velocity is the displacement of the last substep over its length: Simpson's mean over the arc that ends at x,
-    which needs no memory of where the row stood before.
+    The velocity is the displacement of the last substep over its duration: the mean by Simpson's rule over the arc that
+    ends at x, which does not need the previous position.
 
     Args:
         x: x, y, z [m], yaw, pitch [rad], (5, n), world frame, pitch nose up.
-        commands: Commanded speed [m/s], turn rate [rad/s], and pitch rate [rad/s] if pitch is steered, else climb speed [m/s], (n,).
-        limits: Limits of these, (n,).
-        flags: Whether pitch is steered; whether the vehicle shows the bank of a coordinated turn.
+        commands: Commanded speed [m/s], turn rate [rad/s], and pitch rate [rad/s] with use_pitch, else climb speed [m/s], (n,) each.
+        limits: Limits of the commands, (n,) each.
+        flags: use_pitch; whether the attitude has the bank of a coordinated turn.
         h: Length of the last substep [s].
-        table: Body table: position [m], velocity [m/s], quaternion body to world, turn rate [rad/s], world frame, (>= 13, N);
+        table: Body table: position [m], velocity [m/s], quaternion body to world, angular velocity [rad/s], world frame, (>= 13, N);
             written.
-        first_row: Where the rows begin in it.
-        part: First row and end of the rows to publish.
+        first_row: First row of the group in the table.
+        part: First row and end of the rows to write.
     """
     pitches, banks = flags
     begin, end = part
@@ -254,7 +257,7 @@ def to_body(x, commands, limits, flags, h, table, first_row, part):
     held, made = (
         np.empty((3, BLOCK)),
         np.empty((10, BLOCK)),
-    )  # commands within their limits; velocity, quaternion, turn rate
+    )  # clamped commands; velocity, quaternion, angular velocity
     sine[4] = 0.0
     cosine[4] = 1.0
     for first in range(0, n, BLOCK):
@@ -280,9 +283,7 @@ def to_body(x, commands, limits, flags, h, table, first_row, part):
             made[3, l], made[4, l], made[5, l], made[6, l] = from_half_angles(
                 sine[4, l], cosine[4, l], sine[1, l], cosine[1, l], sine[0, l], cosine[0, l]
             )
-        for l in range(
-            m
-        ):  # from half the yaw to the yaw, from half the quaternion pitch to the pitch (nose up)
+        for l in range(m):  # double the angles: half yaw to yaw, half quaternion pitch to pitch (nose up)
             sy, cy, sp, cp = sine[0, l], cosine[0, l], sine[1, l], cosine[1, l]
             sine[0, l], cosine[0, l] = 2.0 * sy * cy, cy * cy - sy * sy
             sine[1, l], cosine[1, l] = -2.0 * sp * cp, cp * cp - sp * sp

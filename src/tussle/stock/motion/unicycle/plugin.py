@@ -1,4 +1,4 @@
-"""The unicycle of the paper's equation (1), with pitch up positive."""
+"""The unicycle of equation (1) of the paper, with pitch nose up positive."""
 
 from __future__ import annotations
 
@@ -12,24 +12,23 @@ from tussle.stock.motion.unicycle import kernels
 
 
 class Unicycle(MotionModel):
-    """A vehicle that moves where its nose points; speed, turn rate and pitch rate are commanded and followed at once.
+    """A vehicle that moves where its nose points and follows commanded speed, turn rate and pitch rate without delay.
 
     DeMarco, Squires, Day, Pippin 2018, equation (1): x' = v cos(pitch) cos(yaw), y' = v cos(pitch) sin(yaw), z' = v
-    sin(pitch), yaw' = turn_rate, pitch' = pitch_rate, with pitch nose up and every command held within its limit.
-    Without `use_pitch` the pitch stays as it was placed and z' = velocity_z.
+    sin(pitch), yaw' = turn_rate, pitch' = pitch_rate, with pitch nose up and every command clamped to its limit.
+    Without `use_pitch` the pitch does not change and z' = velocity_z. `vel` is the displacement of the last substep over
+    its duration, as in the existing system; it lags the heading by half a substep of turn.
 
-    The existing system turned the sign of z' (since May 2020) but not that of the behaviours that fly it, so pursuers
-    dived, looped and flew on upside down; here climbing is nose up throughout. Its mission files mean use_pitch =
-    false where they say nothing; here the paper's model is the default. Like there, `vel` is the displacement of the
-    last substep over its length (exactly what a camera would see between two substeps), which lags the heading by
-    half a substep of turn. Unlike there, a row that someone else moves (teleport, wall) goes on from where it was
-    put, and `omega` is filled.
+    Differences from the existing system: there the sign of z' was changed in May 2020 but not in the behaviours, so
+    pursuers dived, looped and flew upside down; here a climb is nose up everywhere. There `use_pitch` is false by
+    default; here the model of the paper is the default. Here an entity that another plugin moves (teleport, wall)
+    continues from its new position, and `omega` is written.
     """
 
     grade = "portable"
     historic_attributes = HistoricAttributes(
         differs={
-            "use_pitch": "Unicycle is steered in pitch here unless use_pitch='false' is written; "
+            "use_pitch": "Unicycle follows pitch_rate unless use_pitch='false'; "
             "in the existing system only with use_pitch='true'"
         }
     )
@@ -38,9 +37,9 @@ class Unicycle(MotionModel):
     turn_rate_max = Param(1.0, unit="rad/s", ge=0.0, doc="Limit of the turn rate.")
     pitch_rate_max = Param(1.0, unit="rad/s", ge=0.0, doc="Limit of the pitch rate.")
     velocity_z_max = Param(0.0, unit="m/s", ge=0.0, doc="Limit of the climb speed without use_pitch.")
-    use_pitch = Param(True, structural=True, doc="Steered by pitch_rate; else level with a climb speed.")
+    use_pitch = Param(True, structural=True, doc="Follow pitch_rate; else velocity_z at constant pitch.")
     enable_roll = Param(
-        False, structural=True, doc="Show the bank of a coordinated turn; the path is the same."
+        False, structural=True, doc="Bank the attitude as in a coordinated turn; the path does not change."
     )
     x = State(
         "x y z yaw pitch", unit="m m m rad rad", doc="Position, heading and elevation (nose up), world frame."
@@ -73,22 +72,22 @@ class Unicycle(MotionModel):
         )
 
     def active_inputs(self) -> list[str]:
-        """The third input is pitch_rate or velocity_z."""
+        """Return speed, turn_rate, and pitch_rate or velocity_z."""
         return ["speed", "turn_rate", "pitch_rate" if self.use_pitch else "velocity_z"]
 
     @property
     def advance(self) -> Any:
-        """Kernel of the structural variant."""
+        """Kernel for this value of use_pitch."""
         return kernels.advance_pitch if self.use_pitch else kernels.advance_level
 
     def from_body(self, body: MotionBody, rows: np.ndarray) -> None:
-        """Take position, heading and elevation over."""
+        """Copy position, heading and elevation."""
         self.x[:3, rows] = body.pos[:, rows]
         self.x[3, rows] = body.yaw[rows]
         self.x[4, rows] = body.climb[rows]
 
     def to_body(self, body: MotionBody) -> None:
-        """Publish position, attitude, velocity and turn rate."""
+        """Write position, attitude, velocity and angular velocity."""
         pitches = self.use_pitch
         third = self.pitch_rate if pitches else self.velocity_z
         third_max = self.pitch_rate_max if pitches else self.velocity_z_max

@@ -1,4 +1,4 @@
-"""A vehicle that turns about all three axes of its body."""
+"""Unicycle3D: a unicycle that rotates about all three body axes."""
 
 from tussle.stock.motion.unicycle_3d.plugin import Unicycle3D
 

@@ -1,8 +1,7 @@
-"""Unicycle3D kernels: held body rates make each substep one and the same turn, so a row needs one sine and cosine per call.
+"""Unicycle3D kernels: with constant body rates each substep is the same rotation, so a row needs one sine and cosine per call.
 
-The attitude is exact up to rounding; the path is Simpson's rule over begin, middle and end of each substep, of fourth
-order as RK4 is. RK4 on the quaternion was the alternative: it drifts off the unit sphere and needs a term that pulls it
-back.
+The attitude is exact up to rounding. The path is integrated with Simpson's rule over each substep, of fourth order like
+RK4. The alternative, RK4 on the quaternion, drifts off the unit sphere and needs a correction term.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ from tussle.numeric.quaternion import quat_multiply
 
 @device
 def clamp(value, limit):
-    """Value held within [-limit, limit]."""
+    """Value clamped to [-limit, limit]."""
     return min(max(value, -limit), limit)
 
 
@@ -28,9 +27,9 @@ def forward(w, x, y, z):
 
 @device
 def fly(x, i, p_rate, q_rate, r_rate, speed, acceleration, speed_max, dt, substeps):
-    """Advance row i by dt: body rates about x (right wing down), y (nose down), z (left) [rad/s] held.
+    """Advance row i by dt at constant body rates about x (right wing down), y (nose down) and z (left) [rad/s].
 
-    The speed changes at `acceleration` [m/s^2] within its limit; a substep that would end beyond it ends there.
+    The speed changes at `acceleration` [m/s^2]; at the end of each substep it is clamped to its limit.
     """
     h = dt / substeps
     rate = math.sqrt(p_rate * p_rate + q_rate * q_rate + r_rate * r_rate)
@@ -60,7 +59,7 @@ def fly(x, i, p_rate, q_rate, r_rate, speed, acceleration, speed_max, dt, subste
 
 @kernel("F2w F2 F2 f8 i8")
 def advance_speed(x, u, p, dt, substeps):
-    """Advance the vehicle whose speed is commanded, in place.
+    """Advance vehicles whose speed is commanded, in place.
 
     Args:
         x: x, y, z [m], quaternion w, x, y, z body to world, speed [m/s], (8, n).
@@ -77,7 +76,7 @@ def advance_speed(x, u, p, dt, substeps):
 
 @kernel("F2w F2 F2 f8 f8 i8")
 def advance_acceleration(x, u, p, accel_max, dt, substeps):
-    """Advance the vehicle whose acceleration is commanded, in place.
+    """Advance vehicles whose acceleration is commanded, in place.
 
     Args:
         x: As in `advance_speed`, (8, n).
@@ -96,15 +95,15 @@ def advance_acceleration(x, u, p, accel_max, dt, substeps):
 
 @kernel("F2 (F F F) (F F F) F2w i8")
 def to_body(x, rates, limits, table, first_row):
-    """Publish position, velocity, attitude and turn rate.
+    """Write position, velocity, attitude and angular velocity to the body table.
 
     Args:
         x: State as in `advance_speed`, (8, n).
-        rates: Commanded turn, pitch and roll rate [rad/s], (n,).
-        limits: Their limits [rad/s], (n,).
-        table: Body table: position [m], velocity [m/s], quaternion body to world, turn rate [rad/s], world frame, (>= 13, N);
+        rates: Commanded turn, pitch and roll rate [rad/s], (n,) each.
+        limits: Limits of the rates [rad/s], (n,) each.
+        table: Body table: position [m], velocity [m/s], quaternion body to world, angular velocity [rad/s], world frame, (>= 13, N);
             written.
-        first_row: Where the rows begin in it.
+        first_row: First row of the group in the table.
     """
     turn_rate, pitch_rate, roll_rate = rates
     turn_max, pitch_max, roll_max = limits

@@ -1,4 +1,4 @@
-"""A vehicle that turns about all three axes of its body."""
+"""A unicycle that rotates about all three body axes."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from tussle.stock.motion.unicycle_3d import kernels
 
 
 class Unicycle3D(MotionModel):
-    """A vehicle that flies where its nose points and is turned by rates about the axes of its own body, all followed at once.
+    """A vehicle that moves where its nose points and follows commanded rates about its body axes without delay.
 
-    pos' = v forward(q), q' = q (0, roll_rate, -pitch_rate, turn_rate) / 2, every command held within its limit. With the wings level
-    turn_rate is that of the heading and pitch_rate that of the elevation; banked, they are not, as in an aircraft. With `accel_max`
-    >= 0 the speed is a state and the command its rate, `acceleration_x`; else `speed` is the command.
+    pos' = v forward(q), q' = q (0, roll_rate, -pitch_rate, turn_rate) / 2, every command clamped to its limit. With level wings
+    turn_rate is the rate of the heading and pitch_rate that of the elevation; in a bank they are not, as in an aircraft. With
+    `accel_max` >= 0 the speed is a state and `acceleration_x` is commanded; else `speed` is commanded.
 
-    Other than in the existing system: the rates are about the body's own axes (there, about axes that move with the vehicle but were
-    the world's at the start, so that one that started banked or climbing turned about axes of nothing); positive pitch_rate raises
-    the nose; `accel_max` limits the acceleration both ways (there, the lower limit was read from the upper one's key, so every command
-    gave the same acceleration), and the accelerated speed stays within speed_max. A limit is the same both ways; there is no
-    `speed_min` and the like. External forces, which there gave a velocity of force over mass, mean nothing to a model without inertia
-    and are ignored. `omega` is filled.
+    Differences from the existing system: the rates are about the body axes (there, about axes that rotate with the vehicle but
+    coincide with the world axes at the start, wrong for a vehicle that starts banked or climbing); a positive pitch_rate raises the
+    nose; `accel_max` limits the acceleration in both directions (there, the lower limit was read from the key of the upper one, so
+    every command gave the same acceleration), and the speed stays within speed_max. Limits are symmetric; there is no `speed_min`
+    etc. External forces are ignored, because the model has no inertia (there, a force gave a velocity of force over mass). `omega` is
+    written.
     """
 
     grade = "portable"
@@ -35,7 +35,7 @@ class Unicycle3D(MotionModel):
         -1.0,
         unit="m/s^2",
         structural=True,
-        doc="Limit of the acceleration; negative, the speed is commanded.",
+        doc="Limit of the acceleration; if negative, the speed is commanded.",
     )
     x = State(
         "x y z qw qx qy qz v",
@@ -43,19 +43,19 @@ class Unicycle3D(MotionModel):
         doc="Position, quaternion body to world, speed along the body x axis.",
     )
     speed = Input(unit="m/s", doc="Speed along the body x axis.")
-    acceleration_x = Input(unit="m/s^2", doc="Rate of that speed, with accel_max.")
-    turn_rate = Input(unit="rad/s", doc="Rate about the body z axis, to the left positive.")
+    acceleration_x = Input(unit="m/s^2", doc="Rate of the speed, with accel_max >= 0.")
+    turn_rate = Input(unit="rad/s", doc="Rate about the body z axis, left positive.")
     pitch_rate = Input(unit="rad/s", doc="Rate about the body y axis, nose up positive.")
     roll_rate = Input(unit="rad/s", doc="Rate about the body x axis, right wing down positive.")
 
     def active_inputs(self) -> list[str]:
-        """The first input is speed or acceleration_x."""
+        """Return speed or acceleration_x, and the three rates."""
         first = "speed" if self.accel_max < 0.0 else "acceleration_x"
         return [first, "turn_rate", "pitch_rate", "roll_rate"]
 
     @property
     def advance(self) -> Any:
-        """Kernel of the structural variant."""
+        """Kernel for this value of accel_max."""
         limit = float(self.accel_max)
         if limit < 0.0:
             return kernels.advance_speed
@@ -66,7 +66,7 @@ class Unicycle3D(MotionModel):
         return advance
 
     def from_body(self, body: MotionBody, rows: np.ndarray) -> None:
-        """Take position, attitude and speed over."""
+        """Copy position, attitude and speed."""
         self.x[:3, rows] = body.pos[:, rows]
         quat = body.quat[:, rows]
         w, x, y, z = quat
@@ -74,7 +74,7 @@ class Unicycle3D(MotionModel):
         self.x[7, rows] = body.forward_speed[rows]
 
     def to_body(self, body: MotionBody) -> None:
-        """Publish position, attitude, velocity and turn rate."""
+        """Write position, attitude, velocity and angular velocity."""
         kernels.to_body(
             self.x, (self.turn_rate, self.pitch_rate, self.roll_rate),
             (self.turn_rate_max, self.pitch_rate_max, self.roll_rate_max), body.table, body.first,

@@ -1,4 +1,4 @@
-"""Everybody hears everything."""
+"""GlobalNetwork: messages to all entities."""
 
 from tussle.stock.network.global_network.plugin import GlobalNetwork
 

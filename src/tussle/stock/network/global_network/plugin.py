@@ -1,4 +1,4 @@
-"""Everybody hears everything."""
+"""A network that reaches all entities."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from tussle.api import EVERYONE, Batch, Network, WorldView
 
 
 class GlobalNetwork(Network):
-    """Each message reaches every subscriber of its world, the sender's own plugins among them; nothing is lost."""
+    """Delivers each message to every subscriber in its world, including the sender's own plugins, without loss."""
 
     grade = "portable"
 

@@ -1,4 +1,4 @@
-"""The plugins of one entity among themselves."""
+"""LocalNetwork: messages between the plugins of one entity."""
 
 from tussle.stock.network.local_network.plugin import LocalNetwork
 

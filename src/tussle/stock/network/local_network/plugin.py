@@ -1,4 +1,4 @@
-"""The plugins of one entity among themselves."""
+"""A network between the plugins of one entity."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from tussle.api import SAME_ENTITY, Batch, Network, WorldView
 
 
 class LocalNetwork(Network):
-    """Each message reaches the subscribers of the entity that sent it, and nobody else."""
+    """Delivers each message to the subscribers of the sending entity only."""
 
     grade = "portable"
 

@@ -1,4 +1,4 @@
-"""Radio with a range."""
+"""SphereNetwork: radio with a limited range."""
 
 from tussle.stock.network.sphere_network.plugin import SphereNetwork
 

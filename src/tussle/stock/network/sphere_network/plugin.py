@@ -1,4 +1,4 @@
-"""Radio with a range."""
+"""Radio with a limited range."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ from tussle.api import Batch, Network, Param, WorldView
 
 
 class SphereNetwork(Network):
-    """Messages reach entities nearer than `range`, each with probability `prob_transmit`; an entity always hears itself.
+    """Delivers a message to each entity nearer than `range` with probability `prob_transmit`, and always to the sender.
 
-    Distances are those of the end of the step in which a message is sent. The historic network measured from the sender's new
-    position to the others' old ones, and lost messages of an entity to itself.
+    Distances are measured at the end of the step in which the message is sent. The existing system measured from the sender's new
+    position to the old positions of the others, and could lose messages of an entity to itself.
     """
 
     grade = "portable"
 
-    range = Param(100.0, unit="m", ge=0.0, doc="Distance below which others hear.")
-    prob_transmit = Param(1.0, ge=0.0, le=1.0, doc="Probability that one receiver gets one message.")
+    range = Param(100.0, unit="m", ge=0.0, doc="Distance below which messages are received.")
+    prob_transmit = Param(1.0, ge=0.0, le=1.0, doc="Probability that a receiver gets a message.")
     filter_comms_plane = Param(
-        False, doc="Nothing passes between above and below a plane, such as the water's surface."
+        False, doc="Block messages across a horizontal plane, such as the water surface."
     )
-    comms_boundary_altitude = Param(0.0, unit="m", doc="Height of the plane.")
-    comms_boundary_epsilon = Param(0.0, unit="m", ge=0.0, doc="Both sides reach this far over the plane.")
+    comms_boundary_altitude = Param(0.0, unit="m", doc="Altitude of the plane.")
+    comms_boundary_epsilon = Param(0.0, unit="m", ge=0.0, doc="Distance by which both sides overlap.")
 
     def route(self, w: WorldView, messages: Batch) -> tuple[np.ndarray, np.ndarray]:
         sender = w.rows_at(messages.world, messages.sender)
@@ -32,9 +32,8 @@ class SphereNetwork(Network):
         number = np.repeat(np.arange(messages.n), count)
         place = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
         receiver = pairs.other[np.repeat(first, count) + place]
-        heard = self._passes_plane(w, sender[number], receiver) & self._is_lucky(
-            w, messages, number, receiver
-        )
+        heard = self._passes_plane(w, sender[number], receiver)
+        heard &= self._is_transmitted(w, messages, number, receiver)
         own = np.flatnonzero(sender >= 0)
         return np.concatenate([own, number[heard]]), np.concatenate([sender[own], receiver[heard]])
 
@@ -47,10 +46,11 @@ class SphereNetwork(Network):
         )
         return np.asarray(same_side | ~self.filter_comms_plane[world])
 
-    def _is_lucky(
+    def _is_transmitted(
         self, w: WorldView, messages: Batch, number: np.ndarray, receiver: np.ndarray
     ) -> np.ndarray:
-        # Keyed by sender, its how-many-eth message of the step, and receiver: who else talks or listens changes no draw.
+        # Draws are keyed by sender, index of the message among the sender's in this step, and receiver, so other senders and
+        # receivers do not affect them.
         is_first = np.ones(messages.n, bool)
         is_first[1:] = (messages.world[1:] != messages.world[:-1]) | (
             messages.sender[1:] != messages.sender[:-1]

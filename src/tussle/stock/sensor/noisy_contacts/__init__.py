@@ -1,4 +1,4 @@
-"""NoisyContacts: what an entity measures of the others, with noise."""
+"""NoisyContacts: noisy measurements of other entities."""
 
 from tussle.stock.sensor.noisy_contacts.plugin import NoisyContacts
 

@@ -1,4 +1,4 @@
-"""Gaussian noise on what an entity knows of others."""
+"""A sensor that measures other entities with Gaussian noise."""
 
 from __future__ import annotations
 
@@ -14,33 +14,39 @@ FIELDS = "id team x y z vx vy vz qw qx qy qz"
 
 
 class NoisyContacts(Sensor):
-    """Measures every other entity of the world within range: a list of states with normal noise.
+    """Measures the state of every other entity within range, with normal noise.
 
-    The noise is drawn anew for each pair and call. Draws are keyed by the one who measures and the id of the one who
-    is measured, so that adding entities changes no other measurement; the existing system drew them in the order of a
-    hash table. Its covariance, a constant 5 on the diagonal whatever the noise, is left out: the standard deviations
-    are parameters. `max_range` is new; the default is everybody, whose lists grow with the square of the number of
-    entities.
+    The noise is drawn for each pair at each call. Draws are keyed by the measuring entity and the id of the measured
+    one, so adding entities does not change other measurements; the existing system drew them in the order of a hash
+    table. The existing system also published a covariance, a constant 5 on the diagonal whatever the noise. It is
+    left out here, because the standard deviations are parameters. `max_range` is new. By default the range is
+    infinite, and the total length of the lists grows with the square of the number of entities.
     """
 
     grade = "portable"
     historic_attributes = HistoricAttributes(unread=("topic_name",))
 
-    max_range = Param(math.inf, unit="m", ge=0.0, doc="Nobody further away is measured.")
+    max_range = Param(math.inf, unit="m", ge=0.0, doc="Entities further away are not measured.")
     pos_noise_0 = Param((0.0, 5.0), fields=PAIR, unit="m", doc="Error of x: mean and standard deviation.")
     pos_noise_1 = Param((0.0, 5.0), fields=PAIR, unit="m", doc="Error of y.")
     pos_noise_2 = Param((0.0, 1.0), fields=PAIR, unit="m", doc="Error of z.")
     vel_noise_0 = Param((0.0, 5.0), fields=PAIR, unit="m/s", doc="Error of the velocity's x.")
     vel_noise_1 = Param((0.0, 5.0), fields=PAIR, unit="m/s", doc="Error of the velocity's y.")
     vel_noise_2 = Param((0.0, 1.0), fields=PAIR, unit="m/s", doc="Error of the velocity's z.")
-    orient_noise_0 = Param((0.0, 0.0), fields=PAIR, unit="rad", doc="Turn about the contact's x axis.")
-    orient_noise_1 = Param((0.0, 0.0), fields=PAIR, unit="rad", doc="Turn about the contact's y axis.")
-    orient_noise_2 = Param((0.0, 0.0), fields=PAIR, unit="rad", doc="Turn about the contact's z axis.")
+    orient_noise_0 = Param(
+        (0.0, 0.0), fields=PAIR, unit="rad", doc="Rotation error about the contact's x axis."
+    )
+    orient_noise_1 = Param(
+        (0.0, 0.0), fields=PAIR, unit="rad", doc="Rotation error about the contact's y axis."
+    )
+    orient_noise_2 = Param(
+        (0.0, 0.0), fields=PAIR, unit="rad", doc="Rotation error about the contact's z axis."
+    )
     contacts = Output(
         ragged=True,
         fields=FIELDS,
         unit="1 1 m m m m/s m/s m/s 1 1 1 1",
-        doc="Who is measured, and where; world frame.",
+        doc="Measured states, world frame.",
     )
     n_contacts = Output(doc="Number of entities measured.")
 
@@ -57,7 +63,7 @@ class NoisyContacts(Sensor):
         )  # fmt: skip
 
     def step(self, g: GroupView) -> None:
-        """New lists for all rows."""
+        """Measure the contacts of all rows."""
         near = self.contact(g)
         kernels.blur(
             near.row, (self.pos_noise_0, self.pos_noise_1, self.pos_noise_2), (self.vel_noise_0, self.vel_noise_1, self.vel_noise_2),

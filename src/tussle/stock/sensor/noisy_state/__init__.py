@@ -1,4 +1,4 @@
-"""NoisyState: an entity that knows its own state with noise."""
+"""NoisyState: noisy measurements of an entity's own state."""
 
 from tussle.stock.sensor.noisy_state.plugin import NoisyState
 

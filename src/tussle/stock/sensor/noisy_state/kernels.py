@@ -1,4 +1,4 @@
-"""Noise on a rigid body's state."""
+"""Add noise to the state of a rigid body."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from tussle.numeric.quaternion import quat_conjugate, quat_from_euler, quat_mult
 
 @kernel("(F F F F F F F F F F) (F2 F2 F2) (F2 F2 F2) (F2 F2 F2) (F2 F2 F2) F2w F2w F2w")
 def blur(truth, pos_noise, vel_noise, orient_noise, draws, pos, vel, quat):
-    """True state plus mean plus standard deviation times a draw, component by component.
+    """Compute the true state plus mean plus standard deviation times a draw, component by component.
 
     Args:
         truth: Position [m], velocity [m/s], world frame, and quaternion body to world, ten (n,).
-        pos_noise: Mean and standard deviation of x, y, z [m], (2, n) each.
-        vel_noise: Those of the velocity [m/s].
-        orient_noise: Those of the turns about the body x, y and z axes, in this order [rad].
-        draws: Standard normal draws for position, velocity and turns, (3, n) each.
-        pos: Noisy position [m], (3, n), written.
-        vel: Noisy velocity [m/s], (3, n), written.
-        quat: Noisy quaternion, (4, n), written.
+        pos_noise: Mean and standard deviation of the error of x, y and z [m], (2, n) each.
+        vel_noise: Mean and standard deviation of the velocity error [m/s], (2, n) each.
+        orient_noise: Mean and standard deviation of the rotations about the body x, y and z axes, in this order [rad], (2, n) each.
+        draws: Standard normal draws for position, velocity and rotations, (3, n) each.
+        pos: Noisy position [m], (3, n), world frame, written.
+        vel: Noisy velocity [m/s], (3, n), world frame, written.
+        quat: Noisy quaternion, body to world, (4, n), written.
     """
     x, y, z, vx, vy, vz, qw, qx, qy, qz = truth
     pos_0, pos_1, pos_2 = pos_noise
@@ -35,7 +35,7 @@ def blur(truth, pos_noise, vel_noise, orient_noise, draws, pos, vel, quat):
         about_x = orient_0[0, i] + orient_0[1, i] * orient_draw[0, i]
         about_y = orient_1[0, i] + orient_1[1, i] * orient_draw[1, i]
         about_z = orient_2[0, i] + orient_2[1, i] * orient_draw[2, i]
-        # Rx Ry Rz is the inverse of Rz(-) Ry(-) Rx(-), which quat_from_euler makes.
+        # Rx Ry Rz is the inverse of Rz(-) Ry(-) Rx(-), which quat_from_euler computes.
         bw, bx, by, bz = quat_from_euler(-about_x, -about_y, -about_z)
         tw, tx, ty, tz = quat_conjugate(bw, bx, by, bz)
         quat[0, i], quat[1, i], quat[2, i], quat[3, i] = quat_multiply(

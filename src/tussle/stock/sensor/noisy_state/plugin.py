@@ -1,4 +1,4 @@
-"""Gaussian noise on what an entity knows of itself."""
+"""A sensor that measures an entity's own state with Gaussian noise."""
 
 from __future__ import annotations
 
@@ -9,13 +9,14 @@ PAIR = "mean sd"
 
 
 class NoisyState(Sensor):
-    """Gives the entity a belief of its own position, velocity and attitude: the truth plus normal noise, drawn anew at each call.
+    """Measures the entity's own position, velocity and attitude: the true state plus normal noise, drawn at each call.
 
-    The noise of the attitude is a turn about the body's x, then y, then z axis. Between calls, and before the first
-    one, the belief stays as it is (at the beginning, the truth at which the entity was placed). Autonomies and
-    controllers of the entity see the belief; motion, other entities and referees the truth. As in the existing
-    system, except that draws are counter-based, so no other entity or plugin changes them, and that the first step
-    believes the placed state with the heading and speed that the motion model starts from.
+    The attitude noise is a rotation about the body's x, then y, then z axis. The measured state is the entity's
+    belief. Its autonomies and controllers read the belief; motion models, other entities, interactions and metrics
+    read the true state. Before the first call the belief is the initial state; between calls it does not change.
+
+    Differences from the existing system: draws are counter-based, so other entities and plugins do not affect them,
+    and in the first step the belief has the heading and speed that the motion model starts from.
     """
 
     grade = "portable"
@@ -26,9 +27,9 @@ class NoisyState(Sensor):
     vel_noise_0 = Param((0.0, 5.0), fields=PAIR, unit="m/s", doc="Error of the velocity's x.")
     vel_noise_1 = Param((0.0, 5.0), fields=PAIR, unit="m/s", doc="Error of the velocity's y.")
     vel_noise_2 = Param((0.0, 1.0), fields=PAIR, unit="m/s", doc="Error of the velocity's z.")
-    orient_noise_0 = Param((0.0, 0.0), fields=PAIR, unit="rad", doc="Turn about the body x axis.")
-    orient_noise_1 = Param((0.0, 0.0), fields=PAIR, unit="rad", doc="Turn about the body y axis.")
-    orient_noise_2 = Param((0.0, 0.0), fields=PAIR, unit="rad", doc="Turn about the body z axis.")
+    orient_noise_0 = Param((0.0, 0.0), fields=PAIR, unit="rad", doc="Rotation error about the body x axis.")
+    orient_noise_1 = Param((0.0, 0.0), fields=PAIR, unit="rad", doc="Rotation error about the body y axis.")
+    orient_noise_2 = Param((0.0, 0.0), fields=PAIR, unit="rad", doc="Rotation error about the body z axis.")
     belief_pos = Output(
         "belief_pos_x belief_pos_y belief_pos_z", unit="m", doc="Believed position, world frame."
     )
@@ -40,7 +41,7 @@ class NoisyState(Sensor):
     )
 
     def step(self, g: GroupView) -> None:
-        """A new belief for all rows."""
+        """Update the belief of all rows."""
         kernels.blur(
             (*g.components("pos"), *g.components("vel"), *g.components("quat")), (self.pos_noise_0, self.pos_noise_1, self.pos_noise_2),
             (self.vel_noise_0, self.vel_noise_1, self.vel_noise_2), (self.orient_noise_0, self.orient_noise_1, self.orient_noise_2),
