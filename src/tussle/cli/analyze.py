@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tussle.cli.terminal import told
+from tussle.cli.terminal import reported
 
 BatchDirectory = Annotated[
     Path, typer.Argument(metavar="BATCH", help="A batch directory, finished or not.", show_default=False)
@@ -44,7 +44,7 @@ def analyze(
     debug: Debug = False,
 ) -> None:
     """Show who won a batch and how sure that is, what differs between points, and what matters."""
-    with told(debug):
+    with reported(debug):
         from tussle.cli.analysis_page import show_analysis
 
         show_analysis(directory, quantities or (), [compare] if compare else (), by_point, as_json)

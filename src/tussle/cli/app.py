@@ -1,4 +1,4 @@
-"""The commands and their options."""
+"""Commands of `tussle` and their options."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ from tussle.cli.options import (
 from tussle.cli.plot import plot
 from tussle.cli.replay import replay
 from tussle.cli.report import report
-from tussle.cli.terminal import OK, out, run_guarded, told
+from tussle.cli.terminal import OK, out, reported, run_guarded
 from tussle.cli.view import view
 
 app = typer.Typer(
-    help="Thousands of robots in one 3D world: play missions, look at plugins, write your own.",
+    help="Simulate thousands of robots in one 3D world: play missions, inspect plugins, write your own.",
     epilog=EPILOG, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 80},
 )  # fmt: skip
@@ -43,7 +43,7 @@ MissionOrNone = Annotated[
     str | None,
     typer.Argument(
         metavar="MISSION",
-        help="A mission file, or the name of one that ships (tussle missions).",
+        help="A mission file, or the name of a built-in mission (tussle missions).",
         show_default=False,
     ),
 ]
@@ -52,20 +52,22 @@ FromRun = Annotated[
     typer.Option(
         "--from",
         metavar="BATCH:RUN",
-        help="Play a run of a batch again, instead of a mission.",
+        help="Play a run of a batch again instead of a mission.",
         show_default=False,
     ),
 ]
 Trust = Annotated[
     bool,
-    typer.Option("--trust", help="With --from: run the plugin code of the batch directory, whoever made it."),
+    typer.Option(
+        "--trust", help="With --from: run the plugin code of a batch directory made by someone else."
+    ),
 ]
 RunDirectory = Annotated[
     Path | None,
     typer.Option(
         "--out",
         metavar="DIR",
-        help="The run directory; by default runs/NAME-SEED-TIMESTAMP.",
+        help="Run directory; by default runs/NAME-SEED-TIMESTAMP.",
         show_default=False,
     ),
 ]
@@ -79,7 +81,7 @@ Pace = Annotated[
     float | None,
     typer.Option(
         metavar="X",
-        help="Play no faster than X times real time. The result is the same.",
+        help="Play at most X times as fast as real time. The result does not change.",
         show_default=False,
     ),
 ]
@@ -87,7 +89,7 @@ StartFrom = Annotated[
     Path | None,
     typer.Option(
         metavar="TABLE",
-        help="Take ids, times of birth and first states from a recorded trajectory.",
+        help="Take ids, spawn times and initial states from a recorded trajectory.",
         show_default=False,
     ),
 ]
@@ -127,22 +129,24 @@ def run(
     allow_large: Large = False,
     debug: Debug = False,
 ) -> None:
-    """Play one game, record it, and show what came of it."""
+    """Play one game, record it, and show its result."""
     if no_log and (directory is not None or log_period is not None):
-        raise typer.BadParameter("--no-log records nothing, so --out and --log-period mean nothing beside it")
+        raise typer.BadParameter(
+            "--no-log records nothing, so --out and --log-period are not allowed with it"
+        )
     for name, value in (("--pace", pace), ("--log-period", log_period)):
         if value is not None and not 0.0 < value < float("inf"):
             raise typer.BadParameter(f"{name} {value:g} is not allowed; it takes a number > 0")
     is_changed = any(x for x in (mission, more, settings, plugin_files)) or (seed, end) != (None, None)
     if from_batch is not None and is_changed:
         raise typer.BadParameter(
-            "--from says all of what is played, so no mission, setting, seed or end goes beside it"
+            "--from BATCH:RUN determines the game, so a mission, settings, --seed, --end and --plugin-path are not allowed with it"
         )
     if from_batch is None and trust:
-        raise typer.BadParameter("--trust is about the batch directory of --from, and there is none")
+        raise typer.BadParameter("--trust is allowed with --from only")
     if from_batch is None and mission is None:
-        raise typer.BadParameter("a mission is needed, or --from BATCH:RUN")
-    with told(debug):
+        raise typer.BadParameter("a mission or --from BATCH:RUN is required")
+    with reported(debug):
         from tussle.cli.play import Game, Record, play
 
         if from_batch is not None:
@@ -167,8 +171,8 @@ def check(
     allow_large: Large = False,
     debug: Debug = False,
 ) -> None:
-    """Read a mission and build its game without playing it; tell all that is wrong with it."""
-    with told(debug):
+    """Check a mission: read it, build its game, and report all errors."""
+    with reported(debug):
         from tussle.cli.play import simulate
         from tussle.cli.progress import compiling
 
@@ -188,7 +192,7 @@ def describe(
         str,
         typer.Argument(
             metavar="MISSION|PLUGIN",
-            help="A mission file, a mission that ships, or a plugin.",
+            help="A mission file, a built-in mission, or a plugin.",
             show_default=False,
         ),
     ],
@@ -199,8 +203,8 @@ def describe(
     allow_large: Large = False,
     debug: Debug = False,
 ) -> None:
-    """Show a plugin's parameters and channels, or who takes part in a mission and the list of its step."""
-    with told(debug):
+    """Show the parameters and channels of a plugin, or the entities and the step schedule of a mission."""
+    with reported(debug):
         from tussle.cli import pages
         from tussle.cli.lookup import plugin_named
 
@@ -220,8 +224,8 @@ def describe(
 
 @app.command(epilog=EPILOG)
 def plugins(plugin_files: PluginFiles = None, debug: Debug = False) -> None:
-    """List all plugins: those that ship, those of other packages, those of your files."""
-    with told(debug):
+    """List all plugins: those of tussle, of other packages, and of your files."""
+    with reported(debug):
         from tussle.cli import pages
         from tussle.cli.lookup import all_plugins
         from tussle.cli.terminal import WRONG_INPUT, say_error, say_note
@@ -238,8 +242,8 @@ def plugins(plugin_files: PluginFiles = None, debug: Debug = False) -> None:
 
 @app.command(epilog=EPILOG)
 def missions(debug: Debug = False) -> None:
-    """List the missions that ship."""
-    with told(debug):
+    """List the built-in missions."""
+    with reported(debug):
         from tussle.cli import pages
 
         pages.show_missions()
@@ -256,24 +260,24 @@ def new(
         ),
     ],
     name: Annotated[
-        str, typer.Argument(metavar="NAME", help="Of the class, such as MyBoids.", show_default=False)
+        str, typer.Argument(metavar="NAME", help="Class name, such as MyBoids.", show_default=False)
     ],
     origin: Annotated[
         str | None,
         typer.Option(
-            "--from", metavar="STOCK", help="Begin with a copy of a plugin that ships.", show_default=False
+            "--from", metavar="STOCK", help="Start from a copy of this stock plugin.", show_default=False
         ),
     ] = None,
     easy: Annotated[
-        bool, typer.Option("--easy", help="Write it for one entity, or one world, at a time.")
+        bool, typer.Option("--easy", help="Write code for one entity, or one world, at a time.")
     ] = False,
     directory: Annotated[
-        Path, typer.Option("--out", metavar="DIR", help="Where the files are written.")
+        Path, typer.Option("--out", metavar="DIR", help="Directory for the files.")
     ] = Path(),
     debug: Debug = False,
 ) -> None:
-    """Write a plugin that works, its test, and a mission that plays it."""
-    with told(debug):
+    """Write a working plugin, its test, and a mission that uses it."""
+    with reported(debug):
         from tussle.cli import pages
         from tussle.cli.progress import compiling
         from tussle.cli.scaffold import write_plugin

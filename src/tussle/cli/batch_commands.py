@@ -19,7 +19,7 @@ from tussle.cli.options import (
     Strict,
     mission_source,
 )
-from tussle.cli.terminal import told
+from tussle.cli.terminal import reported
 
 Runs = Annotated[
     int | None,
@@ -176,7 +176,7 @@ def batch(
         )
     if scheduler is not None and slurm is not None:
         raise typer.BadParameter("--scheduler and --slurm are two places to play; give one of them")
-    with told(debug):
+    with reported(debug):
         from tussle.cli.batch import Asked, play_batch
 
         source = mission_source(mission, settings, more, seed, end, strict, plugin_files, allow_large)

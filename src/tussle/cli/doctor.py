@@ -1,4 +1,4 @@
-"""`tussle doctor`: what this installation has, and whether it computes what it should."""
+"""`tussle doctor`: show the installation and run a self-test."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ import tussle
 from tussle.cli.options import Debug
 from tussle.cli.pages import show
 from tussle.cli.progress import compiling, home_short, times
-from tussle.cli.terminal import WRONG_INPUT, put, say_error, told
+from tussle.cli.terminal import WRONG_INPUT, put, reported, say_error
 from tussle.numeric import store
 
 SELF_TEST = "predator_prey"
 SEED, STEPS = 1, 300
 EXPECTED_HASH = "4092338cd3f84e5fc94d8c9e3a149b9c"
-"""State hash of the self-test mission after STEPS steps; it is the same on every machine."""
+"""State hash of the self-test mission after STEPS steps, the same on every machine."""
 
 
 def doctor(debug: Debug = False) -> None:
-    """Show versions, extras, cache folder and threads, and play a game whose result is known."""
-    with told(debug):
+    """Show versions, extras, kernel cache and processors, and run a self-test."""
+    with reported(debug):
         facts = Table.grid(padding=(0, 2))
         facts.add_row(" tussle", tussle.__version__)
         facts.add_row(" Python", f"{platform.python_version()} on {platform.platform()}")
@@ -47,14 +47,14 @@ def doctor(debug: Debug = False) -> None:
             state_hash, speed = play()
         if state_hash != EXPECTED_HASH:
             say_error(
-                f"self-test: {SELF_TEST} has the state hash {state_hash} after {STEPS} steps; it should be {EXPECTED_HASH}"
+                f"self-test: {SELF_TEST} has the state hash {state_hash} after {STEPS} steps; expected {EXPECTED_HASH}"
             )
             raise typer.Exit(WRONG_INPUT)
         put(f" self-test passed: {SELF_TEST} at {times(speed)} × real time, with the expected hash")
 
 
 def requirements() -> tuple[list[str], dict[str, list[str]]]:
-    """Names of the packages that tussle needs, and those that each extra brings."""
+    """Return the names of the required packages, and of the packages of each extra."""
     needed, extras = list[str](), dict[str, list[str]]()
     for line in metadata.requires("tussle") or ():
         name = re.match(r"[\w.-]+", line)[0]  # type: ignore[index]
@@ -67,7 +67,7 @@ def requirements() -> tuple[list[str], dict[str, list[str]]]:
 
 
 def version_of(package: str) -> str:
-    """The installed version; "" where there is none."""
+    """Return the installed version, or "" if the package is not installed."""
     try:
         return metadata.version(package)
     except metadata.PackageNotFoundError:
@@ -75,7 +75,7 @@ def version_of(package: str) -> str:
 
 
 def play() -> tuple[str, float]:
-    """State hash of the self-test, and its speed in simulated seconds per second."""
+    """Run the self-test; return its state hash and speed [simulated seconds per second]."""
     from tussle.cli.play import Source, simulate
 
     loaded, mission, _ = Source(SELF_TEST, {}, SEED).read(tells_all=False)

@@ -1,4 +1,4 @@
-"""`tussle export RUN`: a recorded run as a page, a film, a picture, or tables for other tools."""
+"""`tussle export RUN`: convert a recorded run to a web page, film, image or tables."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import typer
 from typer.core import TyperCommand
 
 from tussle.cli.options import Debug, PluginFiles
-from tussle.cli.terminal import told
+from tussle.cli.terminal import reported
 
 DEFAULT_NAMES = {
     "html": "replay.html",
@@ -21,17 +21,17 @@ DEFAULT_NAMES = {
     "csv": "states.csv",
     "parquet": "states.parquet",
 }
-"""Outputs, and the files in the run directory that they go to when none is named."""
+"""Default file names of the outputs, in the run directory."""
 BESIDE = "@"
-"""Stands on the command line, put there by `ExportCommand`, for the file in the run directory."""
+"""Placeholder for the default file, inserted by `ExportCommand`."""
 FILMS = ("mp4", "gif", "png")
 
 
 class ExportCommand(TyperCommand):
-    """The command, whose outputs need no file name: `tussle export RUN --mp4 --gif small.gif`."""
+    """A command whose output options may omit the file name: `tussle export RUN --mp4 --gif small.gif`."""
 
     def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:  # type: ignore[override]
-        """Give those outputs a name that stand at the end or before another option."""
+        """Insert the placeholder after output options without a file name."""
         options = {f"--{name}" for name in DEFAULT_NAMES}
         whole: list[str] = []
         for word, following in zip(args, [*args[1:], "--"], strict=True):
@@ -51,19 +51,19 @@ def _output(name: str, what: str) -> object:
 
 
 RunName = Annotated[
-    Path, typer.Argument(metavar="RUN", help="A run directory, finished or not.", show_default=False)
+    Path, typer.Argument(metavar="RUN", help="A run directory, complete or not.", show_default=False)
 ]
-Html = Annotated[Path | None, _output("html", "A page that plays it offline.")]
-Mp4 = Annotated[Path | None, _output("mp4", "A film in H.264.")]
-Gif = Annotated[Path | None, _output("gif", "A small film for places that take only pictures.")]
-Png = Annotated[Path | None, _output("png", "One picture.")]
-Mcap = Annotated[Path | None, _output("mcap", "A log that Foxglove opens.")]
-Csv = Annotated[Path | None, _output("csv", "States, and events beside them.")]
-Parquet = Annotated[Path | None, _output("parquet", "The same, compressed.")]
+Html = Annotated[Path | None, _output("html", "A web page that replays the run offline.")]
+Mp4 = Annotated[Path | None, _output("mp4", "A film (H.264).")]
+Gif = Annotated[Path | None, _output("gif", "A small animation.")]
+Png = Annotated[Path | None, _output("png", "One image.")]
+Mcap = Annotated[Path | None, _output("mcap", "A log for Foxglove.")]
+Csv = Annotated[Path | None, _output("csv", "Tables of states and events.")]
+Parquet = Annotated[Path | None, _output("parquet", "The same tables, compressed.")]
 World = Annotated[
     int | None,
     typer.Option(
-        metavar="N", min=0, help="World of a stack; by default 0, and all for tables.", show_default=False
+        metavar="N", min=0, help="World of a stack; by default 0, for tables all.", show_default=False
     ),
 ]
 CameraName = Annotated[
@@ -71,63 +71,59 @@ CameraName = Annotated[
     typer.Option(
         "--camera",
         metavar="overview|top|follow",
-        help="Of films and pictures: all from the south, all from above, or behind one entity; by default overview.",
+        help="Camera of films and images: all entities from the south, from above, or behind one entity; by default overview.",
         show_default=False,
     ),
 ]
 FollowId = Annotated[
-    int | None, typer.Option("--follow", metavar="ID", help="Fly behind this entity.", show_default=False)
+    int | None, typer.Option("--follow", metavar="ID", help="Follow this entity.", show_default=False)
 ]
 Start = Annotated[
     str | None,
-    typer.Option(
-        "--from", metavar="TIME", help="A film begins at this time: 60, or '2 min'.", show_default=False
-    ),
+    typer.Option("--from", metavar="TIME", help="Start time of a film: 60, or '2 min'.", show_default=False),
 ]
 Stop = Annotated[
-    str | None, typer.Option("--to", metavar="TIME", help="It ends at this time.", show_default=False)
+    str | None, typer.Option("--to", metavar="TIME", help="End time of a film.", show_default=False)
 ]
 At = Annotated[
     str | None,
     typer.Option(
-        "--at", metavar="TIME", help="Time of the picture; by default the middle.", show_default=False
+        "--at", metavar="TIME", help="Time of the image; by default the middle.", show_default=False
     ),
 ]
 Speed = Annotated[
     float | None,
     typer.Option(
         metavar="X",
-        help="Simulated seconds per second of film; by default so many that it lasts half a minute or less.",
+        help="Simulated seconds per second of film; by default chosen so that the film lasts at most 30 s.",
         show_default=False,
     ),
 ]
 Fps = Annotated[
-    float | None, typer.Option(metavar="N", help="Pictures per second; by default 25.", show_default=False)
+    float | None, typer.Option(metavar="N", help="Frames per second; by default 25.", show_default=False)
 ]
 Size = Annotated[
     str | None,
     typer.Option(
-        metavar="WIDTHxHEIGHT", help="Of films and pictures; by default 1280x720.", show_default=False
+        metavar="WIDTHxHEIGHT", help="Size of films and images; by default 1280x720.", show_default=False
     ),
 ]
 Trails = Annotated[
     float | None,
-    typer.Option(metavar="S", help="How much of the past trails show [s]; 0 for none.", show_default=False),
+    typer.Option(metavar="S", help="Duration of the trails [s]; 0 for none.", show_default=False),
 ]
-Labels = Annotated[bool, typer.Option("--labels", help="Write ids beside the entities.")]
-NoCaption = Annotated[bool, typer.Option("--no-caption", help="Write nothing on films and pictures.")]
-Zoom = Annotated[
-    float | None, typer.Option(metavar="X", help="So much nearer than it would be.", show_default=False)
-]
+Labels = Annotated[bool, typer.Option("--labels", help="Show the ids of the entities.")]
+NoCaption = Annotated[bool, typer.Option("--no-caption", help="Show no caption on films and images.")]
+Zoom = Annotated[float | None, typer.Option(metavar="X", help="Zoom factor.", show_default=False)]
 Scale = Annotated[
     float | None,
-    typer.Option(metavar="X", help="Models so much larger than they would be.", show_default=False),
+    typer.Option(metavar="X", help="Factor on the size of the models.", show_default=False),
 ]
 Period = Annotated[
     float | None,
     typer.Option(
         metavar="S",
-        help="Time between the states that --html and --mcap keep [s]; by default all.",
+        help="Time between the states in --html and --mcap [s]; by default all states.",
         show_default=False,
     ),
 ]
@@ -160,7 +156,7 @@ def export(
     plugin_files: PluginFiles = None,
     debug: Debug = False,
 ) -> None:
-    """Make a page, a film, a picture or tables of a recorded run; several at once if you like."""
+    """Convert a recorded run to a web page, film, image or tables; several outputs at once are possible."""
     asked = {"html": html, "mp4": mp4, "gif": gif, "png": png, "mcap": mcap, "csv": csv, "parquet": parquet}
     files = {
         name: run / DEFAULT_NAMES[name] if str(file) == BESIDE else file
@@ -169,7 +165,7 @@ def export(
     }
     if not files:
         names = ", ".join(f"--{name}" for name in asked)
-        raise typer.BadParameter(f"nothing is asked for; there are: {names}")
+        raise typer.BadParameter(f"no output is given; possible outputs: {names}")
     look = {
         "--camera": camera, "--follow": follow, "--from": start, "--to": stop, "--speed": speed, "--fps": fps, "--size": size,
         "--trails": trails, "--labels": labels or None, "--no-caption": no_caption or None, "--zoom": zoom,
@@ -181,7 +177,7 @@ def export(
     _refuse_idle({"--period": period}, ("html", "mcap"), files)
     if period is not None and not 0.0 < period < float("inf"):
         raise typer.BadParameter(f"--period {period:g} is not allowed; it takes a number > 0")
-    with told(debug):
+    with reported(debug):
         from tussle.cli.exporting import Source, film_options, write_outputs
 
         options = film_options(
@@ -193,14 +189,14 @@ def export(
 
 
 def _refuse_idle(options: Mapping[str, object], useful: tuple[str, ...], files: Mapping[str, Path]) -> None:
-    """Refuse options that change nothing of what is asked for.
+    """Refuse options that none of the outputs uses.
 
     Raises:
-        typer.BadParameter: There is one.
+        typer.BadParameter: An option is not used.
     """
     if any(name in files for name in useful):
         return
     for option, value in options.items():
         if value is not None:
             names = " or ".join(f"--{name}" for name in useful)
-            raise typer.BadParameter(f"{option} means nothing without {names}")
+            raise typer.BadParameter(f"{option} is allowed with {names} only")

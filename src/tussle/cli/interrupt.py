@@ -1,4 +1,4 @@
-"""Ctrl-C ends the step, not the program."""
+"""Handling of Ctrl-C and SIGTERM: finish the current step, then stop."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from tussle.cli.terminal import INTERRUPTED, TERMINATED, err
 
 
 class Interrupt:
-    """While it is open, SIGINT and SIGTERM only raise a flag; a second one stops the program at once.
+    """A context in which SIGINT and SIGTERM set a flag; a second signal stops the program at once.
 
     Attributes:
-        code: Exit code of the first that came, 0 before.
+        code: Exit code of the first signal; 0 before.
     """
 
     def __init__(self) -> None:
@@ -23,20 +23,18 @@ class Interrupt:
 
     def __enter__(self) -> Self:
         for number in (signal.SIGINT, signal.SIGTERM):
-            self._previous[number] = signal.signal(number, self._heard)
+            self._previous[number] = signal.signal(number, self._handle)
         return self
 
     def __exit__(self, *_: object) -> None:
         for number, handler in self._previous.items():
             signal.signal(number, handler)
 
-    def _heard(self, number: int, _: FrameType | None) -> None:
+    def _handle(self, number: int, _: FrameType | None) -> None:
         code = INTERRUPTED if number == signal.SIGINT else TERMINATED
         if self.code:
-            # In the middle of a step there is no state worth recording; what has been flushed stays as it is.
+            # The state in the middle of a step is not recorded; flushed data remains.
             err().show_cursor(True)
-            os.write(
-                2, b"\nstopped in the middle of a step; what was recorded until the last flush is kept\n"
-            )
+            os.write(2, b"\nstopped in the middle of a step; the recording up to the last flush is kept\n")
             os._exit(code)
         self.code = code

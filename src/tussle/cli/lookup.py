@@ -1,4 +1,4 @@
-"""Which plugin a name on the command line means."""
+"""Find plugins by name."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tussle.mission import Catalogue, PluginFile, shipped_missions
 
 
 def all_plugins(files: Iterable[Path]) -> tuple[dict[str, type[Plugin]], list[str], list[str]]:
-    """All plugins by name, what is wrong with those that cannot be loaded, and which names hide others."""
+    """Return all plugins by name, the errors of those that cannot be loaded, and notes on names that hide others."""
     found: dict[str, type[Plugin]] = {}
     good, wrong = list[PluginFile](), list[str]()
     for path in files:
@@ -32,10 +32,10 @@ def all_plugins(files: Iterable[Path]) -> tuple[dict[str, type[Plugin]], list[st
 
 
 def plugin_named(name: str, files: Iterable[Path]) -> type[Plugin] | None:
-    """The plugin of this name; None where a mission is meant.
+    """Return the plugin of this name, or None if the name is that of a mission.
 
     Raises:
-        MissionError: There is neither a plugin nor a mission of this name.
+        MissionError: No plugin or mission has this name.
     """
     catalogue = Catalogue(files)
     if name in catalogue.names:
@@ -46,6 +46,6 @@ def plugin_named(name: str, files: Iterable[Path]) -> type[Plugin] | None:
         return None
     known = [*shipped_missions(), *catalogue.names]
     raise MissionError(
-        f"there is no mission and no plugin {name!r}{nearest_name(name, known)}; "
-        f"tussle missions and tussle plugins list what there is, and the name of a mission file ends with .xml"
+        f"no mission or plugin is named {name!r}{nearest_name(name, known)}; "
+        f"`tussle missions` and `tussle plugins` list all names, and the name of a mission file ends with .xml"
     )

@@ -20,7 +20,7 @@ from tussle.cli.options import (
     Strict,
     mission_source,
 )
-from tussle.cli.terminal import told
+from tussle.cli.terminal import reported
 
 Objective = Annotated[
     str,
@@ -84,7 +84,7 @@ def optimize(
         raise typer.BadParameter(
             "--vary says what is searched: speed=20:30, gain=1e-3:10:log, tactic=keep,switch"
         )
-    with told(debug):
+    with reported(debug):
         from tussle.cli.optimize_course import Asked, search
 
         source = mission_source(mission, settings, more, seed, end, strict, plugin_files, allow_large)

@@ -1,4 +1,4 @@
-"""Options that several commands have, and the epilog of all of them."""
+"""Options shared by several commands, and the epilog of all commands."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from tussle.cli.terminal import EXIT_CODES
 if TYPE_CHECKING:
     from tussle.cli.play import Source
 
-# The mark \b keeps click from filling the lines that follow.
+# \b keeps click from rewrapping the lines that follow.
 EPILOG = "\b\nExit codes:\n" + "\n".join(f"  {code:>3}  {meaning}" for code, meaning in EXIT_CODES.items())
 
 SET_HELP = (
-    "A value of the mission's ${name=default}, or of anything by path: prey.Boids.max_speed='50 kt', "
-    "prey.motion_model=SimpleAircraft, run.dt=0.05. As often as needed."
+    "Set a variable ${name=default} of the mission, or any value by its path: prey.Boids.max_speed='50 kt', "
+    "prey.motion_model=SimpleAircraft, run.dt=0.05. Can be repeated."
 )
 
 MissionName = Annotated[
     str,
     typer.Argument(
         metavar="MISSION",
-        help="A mission file, or the name of one that ships (tussle missions).",
+        help="A mission file, or the name of a built-in mission (tussle missions).",
         show_default=False,
     ),
 ]
@@ -34,7 +34,7 @@ Seed = Annotated[
         metavar="N",
         min=0,
         max=2**64 - 1,
-        help="Seed of the game; by default the mission's, or 1.",
+        help="Seed of the game; by default that of the mission, or 1.",
         show_default=False,
     ),
 ]
@@ -48,27 +48,25 @@ Set = Annotated[
     ),
 ]
 More = Annotated[
-    list[str] | None, typer.Argument(metavar="NAME=VALUE", help="As with --set.", show_default=False)
+    list[str] | None, typer.Argument(metavar="NAME=VALUE", help="Same as --set.", show_default=False)
 ]
 End = Annotated[
     str | None,
     typer.Option(metavar="TIME", help="End the game at this time: 60, or '2 min'.", show_default=False),
 ]
 Strict = Annotated[
-    bool, typer.Option("--strict", help="Unknown tags and attributes of the mission are errors.")
+    bool, typer.Option("--strict", help="Treat unknown tags and attributes of the mission as errors.")
 ]
 PluginFiles = Annotated[
     list[Path] | None,
     typer.Option(
         "--plugin-path",
         metavar="FILE",
-        help="A Python file with plugins of yours. As often as needed.",
+        help="A Python file with plugins. Can be repeated.",
         show_default=False,
     ),
 ]
-Large = Annotated[
-    bool, typer.Option("--allow-large", help="Lift the limits on how much a mission may ask for.")
-]
+Large = Annotated[bool, typer.Option("--allow-large", help="Lift the limits on the size of a mission.")]
 Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
 
 
@@ -82,7 +80,7 @@ def mission_source(
     plugin_files: list[Path] | None,
     allow_large: bool,
 ) -> Source:
-    """The mission that a command line means."""
+    """Return the mission selected by the options."""
     from tussle.cli.play import Source
     from tussle.cli.settings import read_settings
 

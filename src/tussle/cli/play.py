@@ -1,4 +1,4 @@
-"""`tussle run`: one game, played, shown and recorded."""
+"""`tussle run`: play, show and record one game."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ import datetime as dt
 import itertools
 import re
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from tussle.cli.interrupt import Interrupt
-from tussle.cli.progress import Meter, compiling
+from tussle.cli.progress import ProgressMeter, compiling
 from tussle.cli.settings import ending_by_time, read_time
 from tussle.cli.summary import Speed, show_summary
 from tussle.cli.terminal import say, say_note
@@ -24,23 +24,23 @@ from tussle.mission import Loaded, Mission, read_mission
 if TYPE_CHECKING:
     from tussle.record import Recorder
 
-NAP = 0.05  # [s] longest sleep of a paced run, so that Ctrl-C is heard
+NAP = 0.05  # [s] longest sleep of a paced run, so that Ctrl-C is handled in time
 
 FOR_VIEWER = ": kept for the viewer: "
 
 
 @dataclass(frozen=True)
 class Source:
-    """Where a mission comes from, and what is set in it; the options that run, check and describe share.
+    """A mission and its settings; the options shared by run, check and describe.
 
     Attributes:
-        mission: A file, or the name of a mission that ships.
-        settings: Values of the file's ${name=default}, and of anything by path.
-        seed: Instead of the mission's.
-        end: Time that ends the game, whatever else does.
-        strict: What is unknown is an error.
+        mission: A file, or the name of a built-in mission.
+        settings: Values of variables ${name=default}, and of any path.
+        seed: Replaces the seed of the mission.
+        end: End time, in addition to the other end conditions.
+        strict: Treat unknown tags and attributes as errors.
         plugin_files: Python files with plugins.
-        allow_large: Without limits on how much the mission may ask for.
+        allow_large: Lift the limits on the size of the mission.
     """
 
     mission: str
@@ -52,7 +52,7 @@ class Source:
     allow_large: bool = False
 
     def read(self, tells_all: bool = True) -> tuple[Loaded, Mission, int]:
-        """The file as read, the mission, and the seed. Without `tells_all`, nothing is said of settings kept for the viewer."""
+        """Return the file as read, the mission, and the seed. Without `tells_all`, notes on viewer settings are omitted."""
         loaded = read_mission(
             self.mission,
             self.given,
@@ -68,18 +68,18 @@ class Source:
 
     @property
     def given(self) -> dict[str, Any]:
-        """All that is set."""
+        """All settings, including the end time."""
         return self.settings | ({} if self.end is None else {"run.end": read_time("--end", self.end)})
 
     def ended(self, state_hash: str) -> None:
-        """The game has come to its end, whatever it is."""
+        """Do nothing: any end is accepted."""
 
 
 def simulate(loaded: Loaded, mission: Mission, seed: int, **more: Any) -> Simulation:
-    """The game of a mission that was read, before its first step.
+    """Build the simulation of a mission.
 
     Raises:
-        TussleError: It cannot be played; the message begins with file and line where it names a block.
+        TussleError: The mission cannot be played. If the message names a block, it starts with file and line.
     """
     try:
         return Simulation(mission, seed, on_error="record", **more)
@@ -91,7 +91,7 @@ def simulate(loaded: Loaded, mission: Mission, seed: int, **more: Any) -> Simula
 
 @dataclass(frozen=True)
 class Record:
-    """Where a run is written, and how often."""
+    """Recording options: run directory, whether to record, and period [s]."""
 
     directory: Path | None = None
     is_on: bool = True
@@ -99,23 +99,23 @@ class Record:
 
 
 class Game(Protocol):
-    """What is to be played: a mission with settings, or a run of a batch."""
+    """A game to play: a mission with settings, or a run of a batch."""
 
     def read(self, tells_all: bool = True) -> tuple[Loaded, Mission, int]:
-        """The file as read, the mission, and the seed."""
+        """Return the file as read, the mission, and the seed."""
 
     def ended(self, state_hash: str) -> None:
-        """The game has come to its end."""
+        """Called when the game has ended."""
 
 
 def play(source: Game, record: Record, pace: float | None, start_from: Path | None) -> int:
-    """Play a mission and show what came of it.
+    """Play a game and show its result.
 
     Returns:
         The exit code.
 
     Raises:
-        PluginError: A plugin failed; all until then is recorded and shown.
+        PluginError: A plugin failed. The game up to the failure is recorded and shown.
     """
     began = time.perf_counter()
     loaded, mission, seed = source.read(tells_all=False)
@@ -129,7 +129,7 @@ def play(source: Game, record: Record, pace: float | None, start_from: Path | No
             simulation = stack.enter_context(simulate(loaded, mission, seed, **more))
             interrupt = stack.enter_context(Interrupt())
             recorder = _recorder(simulation, record, loaded, seed) if record.is_on else None
-            simulation.step()  # loads or compiles what the game needs, and so counts as preparation
+            simulation.step()  # loads or compiles kernels, so it counts as preparation
         speed = Speed(began)
         _run(simulation, loaded.path.stem, speed, pace, interrupt)
         error = simulation.result()[0].error
@@ -141,38 +141,35 @@ def play(source: Game, record: Record, pace: float | None, start_from: Path | No
     if error is not None:
         raise error
     if interrupt.code:
-        say(
-            "interrupted",
-            "the step was ended, and all files were written" if recorder else "the step was ended",
-            "bold yellow",
-        )
+        files = ", and all files were written" if recorder else ""
+        say("interrupted", f"the current step was finished{files}", "bold yellow")
     return interrupt.code
 
 
 def _run(simulation: Simulation, name: str, speed: Speed, pace: float | None, interrupt: Interrupt) -> None:
-    """Play on to the end, or until an interrupt."""
+    """Play to the end, or until an interrupt."""
     start = float(simulation.t[0])
     speed.begin(start)
     end = simulation.mission.end if "time" in simulation.mission.end_conditions else None
 
-    with Meter(name, start, end) as meter:
+    with ProgressMeter(name, "s", start, "× real time") as meter:
 
         def is_enough(s: Simulation) -> bool:
             t = float(s.t[0])
-            meter.show(t)
+            meter.show(t, end)
             if pace is not None:
-                _wait(speed.wall_began + (t - start) / pace, meter, t, interrupt)
+                _wait(speed.wall_began + (t - start) / pace, lambda: meter.show(t, end), interrupt)
             return bool(interrupt.code)
 
         simulation.run_until(is_enough)
     speed.end(float(simulation.t[0]))
 
 
-def _wait(until: float, meter: Meter, t: float, interrupt: Interrupt) -> None:
-    """Sleep until a moment of the wall clock, so that the game keeps its pace; a game that is late is not hurried."""
+def _wait(until: float, show: Callable[[], None], interrupt: Interrupt) -> None:
+    """Sleep until a time of `time.perf_counter` to keep the pace, and show the progress meanwhile."""
     while (left := until - time.perf_counter()) > 0.0 and not interrupt.code:
         time.sleep(min(left, NAP))
-        meter.show(t)
+        show()
 
 
 def _recorder(simulation: Simulation, record: Record, loaded: Loaded, seed: int) -> Recorder:
@@ -185,10 +182,12 @@ def _recorder(simulation: Simulation, record: Record, loaded: Loaded, seed: int)
 
 
 def _new_directory(name: str, seed: int) -> Path:
-    """A new runs/NAME-SEED-TIMESTAMP, with a number behind it where that is taken; made here, since others may begin in this second.
+    """Create a new directory runs/NAME-SEED-TIMESTAMP, with a number appended if it exists.
+
+    It is created here because another run may start in the same second.
 
     Raises:
-        RecordError: It cannot be made.
+        RecordError: The directory cannot be created.
     """
     stamp = dt.datetime.now().strftime("%Y%m%d-%H%M%S")  # noqa: DTZ005 - the user's own clock
     plain = re.sub(r"[^A-Za-z0-9_.-]+", "_", name).strip("._") or "mission"

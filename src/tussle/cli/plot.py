@@ -1,4 +1,4 @@
-"""`tussle plot RUN`: plots of a recorded run."""
+"""`tussle plot RUN`: plot a recorded run."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ from typing import Annotated
 import typer
 
 from tussle.cli.options import Debug, PluginFiles
-from tussle.cli.terminal import out, say_note, told
+from tussle.cli.terminal import out, reported, say_note
 
 PLOTS = "plots"
-"""Folder of a run directory that holds its plots."""
+"""Folder of the plots in the run directory."""
 
 RunName = Annotated[
-    Path, typer.Argument(metavar="RUN", help="A run directory, finished or not.", show_default=False)
+    Path, typer.Argument(metavar="RUN", help="A run directory, complete or not.", show_default=False)
 ]
 Kinds = Annotated[
     list[str] | None,
     typer.Option(
         "--kind",
         metavar="KIND",
-        help="trajectory, trajectory3d, speed, altitude, left, captures, density or distance; by default all that show "
-        "something. As often as needed.",
+        help="trajectory, trajectory3d, speed, altitude, left, captures, density or distance; by default all that have data. "
+        "Can be repeated.",
         show_default=False,
     ),
 ]
@@ -33,15 +33,15 @@ Between = Annotated[
 ]
 Teams = Annotated[
     list[int] | None,
-    typer.Option("--team", metavar="N", help="Only this team. As often as needed.", show_default=False),
+    typer.Option("--team", metavar="N", help="Only this team. Can be repeated.", show_default=False),
 ]
 Entities = Annotated[
     list[int] | None,
-    typer.Option("--entity", metavar="ID", help="Only this entity. As often as needed.", show_default=False),
+    typer.Option("--entity", metavar="ID", help="Only this entity. Can be repeated.", show_default=False),
 ]
 Start = Annotated[
     str | None,
-    typer.Option("--from", metavar="TIME", help="Begin at this time: 60, or '2 min'.", show_default=False),
+    typer.Option("--from", metavar="TIME", help="Start at this time: 60, or '2 min'.", show_default=False),
 ]
 End = Annotated[
     str | None, typer.Option("--to", metavar="TIME", help="End at this time.", show_default=False)
@@ -49,7 +49,7 @@ End = Annotated[
 Directory = Annotated[
     Path | None,
     typer.Option(
-        "--out", metavar="DIR", help="Where the plots are written; by default RUN/plots.", show_default=False
+        "--out", metavar="DIR", help="Directory for the plots; by default RUN/plots.", show_default=False
     ),
 ]
 
@@ -63,13 +63,13 @@ def plot(
     start: Start = None,
     end: End = None,
     world: Annotated[int, typer.Option(metavar="N", min=0, help="World of a stack.")] = 0,
-    form: Annotated[str, typer.Option("--format", metavar="png|svg|pdf", help="Of the files.")] = "png",
+    form: Annotated[str, typer.Option("--format", metavar="png|svg|pdf", help="File format.")] = "png",
     directory: Directory = None,
     plugin_files: PluginFiles = None,
     debug: Debug = False,
 ) -> None:
-    """Write plots of a recorded run: ways, speed, altitude, who is left, captures, where they were."""
-    with told(debug):
+    """Plot a recorded run: trajectories, speed, altitude, entities left, captures, density."""
+    with reported(debug):
         from tussle.cli.progress import home_short
         from tussle.cli.settings import read_time
         from tussle.view.plots import Choice, write_plots

@@ -1,4 +1,4 @@
-"""How far a game is: a bar on a terminal, a line now and then elsewhere; what is being compiled."""
+"""Progress of a game, an export and kernel compilation: a bar on a terminal, lines in a log."""
 
 from __future__ import annotations
 
@@ -15,26 +15,27 @@ from rich.text import Text
 from tussle.cli.terminal import err
 from tussle.numeric import kernel, store
 
-BAR_EVERY = 0.1  # [s] faster is not seen
-LINE_EVERY = 10.0  # [s] of a log that somebody reads later
+BAR_EVERY = 0.1  # [s] between updates of a bar
+LINE_EVERY = 10.0  # [s] between lines in a log
 
 
 def text_column(template: str, style: str = "none") -> TextColumn:
-    """A column of a bar, in which names of files and missions are no markup."""
+    """Return a column of a bar that shows its text without interpreting markup."""
     return TextColumn(template, style, markup=False)
 
 
-class Meter:
-    """Shows how far a game is and how fast it goes.
+class ProgressMeter:
+    """Shows the progress of a task, its speed and the time left: a bar on a terminal, a line every 10 s elsewhere.
 
     Args:
-        name: Of the mission.
-        start: Time at which it is measured from [s].
-        end: Time at which the game ends [s]; None where it has no such time.
+        name: Name of the task.
+        unit: Unit of the amount done, such as "s" or "states".
+        start: Amount done at the start.
+        speed_unit: Unit of the amount done per second of wall time; if empty, the speed is not shown.
     """
 
-    def __init__(self, name: str, start: float, end: float | None) -> None:
-        self.start, self.end = start, end
+    def __init__(self, name: str, unit: str, start: float = 0.0, speed_unit: str = "") -> None:
+        self._name, self._unit, self._start, self._speed_unit = name, unit, start, speed_unit
         self._began = time.perf_counter()
         self._is_bar = err().is_terminal
         self._due = self._began + (0.0 if self._is_bar else LINE_EVERY)
@@ -46,8 +47,7 @@ class Meter:
             text_column("{task.fields[left]}", style="dim"),
             console=err(), auto_refresh=False, transient=True, expand=True,
         )  # fmt: skip
-        total = None if end is None else end - start
-        self._task = self._bar.add_task(name, total=total, at="", speed="", left="")
+        self._task = self._bar.add_task(name, total=None, at="", speed="", left="")
 
     def __enter__(self) -> Self:
         if self._is_bar:
@@ -58,31 +58,42 @@ class Meter:
         if self._is_bar:
             self._bar.stop()
 
-    def show(self, t: float) -> None:
-        """The game is at time t [s]; returns at once unless there is something to show."""
+    def show(self, done: float, total: float | None = None) -> None:
+        """Show the amount done, of a total if it is known. Returns at once if an update is not due."""
         now = time.perf_counter()
         if now < self._due:
             return
         self._due = now + (BAR_EVERY if self._is_bar else LINE_EVERY)
-        speed = (t - self.start) / max(now - self._began, 1e-9)
-        at = f"{t:.0f} s" if self.end is None else f"{t:.0f}/{self.end:g} s"
-        ratio = f"{times(speed)} × real time"
-        if not self._is_bar:
-            err().print(f"t = {at}, {ratio}")
-            return
-        left = "" if self.end is None or speed <= 0.0 else clock((self.end - t) / speed) + " left"
-        self._bar.update(self._task, completed=t - self.start, at=at, speed=ratio, left=left, refresh=True)
+        rate = (done - self._start) / max(now - self._began, 1e-9)
+        at = f"{done:,.0f}" + ("" if total is None else f"/{total:,.10g}") + f" {self._unit}"
+        speed = f"{times(rate)} {self._speed_unit}" if self._speed_unit else ""
+        left = "" if total is None or rate <= 0.0 else f"{clock((total - done) / rate)} left"
+        if self._is_bar:
+            span = None if total is None else total - self._start
+            self._bar.update(
+                self._task,
+                completed=done - self._start,
+                total=span,
+                at=at,
+                speed=speed,
+                left=left,
+                refresh=True,
+            )
+        else:
+            err().print(
+                f"{self._name}: " + ", ".join(text for text in (at, speed, left) if text), soft_wrap=True
+            )
 
 
 def times(factor: float) -> str:
-    """A ratio with the digits that count: "0.042", "3.1", "52", "1,280"."""
+    """Format a ratio: "0.042", "3.1", "52", "1,280"."""
     if factor >= 100.0:
         return f"{factor:,.0f}"
     return f"{factor:.3g}"
 
 
 def clock(seconds: float) -> str:
-    """A duration as a clock shows it: "0:07", "12:00", "3:00:00"."""
+    """Format a duration [s]: "0:07", "12:00", "3:00:00"."""
     minutes, rest = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
@@ -90,22 +101,22 @@ def clock(seconds: float) -> str:
 
 @contextmanager
 def compiling() -> Iterator[None]:
-    """Says what the user waits for while kernels are compiled inside; nothing where all of them come from disk."""
+    """Show which kernels are compiled inside; nothing if all are loaded from disk."""
     console, began, names = err(), time.perf_counter(), []
     status = Status("", console=console)
 
-    def tell(name: str) -> None:
+    def show(name: str) -> None:
         names.append(name)
         if len(names) == 1:
             console.print(
-                f"compiling kernels for this machine, once; they are kept in {home_short(store.directory())}",
+                f"compiling kernels for this machine; they are cached in {home_short(store.directory())}",
                 soft_wrap=True,
             )
         if console.is_terminal:
             status.start()
             status.update(Text(f"{len(names)}  {name.removeprefix('tussle.').removeprefix('stock.')}"))
 
-    before, kernel.stats.on_compile = kernel.stats.on_compile, tell
+    before, kernel.stats.on_compile = kernel.stats.on_compile, show
     try:
         yield
     finally:
@@ -117,7 +128,7 @@ def compiling() -> Iterator[None]:
 
 
 def home_short(path: Path) -> str:
-    """A path with ~ for the user's home."""
+    """Abbreviate the user's home directory in a path as ~."""
     try:
         return f"~/{path.relative_to(Path.home())}"
     except (ValueError, RuntimeError):

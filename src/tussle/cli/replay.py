@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from tussle.cli.options import Debug, PluginFiles
-from tussle.cli.terminal import told
+from tussle.cli.terminal import reported
 from tussle.cli.watching import Host, NoBrowser, Paused, Port, announce, read_pace, watch
 
 RunName = Annotated[
@@ -52,7 +52,7 @@ def replay(
     warp = read_pace(pace, 1.0)
     if over and other is None:
         raise typer.BadParameter("--over draws two runs in one place, and there is only one")
-    with told(debug):
+    with reported(debug):
         from tussle.cli.interrupt import Interrupt
         from tussle.errors import ViewError
         from tussle.view.page.comparing import Comparison

@@ -9,7 +9,7 @@ import typer
 
 from tussle.cli.options import Debug
 from tussle.cli.progress import home_short
-from tussle.cli.terminal import out, say_note, told
+from tussle.cli.terminal import out, reported, say_note
 
 REPORT = "report"
 """Folder of a batch directory that holds its report."""
@@ -40,7 +40,7 @@ def report(
     debug: Debug = False,
 ) -> None:
     """Write a page with the results of a batch: who won, what the varied values do, with plots as SVG and PNG."""
-    with told(debug):
+    with reported(debug):
         from tussle.batch import load_batch
         from tussle.batch.report import write_report
 

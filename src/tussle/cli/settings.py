@@ -1,4 +1,4 @@
-"""`--set name=value` and times: what the command line changes in a mission."""
+"""Read settings (`--set NAME=VALUE`) and times from the command line."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from tussle.units import parse
 
 
 def read_settings(texts: Iterable[str]) -> dict[str, str]:
-    """Texts "name=value" as a dict.
+    """Parse texts "name=value" into a dict.
 
     Raises:
-        typer.BadParameter: One is written otherwise, or a name stands twice.
+        typer.BadParameter: A text has another form, or a name is set twice.
     """
     settings: dict[str, str] = {}
     for text in texts:
         name, equals, value = (part.strip() for part in text.partition("="))
         if not equals or not name:
             raise typer.BadParameter(
-                f"{text!r} is not written as NAME=VALUE, such as prey.Boids.max_speed='50 kt'"
+                f"{text!r} does not have the form NAME=VALUE, such as prey.Boids.max_speed='50 kt'"
             )
         if name in settings:
             raise typer.BadParameter(f"{name} is set twice, to {settings[name]!r} and to {value!r}")
@@ -31,10 +31,10 @@ def read_settings(texts: Iterable[str]) -> dict[str, str]:
 
 
 def read_time(option: str, text: str) -> float:
-    """The time of an option [s].
+    """Parse the time of an option [s].
 
     Raises:
-        ParameterError: It is no time.
+        ParameterError: The text is not a time.
     """
     try:
         return parse(text, "s")
@@ -43,10 +43,10 @@ def read_time(option: str, text: str) -> float:
 
 
 def ending_by_time(mission: Mission) -> Mission:
-    """The mission with the condition "time" among those that end it.
+    """Add the end condition "time" to a mission.
 
     Raises:
-        ParameterError: Its end is not after its start.
+        ParameterError: The end is not after the start.
     """
     if not mission.end > mission.start:
         raise ParameterError(

@@ -1,4 +1,4 @@
-"""The end of a game as a table: teams, what was counted, why it ended, how fast it was, what it can be told by."""
+"""Summary of a game: teams, metrics, end condition, speed and state hash."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from tussle.engine.simulation import Simulation
 from tussle.mission import Mission
 
 ENDS = {
-    "time": "its end time is reached",
+    "time": "end time reached",
     "one_team": "one team is left",
-    "all_dead": "nobody is left",
+    "all_dead": "no entity is left",
     "error": "a plugin failed",
     "": "interrupted",
 }
 
 
 class Speed:
-    """How long a game took.
+    """Duration and speed of a game.
 
     Args:
-        process_began: When the program began to read the mission, by `time.perf_counter` [s].
+        process_began: `time.perf_counter` at the start of reading the mission [s].
     """
 
     def __init__(self, process_began: float) -> None:
@@ -39,12 +39,12 @@ class Speed:
         self.wall_began = self._cpu_began = self._t_began = 0.0
 
     def begin(self, t: float) -> None:
-        """The game is under way, at time t [s]."""
+        """Start the measurement at simulation time t [s]."""
         self.wall_began, self._cpu_began, self._t_began = time.perf_counter(), time.process_time(), t
         self.preparation = self.wall_began - self._process_began
 
     def end(self, t: float) -> None:
-        """The game is over, at time t [s]."""
+        """End the measurement at simulation time t [s]."""
         self.wall = time.perf_counter() - self.wall_began
         self.cpu = time.process_time() - self._cpu_began
         self.played = t - self._t_began
@@ -59,7 +59,7 @@ class Speed:
 
 
 def show_summary(simulation: Simulation, name: str, speed: Speed, directory: Path | None) -> None:
-    """Print what came of the only world of a simulation."""
+    """Print the result of world 0 of a simulation."""
     result, mission = simulation.result()[0], simulation.mission
     n = sum(block.count for block in mission.blocks)
     title = mission.name or name
@@ -74,7 +74,7 @@ def show_summary(simulation: Simulation, name: str, speed: Speed, directory: Pat
 
 
 def teams_table(result: WorldResult, mission: Mission) -> Table:
-    """One line per team: who it is, how many are left, what the metrics say of it."""
+    """Build the table of teams: names, number of entities at start and end, metrics."""
     columns = list(_team_columns(result))
     table = Table(box=box.SIMPLE_HEAD, header_style="bold", pad_edge=False, padding=(0, 1))
     table.add_column(" team", overflow="fold")
@@ -97,7 +97,7 @@ def teams_table(result: WorldResult, mission: Mission) -> Table:
 
 
 def _team_columns(result: WorldResult) -> Iterable[tuple[str, str, dict[int, Any]]]:
-    """Plugin, name and values of all that is counted per team, but for the scores, which have a column of their own."""
+    """Yield plugin, column name and values of each metric per team, except for the scores, which have their own column."""
     found = [
         (plugin, name, values)
         for plugin, named in result.metrics.items()

@@ -1,4 +1,4 @@
-"""What is said on the terminal, how errors are told, and what exit codes mean."""
+"""Terminal output, error reporting and exit codes."""
 
 from __future__ import annotations
 
@@ -18,48 +18,48 @@ from rich.text import Text
 from tussle.errors import BatchError, PluginError, RecordError, TussleError, visible
 
 WIDEST = 100
-"""Tables and bars grow no wider than this, on the widest of screens."""
+"""Largest width of tables and bars, in characters."""
 
 OK, WRONG_INPUT, USAGE, PLUGIN_FAILED, NOT_WRITTEN, RUNS_FAILED, OWN_FAULT = 0, 1, 2, 3, 4, 5, 70
 INTERRUPTED, TERMINATED = 130, 143
 
 EXIT_CODES = {
-    OK: "all went well",
-    WRONG_INPUT: "the mission, a setting or a plugin file is wrong",
-    USAGE: "the command line is wrong",
-    PLUGIN_FAILED: "a plugin failed while the game was played",
+    OK: "success",
+    WRONG_INPUT: "error in the mission, a setting or a plugin file",
+    USAGE: "error in the command line",
+    PLUGIN_FAILED: "a plugin failed during the game",
     NOT_WRITTEN: "a run or batch directory cannot be written or read",
     RUNS_FAILED: "some runs of a batch failed; its tables hold the others",
-    OWN_FAULT: "tussle itself failed: a bug, please report it",
-    INTERRUPTED: "interrupted by Ctrl-C; what was played is kept",
-    TERMINATED: "the same, by SIGTERM",
+    OWN_FAULT: "internal error of tussle: a bug, please report it",
+    INTERRUPTED: "interrupted by Ctrl-C; results so far are kept",
+    TERMINATED: "terminated by SIGTERM; results so far are kept",
 }
 
 
 @cache
 def out() -> Console:
-    """Where results go."""
+    """Console for results."""
     return _console(stderr=False)
 
 
 @cache
 def err() -> Console:
-    """Where progress, notes and errors go, so that results can be piped."""
+    """Console for progress, notes and errors, separate from results so that those can be piped."""
     return _console(stderr=True)
 
 
 class PlainConsole(Console):
-    """A console to which every text is data: nothing in it is markup, and what would steer the terminal is shown as an escape."""
+    """A console that prints every text literally: no markup, and control characters shown as escapes."""
 
     def __init__(self, stderr: bool) -> None:
         super().__init__(stderr=stderr, highlight=False, emoji=False, markup=False)
 
     def render_str(self, text: str, **options: Any) -> Text:
-        """A string as it is shown."""
+        """Render a string with visible control characters."""
         return super().render_str(visible(text), **options)
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
-        """All that is printed comes through here, what is in tables and bars too."""
+        """Render any output, including tables and bars, with visible control characters."""
         if isinstance(renderable, Text) and (shown := visible(renderable.plain)) != renderable.plain:
             renderable = renderable.blank_copy(shown)
         return super().render(renderable, options)
@@ -72,7 +72,7 @@ def _console(stderr: bool) -> Console:
 
 
 def put(*parts: RenderableType) -> None:
-    """Print results. In a file, lines end where their text does."""
+    """Print results. If the output is not a terminal, trailing spaces are removed."""
     console = out()
     if console.is_terminal:
         for part in parts:
@@ -86,7 +86,7 @@ def put(*parts: RenderableType) -> None:
 
 
 def say(label: str, text: str, style: str = "") -> None:
-    """A message on the error stream, with its label before each line; on a terminal wrapped between words."""
+    """Print a message on the error stream, with the label before each line. On a terminal, long lines wrap between words."""
     console = err()
     for line in text.splitlines() or [""]:
         message = Text.assemble((f"{label}: ", style), line)
@@ -94,17 +94,17 @@ def say(label: str, text: str, style: str = "") -> None:
 
 
 def say_error(text: str) -> None:
-    """What went wrong, one line each."""
+    """Print errors, one per line."""
     say("error", text, "bold red")
 
 
 def say_note(text: str) -> None:
-    """What the user should know."""
+    """Print a note."""
     say("note", text, "bold yellow")
 
 
 def code_of(error: BaseException) -> int:
-    """The exit code that an error stands for."""
+    """Return the exit code of an error."""
     if isinstance(error, KeyboardInterrupt):
         return INTERRUPTED
     if isinstance(error, PluginError):
@@ -115,39 +115,35 @@ def code_of(error: BaseException) -> int:
 
 
 @contextmanager
-def told(is_debugging: bool) -> Iterator[None]:
-    """Ends the command with one message and an exit code where something fails inside; with a traceback when debugging.
+def reported(is_debugging: bool) -> Iterator[None]:
+    """Report any error inside as one message and an exit code; with a traceback when debugging.
 
     Raises:
-        typer.Exit: Something failed, and has been told.
+        typer.Exit: An error occurred and was reported.
     """
     with warnings.catch_warnings():
         warnings.showwarning = _show_warning
         try:
             yield
-        except (
-            typer.Exit,
-            typer.BadParameter,
-            BrokenPipeError,
-        ):  # the last: whoever read the output has seen enough
+        except (typer.Exit, typer.BadParameter, BrokenPipeError):  # the last: the reader closed the output
             raise
-        except BaseException as error:  # whatever it is, the user gets a message and an exit code
+        except BaseException as error:  # every other error gets a message and an exit code
             if isinstance(error, SystemExit):
                 raise
             if is_debugging:
                 err().print(traceback.format_exc(), soft_wrap=True)
-            _tell(error)
+            _report(error)
             raise typer.Exit(code_of(error)) from None
 
 
-def _tell(error: BaseException) -> None:
+def _report(error: BaseException) -> None:
     if isinstance(error, KeyboardInterrupt):
         say("interrupted", "nothing was played", "bold yellow")
     elif isinstance(error, (TussleError, OSError)):
         say_error(str(error))
     else:
         say_error(
-            f"tussle itself failed: {type(error).__name__}: {error}\nThis is a bug. --debug shows where it happened."
+            f"internal error: {type(error).__name__}: {error}\nThis is a bug in tussle. --debug shows the traceback."
         )
 
 
@@ -156,7 +152,7 @@ def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
 
 
 def run_guarded(program: Callable[[], Any]) -> None:
-    """Call the program with streams that can print anything: a terminal that lacks a character shows another one."""
+    """Call the program with output streams that replace characters which the terminal's encoding lacks."""
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")

@@ -21,7 +21,7 @@ from tussle.cli.options import (
     Strict,
     mission_source,
 )
-from tussle.cli.terminal import told
+from tussle.cli.terminal import reported
 from tussle.cli.watching import Host, NoBrowser, Paused, Port, announce, read_pace, watch
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def view(
 ) -> None:
     """Play one game live on a page in the browser: pause it, step it, wind it back, follow who takes part."""
     wanted = read_pace(pace, None) if pace is not None else 0.0
-    with told(debug):
+    with reported(debug):
         source = mission_source(mission, settings, more, seed, end, strict, plugin_files, allow_large)
         code = play_live(
             source, wanted, record, is_paused=paused, is_opened=not no_browser, ends=exit_when_over,

@@ -32,7 +32,7 @@ def load(name: str) -> Any:
     """
     if name not in manifest():
         raise ParameterError(
-            f"no stock plugin is named {name!r}{nearest_name(name, manifest())}; {listed(manifest())}"
+            f"there is no plugin {name!r}{nearest_name(name, manifest())}; {listed(manifest())}"
         )
     module, _, attribute = manifest()[name].partition(":")
     return getattr(importlib.import_module(module), attribute)

@@ -86,7 +86,7 @@ def here(folder, monkeypatch):
         assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
         assert not STEERING.search(done.output), ascii(done.output)
         assert "Traceback" not in done.output
-        assert "tussle itself failed" not in done.output
+        assert "internal error" not in done.output
         return done.exit_code, done.output
 
     return call

@@ -59,7 +59,7 @@ def test_the_step_is_ended_and_all_is_written(folder, number, code):
     finally:
         process.kill()
     assert process.returncode == code
-    assert err == "interrupted: the step was ended, and all files were written\n"
+    assert err == "interrupted: the current step was finished, and all files were written\n"
     ended = next(line for line in out.splitlines() if line.startswith(" ended"))
     assert ended.startswith(" ended  interrupted, at t = ")
     run = load_run(folder / "out")

@@ -58,18 +58,18 @@ def test_every_plugin_that_ships_can_be_begun_with(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (["thing", "Mine"], "there is no kind 'thing'"),
+        (["thing", "Mine"], "kind of plugin 'thing'"),
         (["autonomi", "Mine"], "did you mean 'autonomy'?"),
-        (["autonomy", "mine"], "a capital first"),
-        (["autonomy", "../Mine"], "is no name of a plugin"),
-        (["autonomy", "Boids"], "a plugin that ships is called 'Boids'"),
+        (["autonomy", "mine"], "'mine' is not a plugin name"),
+        (["autonomy", "../Mine"], "'../Mine' is not a plugin name"),
+        (["autonomy", "Boids"], "a stock plugin is named 'Boids'"),
         (["autonomy", "Mine", "--from", "Boid"], "did you mean 'Boids'?"),
         (
             ["motion", "Mine", "--easy"],
-            "--easy does not go with the kind motion; easy ones are autonomy, controller",
+            "--easy is not allowed with the kind motion; allowed kinds: autonomy, controller",
         ),
-        (["metric", "Mine", "--easy", "--from", "CPA"], "--easy does not go with --from CPA"),
-        (["autonomy", "Mine", "--from", "Unicycle"], "this is of the kind motion, not autonomy"),
+        (["metric", "Mine", "--easy", "--from", "CPA"], "--easy is not allowed with --from CPA"),
+        (["autonomy", "Mine", "--from", "Unicycle"], "is motion, not autonomy"),
     ],
 )
 def test_what_cannot_be_begun_is_told(tussle, folder, arguments, text):
@@ -83,6 +83,6 @@ def test_what_cannot_be_begun_is_told(tussle, folder, arguments, text):
 def test_files_of_the_same_name_are_left_alone(tussle, folder):
     (folder / "test_mine.py").write_text("precious")
     done = tussle("new", "metric", "Mine", code=1)
-    assert "test_mine.py: there is such a file already" in done.stderr
+    assert "test_mine.py: the file exists" in done.stderr
     assert (folder / "test_mine.py").read_text() == "precious"
     assert not (folder / "mine.py").exists()

@@ -42,7 +42,7 @@ def test_it_shows_what_came_of_the_game_and_where_it_is_recorded(tussle, folder)
         assert line[2:4] == [start, str(info["worlds"][0]["alive"][team])]
         assert line[6] == f"{scores[team]:g}"
     for label in (
-        " ended  its end time is reached, at t = 3 s",
+        " ended  end time reached, at t = 3 s",
         " grade  portable",
         f" run    runs/{run.name}",
     ):
@@ -104,7 +104,7 @@ def test_end_takes_a_unit_and_ends_a_mission_that_has_no_such_end(tussle, folder
     text = (folder / "game.xml").read_text().replace("<seed>", "<end_condition>none</end_condition><seed>")
     (folder / "endless.xml").write_text(text)
     done = tussle("run", "endless.xml", "--no-log", "--end", "0.05 min")
-    assert " ended  its end time is reached, at t = 3 s" in done.stdout.splitlines()
+    assert " ended  end time reached, at t = 3 s" in done.stdout.splitlines()
     assert hash_of(done) == hash_of(tussle("run", "game.xml", "--no-log"))
 
 
@@ -187,7 +187,7 @@ def test_a_plugin_that_fails_ends_the_game_and_what_was_played_is_kept(tussle, f
         (["run"], 2, "MISSION"),
         (["run", "game.xml", "--sed", "1"], 2, "--sed"),
         (["run", "game.xml", "--seed", "-1"], 2, "--seed"),
-        (["run", "game.xml", "--set", "n"], 2, "'n' is not written as NAME=VALUE"),
+        (["run", "game.xml", "--set", "n"], 2, "'n' does not have the form NAME=VALUE"),
         (["run", "game.xml", "--set", "n=1", "n=2"], 2, "n is set twice, to '1' and to '2'"),
         (["run", "game.xml", "--pace", "0"], 2, "--pace 0 is not allowed"),
         (["run", "game.xml", "--log-period", "nan"], 2, "--log-period nan is not allowed"),

@@ -65,6 +65,7 @@ def test_the_first_run_ever_says_that_it_compiles_and_the_next_does_not(folder, 
         for _ in range(2)
     ]
     first, last = runs[0].stderr.splitlines()
-    assert first == f"compiling kernels for this machine, once; they are kept in {folder / 'kernels'}"
+    assert first.startswith("compiling kernels")
+    assert first.endswith(f" {folder / 'kernels'}")
     assert re.fullmatch(r"compiled \d+ kernels? in \d+\.\d s", last)
     assert not runs[1].stderr

@@ -117,7 +117,7 @@ def test_code_generator_of_the_lanes_reaches_the_laws_that_use_lanes(edited, pla
 
 @pytest.mark.slow
 def test_callee_of_one_motion_model_reaches_no_other_module(edited, plain):
-    head = 'def clamp(value, limit):\n    """Value held within [-limit, limit]."""\n'
+    head = 'def clamp(value, limit):\n    """Value clamped to [-limit, limit]."""\n'
     after = edited("stock/motion/unicycle/kernels.py", head, f"{head}    value = 0.5 * value\n")
     assert after["hash"] != plain["hash"]
     assert after["made"]

@@ -331,7 +331,7 @@ def test_differences_to_the_existing_system_are_said(files):
     notes = "\n".join(
         files.read("<runscript>\n<entity><motion_model>Unicycle</motion_model></entity></runscript>").notes
     )
-    assert "m.xml:2: Unicycle is steered in pitch here" in notes
+    assert "m.xml:2: Unicycle follows pitch_rate unless use_pitch='false'" in notes
     quiet = files.read(
         "<runscript><entity><motion_model use_pitch='true'>Unicycle</motion_model></entity></runscript>"
     ).notes

@@ -1,4 +1,4 @@
-"""`tussle new`: a plugin of your own that works from the start, with its test and a mission that plays it."""
+"""`tussle new`: write a working plugin, its test, and a mission that uses it."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from tussle.errors import MissionError, ParameterError, listed, nearest_name
 TEMPLATES = Path(__file__).parent / "templates"
 KINDS = ("autonomy", "motion", "controller", "sensor", "interaction", "metric", "network")
 EASY_KINDS = ("autonomy", "controller", "sensor", "interaction", "metric")
-"""Kinds that can be written for one entity or one world at a time; an autonomy from the template always is."""
+"""Kinds with an easy mode. The autonomy template always uses easy mode."""
 
-TEST = '''"""{name} keeps the contract of plugins, and its mission can be played."""
+TEST = '''"""{name} passes the conformance checks, and its mission can be played."""
 
 from pathlib import Path
 
@@ -33,11 +33,11 @@ from tussle.mission import read_mission
 HERE = Path(__file__).parent
 
 
-def test_it_keeps_the_contract():
+def test_conformance():
     check_plugin({name})
 
 
-def test_its_mission_is_played_to_the_end():
+def test_mission_reaches_its_end_time():
     loaded = read_mission(HERE / "{module}.xml", plugin_files=[HERE / "{module}.py"])
     (result,) = Simulation(loaded.mission, seeds=1).run()
     assert result.end == "time"
@@ -46,11 +46,11 @@ def test_its_mission_is_played_to_the_end():
 
 @dataclass(frozen=True)
 class Written:
-    """What was written.
+    """The written files.
 
     Attributes:
-        files: Path -> what it is.
-        next_steps: What to type next.
+        files: Description of each file, by path.
+        next_steps: Commands to try next.
     """
 
     files: dict[Path, str]
@@ -62,19 +62,19 @@ def write_plugin(kind: str, name: str, origin: str | None, directory: Path, is_e
 
     Args:
         kind: "autonomy", "motion", "controller", "sensor", "interaction", "metric" or "network".
-        name: Name of the class, such as "MyBoids"; the files are called after it.
-        origin: A plugin that ships, to begin with a copy of it.
-        directory: Where; made if need be.
-        is_easy: Write it for one entity or one world at a time.
+        name: Name of the class, such as "MyBoids"; the file names derive from it.
+        origin: Stock plugin to copy, or None to use the template.
+        directory: Directory for the files, created if necessary.
+        is_easy: Use the easy mode: code for one entity or one world at a time.
 
     Raises:
-        ParameterError: The kind or the plugin to copy is unknown, the name cannot be a class's, or the kind has no easy mode.
-        MissionError: One of the files is there already, or cannot be written.
+        ParameterError: The kind or the plugin to copy is unknown, the name is no class name, or the kind has no easy mode.
+        MissionError: A file exists already or cannot be written.
     """
     _check_names(kind, name)
     if is_easy and (kind not in EASY_KINDS or origin):
-        other = f"--from {origin}" if origin else f"the kind {kind}; easy ones are {', '.join(EASY_KINDS)}"
-        raise ParameterError(f"--easy does not go with {other}")
+        other = f"--from {origin}" if origin else f"the kind {kind}; allowed kinds: {', '.join(EASY_KINDS)}"
+        raise ParameterError(f"--easy is not allowed with {other}")
     source, plugin = (
         _from_template(kind, name, is_easy) if origin is None else _from_stock(kind, name, origin)
     )
@@ -82,7 +82,7 @@ def write_plugin(kind: str, name: str, origin: str | None, directory: Path, is_e
     texts = {
         directory / f"{module}.py": (source, f"the {kind}"),
         directory / f"test_{module}.py": (TEST.format(name=name, module=module), "its test"),
-        directory / f"{module}.xml": (mission_text(kind, name, plugin), "a mission that plays it"),
+        directory / f"{module}.xml": (mission_text(kind, name, plugin), "a mission that uses it"),
     }
     _write({path: text for path, (text, _) in texts.items()})
     at = directory / module
@@ -96,15 +96,13 @@ def write_plugin(kind: str, name: str, origin: str | None, directory: Path, is_e
 
 def _check_names(kind: str, name: str) -> None:
     if kind not in KINDS:
-        raise ParameterError(f"there is no kind {kind!r}{nearest_name(kind, KINDS)}; {listed(KINDS)}")
+        raise ParameterError(f"unknown kind of plugin {kind!r}{nearest_name(kind, KINDS)}; {listed(KINDS)}")
     if not re.fullmatch(r"[A-Z][A-Za-z0-9]*", name) or keyword.iskeyword(name):
         raise ParameterError(
-            f"{name!r} is no name of a plugin; it takes letters and digits, a capital first, such as MyBoids"
+            f"{name!r} is not a plugin name; use letters and digits, starting with a capital letter, such as MyBoids"
         )
     if name in stock.manifest():
-        raise ParameterError(
-            f"a plugin that ships is called {name!r}; give yours a name of its own, such as My{name}"
-        )
+        raise ParameterError(f"a stock plugin is named {name!r}; choose another name, such as My{name}")
 
 
 def _from_template(kind: str, name: str, is_easy: bool) -> tuple[str, Plugin]:
@@ -119,17 +117,17 @@ def _from_template(kind: str, name: str, is_easy: bool) -> tuple[str, Plugin]:
 def _from_stock(kind: str, name: str, origin: str) -> tuple[str, Plugin]:
     cls: Any = stock.load(origin)
     if cls.kind != kind:
-        raise ParameterError(f"--from {origin}: this is of the kind {cls.kind}, not {kind}")
+        raise ParameterError(f"--from {origin}: the kind of this plugin is {cls.kind}, not {kind}")
     return class_renamed(merged(cls), origin, name), cls()
 
 
 def _write(texts: dict[Path, str]) -> None:
     for path in texts:
         if path.exists():
-            raise MissionError(f"{path}: there is such a file already; choose another name, or remove it")
+            raise MissionError(f"{path}: the file exists already; choose another name, or remove the file")
     for path, text in texts.items():
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text, encoding="utf-8")
         except OSError as error:
-            raise MissionError(f"{path}: it cannot be written: {error.strerror or error}") from error
+            raise MissionError(f"{path}: the file cannot be written: {error.strerror or error}") from error

@@ -1,4 +1,4 @@
-"""A shipped plugin's source as one file: the class, and the kernels that stand beside it."""
+"""Merge the source of a stock plugin and its kernels into one file."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from tussle.errors import ParameterError
 
 
 def class_renamed(source: str, old: str, new: str) -> str:
-    """The source with the class's name changed, wherever it stands as a word."""
+    """Replace a class name wherever it occurs as a word."""
     return re.sub(rf"\b{old}\b", new, source)
 
 
 def merged(cls: type[Any]) -> str:
-    """The source of a plugin's file, with its `kernels` put in front of the class.
+    """Return the source of a plugin's file, with its kernels inserted before the class.
 
     Raises:
-        ParameterError: Its source is not there.
+        ParameterError: The source cannot be read.
     """
     try:
         path = Path(inspect.getfile(cls))
@@ -37,7 +37,7 @@ def merged(cls: type[Any]) -> str:
 
 
 class _Parts:
-    """A module's docstring, imports and the rest, as text."""
+    """The docstring, the imports and the remaining source of a module."""
 
     def __init__(self, text: str) -> None:
         self.tree = ast.parse(text)
@@ -49,7 +49,7 @@ class _Parts:
         self.rest = "\n".join(lines[last:]).strip("\n")
 
     def names(self) -> set[str]:
-        """Names that are bound inside functions, and so would hide a name of the module."""
+        """Names bound inside functions, which would hide names of the module."""
         functions = [n for n in ast.walk(self.tree) if isinstance(n, ast.FunctionDef | ast.Lambda)]
         inside = [n for f in functions for n in ast.walk(f)]
         return {n.arg for n in inside if isinstance(n, ast.arg)} | {
@@ -57,7 +57,7 @@ class _Parts:
         }
 
     def defined(self) -> list[str]:
-        """Names that the module's top level defines."""
+        """Names defined at the top level of the module."""
         found = [n.name for n in self.tree.body if isinstance(n, ast.FunctionDef | ast.ClassDef)]
         assigned = [n for n in self.tree.body if isinstance(n, ast.Assign | ast.AnnAssign)]
         names = [n for a in assigned for n in ast.walk(a) if isinstance(n, ast.Name)]

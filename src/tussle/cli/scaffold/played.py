@@ -1,4 +1,4 @@
-"""A small mission around one plugin, as text."""
+"""The text of a small mission that uses a given plugin."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from tussle.errors import MissionError, TussleError
 from tussle.mission import Block, Mission
 
 SELF = "SELF"
-"""Stands for the plugin itself in a lineup."""
+"""Placeholder for the plugin itself in a lineup."""
 
 LINEUPS: dict[str, list[tuple[str, str, str]]] = {
-    # (autonomies, controller, motion) to be tried in turn.
+    # (autonomies, controller, motion model), tried in this order.
     "autonomy": [
         (SELF, "DirectController", "Unicycle"),
         (SELF, "UnicyclePID", "Unicycle"),
@@ -74,15 +74,15 @@ TEXT = """\
 
 
 def mission_text(kind: str, name: str, plugin: Plugin) -> str:
-    """A mission in which 20 robots and 5 others play, and the plugin with them.
+    """Return a mission of 20 robots and 5 others that uses the plugin.
 
     Args:
-        kind: Of the plugin.
-        name: By which it will be known.
-        plugin: As data; found out with it is which other plugins it goes with.
+        kind: Kind of the plugin.
+        name: Name of the plugin in the mission.
+        plugin: An instance, used to find stock plugins that fit it.
 
     Raises:
-        MissionError: It goes with none of those that ship.
+        MissionError: The plugin does not fit any stock plugins.
     """
     autonomies, controller, motion = (part.replace(SELF, name) for part in _lineup(kind, plugin))
     autonomy = "".join(f"    <autonomy>{each}</autonomy>\n" for each in autonomies.split())
@@ -97,7 +97,7 @@ def mission_text(kind: str, name: str, plugin: Plugin) -> str:
 
 
 def _lineup(kind: str, plugin: Plugin) -> tuple[str, str, str]:
-    """The first lineup that can be built."""
+    """Return the first lineup that can be built."""
     why = ""
     for lineup in LINEUPS.get(kind, USUAL):
         try:
@@ -106,7 +106,7 @@ def _lineup(kind: str, plugin: Plugin) -> tuple[str, str, str]:
         except TussleError as error:
             why = str(error)
     raise MissionError(
-        f"no mission could be made for {plugin!r}: it goes with none of the plugins that ship ({why})"
+        f"no mission could be written for {plugin!r}: it fits none of the stock plugins ({why})"
     )
 
 

@@ -1,1 +1,1 @@
-"""What `tussle new` begins with: a plugin of each kind that works as it stands, called New here."""
+"""Templates of `tussle new`: one working plugin, named New, per kind."""

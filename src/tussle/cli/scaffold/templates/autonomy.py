@@ -1,4 +1,4 @@
-"""An autonomy: what a robot decides, in plain Python for one robot at a time."""
+"""An autonomy: the decisions of a robot, in plain Python for one robot at a time."""
 
 import math
 
@@ -6,17 +6,17 @@ from tussle.api import EasyAutonomy, Me, Output, Param, State, wrap
 
 
 class New(EasyAutonomy):
-    """Fly towards the nearest robot of another team; straight on while there is none."""
+    """Flies towards the nearest robot of another team, or straight on if there is none."""
 
     max_speed = Param(25.0, unit="m/s", ge=0.0, doc="Speed while chasing.")
-    other_team = Param(2, doc="Team that is chased.")
+    other_team = Param(2, doc="Team to chase.")
     way = State(unit="m", doc="Distance flown so far.")
     speed = Output(unit="m/s")
     turn_rate = Output(unit="rad/s")
     pitch_rate = Output(unit="rad/s")
 
     def step_one(self, me: Me) -> None:
-        """Decide for one robot; `me` has its pos, yaw, climb, neighbours, and all that is declared above."""
+        """Decide for one robot. `me` has its pos, yaw, climb, neighbours, and the columns declared above."""
         me.speed = me.max_speed
         me.way += me.max_speed * me.dt
         other = me.nearest(team=me.other_team)

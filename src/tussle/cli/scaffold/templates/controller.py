@@ -1,4 +1,4 @@
-"""A controller: from what an autonomy wants to what the motion model takes, for all robots at once."""
+"""A controller: converts desired values of an autonomy to inputs of the motion model, for all robots at once."""
 
 import numpy as np
 
@@ -7,13 +7,13 @@ from tussle.numeric import atan2, wrap
 
 
 class New(Controller):
-    """Turn to a heading and climb to an altitude, each at a rate in proportion to the error."""
+    """Turns to a heading and climbs to an altitude, each at a rate proportional to the error."""
 
     grade = "portable"
 
     turn_gain = Param(1.0, unit="1/s", ge=0.0, doc="Turn rate per heading error.")
     climb_gain = Param(1.0, unit="1/s", ge=0.0, doc="Pitch rate per error of the climb angle.")
-    look_ahead = Param(100.0, unit="m", gt=0.0, doc="Way in which an altitude error is to be made up for.")
+    look_ahead = Param(100.0, unit="m", gt=0.0, doc="Distance over which an altitude error is corrected.")
     desired_heading = Input(unit="rad")
     desired_altitude = Input(unit="m")
     desired_speed = Input(unit="m/s")
@@ -22,7 +22,7 @@ class New(Controller):
     pitch_rate = Output(unit="rad/s")
 
     def step(self, g: GroupView) -> None:
-        """One call for all robots; every array has one value per robot."""
+        """Control all robots; every array has one value per robot."""
         climb = atan2(self.desired_altitude - g.pos[2], np.asarray(self.look_ahead))
         self.speed[:] = self.desired_speed
         self.turn_rate[:] = self.turn_gain * wrap(self.desired_heading - g.yaw)

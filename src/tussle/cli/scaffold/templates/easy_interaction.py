@@ -1,4 +1,4 @@
-"""An interaction: what happens between robots after all have moved, in plain Python for one world at a time."""
+"""An interaction: effects between robots after the motion of each step, in plain Python for one world at a time."""
 
 import math
 
@@ -6,13 +6,13 @@ from tussle.api import EasyInteraction, OneWorld, Param, State
 
 
 class New(EasyInteraction):
-    """An arena: who leaves it is out of the game."""
+    """An arena; robots that leave it are removed."""
 
-    radius = Param(1500.0, unit="m", gt=0.0, doc="Of the arena, around the origin.")
-    n_lost = State(dtype=int, per="team", doc="Who left so far.")
+    radius = Param(1500.0, unit="m", gt=0.0, doc="Radius of the arena around the origin.")
+    n_lost = State(dtype=int, per="team", doc="Robots removed so far.")
 
     def step_one(self, w: OneWorld) -> None:
-        """Look at one world; `w` has its entities, t, messages, and all that is declared above."""
+        """Update one world. `w` has its entities, t, messages, and the columns declared above."""
         for entity in w.entities:
             east, north, _ = entity.pos
             if math.hypot(east, north) > w.radius:
@@ -20,5 +20,5 @@ class New(EasyInteraction):
                 w.kill(entity, "left the arena")
 
     def result_one(self, w: OneWorld) -> dict[str, object]:
-        """What is told at the end: a number, or one for each team."""
+        """Return the results at the end: a number, or one per team."""
         return {"left the arena": w.n_lost}

@@ -1,4 +1,4 @@
-"""An interaction: what happens between robots, or between them and the world, after all have moved."""
+"""An interaction: effects between robots, or between robots and the world, after the motion of each step."""
 
 import numpy as np
 
@@ -6,20 +6,20 @@ from tussle.api import Interaction, Param, State, WorldView
 
 
 class New(Interaction):
-    """An arena: who leaves it is out of the game."""
+    """An arena; robots that leave it are removed."""
 
     grade = "portable"
 
-    radius = Param(1500.0, unit="m", gt=0.0, doc="Of the arena, around the origin.")
-    n_lost = State(dtype=int, per="team", doc="Who left so far.")
+    radius = Param(1500.0, unit="m", gt=0.0, doc="Radius of the arena around the origin.")
+    n_lost = State(dtype=int, per="team", doc="Robots removed so far.")
 
     def step(self, w: WorldView) -> None:
-        """One call for all robots of all worlds; parameters have one value per world."""
+        """Update all robots of all worlds; parameters have one value per world."""
         east, north, _ = w.pos
         is_out = east * east + north * north > self.radius[w.world] ** 2
         np.add.at(self.n_lost, (w.team_numbers(w.team[is_out]), w.world[is_out]), 1)
         w.kill(is_out, "left the arena")
 
     def result(self, w: WorldView) -> dict[str, np.ndarray]:
-        """What is told at the end: one value per team and world."""
+        """Return the results at the end: one value per team and world."""
         return {"left the arena": self.n_lost}

@@ -1,4 +1,4 @@
-"""A metric: what is counted in a game, and who wins it."""
+"""A metric: measures a game and decides who wins."""
 
 import numpy as np
 
@@ -6,19 +6,19 @@ from tussle.api import Metric, Param, State, WorldView
 
 
 class New(Metric):
-    """The time that each team's robots spend near a point; the team that is there more wins."""
+    """Measures the time that the robots of each team spend near the origin; the team with the longest time wins."""
 
     grade = "portable"
 
-    radius = Param(500.0, unit="m", gt=0.0, doc="What counts as near the origin.")
-    time_there = State(unit="s", per="team", doc="Robot seconds so far.")
+    radius = Param(500.0, unit="m", gt=0.0, doc="Distance from the origin that counts as near.")
+    time_there = State(unit="s", per="team", doc="Time so far, summed over the robots.")
 
     def step(self, w: WorldView) -> None:
-        """One call for all robots of all worlds; parameters have one value per world."""
+        """Update all robots of all worlds; parameters have one value per world."""
         east, north, _ = w.pos
         is_there = east * east + north * north < self.radius[w.world] ** 2
         np.add.at(self.time_there, (w.team_numbers(w.team[is_there]), w.world[is_there]), w.dt)
 
     def result(self, w: WorldView) -> dict[str, np.ndarray]:
-        """What is told at the end, one value per team and world; "score" decides who wins."""
+        """Return the results at the end: one value per team and world; "score" decides who wins."""
         return {"score": self.time_there}

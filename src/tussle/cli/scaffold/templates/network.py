@@ -1,4 +1,4 @@
-"""A network: who hears whom."""
+"""A network: decides which messages reach which entities."""
 
 import numpy as np
 
@@ -6,14 +6,14 @@ from tussle.api import Batch, Network, Param, WorldView
 
 
 class New(Network):
-    """Radio with a range: a message reaches the sender, and whoever is nearer than that."""
+    """Radio with a limited range: a message reaches the sender and all entities nearer than `radius`."""
 
     grade = "portable"
 
-    radius = Param(400.0, unit="m", ge=0.0, doc="Distance within which others hear.")
+    radius = Param(400.0, unit="m", ge=0.0, doc="Range of the radio.")
 
     def route(self, w: WorldView, messages: Batch) -> tuple[np.ndarray, np.ndarray]:
-        """For each delivery, the number of the message and the row of the receiver."""
+        """Return, for each delivery, the index of the message and the row of the receiver."""
         sender = w.rows_at(messages.world, messages.sender)
         near = w.near(self.radius[w.world])  # pairs (row, other), ordered by row
         first = np.searchsorted(near.row, sender, side="left")

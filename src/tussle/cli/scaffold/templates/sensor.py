@@ -1,4 +1,4 @@
-"""A sensor: what a robot measures after all have moved, for all robots at once."""
+"""A sensor: measures after the motion of each step, for all robots at once."""
 
 import numpy as np
 
@@ -6,16 +6,16 @@ from tussle.api import GroupView, Output, Param, Sensor
 
 
 class New(Sensor):
-    """Distance to the nearest other robot, with noise; `reach` where nobody is that near."""
+    """Measures the distance to the nearest other robot, with noise; `reach` if no robot is that near."""
 
     grade = "portable"
 
-    reach = Param(300.0, unit="m", gt=0.0, doc="Largest distance that is measured.")
+    reach = Param(300.0, unit="m", gt=0.0, doc="Largest measured distance.")
     noise = Param(2.0, unit="m", ge=0.0, doc="Standard deviation of the error.")
-    clearance = Output(unit="m", doc="The distance as measured; an autonomy reads it with Input(unit='m').")
+    clearance = Output(unit="m", doc="Measured distance; an autonomy reads it with Input(unit='m').")
 
     def step(self, g: GroupView) -> None:
-        """One call for all robots; every array has one value per robot."""
+        """Measure for all robots; every array has one value per robot."""
         nearest = g.nearest(k=1)
         is_seen = (nearest.other[0] >= 0) & (nearest.distance[0] < self.reach)
         measured = np.where(is_seen, nearest.distance[0], self.reach) + self.noise * g.normal("noise")

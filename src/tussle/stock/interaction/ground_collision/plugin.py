@@ -63,7 +63,7 @@ class GroundCollision(Interaction):
             return int(self.team)
         except ValueError:
             raise ParameterError(
-                f"GroundCollision.team = {self.team!r} is not allowed; allowed are the number of a team and 'all'"
+                f"GroundCollision.team = {self.team!r} is not allowed; it takes the number of a team or 'all'"
             ) from None
 
     def rejects(self, w: WorldView, world: int, pos: np.ndarray, taken: np.ndarray) -> bool:
