@@ -1,9 +1,9 @@
-"""Batches of the 500 s predator/prey game: wall and CPU time, by processes, stack and number of runs; memory; the cost of one.
+"""Batches of the 500 s predator/prey game: wall time, CPU time and memory by processes, stack size and number of runs.
 
     python benchmarks/batch.py [--runs 1000] [--parts game processes stacks flat one] [--json FILE]
 
-Each row is `tussle batch` as a user calls it, in a process of its own, start-up included; 12 motion substeps, as the original was measured.
-The original takes 2.5 CPU s a game, about 21 minutes of wall time for 1,000 games on two cores.
+Each row runs `tussle batch` in a separate process, start-up included, with 12 motion substeps, as in the measurement of the original.
+The original takes 2.5 CPU s per game, about 21 minutes of wall time for 1,000 games on two cores.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ SHORT = ["predator_prey", "prey=20", "predators=2", "--end", "10"]
 
 
 def tussle(*arguments: str) -> dict[str, float]:
-    """Wall time, CPU time of all processes, and the largest memory of one of them."""
+    """Wall time, CPU time of all processes, and peak memory of the largest process."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     begun = time.perf_counter()
-    # In a process of its own, whose children are the batch's processes.
+    # A separate process, so that its children are the processes of the batch only.
     script = (
         "import resource, subprocess, sys\n"
         "subprocess.run([sys.executable, '-m', 'tussle.cli', *sys.argv[1:]], check=True, "
@@ -47,7 +47,7 @@ def tussle(*arguments: str) -> dict[str, float]:
 
 
 def batch(mission: list[str], n: int, **options: int) -> dict[str, Any]:
-    """One batch of n runs."""
+    """Run one batch of n runs."""
     with tempfile.TemporaryDirectory() as folder:
         more = [item for name, value in options.items() for item in (f"--{name}", str(value))]
         row = tussle("batch", *mission, "--runs", str(n), "--out", f"{folder}/b", *more)
@@ -55,7 +55,7 @@ def batch(mission: list[str], n: int, **options: int) -> dict[str, Any]:
 
 
 def game(n: int) -> list[dict[str, Any]]:
-    """The figure that counts: all runs on all cores."""
+    """All runs on all cores."""
     row = batch(GAME, n)
     return [row | {"ratio": ORIGINAL * n / row["cpu_s"]}]
 
@@ -74,12 +74,12 @@ def stacks(n: int) -> list[dict[str, Any]]:
 
 
 def flat(n: int) -> list[dict[str, Any]]:
-    """Short games, so that it is the batch that is measured: 100, 1,000, 10,000 of them."""
+    """100, 1,000 and 10,000 short games, to measure the overhead of the batch."""
     return [batch(SHORT, 10 * n // factor) for factor in (100, 10, 1)]
 
 
 def one(_: int) -> list[dict[str, Any]]:
-    """A batch of one beside a plain run, both recording what they always record; medians of pairs played in turn."""
+    """A batch of one run against `tussle run`, both with default recording; medians of pairs run in turn."""
     pairs = []
     with tempfile.TemporaryDirectory() as folder:
         for k in range(7):

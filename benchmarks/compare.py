@@ -1,10 +1,10 @@
-"""CPU time of a step in two checkouts, in small pieces played in turn, so that a busy machine is the same for both.
+"""CPU time of a step in two checkouts, measured in short alternating intervals so that machine load affects both equally.
 
     python benchmarks/compare.py OLD NEW [--rows SingleIntegrator:200 game:64] [--rounds 40] [--json FILE]
 
 OLD and NEW are folders of checkouts; a row is a model of table1.py with a number of entities, `game` with a number of worlds, or
-`sequential`, the same with entities that move one after the other. `ratio` is the median of new / old over the rounds, `least_old` and
-`least_new` the least times of a step [us]. OLD against itself shows how far noise goes.
+`sequential`, the same with update="sequential". `ratio` is the median of new / old over the rounds; `least_old` and
+`least_new` are the smallest times of a step [us]. OLD against itself shows the noise.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import measuring
 
 ROWS = ("SingleIntegrator:200", "SingleIntegrator:2000", "Unicycle:200", "Unicycle:2000", "game:1", "game:64")
 PIECE = 0.04
-"""CPU seconds of a piece, about."""
+"""Approximate CPU time of an interval [s]."""
 PLAYER = """
 import sys, time
 sys.path[:0] = [sys.argv[1] + "/src", sys.argv[1] + "/benchmarks"]
@@ -45,7 +45,7 @@ for line in sys.stdin:
 
 
 def measure(folders: list[Path], row: str, rounds: int) -> dict[str, Any]:
-    """Play both in turn."""
+    """Measure both checkouts in turn."""
     command = [[sys.executable, "-c", PLAYER, str(folder.resolve()), row] for folder in folders]
     both = [subprocess.Popen(c, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) for c in command]
 

@@ -1,10 +1,10 @@
-"""The cost of easy mode per entity and step, by what the behaviour asks for.
+"""The cost of easy mode per entity and step, by the features that the behaviour uses.
 
     python benchmarks/easy.py [--sizes 200] [--repeats 5] [--json FILE]
 
-N chasers and N prey in one world; the prey fly by a plugin of NumPy. `us_per_entity_step` is the CPU time of the chasers' calls alone,
-`us_least` that of the cheapest step: what it costs where nobody else uses the machine. `keeps` is the Chaser of the guide, which looks for
-prey when it has none; `looks` takes the nearest anew in every step. `plain` is its arithmetic alone, on objects that hold the values.
+N chasers and N prey in one world; the prey use a NumPy plugin. `us_per_entity_step` is the CPU time of the chasers' calls alone,
+`us_least` that of the fastest step, an estimate without other load on the machine. `keeps` is the Chaser of the guide, which searches
+for prey when it has none; `looks` searches for the nearest in every step. `plain` is its arithmetic alone, on plain Python objects.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class Prey(Autonomy):
 
 
 class Keeps(EasyAutonomy):
-    """Chase the nearest prey and keep to it until it is gone."""
+    """Chases the nearest prey until it is gone."""
 
     prey_team = Param(1, doc="Team that is hunted.")
     max_speed = Param(35.0, unit="m/s", ge=0.0)
@@ -77,7 +77,7 @@ class Keeps(EasyAutonomy):
 
 
 class Looks(Keeps):
-    """Chase whoever is nearest now."""
+    """Chases the nearest prey, chosen in every step."""
 
     def step_one(self, me: Me) -> None:
         me.target = None
@@ -85,7 +85,7 @@ class Looks(Keeps):
 
 
 class Flocks(Keeps):
-    """Fly to the middle of those of the own team within 100 m."""
+    """Flies to the centroid of the team mates within 100 m."""
 
     def step_one(self, me: Me) -> None:
         near = me.near(100.0, team=me.team)
@@ -96,7 +96,7 @@ class Flocks(Keeps):
 
 
 class Claims(Keeps):
-    """Send a message in every step, and read what came."""
+    """Sends a message in every step and reads the messages received."""
 
     claims = Subscribe(CaptureEntity, network="LocalNetwork")
     claim = Publish(CaptureEntity, network="LocalNetwork")
@@ -110,7 +110,7 @@ class Claims(Keeps):
 
 
 class Wanders(Keeps):
-    """Turn by chance."""
+    """Turns at random."""
 
     def step_one(self, me: Me) -> None:
         me.speed = me.max_speed
@@ -138,7 +138,7 @@ def mission(n: int, autonomy: Any) -> Mission:
 
 
 def measure(behaviour: type[EasyAutonomy], n: int) -> dict[str, Any]:
-    """Play one game and time the calls of one plugin."""
+    """Play one game and measure the calls of one plugin."""
     spent: list[float] = []
     sim = Simulation(mission(n, behaviour()))
     sim.step(3)
@@ -151,7 +151,7 @@ def measure(behaviour: type[EasyAutonomy], n: int) -> dict[str, Any]:
 
 
 def measure_plain(n: int) -> dict[str, Any]:
-    """The same for objects outside a simulation, which do the arithmetic of `Keeps`."""
+    """Measure the arithmetic of `Keeps` on plain objects outside a simulation."""
     entities = []
     for i in range(n):
         prey = SimpleNamespace(pos=np.array([i, 50.0, 0.0]))

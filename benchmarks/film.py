@@ -1,11 +1,11 @@
-"""How fast a film of a recorded run is made without a display, and where the time goes.
+"""Speed of making a film of a recorded run without a display, by part.
 
     python benchmarks/film.py [--sizes 20 200 2000] [--repeats 3] [--json FILE]
 
-Sizes are entities in two flocks, filmed at 1280x720 into H.264, with trails, shadows and caption, through each window that draws here
-without a display. `pictures/s` is of wall time, planning and the last wait for the encoder included; the other columns are milliseconds of
-a picture: reading it and its trails, drawing it, writing on it, waiting for the encoder, and CPU time of this process, in which Mesa draws
-with all cores. What else the machine does shows in all but the last.
+Sizes are entities in two flocks, filmed at 1280x720 in H.264 with trails, shadows and caption, with each offscreen window type that
+works on this machine. `pictures/s` is per wall time, including planning and the final wait for the encoder. The other columns are
+milliseconds per picture: reading states and trails, drawing, captions, waiting for the encoder, and CPU time of this process, in which
+Mesa draws with all cores. Other load on the machine affects all columns but the last.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from tussle.view.export.film.window import CHOICE, LIBRARIES, is_there
 
 SIZES = (20, 200, 2000)
 SECONDS = 6.0
-"""Length of the films [s]."""
+"""Duration of the films [s]."""
 
 
 def recorded(n: int, folder: Path) -> Recording:
-    """Two flocks for as long as the film is."""
+    """Two flocks, for the duration of the film."""
     blocks = [
         Block(
             name=name, team=team, count=n // 2, position=(x, 0, 150), placement="uniform", half_width=(80, 80, 50),

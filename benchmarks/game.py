@@ -1,4 +1,4 @@
-"""The 500 s predator/prey game: CPU seconds a world, alone and in a stack.
+"""The 500 s predator/prey game: CPU seconds per world, alone and in a stack.
 
     python benchmarks/game.py [--update sequential] [--sizes 1 64] [--repeats 3] [--json FILE]
 
@@ -20,7 +20,7 @@ ORIGINAL = 2.5
 
 
 def mission(motion_multiplier: int = 12, end: float = 500.0, **changes: Any) -> Mission:
-    """The game of the paper's section 6.5."""
+    """The game of section 6.5 of the paper."""
 
     def predators(name: str, team: int, north: float, switching: bool) -> Block:
         return Block(

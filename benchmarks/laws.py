@@ -1,9 +1,9 @@
-"""The cost of a neighbour law per pair, against that of Boids and of the same law over NumPy pairs.
+"""The cost of a neighbour law per pair, compared with Boids and with the same law over NumPy pairs.
 
     python benchmarks/laws.py [--sizes 2000] [--repeats 3] [--json FILE]
 
-Every law looks 200 m far in one world of entities as dense as the 2,000 of Table 1, one thread. `ns_per_pair` is CPU time of the
-neighbour sums alone by pairs in range; `to_boids` is the ratio to Boids' sums in the same round, the median over the rounds.
+Every law has a range of 200 m, in one world at the density of Table 1 with N = 2000, on one thread. `ns_per_pair` is the CPU time of
+the neighbour sums alone per pair in range; `to_boids` is the ratio to the sums of Boids in the same round, median over the rounds.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from tussle.stock import Boids, SingleIntegrator
 
 SIZES = (200, 2000, 20_000)
 ROUNDS = 30
-"""Measurements of each law behind one median; the laws take turns."""
+"""Measurements per median; the laws are measured in turn."""
 
 
 class Vicsek(Autonomy):
-    """Fly as the neighbours do on average (Vicsek 1995), at one speed and without noise."""
+    """Flies in the mean direction of the neighbours (Vicsek 1995), at constant speed and without noise."""
 
     sight = Param(200.0, unit="m", gt=0.0)
     speed = Param(30.0, unit="m/s")
@@ -45,7 +45,7 @@ class Vicsek(Autonomy):
 
 
 class Social(Autonomy):
-    """A law with a branch: team mates attract, others repel, the more the nearer, and whoever stands close counts."""
+    """A law with a branch: team mates attract, others repel, more strongly when nearer, and close entities are counted."""
 
     sight = Param(200.0, unit="m", gt=0.0)
     near = Param(20.0, unit="m")
@@ -74,7 +74,7 @@ def in_numpy(g: GroupView, sight: np.ndarray) -> None:
 
 
 def laws(n: int) -> tuple[dict[str, Callable[[], Any]], float]:
-    """The sums of each law over the same crowd, and the number of pairs."""
+    """Set up the sums of each law over the same entities, and count the pairs."""
     half = 0.5 * float(np.sqrt(n * scale.AREA_PER_AGENT))
     made: dict[str, Callable[[], Any]] = {}
     for autonomy in (Boids(), Vicsek(), Social()):
@@ -95,7 +95,7 @@ def laws(n: int) -> tuple[dict[str, Callable[[], Any]], float]:
 
 
 def measure(n: int) -> list[dict[str, Any]]:
-    """One row for each law."""
+    """Measure all laws."""
     made, pairs = laws(n)
     calls = max(1, round(200_000 / (pairs + 1)))
     cpu: dict[str, list[float]] = {name: [] for name in made}

@@ -1,9 +1,9 @@
-"""What recording every step of the 500 s game costs: the same games with and without it, in turn.
+"""The cost of recording every step of the 500 s game: the same games with and without recording, in turn.
 
     python benchmarks/logging_cost.py [--sizes 1 8] [--repeats 5] [--json FILE]
 
-Sizes are worlds in the stack. A game counts from its first step to its last, with opening and closing of the run directory, which lies in
-the folder for temporary files; `cost` is the time that recording adds, in CPU and in wall time, as part of that without it.
+Sizes are worlds in the stack. The time of a game includes opening and closing the run directory, which is in the temporary folder.
+`cost` is the CPU or wall time added by recording, relative to the time without recording.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ SIZES = (1, 8)
 
 
 def play(n_worlds: int, seed: int, folder: str | None, period: float | None = None) -> tuple[float, float]:
-    """CPU and wall seconds of one stack of games, recorded into a folder or not at all."""
+    """CPU and wall seconds of one stack of games, with or without recording."""
     sim = Simulation(game.mission(), seeds=range(seed, seed + n_worlds))
     with ExitStack() as stack:
         cpu, wall = time.process_time(), time.perf_counter()
@@ -36,7 +36,7 @@ def play(n_worlds: int, seed: int, folder: str | None, period: float | None = No
 
 
 def measure(n_worlds: int, repeats: int, period: float | None) -> dict[str, Any]:
-    """Medians over pairs of games with the same seeds, one after the other."""
+    """Medians over pairs of games with the same seeds, played in turn."""
     cpu, wall, mega = [], [], 0.0
     for i in range(repeats + 1):
         seed = 1 + i * n_worlds

@@ -1,4 +1,4 @@
-"""What the benchmarks share: CPU time of stepping, medians, a table on the screen, rows in a file."""
+"""Shared by the benchmarks: options, CPU time of stepping, medians, tables and JSON files."""
 
 from __future__ import annotations
 
@@ -15,16 +15,14 @@ import numpy as np
 from tussle import Mission, Simulation
 
 LEAST_CPU = 2.0
-"""CPU seconds of stepping behind every figure, at least."""
+"""Smallest CPU time of a measurement [s]."""
 
 
 def arguments(description: str, sizes: Sequence[int], **choices: Sequence[str]) -> argparse.Namespace:
-    """The options of all benchmarks: --sizes, --repeats, --json; and choices of a benchmark's own, the first by default."""
+    """Parse the options of all benchmarks, --sizes, --repeats and --json, and the choices of one benchmark; the first is the default."""
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--sizes", type=int, nargs="+", default=list(sizes), help="which sizes to measure")
-    parser.add_argument(
-        "--repeats", type=int, default=3, help="measurements of each row, of which the median counts"
-    )
+    parser.add_argument("--repeats", type=int, default=3, help="measurements per row; the median is reported")
     parser.add_argument("--json", type=Path, help="write the rows to this file")
     for name, allowed in choices.items():
         parser.add_argument(f"--{name}", choices=allowed, default=allowed[0])
@@ -32,7 +30,7 @@ def arguments(description: str, sizes: Sequence[int], **choices: Sequence[str]) 
 
 
 def play(make: Callable[[], Simulation]) -> tuple[float, float, int, Simulation]:
-    """Play simulations from their beginning to their end until LEAST_CPU is reached.
+    """Play whole simulations until LEAST_CPU is reached.
 
     Returns:
         CPU seconds of stepping, simulated seconds (of all worlds together), agent-steps, the last simulation.
@@ -53,7 +51,7 @@ def play(make: Callable[[], Simulation]) -> tuple[float, float, int, Simulation]
 
 
 def mean_pairs(mission: Mission, radius: float, every: int = 20) -> float:
-    """Neighbours within radius [m] per entity and step, all teams, over one run with seed 1."""
+    """Mean number of neighbours of all teams within radius [m], per entity and step, over one run with seed 1."""
     sim = Simulation(mission)
     counts: list[float] = []
     while not sim.is_over:
@@ -65,12 +63,12 @@ def mean_pairs(mission: Mission, radius: float, every: int = 20) -> float:
 
 
 def captures(sim: Simulation) -> float:
-    """Captures in all worlds, per world."""
+    """Mean number of captures per world."""
     return sum(sum(r.scores.values()) for r in sim.result()) / sim.n_worlds
 
 
 def median_of(repeats: int, measure: Callable[[], dict[str, Any]], key: str) -> dict[str, Any]:
-    """The measurement whose `key` is the median."""
+    """Return the measurement whose `key` is the median."""
     rows = sorted((measure() for _ in range(repeats)), key=lambda row: row[key])
     row = rows[len(rows) // 2]
     row["spread"] = round((rows[-1][key] - rows[0][key]) / statistics.median(r[key] for r in rows), 3)
@@ -78,7 +76,7 @@ def median_of(repeats: int, measure: Callable[[], dict[str, Any]], key: str) -> 
 
 
 def report(title: str, rows: list[dict[str, Any]], path: Path | None) -> None:
-    """Print the rows as a table, and write them where that is asked for."""
+    """Print the rows as a table, and write them to the file of --json."""
     print(title)
     columns = list(dict.fromkeys(k for row in rows for k in row))
     text = [[_text(row.get(c, "")) for c in columns] for row in rows]

@@ -1,9 +1,9 @@
-"""What it costs to begin one world of a stack anew, in steps of the whole stack.
+"""The cost of resetting one world of a stack, in steps of the whole stack.
 
     python benchmarks/resets.py [--sizes 64] [--repeats 3] [--json FILE]
 
-The game of predators and prey with deaths; a size is a number of worlds. `reset` is the CPU time of a step of the stack that follows
-a reset, and of the reset itself, less that of a step that follows none, in steps; the median over the rounds.
+The predator/prey game with captures; sizes are worlds in the stack. `reset` is the CPU time of a reset and the following step, minus
+that of a step without a reset, in steps; the median over the rounds.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ ROUNDS = 100
 
 
 def row(n_worlds: int) -> dict[str, Any]:
-    """Steps with and without a reset before them, in turn."""
+    """Measure steps with and without a preceding reset, in turn."""
     sim = Simulation(game.mission(end=10_000.0), range(1, n_worlds + 1))
     sim.step(100)
     seeds, costs, steps = itertools.count(10_000), [], []

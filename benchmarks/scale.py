@@ -1,11 +1,11 @@
-"""Cost per agent and step from 100 to 100,000 entities at one density, and memory.
+"""Cost per agent and step, and memory, from 100 to 100,000 entities at constant density.
 
     python benchmarks/scale.py [--sizes 1000 20000] [--repeats 3] [--json FILE]
 
-Unicycle boids, spread as densely as the 2,000 of Table 1 (which are normal with 632 m; here uniform over the square that has the same
-mean number of neighbours), dt 0.1 s, one motion step. `real_time` is simulated seconds per CPU second, `in_wall_time` per second.
-From 100,000 on with one thread and with two; `state` is the hash after two steps, the same for both, and `cpu_per_wall` says how much
-of two cores the second thread was given.
+Unicycle boids at the density of Table 1 with N = 2000 (there normal with 632 m; here uniform over the square with the same mean number
+of neighbours), dt 0.1 s, one motion step. `real_time` is simulated seconds per CPU second, `in_wall_time` per wall second. From 100,000
+on with one and with two threads; `state` is the hash after two steps, the same for both, and `cpu_per_wall` is the mean number of
+cores used.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from tussle.stock import Boids, Unicycle
 SIZES = (100, 300, 1000, 3000, 10_000, 20_000, 30_000, 100_000)
 SIGMA = math.sqrt(400_000.0)
 AREA_PER_AGENT = 4.0 * math.pi * SIGMA**2 / 2000.0
-"""Area per agent at which uniform agents have as many neighbours on average as 2,000 normal ones [m^2]."""
+"""Area per agent [m^2] at which uniformly placed agents have the same mean number of neighbours as 2,000 normally placed ones."""
 STEPS = 50
 THREADED = 100_000
 
 
 def mission(n: int) -> Mission:
-    """n boids at the density of Table 1 with N = 2000."""
+    """A mission of n boids at the density of Table 1 with N = 2000."""
     half = 0.5 * math.sqrt(n * AREA_PER_AGENT)
     block = Block(
         name="prey",
@@ -76,7 +76,7 @@ def measure(n: int, threads: int = 1) -> dict[str, Any]:
 
 
 def _resident_mb() -> float:
-    """Memory of this process now, the interpreter and compiled kernels included [MB]."""
+    """Current memory of this process, including the interpreter and compiled kernels [MB]."""
     pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
     return pages * resource.getpagesize() / 1e6
 

@@ -1,8 +1,8 @@
-"""Time to import tussle and to the first step: kernels cached, not cached, and one of them edited.
+"""Time to import tussle and to the first step: with cached kernels, without, and after an edit of one kernel.
 
     python benchmarks/start.py [--repeats 3] [--json FILE]
 
-Each figure is a fresh process, wall time. The edited kernel is one in a copy of the package.
+Each figure is the wall time of a fresh process. The kernel is edited in a copy of the package.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ BEFORE, AFTER = "        done = 0\n", "        done = b - b\n"
 
 
 def run(code: str, package: Path, cache: Path) -> float:
-    """Wall seconds of a fresh Python that runs code with the package's copy."""
+    """Wall seconds of a fresh Python process that runs code with the copy of the package."""
     environment = {**os.environ, "PYTHONPATH": str(package), "TUSSLE_CACHE_DIR": str(cache)}
     begin = time.perf_counter()
     subprocess.run([sys.executable, "-c", code], check=True, env=environment)
@@ -34,7 +34,7 @@ def run(code: str, package: Path, cache: Path) -> float:
 
 
 def edit(path: Path) -> None:
-    """Change the code of one kernel, the largest, without changing what it computes."""
+    """Change the code of the largest kernel without changing its results."""
     text = path.read_text(encoding="utf-8")
     assert text.count(BEFORE) >= 1
     path.write_text(text.replace(BEFORE, AFTER, 1), encoding="utf-8")

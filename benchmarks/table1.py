@@ -1,9 +1,9 @@
-"""Speed against the number of entities: the paper's Table 1, against the original measured on one machine.
+"""Speed by number of entities, Table 1 of the paper, compared with the original.
 
     python benchmarks/table1.py [--sizes 200 2000] [--repeats 3] [--json FILE]
 
 One thread, logs off, prey fly at 30 m/s, dt 0.1 s with 12 motion substeps. `original` is SCRIMMAGE (revision of 2025-08-12, Release
-build, one thread, logs off) in simulated seconds per CPU second on a 2-core 2.6 GHz Xeon virtual machine; `ratio` holds on such a one.
+build, one thread, logs off) in simulated seconds per CPU second on a 2-core 2.6 GHz Xeon virtual machine; `ratio` holds on such a machine.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ MODELS: dict[str, dict[str, Any]] = {
 
 
 def mission(model: str, n: int) -> Mission:
-    """n - 10 prey and 5 + 5 predators for 20 s."""
+    """A mission of n - 10 prey and 5 + 5 predators for 20 s."""
 
     def predators(name: str, team: int, switching: bool) -> Block:
         hunter = Predator(max_speed=35.0, capture_range=5.0, allow_prey_switching=switching)

@@ -1,12 +1,12 @@
-"""The paper's experiment again: 1,000 games, who wins, against the code of its time.
+"""The experiment of the paper: wins in 1,000 games, compared with the code of the paper.
 
     python benchmarks/validity.py [--update sequential|synchronous] [--law historic|corrected] [--seeds 1000] [--processes 2]
                                   [--csv FILE] [--reference FILE] [--json FILE]
 
-`--law historic` plays Boids with the means of the code behind the paper and credits each claim that holds; `corrected` plays tussle's
-own Boids and keeps the paper's scoring. A reference is a table of (seed, score of team 2, score of team 3, prey left, ...), one run
-a line, from the original's code; with it every distance is printed next to its two-sample limit at the 1 % level.
-Published: team 2 (keeps to one prey) wins 593, team 3 (switches) 361, 46 ties of 1,000.
+`--law historic` uses Boids with the means of the paper's code and credits each valid claim; `corrected` uses the default Boids
+with the scoring of the paper. A reference is a table of (seed, score of team 2, score of team 3, prey left, ...), one run per
+line, from the original code; with it, every distance is printed next to its two-sample limit at the 1 % level.
+Published: of 1,000 games team 2 (follows one prey) wins 593, team 3 (switches) wins 361, and 46 are ties.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ GOAL_AHEAD = 1e4  # [m], in the paper's mission
 
 
 def mission(update: str, law: str) -> Mission:
-    """The mission of the paper's section 6.5, one motion step per decision."""
+    """The mission of section 6.5 of the paper, one motion step per decision."""
     means = "historic" if law == "historic" else "team"
     base = game.mission(motion_multiplier=1)
     prey, *predators = base.blocks
@@ -69,7 +69,7 @@ def ks_distance(a: np.ndarray, b: np.ndarray) -> float:
 
 
 def compare(ours: np.ndarray, theirs: np.ndarray) -> list[dict[str, Any]]:
-    """Each measure of both samples, its difference, and the limit that chance keeps to in 99 % of all pairs of samples."""
+    """Each measure of both samples, their difference, and its 99 % limit for samples of the same distribution."""
     n, m = len(ours), len(theirs)
     rows = []
     for name, a, b in zip(("team 2 wins", "team 3 wins", "ties"), shares(ours), shares(theirs), strict=True):
@@ -148,7 +148,7 @@ def main() -> None:
         report = compare(ours, np.genfromtxt(args.reference, delimiter=",", skip_header=1)[:, :4])
         print(f"{'measure':<30} {'ours':>9} {'theirs':>9} {'distance':>9} {'1 % limit':>9}")
         for row in report:
-            mark = "" if row["difference"] <= row["limit"] else "   TOLD APART"
+            mark = "" if row["difference"] <= row["limit"] else "   DIFFERENT"
             print(
                 f"{row['measure']:<30} {row['ours']:9.4f} {row['theirs']:9.4f} {row['difference']:9.4f} {row['limit']:9.4f}{mark}"
             )

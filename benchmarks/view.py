@@ -1,14 +1,14 @@
-"""What a page costs that somebody watches: CPU of the server beside that of the game, frames a second, and the game's speed.
+"""The cost of a watched page: CPU time of the server, frames per second, and speed of the game.
 
     python benchmarks/view.py [--sizes 2000 20000] [--repeats 1] [--json FILE]
 
-Sizes are Boids, at the density of `scale.py`. Who watches is a process that speaks viser's protocol and draws nothing, so that a browser
-without a graphics card does not take the machine from what is measured. Per size:
+Sizes are numbers of Boids, at the density of `scale.py`. The viewer is a process that speaks viser's protocol and draws nothing, because
+a browser without a graphics card would take CPU time from the measurement. Per size:
 
-* paced: the game at 60 steps a second. `page` is the CPU time of the threads that serve (all but the game's), and `frames` what was
-  received, each second of the wall's time.
-* free: as fast as possible. `speed` is steps per CPU second of the game's thread while somebody watches, with all that is kept to wind it
-  back, as part of steps per CPU second of the same steps without page.
+* paced: the game at 60 steps per second. `page` is the CPU time of the server threads (all but the game's) and `frames` the number of
+  frames received, both per wall second.
+* free: as fast as possible. `speed` is steps per CPU second of the game's thread with a viewer and rewind history, relative to the same
+  steps without a page.
 """
 
 from __future__ import annotations
@@ -44,12 +44,12 @@ for line in sys.stdin:
 
 
 def boids(n: int) -> Mission:
-    """A game that does not end while it is measured."""
+    """A game that does not end during the measurement."""
     return scale.mission(n).replace(end=1e6)
 
 
 class Watcher:
-    """Another process that takes all that the page sends."""
+    """A separate process that receives everything the page sends."""
 
     def __init__(self, url: str) -> None:
         self._process = subprocess.Popen(
@@ -60,7 +60,7 @@ class Watcher:
         )
 
     def received(self) -> tuple[int, int]:
-        """Frames and bytes so far."""
+        """Frames and bytes received so far."""
         assert self._process.stdin
         assert self._process.stdout
         self._process.stdin.write("\n")
@@ -74,7 +74,7 @@ class Watcher:
 
 
 def cpu_by_thread() -> dict[str, float]:
-    """CPU seconds of the game's thread and of all others."""
+    """CPU seconds of the game's thread and of all other threads."""
     tick = os.sysconf("SC_CLK_TCK")
     names = {thread.native_id: thread.name for thread in threading.enumerate()}
     spent = {"game": 0.0, "page": 0.0}
@@ -86,7 +86,7 @@ def cpu_by_thread() -> dict[str, float]:
 
 
 def between(seconds: float) -> dict[str, float]:
-    """CPU seconds a second of the wall's time, over some seconds."""
+    """CPU seconds per wall second, over some seconds."""
     first, began = cpu_by_thread(), time.perf_counter()
     time.sleep(seconds)
     wall = time.perf_counter() - began
@@ -94,7 +94,7 @@ def between(seconds: float) -> dict[str, float]:
 
 
 def paced(simulation: Simulation) -> dict[str, float]:
-    """CPU of the page while the game keeps a pace."""
+    """CPU time of the page while the game is paced."""
     with Live(simulation, pace=STEPS_A_SECOND * simulation.mission.dt) as live, Page(live) as page:
         time.sleep(2.0)
         alone = between(SECONDS / 2)
@@ -118,7 +118,7 @@ def paced(simulation: Simulation) -> dict[str, float]:
 
 
 def free(n: int) -> dict[str, float]:
-    """Steps per CPU second while somebody watches, as part of those of the same steps alone."""
+    """Steps per CPU second with a viewer, relative to the same steps without."""
     with (
         Simulation(boids(n), 1) as simulation,
         Live(simulation, pace=None) as live,

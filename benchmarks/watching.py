@@ -1,11 +1,11 @@
-"""What it costs a game to be watched: CPU time of its thread beside the steps, and of each thing that is looked at.
+"""The cost of watching a game: CPU time of its thread besides the steps, and of each part of the view.
 
     python benchmarks/watching.py [--sizes 20 200 2000 20000] [--repeats 3] [--json FILE]
 
-Sizes are entities in two flocks, played as fast as possible by `tussle.view.Live`. `idle` is what snapshots, the history of frames and
-the bookkeeping take as part of the steps' own time while nobody looks, `watched` the same while frame, result, shapes and an entity are
-asked for 20 times a second; both are measured within one run, so that what else the machine does shows in neither. The other columns
-are microseconds of one step, one frame, one snapshot, one restore.
+Sizes are entities in two flocks, played as fast as possible by `tussle.view.Live`. `idle` is the time of snapshots, frame history and
+bookkeeping relative to the time of the steps, without a viewer; `watched` is the same while frame, result, shapes and an entity are
+requested 20 times per second. Both are measured in one run, so that other load on the machine affects neither. The other columns
+are microseconds per step, frame, snapshot and restore.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from tussle.view import Live, frame_of
 
 SIZES = (20, 200, 2000, 20000)
 LEAST_CPU = 2.0
-"""CPU seconds of steps behind each share."""
+"""CPU time of the steps in each measurement [s]."""
 PERIOD = 0.05
-"""Time between two looks [s]."""
+"""Time between two requests [s]."""
 
 
 def mission(n: int) -> Mission:
-    """Two flocks, as dense whatever their size."""
+    """Two flocks at constant density."""
     half = 10.0 * n**0.5
     flock = {
         "count": n // 2, "placement": "uniform", "half_width": (half, half, 20.0), "position": (0, 0, 200),
@@ -38,7 +38,7 @@ def mission(n: int) -> Mission:
 
 
 def share(n: int, is_watched: bool) -> float:
-    """CPU time of the thread beside the steps, as part of that of the steps."""
+    """CPU time of the thread besides the steps, relative to that of the steps."""
     sim = Simulation(mission(n))
     sim.step(20)  # loads what the game needs
     inside, thread, step = [0.0], [0.0, 0.0], sim.step
@@ -65,7 +65,7 @@ def share(n: int, is_watched: bool) -> float:
 
 
 def cost(do: Callable[[], Any], n: int) -> float:
-    """Microseconds of CPU time, the least of some tries."""
+    """Smallest CPU time of several tries [us]."""
     k = max(2, 5000 // n)
     tries = []
     for _ in range(5):

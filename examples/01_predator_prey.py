@@ -1,6 +1,6 @@
 """The game of DeMarco, Squires, Day and Pippin (2018): two teams of five predators hunt a flock of 100 prey for 500 s.
 
-Team 2 keeps to a prey until it is gone; team 3 turns to the nearest one in every step.
+Team 2 follows one prey until it is captured; team 3 follows the nearest prey in every step.
 """
 
 import argparse
@@ -10,8 +10,8 @@ from tussle import Block, Mission, Simulation
 from tussle.stock import Boids, Predator, SimpleCapture, SimpleCaptureMetrics, Unicycle
 
 parser = argparse.ArgumentParser(description=__doc__)
-parser.add_argument("--seeds", type=int, default=8, help="number of games, all played side by side")
-parser.add_argument("--end", type=float, default=500.0, help="length of a game [s]")
+parser.add_argument("--seeds", type=int, default=8, help="number of games, all played in one stack")
+parser.add_argument("--end", type=float, default=500.0, help="duration of a game [s]")
 args = parser.parse_args()
 
 prey = Block(
@@ -29,9 +29,9 @@ prey = Block(
 def hunters(name: str, team: int, north: float, switching: bool) -> Block:
     """Five predators 2 km East of the prey, flying West."""
     place = {"position": (2000, north, 200), "placement": "uniform", "half_width": (500, 500, 100)}
-    mind = Predator(max_speed=35, allow_prey_switching=switching)
-    body = Unicycle(vel_max=35, turn_rate_max=2, pitch_rate_max=1.5)
-    return Block(name=name, team=team, count=5, **place, heading="180 deg", autonomy=mind, motion=body)
+    predator = Predator(max_speed=35, allow_prey_switching=switching)
+    motion = Unicycle(vel_max=35, turn_rate_max=2, pitch_rate_max=1.5)
+    return Block(name=name, team=team, count=5, **place, heading="180 deg", autonomy=predator, motion=motion)
 
 
 mission = Mission(
@@ -42,7 +42,7 @@ mission = Mission(
     metrics=[SimpleCaptureMetrics()],
 )
 simulation = Simulation(mission, seeds=range(1, args.seeds + 1))
-simulation.step()  # the first one loads the kernels, and the first one ever compiles them
+simulation.step()  # the first step loads the kernels, or compiles them if they are not cached
 began = time.process_time()
 results = simulation.run()
 cpu = time.process_time() - began

@@ -1,6 +1,6 @@
-"""A chaser of your own, in plain Python for one entity at a time, against the predator that ships.
+"""Your own chaser, in plain Python for one entity at a time, against the stock predator.
 
-The predators of a team all turn to the nearest prey and soon fly on top of each other. Yours share the prey out.
+Stock predators all follow the nearest prey and soon fly on top of each other. Your chasers select different prey.
 """
 
 import math
@@ -13,7 +13,7 @@ from tussle.stock import Boids, Predator, SimpleCapture, SimpleCaptureMetrics, U
 
 
 class SharingChaser(EasyAutonomy):
-    """Chase one of the nearest prey, each chaser another one, and keep to it until it is gone."""
+    """Chases one of the nearest prey, a different one per chaser, until it is gone."""
 
     prey_team = Param(1, doc="Team that is hunted.")
     max_speed = Param(35.0, unit="m/s", ge=0.0)
@@ -28,7 +28,7 @@ class SharingChaser(EasyAutonomy):
         if me.target is None:
             prey = me.near(3000.0, team=me.prey_team)  # nearest first
             if not prey:
-                return  # what was commanded last stays in force
+                return  # the last commands persist
             me.target = prey[min(me.id % 5, len(prey) - 1)]
         east, north, up = me.target.pos - me.pos
         me.speed = me.max_speed

@@ -1,4 +1,4 @@
-"""A motion model of your own, as its state equation, and a planner that tries it out before it flies it."""
+"""Your own motion model, given by its state equation, and a planner that predicts paths with it."""
 
 import numpy as np
 
@@ -9,9 +9,9 @@ from tussle.stock import Boids, Predator, SimpleCapture, SimpleCaptureMetrics, U
 
 
 class SluggishPlane(MotionModel):
-    """A vehicle that flies where its nose points, and whose speed follows the wanted one with a lag."""
+    """A vehicle that flies where its nose points and follows the commanded speed with a first-order lag."""
 
-    lag = Param(2.0, unit="s", gt=0.0, doc="Time in which the speed makes 63 % of a change.")
+    lag = Param(2.0, unit="s", gt=0.0, doc="Time constant of the speed.")
     x = State("east north up yaw climb v", unit="m m m rad rad m/s")
     commands = Input("speed turn_rate pitch_rate", unit="m/s rad/s rad/s")
 
@@ -31,26 +31,28 @@ class SluggishPlane(MotionModel):
 
 PLANE = SluggishPlane(lag=1.0)
 STEERING = np.meshgrid(38.0, np.linspace(-1.5, 1.5, 7), np.linspace(-1.0, 1.0, 5))
-WAYS = np.array(STEERING).reshape(3, 35)  # (3 commands, 35 ways to set them)
+OPTIONS = np.array(STEERING).reshape(3, 35)  # (3 commands, 35 options)
 SECONDS = 0.3 * np.arange(11)[:, None, None]
 
 
 class Planner(Autonomy):
-    """Imagine 35 ways to steer for 3 s, with the very function that flies it, and take the one nearest to the prey."""
+    """Predicts 35 steering options over 3 s with the motion model itself and takes the one that comes nearest to the prey."""
 
     commands = Output("speed turn_rate pitch_rate", unit="m/s rad/s rad/s")
 
     def step(self, g):
         now = np.array([*g.pos, g.yaw, g.climb, np.sqrt(np.square(g.vel).sum(axis=0))])  # (6 states, n)
-        path = PLANE.rollout(now.repeat(35, axis=1), np.tile(WAYS, (10, 1, g.n)), dt=0.3)  # (11, 6, n * 35)
-        prey = g.nearest(teams=1).other[0]  # (n,) rows in the table of all bodies; -1 where no prey is left
+        path = PLANE.rollout(
+            now.repeat(35, axis=1), np.tile(OPTIONS, (10, 1, g.n)), dt=0.3
+        )  # (11, 6, n * 35)
+        prey = g.nearest(teams=1).other[0]  # (n,) rows of the body table; -1 if no prey is left
         goal = g.bodies.pos[:, prey] + SECONDS * g.bodies.vel[:, prey]  # (11, 3, n)
         miss = path.reshape(11, 6, g.n, 35)[:, :3] - goal[..., None]
         best = np.square(miss).sum(axis=1).min(axis=0).argmin(axis=1)
-        self.commands[:, prey >= 0] = WAYS[:, best[prey >= 0]]
+        self.commands[:, prey >= 0] = OPTIONS[:, best[prey >= 0]]
 
 
-# Of two that write a channel the last wins: the predator's part is to claim what is within its reach.
+# The last writer of a channel wins, so the planner steers; the predator only claims prey within its range.
 pack = {"position": (1200, 0, 0), "heading": "180 deg", "autonomy": [Predator(), Planner()], "motion": PLANE}
 flock = {"variance": (2e4, 2e4, 0), "autonomy": Boids(), "motion": Unicycle(vel_max=30)}
 blocks = [Block(name="prey", team=1, count=60, **flock), Block(name="hunters", team=2, count=5, **pack)]

@@ -1,4 +1,4 @@
-"""A flock in vector NumPy: one call steers all robots of all worlds, so a thousand need no more Python than two."""
+"""A flock in vectorised NumPy: one call steers all robots of all worlds, so Python overhead does not grow with their number."""
 
 import time
 
@@ -18,16 +18,16 @@ class Flock(Autonomy):
     velocity = Output("velocity_x velocity_y velocity_z", unit="m/s")
 
     def step(self, g):
-        near = g.near(self.sight, teams="own")  # pairs: a robot, and one in its sight
+        near = g.near(self.sight, teams="own")  # pairs of a robot and a neighbour
         push = np.maximum(0.0, 1.0 - near.distance / self.space[near.row]) / near.distance
-        separation = near.sum(-push * near.offset)  # (3, n), as all vectors
+        separation = near.sum(-push * near.offset)  # (3, n), like all vectors
         alignment = unit(near.mean(near.vel))
         cohesion = unit(near.mean(near.offset))
         self.velocity[:] = self.max_speed * unit(separation + 2.0 * alignment + 0.1 * cohesion)
 
 
 def order(simulation: Simulation) -> float:
-    """How well the velocities agree: 0 for not at all, 1 when all are the same (Vicsek 1995, equation 5)."""
+    """Order parameter of the velocities, from 0 to 1 for equal velocities (Vicsek 1995, equation 5)."""
     velocity, _ = simulation.read("flock.vel")  # (worlds, robots, 3)
     return float(np.linalg.norm(velocity.mean(axis=1)) / 15.0)
 
@@ -39,5 +39,5 @@ simulation.step()
 began = time.process_time()
 for seconds in (0, 10, 20, 30, 40):
     simulation.run(until=seconds)
-    print(f"after {seconds:2} s the flock's order is {order(simulation):.2f}")
+    print(f"after {seconds:2} s the order of the flock is {order(simulation):.2f}")
 print(f"{time.process_time() - began:.1f} CPU s for {simulation.steps[0]} steps of 1000 robots")

@@ -1,4 +1,4 @@
-"""A sweep over one parameter in one stack: each world has its own value, and all worlds run side by side."""
+"""A parameter sweep in one stack: each world has its own parameter value, and all worlds are stepped together."""
 
 import numpy as np
 

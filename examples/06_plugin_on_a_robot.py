@@ -1,6 +1,6 @@
-"""An autonomy outside its simulation: the states come from a robot and a tracker, the commands go to the robot.
+"""An autonomy on a real robot: states come from the robot, commands go to the robot.
 
-`Robot` stands for the driver of a real one: it drives by (speed, turn rate) and tells where it is.
+`Robot` takes the place of a robot's driver: it accepts speed and turn rate and reports its position and yaw.
 """
 
 import math
@@ -14,7 +14,7 @@ DT = 0.05  # [s]
 
 
 class Robot:
-    """Odometry and commands of a wheeled robot, ideal."""
+    """An ideal wheeled robot."""
 
     def __init__(self, east: float, north: float) -> None:
         self.pos, self.yaw, self.speed = np.array([east, north, 0.0]), 0.0, 0.0
@@ -25,7 +25,7 @@ class Robot:
 
 
 def states(robots: list[Robot]) -> dict[str, np.ndarray]:
-    """Columns of the robots as they are now, (1 world, n robots, components)."""
+    """Current states of the robots, (1 world, n robots, components)."""
     yaw = np.array([r.yaw for r in robots])
     level, speed = 0.0 * yaw, np.array([r.speed for r in robots])
     return {
