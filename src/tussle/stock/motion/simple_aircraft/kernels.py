@@ -19,13 +19,13 @@ ACCELERATION = 0.2  # m/s^2 per unit of throttle
 
 
 @device
-def hold(value, low, high):
+def clamp(value, low, high):
     """Value clamped to [low, high]."""
     return min(max(value, low), high)
 
 
 @device
-def turning(sine, cosine, speed, radius, slope, target):
+def turn_rate(sine, cosine, speed, radius, slope, target):
     """Turn rate [rad/s] at a bank given by its sine and cosine: V tan(roll) / (radius + slope (V - target))."""
     return speed * sine / (cosine * (radius + slope * (speed - target)))
 
@@ -36,14 +36,14 @@ def state_equation(roll, pitch, yaw, speed, throttle, roll_rate, pitch_rate, rad
     sp, cp = sincos(pitch)
     sy, cy = sincos(yaw)
     turn = speed / (radius + slope * (speed - target)) * tan(roll)
-    pull = ACCELERATION * hold(throttle, -THROTTLE_MAX, THROTTLE_MAX)
+    pull = ACCELERATION * clamp(throttle, -THROTTLE_MAX, THROTTLE_MAX)
     return speed * cp * cy, speed * cp * sy, speed * sp, roll_rate, pitch_rate, turn, pull
 
 
 @device
-def stepped(value, rate, rate_max, h, limit):
+def advance_clamped(value, rate, rate_max, h, limit):
     """Value after h at a rate clamped to rate_max; the result is clamped to [-limit, limit]."""
-    return hold(value + h * hold(rate, -rate_max, rate_max), -limit, limit)
+    return clamp(value + h * clamp(rate, -rate_max, rate_max), -limit, limit)
 
 
 @device
@@ -91,26 +91,28 @@ def advance(x, u, p, dt, substeps):
             v0[l] = speed[first + l]
             rise0[l] = v0[l] * sine[m + l]
             level0[l] = v0[l] * cosine[m + l]
-            turn0[l] = turning(sine[l], cosine[l], v0[l], radius[l], slope[l], target[l])
+            turn0[l] = turn_rate(sine[l], cosine[l], v0[l], radius[l], slope[l], target[l])
         for _ in range(substeps):
             for l in range(m):
-                angle[m + l] = stepped(roll[first + l], roll_rate[l], roll_rate_max[l], h, roll_max[l])
+                angle[m + l] = advance_clamped(
+                    roll[first + l], roll_rate[l], roll_rate_max[l], h, roll_max[l]
+                )
                 angle[l] = 0.5 * (roll[first + l] + angle[m + l])
                 roll[first + l] = angle[m + l]
             for l in range(m):
-                angle[3 * m + l] = stepped(
+                angle[3 * m + l] = advance_clamped(
                     pitch[first + l], pitch_rate[l], pitch_rate_max[l], h, pitch_max[l]
                 )
                 angle[2 * m + l] = 0.5 * (pitch[first + l] + angle[3 * m + l])
                 pitch[first + l] = angle[3 * m + l]
             for l in range(m):
-                pull = ACCELERATION * hold(throttle[l], -THROTTLE_MAX, THROTTLE_MAX)
-                v1[l] = hold(v0[l] + h * pull, speed_min[l], speed_max[l])
+                pull = ACCELERATION * clamp(throttle[l], -THROTTLE_MAX, THROTTLE_MAX)
+                v1[l] = clamp(v0[l] + h * pull, speed_min[l], speed_max[l])
                 vm[l] = 0.5 * (v0[l] + v1[l])
             sincos_rows(angle, sine, cosine, 4 * m)
             for l in range(m):
-                turn_m[l] = turning(sine[l], cosine[l], vm[l], radius[l], slope[l], target[l])
-                turn1[l] = turning(sine[m + l], cosine[m + l], v1[l], radius[l], slope[l], target[l])
+                turn_m[l] = turn_rate(sine[l], cosine[l], vm[l], radius[l], slope[l], target[l])
+                turn1[l] = turn_rate(sine[m + l], cosine[m + l], v1[l], radius[l], slope[l], target[l])
             for l in range(m):
                 rise1 = v1[l] * sine[3 * m + l]
                 up[first + l] += sixth_h * (rise0[l] + 4.0 * (vm[l] * sine[2 * m + l]) + rise1)
@@ -139,8 +141,8 @@ def advance(x, u, p, dt, substeps):
 @device
 def effective(value, rate, rate_max, limit):
     """Effective rate [rad/s]: clamped to rate_max, and zero where the value is at its limit."""
-    held = hold(rate, -rate_max, rate_max)
-    return 0.0 if (value >= limit and held > 0.0) or (value <= -limit and held < 0.0) else held
+    clamped = clamp(rate, -rate_max, rate_max)
+    return 0.0 if (value >= limit and clamped > 0.0) or (value <= -limit and clamped < 0.0) else clamped
 
 
 @kernel("F2 (F F) (F F F F) (F F F) F2w i8")
@@ -210,7 +212,7 @@ def to_body(x, rates, limits, circle, table, first_row):
             )
             banked = -effective(roll[i], roll_rate[i], roll_rate_max[i], roll_max[i])
             lowered = -effective(pitch[i], pitch_rate[i], pitch_rate_max[i], pitch_max[i])
-            turned = turning(-2.0 * sr * cr, cr * cr - sr * sr, speed[i], radius[i], slope[i], target[i])
+            turned = turn_rate(-2.0 * sr * cr, cr * cr - sr * sr, speed[i], radius[i], slope[i], target[i])
             wx[i] = banked * (cp * cy) - lowered * sy
             wy[i] = banked * (cp * sy) + lowered * cy
             wz[i] = banked * sp + turned
