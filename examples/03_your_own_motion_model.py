@@ -31,25 +31,23 @@ class SluggishPlane(MotionModel):
 
 PLANE = SluggishPlane(lag=1.0)
 STEERING = np.meshgrid(38.0, np.linspace(-1.5, 1.5, 7), np.linspace(-1.0, 1.0, 5))
-OPTIONS = np.array(STEERING).reshape(3, 35)  # (3 commands, 35 options)
+PLANS = np.array(STEERING).reshape(3, 35)  # (3 commands, 35 plans)
 SECONDS = 0.3 * np.arange(11)[:, None, None]
 
 
 class Planner(Autonomy):
-    """Predicts 35 steering options over 3 s with the motion model itself and takes the one that comes nearest to the prey."""
+    """Predicts 35 steering plans over 3 s with the motion model and takes the one that comes nearest to the prey."""
 
     commands = Output("speed turn_rate pitch_rate", unit="m/s rad/s rad/s")
 
     def step(self, g):
         now = np.array([*g.pos, g.yaw, g.climb, np.sqrt(np.square(g.vel).sum(axis=0))])  # (6 states, n)
-        path = PLANE.rollout(
-            now.repeat(35, axis=1), np.tile(OPTIONS, (10, 1, g.n)), dt=0.3
-        )  # (11, 6, n * 35)
+        path = PLANE.rollout(now.repeat(35, axis=1), np.tile(PLANS, (10, 1, g.n)), dt=0.3)  # (11, 6, n * 35)
         prey = g.nearest(teams=1).other[0]  # (n,) rows of the body table; -1 if no prey is left
         goal = g.bodies.pos[:, prey] + SECONDS * g.bodies.vel[:, prey]  # (11, 3, n)
         miss = path.reshape(11, 6, g.n, 35)[:, :3] - goal[..., None]
         best = np.square(miss).sum(axis=1).min(axis=0).argmin(axis=1)
-        self.commands[:, prey >= 0] = OPTIONS[:, best[prey >= 0]]
+        self.commands[:, prey >= 0] = PLANS[:, best[prey >= 0]]
 
 
 # The last writer of a channel wins, so the planner steers; the predator only claims prey within its range.

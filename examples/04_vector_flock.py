@@ -1,4 +1,4 @@
-"""A flock in vectorised NumPy: one call steers all robots of all worlds, so Python overhead does not grow with their number."""
+"""A flock in vectorised NumPy: one call steers all robots of all worlds, with constant Python overhead."""
 
 import time
 
@@ -39,5 +39,5 @@ simulation.step()
 began = time.process_time()
 for seconds in (0, 10, 20, 30, 40):
     simulation.run(until=seconds)
-    print(f"after {seconds:2} s the order of the flock is {order(simulation):.2f}")
+    print(f"after {seconds:2} s the flock's order is {order(simulation):.2f}")
 print(f"{time.process_time() - began:.1f} CPU s for {simulation.steps[0]} steps of 1000 robots")
