@@ -26,6 +26,7 @@ from tussle.api.kinds import (
 from tussle.api.laws import neighbors, together
 from tussle.api.motion import MotionBody, MotionModel
 from tussle.api.plugin import HistoricAttributes, Plugin, service
+from tussle.api.row_laws import row_law
 from tussle.api.world import WorldView
 from tussle.columns import (
     Children,
@@ -86,6 +87,7 @@ __all__ = [
     "WorldPlugin",
     "WorldView",
     "neighbors",
+    "row_law",
     "service",
     "together",
     "unit",

@@ -8,6 +8,7 @@ import numpy as np
 
 from tussle.api.group import GroupView
 from tussle.api.plugin import HistoricAttributes, Plugin
+from tussle.api.row_laws import step_rows
 from tussle.api.world import WorldView
 from tussle.columns import Output, Param
 
@@ -42,11 +43,18 @@ class Behavior(Autonomy):
 
 
 class Controller(EntityPlugin):
-    """Turns wanted values into what the next controller or the motion model takes; abstract."""
+    """Turns wanted values into what the next controller or the motion model takes; abstract.
+
+    It is written as row laws (see `row_law`), or as a `step` of all rows.
+    """
 
     kind = "controller"
     passthrough: ClassVar[bool] = False
     """Its outputs are its inputs: it is wiring, and no call."""
+
+    def step(self, g: GroupView) -> None:
+        """One step of all rows: the row laws, in order of declaration."""
+        step_rows(self, g)
 
 
 class Sensor(EntityPlugin):

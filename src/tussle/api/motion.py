@@ -11,12 +11,12 @@ import numpy as np
 from tussle.api.bodies import DERIVED, OFFSETS, Bodies, derive
 from tussle.api.group import GroupView
 from tussle.api.kinds import EntityPlugin
+from tussle.api.row_laws import BODY_INPUTS, advance_rows
 from tussle.columns import Channel, Param, State
 from tussle.errors import DeclarationError, ParameterError, listed, nearest_name
 from tussle.numeric.quaternion import quat_from_euler
 from tussle.numeric.rk4 import compile_derivative, rk4
 
-BODY_INPUTS = ("force_x", "force_y", "force_z", "torque_x", "torque_y", "torque_z", "mass")
 WRITABLE = ("pos", "quat", "vel", "omega")
 
 
@@ -68,7 +68,8 @@ class MotionModel(EntityPlugin):
 
     A model declares one `State` with named fields, its inputs and parameters, and `derivative`: a static function whose arguments
     are matched by name to fields, inputs, parameters, force_x ... torque_z (world frame) and mass, and which returns the fields'
-    derivatives in order. One shared Runge-Kutta driver of fourth order integrates it. A model may bring its own kernel instead:
+    derivatives in order. One shared Runge-Kutta driver of fourth order integrates it. A model may instead be written as `row_law`s,
+    which also say what the body then is, so that controllers written so run between its substeps in one kernel; or bring a kernel:
     `advance = kernel` over (x, u, p, dt, substeps), x (m, n), u (k, n) inputs and p (q, n) parameters in order of declaration; or
     a property `advance` that returns the kernel of the structural variant.
 
@@ -92,7 +93,7 @@ class MotionModel(EntityPlugin):
         own = vars(cls).get("advance")
         if own is not None and not isinstance(own, (property, staticmethod)):
             cls.advance = staticmethod(own)  # type: ignore[method-assign]  # a function would be taken for a method
-        if cls.derivative is None and cls.advance is MotionModel.advance:
+        if cls.derivative is None and cls.advance is MotionModel.advance and not cls.row_laws:
             return
         states = [c for c in cls.states().values() if c.fields]
         if len(states) != 1:
@@ -136,14 +137,20 @@ class MotionModel(EntityPlugin):
 
     def body_inputs(self) -> list[str]:
         """Which of force, torque and mass the derivative takes."""
-        if type(self).advance is not MotionModel.advance or self.derivative is None:
+        if type(self).advance is not MotionModel.advance:
             return []
-        names = inspect.signature(self.derivative).parameters
+        names = {name for law in self.row_laws.values() for name in law.arguments}
+        if self.derivative is not None and not names:
+            names = set(inspect.signature(self.derivative).parameters)
         return [name for name in BODY_INPUTS if name in names]
 
     @property
     def advance(self) -> Any:
         """The compiled function (x, u, p, dt, substeps) that flies this model, and that `rollout` calls."""
+        return advance_rows(self) if self.row_laws else self.solver()
+
+    def solver(self) -> Any:
+        """The shared driver on the model's own derivative, as a function (x, u, p, dt, substeps)."""
         f = compile_derivative(
             type(self).derivative,
             list(self.state().fields),

@@ -11,6 +11,7 @@ from typing import Any, ClassVar, Self, TypeVar
 import numpy as np
 
 from tussle.api.laws import NeighborLaw
+from tussle.api.row_laws import RowLaw
 from tussle.columns import (
     Channel,
     Children,
@@ -81,6 +82,7 @@ class Plugin:
 
     columns: ClassVar[dict[str, Column]] = {}
     services: ClassVar[tuple[str, ...]] = ()
+    row_laws: ClassVar[dict[str, RowLaw]] = {}
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -98,8 +100,14 @@ class Plugin:
                     f"{cls.__name__}.{name}: the name is reserved; choose another for this {type(column).__name__}"
                 )
         for name, law in vars(cls).items():
-            if isinstance(law, NeighborLaw):
+            if isinstance(law, (NeighborLaw, RowLaw)):
                 law.check(cls, name)
+        cls.row_laws = {
+            k: law
+            for base in reversed(cls.__mro__)
+            for k, law in vars(base).items()
+            if isinstance(law, RowLaw)
+        }
         params = [
             inspect.Parameter(k, inspect.Parameter.KEYWORD_ONLY, default=c.default)
             for k, c in cls.params().items()

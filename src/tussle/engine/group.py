@@ -105,7 +105,7 @@ def check_hooks(spec: Any, where: str) -> None:
     needed = {"motion": ("from_body", "to_body"), "network": ("route",)}.get(spec.kind, ("step",))
     if isinstance(spec, EasyEntityPlugin):
         needed = ("step_one",)
-    if getattr(spec, "passthrough", False):
+    if getattr(spec, "passthrough", False) or (spec.kind == "controller" and type(spec).row_laws):
         return
     abstract = [c for c in type(spec).__mro__ if c.__module__.startswith("tussle.api.")]
     for hook in needed:
@@ -327,7 +327,7 @@ class Group:
         params = [motion.places[k] for k in type(plugin).row_params()]
         first = params[0].first if params else 0
         self.p_rows = slice(first, first + sum(max(1, p.k) for p in params))
-        rows = [r for k in plugin.active_inputs() for r in self._rows_of(motion, k)]
+        rows = [r for k in plugin.active_inputs() for r in self.rows_of(motion, k)]
         self.body_inputs = plugin.body_inputs()
         side_by_side = rows == list(range(rows[0], rows[0] + len(rows))) if rows else True
         self.u_rows = rows
@@ -340,7 +340,8 @@ class Group:
         for view in self.views:
             view.motion_state = read_only(self.x)
 
-    def _rows_of(self, binding: Binding, name: str) -> tuple[int, ...]:
+    def rows_of(self, binding: Binding, name: str) -> tuple[int, ...]:
+        """Rows of a column in the table, of a channel where its number passes from writer to reader."""
         link = binding.links.get(name)
         if link is not None and link.rows is not None:
             return link.rows
@@ -357,7 +358,7 @@ class Group:
             view.span = (0, self.n)
 
     def advance(self, dt: float, substeps: int) -> None:
-        """Integrate all rows over dt [s], and publish the new states to the body table."""
+        """Integrate all rows over dt [s], and publish the new states."""
         u = self.u
         if self.stacks_inputs:
             u = self._stacked_inputs()
@@ -365,6 +366,10 @@ class Group:
             self.integrate(self.x, u, self.p, dt, substeps)
         else:
             self.moving.split(lambda *part: self._integrate_part(slice(*part), u, dt, substeps))
+        self.publish()
+
+    def publish(self) -> None:
+        """Write the states to the body table."""
         self.motion.plugin.to_body(self.moving)
         self.bodies.touch(self.first, self.last)
 

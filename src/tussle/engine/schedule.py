@@ -18,6 +18,7 @@ from tussle.engine.group import Binding, Group
 from tussle.engine.referees import Referee
 from tussle.engine.rows import take_over_moves
 from tussle.engine.state import SimulationState
+from tussle.engine.steering import Steering, steering_of
 from tussle.engine.step_end import end_step
 from tussle.engine.subset import call_group, call_referee
 from tussle.errors import PluginError
@@ -76,6 +77,9 @@ def _motion(state: SimulationState, groups: list[Group]) -> list[Call]:
     dt, m = state.mission.dt, state.mission.motion_multiplier
     calls = [_advance_call(state, g, dt, m, 0.0) for g in groups if not g.controllers]
     steered = [g for g in groups if g.controllers]
+    steerings = [None if state.by_substep else steering_of(g) for g in steered]
+    if None not in steerings:  # else a controller might look at others, and see them move substep by substep
+        return calls + [_steering_call(state, steering, dt / m, m) for steering in steerings if steering]
     for s in range(m if steered else 0):
         for group in steered:
             calls += [_entity_call(state, "controller", group, b, s) for b in group.controllers]
@@ -114,6 +118,24 @@ def _advance_call(state: SimulationState, group: Group, dt: float, substeps: int
                 raise failure.in_call(error, plugin, view, group) from error
 
     return Call(_label(state, "motion", group, group.motion), run)
+
+
+def _steering_call(state: SimulationState, steering: Steering, dt: float, substeps: int) -> Call:
+    group = steering.group
+    view, plugin, body = group.steering, group.controllers[0].plugin, group.moving
+
+    def run() -> None:
+        if group.n:
+            view._caller, view.substep, view.phase, view.dt = plugin, 0, 0.0, dt
+            body._caller, body.phase = group.motion.plugin, 1.0 - 1.0 / substeps
+            try:
+                steering.run(dt, substeps)
+            except Exception as error:
+                raise failure.in_call(error, plugin, view, group) from error
+
+    place = f" {group.place}" if state.mission.update == "sequential" else ""
+    names = ", ".join(b.spec.instance_name for b in (*group.controllers, group.motion))
+    return Call(f"{'control, move':<12} {group.name}{place}: {names}, {substeps} substeps in one", run)
 
 
 def _entity_call(state: SimulationState, kind: str, group: Group, binding: Binding, substep: int = 0) -> Call:

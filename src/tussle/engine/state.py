@@ -65,6 +65,7 @@ class SimulationState:
         has_changed: Who is there has changed since the last look at the end conditions.
         checked: Columns that are checked at the end of a step, and which rows are faulty, (n,).
         n_steps: Number of steps until the mission's end time.
+        by_substep: The schedule takes each substep by itself, also where one kernel could do all: to look between them.
     """
 
     def __init__(
@@ -83,7 +84,7 @@ class SimulationState:
         self.running, self.failed = np.ones(n, bool), np.zeros(n, bool)
         self.results: list[WorldResult | None] = [None] * n
         self.parked: dict[int, Parked] = {}
-        self.has_failures, self.has_changed = False, True
+        self.has_failures, self.has_changed, self.by_substep = False, True, False
         self.checked: tuple[Any, ...] = ()
         clock = Clock(n, mission.start, mission.dt)
         keys = np.array([s % 2**64 for s in seeds], np.uint64)

@@ -1,7 +1,8 @@
-"""One step of a PID law with an integral band, for the kernels of controllers."""
+"""One step of a PID law with an integral band, for controllers."""
 
 from __future__ import annotations
 
+from tussle.numeric.elementary import wrap
 from tussle.numeric.kernel import device
 
 
@@ -29,3 +30,29 @@ def pid(error, change, dt, kp, ki, kd, band, integral):
     grown = integral + error * dt
     integral = grown if abs(error) <= band else 0.0
     return kp * error + ki * integral + kd * (change / dt), integral
+
+
+@device
+def pid_loop(error, gains, memory, dt):
+    """Command and new memory of a loop's call.
+
+    Args:
+        error: Wanted value minus measured value.
+        gains: kp, ki, kd, band.
+        memory: Integral, last error, and 1.0 once there is a last error.
+        dt: Time since the last call [s].
+    """
+    kp, ki, kd, band = gains
+    integral, last, has_error = memory
+    command, integral = pid(error, has_error * (error - last), dt, kp, ki, kd, band, integral)
+    return command, (integral, error, 1.0)
+
+
+@device
+def pid_angle_loop(error, gains, memory, dt):
+    """As `pid_loop`, of an angle [rad]: neither the error nor its change jumps where it passes from +pi to -pi."""
+    kp, ki, kd, band = gains
+    integral, last, has_error = memory
+    error = wrap(error)
+    command, integral = pid(error, wrap(has_error * (error - last)), dt, kp, ki, kd, band, integral)
+    return command, (integral, error, 1.0)

@@ -23,7 +23,7 @@ HOOKS_NAMES = """
     abstract kind historic_attributes
 """
 HOOKS = frozenset(HOOKS_NAMES.split())
-MACHINERY = frozenset({"columns", "services", "me_type", "world_types", "__signature__"})
+MACHINERY = frozenset({"columns", "services", "row_laws", "me_type", "world_types", "__signature__"})
 MUTABLE = (list, dict, set, bytearray, np.ndarray)
 MAGIC_NAMES = """
     __init__ __new__ __setattr__ __getattr__ __getattribute__ __delattr__ __eq__ __hash__ __reduce__
@@ -82,8 +82,8 @@ def _attributes(cls: type[Plugin]) -> Iterator[str]:
 def _hooks(cls: type[Plugin]) -> Iterator[str]:
     """Finds a class without any hook that does work; the engine reports missing required hooks when the kit's game is built."""
     if issubclass(cls, MotionModel):
-        if not cls.derivative and cls.advance is MotionModel.advance:
-            yield "it has neither derivative nor advance"
+        if not cls.derivative and cls.advance is MotionModel.advance and not cls.row_laws:
+            yield "it has neither derivative nor row laws nor advance"
     elif issubclass(cls, (Interaction, Metric)) and all(
         getattr(cls, k, cls.step).__module__.startswith("tussle.api.")
         for k in ("start", "step", "result", "start_one", "step_one", "result_one")

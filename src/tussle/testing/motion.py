@@ -45,6 +45,8 @@ class Flight:
 
     def __init__(self, game: Game) -> None:
         self.sim = sim = Simulation(game.quiet, [11, 12], on_error="raise")
+        sim.state.by_substep = True
+        sim.state.population.on_new_group()  # the schedule is made anew
         self.group: Group = next(
             g for g in sim.state.population.groups if type(g.motion.spec) is type(game.plugin)
         )
@@ -79,10 +81,9 @@ def check_motion(game: Game, is_default: bool) -> None:
         _check_rollout(model, flight)
         _check_rows(model, flight)
         _check_bodies(model, flight)
-        if model.derivative is not None and (is_default or type(model).advance is MotionModel.advance):
-            equation = vars(MotionModel)["advance"].fget(
-                model
-            )  # the shared driver on the model's own equation
+        is_solved = type(model).advance is MotionModel.advance and not model.row_laws
+        if model.derivative is not None and (is_default or is_solved):
+            equation = model.solver()
             _check_order(model, flight, equation)
             _check_kernel(model, flight, equation)
         else:

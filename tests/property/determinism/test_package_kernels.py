@@ -95,9 +95,7 @@ def test_moved_copy_and_comments_compile_nothing(edited, plain):
 def test_constant_of_the_sine_reaches_all_that_turns_or_draws(edited, plain):
     after = edited("numeric/elementary.py", "8.33333333332248946124e-03", "8.33333333e-03")
     assert after["hash"] != plain["hash"]
-    assert {"tussle.stock.motion.unicycle.kernels.advance_pitch", "tussle.rng.fill_normal"} <= set(
-        after["made"]
-    )
+    assert {"tussle.stock.motion.unicycle.kernels.pitched", "tussle.rng.fill_normal"} <= set(after["made"])
     assert not [name for name in after["made"] if name.startswith("tussle.neighbors")]
     assert after["loaded"] > 0
 

@@ -7,10 +7,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tussle.numeric.quaternion import quat_rotate
+from tussle.stock.motion.simple_aircraft import SimpleAircraft
 from tussle.stock.motion.simple_aircraft import kernels as aircraft
 from tussle.stock.motion.single_integrator import kernels as single
+from tussle.stock.motion.unicycle import Unicycle
 from tussle.stock.motion.unicycle import kernels as unicycle
 
+UNICYCLE, AIRCRAFT = Unicycle().advance, SimpleAircraft().advance
 angle = st.floats(-math.pi, math.pi)
 rate = st.floats(-2.0, 2.0)
 speed = st.floats(-40.0, 40.0)
@@ -34,8 +37,8 @@ def test_unicycle_path_turns_with_its_start(yaw, pitch, by, v, w, q, n):
     u = column(v, w, q)
     straight, rotated = column(0, 0, 0, yaw, pitch), column(0, 0, 0, yaw + by, pitch)
     for _ in range(10):
-        unicycle.advance_pitch(straight, u, UNLIMITED, 0.1, n)
-        unicycle.advance_pitch(rotated, u, UNLIMITED, 0.1, n)
+        UNICYCLE(straight, u, UNLIMITED, 0.1, n)
+        UNICYCLE(rotated, u, UNLIMITED, 0.1, n)
     assert np.abs(rotated[:3, 0] - turned(straight[:3, 0], by)).max() < 1e-11
     assert abs(rotated[3, 0] - straight[3, 0] - by) < 1e-13
 
@@ -44,9 +47,9 @@ def test_unicycle_path_turns_with_its_start(yaw, pitch, by, v, w, q, n):
 def test_unicycle_step_may_be_cut_at_a_substep(yaw, pitch, v, w, q, n):
     u = column(v, w, q)
     whole, cut = column(1, 2, 3, yaw, pitch), column(1, 2, 3, yaw, pitch)
-    unicycle.advance_pitch(whole, u, UNLIMITED, 0.1 * n, n)
+    UNICYCLE(whole, u, UNLIMITED, 0.1 * n, n)
     for _ in range(n):
-        unicycle.advance_pitch(cut, u, UNLIMITED, 0.1, 1)
+        UNICYCLE(cut, u, UNLIMITED, 0.1, 1)
     assert np.abs(whole - cut).max() < 1e-11
 
 
@@ -54,8 +57,8 @@ def test_unicycle_step_may_be_cut_at_a_substep(yaw, pitch, v, w, q, n):
 def test_unicycle_comes_back_when_time_runs_backwards(yaw, pitch, v, w, q, n):
     start = column(1, 2, 3, yaw, pitch)
     x = start.copy()
-    unicycle.advance_pitch(x, column(v, w, q), UNLIMITED, 0.7, n)
-    unicycle.advance_pitch(x, column(v, w, q), UNLIMITED, -0.7, n)
+    UNICYCLE(x, column(v, w, q), UNLIMITED, 0.7, n)
+    UNICYCLE(x, column(v, w, q), UNLIMITED, -0.7, n)
     assert np.abs(x - start).max() < 1e-12
 
 
@@ -99,8 +102,8 @@ def test_aircraft_path_turns_with_its_start(yaw, by, roll, pitch, v, p, q, n):
     u = column(1.0, p, q)
     straight, rotated = column(0, 0, 0, roll, pitch, yaw, v), column(0, 0, 0, roll, pitch, yaw + by, v)
     for _ in range(5):
-        aircraft.advance(straight, u, AIRFRAME, 0.1, n)
-        aircraft.advance(rotated, u, AIRFRAME, 0.1, n)
+        AIRCRAFT(straight, u, AIRFRAME, 0.1, n)
+        AIRCRAFT(rotated, u, AIRFRAME, 0.1, n)
     assert np.abs(rotated[:3, 0] - turned(straight[:3, 0], by)).max() < 1e-10
     assert np.array_equal(rotated[[2, 3, 4, 6]], straight[[2, 3, 4, 6]])
 

@@ -216,7 +216,7 @@ def test_a_pid_with_a_rate_integrates_over_its_period():
         )
         sim = Simulation(game)
         sim.step(100)
-        assert sim.read("a.UnicyclePID.memory")[0][0, 0, 0] == pytest.approx(0.5)
+        assert sim.read("a.UnicyclePID.heading")[0][0, 0, 0] == pytest.approx(0.5)
 
 
 def test_easy_mode_has_the_dt_of_its_period():

@@ -10,7 +10,6 @@ from tussle import Mission, Simulation
 from tussle.api import Autonomy, EasyAutonomy, MotionModel, Output, Param, State
 from tussle.errors import ParameterError
 from tussle.stock import Unicycle
-from tussle.stock.motion.unicycle import kernels
 
 MODEL = Unicycle(vel_max=20.0)
 
@@ -52,8 +51,6 @@ def test_advance_is_the_function_that_flies_a_model_whoever_wrote_it() -> None:
             """Nothing."""
 
     x0, u = [0.0, 0.0, 0.0, 0.5, 0.1], [[10.0, 0.3, 0.1]]
-    assert Unicycle().advance is kernels.advance_pitch
-    assert Unicycle(use_pitch=False).advance is kernels.advance_level
     np.testing.assert_allclose(Shared().rollout(x0, u, 0.1, 8), Unicycle().rollout(x0, u, 0.1, 8), atol=1e-9)
     assert Still().rollout(x0, u, 0.1)[1].tolist() == x0
     game = Mission(blocks=[block(count=2, autonomy=Planner(), motion=Still())], dt=0.1, end=1.0)

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from tussle.numeric.quaternion import quat_from_euler, quat_rotate
-from tussle.stock.motion.simple_aircraft import kernels
+from tussle.stock.motion.simple_aircraft import SimpleAircraft, kernels
+
+ADVANCE = SimpleAircraft().advance
 
 RADIUS, V_MIN, V_MAX, ROLL_MAX, PITCH_MAX, ROLL_RATE_MAX, PITCH_RATE_MAX, TARGET, SLOPE = range(9)
 
@@ -60,7 +62,7 @@ def test_equals_rk4_away_from_the_limits(substeps):
     ours, reference = x.copy(), x.copy()
     for k in range(20):
         sign = 1.0 if k % 2 else -1.0
-        kernels.advance(ours, sign * u, p, 0.1, substeps)
+        ADVANCE(ours, sign * u, p, 0.1, substeps)
         reference = rk4(reference, sign * u, p, 0.1, substeps)
     assert np.abs(ours - reference).max() < 1e-10
 
@@ -68,11 +70,11 @@ def test_equals_rk4_away_from_the_limits(substeps):
 def test_fourth_order():
     x, u, p = many(30)
     exact = x.copy()
-    kernels.advance(exact, u, p, 0.5, 2048)
+    ADVANCE(exact, u, p, 0.5, 2048)
     errors = []
     for substeps in (4, 8, 16, 32):
         y = x.copy()
-        kernels.advance(y, u, p, 0.5, substeps)
+        ADVANCE(y, u, p, 0.5, substeps)
         errors.append(np.abs(y - exact).max())
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
     assert np.all(np.abs(orders - 4.0) < 0.35), orders
@@ -82,7 +84,7 @@ def test_state_equation_is_what_flies():
     x, u, p = many(20)
     y = x.copy()
     h = 1e-7
-    kernels.advance(y, u, p, h, 1)
+    ADVANCE(y, u, p, h, 1)
     for i in range(20):
         rates = kernels.state_equation(*x[3:, i], *u[:, i], p[RADIUS, i], p[SLOPE, i], p[TARGET, i])
         assert np.allclose((y[:, i] - x[:, i]) / h, rates, atol=2e-5)
@@ -96,7 +98,7 @@ def test_limits_hold_and_are_reached_exactly(substeps):
     u = np.array([[500.0, -500.0, 1e9, 0.0], [9.0, -9.0, 0.5, 0.0], [9.0, -9.0, 0.5, 0.0]])
     p = limits(n, ROLL_MAX=0.5, PITCH_MAX=0.3, ROLL_RATE_MAX=1.0, PITCH_RATE_MAX=1.0, V_MIN=15.0, V_MAX=40.0)
     for _ in range(20):
-        kernels.advance(x, u, p, 0.1, substeps)
+        ADVANCE(x, u, p, 0.1, substeps)
         assert np.all(np.abs(x[3]) <= 0.5)
         assert np.all(np.abs(x[4]) <= 0.3)
         assert np.all((x[6] >= 15.0) & (x[6] <= 40.0))
@@ -109,7 +111,7 @@ def test_rates_are_held_within_their_limits():
     x = np.zeros((7, 1))
     x[6] = 20.0
     u = np.array([[1e6], [9.0], [-9.0]])
-    kernels.advance(x, u, limits(1, ROLL_RATE_MAX=0.5, PITCH_RATE_MAX=0.25), 0.1, 1)
+    ADVANCE(x, u, limits(1, ROLL_RATE_MAX=0.5, PITCH_RATE_MAX=0.25), 0.1, 1)
     assert x[3, 0] == pytest.approx(0.05)
     assert x[4, 0] == pytest.approx(-0.025)
     assert x[6, 0] == pytest.approx(20.0 + 0.1 * 100.0 / 5.0)
@@ -120,9 +122,9 @@ def test_steady_bank_flies_a_circle_of_the_turning_radius():
     x[3], x[6] = math.pi / 4, 20.0
     p = limits(1, RADIUS=50.0, TARGET=20.0)
     period = 2.0 * math.pi * 50.0 / 20.0
-    kernels.advance(x, np.zeros((3, 1)), p, period / 2, 400)
+    ADVANCE(x, np.zeros((3, 1)), p, period / 2, 400)
     assert x[1, 0] == pytest.approx(100.0, abs=1e-6)  # a positive bank turns left: half the circle ends at +y
-    kernels.advance(x, np.zeros((3, 1)), p, period / 2, 400)
+    ADVANCE(x, np.zeros((3, 1)), p, period / 2, 400)
     assert np.abs(x[:2]).max() < 1e-6
 
 
@@ -130,7 +132,7 @@ def test_published_velocity_is_that_of_the_path_and_bank_is_right_wing_down():
     x, u, p = many(25)
     out = published(x, u, p)
     y = x.copy()
-    kernels.advance(y, 0.0 * u, p, 1e-7, 1)
+    ADVANCE(y, 0.0 * u, p, 1e-7, 1)
     assert np.abs((y - x)[:3] / 1e-7 - out[7:10]).max() < 1e-5
     assert np.abs(out[3:7] - quat_from_euler(-x[3], -x[4], x[5])).max() < 1e-15
     nose = quat_rotate(out[3:7], np.array([[1.0], [0.0], [0.0]]) + 0.0 * x[:3])
@@ -144,7 +146,7 @@ def test_published_turn_rate_is_that_of_the_attitude():
     x[4, 5:9], u[2, 5:9] = -p[PITCH_MAX, 5:9], -1.0
     before = published(x, u, p)
     h = 1e-6
-    kernels.advance(x, u, p, h, 1)
+    ADVANCE(x, u, p, h, 1)
     rate = (published(x, u, p)[3:7] - before[3:7]) / h
     # q' = omega q / 2 with omega in the world frame, so omega is the vector part of 2 q' q*
     w, v = before[3], before[4:7]
@@ -157,13 +159,13 @@ def test_bits_do_not_depend_on_place():
     x, u, p = many(150)
     p[ROLL_MAX, ::5] = 0.3
     whole = x.copy()
-    kernels.advance(whole, u, p, 0.1, 3)
+    ADVANCE(whole, u, p, 0.1, 3)
     out = published(whole, u, p)
     for width in range(1, 38):
         for first in range(0, 150 - width, width):
             rows = slice(first, first + width)
             part = np.ascontiguousarray(x[:, rows])
-            kernels.advance(part, np.ascontiguousarray(u[:, rows]), np.ascontiguousarray(p[:, rows]), 0.1, 3)
+            ADVANCE(part, np.ascontiguousarray(u[:, rows]), np.ascontiguousarray(p[:, rows]), 0.1, 3)
             shown = published(part, np.ascontiguousarray(u[:, rows]), np.ascontiguousarray(p[:, rows]))
             assert np.array_equal(part, whole[:, rows])
             assert np.array_equal(shown, out[:, rows])

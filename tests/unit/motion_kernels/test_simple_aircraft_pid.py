@@ -2,8 +2,10 @@ import math
 
 import numpy as np
 import pytest
+from bound_rows import bound, seen
 
-from tussle.stock.controller.simple_aircraft_controller_pid import SimpleAircraftControllerPID, kernels
+from tussle.stock.controller.simple_aircraft_controller_pid import SimpleAircraftControllerPID
+from tussle.stock.motion.simple_aircraft import SimpleAircraft
 from tussle.stock.motion.simple_aircraft import kernels as aircraft
 
 HEADING = (1.0, 0.01, 2.0, math.radians(9.0))
@@ -17,23 +19,18 @@ def columns(*values):
 
 class Steering:
     def __init__(self, n=1, use_roll=False, use_slope=False, gains=(HEADING, ALTITUDE, SPEED)):
-        self.gains = [np.repeat(np.array(g)[:, None], n, axis=1) for g in gains]
-        self.flags = use_roll, use_slope
-        self.memory = np.zeros((7, n))
-        self.out = np.full((3, n), np.nan)
+        heading, altitude, speed = (tuple(map(float, g)) for g in gains)
+        flags = {"use_roll": use_roll, "use_glide_slope": use_slope}
+        gained = {"heading_pid": heading, "alt_pid": altitude, "vel_pid": speed}
+        self.plugin = bound(SimpleAircraftControllerPID(**flags, **gained), n)
 
     def step(self, lateral, vertical, speed, z, vx, vy, vz, angle, dt=0.1):
-        kernels.steer(
-            (lateral, vertical, speed),
-            (z, vx, vy, vz),
-            angle,
-            self.flags,
-            tuple(self.gains),
-            self.memory,
-            dt,
-            tuple(self.out),
-        )
-        return self.out
+        own = self.plugin
+        for name, values in zip(own.active_inputs(), (lateral, vertical, speed), strict=True):
+            own.__dict__[name][:] = values
+        pos, vel = np.stack([z, z, z]), np.stack([vx, vy, vz])
+        own.step(seen(len(z), dt, pos=pos, vel=vel, yaw=angle, roll=angle))
+        return np.stack([own.throttle, own.roll_rate, own.pitch_rate])
 
 
 def proportional(use_roll=False, use_slope=False):
@@ -74,14 +71,14 @@ def test_first_call_has_no_derivative_kick():
 
 def test_flies_an_aircraft_to_heading_altitude_and_speed():
     steering = Steering()
-    x = np.zeros((7, 1))
+    x, advance = np.zeros((7, 1)), SimpleAircraft().advance
     x[6], x[2] = 20.0, 100.0
     p = np.array([13.0, 15.0, 40.0, *np.radians([30.0, 30.0, 57.3, 57.3]), 50.0, 0.0])[:, None]
     u, body = np.zeros((3, 1)), np.empty((13, 1))
     for _ in range(600):
         aircraft.to_body(x, (u[1], u[2]), tuple(p[3:7]), (p[0], p[8], p[7]), body, 0)
         u = out = steering.step(*columns(1.0, 130.0, 25.0), x[2], *body[3:6], x[5])
-        aircraft.advance(x, np.ascontiguousarray(out), p, 0.1, 1)
+        advance(x, np.ascontiguousarray(out), p, 0.1, 1)
     assert x[5, 0] == pytest.approx(1.0, abs=0.02)
     assert x[2, 0] == pytest.approx(130.0, abs=1.0)
     assert x[6, 0] == pytest.approx(25.0, abs=0.1)
@@ -102,11 +99,11 @@ def test_bits_do_not_depend_on_place(flag):
     rows = np.random.default_rng(6).normal(size=(8, 150)) * 3.0
     whole = Steering(150, flag, flag)
     for _ in range(2):
-        whole.step(*rows)
+        every = whole.step(*rows)
     for width in range(1, 38):
         for first in range(0, 150 - width, width):
             some = slice(first, first + width)
             part = Steering(width, flag, flag)
             for _ in range(2):
-                part.step(*rows[:, some])
-            assert np.array_equal(part.out, whole.out[:, some])
+                out = part.step(*rows[:, some])
+            assert np.array_equal(out, every[:, some])

@@ -6,6 +6,8 @@ import pytest
 from tussle.numeric.quaternion import quat_from_euler
 from tussle.stock.motion.unicycle import Unicycle, kernels
 
+PITCHED, LEVEL = Unicycle().advance, Unicycle(use_pitch=False).advance
+
 
 def rk4(x, u, p, dt, substeps, pitches=True):
     """The textbook method, in NumPy."""
@@ -44,9 +46,7 @@ def publish(x, u, p, h, pitches=True, banks=False):
 
 
 @pytest.mark.parametrize("substeps", [1, 2, 3, 12])
-@pytest.mark.parametrize(
-    ("advance", "pitches"), [(kernels.advance_pitch, True), (kernels.advance_level, False)]
-)
+@pytest.mark.parametrize(("advance", "pitches"), [(PITCHED, True), (LEVEL, False)])
 def test_ten_seconds_equal_rk4(advance, pitches, substeps):
     x, u, p = many(50)
     ours, reference = x.copy(), x.copy()
@@ -62,24 +62,24 @@ def test_turns_of_many_revolutions_per_substep_equal_rk4(substeps):
     u[1, :4] = [0.0, 20.0 * substeps * math.pi, -20.0 * substeps * math.pi, 40.0 * substeps * math.pi]
     u[2, :4] = 0.0
     ours = x.copy()
-    kernels.advance_pitch(ours, u, p, 0.1, substeps)
+    PITCHED(ours, u, p, 0.1, substeps)
     assert np.abs(ours - rk4(x, u, p, 0.1, substeps)).max() < 1e-10
 
 
 def test_fourth_order():
     x, u, p = many(20, speed=5.0, rate=2.0)
     exact = x.copy()
-    kernels.advance_pitch(exact, u, p, 1.0, 4096)
+    PITCHED(exact, u, p, 1.0, 4096)
     errors = []
     for substeps in (2, 4, 8, 16):
         y = x.copy()
-        kernels.advance_pitch(y, u, p, 1.0, substeps)
+        PITCHED(y, u, p, 1.0, substeps)
         errors.append(np.abs(y - exact)[:3].max())
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
     assert np.all(np.abs(orders - 4.0) < 0.15), orders
 
 
-@pytest.mark.parametrize("advance", [kernels.advance_pitch, kernels.advance_level])
+@pytest.mark.parametrize("advance", [PITCHED, LEVEL])
 def test_bits_do_not_depend_on_place(advance):
     x, u, p = many(203, rate=40.0)
     whole = x.copy()
@@ -107,7 +107,7 @@ def test_commands_are_held_within_limits():
     x = np.zeros((5, 2))
     u = np.array([[9.0, -9.0], [9.0, -9.0], [9.0, -9.0]])
     p = np.array([[2.0, 2.0], [0.5, 0.5], [0.25, 0.25], [0.0, 0.0]])
-    kernels.advance_pitch(x, u, p, 1.0, 1)
+    PITCHED(x, u, p, 1.0, 1)
     assert x[3].tolist() == [0.5, -0.5]
     assert x[4].tolist() == [0.25, -0.25]
     _, _, vel, omega = publish(x, u, p, 1e-6)
@@ -119,7 +119,7 @@ def test_level_model_climbs_with_velocity_z_and_keeps_its_pitch():
     x = np.array([[0.0], [0.0], [0.0], [0.0], [0.5]])
     u = np.array([[2.0], [0.0], [9.0]])
     p = np.array([[5.0], [1.0], [1.0], [3.0]])
-    kernels.advance_level(x, u, p, 2.0, 3)
+    LEVEL(x, u, p, 2.0, 3)
     assert np.allclose(x[:, 0], [4.0 * math.cos(0.5), 0.0, 6.0, 0.0, 0.5])
     _, _, vel, omega = publish(x, u, p, 0.1, pitches=False)
     assert np.allclose(vel[:, 0], [2.0 * math.cos(0.5), 0.0, 3.0])
@@ -131,7 +131,7 @@ def test_pitch_up_climbs_and_shows_nose_up():
     u = np.array([[10.0], [0.0], [0.5]])
     p = np.array([[20.0], [1.0], [1.0], [0.0]])
     for _ in range(10):
-        kernels.advance_pitch(x, u, p, 0.1, 2)
+        PITCHED(x, u, p, 0.1, 2)
     pos, quat, vel, _ = publish(x, u, p, 0.05)
     assert pos[2, 0] > 0.0
     assert vel[2, 0] > 0.0
@@ -146,7 +146,7 @@ def test_circle_closes():
     dt = 2.0 * math.pi / 0.5 / steps
     radius_seen = []
     for _ in range(steps):
-        kernels.advance_pitch(x, u, p, dt, 12)
+        PITCHED(x, u, p, dt, 12)
         radius_seen.append(math.hypot(x[0, 0], x[1, 0] - 60.0))
     assert np.abs(x[:3]).max() < 1e-9
     assert np.ptp(radius_seen) < 1e-9
@@ -155,7 +155,7 @@ def test_circle_closes():
 @pytest.mark.parametrize("pitches", [True, False])
 def test_velocity_is_displacement_of_the_last_substep(pitches):
     x, u, p = many(40)
-    advance = kernels.advance_pitch if pitches else kernels.advance_level
+    advance = PITCHED if pitches else LEVEL
     before = x.copy()
     advance(x, u, p, 0.1, 1)
     pos, _, vel, _ = publish(x, u, p, 0.1, pitches)
@@ -179,7 +179,7 @@ def test_turn_rate_vector_turns_the_quaternion():
     x, u, p = many(30)
     h = 1e-6
     _, before, _, omega = publish(x, u, p, h)
-    kernels.advance_pitch(x, u, p, h, 1)
+    PITCHED(x, u, p, h, 1)
     _, after, _, _ = publish(x, u, p, h)
     wx, wy, wz = omega
     w, a, b, c = before
@@ -208,7 +208,7 @@ def test_state_equation_of_the_page_is_the_one_that_flies():
     x, u, p = many(30)
     y = x.copy()
     h = 1e-7
-    kernels.advance_pitch(y, u, p, h, 1)
+    PITCHED(y, u, p, h, 1)
     for i in range(30):
         rates = Unicycle.derivative(x[3, i], x[4, i], *u[:, i], *p[:3, i])
         assert np.allclose((y[:, i] - x[:, i]) / h, rates, atol=1e-5)

@@ -2,10 +2,11 @@ import math
 
 import numpy as np
 import pytest
+from bound_rows import bound, seen
 
 from tussle.numeric.pid import pid
-from tussle.stock.controller.unicycle_pid import UnicyclePID, kernels
-from tussle.stock.motion.unicycle import kernels as unicycle
+from tussle.stock.controller.unicycle_pid import UnicyclePID
+from tussle.stock.motion.unicycle import Unicycle
 
 HEADING, PITCH, ROLL, SPEED = range(4)
 GAINS = np.array(
@@ -36,18 +37,24 @@ class Loop:
 
 
 class Steering:
-    """n rows of the kernel with their memory."""
+    """n rows of the controller with their memory."""
 
     def __init__(self, n, gains=GAINS):
-        self.gains = [np.repeat(g[:, None], n, axis=1) for g in gains]
-        self.memory = np.zeros((9, n))
-        self.out = np.full((5, n), np.nan)
+        names = "heading_pid", "pitch_pid", "roll_pid", "speed_pid"
+        self.plugin = bound(UnicyclePID(**dict(zip(names, map(tuple, gains), strict=True))), n)
+
+    @property
+    def memory(self):
+        own = self.plugin
+        return np.concatenate([own.heading, own.elevation, own.bank, own.forward])
 
     def step(self, wanted, z, vel, attitude, dt=0.1):
-        kernels.steer(
-            tuple(wanted), (z, *vel), tuple(attitude), tuple(self.gains), self.memory, dt, tuple(self.out)
-        )
-        return self.out
+        own = self.plugin
+        own.desired_altitude[:], own.desired_speed[:], own.desired_heading[:] = wanted
+        yaw, climb, roll = attitude
+        pos = np.stack([0.0 * z, 0.0 * z, z])
+        own.step(seen(len(z), dt, pos=pos, vel=np.stack(list(vel)), yaw=yaw, climb=climb, roll=roll))
+        return np.stack([own.speed, own.acceleration_x, own.turn_rate, own.pitch_rate, own.roll_rate])
 
 
 def one(**changed):
@@ -162,12 +169,12 @@ def test_flies_a_unicycle_to_heading_and_altitude():
             [[1.0, 0.0, 0.1, 1.0], [1.0, 0.0, 0.0, 10.0], [1.0, 0.0, 0.0, 10.0], [1.0, 0.1, 0.03, 10.0]]
         ),
     )
-    x = np.zeros((5, 1))
+    x, advance = np.zeros((5, 1)), Unicycle().advance
     p = np.array([[40.0], [1.0], [1.0], [0.0]])
     for _ in range(600):
         moving = one(heading=2.5, altitude=50.0, z=x[2, 0], yaw=x[3, 0], climb=x[4, 0])
         out = steering.step(*moving, 0.05)
-        unicycle.advance_pitch(x, np.ascontiguousarray(out[[0, 2, 3]]), p, 0.05, 1)
+        advance(x, np.ascontiguousarray(out[[0, 2, 3]]), p, 0.05, 1)
     assert x[3, 0] == pytest.approx(2.5, abs=1e-3)
     assert x[2, 0] == pytest.approx(50.0, abs=0.05)
     assert x[4, 0] == pytest.approx(0.0, abs=1e-3)
@@ -178,14 +185,14 @@ def test_bits_do_not_depend_on_place():
     rows = draw.normal(size=(10, 150)) * 3.0
     whole = Steering(150)
     for _ in range(3):
-        whole.step(rows[:3], rows[3], rows[4:7], rows[7:])
+        every = whole.step(rows[:3], rows[3], rows[4:7], rows[7:])
     for width in range(1, 38):
         for first in range(0, 150 - width, width):
             some = slice(first, first + width)
             part = Steering(width)
             for _ in range(3):
-                part.step(rows[:3, some], rows[3, some], rows[4:7, some], rows[7:, some])
-            assert np.array_equal(part.out, whole.out[:, some])
+                out = part.step(rows[:3, some], rows[3, some], rows[4:7, some], rows[7:, some])
+            assert np.array_equal(out, every[:, some])
             assert np.array_equal(part.memory, whole.memory[:, some])
 
 

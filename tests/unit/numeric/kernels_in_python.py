@@ -5,7 +5,18 @@ import sys
 import numpy as np
 
 from tussle import Block, Mission, Simulation
-from tussle.api import Autonomy, Input, MotionModel, Output, Param, State, neighbors, together
+from tussle.api import (
+    Autonomy,
+    Controller,
+    Input,
+    MotionModel,
+    Output,
+    Param,
+    State,
+    neighbors,
+    row_law,
+    together,
+)
 from tussle.numeric import cos, sin
 from tussle.numeric.kernel import device, kernel
 
@@ -40,6 +51,20 @@ class Car(MotionModel):
         body.pos[:2] = self.x[:2]
         body.vel[:2] = self.x[3] * np.stack([cos(self.x[2]), sin(self.x[2])])
         body.set_attitude(yaw=self.x[2])
+
+
+class Trim(Controller):
+    """Drive slower the farther it is east."""
+
+    asked = Input("speed", unit="m/s")
+    speed = Output(unit="m/s")
+    memory = State("last n", unit="m/s 1")
+
+    @row_law("speed", "memory")
+    @staticmethod
+    def trim(speed, pos_x, memory, dt):
+        last, n = memory
+        return half(speed + last) - dt * pos_x if n > 0.0 else speed, (speed, n + 1.0)
 
 
 class Driver(Autonomy):
@@ -81,9 +106,17 @@ seen = set()
 sys.setprofile(
     lambda frame, event, _: seen.add(frame.f_code.co_name) if frame.f_code.co_filename == __file__ else None
 )
-block = Block(name="cars", team=1, count=12, variance=(100.0, 100.0, 0.0), autonomy=Driver(), motion=Car())
+block = Block(
+    name="cars",
+    team=1,
+    count=12,
+    variance=(100.0, 100.0, 0.0),
+    autonomy=Driver(),
+    controller=Trim(),
+    motion=Car(),
+)
 simulation = Simulation(Mission(blocks=[block], end=1.0))
 simulation.run()
 sys.setprofile(None)
-print(" ".join(sorted(seen & {"half", "drive", "derivative", "law", "pairs", "ahead"})))
+print(" ".join(sorted(seen & {"half", "drive", "derivative", "law", "pairs", "ahead", "trim"})))
 print(simulation.state_hash())

@@ -629,5 +629,5 @@ def test_without_jit_an_authors_kernels_run_as_python_with_the_same_bits():
 
     compiled, interpreted = played(), played(NUMBA_DISABLE_JIT="1")
     assert "half" not in compiled[0]
-    assert interpreted[0] == "ahead derivative drive half law pairs"
+    assert interpreted[0] == "ahead derivative drive half law pairs trim"
     assert compiled[1] == interpreted[1]

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
-from tussle.api import Controller, GroupView, Input, Output, Param, State
-from tussle.stock.controller.simple_aircraft_controller_pid import kernels
+from tussle.api import Controller, Input, Output, Param, State, row_law
+from tussle.numeric import atan2
+from tussle.numeric.pid import pid_angle_loop, pid_loop
 
 GAINS = "kp ki kd band"
+LOOP = "integral error has_error"
+LOOP_DOC = "integral, last error, and 1 after the first call."
 
 
 class SimpleAircraftControllerPID(Controller):
@@ -49,10 +53,9 @@ class SimpleAircraftControllerPID(Controller):
     throttle = Output(doc="Throttle; five times the acceleration [m/s^2].")
     roll_rate = Output(unit="rad/s", doc="Rate of the bank, positive into a left turn.")
     pitch_rate = Output(unit="rad/s", doc="Rate of the elevation, nose up positive.")
-    memory = State(
-        "lateral_integral lateral_error vertical_integral vertical_error speed_integral speed_error has_error",
-        doc="Integral and last error of each loop; has_error is 1 after the first call.",
-    )
+    lateral = State(LOOP, doc="Of the heading or the bank: " + LOOP_DOC)
+    vertical = State(LOOP, doc="Of the altitude or the slope: " + LOOP_DOC)
+    forward = State(LOOP, doc="Of the speed: " + LOOP_DOC)
 
     def active_inputs(self) -> list[str]:
         """Return heading or bank, altitude or slope, and speed."""
@@ -60,11 +63,37 @@ class SimpleAircraftControllerPID(Controller):
         vertical = "desired_glide_slope" if self.use_glide_slope else "desired_altitude"
         return [lateral, vertical, "desired_speed"]
 
-    def step(self, g: GroupView) -> None:
-        """Run all loops of all rows."""
-        lateral, angle = (self.desired_roll, g.roll) if self.use_roll else (self.desired_heading, g.yaw)
-        vertical = self.desired_glide_slope if self.use_glide_slope else self.desired_altitude
-        kernels.steer(
-            (lateral, vertical, self.desired_speed), (g.pos[2], *g.vel), angle, (self.use_roll, self.use_glide_slope),
-            (self.heading_pid, self.alt_pid, self.vel_pid), self.memory, g.dt, (self.throttle, self.roll_rate, self.pitch_rate),
-        )  # fmt: skip
+    @row_law("roll_rate", "lateral")
+    @staticmethod
+    def turn(desired_heading: float, yaw: float, heading_pid: Any, lateral: Any, dt: float) -> Any:
+        """The heading's loop."""
+        return pid_angle_loop(desired_heading - yaw, heading_pid, lateral, dt)
+
+    @row_law("roll_rate", "lateral")
+    @staticmethod
+    def bank(desired_roll: float, roll: float, heading_pid: Any, lateral: Any, dt: float) -> Any:
+        """The bank's loop; a bank to the right needs a negative roll rate of the model."""
+        command, lateral = pid_angle_loop(desired_roll - roll, heading_pid, lateral, dt)
+        return -command, lateral
+
+    @row_law("pitch_rate", "vertical")
+    @staticmethod
+    def rise(desired_altitude: float, pos_z: float, alt_pid: Any, vertical: Any, dt: float) -> Any:
+        """The altitude's loop."""
+        return pid_loop(desired_altitude - pos_z, alt_pid, vertical, dt)
+
+    @row_law("pitch_rate", "vertical")
+    @staticmethod
+    def glide(desired_glide_slope: float, vel: Any, alt_pid: Any, vertical: Any, dt: float) -> Any:
+        """The slope's loop; a steeper descent needs a lower nose."""
+        vx, vy, vz = vel
+        slope = atan2(-vz, math.sqrt(vx * vx + vy * vy))
+        command, vertical = pid_loop(desired_glide_slope - slope, alt_pid, vertical, dt)
+        return -command, vertical
+
+    @row_law("throttle", "forward")
+    @staticmethod
+    def push(desired_speed: float, vel: Any, vel_pid: Any, forward: Any, dt: float) -> Any:
+        """The speed's loop."""
+        vx, vy, vz = vel
+        return pid_loop(desired_speed - math.sqrt(vx * vx + vy * vy + vz * vz), vel_pid, forward, dt)

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
-from tussle.api import Controller, GroupView, Input, Output, Param, State
-from tussle.stock.controller.unicycle_pid import kernels
+from tussle.api import Controller, Input, Output, Param, State, row_law
+from tussle.numeric import atan2
+from tussle.numeric.pid import pid_angle_loop, pid_loop
 
 GAINS = "kp ki kd band"
+LOOP = "integral error has_error"
+LOOP_DOC = "Integral and last error of its loop; has_error is 1 after the first call."
 
 
 class UnicyclePID(Controller):
@@ -17,9 +21,10 @@ class UnicyclePID(Controller):
     vehicle that flies backwards. The desired speed is passed through as `speed`; the speed loop commands `acceleration_x`
     for models that take an acceleration. The integral of a loop is zero while its error exceeds `band`.
 
-    Differences from the existing system: elevation is nose up and a positive pitch_rate raises the nose; the time step
-    of each loop is that of the call (there, the full step even when called once per substep); the first call has no
-    derivative kick; and the derivative of an angle's error does not jump where the error passes from +pi to -pi.
+    Other than in the existing system, elevation is nose up and a positive pitch_rate raises the nose; each loop's
+    time step is that of the call (there, the full step even when called once per substep); the first call has no
+    derivative kick; the derivative of an angle's error does not jump where the error passes from +pi to -pi; and a loop
+    whose output nobody reads does not run.
     """
 
     grade = "portable"
@@ -51,16 +56,47 @@ class UnicyclePID(Controller):
     turn_rate = Output(unit="rad/s", doc="Turn rate, counter-clockwise positive.")
     pitch_rate = Output(unit="rad/s", doc="Rate of the elevation, nose up positive.")
     roll_rate = Output(unit="rad/s", doc="Roll rate, right wing down positive.")
-    memory = State(
-        "heading_integral heading_error pitch_integral pitch_error roll_integral roll_error speed_integral speed_error has_error",
-        unit="rad*s rad rad*s rad rad*s rad m m/s 1",
-        doc="Integral and last error of each loop; has_error is 1 after the first call.",
-    )
+    heading = State(LOOP, unit="rad*s rad 1", doc=LOOP_DOC)
+    elevation = State(LOOP, unit="rad*s rad 1", doc=LOOP_DOC)
+    bank = State(LOOP, unit="rad*s rad 1", doc=LOOP_DOC)
+    forward = State(LOOP, unit="m m/s 1", doc=LOOP_DOC)
 
-    def step(self, g: GroupView) -> None:
-        """Run all loops of all rows."""
-        kernels.steer(
-            (self.desired_altitude, self.desired_speed, self.desired_heading), (g.pos[2], *g.vel), (g.yaw, g.climb, g.roll),
-            (self.heading_pid, self.pitch_pid, self.roll_pid, self.speed_pid), self.memory, g.dt,
-            (self.speed, self.acceleration_x, self.turn_rate, self.pitch_rate, self.roll_rate),
-        )  # fmt: skip
+    @row_law("speed")
+    @staticmethod
+    def pass_speed(desired_speed: float) -> float:
+        """The wanted speed."""
+        return desired_speed
+
+    @row_law("turn_rate", "heading")
+    @staticmethod
+    def turn(desired_heading: float, yaw: float, heading_pid: Any, heading: Any, dt: float) -> Any:
+        """The heading's loop."""
+        return pid_angle_loop(desired_heading - yaw, heading_pid, heading, dt)
+
+    @row_law("pitch_rate", "elevation")
+    @staticmethod
+    def rise(
+        desired_altitude: float,
+        desired_speed: float,
+        pos_z: float,
+        climb: float,
+        pitch_pid: Any,
+        elevation: Any,
+        dt: float,
+    ) -> Any:
+        """The elevation's loop."""
+        aim = atan2((desired_altitude - pos_z) * desired_speed, desired_speed * desired_speed)
+        return pid_loop(aim - climb, pitch_pid, elevation, dt)
+
+    @row_law("roll_rate", "bank")
+    @staticmethod
+    def level(roll: float, roll_pid: Any, bank: Any, dt: float) -> Any:
+        """The bank's loop, to level wings."""
+        return pid_angle_loop(-roll, roll_pid, bank, dt)
+
+    @row_law("acceleration_x", "forward")
+    @staticmethod
+    def push(desired_speed: float, vel: Any, speed_pid: Any, forward: Any, dt: float) -> Any:
+        """The speed's loop."""
+        vx, vy, vz = vel
+        return pid_loop(desired_speed - math.sqrt(vx * vx + vy * vy + vz * vz), speed_pid, forward, dt)

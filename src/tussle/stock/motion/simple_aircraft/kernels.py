@@ -1,16 +1,13 @@
-"""SimpleAircraft kernels: RK4 without repeated evaluations, and conversion to the body table.
+"""SimpleAircraft's law: RK4 with what repeats left out, and the state made public.
 
-Roll, pitch and speed have constant rates in a substep, so the second and third stage of RK4 see the same bank, elevation
-and speed, and the last stage of one substep is the first of the next. This leaves eight of sixteen sine-cosine pairs per
-substep. Rows are processed in blocks of scratch, with the substeps outside the loop over rows, because LLVM vectorises
-only loops over few arrays.
+Rows go through scratch arrays in blocks, because LLVM vectorises loops over few arrays only.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from tussle.numeric import sincos, tan
+from tussle.numeric import sincos, tan, wrap
 from tussle.numeric.kernel import device, kernel
 
 BLOCK = 64  # rows; the scratch of a block fits into the L1 cache
@@ -32,7 +29,7 @@ def turn_rate(sine, cosine, speed, radius, slope, target):
 
 @device
 def state_equation(roll, pitch, yaw, speed, throttle, roll_rate, pitch_rate, radius, slope, target):
-    """(x', y', z' [m/s], roll', pitch', yaw' [rad/s], speed' [m/s^2]), the state equation of `advance` inside the limits."""
+    """(x', y', z' [m/s], roll', pitch', yaw' [rad/s], speed' [m/s^2]) away from the limits; what `flown` integrates."""
     sp, cp = sincos(pitch)
     sy, cy = sincos(yaw)
     turn = speed / (radius + slope * (speed - target)) * tan(roll)
@@ -47,95 +44,43 @@ def advance_clamped(value, rate, rate_max, h, limit):
 
 
 @device
-def sincos_rows(angle, sine, cosine, n):
-    """Sine and cosine of the first n angles."""
-    for j in range(n):
-        sine[j], cosine[j] = sincos(angle[j])
+def flown(
+    x, y, z, roll, pitch, yaw, speed, throttle, roll_rate, pitch_rate, turning_radius, min_velocity, max_velocity, max_roll, max_pitch,
+    max_roll_rate, max_pitch_rate, speed_target, radius_slope_per_speed, dt,
+):  # fmt: skip
+    """Law of the aircraft: state and body after one RK4 step of dt; names, units and frames are the plugin's.
 
-
-@kernel("F2w F2 F2 f8 i8")
-def advance(x, u, p, dt, substeps):
-    """Advance all rows, in place.
-
-    If a substep would end beyond a limit of roll, pitch or speed, the rate is reduced so that it ends at the limit.
-
-    Args:
-        x: x, y, z [m], roll, pitch, yaw [rad], speed [m/s], (7, n), world frame; positive roll turns left,
-            pitch nose up.
-        u: throttle, roll_rate, pitch_rate [rad/s], (3, n).
-        p: turning_radius [m], min_velocity, max_velocity [m/s], max_roll, max_pitch [rad], max_roll_rate,
-            max_pitch_rate [rad/s], speed_target [m/s], radius_slope_per_speed [s], (9, n).
-        dt: Duration [s].
-        substeps: Number of equal RK4 steps in dt.
+    A rate that would end the step beyond a limit of roll, pitch or speed is lowered so that it ends on the limit. Roll, pitch and speed
+    have constant rates then, so RK4's second and third stage see the same bank, elevation and speed.
     """
-    east, north, up, roll, pitch, yaw, speed = x[0], x[1], x[2], x[3], x[4], x[5], x[6]
-    h = dt / substeps
-    half_h, sixth_h = 0.5 * h, dt / substeps / 6.0
-    # 0, m, 1: start, middle and end of the substep; "level" is the horizontal speed.
-    rows = np.empty((9, BLOCK))
-    v0, vm, v1, turn0, turn_m, turn1 = rows[0], rows[1], rows[2], rows[3], rows[4], rows[5]
-    rise0, level0, level_m = rows[6], rows[7], rows[8]
-    angle, sine, cosine = np.empty(4 * BLOCK), np.empty(4 * BLOCK), np.empty(4 * BLOCK)
-    for first in range(0, x.shape[1], BLOCK):
-        m = min(BLOCK, x.shape[1] - first)
-        last = first + m
-        throttle, roll_rate, pitch_rate = u[0, first:last], u[1, first:last], u[2, first:last]
-        radius, speed_min, speed_max = p[0, first:last], p[1, first:last], p[2, first:last]
-        roll_max, pitch_max, roll_rate_max = p[3, first:last], p[4, first:last], p[5, first:last]
-        pitch_rate_max, target, slope = p[6, first:last], p[7, first:last], p[8, first:last]
-        for l in range(m):
-            angle[l] = roll[first + l]
-            angle[m + l] = pitch[first + l]
-        sincos_rows(angle, sine, cosine, 2 * m)
-        for l in range(m):
-            v0[l] = speed[first + l]
-            rise0[l] = v0[l] * sine[m + l]
-            level0[l] = v0[l] * cosine[m + l]
-            turn0[l] = turn_rate(sine[l], cosine[l], v0[l], radius[l], slope[l], target[l])
-        for _ in range(substeps):
-            for l in range(m):
-                angle[m + l] = advance_clamped(
-                    roll[first + l], roll_rate[l], roll_rate_max[l], h, roll_max[l]
-                )
-                angle[l] = 0.5 * (roll[first + l] + angle[m + l])
-                roll[first + l] = angle[m + l]
-            for l in range(m):
-                angle[3 * m + l] = advance_clamped(
-                    pitch[first + l], pitch_rate[l], pitch_rate_max[l], h, pitch_max[l]
-                )
-                angle[2 * m + l] = 0.5 * (pitch[first + l] + angle[3 * m + l])
-                pitch[first + l] = angle[3 * m + l]
-            for l in range(m):
-                pull = ACCELERATION * clamp(throttle[l], -THROTTLE_MAX, THROTTLE_MAX)
-                v1[l] = clamp(v0[l] + h * pull, speed_min[l], speed_max[l])
-                vm[l] = 0.5 * (v0[l] + v1[l])
-            sincos_rows(angle, sine, cosine, 4 * m)
-            for l in range(m):
-                turn_m[l] = turn_rate(sine[l], cosine[l], vm[l], radius[l], slope[l], target[l])
-                turn1[l] = turn_rate(sine[m + l], cosine[m + l], v1[l], radius[l], slope[l], target[l])
-            for l in range(m):
-                rise1 = v1[l] * sine[3 * m + l]
-                up[first + l] += sixth_h * (rise0[l] + 4.0 * (vm[l] * sine[2 * m + l]) + rise1)
-                rise0[l] = rise1
-                level_m[l] = 2.0 * (vm[l] * cosine[2 * m + l])
-                vm[l] = v1[l] * cosine[3 * m + l]  # from here on, vm holds the horizontal speed at the end
-            for l in range(m):
-                now = yaw[first + l]
-                angle[l] = now
-                angle[m + l] = now + half_h * turn0[l]
-                angle[2 * m + l] = now + half_h * turn_m[l]
-                angle[3 * m + l] = now + h * turn_m[l]
-                yaw[first + l] = now + sixth_h * (turn0[l] + 4.0 * turn_m[l] + turn1[l])
-            sincos_rows(angle, sine, cosine, 4 * m)
-            for l in range(m):
-                middle = level_m[l] * (cosine[m + l] + cosine[2 * m + l])
-                east[first + l] += sixth_h * (level0[l] * cosine[l] + middle + vm[l] * cosine[3 * m + l])
-            for l in range(m):
-                middle = level_m[l] * (sine[m + l] + sine[2 * m + l])
-                north[first + l] += sixth_h * (level0[l] * sine[l] + middle + vm[l] * sine[3 * m + l])
-                v0[l], turn0[l], level0[l] = v1[l], turn1[l], vm[l]
-        for l in range(m):
-            speed[first + l] = v0[l]
+    radius, slope, target = turning_radius, radius_slope_per_speed, speed_target
+    half, sixth = 0.5 * dt, dt / 6.0
+    roll_1 = advance_clamped(roll, roll_rate, max_roll_rate, dt, max_roll)
+    pitch_1 = advance_clamped(pitch, pitch_rate, max_pitch_rate, dt, max_pitch)
+    pull = ACCELERATION * clamp(throttle, -THROTTLE_MAX, THROTTLE_MAX)
+    speed_1 = clamp(speed + dt * pull, min_velocity, max_velocity)
+    speed_m = 0.5 * (speed + speed_1)
+    turn_0, turn_m, turn_1 = (
+        turn_rate(*sincos(roll), speed, radius, slope, target),
+        turn_rate(*sincos(0.5 * (roll + roll_1)), speed_m, radius, slope, target),
+        turn_rate(*sincos(roll_1), speed_1, radius, slope, target),
+    )
+    sine_0, cosine_0 = sincos(pitch)
+    sine_m, cosine_m = sincos(0.5 * (pitch + pitch_1))
+    sine_1, cosine_1 = sincos(pitch_1)
+    level_0, level_m, level_1 = speed * cosine_0, 2.0 * (speed_m * cosine_m), speed_1 * cosine_1
+    up = speed * sine_0 + 4.0 * (speed_m * sine_m) + speed_1 * sine_1
+    north_0, east_0 = sincos(yaw)
+    north_1, east_1 = sincos(yaw + half * turn_0)
+    north_2, east_2 = sincos(yaw + half * turn_m)
+    north_3, east_3 = sincos(yaw + dt * turn_m)
+    yaw_1 = yaw + sixth * (turn_0 + 4.0 * turn_m + turn_1)
+    east = level_0 * east_0 + level_m * (east_1 + east_2) + level_1 * east_3
+    north = level_0 * north_0 + level_m * (north_1 + north_2) + level_1 * north_3
+    state = x + sixth * east, y + sixth * north, z + sixth * up, roll_1, pitch_1, yaw_1, speed_1
+    sine, cosine = sincos(yaw_1)
+    vel = level_1 * cosine, level_1 * sine, speed_1 * sine_1
+    return state, state[2], vel, wrap(yaw_1), pitch_1, -roll_1
 
 
 @device
@@ -150,7 +95,7 @@ def to_body(x, rates, limits, circle, table, first_row):
     """Write position, attitude, velocity and angular velocity to the body table.
 
     Args:
-        x: State as in `advance`, (7, n).
+        x: x, y, z [m], roll (turns left), pitch (nose up), yaw [rad], speed [m/s], (7, n), world frame.
         rates: roll_rate, pitch_rate [rad/s], (n,) each.
         limits: max_roll, max_pitch [rad], max_roll_rate, max_pitch_rate [rad/s], (n,) each.
         circle: turning_radius [m], radius_slope_per_speed [s], speed_target [m/s], (n,) each.

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from tussle.api import Input, MotionBody, MotionModel, Param, State
+from tussle.api import Input, MotionBody, MotionModel, Param, State, row_law
 from tussle.stock.motion.simple_aircraft import kernels
 
 
@@ -51,7 +51,7 @@ class SimpleAircraft(MotionModel):
     roll_rate = Input(unit="rad/s", doc="Rate of the bank, positive into a left turn.")
     pitch_rate = Input(unit="rad/s", doc="Rate of the elevation, nose up positive.")
 
-    advance = kernels.advance
+    flown = row_law("x", "pos_z", "vel", "yaw", "climb", "roll")(kernels.flown)
 
     def from_body(self, body: MotionBody, rows: np.ndarray) -> None:
         """Copy position, attitude and speed, clamped to the limits."""

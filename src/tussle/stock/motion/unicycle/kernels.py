@@ -1,4 +1,4 @@
-"""Unicycle kernels: RK4 over any number of substeps in closed form, and conversion to the body table.
+"""The unicycle's laws: RK4 over any number of substeps in closed form, and the state made public.
 
 With constant speed and rates the derivative depends on time only, so RK4 is Simpson's rule, and its sum over N substeps
 of length h is geometric. For an angle a with rate w and delta = h w / 2:
@@ -10,9 +10,8 @@ and the same for sin. With pitch, cos(pitch) cos(yaw) is split into the angles y
 equals RK4 up to rounding (with smaller rounding errors), and 12 substeps cost as much as one. The alternative, rotating
 cosine and sine once per substep, is as accurate, but its cost grows with the number of substeps.
 
-Rows are processed in blocks, with one scratch array each for angles, sines and cosines, because LLVM vectorises only loops over
-few arrays, and columns at fixed distances in one array are known not to overlap. The operations on a row do not depend on its
-index.
+What is made public goes in blocks of rows through one scratch array each for angles, sines and cosines, because LLVM vectorises
+loops over few arrays only; at fixed distances in one array it sees that columns do not overlap.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ import math
 
 import numpy as np
 
-from tussle.numeric import atan2, sincos
+from tussle.numeric import atan2, sincos, wrap
 from tussle.numeric.kernel import device, kernel
 
 BLOCK = 128  # rows; the scratch of a block (about 32 kB) fits into the L1 cache
@@ -47,19 +46,72 @@ def fold(delta):
 
 
 @device
-def simpson_gain(sin_delta, cos_delta, sin_n_delta, odd, n, n_is_even):
-    """g(delta) of the module docstring, from sines of the folded delta; `odd` is the parity of k, n the number of substeps."""
-    cosine = cos_delta - 2.0 * odd * cos_delta
-    ratio = sin_n_delta / (n * sin_delta)
-    ratio = 1.0 if sin_delta == 0.0 else ratio
-    ratio = ratio - 2.0 * odd * n_is_even * ratio
+def simpson_gain(delta, n, is_even):
+    """g(delta) of the module's docstring; n, the substeps, and 1.0 where they are even, else 0.0."""
+    folded, odd = fold(delta)
+    sine, cosine = sincos(folded)
+    sine_n, _ = sincos(n * folded)
+    cosine = cosine - 2.0 * odd * cosine
+    ratio = 1.0 if (n == 1.0) | (sine == 0.0) else sine_n / (n * sine)
+    ratio = ratio - 2.0 * odd * is_even * ratio
     return (2.0 + cosine) * ratio * (1.0 / 3.0)
 
 
 @device
-def simpson_gain_once(cos_delta, odd):
-    """g(delta) for one substep, where the ratio of the sines is 1."""
-    return (2.0 + (cos_delta - 2.0 * odd * cos_delta)) * (1.0 / 3.0)
+def towards(sa, ca, sb, cb, plus, minus):
+    """East and north of a mean direction, from sine and cosine of the middle yaw a and pitch b and half of Simpson's gains."""
+    cc, ss, sc, cs = ca * cb, sa * sb, sa * cb, ca * sb
+    return plus * (cc - ss) + minus * (cc + ss), plus * (sc + cs) + minus * (sc - cs)
+
+
+@device
+def flown(yaw, pitch, turn, rise, dt, substeps):
+    """Mean direction (east, north, up) over a step of dt [s] that begins at yaw and pitch [rad] and turns at held rates [rad/s]."""
+    n, is_even = float(substeps), 1.0 if substeps % 2 == 0 else 0.0
+    turned, raised = 0.5 * dt / n * turn, 0.5 * dt / n * rise
+    sa, ca = sincos(yaw + 0.5 * dt * turn)
+    sb, cb = sincos(pitch + 0.5 * dt * rise)
+    plus = 0.5 * simpson_gain(turned + raised, n, is_even)
+    minus = 0.5 * simpson_gain(turned - raised, n, is_even)
+    east, north = towards(sa, ca, sb, cb, plus, minus)
+    return east, north, simpson_gain(raised, n, is_even) * sb
+
+
+@device
+def attitude(yaw, pitch, bank):
+    """Heading, elevation and bank as a body has them, the elevation within a quarter turn, of any yaw, pitch and bank [rad]."""
+    folded, odd = fold(pitch)
+    return wrap(yaw + odd * math.pi), folded - 2.0 * odd * folded, wrap(bank + odd * math.pi)
+
+
+@device
+def bank_of(speed, turn):
+    """Bank [rad] of a coordinated turn, right wing down positive."""
+    return -atan2(speed * turn, GRAVITY)
+
+
+@device
+def pitched(
+    x, y, z, yaw, pitch, speed, turn_rate, pitch_rate, vel_max, turn_rate_max, pitch_rate_max, enable_roll, dt, substeps
+):  # fmt: skip
+    """Law of the unicycle that pitches: state and body after dt; names, units and frames are the plugin's."""
+    v, turn, rise = clamp(speed, vel_max), clamp(turn_rate, turn_rate_max), clamp(pitch_rate, pitch_rate_max)
+    east, north, up = flown(yaw, pitch, turn, rise, dt, substeps)
+    state = x + v * dt * east, y + v * dt * north, z + v * dt * up, yaw + dt * turn, pitch + dt * rise
+    shown = attitude(state[3], state[4], bank_of(v, turn) if enable_roll else 0.0)
+    return state, state[2], (v * east, v * north, v * up), *shown
+
+
+@device
+def level(
+    x, y, z, yaw, pitch, speed, turn_rate, velocity_z, vel_max, turn_rate_max, velocity_z_max, enable_roll, dt, substeps
+):  # fmt: skip
+    """Law of the unicycle whose pitch is held and whose climb speed is an input."""
+    v, turn, climb = clamp(speed, vel_max), clamp(turn_rate, turn_rate_max), clamp(velocity_z, velocity_z_max)
+    east, north, _ = flown(yaw, pitch, turn, 0.0, dt, substeps)
+    state = x + v * dt * east, y + v * dt * north, z + dt * climb, yaw + dt * turn, pitch
+    shown = attitude(state[3], pitch, bank_of(v, turn) if enable_roll else 0.0)
+    return state, state[2], (v * east, v * north, climb), *shown
 
 
 @device
@@ -67,136 +119,6 @@ def put_sincos(angle, m, sine, cosine):
     """Sines and cosines of the first m angles [rad] of a row of scratch."""
     for l in range(m):
         sine[l], cosine[l] = sincos(angle[l])
-
-
-@device
-def turn_and_rise(yaw, pitch, first, m, rates, dt, half_h, work):
-    """Advance yaw and pitch of a block of rows.
-
-    Writes to `work`: mid-step yaw and pitch, and half the change per substep of yaw + pitch, yaw - pitch and pitch.
-    """
-    turn_rate, turn_max, pitch_rate, pitch_max = rates
-    for l in range(m):
-        work[3, l] = clamp(turn_rate[first + l], turn_max[first + l])
-    for l in range(m):
-        work[4, l] = clamp(pitch_rate[first + l], pitch_max[first + l])
-    for l in range(m):
-        work[0, l] = yaw[first + l] + 0.5 * dt * work[3, l]
-        yaw[first + l] += dt * work[3, l]
-    for l in range(m):
-        work[1, l] = pitch[first + l] + 0.5 * dt * work[4, l]
-        pitch[first + l] += dt * work[4, l]
-    for l in range(m):
-        turn, raised = half_h * work[3, l], half_h * work[4, l]
-        work[2, l] = turn + raised
-        work[3, l] = turn - raised
-        work[4, l] = raised
-
-
-@kernel("F2w F2 F2 f8 i8")
-def advance_pitch(x, u, p, dt, substeps):
-    """Advance unicycles whose pitch rate is commanded, in place.
-
-    Args:
-        x: x, y, z [m], yaw, pitch [rad], (5, n), world frame, pitch nose up.
-        u: speed [m/s], turn_rate, pitch_rate [rad/s], (3, n).
-        p: vel_max [m/s], turn_rate_max, pitch_rate_max [rad/s], further rows unused, (>= 3, n).
-        dt: Duration [s].
-        substeps: Number of equal RK4 steps in dt.
-    """
-    east, north, up = x[0], x[1], x[2]
-    speed, vel_max, rates = u[0], p[0], (u[1], p[1], u[2], p[2])
-    count = float(substeps)
-    n_is_even = 1.0 if substeps % 2 == 0 else 0.0
-    angle = np.empty((8, BLOCK))
-    sine = np.empty((8, BLOCK))
-    cosine = np.empty((8, BLOCK))
-    gain = np.empty((3, BLOCK))
-    length = np.empty(BLOCK)
-    n = x.shape[1]
-    for first in range(0, n, BLOCK):
-        m = min(BLOCK, n - first)
-        turn_and_rise(x[3], x[4], first, m, rates, dt, 0.5 * dt / count, angle)
-        for l in range(m):
-            length[l] = clamp(speed[first + l], vel_max[first + l]) * dt
-        for k in range(3):
-            delta, n_delta, parity = angle[2 + k], angle[5 + k], gain[k]
-            for l in range(m):
-                delta[l], parity[l] = fold(delta[l])
-                n_delta[l] = count * delta[l]
-        for k in range(5 if substeps == 1 else 8):
-            put_sincos(angle[k], m, sine[k], cosine[k])
-        for k in range(3):
-            sin_delta, cos_delta, sin_n_delta, out = sine[2 + k], cosine[2 + k], sine[5 + k], gain[k]
-            if substeps == 1:
-                for l in range(m):
-                    out[l] = simpson_gain_once(cos_delta[l], out[l])
-            else:
-                for l in range(m):
-                    out[l] = simpson_gain(
-                        sin_delta[l], cos_delta[l], sin_n_delta[l], out[l], count, n_is_even
-                    )
-        for l in range(m):
-            i = first + l
-            cc = cosine[0, l] * cosine[1, l]
-            ss = sine[0, l] * sine[1, l]
-            sc = sine[0, l] * cosine[1, l]
-            cs = cosine[0, l] * sine[1, l]
-            plus = 0.5 * gain[0, l]
-            minus = 0.5 * gain[1, l]
-            east[i] += length[l] * (plus * (cc - ss) + minus * (cc + ss))
-            north[i] += length[l] * (plus * (sc + cs) + minus * (sc - cs))
-            up[i] += length[l] * (gain[2, l] * sine[1, l])
-
-
-@kernel("F2w F2 F2 f8 i8")
-def advance_level(x, u, p, dt, substeps):
-    """Advance unicycles with constant pitch and commanded climb speed, in place.
-
-    Args:
-        x: x, y, z [m], yaw, pitch [rad], (5, n), world frame.
-        u: speed [m/s], turn_rate [rad/s], velocity_z [m/s], (3, n).
-        p: vel_max [m/s], turn_rate_max, pitch_rate_max (unused) [rad/s], velocity_z_max [m/s], (>= 4, n).
-        dt: Duration [s].
-        substeps: Number of equal RK4 steps in dt.
-    """
-    east, north, up, yaw, pitch = x[0], x[1], x[2], x[3], x[4]
-    speed, turn_rate, velocity_z = u[0], u[1], u[2]
-    vel_max, turn_max, velocity_z_max = p[0], p[1], p[3]
-    count = float(substeps)
-    n_is_even = 1.0 if substeps % 2 == 0 else 0.0
-    half_dt = 0.5 * dt
-    half_h = half_dt / count
-    angle = np.empty(4 * BLOCK)
-    sine = np.empty(4 * BLOCK)
-    cosine = np.empty(4 * BLOCK)
-    parity = np.empty(BLOCK)
-    length = np.empty(BLOCK)
-    n = x.shape[1]
-    for first in range(0, n, BLOCK):
-        m = min(BLOCK, n - first)
-        for l in range(m):
-            i = first + l
-            turn = clamp(turn_rate[i], turn_max[i])
-            folded, odd = fold(half_h * turn)
-            length[l] = clamp(speed[i], vel_max[i]) * dt
-            angle[l] = yaw[i] + half_dt * turn
-            angle[m + l] = pitch[i]
-            angle[2 * m + l] = folded
-            angle[3 * m + l] = count * folded
-            parity[l] = odd
-            yaw[i] += dt * turn
-            up[i] += dt * clamp(velocity_z[i], velocity_z_max[i])
-        for j in range(4 * m):
-            sine[j], cosine[j] = sincos(angle[j])
-        for l in range(m):
-            i = first + l
-            gain = simpson_gain(
-                sine[2 * m + l], cosine[2 * m + l], sine[3 * m + l], parity[l], count, n_is_even
-            )
-            travelled = length[l] * cosine[m + l] * gain
-            east[i] += travelled * cosine[l]
-            north[i] += travelled * sine[l]
 
 
 @device
@@ -220,8 +142,7 @@ def mean_direction(sy, cy, sp, cp, sd, cd, se, ce):
     sb, cb = sp * ce - cp * se, cp * ce + sp * se
     plus = (2.0 + (cd * ce - sd * se)) * (1.0 / 6.0)
     minus = (2.0 + (cd * ce + sd * se)) * (1.0 / 6.0)
-    east = plus * (ca * cb - sa * sb) + minus * (ca * cb + sa * sb)
-    north = plus * (sa * cb + ca * sb) + minus * (sa * cb - ca * sb)
+    east, north = towards(sa, ca, sb, cb, plus, minus)
     return east, north, (2.0 + ce) * sb * (1.0 / 3.0)
 
 
@@ -276,7 +197,7 @@ def to_body(x, commands, limits, flags, h, table, first_row, part):
             angle[3, l] = half_h * held[2, l] if pitches else 0.0
         if banks:
             for l in range(m):
-                angle[4, l] = -0.5 * atan2(held[0, l] * held[1, l], GRAVITY)
+                angle[4, l] = 0.5 * bank_of(held[0, l], held[1, l])
         for k in range(5 if banks else 4):
             put_sincos(angle[k], m, sine[k], cosine[k])
         for l in range(m):

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from tussle.api import HistoricAttributes, Input, MotionBody, MotionModel, Param, State
+from tussle.api import HistoricAttributes, Input, MotionBody, MotionModel, Param, State, row_law
 from tussle.numeric import cos, sin
 from tussle.stock.motion.unicycle import kernels
+
+SHOWN = "x", "pos_z", "vel", "yaw", "climb", "roll"
 
 
 class Unicycle(MotionModel):
@@ -75,10 +75,8 @@ class Unicycle(MotionModel):
         """Return speed, turn_rate, and pitch_rate or velocity_z."""
         return ["speed", "turn_rate", "pitch_rate" if self.use_pitch else "velocity_z"]
 
-    @property
-    def advance(self) -> Any:
-        """Kernel for this value of use_pitch."""
-        return kernels.advance_pitch if self.use_pitch else kernels.advance_level
+    pitched = row_law(*SHOWN)(kernels.pitched)
+    level = row_law(*SHOWN)(kernels.level)
 
     def from_body(self, body: MotionBody, rows: np.ndarray) -> None:
         """Copy position, heading and elevation."""

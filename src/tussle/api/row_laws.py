@@ -1,0 +1,220 @@
+"""Row laws: what a controller or a motion model makes of one entity's numbers, as a function of these."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Collection, Sequence
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from tussle.api.bodies import DERIVED, FLOATS
+from tussle.api.group import GroupView
+from tussle.api.laws import BODY, components
+from tussle.columns import Channel, Numbers, Output, Param, State
+from tussle.errors import DeclarationError, listed, nearest_name
+from tussle.numeric.rk4 import label
+from tussle.numeric.row_kernel import Item, Number, RowCall, RowKernel, Text, Value, numbers_of, read_first
+
+BODY_INPUTS = ("force_x", "force_y", "force_z", "torque_x", "torque_y", "torque_z", "mass")
+BODY_NUMBERS: dict[str, Value] = {
+    **{part: Number(part) for part in BODY},
+    **{k: tuple(map(Number, components(k, n))) for k, n in {**FLOATS, **DERIVED}.items() if n > 1},
+}
+"""What body columns and their components are in a kernel: vel_x a number, vel three of them."""
+
+
+def row_law(*results: str) -> Callable[[Callable[..., Any]], RowLaw]:
+    """Declare a function of one row as a law of a controller or a motion model.
+
+    Its arguments are matched by name: `dt` [s]; the plugin's columns, one with fields as a tuple; a single field as `gains_kp` (of a
+    motion model `kp`, as in `derivative`), a channel by its own name; structural parameters. A controller's law may also take body
+    columns of the entity, as it believes them: yaw, climb, roll, vel, pos_z ..., a motion model's force_x ... torque_z and mass,
+    and `substeps`: it then advances by dt in so many, and otherwise by one.
+
+    A law that takes an input that is switched off (see `active_inputs`) is not called, nor one whose outputs nobody reads.
+
+    Args:
+        *results: What it returns, in order, columns with fields as tuples: own states and outputs, or an output's channel; of a
+            motion model its state, and what the body then is: pos_z, vel, yaw, climb, roll ...
+
+    Raises:
+        DeclarationError: There are no results; when the plugin's class is made, an argument or a result is none of these names.
+    """
+
+    def declare(function: Callable[..., Any]) -> RowLaw:
+        return RowLaw(getattr(function, "__func__", function), results)
+
+    return declare
+
+
+class RowLaw:
+    """A function of one row as an attribute of a plugin.
+
+    Attributes:
+        function: The function.
+        arguments: Names of its arguments.
+        results: Names of what it returns.
+    """
+
+    def __init__(self, function: Callable[..., Any], results: tuple[str, ...]) -> None:
+        self.function, self.results = function, results
+        self.arguments = tuple(inspect.signature(function).parameters)
+        if not results:
+            raise DeclarationError(f"{label(function)}: name the results, such as @row_law('turn_rate')")
+
+    def check(self, cls: Any, name: str) -> None:
+        """Refuse a law whose arguments or results mean nothing to a plugin.
+
+        Raises:
+            DeclarationError: One of them means nothing.
+        """
+        kinds = (("argument", self.arguments, arguments_of(cls)), ("result", self.results, results_of(cls)))
+        for kind, names, allowed in kinds:
+            for each in names:
+                if each not in allowed:
+                    own = [k for k in allowed if k not in BODY_NUMBERS]
+                    raise DeclarationError(
+                        f"{label(self.function)}: {cls.__name__}.{name}: {each!r} is no {kind} of a row law"
+                        f"{nearest_name(each, allowed)}; {listed(own)}; and body columns"
+                    )
+
+    def call(self, plugin: Any) -> RowCall:
+        """The law as a call in a kernel, for a plugin as data or bound."""
+        cls: Any = type(plugin)
+        takes, gives = arguments_of(cls), results_of(cls)
+        arguments = [takes[name] or Text(repr(plugin.values[name])) for name in self.arguments]
+        return RowCall(self.function, tuple(arguments), tuple(gives[name] for name in self.results))
+
+
+def own_numbers(cls: Any) -> dict[str, tuple[Number, ...]]:
+    """The numbers of each column of a plugin."""
+    return {
+        name: tuple(Number((name, place)) for place in range(len(declared.fields) or 1))
+        for name, declared in cls.declared(Numbers).items()
+        if not declared.ragged and not (isinstance(declared, Param) and not declared.is_row_data)
+    }
+
+
+@lru_cache(maxsize=256)
+def arguments_of(cls: Any) -> dict[str, Value | None]:
+    """What each argument that a class's laws may have is in a kernel; None is a structural parameter."""
+    is_motion = cls.kind == "motion"
+    found: dict[str, Value | None] = {"dt": Text("dt")}
+    if is_motion:
+        found |= {"substeps": Text("substeps"), **{name: Number(name) for name in BODY_INPUTS}}
+    else:
+        found |= BODY_NUMBERS
+    found |= {name: None for name, column in cls.params().items() if column.structural}
+    whole: dict[str, Value | None] = {}
+    single: dict[str, Value | None] = {}
+    for name, numbers in own_numbers(cls).items():
+        column = cls.columns[name]
+        whole[name] = numbers if column.fields else numbers[0]
+        is_channel = isinstance(column, Channel)
+        names = column.channels if is_channel else column.fields
+        plain = is_motion or is_channel
+        parts = {each if plain else f"{name}_{each}": n for each, n in zip(names, numbers, strict=False)}
+        # What passes a channel on has it twice: by its name goes what comes in.
+        single = {**parts, **single} if isinstance(column, Output) else {**single, **parts}
+    return found | whole | single
+
+
+@lru_cache(maxsize=256)
+def results_of(cls: Any) -> dict[str, Value]:
+    """What each result that a class's laws may have is in a kernel."""
+    found: dict[str, Value] = dict(BODY_NUMBERS) if cls.kind == "motion" else {}
+    for name, numbers in own_numbers(cls).items():
+        column = cls.columns[name]
+        if isinstance(column, (State, Output)) and column.dtype is float:
+            if isinstance(column, Output):
+                found |= zip(column.channels, numbers, strict=True)
+            found[name] = numbers if column.fields else numbers[0]
+    return found
+
+
+def laws_of(plugin: Any, wired: Collection[str] | None = None) -> list[RowCall]:
+    """Calls of the laws that a plugin, as data or bound, runs; `wired` are its outputs that somebody reads, None for all."""
+    cls = type(plugin)
+    inputs = cls.inputs()
+    active = plugin.active_inputs() if hasattr(plugin, "active_inputs") else inputs
+    off = {each for k, c in inputs.items() if k not in active for each in (k, *c.channels)}
+    calls = []
+    for law in cls.row_laws.values():
+        call = law.call(plugin)
+        gives = {each.key[0] for each in numbers_of(call.results) if isinstance(each.key, tuple)}
+        outputs = gives & cls.outputs().keys()
+        is_read = wired is None or not outputs or not outputs.isdisjoint(wired)
+        if is_read and off.isdisjoint(law.arguments):
+            calls.append(call)
+    return calls
+
+
+class Rows:
+    """Some laws' kernel over the rows of a view, and where its columns come from.
+
+    Own columns, whose keys are tuples, are loaded where a law reads them first, and stored where one writes them. Body columns are
+    loaded; what laws make of them passes from substep to substep only.
+
+    Args:
+        calls: The laws, in order.
+        held: Body numbers that stay as they are seen, whatever a law says.
+    """
+
+    def __init__(self, calls: Sequence[RowCall], held: Collection[Number] = ()) -> None:
+        read = {each for call in calls for each in numbers_of(call.arguments)} - set(held)
+
+        def needed(item: Item) -> Item:
+            is_own = isinstance(item, Number) and isinstance(item.key, tuple)
+            return item if is_own or item in read else Text("_")
+
+        calls = [call.replaced(lambda a: Text("1") if a == Text("substeps") else a, needed) for call in calls]
+        first = read_first(calls)
+        written = dict.fromkeys(
+            each for call in calls for each in numbers_of(call.results) if isinstance(each.key, tuple)
+        )
+        both = [each for each in first if each in written]
+        self.given = [*(each for each in first if each not in written), *both]
+        self.kept = [*both, *(each for each in written if each not in both)]
+        codes = f"({' '.join('F' * len(self.given))}) ({' '.join(['Fw'] * len(self.kept))})"
+        head = f"{codes} f8 i8 (i8 i8)", "own, out, dt, substeps, part", "part", "substeps"
+        self.kernel = RowKernel(calls, {"own": self.given}, {"out": self.kept}, head)
+
+    def run(self, g: GroupView, own: Callable[..., np.ndarray], dt: float, substeps: int) -> None:
+        """Run the laws for every row of a view, substeps times by dt [s] each; `own` gives the column of a key, (n,)."""
+
+        def column(number: Number) -> np.ndarray:
+            if isinstance(number.key, tuple):
+                return np.asarray(own(*number.key), float)
+            name, place = BODY[str(number.key)]
+            return np.asarray(np.atleast_2d(g.column(name))[place], float)
+
+        given, kept = tuple(map(column, self.given)), tuple(map(column, self.kept))
+        g.split(lambda *part: self.kernel(given, kept, dt, substeps, part))
+
+
+def step_rows(plugin: Any, g: GroupView) -> None:
+    """Run a bound plugin's laws once for every row of its view."""
+    own = plugin.__dict__
+    if "_rows" not in own:
+        own["_rows"] = Rows(laws_of(plugin, plugin.wired))
+    own["_rows"].run(g, lambda name, place: np.atleast_2d(own[name])[place], g.dt, 1)
+
+
+def advance_rows(model: Any) -> Callable[..., None]:
+    """The compiled function (x, u, p, dt, substeps) of a motion model, as data or bound, that is written as row laws."""
+    cls: Any = type(model)
+    arguments, own = arguments_of(cls), own_numbers(cls)
+    state = next(k for k, c in model.states().items() if c.fields)
+    channels = [*model.input_channels(), *model.body_inputs()]
+    x, u = own[state], [arguments[name] for name in channels]
+    p = [each for name in model.row_params() for each in own[name]]
+
+    calls = [call.replaced(lambda a: a, lambda r: r if r in x else Text("_")) for call in laws_of(model)]
+    at_once = any(Text("substeps") in call.arguments for call in calls)
+    head = "F2w F2 F2 f8 i8", "x, u, p, dt, substeps", "0, x.shape[1]", "1" if at_once else "substeps"
+    kernel = RowKernel(calls, {"x": x, "u": u, "p": p}, {"x": x}, head)  # type: ignore[dict-item]
+    if at_once:
+        return kernel
+    return lambda x, u, p, dt, substeps: kernel(x, u, p, dt / substeps, substeps)

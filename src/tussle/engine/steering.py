@@ -1,0 +1,70 @@
+"""Controllers and motion model of a group in one kernel over all substeps, where all of them are written as row laws."""
+
+from __future__ import annotations
+
+from tussle.api.bodies import DERIVED
+from tussle.api.kinds import Controller
+from tussle.api.laws import BODY
+from tussle.api.motion import WRITABLE, MotionModel
+from tussle.api.row_laws import Rows, laws_of
+from tussle.columns import Handle, Topic
+from tussle.engine.group import Binding, Group
+from tussle.numeric.row_kernel import Item, Number, RowCall, numbers_of
+
+
+class Steering:
+    """The substeps of a group between one step's autonomies and sensors.
+
+    Rows are worked block by block, all substeps of a block before the next; what controllers read of the body between two substeps
+    comes from the motion model's law, and the body table is written once, behind the last.
+    """
+
+    def __init__(self, group: Group, rows: Rows) -> None:
+        self.group, self.rows = group, rows
+
+    def run(self, dt: float, substeps: int) -> None:
+        """Control and move all rows over some substeps of dt [s]."""
+        group = self.group
+        table = group.table
+        self.rows.run(group.steering, lambda dtype, row: table.arrays[dtype][row], dt, substeps)
+        group.publish()
+
+
+def steering_of(group: Group) -> Steering | None:
+    """The one kernel of a group; None where a plugin is no row law, has a rate, or reads of the body what the model's law does not give."""
+    motion = group.motion
+    if not all(_is_law(b) for b in group.controllers) or not _flies_by_law(motion):
+        return None
+    calls = [placed(call, group, b) for b in group.controllers for call in laws_of(b.plugin, b.plugin.wired)]
+    moves = [placed(call, group, motion) for call in laws_of(motion.plugin)]
+    believed = set(group.belief) | ({*DERIVED} if "quat" in group.belief else set())
+    held = [Number(part) for part, (name, _) in BODY.items() if name in believed]
+    changing = {Number(part) for part, (name, _) in BODY.items() if name in (*WRITABLE, *DERIVED)}
+    given = {each for call in moves for each in numbers_of(call.results)}
+    read = {each for call in calls for each in numbers_of(call.arguments)}
+    if (read & changing) - given - set(held):
+        return None
+    return Steering(group, Rows([*calls, *moves], held))
+
+
+def _is_law(binding: Binding) -> bool:
+    cls = type(binding.plugin)
+    is_alone = not any(isinstance(c, (Handle, Topic)) for c in cls.columns.values()) and not binding.children
+    return cls.step is Controller.step and bool(cls.row_laws) and binding.spec.rate is None and is_alone
+
+
+def _flies_by_law(binding: Binding) -> bool:
+    cls = type(binding.plugin)
+    return bool(cls.row_laws) and cls.advance is MotionModel.advance and not cls.handles()
+
+
+def placed(call: RowCall, group: Group, binding: Binding) -> RowCall:
+    """A call whose own columns are rows of the group's table: what one plugin writes is then what the next one reads."""
+
+    def at(item: Item) -> Item:
+        if not isinstance(item, Number) or not isinstance(item.key, tuple):
+            return item
+        name, place = item.key
+        return Number((binding.places[name].dtype, group.rows_of(binding, name)[place]))
+
+    return call.replaced(at, at)

@@ -1,0 +1,176 @@
+"""Functions of one row as a kernel over all rows: block of rows by block of rows, all calls of a block before the next."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tussle.errors import DeclarationError
+from tussle.numeric.fingerprint import package
+from tussle.numeric.kernel import Device, device, kernel
+from tussle.numeric.rk4 import label
+
+BLOCK = 128
+"""Rows that are worked on together: what a step's calls read and write of them stays in the first-level cache."""
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number of the row; equal ones are the same number."""
+
+    key: Hashable
+
+
+@dataclass(frozen=True)
+class Text:
+    """What is the same for all rows, as it stands in the kernel: "dt", "substeps", a constant; or "_", a result that nobody needs."""
+
+    text: str
+
+
+Item = Number | Text
+Value = Item | tuple[Item, ...]
+
+
+@dataclass(frozen=True)
+class RowCall:
+    """A call of a function of one row, which takes and returns numbers and tuples of numbers."""
+
+    function: Callable[..., Any]
+    arguments: tuple[Value, ...]
+    results: tuple[Value, ...]
+
+    def replaced(self, argument: Callable[[Item], Item], result: Callable[[Item], Item]) -> RowCall:
+        """The call with other numbers or texts."""
+
+        def each(change: Callable[[Item], Item], values: Iterable[Value]) -> tuple[Value, ...]:
+            return tuple(tuple(map(change, v)) if isinstance(v, tuple) else change(v) for v in values)
+
+        return RowCall(self.function, each(argument, self.arguments), each(result, self.results))
+
+
+def numbers_of(values: Iterable[Value]) -> Iterator[Number]:
+    """The numbers of the row in arguments or results."""
+    for value in values:
+        if isinstance(value, tuple):
+            yield from numbers_of(value)
+        elif isinstance(value, Number):
+            yield value
+
+
+class RowKernel:
+    """A kernel that makes some calls in turn for every row, again for every substep.
+
+    The numbers of a block of rows lie in one scratch array, a line for each: at fixed distances in one array LLVM sees that lines do
+    not overlap, and takes rows as SIMD lanes.
+
+    Args:
+        calls: The calls.
+        given: What is loaded: name of an argument, 2-D array or tuple of columns (n,), -> the numbers in it.
+        kept: What is stored, likewise; numbers that stand one after the other in what is given, or follow it.
+        head: Signature, arguments, and as texts which rows are meant and how often the calls are made.
+
+    Raises:
+        DeclarationError: When first called: a function cannot be compiled, or does not return what is expected.
+    """
+
+    def __init__(
+        self,
+        calls: Sequence[RowCall],
+        given: Mapping[str, Sequence[Number]],
+        kept: Mapping[str, Sequence[Number]],
+        head: tuple[str, str, str, str],
+    ) -> None:
+        self.calls = calls
+        signature, arguments, rows, times = head
+        every = [*(each for part in (given, kept) for numbers in part.values() for each in numbers)]
+        every += [each for call in calls for each in numbers_of((*call.arguments, *call.results))]
+        self._line = {each: place for place, each in enumerate(dict.fromkeys(every))}
+        functions = [call.function for call in calls]
+        scope: dict[str, Any] = {"np": np, "BLOCK": BLOCK}
+        for place, function in enumerate(functions):
+            scope[f"call_{place}"] = function if isinstance(function, Device) else device(function)
+        text = [f"def row_kernel({arguments}):", *self._lines(given, kept, rows, times)]
+        exec("\n".join(text) + "\n", scope)  # noqa: S102 - written here; what authors wrote is in functions of its own
+        made = scope["row_kernel"]
+        # An author's function makes the kernel the author's, which may be run as Python.
+        made.__module__ = next((f for f in functions if package(f) != "tussle"), functions[0]).__module__
+        made.__qualname__ = "+".join(dict.fromkeys(f.__qualname__ for f in functions))
+        self.kernel = kernel(signature)(made)
+
+    def _text(self, value: Value) -> str:
+        """An argument or result as it stands in the kernel."""
+        if isinstance(value, tuple):
+            return f"({''.join(f'{self._text(each)}, ' for each in value)})"
+        return value.text if isinstance(value, Text) else f"work[{self._line[value]}, l]"
+
+    def _lines(self, given: Any, kept: Any, rows: str, times: str) -> Iterator[str]:
+        yield f"    begin, end = {rows}"
+        yield f"    work = np.empty(({len(self._line)}, BLOCK))"
+        yield "    for start in range(begin, end, BLOCK):"
+        yield "        m = min(BLOCK, end - start)"
+        for name, numbers in given.items():
+            yield from self._copies(name, numbers, "work[{line} + k, l] = column[start + l]")
+        yield f"        for _ in range({times}):"
+        for place, call in enumerate(self.calls):
+            yield "            for l in range(m):"
+            results = ", ".join(map(self._text, call.results))
+            yield f"                {results} = call_{place}({', '.join(map(self._text, call.arguments))})"
+        for name, numbers in kept.items():
+            yield from self._copies(name, numbers, "column[start + l] = work[{line} + k, l]")
+
+    def _copies(self, name: str, numbers: Sequence[Number], copy: str) -> Iterator[str]:
+        if not numbers:
+            return
+        line = self._line[numbers[0]]
+        assert [self._line[each] for each in numbers] == list(range(line, line + len(numbers)))
+        yield f"        for k in range({len(numbers)}):"
+        yield f"            column = {name}[k]"
+        yield "            for l in range(m):"
+        yield f"                {copy.format(line=line)}"
+
+    def __call__(self, *arguments: Any) -> None:
+        try:
+            self.kernel(*arguments)
+        except Exception as error:
+            self._explain(error)
+            raise
+
+    def _explain(self, error: Exception) -> None:
+        from numba.core.errors import NumbaError
+
+        for call in self.calls:
+            function = getattr(call.function, "py_func", call.function)
+            ones = [(1.0,) * len(each) if isinstance(each, tuple) else 1.0 for each in call.arguments]
+            wanted = shape_of(call.results[0] if len(call.results) == 1 else call.results)
+            try:
+                found = shape_of(function(*ones))
+            except Exception:  # noqa: BLE001 - what it does with ones tells nothing then
+                found = wanted
+            if found != wanted:
+                raise DeclarationError(
+                    f"{label(function)} returns {found}; its results are {wanted}"
+                ) from error
+        if isinstance(error, NumbaError):
+            names = ", ".join(label(call.function) for call in self.calls)
+            raise DeclarationError(f"{names} cannot be compiled: {error}") from error
+
+
+def shape_of(value: Any) -> str:
+    """In words how many numbers a function returns."""
+    if not isinstance(value, tuple):
+        return "a number"
+    return f"({', '.join(shape_of(each) for each in value)})"
+
+
+def read_first(calls: Iterable[RowCall]) -> list[Number]:
+    """The numbers that are read before a call has written them."""
+    found: dict[Number, None] = {}
+    written: set[Number] = set()
+    for call in calls:
+        found |= dict.fromkeys(each for each in numbers_of(call.arguments) if each not in written)
+        written.update(numbers_of(call.results))
+    return list(found)
