@@ -211,10 +211,18 @@ def advance_rows(model: Any) -> Callable[..., None]:
     x, u = own[state], [arguments[name] for name in channels]
     p = [each for name in model.row_params() for each in own[name]]
 
-    calls = [call.replaced(lambda a: a, lambda r: r if r in x else Text("_")) for call in laws_of(model)]
-    at_once = any(Text("substeps") in call.arguments for call in calls)
-    head = "F2w F2 F2 f8 i8", "x, u, p, dt, substeps", "0, x.shape[1]", "1" if at_once else "substeps"
-    kernel = RowKernel(calls, {"x": x, "u": u, "p": p}, {"x": x}, head)  # type: ignore[dict-item]
-    if at_once:
-        return kernel
-    return lambda x, u, p, dt, substeps: kernel(x, u, p, dt / substeps, substeps)
+    def made(substeps: str, times: str) -> RowKernel:
+        calls = [
+            call.replaced(
+                lambda a: Text(substeps) if a == Text("substeps") else a, lambda r: r if r in x else Text("_")
+            )
+            for call in laws_of(model)
+        ]
+        head = "F2w F2 F2 f8 i8", "x, u, p, dt, substeps", "0, x.shape[1]", times
+        return RowKernel(calls, {"x": x, "u": u, "p": p}, {"x": x}, head)  # type: ignore[dict-item]
+
+    if any("substeps" in law.arguments for law in cls.row_laws.values()):
+        once, many = made("1", "1"), made("substeps", "1")
+        return lambda x, u, p, dt, n: (once if n == 1 else many)(x, u, p, dt, n)
+    each = made("1", "substeps")
+    return lambda x, u, p, dt, n: each(x, u, p, dt / n, n)
