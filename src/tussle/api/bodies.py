@@ -36,6 +36,12 @@ BRUTE = 600
 
 _DERIVING = {name: getattr(kernels, name) for name in DERIVED}
 OFFSETS = {name: sum(list(FLOATS.values())[:i]) for i, name in enumerate(FLOATS)}
+_COLUMNS = {
+    **{name: (OFFSETS[name], k) for name, k in FLOATS.items()},
+    **{name: (i, 1) for i, name in enumerate(STORED_INTS)},
+    "loads": (OFFSETS["force"], 6),
+}
+"""First row and number of rows of each column in its storage."""
 BODY_UNITS = {
     "pos": "m", "vel": "m/s", "quat": "", "omega": "rad/s", "force": "N", "torque": "N m", "health": "", "radius": "m",
     "mass": "kg", "yaw": "rad", "climb": "rad", "roll": "rad", "forward": "", "level_forward": "",
@@ -80,6 +86,7 @@ class Bodies:
     block: np.ndarray
     place_in_block: np.ndarray
     born: np.ndarray
+    loads: np.ndarray
 
     def __init__(self, floats: np.ndarray, ints: np.ndarray, n_worlds: int) -> None:
         self.n_worlds = n_worlds
@@ -99,13 +106,8 @@ class Bodies:
         """Take other rows; everything that was derived from the old ones is dropped."""
         self.floats, self.ints = floats, ints
         self.n = floats.shape[1]
-        own = self.__dict__
-        for name, k in FLOATS.items():
-            first = OFFSETS[name]
-            own[name] = floats[first : first + k] if k > 1 else floats[first]
-        self.loads = floats[OFFSETS["force"] : OFFSETS["torque"] + 3]
-        for i, name in enumerate(STORED_INTS):
-            own[name] = ints[i]
+        for name in _COLUMNS:
+            self.__dict__.pop(name, None)
         self.version = self._oldest = 0
         self._touched: list[tuple[int, int]] = []
         self._derived: dict[str, Kept] = {}
@@ -115,6 +117,15 @@ class Bodies:
         self._by_place: dict[tuple[int, str], Kept] = {}
         self._layout: tuple[np.ndarray, ...] | None = None
         self._read_only: BodyView | None = None
+
+    def __getattr__(self, name: str) -> np.ndarray:
+        """A column: a view of the storage, made when it is first asked for."""
+        if name not in _COLUMNS:
+            raise AttributeError(f"Bodies has no {name!r}")
+        first, k = _COLUMNS[name]
+        storage = self.ints if name in STORED_INTS else self.floats
+        column = self.__dict__[name] = storage[first : first + k] if k > 1 else storage[first]
+        return column
 
     @property
     def view(self) -> BodyView:
@@ -257,6 +268,14 @@ class Bodies:
 def derive(name: str, quat: np.ndarray, first: int, last: int, base: int, out: np.ndarray) -> None:
     """Put yaw, climb, roll, forward or level_forward of the quaternions [first, last) into out, (n,) or (k, n), from first - base on."""
     _DERIVING[name](quat, first, last, base, out)
+
+
+def derived_from(name: str, quat: np.ndarray) -> np.ndarray:
+    """yaw, climb, roll [rad], (n,), forward, (3, n), or level_forward, (2, n), of quaternions (4, n)."""
+    k, n = DERIVED[name], quat.shape[1]
+    out = np.empty((k, n) if k > 1 else n)
+    derive(name, np.ascontiguousarray(quat), 0, n, 0, out)
+    return out
 
 
 def read_only(array: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ import numpy as np
 
 from tussle import rng
 from tussle.api import kernels
-from tussle.api.bodies import DERIVED, FLOATS, INTS, Bodies, BodyView, Kept, derive, read_only
+from tussle.api.bodies import DERIVED, FLOATS, INTS, Bodies, BodyView, Kept, derive, derived_from, read_only
 from tussle.api.context import Context, stream
 from tussle.api.draw import Draw
 from tussle.api.pairs import Nearest, Pairs, find_nearest, find_pairs
@@ -48,14 +48,14 @@ class GroupView:
         self.begin()
         self.failing_row = None
         self.motion_state: np.ndarray = np.empty((0, 0))
-        self._seen: list[str] = []
+        self._seen: set[str] = set()
         self.services: dict[str, Callable[..., Any]] = {}
         self.belief: dict[str, np.ndarray] = {}
         self.reset(bodies, first, last)
 
     def own_cache(self) -> None:
         """After a copy: forget names without the original's forgetting them too."""
-        self._seen = list(self._seen)
+        self._seen = set(self._seen)
 
     def reset(self, bodies: Bodies, first: int, last: int) -> None:
         """Look at other rows, after the table has been repacked."""
@@ -70,6 +70,11 @@ class GroupView:
         self.n = last - first
         self._reaches: dict[int, tuple[np.ndarray, float | np.ndarray]] = {}
 
+    def renew(self) -> None:
+        """Forget what follows from seeds and parameters: some rows have begun anew in their places."""
+        self.__dict__.pop("_seeds", None)
+        self._reaches.clear()
+
     def __getattr__(self, name: str) -> Any:
         if name in FLOATS or name in INTS:
             own = self.belief.get(name)
@@ -77,13 +82,13 @@ class GroupView:
                 getattr(self._bodies, name)[..., self.first : self.last] if own is None else own
             )
             self.__dict__[name] = array
-            self._seen.append(name)
+            self._seen.add(name)
             return array
         if name.startswith("__"):  # what `copy` asks for
             raise AttributeError(name)
         if name == "_seeds":
             self._seeds = self.context.row_seeds(self.world, self.block)
-            self._seen.append(name)
+            self._seen.add(name)
             return self._seeds
         allowed = [*FLOATS, *INTS, *DERIVED, "t", "dt", "n"]
         raise AttributeError(f"g has no {name!r}{nearest_name(name, allowed)}; {listed(allowed)}")
@@ -102,9 +107,14 @@ class GroupView:
             kept.version = bodies.version
         return kept.columns[1]  # type: ignore[no-any-return]
 
-    def column(self, name: str) -> np.ndarray:
-        """A body column or what is derived from it, by name: what the entity believes, where it believes something."""
-        return self._derive(name) if name in DERIVED else getattr(self, name)
+    def column(self, name: str, rows: np.ndarray | None = None) -> np.ndarray:
+        """A body column or what is derived from it, by name: what the entity believes, where it believes something.
+
+        With rows, (m,), those of them only: in `spawn`, a few newborn of very many.
+        """
+        if rows is None:
+            return self._derive(name) if name in DERIVED else getattr(self, name)
+        return derived_from(name, self.quat[:, rows]) if name in DERIVED else getattr(self, name)[..., rows]
 
     def components(self, name: str) -> tuple[np.ndarray, ...]:
         """Components of a column such as pos, each (n,); for kernels."""

@@ -38,7 +38,7 @@ class MotionBody(GroupView):
         if name in WRITABLE:
             array = getattr(self._bodies, name)[:, self.first : self.last]
             self.__dict__[name] = array
-            self._seen.append(name)
+            self._seen.add(name)
             return array
         if name == "forward_speed":
             east, north, up = self.forward

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tussle.api.bodies import BODY_UNITS, DERIVED, FLOATS, INTS, Bodies, derive
+from tussle.api.bodies import BODY_UNITS, DERIVED, FLOATS, INTS, Bodies, derived_from
 from tussle.api.plugin import Plugin
 from tussle.columns import Numbers, Param, State
 from tussle.engine.group import Binding, Group
@@ -58,10 +58,7 @@ def _follow(state: SimulationState, path: str) -> tuple[Any, tuple[str, ...], st
 
 def _body_column(bodies: Bodies, name: str, rows: np.ndarray) -> np.ndarray:
     if name in DERIVED:
-        k = DERIVED[name]
-        out = np.empty((k, len(rows)) if k > 1 else len(rows))
-        derive(name, np.ascontiguousarray(bodies.quat[:, rows]), 0, len(rows), 0, out)
-        return out
+        return derived_from(name, bodies.quat[:, rows])
     return np.asarray(getattr(bodies, name)[..., rows])
 
 

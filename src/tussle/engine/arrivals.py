@@ -11,7 +11,7 @@ from tussle.api.bodies import Bodies
 from tussle.api.kinds import Interaction, WorldPlugin
 from tussle.api.world import WorldView
 from tussle.engine import failure
-from tussle.engine.births import Room, joined
+from tussle.engine.births import Room, in_order, joined
 from tussle.engine.referees import Referee
 from tussle.engine.rows import repack, take_over_moves
 from tussle.engine.state import SimulationState
@@ -37,7 +37,7 @@ def reset(
     clock, view = state.context.clock, state.world_view
     clock.step[chosen] = 0
     state.running[chosen], state.failed[chosen] = True, False
-    state.n_running = int(state.running.sum())
+    state.n_running = int(np.count_nonzero(state.running))
     for world in chosen:
         state.results[world] = None
         state.parked.pop(int(world), None)
@@ -52,8 +52,8 @@ def reset(
     due = state.births.begin(chosen)
     gone = mask | ~state.running  # worlds that ended last keep their rows as long as nobody runs
     repack(state, gone[state.population.bodies.world], _create(state, due, at_start=True))
-    steps = np.unique(clock.step[state.running])
-    clock.common = int(steps[0]) if len(steps) == 1 else -1
+    steps = clock.step[state.running]
+    clock.common = int(steps[0]) if len(steps) and (steps == steps[0]).all() else -1
     _start_referees(state, mask)
     take_out_dead(state)
 
@@ -104,14 +104,14 @@ def _create(state: SimulationState, due: Mapping[int, np.ndarray], at_start: boo
 
     room = Room(rejects, standing, fail) if rejecting else None
     state.world_view.begin()
-    parts = []
+    new, first = Bodies.empty(sum(map(len, due.values())), state.n_worlds), 0
     for block, worlds in due.items():
-        part = state.births.create(block, worlds, room=room)
-        parts.append(part)
+        mine = slice(first, first := first + len(worlds))
+        state.births.create(new, mine, block, worlds, room=room)
         if rejecting:
             for world in np.unique(worlds):
-                placed.setdefault(int(world), []).append(part.pos[:, part.world == world])
-    return joined(parts) if parts else None
+                placed.setdefault(int(world), []).append(new.pos[:, mine][:, worlds == world])
+    return in_order(new) if due else None
 
 
 def give_birth(state: SimulationState) -> None:
@@ -129,7 +129,9 @@ def give_birth(state: SimulationState) -> None:
         if len(kept):
             where = {k: v[..., kept] for k, v in where.items()}
             block = state.context.block_names.index(wish["block"])
-            parts.append(births.create(block, worlds[kept], where))
+            new = Bodies.empty(len(kept), state.n_worlds)
+            births.create(new, slice(0, new.n), block, worlds[kept], where)
+            parts.append(new)
     due = births.due(state.context.clock.t, state.running) if births.has_rates else {}
     born = _create(state, due) if due else None
     parts += [born] if born is not None else []

@@ -13,9 +13,11 @@ from tussle.api.bodies import Bodies
 from tussle.engine import kernels
 from tussle.engine.params import Overrides
 from tussle.errors import MissionError
+from tussle.mission import Block
 from tussle.rng import stream_key
 
 POSITION, HEADING = (np.uint64(stream_key("birth", label)) for label in ("position", "heading"))
+VALUES = ("heading", "climb", "roll", "speed", "heading_variance", "health", "radius", "mass")
 MOST_TRIES = 10_000
 """Attempts to find a free place for one entity before the mission is called too crowded."""
 
@@ -41,14 +43,24 @@ class Room:
 
 def joined(parts: list[Bodies]) -> Bodies:
     """All in one table, ordered by (world, id)."""
-    if len(parts) == 1:
-        floats, ints = parts[0].floats, parts[0].ints
-    else:
-        floats = np.concatenate([p.floats for p in parts], axis=1)
-        ints = np.concatenate([p.ints for p in parts], axis=1)
-    both = Bodies(floats, ints, parts[0].n_worlds)
-    order = np.lexsort((both.id, both.world))
-    return Bodies(floats.take(order, axis=1), ints.take(order, axis=1), both.n_worlds)
+    floats = np.concatenate([p.floats for p in parts], axis=1)
+    ints = np.concatenate([p.ints for p in parts], axis=1)
+    return in_order(Bodies(floats, ints, parts[0].n_worlds))
+
+
+def in_order(bodies: Bodies) -> Bodies:
+    """The same rows ordered by (world, id)."""
+    if (np.diff(bodies.world << 32 | bodies.id) > 0).all():
+        return bodies
+    order = np.lexsort((bodies.id, bodies.world))
+    return Bodies(bodies.floats.take(order, axis=1), bodies.ints.take(order, axis=1), bodies.n_worlds)
+
+
+def _placing(block: Block) -> tuple[np.ndarray, np.ndarray]:
+    """How a block's entities are scattered: flags and shape of `kernels.scatter`."""
+    is_uniform = block.placement == "uniform"
+    width = block.half_width if is_uniform else np.sqrt(block.variance)
+    return np.array([is_uniform, block.scatter_first]), np.array([block.position, width], float)
 
 
 class Births:
@@ -74,6 +86,7 @@ class Births:
             np.full((n_worlds, b.slots if b.rate else 0), np.inf) for b in overrides.mission.blocks
         ]
         self.has_rates = any(b.rate for b in overrides.mission.blocks)
+        self._placing = [_placing(b) for b in overrides.mission.blocks]
 
     def begin(self, worlds: np.ndarray) -> dict[int, np.ndarray]:
         """Set worlds to their beginning; block number -> world of each entity that is there from the start."""
@@ -137,27 +150,20 @@ class Births:
         """No birth is to come in this world."""
         return not (self.n_left[:, world] > 0).any()
 
-    def _scatter(
-        self, block: int, worlds: np.ndarray, places: np.ndarray, attempt: int, pos: np.ndarray
-    ) -> None:
-        """Draw positions [m] into pos, (3, m)."""
-        spec = self.overrides.mission.blocks[block]
-        is_uniform = spec.placement == "uniform"
-        width = spec.half_width if is_uniform else np.sqrt(spec.variance)
-        shape, flags = np.array([spec.position, width], float), np.array([is_uniform, spec.scatter_first])
-        seeds = self.seeds[worlds] ^ self.keys[block]
-        kernels.scatter(seeds, POSITION, places, attempt, flags, shape, pos)
-
     def create(
         self,
+        new: Bodies,
+        mine: slice,
         block: int,
         worlds: np.ndarray,
         where: dict[str, np.ndarray] | None = None,
         room: Room | None = None,
-    ) -> Bodies:
-        """Entities of one block, one per item of `worlds` (sorted).
+    ) -> None:
+        """Make some rows of an empty table entities of one block, one per item of `worlds` (sorted).
 
         Args:
+            new: The table.
+            mine: The rows.
             block: Number of the block.
             worlds: World of each, (m,).
             where: pos, vel, quat, team that were asked for.
@@ -165,27 +171,17 @@ class Births:
         """
         where = where or {}
         spec = self.overrides.mission.blocks[block]
-        new = Bodies.empty(len(worlds), self.overrides.n_worlds)
-        new.world[:], new.block[:] = worlds, block
-        kernels.number(worlds, self.next_id, self.n_born[block], new.id, new.place_in_block)
-        self._scatter(block, worlds, new.place_in_block, 0, new.pos)
+        new.world[mine], new.block[mine], new.team[mine] = worlds, block, spec.team
+        values = self.overrides.block_values(spec, VALUES, worlds)
+        out = new.id, new.place_in_block, new.pos, new.vel, new.quat, new.health, new.radius, new.mass
+        keys, counts = (self.keys[block], POSITION, HEADING), (self.next_id, self.n_born[block])
+        kernels.bear((self.seeds, worlds), keys, *self._placing[block], values, counts, out, mine.start)
         if "pos" not in where and room is not None:
-            self._separate(block, worlds, new.place_in_block, new.pos, room)
-
-        heading = np.empty((4, new.n))
-        for i, name in enumerate(("heading", "climb", "roll", "speed")):
-            heading[i] = self.overrides.block_value(spec, name, worlds)
-        seeds = self.seeds[worlds] ^ self.keys[block]
-        sd = np.sqrt(spec.heading_variance)
-        kernels.turn(seeds, HEADING, new.place_in_block, sd, heading, new.vel, new.quat)
+            self._separate(block, worlds, new.place_in_block[mine], new.pos[:, mine], room)
         if spec.velocity is not None:
-            new.vel[:] = np.array(spec.velocity)[:, None]
-        new.team[:] = spec.team
-        for name in ("health", "radius", "mass"):
-            getattr(new, name)[:] = self.overrides.block_value(spec, name, worlds)
+            new.vel[:, mine] = np.array(spec.velocity)[:, None]
         for name, asked in where.items():
-            getattr(new, name)[:] = asked
-        return new
+            getattr(new, name)[..., mine] = asked
 
     def _separate(
         self, block: int, worlds: np.ndarray, places: np.ndarray, pos: np.ndarray, room: Room
@@ -218,8 +214,9 @@ class Births:
                         f"block {spec.name!r}: no free place for entity {int(places[i]) + 1} of {spec.count} "
                         f"after {attempt - 1} tries{others}; give the block more room (placement {spec.placement!r}) or fewer entities"
                     )
-                again = np.empty((3, 1))
-                self._scatter(block, np.array([world]), places[i : i + 1], attempt, again)
-                pos[:, i] = again[:, 0]
+                again = np.empty(3)
+                seed = self.seeds[world] ^ self.keys[block]
+                kernels.scatter(seed, POSITION, places[i], attempt, *self._placing[block], again)
+                pos[:, i] = again
             taken[:, n] = pos[:, i]
             n += 1

@@ -296,14 +296,13 @@ class Group:
 
     # -- rows ---------------------------------------------------------------------------------------------------------------
 
-    def rearrange(self, source: np.ndarray) -> bool:
-        """New row i is row source[i] of the old body table; one below 0 is a new one at the defaults. Whether arrays are other ones."""
-        is_moved = self.table.rearrange(source, self.first)
+    def rearrange(self, source: np.ndarray) -> None:
+        """New row i is row source[i] of the old body table; one below 0 is a new one at the defaults. `attach` follows."""
+        self.table.rearrange(source, self.first)
         index = np.where(source >= 0, source - self.first, -1) if self.holds_handles else source
-        for binding in self.walk():
+        for binding in self.walk() if self.holds_handles else ():
             for name, objects in binding.handles.items():
                 binding.handles[name] = [objects[i] if i >= 0 else None for i in index]
-        return is_moved or self.holds_handles
 
     def attach(self, bodies: Bodies, first: int) -> None:
         """Take the place [first, first + n) in the body table, and give all plugins and views their arrays."""
@@ -319,6 +318,12 @@ class Group:
         self.bodies, self.first, self.n = bodies, first, self.table.n
         for view in self.views:
             view.reset(bodies, first, self.last)
+
+    def renew(self, rows: np.ndarray) -> None:
+        """Some rows begin anew: they go back to the defaults, in the arrays and places that they have."""
+        self.table.renew(rows)
+        for view in self.views:
+            view.renew()
 
     def _place_motion(self) -> None:
         """Where the motion model's state, inputs and parameters lie in the table."""

@@ -2,69 +2,96 @@
 
 from __future__ import annotations
 
+import math
+
 from tussle.numeric import cos, sin
 from tussle.numeric.kernel import device, kernel
 from tussle.numeric.quaternion import quat_from_euler
 from tussle.rng import normal2, uniform2
 
 
-@kernel("U u8 I i8 B F2 F2w")
-def scatter(seeds, stream, place, attempt, flags, shape, pos):
-    """Positions [m], (3, m), of entities around the position of their block.
+@device
+def drawn_place(seed, stream, index, attempt, flags, shape):
+    """Position [m] of the entity `index` of a block; flags and shape as in `scatter`."""
+    if attempt == 0 and index == 0 and not flags[1]:
+        x, y, z = 0.0, 0.0, 0.0
+    elif flags[0]:
+        x, y = uniform2(seed, stream, index, 0, attempt, 0)
+        z, _ = uniform2(seed, stream, index, 0, attempt, 1)
+        x, y, z = 2.0 * x - 1.0, 2.0 * y - 1.0, 2.0 * z - 1.0
+    else:
+        x, y = normal2(seed, stream, index, 0, attempt, 0)
+        z, _ = normal2(seed, stream, index, 0, attempt, 1)
+    return shape[0, 0] + x * shape[1, 0], shape[0, 1] + y * shape[1, 1], shape[0, 2] + z * shape[1, 2]
 
-    seeds, place: (m,) each, the place being that within the block. flags: whether places are uniform in a box, else normal; and
-    whether the first entity is scattered too. shape: centre and half width, or standard deviation, (2, 3) [m].
+
+@kernel("u8 u8 i8 i8 B F2 Fw")
+def scatter(seed, stream, place, attempt, flags, shape, pos):
+    """Position [m], (3,), of an entity around the position of its block.
+
+    place: its place within the block. flags: whether places are uniform in a box, else normal; and whether the first entity is
+    scattered too. shape: centre and half width, or standard deviation, (2, 3) [m].
     """
-    is_uniform, scatter_first = flags[0], flags[1]
-    for i in range(place.shape[0]):
-        index = place[i]
-        if attempt == 0 and index == 0 and not scatter_first:
-            x, y, z = 0.0, 0.0, 0.0
-        elif is_uniform:
-            x, y = uniform2(seeds[i], stream, index, 0, attempt, 0)
-            z, _ = uniform2(seeds[i], stream, index, 0, attempt, 1)
-            x, y, z = 2.0 * x - 1.0, 2.0 * y - 1.0, 2.0 * z - 1.0
-        else:
-            x, y = normal2(seeds[i], stream, index, 0, attempt, 0)
-            z, _ = normal2(seeds[i], stream, index, 0, attempt, 1)
-        pos[0, i] = shape[0, 0] + x * shape[1, 0]
-        pos[1, i] = shape[0, 1] + y * shape[1, 1]
-        pos[2, i] = shape[0, 2] + z * shape[1, 2]
+    pos[0], pos[1], pos[2] = drawn_place(seed, stream, place, attempt, flags, shape)
 
 
-@kernel("U u8 I f8 F2 F2w F2w")
-def turn(seeds, stream, place, heading_sd, motion, vel, quat):
-    """Velocities [m/s], (3, m), and attitudes, (4, m), of heading, climb, roll [rad] and speed [m/s], (4, m)."""
-    for i in range(place.shape[0]):
-        jitter, _ = normal2(seeds[i], stream, place[i], 0, 0, 0)
-        yaw = motion[0, i] + heading_sd * jitter
-        climb, speed = motion[1, i], motion[3, i]
-        quat[0, i], quat[1, i], quat[2, i], quat[3, i] = quat_from_euler(motion[2, i], -climb, yaw)
-        vel[0, i] = speed * (cos(climb) * cos(yaw))
-        vel[1, i] = speed * (cos(climb) * sin(yaw))
-        vel[2, i] = speed * sin(climb)
+@kernel("(U I) (u8 u8 u8) B F2 F2 (Iw Iw) (Iw Iw F2w F2w F2w Fw Fw Fw) i8")
+def bear(worlds, keys, flags, shape, values, counts, out, first):
+    """Number, place and turn the newborn, (m,), of a block.
 
-
-@kernel("I Iw Iw Iw Iw")
-def number(world, next_id, n_born, ids, places):
-    """Give each newborn, (m,), of a block the next id of its world and the next place in the block; both count on."""
-    for i in range(world.shape[0]):
-        w = world[i]
+    worlds: seeds of all worlds, and the world of each newborn. keys: of the block, and of the streams of positions and headings.
+    flags, shape: as in `scatter`. values: heading, climb, roll [rad], speed [m/s], variance of the heading [rad^2], health, radius
+    [m], mass [kg], (8, m) or (8, 1). counts: next id of each world, and how many of the block it has had; both count on. out: columns
+    whose rows from `first` on are written: id, place in the block, position [m], velocity [m/s], (3, n), quaternion, (4, n), health,
+    radius, mass.
+    """
+    seeds, world = worlds
+    key, position, turning = keys
+    next_id, n_born = counts
+    ids, places, pos, vel, quat, health, radius, mass = out
+    last = values.shape[1] - 1
+    for j in range(world.shape[0]):
+        w, k, i = world[j], min(j, last), first + j
         ids[i], places[i] = next_id[w], n_born[w]
         next_id[w] += 1
         n_born[w] += 1
+        seed = seeds[w] ^ key
+        pos[0, i], pos[1, i], pos[2, i] = drawn_place(seed, position, places[i], 0, flags, shape)
+        jitter, _ = normal2(seed, turning, places[i], 0, 0, 0)
+        yaw = values[0, k] + math.sqrt(values[4, k]) * jitter
+        climb, speed = values[1, k], values[3, k]
+        quat[0, i], quat[1, i], quat[2, i], quat[3, i] = quat_from_euler(values[2, k], -climb, yaw)
+        vel[0, i] = speed * (cos(climb) * cos(yaw))
+        vel[1, i] = speed * (cos(climb) * sin(yaw))
+        vel[2, i] = speed * sin(climb)
+        health[i], radius[i], mass[i] = values[5, k], values[6, k], values[7, k]
 
 
-@kernel("B i8 i8 (I I) (I I) I Iw -> i8")
-def merge(gone, first, last, old, new, fresh, source):
-    """Where the rows of a group come from: those of [first, last) that stay, and newborn j of `fresh` as -1 - j; how many there are.
+@kernel("I I I B2w")
+def note_teams(world, team, teams, there):
+    """there[w, k] becomes true where world w has a row of team teams[k]."""
+    for i in range(world.shape[0]):
+        if i > 0 and world[i] == world[i - 1] and team[i] == team[i - 1]:
+            continue
+        for k in range(teams.shape[0]):
+            if team[i] == teams[k]:
+                there[world[i], k] = True
 
-    old, new: world and id of all rows, and of the newborn; both are in the order of (world, id) within a group, and so is source.
+
+@kernel("B i8 i8 (I I) (I I) I (Iw Iw) -> i8 b1")
+def merge(gone, first, last, old, new, fresh, out):
+    """Where the rows of a group come from: those of [first, last) that stay, and newborn j of `fresh` as -1 - j.
+
+    old, new: world and id of all rows, and of the newborn; both are in the order of (world, id) within a group, and so are the rows
+    that come of it. out: where each of these comes from, and the place of each newborn among them. Returns how many there are, and
+    whether all that stay do so in their places.
     """
     old_world, old_id = old
     new_world, new_id = new
+    source, place = out
     n = 0
     row = first
+    stays = True
     for k in range(fresh.shape[0]):
         j = fresh[k]
         while row < last and (
@@ -72,28 +99,20 @@ def merge(gone, first, last, old, new, fresh, source):
             or (old_world[row] == new_world[j] and (gone[row] or old_id[row] < new_id[j]))
         ):
             if not gone[row]:
+                stays = stays and row == first + n
                 source[n] = row
                 n += 1
             row += 1
         source[n] = -1 - j
+        place[k] = n
         n += 1
     while row < last:
         if not gone[row]:
+            stays = stays and row == first + n
             source[n] = row
             n += 1
         row += 1
-    return n
-
-
-@kernel("I i8 i8 -> b1")
-def stays(source, first, n):
-    """Whether n rows from `first` on stay where they are, but for those that newborn ones replace."""
-    if source.shape[0] != n:
-        return False
-    for i in range(n):
-        if source[i] >= 0 and source[i] != first + i:
-            return False
-    return True
+    return n, stays and n == last - first
 
 
 @device

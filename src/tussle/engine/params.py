@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -82,12 +82,16 @@ class Overrides:
             raise ParameterError(f"{path!r} is one for all worlds of a stack; set it in the mission")
         return (names[0], plugins, name), column
 
-    def block_value(self, block: Block, name: str, world: np.ndarray) -> float | np.ndarray:
-        """A number of a block for entities of the worlds `world`: one for all, or (m,)."""
-        value, key = float(getattr(block, name)), (block.name, (), name)
-        if key not in self.columns:
-            return value
-        return np.where(self.given[key][world], self.columns[key][world], value)
+    def block_values(self, block: Block, names: Sequence[str], world: np.ndarray) -> np.ndarray:
+        """Numbers of a block for entities of the worlds `world`, (k, m), or (k, 1) where all have the same."""
+        values = np.array([[getattr(block, name)] for name in names], float)
+        keys = [(block.name, (), name) for name in names] if self.columns else []
+        if any(key in self.columns for key in keys):
+            values = np.repeat(values, len(world), axis=1)
+            for own, key in zip(values, keys, strict=True):
+                if key in self.columns:
+                    np.copyto(own, self.columns[key][world], where=self.given[key][world])
+        return values
 
     def fill(self, owner: str, path: tuple[str, ...], name: str, base: Any, world: np.ndarray) -> np.ndarray:
         """A parameter for rows of the worlds `world`, (m,) or (k, m)."""

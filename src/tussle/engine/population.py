@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import warnings
 from bisect import insort
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,14 +12,20 @@ import numpy as np
 
 from tussle.api.bodies import Bodies
 from tussle.api.context import Context
+from tussle.api.kinds import EntityPlugin
 from tussle.columns import Param
 from tussle.engine import failure, kernels
 from tussle.engine.group import Binding, Group
 from tussle.engine.params import Overrides
+from tussle.engine.table import span
 from tussle.errors import PluginError
 from tussle.lists import RaggedColumn
 from tussle.mission import Block
 
+Params = list[tuple[int, Binding, str, Any]]
+"""Number of a block, plugin, parameter, and its value there."""
+Newborn = list[tuple[Group, np.ndarray, np.ndarray]]
+"""Groups with newborn rows: these, and their numbers among the newborn, (m,) each."""
 NOBODY = Bodies.empty(0, 1)
 
 
@@ -63,6 +68,7 @@ class Population:
         self._by_key: dict[Any, Group] = {}
         self._asked: dict[tuple[int, int, int], Group] = {}
         self._specs: dict[tuple[int, tuple[str, ...]], Any] = {}
+        self._params: dict[Group, tuple[Params, Params]] = {}
         self.on_new_group: Callable[[], None] = lambda: None
 
     # -- groups -------------------------------------------------------------------------------------------------------------
@@ -103,6 +109,7 @@ class Population:
         group = self._by_key[key]
         if block.name not in group.names:
             group.names.append(block.name)
+            self._params.pop(group, None)
             self.on_new_group()
         return group
 
@@ -114,6 +121,11 @@ class Population:
 
     def _groups_of(self, new: Bodies) -> np.ndarray:
         """Number in `groups` of each newborn, (m,)."""
+        if not (self.is_sequential or self.overrides.structural):
+            number = {id(g): i for i, g in enumerate(self.groups)}
+            blocks = self.overrides.variant(0)
+            by_block = [number[id(self.group_of(blocks, k, 0))] for k in range(len(blocks))]
+            return np.take(by_block, new.block)
         alike = new.block  # who has the same number here has the same group
         if self.is_sequential:
             alike = alike << 32 | new.id
@@ -131,8 +143,8 @@ class Population:
 
     # -- repack -------------------------------------------------------------------------------------------------------------
 
-    def repack(self, gone: np.ndarray | None, new: Bodies | None) -> np.ndarray:
-        """Remove rows (gone, (n,), true) and add newborn ones; returns for each new row its old one, below 0 for newborn.
+    def repack(self, gone: np.ndarray | None, new: Bodies | None) -> tuple[np.ndarray, Newborn]:
+        """Remove rows (gone, (n,), true) and add newborn ones; returns for each new row its old one, and the newborn.
 
         Rows stay ordered by (group, world, id).
         """
@@ -142,73 +154,79 @@ class Population:
         owner = self._groups_of(new)
         self._close_handles(gone)
         source = np.empty(old.n + new.n, np.int64)
-        changed, first = set(), 0
+        moved, newborn, first = set(), [], 0
         for number, group in enumerate(self.groups):
             fresh = np.flatnonzero(owner == number)
-            rows = source[first:]
-            n = kernels.merge(
-                gone, group.first, group.last, (old.world, old.id), (new.world, new.id), fresh, rows
-            )
-            if (n != group.n or len(fresh)) and group.rearrange(rows[:n]):
-                changed.add(number)
+            out = rows, places = source[first:], np.empty(len(fresh), np.int64)
+            who = (old.world, old.id), (new.world, new.id)
+            n, stays = kernels.merge(gone, group.first, group.last, *who, fresh, out)
+            if not stays:
+                moved.add(number)
+                group.rearrange(rows[:n])
+            elif len(fresh):
+                group.renew(places)
+            if len(fresh):
+                newborn.append((group, places, fresh))
             first += n
-        self._fill_bodies(source[:first], new)
         source, first = source[:first], 0
-        for number, group in enumerate(self.groups):
-            if number in changed:
-                group.attach(self.bodies, first)
-            else:
-                group.shift(self.bodies, first)
-            first += group.n
-        return source
-
-    def _fill_bodies(self, source: np.ndarray, new: Bodies) -> None:
-        old = self.bodies
         new.born[:] = self.context.clock.step[new.world]
-        if kernels.stays(source, 0, old.n):
-            fresh = np.flatnonzero(source < 0)
-            old.floats[:, fresh] = new.floats[:, -1 - source[fresh]]
-            ints = old.ints.copy()  # a recorder knows by the new array that other entities have come
-            ints[:, fresh] = new.ints[:, -1 - source[fresh]]
-            old.replace(old.floats, ints)
-            return
-        floats, ints = (
-            np.empty((len(old.floats), len(source))),
-            np.empty((len(old.ints), len(source)), np.int64),
-        )
+        is_same = not moved and self._fill_bodies(newborn, new)
+        if moved:
+            self._move_bodies(source, new)
+        for number, group in enumerate(self.groups):
+            if number in moved:
+                group.attach(old, first)
+            elif not is_same:
+                group.shift(old, first)
+            first += group.n
+        return source, newborn
+
+    def _fill_bodies(self, newborn: Newborn, new: Bodies) -> bool:
+        """Write the newborn over the rows whose places they take; whether these had the same whole numbers."""
+        bodies = self.bodies
+        ints = bodies.ints
+        for group, places, fresh in newborn:
+            rows, mine = span(group.first + places), span(fresh)
+            bodies.floats[:, rows] = new.floats[:, mine]
+            if (ints[:, rows] != new.ints[:, mine]).any():
+                if ints is bodies.ints:
+                    ints = ints.copy()  # a recorder knows by the new array that other entities have come
+                ints[:, rows] = new.ints[:, mine]
+        if ints is bodies.ints:
+            bodies.touch(0, bodies.n)
+            return True
+        bodies.replace(bodies.floats, ints)
+        return False
+
+    def _move_bodies(self, source: np.ndarray, new: Bodies) -> None:
+        old, n = self.bodies, len(source)
+        floats, ints = np.empty((len(old.floats), n)), np.empty((len(old.ints), n), np.int64)
         kernels.gather_floats(old.floats, 0, new.floats, source, floats)
         kernels.gather_ints(old.ints, 0, new.ints, source, ints)
         old.replace(floats, ints)
 
-    def begin_rows(self, source: np.ndarray) -> None:
-        """Parameters, beliefs, motion states, handles and `spawn` hooks of the newborn rows, those whose `source` is below 0."""
-        for group in self.groups:
-            rows = np.flatnonzero(source[group.first : group.last] < 0)
-            if not len(rows):
-                continue
-            block = self.bodies.block[group.first + rows]
-            numbers = [(int(k), rows[block == k]) for k in np.unique(block)]
+    def begin_rows(self, newborn: Newborn) -> None:
+        """Parameters, beliefs, motion states, handles and `spawn` hooks of newborn rows."""
+        for group, rows, _ in newborn:
+            self._fill_params(group, rows)
             for binding in group.walk():
-                for number, some in numbers:
-                    self._fill_params(group, binding, number, some)
                 if binding.ragged:
                     self._fill_ragged(group, binding, rows)
             for name, place in group.belief.items():
                 group.table.array(place)[..., rows] = getattr(self.bodies, name)[..., group.first + rows]
-            group.moving.begin(group.motion.plugin)
-            with self._blaming(group, group.motion, rows):
-                group.from_body(rows)
+            self._call(group, group.motion, rows, group.from_body, rows)
             for binding in group.walk():
-                binding.view.begin(binding.plugin)
                 opened = self._open_handles(group, binding, rows) if binding.handles else rows
-                with self._blaming(group, binding, rows):
-                    binding.plugin.spawn(binding.view, opened)
+                if type(binding.plugin).spawn is not EntityPlugin.spawn:
+                    self._call(group, binding, rows, binding.plugin.spawn, binding.view, opened)
 
-    @contextmanager
-    def _blaming(self, group: Group, binding: Binding, rows: np.ndarray) -> Iterator[None]:
-        """An error of a plugin's hook for newborn rows becomes one that names it."""
+    def _call(
+        self, group: Group, binding: Binding, rows: np.ndarray, hook: Callable[..., Any], *args: Any
+    ) -> None:
+        """Call a plugin's hook for newborn rows; an error of it becomes one that names the plugin."""
+        binding.view.begin(binding.plugin)
         try:
-            yield
+            hook(*args)
         except Exception as error:
             if isinstance(error, PluginError):  # of `fail`
                 raise
@@ -217,14 +235,28 @@ class Population:
             world = int(worlds[0]) if len(worlds) == 1 else None
             raise failure.raised(error, binding.plugin, where=group.name, step=step, world=world) from error
 
-    def _fill_params(self, group: Group, binding: Binding, number: int, rows: np.ndarray) -> None:
-        """Set the parameters of rows of one block: those that are not the default of the group's table, which its first block gives."""
-        block, values = self.overrides.mission.blocks[number], self._spec(number, binding.path).values
-        for name in binding.params:
-            if self.overrides.columns or values[name] != binding.spec.values[name]:
-                world = self.bodies.world[group.first + rows]
-                filled = self.overrides.fill(block.name, binding.path, name, values[name], world)
-                group.table.array(binding.places[name])[..., rows] = filled
+    def _fill_params(self, group: Group, rows: np.ndarray) -> None:
+        """Set the parameters that are not the default of the group's table, which its first block gives."""
+        columns, names = self.overrides.columns, self.context.block_names
+        own, common = self._params_of(group)
+        given = [p for p in common if (names[p[0]], p[1].path, p[2]) in columns] if columns else []
+        for number, binding, name, value in own + given:
+            some = rows[self.bodies.block[group.first + rows] == number]
+            world = self.bodies.world[group.first + some]
+            filled = self.overrides.fill(names[number], binding.path, name, value, world)
+            group.table.array(binding.places[name])[..., some] = filled
+
+    def _params_of(self, group: Group) -> tuple[Params, Params]:
+        """Parameters of a group's blocks: those that differ from the group's first block, and the others."""
+        if group not in self._params:
+            own, common = self._params[group] = [], []
+            for number in map(self.context.block_names.index, group.names):
+                for binding in group.walk():
+                    values, first = self._spec(number, binding.path).values, binding.spec.values
+                    for name in binding.params:
+                        some = own if values[name] != first[name] else common
+                        some.append((number, binding, name, values[name]))
+        return self._params[group]
 
     def _fill_ragged(self, group: Group, binding: Binding, rows: np.ndarray) -> None:
         for name, number in binding.ragged.items():
@@ -254,6 +286,7 @@ class Population:
 
     def _open_handles(self, group: Group, binding: Binding, rows: np.ndarray) -> np.ndarray:
         """Open what newborn rows hold outside the arrays; returns the rows with which that went well."""
+        binding.view.begin(binding.plugin)
         failed = []
         for name in type(binding.spec).handles() if hasattr(type(binding.spec), "open_one") else ():
             for row in rows:
@@ -271,7 +304,7 @@ class Population:
 
     def _close_handles(self, gone: np.ndarray) -> None:
         for group in self.groups:
-            for binding in group.walk():
+            for binding in group.walk() if group.holds_handles else ():
                 for objects in binding.handles.values():
                     for i in np.flatnonzero(gone[group.first : group.last]):
                         held, objects[i] = objects[i], None

@@ -27,6 +27,7 @@ class Referee:
         view: What its step is given.
         tables: "world", "team" and "entity" -> its columns.
         places: Attribute -> (which table, where in it).
+        memory: Place and default of each state that worlds begin anew with.
     """
 
     plugin: Any
@@ -36,6 +37,7 @@ class Referee:
         default_factory=lambda: {"world": Table(), "team": Table(), "entity": Table()}
     )
     places: dict[str, tuple[str, Place]] = field(default_factory=dict)
+    memory: list[tuple[Place, Any]] = field(default_factory=list)
 
     @classmethod
     def bind(cls, spec: Any, view: WorldView, overrides: Overrides) -> Referee:
@@ -60,9 +62,10 @@ class Referee:
                 referee._add("world", name, column.dtype, len(column.fields), column.default)
             elif isinstance(column, State):
                 k = n_teams if column.per == "team" else len(column.fields)
-                referee._add(
-                    "world" if column.per == "team" else column.per, name, column.dtype, k, column.default
-                )
+                per = "world" if column.per == "team" else column.per
+                referee._add(per, name, column.dtype, k, column.default)
+                if per == "world":
+                    referee.memory.append((referee.places[name][1], column.default))
             elif isinstance(column, Publish):
                 topic = view.context.topic(column.network, column.topic, column.message, spec.instance_name)
                 referee.plugin.__dict__[name] = Publisher(topic, view)
@@ -91,10 +94,8 @@ class Referee:
 
     def reset(self, worlds: np.ndarray) -> None:
         """Memory of some worlds back to the declared defaults."""
-        for name, column in type(self.spec).states().items():
-            per, place = self.places[name]
-            if per == "world":
-                self.tables[per].array(place)[..., worlds] = column.default
+        for place, default in self.memory:
+            self.tables["world"].array(place)[..., worlds] = default
 
     def rearrange(self, index: np.ndarray) -> None:
         """The body table has been repacked."""

@@ -11,12 +11,18 @@ from tussle.engine.state import SimulationState
 
 def repack(state: SimulationState, gone: np.ndarray | None, new: Bodies | None) -> None:
     """Remove rows (gone, (n,), true) and add newborn ones."""
-    index = state.population.repack(gone, new)
-    rows_changed(state)
+    bodies = state.population.bodies
+    ints = bodies.ints
+    index, newborn = state.population.repack(gone, new)
+    if bodies.ints is ints:
+        state.world_view.renew()
+        state.has_changed = True
+    else:
+        rows_changed(state)
     for referee in state.referees:
         referee.rearrange(index)
     if new is not None:
-        state.population.begin_rows(index)
+        state.population.begin_rows(newborn)
         if state.events:
             state.events.births(new)
 

@@ -65,27 +65,29 @@ class RecordedBirths(Births):
 
     def create(
         self,
+        new: Bodies,
+        mine: slice,
         block: int,
         worlds: np.ndarray,
         where: dict[str, np.ndarray] | None = None,
         room: Room | None = None,
-    ) -> Bodies:
+    ) -> None:
         if where is not None:
-            return super().create(block, worlds, where, room)
+            super().create(new, mine, block, worlds, where, room)
+            return
         rows, table = self.rows[block], self.table
         # Those who are due have been taken off n_left before: the last of them is the last that has entered.
         n_entered = len(rows) - self.n_left[block, worlds]
         _, first, counts = np.unique(worlds, return_index=True, return_counts=True)
         place = np.arange(len(worlds)) - np.repeat(first, counts)
-        mine = rows[n_entered - np.repeat(counts, counts) + place]
-        states = {"pos": table.pos[:, mine], "quat": table.quat[:, mine], "vel": table.vel[:, mine]}
+        entering = rows[n_entered - np.repeat(counts, counts) + place]
+        states = {name: getattr(table, name)[:, entering] for name in ("pos", "quat", "vel")}
         if table.team is not None:
-            states["team"] = table.team[mine]
+            states["team"] = table.team[entering]
         next_id = self.next_id.copy()
-        born = super().create(block, worlds, states)
+        super().create(new, mine, block, worlds, states)
         self.next_id[:] = next_id
-        born.id[:] = table.id[mine]
-        return born
+        new.id[mine] = table.id[entering]
 
 
 def blocks_of(table: FirstStates, blocks: Sequence[Block]) -> np.ndarray:

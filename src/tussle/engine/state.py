@@ -85,7 +85,6 @@ class SimulationState:
         self.results: list[WorldResult | None] = [None] * n
         self.parked: dict[int, Parked] = {}
         self.has_failures, self.has_changed, self.by_substep = False, True, False
-        self.checked: tuple[Any, ...] = ()
         clock = Clock(n, mission.start, mission.dt)
         keys = np.array([s % 2**64 for s in seeds], np.uint64)
         blocks = [b.name for b in mission.blocks]
@@ -99,6 +98,8 @@ class SimulationState:
         context.topic, context.fail = mail.topic, self.record_failure
         self.events = Listeners(context)
         self.population = Population(context, self.overrides, advise_controllers)
+        nobody = self.population.bodies
+        self.checked = nobody.pos, nobody.quat, nobody.health, np.empty(0, bool)
         view = self.world_view = WorldView(self.population.bodies, context)
         view.templates, view.publish_to, view.by_type = blocks, mail.publish_to, mail.by_type
 

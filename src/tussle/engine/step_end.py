@@ -9,6 +9,7 @@ import numpy as np
 from tussle.api import kernels
 from tussle.api.bodies import Bodies
 from tussle.engine import failure
+from tussle.engine.kernels import note_teams
 from tussle.engine.result import WorldResult
 from tussle.engine.rows import repack
 from tussle.engine.snapshot import state_hash
@@ -82,10 +83,9 @@ def _lost_teams(state: SimulationState) -> Iterable[tuple[int, str]]:
     if "none" in conditions or not {"one_team", "all_dead"} & set(conditions):
         return
     bodies, teams = state.population.bodies, state.context.teams
-    number = np.searchsorted(teams, bodies.team)
-    shape = state.n_worlds, len(teams) + 1
-    counts = np.bincount(bodies.world * shape[1] + number, minlength=shape[0] * shape[1]).reshape(shape)
-    left = (counts > 0).sum(axis=1)
+    there = np.zeros((state.n_worlds, len(teams)), bool)
+    note_teams(bodies.world, bodies.team, teams, there)
+    left = there.sum(axis=1)
     for world in np.flatnonzero(state.running & (left <= 1)):
         if not state.births.is_over(int(world)):
             continue

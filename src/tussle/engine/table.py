@@ -17,6 +17,12 @@ DTYPES: dict[type, Any] = {float: np.float64, int: np.int64, bool: np.bool_}
 _GATHER = {float: kernels.gather_floats, int: kernels.gather_ints, bool: kernels.gather_truths}
 
 
+def span(rows: np.ndarray) -> Any:
+    """Ascending rows as a slice where they lie side by side, which is faster to write to; else the rows."""
+    first, last = rows[0], rows[-1] + 1
+    return slice(first, last) if last - first == len(rows) else rows
+
+
 @dataclass(frozen=True, slots=True)
 class Place:
     """Where a column lies: `k` rows from `first` in the array of a dtype; k = 0 is one row seen as (n,)."""
@@ -76,15 +82,16 @@ class Table:
         data = self.arrays[place.dtype]
         return data[place.first : place.first + place.k] if place.k else data[place.first]
 
-    def rearrange(self, index: np.ndarray, first: int = 0) -> bool:
-        """New row i is old row index[i] - first; one below 0 is a new row at the defaults. Whether the arrays are other ones."""
-        if kernels.stays(index, first, self.n):
-            fresh = np.flatnonzero(index < 0)
-            for dtype, values in self.defaults.items():
-                self.arrays[dtype][:, fresh] = np.array(values, DTYPES[dtype])[:, None]
-            for column in self.lists:
-                column.put(fresh, column.take(np.full(len(fresh), -1)))
-            return False
+    def renew(self, rows: np.ndarray) -> None:
+        """Put rows back to the defaults."""
+        for dtype, values in self.defaults.items():
+            if values:
+                self.arrays[dtype][:, span(rows)] = np.array(values, DTYPES[dtype])[:, None]
+        for column in self.lists:
+            column.put(rows, column.take(np.full(len(rows), -1)))
+
+    def rearrange(self, index: np.ndarray, first: int = 0) -> None:
+        """New row i is old row index[i] - first; one below 0 is a new row at the defaults. The arrays are other ones then."""
         for dtype, old in self.arrays.items():
             new = np.empty((len(old), len(index)), old.dtype)
             if len(old):
@@ -94,7 +101,6 @@ class Table:
             index = np.where(index >= 0, index - first, -1)
             self.lists = [column.take(index) for column in self.lists]
         self.n = len(index)
-        return True
 
     def copy(self) -> Stored:
         return Stored({d: a.copy() for d, a in self.arrays.items()}, [c.copy() for c in self.lists])

@@ -81,14 +81,3 @@ def test_radii_that_change_at_each_step_keep_no_index_each():
     bodies = sim.state.population.bodies
     assert 0 < len(bodies._indexes) <= MOST_INDEXES
     assert len(bodies._laid_out) <= MOST_INDEXES
-
-
-def test_a_reset_in_place_leaves_the_ids_that_others_hold_as_they_were():
-    block = Block(name="boids", team=1, count=5, autonomy=[Boids()], motion=Unicycle())
-    sim = Simulation(Mission(blocks=[block], end=100.0, dt=0.1), seeds=range(3))
-    held = sim.state.population.bodies.ints
-    before = held.copy()
-    sim.step(2)
-    sim.reset([1], [7])
-    assert sim.state.population.bodies.ints is not held
-    assert (held == before).all()

@@ -137,7 +137,7 @@ class Boids(Autonomy):
     historic_in_view = together(historic_mates, others, team_push, other_push, where=in_view)
 
     def spawn(self, g: GroupView, rows: np.ndarray) -> None:
-        ahead = g.pos[:, rows] + self.goal_distance[rows] * g.forward[:, rows]
+        ahead = g.pos[:, rows] + self.goal_distance[rows] * g.column("forward", rows)
         self.target[:, rows] = np.where(self.use_initial_heading[rows], ahead, self.goal[:, rows])
 
     def step(self, g: GroupView) -> None:

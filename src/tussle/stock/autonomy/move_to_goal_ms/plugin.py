@@ -33,10 +33,12 @@ class MoveToGoalMS(Behavior):
     network_name = Param("LocalNetwork", doc="Network that carries the waypoints.")
 
     def spawn(self, g: GroupView, rows: np.ndarray) -> None:
-        ahead = g.pos + AHEAD * g.forward
-        self.target[:, rows] = np.where(self.use_initial_heading, ahead, self.goal)[:, rows]
+        pos = g.pos[:, rows]
+        ahead = pos + AHEAD * g.column("forward", rows)
+        target = np.where(self.use_initial_heading[rows], ahead, self.goal[:, rows])
+        self.target[:, rows] = target
         # The derivative term is zero at the first call.
-        self.previous[rows] = length(self.target - g.pos)[rows]
+        self.previous[rows] = length(target - pos)
 
     def step(self, g: GroupView) -> None:
         if self.waypoints:

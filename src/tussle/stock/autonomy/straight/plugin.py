@@ -54,7 +54,7 @@ class Straight(Autonomy):
     desired_heading = Output(unit="rad")
 
     def spawn(self, g: GroupView, rows: np.ndarray) -> None:
-        self.goal[:, rows] = g.pos[:, rows] + AHEAD * g.forward[:, rows]
+        self.goal[:, rows] = g.pos[:, rows] + AHEAD * g.column("forward", rows)
         self.goal[2, rows] = g.pos[2, rows]
 
     def step(self, g: GroupView) -> None:
