@@ -204,7 +204,7 @@ class Bodies:
             ranges = self._since(kept.version)
             if self.scans and kept.version >= 0 and ranges != [(0, self.n)]:
                 for first, last in ranges:
-                    index.update(np.arange(first, last), x[first:last], y[first:last], z[first:last])
+                    index.update(first, last, x, y, z)
             else:
                 index.build(x, y, z, reaches, split)
             kept.version = self.version
@@ -227,20 +227,15 @@ class Bodies:
             kept = self._by_place[key] = Kept(-1, tuple(padded(self.n) for _ in range(k)))
         if kept.built == index.built and (kept.version == self.version or name in INTS):
             return kept.columns  # type: ignore[no-any-return]
-        if kept.built == index.built and self.scans:
-            source = np.atleast_2d(self.derived(name) if name in DERIVED else getattr(self, name))
-            for first, last in self._since(kept.version):
-                places = index.place[first:last]
+        for part in self._since(kept.version) if kept.built == index.built else [(0, self.n)]:
+            if name == "level_forward":
+                kernels.level_forward_by_place(self.quat, *part, index.place, *kept.columns)
+            elif name in INTS:
+                kernels.ints_by_place(getattr(self, name), *part, index.place, kept.columns[0])
+            else:
+                source = np.atleast_2d(self.derived(name) if name in DERIVED else getattr(self, name))
                 for column, values in zip(kept.columns, source, strict=True):
-                    column[places] = values[first:last]
-        elif name == "level_forward":
-            kernels.level_forward_by_place(self.quat, index.order, *kept.columns)
-        elif name in INTS:
-            kernels.ints_by_place(getattr(self, name), index.order, kept.columns[0])
-        else:
-            source = np.atleast_2d(self.derived(name) if name in DERIVED else getattr(self, name))
-            for column, values in zip(kept.columns, source, strict=True):
-                kernels.floats_by_place(values, index.order, column)
+                    kernels.floats_by_place(values, *part, index.place, column)
         kept.version, kept.built = self.version, index.built
         return kept.columns  # type: ignore[no-any-return]
 

@@ -10,7 +10,18 @@ import numpy as np
 
 from tussle import rng
 from tussle.api import kernels
-from tussle.api.bodies import DERIVED, FLOATS, INTS, Bodies, BodyView, Kept, derive, derived_from, read_only
+from tussle.api.bodies import (
+    DERIVED,
+    EVERYWHERE,
+    FLOATS,
+    INTS,
+    Bodies,
+    BodyView,
+    Kept,
+    derive,
+    derived_from,
+    read_only,
+)
 from tussle.api.context import Context, stream
 from tussle.api.draw import Draw
 from tussle.api.pairs import Nearest, Pairs, find_nearest, find_pairs
@@ -69,11 +80,15 @@ class GroupView:
         self.first, self.last = first, last
         self.n = last - first
         self._reaches: dict[int, tuple[np.ndarray, float | np.ndarray]] = {}
+        self.walks: dict[
+            tuple[int, int], Any
+        ] = {}  # what neighbour laws keep while rows move one after the other
 
     def renew(self) -> None:
         """Forget what follows from seeds and parameters: some rows have begun anew in their places."""
         self.__dict__.pop("_seeds", None)
         self._reaches.clear()
+        self.walks.clear()
 
     def __getattr__(self, name: str) -> Any:
         if name in FLOATS or name in INTS:
@@ -233,6 +248,8 @@ class GroupView:
 
     def index(self, radius: float | np.ndarray) -> Index:
         """Neighbour index for queries within radius [m], one number or (n,); for kernels."""
+        if self._bodies.scans:
+            return self._bodies.index(EVERYWHERE)
         if self.context.threads == 1:
             return self._bodies.index(self.reach(radius))
         return self._bodies.index(self.reach(radius), partial(self.context.split, least=ROWS_PER_THREAD))

@@ -66,26 +66,26 @@ def level_forward(quat, first, last, base, out):
         out[0, i - base], out[1, i - base] = level(quat[0, i], quat[1, i], quat[2, i], quat[3, i])
 
 
-@kernel("F2 I Fw Fw")
-def level_forward_by_place(quat, order, east, north):
-    """Horizontal unit vectors of the headings of the rows `order`, (n,) each."""
-    for p in range(order.shape[0]):
-        i = order[p]
+@kernel("F2 i8 i8 I Fw Fw")
+def level_forward_by_place(quat, first, last, place, east, north):
+    """Horizontal unit vectors of the headings of the rows [first, last) to their places, (n,) each."""
+    for i in range(first, last):
+        p = place[i]
         east[p], north[p] = level(quat[0, i], quat[1, i], quat[2, i], quat[3, i])
 
 
-@kernel("F I Fw")
-def floats_by_place(values, order, out):
-    """out[p] = values[order[p]]."""
-    for p in range(order.shape[0]):
-        out[p] = values[order[p]]
+@kernel("F i8 i8 I Fw")
+def floats_by_place(values, first, last, place, out):
+    """out[place[i]] = values[i] of the rows [first, last)."""
+    for i in range(first, last):
+        out[place[i]] = values[i]
 
 
-@kernel("I I Fw")
-def ints_by_place(values, order, out):
-    """out[p] = values[order[p]] as a float."""
-    for p in range(order.shape[0]):
-        out[p] = values[order[p]]
+@kernel("I i8 i8 I Fw")
+def ints_by_place(values, first, last, place, out):
+    """out[place[i]] = values[i] of the rows [first, last), as a float."""
+    for i in range(first, last):
+        out[place[i]] = values[i]
 
 
 @kernel("I I Iw")

@@ -14,6 +14,7 @@ from tussle.api.bodies import DERIVED, FLOATS, INTS
 from tussle.api.group import GroupView
 from tussle.columns import Channel, Numbers, Param
 from tussle.errors import DeclarationError, listed, nearest_name
+from tussle.neighbors.index import Blocks
 from tussle.neighbors.law import OTHER, PAIR, Law
 from tussle.neighbors.walk import make_walk
 from tussle.numeric.rk4 import label
@@ -210,7 +211,7 @@ def own_columns(cls: Any) -> dict[str, str]:
     return found
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Plan:
     """What one walk over the neighbours takes of a plugin.
 
@@ -221,6 +222,8 @@ class Plan:
         columns: Gives, of a view and a plugin's attributes, how far to look [m] and the columns by row.
         other: Its columns by place: of the body table, and which components.
         lists: It gives one value for each pair, instead of one for each row.
+        moving: Columns by place that follow who moves.
+        keeps: The columns by row are arrays that the view and the plugin keep.
     """
 
     run: Callable[..., Any]
@@ -229,18 +232,22 @@ class Plan:
     columns: Callable[[GroupView, dict[str, Any]], tuple[Any, tuple[np.ndarray, ...]]]
     other: tuple[tuple[str, tuple[int, ...]], ...]
     lists: bool
+    moving: tuple[str, ...]
+    keeps: bool
 
     def walk(self, plugin: Any, g: GroupView) -> Contributions:
         """What the neighbours of each row contribute."""
-        reach, own = self.columns(g, plugin.__dict__)
-        index = g.index(reach)
-        blocks = index.blocks(g.first, g.last)
-        longs, points = (blocks.cuts, blocks.spans, index.order), (blocks.points, index.points)
-        others: tuple[np.ndarray, ...] = ()
-        for name, places in self.other:
-            columns = g.by_place(index, name)
-            others += columns if len(columns) == len(places) else tuple([columns[place] for place in places])
-        arrays = longs, points, others, own
+        key = id(self), id(plugin)
+        kept = g.walks.get(key)
+        if kept is None:
+            kept = self.gather(plugin, g)
+            if g.one_per_world and self.keeps and not self.lists:
+                g.walks[key] = kept
+        else:
+            index = g.index(np.inf)
+            for name in self.moving:
+                g.by_place(index, name)
+        blocks, arrays = kept
         if self.lists:
             return self.listed(g, blocks.n_blocks, lambda *last: self.run(*arrays, *last, blocks.most))
         out = np.empty((len(self.names), g.n))
@@ -250,6 +257,18 @@ class Plan:
         else:
             g.context.split(blocks.n_blocks, lambda *part: run(*arrays, out, g.first, part, blocks.most))
         return Contributions(self.names, out)
+
+    def gather(self, plugin: Any, g: GroupView) -> tuple[Blocks, tuple[Any, ...]]:
+        """The blocks of the rows, and the arrays that the kernels take."""
+        reach, own = self.columns(g, plugin.__dict__)
+        index = g.index(reach)
+        blocks = index.blocks(g.first, g.last)
+        longs, points = (blocks.cuts, blocks.spans, index.order), (blocks.points, index.points)
+        others: tuple[np.ndarray, ...] = ()
+        for name, places in self.other:
+            columns = g.by_place(index, name)
+            others += columns if len(columns) == len(places) else tuple([columns[place] for place in places])
+        return blocks, (longs, points, others, own)
 
     def listed(self, g: GroupView, n_blocks: int, run: Callable[..., int]) -> Listed:
         """What each pair contributes."""
@@ -303,4 +322,6 @@ def make_plan(g: GroupView, plugin: Any, declared: NeighborLaw) -> Plan:
         evaluated(f"({farthest}, ({by_row}))"),
         tuple(other.items()),
         laws[0].lists,
+        tuple(name for name in other if name not in INTS),
+        "column(" not in by_row and "g.world" not in by_row,
     )

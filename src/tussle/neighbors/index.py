@@ -171,9 +171,9 @@ class Index:
             kernels.build(*arrays, (kernels.SORT, 0, n))
             split(n, lambda *part: kernels.build(*arrays, (kernels.PLACES, *part)))
 
-    def update(self, rows: Longs, x: Floats, y: Floats, z: Floats) -> None:
-        """Rows (n,) moved to x, y, z (n,) [m] and keep their places; only where their world's reach is infinite."""
-        kernels.update(rows, x, y, z, self.place, self.points)
+    def update(self, first: int, last: int, x: Floats, y: Floats, z: Floats) -> None:
+        """Rows [first, last) moved, and keep their places; x, y, z (N,) [m] as for `build`. Only where all reaches are infinite."""
+        kernels.update(first, last, x, y, z, self.place, self.points)
 
     def gather(self, column: Floats) -> Floats:
         """A float column of the table by place, (N,), with LANES spare elements behind the end."""

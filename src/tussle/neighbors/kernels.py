@@ -186,14 +186,14 @@ def build(pos, inverse_cell, worlds, work, placed, points, strips, part):
         put_places(pos, worlds, work[0], placed, points, begin, end)
 
 
-@kernel("I F F F I F2w")
-def update(rows, x, y, z, place, points):
-    """Rows that moved and keep their places: x, y, z (n,) positions [m] of rows (n,)."""
-    for k in range(rows.shape[0]):
-        p = place[rows[k]]
-        points[0, p] = x[k]
-        points[1, p] = y[k]
-        points[2, p] = z[k]
+@kernel("i8 i8 F F F I F2w")
+def update(first, last, x, y, z, place, points):
+    """Rows [first, last) that moved and keep their places; x, y, z (N,) positions [m]."""
+    for i in range(first, last):
+        p = place[i]
+        points[0, p] = x[i]
+        points[1, p] = y[i]
+        points[2, p] = z[i]
 
 
 @kernel("F I Fw")

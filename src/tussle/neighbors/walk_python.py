@@ -34,7 +34,7 @@ def walk_in_python(
                 places = (p for s in range(*cuts[2, b : b + 2]) for p in range(*spans[:, s]) if p != me)
                 for p in places:
                     theirs = {name: column[p] for name, column in zip(other_names, other, strict=True)}
-                    pair = {**mine, **theirs, **between(points[1][:, p] - points[0][:, q])}
+                    pair = {**mine, **theirs, **between(points[1][:, p] - points[1][:, me])}
                     for each in totals if where is None or call(where, pair) else ():
                         values = each.add(pair)
                         if values is not None and each.law.lists:

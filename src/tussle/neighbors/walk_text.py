@@ -259,7 +259,7 @@ class WalkText:
     def single_neighbors(self, names: Sequence[str]) -> Iterator[str]:
         """Eight neighbours of one agent, and which of them there are, are of its team, and near enough."""
         for axis in "xyz":
-            yield f"offset_{axis}_ = load(s{axis}, p) - q{axis}[q]"
+            yield f"offset_{axis}_ = load(s{axis}, p) - s{axis}[me]"
         yield "distance_squared_ = offset_x_ * offset_x_ + offset_y_ * offset_y_ + offset_z_ * offset_z_"
         yield "all_ = (1 << min(LANES, span_end[s] - p)) - 1"
         yield "if p <= me < p + LANES:"

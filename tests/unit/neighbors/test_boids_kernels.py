@@ -7,6 +7,7 @@ import pytest
 from neighbor_stacks import stack
 
 from tussle.neighbors.walk import make_walk
+from tussle.numeric.quaternion import quat_from_euler
 from tussle.stock import Boids
 from tussle.stock.autonomy.boids import kernels
 
@@ -203,12 +204,14 @@ def test_outputs_follow_the_wanted_velocity():
         rng.uniform(-1, 1, n),
         rng.normal(size=n),
     )
+    quat = quat_from_euler(np.zeros(n), -climb, yaw)
+    quat = tuple(2.0 * np.ascontiguousarray(part) for part in quat)  # of any length
     fast, out, results = np.full(n, 30.0), np.empty((3, n)), [np.empty(n) for _ in range(6)]
     kernels.velocity(wanted, fast, out)
     size = np.sqrt((wanted**2).sum(0))
     np.testing.assert_allclose(out, wanted * np.minimum(15.0 / np.maximum(size, 1.0), 1.0), rtol=1e-14)
     for part in ((0, 7), (7, n)):
-        kernels.rates(wanted, yaw, climb, fast, *results[:3], part)
+        kernels.rates(wanted, quat, fast, *results[:3], part)
     turn = np.arctan2(wanted[1], wanted[0]) - yaw
     np.testing.assert_allclose(results[1], np.arctan2(np.sin(turn), np.cos(turn)), atol=1e-14)
     np.testing.assert_allclose(results[2], np.arctan2(wanted[2], np.hypot(*wanted[:2])) - climb, atol=1e-14)

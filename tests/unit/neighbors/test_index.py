@@ -95,7 +95,9 @@ def test_moved_rows_keep_their_places_with_one_cell_per_world():
     index = s.index(np.inf)
     blocks = index.blocks(4, 6)
     assert blocks.n_blocks == 2
-    index.update(np.array([4, 5]), np.array([7.0, 8.0]), np.zeros(2), np.zeros(2))
+    x = np.zeros(40)
+    x[4:6] = 7.0, 8.0
+    index.update(4, 6, x, np.zeros(40), np.zeros(40))
     assert (index.points[0, index.place[[4, 5]]] == [7.0, 8.0]).all()
     again = index.blocks(4, 6)
     assert again.spans is blocks.spans

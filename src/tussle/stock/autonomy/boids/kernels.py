@@ -77,6 +77,12 @@ def shortened(x, y, z):
 
 
 @device
+def nose(w, x, y, z):
+    """Body x axis (east, north, up) of a quaternion, in units of its squared length."""
+    return w * w + x * x - y * y - z * z, 2.0 * (w * z + x * y), 2.0 * (x * z - w * y)
+
+
+@device
 def length(x, y, z):
     """Length of (x, y, z)."""
     square = x * x + y * y + z * z
@@ -146,17 +152,24 @@ def velocity(wanted, max_speed, out):
         put_rows(out, i, m, vx * factor, vy * factor, vz * factor)
 
 
-@kernel("F2 F F F Fw Fw Fw (i8 i8)")
-def rates(wanted, yaw, climb, max_speed, speed, turn_rate, pitch_rate, part):
-    """Speed [m/s] and the rates [rad/s] that turn the body x axis (yaw, climb [rad], nose up positive) towards the desired velocity."""
+@kernel("F2 (F F F F) F Fw Fw Fw (i8 i8)")
+def rates(wanted, quat, max_speed, speed, turn_rate, pitch_rate, part):
+    """Speed [m/s] and the rates [rad/s] that turn the body x axis of quaternions (w, x, y, z) towards the desired velocity."""
     begin, end = part
     vx, vy, vz = wanted[0, begin:end], wanted[1, begin:end], wanted[2, begin:end]
-    yaw, climb, max_speed = yaw[begin:end], climb[begin:end], max_speed[begin:end]
+    qw, qx, qy, qz = quat[0][begin:end], quat[1][begin:end], quat[2][begin:end], quat[3][begin:end]
+    max_speed = max_speed[begin:end]
     speed, turn_rate, pitch_rate = speed[begin:end], turn_rate[begin:end], pitch_rate[begin:end]
     for i in range(end - begin):
-        turn_rate[i] = wrap(atan2(vy[i], vx[i]) - yaw[i])
+        east, north, _ = nose(qw[i], qx[i], qy[i], qz[i])
+        turn_rate[i] = atan2(north, east)
     for i in range(end - begin):
-        pitch_rate[i] = wrap(atan2(vz[i], np.sqrt(vx[i] * vx[i] + vy[i] * vy[i])) - climb[i])
+        turn_rate[i] = wrap(atan2(vy[i], vx[i]) - turn_rate[i])
+    for i in range(end - begin):
+        east, north, up = nose(qw[i], qx[i], qy[i], qz[i])
+        pitch_rate[i] = atan2(up, np.sqrt(east * east + north * north))
+    for i in range(end - begin):
+        pitch_rate[i] = wrap(atan2(vz[i], np.sqrt(vx[i] * vx[i] + vy[i] * vy[i])) - pitch_rate[i])
     for i in range(end - begin):
         speed[i] = max_speed[i]
 

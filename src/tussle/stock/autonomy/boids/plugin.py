@@ -156,9 +156,8 @@ class Boids(Autonomy):
         g.split(lambda *part: kernels.law(pos, self.target, seen, weights, wanted, part))
         wired = self.wired
         if "turn_rate" in wired or "pitch_rate" in wired or "speed" in wired:
-            facing = g.yaw, g.climb
-            commands = self.speed, self.turn_rate, self.pitch_rate
-            g.split(lambda *part: kernels.rates(wanted, *facing, self.max_speed, *commands, part))
+            quat, commands = g.components("quat"), (self.speed, self.turn_rate, self.pitch_rate)
+            g.split(lambda *part: kernels.rates(wanted, quat, self.max_speed, *commands, part))
         if "velocity" in wired:
             kernels.velocity(wanted, self.max_speed, self.velocity)
         if "desired_heading" in wired or "desired_altitude" in wired or "desired_speed" in wired:
