@@ -26,27 +26,29 @@ Objective = Annotated[
     str,
     typer.Option(
         metavar="QUANTITY",
-        help="What is to be great, on average over the games: 'score[3]-score[2]', 'wins[2]', 't'.",
+        help="The quantity whose mean over the games is maximized: 'score[3]-score[2]', 'wins[2]', 't'.",
         show_default=False,
     ),
 ]
-Minimize = Annotated[bool, typer.Option("--minimize", help="It is to be small instead.")]
+Minimize = Annotated[bool, typer.Option("--minimize", help="Minimize it instead.")]
 Trials = Annotated[int, typer.Option(metavar="N", min=1, help="Sets of values that are tried.")]
 RunsOfTrial = Annotated[
     int,
     typer.Option("--runs", "-n", metavar="N", min=1, help="Games of each trial, all with the same seeds."),
 ]
 PerRound = Annotated[
-    int, typer.Option(metavar="N", min=1, help="Trials that are chosen together and played side by side.")
+    int, typer.Option(metavar="N", min=1, help="Trials that are proposed together and played side by side.")
 ]
-Sampler = Annotated[str, typer.Option(metavar="NAME", help="Who chooses what is tried: tpe, cmaes, random.")]
-SampleSeed = Annotated[int, typer.Option(metavar="N", min=0, help="Seed of the choosing.")]
+Sampler = Annotated[
+    str, typer.Option(metavar="NAME", help="Optuna's sampler that proposes trials: tpe, cmaes, random.")
+]
+SampleSeed = Annotated[int, typer.Option(metavar="N", min=0, help="Seed of the sampler.")]
 StudyDirectory = Annotated[
     Path | None,
     typer.Option(
         "--out",
         metavar="DIR",
-        help="Where trials are kept; by default optimizations/NAME-HASH, the same for the same search, which goes on from there.",
+        help="Where trials are kept; by default optimizations/NAME-HASH. The same command goes on from there.",
         show_default=False,
     ),
 ]
@@ -77,20 +79,16 @@ def optimize(
 ) -> None:
     """Search for the values with which a quantity of the game is greatest, or smallest."""
     if not objective:
-        raise typer.BadParameter(
-            "--objective says what is to be great: a quantity such as 'score[3]-score[2]'"
-        )
+        raise typer.BadParameter("--objective is missing: a quantity such as 'score[3]-score[2]'")
     if not vary:
-        raise typer.BadParameter(
-            "--vary says what is searched: speed=20:30, gain=1e-3:10:log, tactic=keep,switch"
-        )
-    with reported(debug):
-        from tussle.cli.optimize_course import Asked, search
+        raise typer.BadParameter("--vary is missing: speed=20:30, gain=1e-3:10:log, tactic=keep,switch")
+    with told(debug):
+        from tussle.cli.optimize_course import search
 
         source = mission_source(mission, settings, more, seed, end, strict, plugin_files, allow_large)
-        asked = Asked(
-            source, objective, tuple(vary), minimize, trials, runs, per_round, sampler, sample_seed, directory, processes,
-            stack, run_timeout,
+        code = search(
+            source, objective, directory, trials, [Path(sys.argv[0]).name, *sys.argv[1:]], processes=processes, stack=stack,
+            vary=tuple(vary), minimize=minimize, runs=runs, per_round=per_round, sampler=sampler, sample_seed=sample_seed,
+            run_timeout=run_timeout,
         )  # fmt: skip
-        code = search(asked, [Path(sys.argv[0]).name, *sys.argv[1:]])
     raise typer.Exit(code)

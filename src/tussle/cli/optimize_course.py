@@ -1,13 +1,12 @@
-"""`tussle optimize`: values are tried, kept, and the best of them shown."""
+"""`tussle optimize`: plays a search, shows its progress, then its results."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 from rich.console import Group
 from rich.live import Live
@@ -24,88 +23,52 @@ from tussle.cli.progress import BAR_EVERY, LINE_EVERY, clock, compiling, text_co
 from tussle.cli.terminal import err, say, say_note
 
 
-@dataclass(frozen=True)
-class Asked:
-    """What the command line says of a search.
+def search(
+    source: Source,
+    objective: str,
+    directory: Path | None,
+    trials: int,
+    command: Sequence[str],
+    *,
+    processes: int | None,
+    stack: int | None,
+    **options: Any,
+) -> int:
+    """Search, or go on where a search was stopped, and show the results.
 
-    Attributes:
-        source: The mission and what is set in it.
+    Args:
+        source: The mission and its settings.
         objective: The quantity.
-        vary: Texts of `--vary`.
-        minimize: Smaller is better.
+        directory: Where trials are kept; None for the default directory.
         trials: Sets of values that are tried.
-        runs: Games of each.
-        per_round: Trials that are chosen together.
-        sampler: Who chooses.
-        sample_seed: Seed of the choosing.
-        directory: Where trials are kept.
+        command: The command that `study.json` names.
         processes: How many.
         stack: Worlds side by side.
-        run_timeout: Wall time that a run may take [s].
-    """
-
-    source: Source
-    objective: str
-    vary: Sequence[str]
-    minimize: bool
-    trials: int
-    runs: int
-    per_round: int
-    sampler: str
-    sample_seed: int
-    directory: Path | None
-    processes: int | None
-    stack: int | None
-    run_timeout: float | None
-
-    def optimization(self) -> Optimization:
-        """The search that is meant.
-
-        Raises:
-            TussleError: Something in it is not allowed.
-        """
-        optimization = Optimization(
-            self.source.mission,
-            self.objective,
-            vary=self.vary,
-            minimize=self.minimize,
-            runs=self.runs,
-            per_round=self.per_round,
-            sampler=self.sampler,
-            sample_seed=self.sample_seed,
-            first_seed=1 if self.source.seed is None else self.source.seed,
-            settings=self.source.given,
-            plugin_files=tuple(self.source.plugin_files),
-            ends_by_time=self.source.end is not None,
-            run_timeout=self.run_timeout,
-            strict=self.source.strict,
-            allow_large=self.source.allow_large,
-        )
-        loaded = optimization.content.loaded
-        for note in loaded.notes if loaded is not None else ():
-            if FOR_VIEWER not in note:
-                say_note(note)
-        return optimization
-
-
-def search(asked: Asked, command: Sequence[str]) -> int:
-    """Search, or go on where a search was stopped, and show what came of it.
+        options: Further arguments of `Optimization`.
 
     Returns:
         The exit code.
     """
     began = time.perf_counter()
-    optimization = asked.optimization()
-    directory = asked.directory or optimization.default_directory()
-    with ExitStack() as stack:
+    optimization = Optimization(
+        source.mission, objective, first_seed=1 if source.seed is None else source.seed, settings=source.given,
+        plugin_files=tuple(source.plugin_files), ends_by_time=source.end is not None, strict=source.strict,
+        allow_large=source.allow_large, **options,
+    )  # fmt: skip
+    loaded = optimization.content.loaded
+    for note in loaded.notes if loaded is not None else ():
+        if FOR_VIEWER not in note:
+            say_note(note)
+    directory = directory or optimization.default_directory()
+    with ExitStack() as exits:
         with compiling():
             optimization.check()
-        interrupt = stack.enter_context(Interrupt())
-        meter = stack.enter_context(SearchMeter(optimization, interrupt))
+        interrupt = exits.enter_context(Interrupt())
+        meter = exits.enter_context(SearchMeter(optimization, interrupt))
         try:
             study = optimization.play(
-                directory, asked.trials, processes=asked.processes, stack=asked.stack, command=command, on_progress=meter.show
-            )  # fmt: skip
+                directory, trials, processes=processes, stack=stack, command=command, on_progress=meter.show
+            )
         except Interrupted:
             kept = f"{meter.n_done} trials are kept" if meter.n_done != 1 else "1 trial is kept"
             say("interrupted", f"{kept} in {directory}; the same command goes on", "bold yellow")
@@ -114,7 +77,7 @@ def search(asked: Asked, command: Sequence[str]) -> int:
         say_note(f"{meter.n_before:,} of {len(study.trials):,} trials were there already, in {directory}")
     for note in study.notes:
         say_note(note)
-    n_new, again = len(study.trials) - meter.n_before, play_again(asked.source, study)
+    n_new, again = len(study.trials) - meter.n_before, play_again(source, study)
     return show_study(study, optimization, directory, time.perf_counter() - began, n_new, again)
 
 
@@ -156,10 +119,10 @@ class SearchMeter:
             self._live.stop()
 
     def show(self, progress: SearchProgress) -> None:
-        """The search has come so far.
+        """Show how far the search is.
 
         Raises:
-            Interrupted: The user has asked for an end.
+            Interrupted: The user pressed Ctrl-C.
         """
         self.n_before, self.n_done = progress.n_before, progress.n_done
         if self._interrupt.code:
@@ -183,8 +146,7 @@ class SearchMeter:
         parts = []
         if (best := progress.best) is not None:
             values = ", ".join(
-                f"{name}={value}"
-                for name, value in settings_of(best.values, self._search.proposer.variables).items()
+                f"{name}={value}" for name, value in settings_of(best.values, self._search.variables).items()
             )
             parts.append(f"best {interval(best.objective, best.low, best.high)} with {values}")
         if progress.n_failed:

@@ -147,8 +147,8 @@ def test_noise_is_told(tussle):
 @pytest.mark.parametrize(
     ("arguments", "code", "message"),
     [
-        (["--vary", "n=1:3"], 2, "--objective says what is to be great"),
-        (["--objective", "t"], 2, "--vary says what is searched"),
+        (["--vary", "n=1:3"], 2, "--objective is missing"),
+        (["--objective", "t"], 2, "--vary is missing"),
         (
             ["--objective", "scor[2]", "--vary", "n=1:3:int"],
             1,

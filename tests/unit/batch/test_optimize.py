@@ -3,28 +3,26 @@
 from __future__ import annotations
 
 import json
-import logging
 import math
 import os
+import re
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import bowl
 import numpy as np
 import optuna
-import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
 from tussle.batch.executors import InProcess, Processes
-from tussle.batch.search.evaluation import WORTH_PROCESSES, Crew
+from tussle.batch.search.evaluation import WORTH_PROCESSES, RoundPlayer
 from tussle.batch.search.optimization import MOST_TRIALS, Optimization, optimize
 from tussle.batch.search.study_store import StudyStore, load_study, notes_on_versions
-from tussle.batch.variables import Choice, Range
-from tussle.errors import BatchError, MissingExtraError, MissionError, ParameterError, RecordError
+from tussle.batch.variables import Range
+from tussle.errors import BatchError, MissingExtraError, MissionError, ParameterError
 
 PLUGIN = Path(bowl.__file__)
 PLACE = {"Bowl.x": (-10.0, 10.0), "Bowl.y": (-10.0, 10.0)}
@@ -62,15 +60,6 @@ def test_the_known_optimum_is_found(sampler):
     assert best.values["Bowl.x"] == pytest.approx(bowl.BEST_X, abs=1.0)
     assert best.values["Bowl.y"] == pytest.approx(bowl.BEST_Y, abs=1.0)
     assert bowl.TOP - 1.0 < best.objective <= bowl.TOP
-
-
-@pytest.mark.parametrize("sampler", ["tpe", "cmaes"])
-def test_a_sampler_is_better_than_chance(sampler):
-    means = {
-        name: np.mean([search(sampler=name, trials=64, sample_seed=seed).best.objective for seed in range(3)])
-        for name in (sampler, "random")
-    }
-    assert means[sampler] > means["random"]
 
 
 def test_the_smallest_is_found():
@@ -176,13 +165,13 @@ def test_processes_and_stacks_change_nothing():
 def test_short_rounds_are_played_in_this_process(monkeypatch):
     asked = []
     monkeypatch.setattr(Processes, "play", lambda self, *a: (asked.append(1), InProcess().play(*a))[1])
-    crew, mission = Crew(), Optimization(bowl.mission(), "t", vary=PLACE, runs=64).mission
+    player, mission = RoundPlayer(), Optimization(bowl.mission(), "t", vary=PLACE, runs=64).mission
     batch = mission.batch([{"Bowl.x": 1.0, "Bowl.y": 0.0}])
     n_processes = batch.executor().n if isinstance(batch.executor(), Processes) else 1
-    crew.play(batch, lambda _: None)
+    player.play(batch, lambda _: None)
     assert len(asked) == (n_processes > 1)
-    assert crew.cpu_s < WORTH_PROCESSES
-    crew.play(batch, lambda _: None)
+    assert player.cpu_s < WORTH_PROCESSES
+    player.play(batch, lambda _: None)
     assert len(asked) == (n_processes > 1)
 
 
@@ -200,14 +189,6 @@ def test_a_trial_with_a_failed_run_is_failed_and_the_search_goes_on():
         assert math.isnan(trial.objective)
     assert study.best.values["Bowl.x"] < 2.0
     assert set(study.table["state"].to_pylist()) == {"complete", "failed"}
-
-
-def test_a_search_in_which_all_fails_has_no_best():
-    study = search(source=bowl.mission(fails_from=-50.0), trials=16)
-    assert study.best is None
-    assert study.lead is None
-    assert not study.is_clear
-    assert study.importances() == {}
 
 
 @pytest.mark.parametrize("sampler", ["tpe", "cmaes", "random"])
@@ -234,12 +215,6 @@ def test_values_that_cannot_be_played_fail_alone():
     assert trial.by_seed == () or trial.is_complete
 
 
-def test_the_error_of_values_in_a_file_names_no_point(game):
-    study = search(source=game, vary=["x=50:150"], plugin_files=[PLUGIN], trials=8)
-    error = next(t.error for t in study.trials if not t.is_complete)
-    assert error.startswith(f"{game}:4: ")
-
-
 def test_values_that_can_never_be_played_are_an_error(game):
     with pytest.raises(ParameterError, match="<= 100"):
         search(vary={"Bowl.x": (150.0, 160.0)})
@@ -251,62 +226,33 @@ def test_values_that_can_never_be_played_are_an_error(game):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "message"),
+    ("arguments", "named"),
     [
-        ({"vary": {}}, "nothing varies, so there is nothing to search"),
-        (
-            {"sampler": "tp"},
-            "sampler = 'tp' is not allowed.*did you mean 'tpe'.*there are: tpe, cmaes, random",
-        ),
-        ({"sampler": "cmaes", "vary": {"Bowl.x": [1, 2]}}, "cmaes searches ranges, and Bowl.x is a choice"),
-        ({"vary": ["Bowl.x=-1e308:1e308"]}, "Bowl.x: from -1e.308 to 1e.308 is too far for a search"),
-        ({"settings": {"Bowl.x": 1}}, "Bowl.x is set and varies"),
-        ({"runs": 0}, "runs = 0 is not allowed; it takes a whole number >= 1"),
-        ({"per_round": 2.5}, "per_round = 2.5 is not allowed"),
-        ({"sample_seed": -1}, "sample_seed = -1 is not allowed"),
-        ({"first_seed": True}, "first_seed = True is not allowed"),
-        ({"trials": 0}, "trials = 0 is not allowed; it takes a whole number from 1 to 10,000"),
-        ({"trials": MOST_TRIALS + 1}, "trials = 10001 is not allowed"),
-        ({"vary": {"Bowl.x": [1, "1", "a"]}}, "Bowl.x: the choices 1 and '1' are written alike"),
-        ({"objective": "Bowl.hight"}, "there is no 'Bowl.hight' .did you mean 'Bowl.height'"),
+        ({"vary": {}}, "nothing varies"),
+        ({"sampler": "tp"}, "did you mean 'tpe'"),
+        ({"sampler": "cmaes", "vary": {"Bowl.x": [1, 2]}}, "Bowl.x"),
+        ({"vary": ["Bowl.x=-1e308:1e308"]}, "Bowl.x"),
+        ({"settings": {"Bowl.x": 1}}, "Bowl.x"),
+        ({"runs": 0}, "runs = 0"),
+        ({"per_round": 2.5}, "per_round = 2.5"),
+        ({"first_seed": True}, "first_seed = True"),
+        ({"trials": MOST_TRIALS + 1}, "trials = 10001"),
+        ({"vary": {"Bowl.x": [1, "1", "a"]}}, "Bowl.x"),
+        ({"objective": "Bowl.hight"}, "did you mean 'Bowl.height'"),
         ({"objective": "Bowl.height["}, "cannot be read"),
-        ({"vary": {"Bowl.z": (0.0, 1.0)}}, "'Bowl.z': Bowl has no 'z'"),
+        ({"vary": {"Bowl.z": (0.0, 1.0)}}, "Bowl.z"),
     ],
 )
-def test_what_means_nothing_is_refused(arguments, message):
-    with pytest.raises(ParameterError, match=message):
+def test_what_means_nothing_is_refused(arguments, named):
+    with pytest.raises(ParameterError, match=named):
         search(**arguments)
 
 
-def test_without_optuna(monkeypatch):
-    monkeypatch.setitem(sys.modules, "optuna", None)
-    with pytest.raises(MissingExtraError, match=r"optimisation needs optuna.*pip install 'tussle\[batch\]'"):
-        search()
-
-
-def test_without_cmaes(monkeypatch):
-    monkeypatch.setitem(sys.modules, "cmaes", None)
-    with pytest.raises(MissingExtraError, match="optimisation needs cmaes"):
-        search(sampler="cmaes")
-    assert search(trials=1).best
-
-
-def test_optuna_says_nothing_and_speaks_to_others_as_before():
-    heard = []
-    handler = logging.Handler()
-    handler.emit = heard.append
-    logger, before = logging.getLogger("optuna"), optuna.logging.get_verbosity()
-    logger.addHandler(handler)
-    optuna.logging.set_verbosity(optuna.logging.DEBUG)
-    try:
-        search(trials=16)
-        assert heard == []
-        assert optuna.logging.get_verbosity() == optuna.logging.DEBUG
-        optuna.create_study()
-        assert heard
-    finally:
-        optuna.logging.set_verbosity(before)
-        logger.removeHandler(handler)
+@pytest.mark.parametrize(("sampler", "package"), [("tpe", "optuna"), ("cmaes", "cmaes")])
+def test_without_a_package_the_extra_is_named(monkeypatch, sampler, package):
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(MissingExtraError, match=rf"{package}.*tussle\[batch\]"):
+        search(sampler=sampler)
 
 
 # -- the directory --------------------------------------------------------------------------------------------------------
@@ -315,7 +261,7 @@ def test_optuna_says_nothing_and_speaks_to_others_as_before():
 @pytest.mark.parametrize("sampler", ["tpe", "cmaes", "random"])
 def test_a_search_goes_on_as_if_it_had_never_stopped(tmp_path, sampler):
     whole = search(sampler=sampler, trials=40)
-    for trials in (8, 24, 40):
+    for trials in (8, 13, 24, 40):  # thirteen: the middle of a round
         study = search(sampler=sampler, trials=trials, directory=tmp_path / "out")
         assert len(study.trials) == trials
     assert facts(study) == facts(whole)
@@ -376,34 +322,35 @@ def test_a_search_that_was_killed_goes_on_as_if_it_had_not(game, sampler, monkey
     assert facts(resumed) == facts(search(**arguments))
 
 
+@pytest.mark.parametrize("lost", [1, 30, 2000])
+def test_a_search_whose_last_round_was_not_kept_whole_goes_on_as_if_it_was(tmp_path, lost):
+    """A process that is killed while it writes leaves some trials of a round, the last of them cut."""
+    whole = search(trials=32, directory=tmp_path / "out")
+    journal = tmp_path / "out" / "trials.journal"
+    os.truncate(journal, journal.stat().st_size - lost)
+    assert facts(search(trials=32, directory=tmp_path / "out")) == facts(whole)
+    assert facts(load_study(tmp_path / "out")) == facts(whole)
+
+
 def test_what_the_directory_holds(tmp_path, game):
     vary = ["x=-10:10", "n=1:3:int", "luck=0,1"]
     search(source=game, vary=vary, plugin_files=[PLUGIN], directory=tmp_path / "out", trials=20)
-    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["lock", "study.json", "trials.parquet"]
+    files = sorted(p.name for p in (tmp_path / "out").iterdir())
+    assert files == ["lock", "study.json", "trials.journal", "trials.parquet"]
     info = json.loads((tmp_path / "out" / "study.json").read_text())
-    assert info["objective"] == "Bowl.height"
-    assert info["direction"] == "maximize"
+    assert (info["objective"], info["direction"]) == ("Bowl.height", "maximize")
     assert info["mission"]["file"] == "bowl.xml"
     table = pq.read_table(tmp_path / "out" / "trials.parquet")
-    assert table.column_names == [
-        *(
-            "trial",
-            "round",
-            "x",
-            "n",
-            "luck",
-            "objective",
-            "low",
-            "high",
-            "n_failed",
-            "state",
-            "error",
-            "by_seed",
-        )
-    ]
+    facts = ("objective", "low", "high", "n_failed", "state", "error", "by_seed")
+    assert table.column_names == ["trial", "round", "x", "n", "luck", *facts]
     assert table["trial"].to_pylist() == list(range(20))
     assert table["round"].to_pylist() == [0] * 8 + [1] * 8 + [2] * 4
-    assert [table.schema.field(n).type for n in ("x", "n", "luck")] == [pa.float64(), pa.int64(), pa.int64()]
+    assert [str(table.schema.field(n).type) for n in ("x", "n", "luck")] == ["double", "int64", "int64"]
+    storage = optuna.storages.JournalStorage(
+        optuna.storages.journal.JournalFileBackend(str(tmp_path / "out" / "trials.journal"))
+    )
+    (seen,) = optuna.get_all_study_summaries(storage)
+    assert (seen.n_trials, seen.best_trial.value) == (20, max(table["objective"].to_pylist()))
 
 
 def test_choices_of_all_kinds_come_back(tmp_path):
@@ -430,14 +377,13 @@ def test_another_search_in_the_directory(tmp_path, game):
 
     go()
     for more, what in (
-        ({"objective": "t"}, "its objective is 'Bowl.height', not 't'"),
-        ({"minimize": True}, "its direction is 'maximize', not 'minimize'"),
-        ({"vary": ["x=-10:11"]}, "it differs in variables"),
-        ({"runs": 3}, "its runs is 2, not 3"),
-        ({"sampler": "random"}, "its sampler is 'tpe', not 'random'"),
-        ({"settings": {"y": 3}}, "it differs in mission"),
+        ({"objective": "t"}, "objective"),
+        ({"minimize": True}, "direction"),
+        ({"vary": ["x=-10:11"]}, "variables"),
+        ({"runs": 3}, "runs"),
+        ({"settings": {"y": 3}}, "mission"),
     ):
-        with pytest.raises(BatchError, match=f"out: holds another search .{what}"):
+        with pytest.raises(BatchError, match=f"out: holds another search .*{what}"):
             go(**more)
     assert len(go(trials=16).trials) == 16
     game.write_text(bowl.MISSION.replace('dt="0.1"', 'dt="0.15"'))
@@ -455,12 +401,6 @@ def test_a_mission_that_changes_meanwhile(tmp_path, game):
             source=game, vary=["x=0:1"], plugin_files=[PLUGIN], directory=tmp_path / "out", on_progress=change
         )
     assert len(load_study(tmp_path / "out").trials) == 16
-
-
-def test_a_function_that_makes_another_mission(tmp_path):
-    search(source=lambda x: bowl.mission(x=x), vary=["x=0:1"], trials=8, directory=tmp_path / "out")
-    with pytest.raises(BatchError, match="the mission or a plugin file has changed since"):
-        search(source=lambda x: bowl.mission(x=2 * x), vary=["x=0:1"], trials=8, directory=tmp_path / "out")
 
 
 def test_two_processes_at_one_search(tmp_path):
@@ -484,47 +424,43 @@ def test_directories_that_hold_something_else(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "content", "message"),
+    ("name", "content"),
     [
-        ("study.json", b"{", r"study\.json: cannot be read"),
-        ("study.json", b'{"format": 9}', "format 9; .* reads format 1"),
-        ("study.json", b"[]", "format None"),
-        ("study.json", b'{"format": 1}', r"study\.json: .* lacks variables"),
-        ("trials.parquet", b"PAR1", r"trials\.parquet: cannot be read"),
+        ("study.json", b"{"),
+        ("study.json", b'{"format": 1}'),
+        ("study.json", b'{"format": 2}'),
+        ("trials.journal", b"[]\n"),
+        ("trials.journal", b'{"op_code": 4}\n{'),
     ],
 )
-def test_files_that_were_damaged(tmp_path, name, content, message):
+def test_files_that_were_damaged(tmp_path, name, content):
     search(directory=tmp_path / "out", trials=8)
     (tmp_path / "out" / name).write_bytes(content)
-    with pytest.raises(BatchError, match=message):
+    with pytest.raises(BatchError, match=name):
         load_study(tmp_path / "out")
 
 
-def test_a_table_of_other_trials(tmp_path):
-    search(directory=tmp_path / "out", trials=8)
-    pq.write_table(pa.table({"trial": [0]}), tmp_path / "out" / "trials.parquet")
-    with pytest.raises(BatchError, match=r"trials\.parquet: is another table; it has no column 'round'"):
-        search(directory=tmp_path / "out", trials=8)
-
-
 @pytest.mark.parametrize(
-    ("name", "value", "said"),
+    ("old", "new", "field"),
     [
-        ("high", None, r"low = [-\d.e]+ in row 0 is not allowed; high is nan"),
-        ("high", -1e9, "low = .* in row 0 is not allowed; high is -1000000000.0"),
-        ("objective", 1e101, "objective = 1e.101 in row 0 is not allowed"),
-        ("by_seed", [1.0], "trial 0 has 1 games; study.json says 2"),
-        ("trial", 7, "trial = 7 in row 0 is not allowed; it is 0"),
+        (r'"high":[-\d.e]+', '"high":null', "low"),
+        (r'"high":[-\d.e]+', '"high":-1e9', "low"),
+        (r'"value":[-\d.e]+', '"value":1e101', "value"),
+        (r'"state":1', '"state":3', "state"),
+        (r'"by_seed":\[[^\]]*\]', '"by_seed":[1.0]', "1 games"),
+        (r'"Bowl.x":[-\d.e]+', '"Bowl.x":77.0', "Bowl.x"),
+        (r'"n_failed":0', '"n_failed":"0"', "n_failed"),
     ],
 )
-def test_a_trial_that_cannot_be_is_named(tmp_path, name, value, said):
+def test_a_trial_that_cannot_be_is_named(tmp_path, old, new, field):
     search(directory=tmp_path / "out", trials=8)
-    path = tmp_path / "out" / "trials.parquet"
-    table = pq.read_table(path)
-    i = table.schema.get_field_index(name)
-    column = pa.array([value, *table[name].to_pylist()[1:]], table.schema.types[i])
-    pq.write_table(table.set_column(i, name, column), path)
-    with pytest.raises(BatchError, match=rf"trials\.parquet: {said}"):
+    path = tmp_path / "out" / "trials.journal"
+    lines = path.read_text().splitlines(keepends=True)
+    place = next(i for i, line in enumerate(lines) if '"n_failed"' in line)
+    lines[place], n = re.subn(old, new, lines[place], count=1)
+    assert n == 1
+    path.write_text("".join(lines))
+    with pytest.raises(BatchError, match=rf"trials\.journal: .*{field}"):
         load_study(tmp_path / "out")
 
 
@@ -538,18 +474,6 @@ def test_a_search_whose_variables_were_changed_is_another_one(tmp_path):
         search(directory=tmp_path / "out", trials=8)
 
 
-def test_a_directory_that_cannot_be_made(tmp_path):
-    (tmp_path / "file").write_text("")
-    with pytest.raises(RecordError, match="file: cannot be written"):
-        search(directory=tmp_path / "file", trials=8)
-
-
-def test_a_search_that_was_killed_as_it_began(tmp_path):
-    (tmp_path / "out").mkdir()
-    (tmp_path / "out" / "study.json.part").write_text("{")
-    assert len(search(directory=tmp_path / "out", trials=8).trials) == 8
-
-
 def test_other_versions_are_told(tmp_path):
     study = search(directory=tmp_path / "out", trials=8)
     versions = {**study.info["versions"], "optuna": "4.2.0"}
@@ -559,12 +483,6 @@ def test_other_versions_are_told(tmp_path):
     now = study.info["versions"]["optuna"]
     assert note.startswith(f"the search was begun with optuna 4.2.0, now {now}: trials from 8 on may differ")
     assert notes_on_versions({"versions": versions}, study.info, 0) == []
-
-
-def test_default_directory():
-    first = Optimization(bowl.mission().replace(name="a/../b c"), "t", vary=PLACE)
-    assert first.default_directory() == Path("optimizations") / f"a_.._b_c-{first.fingerprint[:8]}"
-    assert Optimization(bowl.mission(), "t", vary=PLACE).name == "mission"
 
 
 def test_progress():
@@ -578,20 +496,3 @@ def test_progress():
     assert seen[-1] == (20, 0, 0.0, True)
     assert (16, 4, 1.0, True) in seen
     assert [n for n, *_ in seen] == sorted(n for n, *_ in seen)
-
-
-def test_a_variable_is_a_range_or_a_choice_too():
-    study = search(vary=[Range("Bowl.x", 2, 4), Choice("Bowl.y", (-1.0, 5.0))], trials=24)
-    assert study.best.values["Bowl.y"] == -1.0
-    assert study.label(study.best.values).endswith(", Bowl.y=-1.0")
-
-
-def test_time_of_many_trials():
-    """Looking at all trials before each round stays small beside playing them."""
-    optimization = Optimization(bowl.mission(), "t", vary=PLACE, runs=1)
-    began = time.process_time()
-    done = list(search(trials=400, sampler="random", per_round=400, runs=1).trials)
-    played = time.process_time() - began
-    began = time.process_time()
-    optimization.proposer.propose(50, 8, done)
-    assert time.process_time() - began < played

@@ -1,1 +1,1 @@
-"""The search for values with which a result is best: rounds of trials, each of which is a batch."""
+"""The search for values with which a result is best: Optuna proposes rounds of trials, and each round is played as one batch."""

@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any
 
 from tussle.batch.executors import Executor
 from tussle.batch.quantities import Quantity
-from tussle.batch.search.evaluation import Crew, Evaluator
+from tussle.batch.search.evaluation import Evaluator, RoundPlayer
 from tussle.batch.search.proposals import Proposer
 from tussle.batch.search.searched_mission import SearchedMission
 from tussle.batch.search.study import Study, best_of
-from tussle.batch.search.study_store import StudyStore, notes_on_versions, read_trials, versions_of_samplers
-from tussle.batch.search.trials import MOST_TRIALS, Trial, column_type
+from tussle.batch.search.study_store import StudyStore, notes_on_versions, versions_of_samplers
+from tussle.batch.search.trials import MOST_TRIALS, Point, Trial
 from tussle.batch.variables import Variable
 from tussle.batch.varied import about, as_variables
 from tussle.errors import ParameterError
@@ -62,7 +62,7 @@ class Optimization:
         minimize: Smaller is better.
         runs: Games of each trial. All trials meet the same seeds (common random numbers).
         per_round: Trials that are proposed together and played side by side, each without knowing the others.
-        sampler: Who proposes: tpe (Optuna's), cmaes, or random.
+        sampler: Optuna's sampler that proposes: tpe, cmaes, or random.
         sample_seed: Seed of what is proposed.
         first_seed: Seeds of the games count up from here.
         settings: Values that are set in all trials, as for `read_mission` or by path.
@@ -107,11 +107,12 @@ class Optimization:
         if not variables:
             raise ParameterError("nothing varies, so there is nothing to search; vary at least one value")
         for variable in variables:
-            column_type(variable)
             if variable.name in settings:
                 raise ParameterError(f"{variable.name} is set and varies; say one of the two")
         self.quantity = Quantity.parse(objective)
-        self.proposer = Proposer(variables, sampler, sample_seed, per_round, minimize)
+        self.variables, self.sampler, self.is_minimized = variables, sampler, minimize
+        self.sample_seed, self.per_round = sample_seed, per_round
+        self._first = self._proposer().propose()
         self.mission = SearchedMission(
             mission,
             variables,
@@ -135,43 +136,43 @@ class Optimization:
 
     @property
     def info(self) -> dict[str, Any]:
-        """What `study.json` says."""
+        """The content of `study.json`."""
         said = {
             "tussle": versions()["tussle"],
             "name": self.name,
             "mission": self.mission.about(self.content),
             "objective": str(self.quantity),
-            "direction": "minimize" if self.proposer.is_minimized else "maximize",
-            "variables": [about(v) for v in self.proposer.variables],
+            "direction": "minimize" if self.is_minimized else "maximize",
+            "variables": [about(v) for v in self.variables],
             "runs": self.mission.runs,
             "first_seed": self.mission.first_seed,
-            "sampler": self.proposer.sampler,
-            "sample_seed": self.proposer.seed,
-            "per_round": self.proposer.per_round,
+            "sampler": self.sampler,
+            "sample_seed": self.sample_seed,
+            "per_round": self.per_round,
         }
         text = json.dumps([said, self.content.hash], default=str)
         fingerprint = hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
-        return {"format": 1, "fingerprint": fingerprint, **said, "versions": versions_of_samplers()}
+        return {"format": 2, "fingerprint": fingerprint, **said, "versions": versions_of_samplers()}
 
     @property
     def fingerprint(self) -> str:
-        """Hash of all that the trials depend on, but for how many there are."""
+        """Hash of all that the trials depend on, except how many there are."""
         return str(self.info["fingerprint"])
 
     def default_directory(self) -> Path:
-        """Where the search goes unless told otherwise: the same for the same search, so that the same command goes on with it."""
+        """The directory of this search unless another is given; the same for the same search."""
         return Path("optimizations") / f"{self.name}-{self.fingerprint[:8]}"
 
     # -- the search ---------------------------------------------------------------------------------------------------------
 
     def check(self) -> None:
-        """Begin a game with the values that are proposed first, and see that the quantity is one of its results.
+        """Begin a game with the values that are proposed first, and look for the quantity among its results.
 
         Raises:
             TussleError: None of them can be played.
             ParameterError: There is no such quantity.
         """
-        self.evaluator.check(self.proposer.propose(0, self.proposer.per_round, ()))
+        self.evaluator.check(self._first)
 
     def play(
         self,
@@ -184,64 +185,71 @@ class Optimization:
         command: Sequence[str] | None = None,
         on_progress: Callable[[SearchProgress], None] | None = None,
     ) -> Study:
-        """Search on until there are so many trials.
+        """Search until there are so many trials.
 
         Args:
-            directory: Where whole rounds are kept at once; None keeps all in memory.
+            directory: Where trials are kept, and from where the search goes on; None keeps them in memory.
             trials: How many.
-            executor: Who plays; by default all cores of this machine.
+            executor: Plays the games; by default all cores of this machine.
             processes: How many, instead of one per core.
             stack: Worlds side by side in each.
-            command: What `study.json` is to name as the command.
+            command: The command that `study.json` names.
             on_progress: Called after each finished run, and now and then.
 
         Raises:
-            BatchError: The directory holds another search, somebody else searches there, or a file has changed meanwhile.
+            BatchError: The directory holds another search, another process searches there, or a file has changed meanwhile.
             RecordError: The directory cannot be written.
         """
         _check_whole("trials", trials, 1, MOST_TRIALS)
-        crew = Crew(executor, processes, stack)
-        variables = self.proposer.variables
+        player, proposer = RoundPlayer(executor, processes, stack), self._proposer()
         info = {**self.info, "command": list(command or sys.argv)}
         path = None if directory is None else Path(directory)
         with nullcontext() if path is None else StudyStore(path, info) as store:
-            done = [] if path is None or store is None else read_trials(path, store.info)
+            done = [] if store is None else list(store.trials)
             notes = [] if store is None else notes_on_versions(store.info, info, len(done))
             progress = SearchProgress(trials, len(done), len(done))
             tell = on_progress or (lambda _: None)
             self._count(progress, done)
             tell(progress)
+            n_learned = 0
             while len(done) < trials:
-                done += self._round(done, progress, crew, tell)
+                n_whole = len(done) // self.per_round * self.per_round
+                proposer.learn(done[n_learned:n_whole])
+                n_learned = n_whole
+                points = proposer.propose()[len(done) - n_whole : trials - n_whole]
+                new = self._round(points, done, progress, player, tell)
                 if store is not None:
-                    store.put(done, variables)
+                    store.add(new)
+                done += new
                 self._count(progress, done)
                 tell(progress)
-            return Study(path, info if store is None else store.info, variables, tuple(done), notes)
+            return Study(path, info if store is None else store.info, self.variables, tuple(done), notes)
+
+    def _proposer(self) -> Proposer:
+        return Proposer(self.variables, self.sampler, self.sample_seed, self.per_round, self.is_minimized)
 
     def _round(
         self,
+        points: Sequence[Point],
         done: Sequence[Trial],
         progress: SearchProgress,
-        crew: Crew,
+        player: RoundPlayer,
         tell: Callable[[SearchProgress], None],
     ) -> list[Trial]:
-        """The trials of the next round."""
+        """The trials of some values of the round under way."""
         self.content.check_same(self.mission.read())
-        number = done[-1].round + 1 if done else 0
-        progress.n_round = min(self.proposer.per_round, progress.n_trials - len(done))
+        progress.n_round = len(points)
 
         def on_progress(batch: Progress) -> None:
             progress.played = (batch.n_done + batch.under_way) / batch.n_runs
             tell(progress)
 
-        points = self.proposer.propose(number, progress.n_round, done)
-        return self.evaluator.trials(points, number, done, crew, on_progress)
+        return self.evaluator.trials(points, len(done) // self.per_round, done, player, on_progress)
 
     def _count(self, progress: SearchProgress, done: Sequence[Trial]) -> None:
         progress.n_done, progress.n_round, progress.played = len(done), 0, 0.0
         progress.n_failed = sum(not t.is_complete for t in done)
-        progress.best = best_of(done, self.proposer.is_minimized)
+        progress.best = best_of(done, self.is_minimized)
 
 
 def optimize(
@@ -264,8 +272,8 @@ def optimize(
         objective: The quantity.
         vary: What varies.
         trials: How many sets of values are tried.
-        directory: Where whole rounds are kept at once, and from where the same search goes on; None keeps all in memory.
-        executor: Who plays; by default all cores of this machine.
+        directory: Where trials are kept, and from where the same search goes on; None keeps them in memory.
+        executor: Plays the games; by default all cores of this machine.
         processes: How many, instead of one per core.
         stack: Worlds side by side in each.
         on_progress: Called after each finished run, and now and then.

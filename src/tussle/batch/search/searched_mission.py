@@ -11,12 +11,11 @@ from typing import Any
 
 from tussle.batch.batch import Batch
 from tussle.batch.points import settings_of
+from tussle.batch.search.trials import Point
 from tussle.batch.treatments import build_points
 from tussle.batch.variables import Value, Variable
 from tussle.errors import BatchError, TussleError
 from tussle.mission import Loaded, Mission, PluginFile, read_mission
-
-Point = Mapping[str, Value]
 
 
 @dataclass(frozen=True)
@@ -116,7 +115,7 @@ class SearchedMission:
         return self.batch(playable) if playable else None, errors
 
     def about(self, content: Content) -> dict[str, Any]:
-        """What `study.json` says of it."""
+        """Its entry in `study.json`."""
         if content.loaded is None:
             return {"made_in": "python"}
         return {

@@ -1,4 +1,4 @@
-"""What came of a search: its trials, the best of them, and how far it is ahead."""
+"""The results of a search: its trials, the best of them, and its lead."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 import pyarrow as pa
 
 from tussle.batch.points import settings_of
-from tussle.batch.search.proposals import Proposer
+from tussle.batch.search.proposals import importances
 from tussle.batch.search.trials import Trial, trials_table
 from tussle.batch.statistics import Comparison, paired_difference
 from tussle.batch.variables import Value, Variable
@@ -64,10 +64,10 @@ class Study:
 
     @cached_property
     def lead(self) -> Comparison | None:
-        """What the best trial has more than the next one, seed by seed; None for less than two trials of different values.
+        """The best trial minus the next one, seed by seed; None for less than two trials of different values.
 
-        An interval that holds zero says that the two cannot be told apart. Both were picked for their objectives on these very seeds, so
-        that even one which does not says less than it seems to.
+        Where its interval holds zero, the two cannot be told apart. Both were picked for their objectives on these very seeds, so
+        an interval without zero is weaker evidence than it seems.
         """
         if len(self.ranking) < 2:
             return None
@@ -113,11 +113,7 @@ class Study:
         Raises:
             MissingExtraError: Optuna is not installed.
         """
-        info = self.info
-        proposer = Proposer(
-            self.variables, info["sampler"], info["sample_seed"], info["per_round"], self.is_minimized
-        )
-        return proposer.importances(self.trials)
+        return importances(self.trials, self.variables, self.is_minimized)
 
     def settings(self, values: Mapping[str, Value]) -> dict[str, str]:
         """Values as a mission file takes them."""

@@ -1,43 +1,39 @@
-"""The directory of a search: what is searched, and all whole rounds."""
+"""The directory of a search: what is searched, and the journal of its trials, which Optuna keeps."""
 
 from __future__ import annotations
 
 import json
 import math
+import os
 from collections.abc import Mapping, Sequence
 from importlib import metadata
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
-import pyarrow as pa
 import pyarrow.parquet as pq
 
 from tussle.batch.consistency import MOST_VALUE
 from tussle.batch.plan import MOST_RUNS
 from tussle.batch.schemas import SEED, VARIABLE
-from tussle.batch.search.proposals import SAMPLERS
+from tussle.batch.search.proposals import SAMPLERS, new_study, quiet, require_optuna
 from tussle.batch.search.study import Study
-from tussle.batch.search.trials import (
-    FACTS,
-    MOST_TRIALS,
-    Trial,
-    column_name,
-    column_type,
-    trials_of,
-    trials_table,
-)
+from tussle.batch.search.trials import MOST_TRIALS, Trial, frozen, thawed, trials_table
 from tussle.batch.store import locked, told
-from tussle.batch.variables import Range, Variable
+from tussle.batch.variables import Variable
 from tussle.batch.varied import variable_of
-from tussle.documents import Document, Map, Whole
+from tussle.documents import Document, Map, Maybe, Real, Whole, problem, read_text
 from tussle.errors import BatchError
-from tussle.record.parquet_file import read_parquet
 from tussle.record.run_file import plain, put_whole, versions
-from tussle.record.table_values import COUNT, TEXT, Bounds, check_values
+
+if TYPE_CHECKING:
+    from optuna.storages import JournalStorage
+
+STUDY_FILE, JOURNAL_FILE, TRIALS_FILE, LOCK = "study.json", "trials.journal", "trials.parquet", "lock"
+OWN_FILES = (STUDY_FILE, JOURNAL_FILE, TRIALS_FILE, LOCK)
 
 STUDY = Document(
     "the search",
-    1,
+    2,
     {
         "variables": [VARIABLE],
         "name": str,
@@ -48,39 +44,36 @@ STUDY = Document(
         "first_seed": SEED,
         "sampler": SAMPLERS,
         "sample_seed": Whole(),
-        "per_round": Whole(1),
+        "per_round": Whole(1, MOST_TRIALS),
         "versions": Map(str),
     },
     BatchError,
 )
 """What `study.json` says."""
-_MEAN = Bounds(-MOST_VALUE, MOST_VALUE, may_miss=True)
-RULES = {
-    "objective": _MEAN,
+_MEAN = Maybe(Real(-MOST_VALUE, MOST_VALUE))
+TRIAL = {
+    "value": _MEAN,
     "low": _MEAN,
     "high": _MEAN,
-    "trial": COUNT,
-    "round": COUNT,
-    "n_failed": COUNT,
-    "state": TEXT,
+    "n_failed": Whole(0, MOST_RUNS),
+    "error": str,
+    "by_seed": [Maybe(Real())],
 }
-"""Of the table of trials."""
-STUDY_FILE, TRIALS_FILE, LOCK = "study.json", "trials.parquet", "lock"
-
+"""What the journal says of a trial, beside its parameters."""
 COMPARED = (
     "tussle", "name", "mission", "objective", "direction", "variables", "runs", "first_seed", "sampler", "sample_seed", "per_round",
 )  # fmt: skip
-"""What a search is told apart by, in the order in which differences are named."""
-
-
+"""What tells searches apart, in the order in which differences are named."""
 PROPOSED_BY = ("optuna", "cmaes", "numpy", "scipy")
-"""Packages on whose versions it depends what is tried."""
+"""Packages on whose versions the proposals depend."""
+MOST_JOURNAL = 1 << 28
+"""Of a journal [B]."""
 
 
 class StudyStore:
-    """A directory into which one search writes; nobody else does meanwhile.
+    """A directory into which one search writes.
 
-    The table of trials is replaced after each round, so that a round is there whole or not at all.
+    Each trial is one line of the journal, written when its round is finished.
 
     Args:
         path: The directory; made if need be.
@@ -88,6 +81,7 @@ class StudyStore:
 
     Attributes:
         info: What `study.json` says.
+        trials: All trials so far.
 
     Raises:
         BatchError: It holds another search or something else, or another process writes there.
@@ -96,10 +90,9 @@ class StudyStore:
 
     def __init__(self, path: Path, info: Mapping[str, Any]) -> None:
         self.path = path
-        own = (STUDY_FILE, TRIALS_FILE, LOCK)
         with told(path):
             path.mkdir(parents=True, exist_ok=True)
-            foreign = [p.name for p in path.iterdir() if p.name.removesuffix(".part") not in own]
+            foreign = [p.name for p in path.iterdir() if p.name.removesuffix(".part") not in OWN_FILES]
             if foreign and not (path / STUDY_FILE).exists():
                 raise BatchError(
                     f"{path}: holds something that is no search ({min(foreign)}); choose another directory"
@@ -107,6 +100,9 @@ class StudyStore:
         self._lock = locked(path, "at this search")
         try:
             self.info = self._agreed(dict(plain(info)))
+            self.variables = [variable_of(said) for said in self.info["variables"]]
+            self._repair()
+            self.trials = read_trials(path, self.info)
         except BaseException:
             self._lock.close()
             raise
@@ -124,24 +120,47 @@ class StudyStore:
             )
         return before
 
-    def put(self, trials: Sequence[Trial], variables: Sequence[Variable]) -> None:
-        """Put the table of all trials in its place."""
-        table = trials_table(trials, variables)
-        draft = self.path / f"{TRIALS_FILE}.part"
+    def _repair(self) -> None:
+        """Remove what a killed process may have left: half a line at the end of the journal, and Optuna's own lock."""
+        journal = self.path / JOURNAL_FILE
         with told(self.path):
-            try:
-                draft.unlink(missing_ok=True)
-                pq.write_table(table, draft, compression="zstd")
-                draft.replace(self.path / TRIALS_FILE)
-            except OSError:
-                draft.unlink(missing_ok=True)
-                raise
+            (self.path / f"{JOURNAL_FILE}.lock").unlink(missing_ok=True)
+            if journal.exists():
+                whole = read_text(journal, BatchError, MOST_JOURNAL).rpartition("\n")
+                os.truncate(journal, len((whole[0] + whole[1]).encode()))
+
+    def add(self, trials: Sequence[Trial]) -> None:
+        """Append trials to the journal, and write the table of all."""
+        import optuna
+
+        with told(self.path), quiet():
+            storage = _journal(self.path / JOURNAL_FILE)
+            is_new = not storage.get_all_studies()
+            is_minimized = self.info["direction"] == "minimize"
+            study = (
+                new_study(is_minimized, storage)
+                if is_new
+                else optuna.load_study(study_name="tussle", storage=storage)
+            )
+            study.add_trials([frozen(trial, self.variables) for trial in trials])
+            self.trials += trials
+            draft = self.path / f"{TRIALS_FILE}.part"
+            draft.unlink(missing_ok=True)
+            pq.write_table(trials_table(self.trials, self.variables), draft, compression="zstd")
+            draft.replace(self.path / TRIALS_FILE)
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
         self._lock.close()
+
+
+def _journal(path: Path) -> JournalStorage:
+    from optuna.storages import JournalStorage
+    from optuna.storages.journal import JournalFileBackend
+
+    return JournalStorage(JournalFileBackend(str(path)))
 
 
 def _difference(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
@@ -169,7 +188,7 @@ def read_info(path: Path) -> dict[str, Any]:
 
 
 def read_trials(path: Path, info: Mapping[str, Any]) -> list[Trial]:
-    """All trials of whole rounds.
+    """All trials of a journal, of which nobody else's word is taken: it may have been damaged.
 
     Args:
         path: The directory.
@@ -177,28 +196,48 @@ def read_trials(path: Path, info: Mapping[str, Any]) -> list[Trial]:
 
     Raises:
         BatchError: They cannot be read.
+        MissingExtraError: Optuna is not installed.
     """
-    file = path / TRIALS_FILE
+    file = path / JOURNAL_FILE
     if not file.exists():
         return []
-    variables = [variable_of(said) for said in info["variables"]]
-    wanted = [(column_name(v), column_type(v)) for v in variables]
-    table = read_parquet(file, pa.schema([*FACTS, *wanted]), BatchError, most_rows=MOST_TRIALS)
-    tried = {column_name(v): Bounds(v.low, v.high) if isinstance(v, Range) else TEXT for v in variables}
-    check_values(zip(table.column_names, table.columns, strict=True), RULES | tried, file, BatchError)
+    require_optuna()
+    import optuna
+
+    read_text(file, BatchError, MOST_JOURNAL)
+    variables: list[Variable] = [variable_of(said) for said in info["variables"]]
     try:
-        trials = trials_of(table, variables)
-    except (KeyError, TypeError) as error:
-        raise BatchError(f"{file}: cannot be read: {error}") from None
-    for i, trial in enumerate(trials):
-        if trial.low > trial.high or math.isnan(trial.low) != math.isnan(trial.high):
-            raise BatchError(f"{file}: low = {trial.low} in row {i} is not allowed; high is {trial.high}")
-        if trial.number != i:
-            raise BatchError(f"{file}: trial = {trial.number} in row {i} is not allowed; it is {i}")
-        n_games = len(trial.by_seed)
-        if n_games != info["runs"] and (n_games or trial.is_complete):
-            raise BatchError(f"{file}: trial {i} has {n_games} games; study.json says {info['runs']}")
-    return trials
+        with quiet():
+            storage = _journal(file)
+            if not storage.get_all_studies():
+                return []
+            found = optuna.load_study(study_name="tussle", storage=storage).get_trials(deepcopy=False)
+            for i, one in enumerate(found):
+                if said := _against(i, one, info):
+                    raise BatchError(f"{file}: {said}")
+            return [thawed(i, info["per_round"], one, variables) for i, one in enumerate(found)]
+    except BatchError:
+        raise
+    except Exception as error:  # noqa: BLE001  a damaged line breaks Optuna anywhere
+        raise BatchError(f"{file}: cannot be read: {type(error).__name__}: {error!s:.200}") from None
+
+
+def _against(i: int, trial: Any, info: Mapping[str, Any]) -> str:
+    """What cannot be of a trial in the journal; "" for nothing."""
+    facts = {"value": trial.value, **trial.user_attrs}
+    if i >= MOST_TRIALS or (said := problem(facts, TRIAL, f"trial {i}")):
+        return said if i < MOST_TRIALS else f"has more than {MOST_TRIALS:,} trials"
+    low, high, n_games = facts["low"], facts["high"], len(facts["by_seed"])
+    if (low is None) != (high is None) or (low is not None and low > high):
+        return f"trial {i}: low = {low} is not allowed; high is {high}"
+    is_complete = trial.state.name == "COMPLETE"
+    if is_complete != (not facts["error"]) or is_complete != (
+        trial.value is not None and math.isfinite(trial.value)
+    ):
+        return f"trial {i}: state = {trial.state.name} is not allowed; its value is {trial.value}"
+    if n_games != info["runs"] and (n_games or is_complete):
+        return f"trial {i} has {n_games} games; study.json says {info['runs']}"
+    return ""
 
 
 def load_study(path: str | Path) -> Study:
@@ -206,6 +245,7 @@ def load_study(path: str | Path) -> Study:
 
     Raises:
         BatchError: There is none, or it cannot be read.
+        MissingExtraError: Optuna is not installed.
     """
     path = Path(path)
     info = read_info(path)
@@ -225,7 +265,7 @@ def versions_of_samplers() -> dict[str, str]:
 
 
 def notes_on_versions(before: Mapping[str, Any], now: Mapping[str, Any], n: int) -> list[str]:
-    """What is to be said where the trials so far were proposed by other versions."""
+    """What is to be said where other versions proposed the trials so far."""
     then, today = before.get("versions", {}), now["versions"]
     changed = [
         f"{name} {then.get(name)}, now {today[name]}" for name in PROPOSED_BY if then.get(name) != today[name]
