@@ -7,21 +7,12 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from tussle.palette import TEAM_COLOURS, rgb_of
 from tussle.view.shapes import MODELS
 
 Colour = tuple[int, int, int]
 
-# M. Okabe and K. Ito, Color Universal Design (2008): told apart with every kind of colour vision. Their black is left out, which
-# is lost on a dark background.
-PALETTE: tuple[Colour, ...] = (
-    (0, 114, 178),
-    (213, 94, 0),
-    (0, 158, 115),
-    (230, 159, 0),
-    (86, 180, 233),
-    (204, 121, 167),
-    (240, 228, 66),
-)
+PALETTE: tuple[Colour, ...] = tuple(map(rgb_of, TEAM_COLOURS))
 """Colours of teams 1, 2, ..., and again from the first."""
 
 _WORDS: Mapping[str, tuple[str, ...]] = {

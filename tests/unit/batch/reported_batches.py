@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from made_batches import made_batch
 
-from tussle.batch.report.outline import head_of, sections_of
-from tussle.batch.report.subject import Subject
+from tussle.batch.report import sections_of
+from tussle.batch.report.report_data import ReportData
+from tussle.batch.report.sections import answer, notes
 from tussle.batch.results import Results
 from tussle.batch.sampling import sample
 from tussle.batch.variables import Choice, Range
@@ -49,20 +50,19 @@ def ranges():
     return made_batch(scores, variables=variables, points=points, sample="lhs")
 
 
-def words_of(stored, more=()) -> str:
-    """All that the page would say, without its pictures being drawn."""
-    subject = Subject(Results(stored), more)
-    head, parts = head_of(subject), []
-    for section in sections_of(subject):
+def texts_of(stored, more=()) -> str:
+    """All texts of the page, without its pictures being drawn."""
+    data, parts = ReportData(Results(stored), more), []
+    for section in sections_of(data):
         parts += [section.title, *section.lead]
-        parts += [f"{plate.title} {plate.caption}" for plate in section.plates]
+        parts += [f"{plot.title} {plot.caption}" for plot in section.plots]
         parts += [f"{name} {value}" for name, value in section.facts]
         for table in section.tables:
             parts += [table.title, *(" ".join(row) for row in table.rows), table.caption]
-    return "\n".join([head.title, head.answer, *head.notes, *parts])
+    return "\n".join([answer(data), *notes(data), *parts]).replace("\u00a0", " ")
 
 
 def names_of(stored, more=()) -> set[str]:
     """Names of the sections and of the plots, which are not drawn."""
-    sections = sections_of(Subject(Results(stored), more))
-    return {s.name for s in sections} | {plate.name for s in sections for plate in s.plates}
+    sections = sections_of(ReportData(Results(stored), more))
+    return {s.name for s in sections} | {plot.name for s in sections for plot in s.plots}

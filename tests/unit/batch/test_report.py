@@ -135,7 +135,7 @@ def test_colours_of_the_page_stand_in_the_plots_for_those_of_the_files(of_paper)
     assert "#20252b" not in html[html.index("</style>") :]
 
 
-def test_what_the_page_says_is_on_it(of_paper, of_choices):
+def test_the_page_answers_and_has_its_sections(of_paper, of_choices):
     _, page, _ = of_paper
     assert "keepers won 593 of 1,000 games (59.3 %, 95 % interval 56.2 to 62.3)" in page.text
     assert {"won", "plot-wins", "plot-margin", "left", "plot-left-1"} <= set(page.all("id"))
@@ -226,13 +226,14 @@ def test_the_page_of_many_points_stays_small(tmp_path):
     assert "4,096 games" in page.text
 
 
-def test_without_matplotlib_the_extra_is_named(monkeypatch, tmp_path):
-    monkeypatch.setitem(sys.modules, "matplotlib", None)
-    with pytest.raises(MissingExtraError, match=r"matplotlib.*pip install 'tussle\[batch\]'"):
+@pytest.mark.parametrize("package", ["matplotlib", "jinja2", "statsmodels.regression.linear_model"])
+def test_without_a_package_the_extra_is_named(monkeypatch, tmp_path, package):
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(MissingExtraError, match=rf"{package.partition('.')[0]}.*tussle\[batch\]"):
         write_report(Results(choices()), tmp_path)
 
 
 def test_a_directory_that_cannot_be_written_is_named(tmp_path):
     (tmp_path / "taken").write_text("a file")
-    with pytest.raises(RecordError, match=r"taken: the report cannot be written"):
+    with pytest.raises(RecordError, match="taken"):
         write_report(Results(choices()), tmp_path / "taken")

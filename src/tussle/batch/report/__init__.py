@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tussle.errors import RecordError
+from tussle.errors import MissingExtraError, RecordError
 
 if TYPE_CHECKING:
+    from tussle.batch.report.drawing import Picture
+    from tussle.batch.report.report_data import ReportData
+    from tussle.batch.report.sections import Section
     from tussle.batch.results import Results
 
 INDEX = "index.html"
@@ -40,23 +45,17 @@ def write_report(results: Results, directory: str | Path, quantities: Sequence[s
 
     Raises:
         ParameterError: There is no such quantity.
-        MissingExtraError: Matplotlib is not installed.
+        MissingExtraError: Matplotlib, Jinja or statsmodels is not installed.
         RecordError: The directory cannot be written.
     """
     from tussle.batch.report.drawing import house_style, pictured
-    from tussle.batch.report.outline import head_of, sections_of
-    from tussle.batch.report.page import figure_id, page
-    from tussle.batch.report.subject import Subject
+    from tussle.batch.report.report_data import ReportData
 
-    subject = Subject(results, quantities)
     with house_style():
-        sections = sections_of(subject)
-        plates = [plate for section in sections for plate in section.plates]
-        pictures = {
-            plate.name: pictured(plate.draw(), figure_id(plate.name), plate.title) for plate in plates
-        }
-    assert len(pictures) == len(plates), "two plots have one name"
-    html = page(head_of(subject), sections, pictures)
+        data = ReportData(results, quantities)
+        sections = sections_of(data)
+        pictures = {p.name: pictured(p.draw(), f"plot-{p.name}", p.title) for s in sections for p in s.plots}
+    html = _page(data, sections, pictures)
     place = Path(directory)
     try:
         place.mkdir(parents=True, exist_ok=True)
@@ -67,9 +66,65 @@ def write_report(results: Results, directory: str | Path, quantities: Sequence[s
     except OSError as error:
         raise RecordError(f"{place}: the report cannot be written: {error.strerror or error}") from error
     missing = "".join(sorted({letter for picture in pictures.values() for letter in picture.missing}))
-    notes = (
-        (f"the font of the PNG files has no {missing}; the page and the SVG files show it",)
-        if missing
-        else ()
+    note = f"the font of the PNG files has no {missing}; the page and the SVG files show it"
+    return Report(place / INDEX, tuple(pictures), (note,) if missing else ())
+
+
+def sections_of(data: ReportData) -> list[Section]:
+    """All sections that are not empty; without a game that did not fail, only those that need none."""
+    from tussle.batch.report import sections as of_games
+    from tussle.batch.report import variable_sections as of_variables
+
+    chosen = [of_games.look_at, of_games.making]
+    if data.n_good:
+        effects = [
+            of_variables.effects,
+            of_variables.maps,
+            of_variables.strengths,
+            of_variables.differences,
+            of_variables.points,
+        ]
+        chosen = [of_games.won, of_games.scores, *effects, of_games.left, of_games.ended, *chosen]
+    return list(_with_own_names([made for section in chosen if not (made := section(data)).is_empty]))
+
+
+def _with_own_names(sections: Sequence[Section]) -> Iterator[Section]:
+    """Sections whose plots have different names, also where files do not tell A from a."""
+    seen: Counter[str] = Counter()
+    for section in sections:
+        named = []
+        for plot in section.plots:
+            name = plot.name
+            while seen[name.lower()]:
+                seen[plot.name.lower()] += 1
+                name = f"{plot.name}-{seen[plot.name.lower()]}"
+            seen[name.lower()] += 1
+            named.append(replace(plot, name=name))
+        yield replace(section, plots=named)
+
+
+def _page(data: ReportData, sections: Sequence[Section], pictures: dict[str, Picture]) -> str:
+    try:
+        import jinja2
+    except ImportError as error:
+        raise MissingExtraError(
+            f"the report needs jinja2, which cannot be imported ({error}); pip install 'tussle[batch]' brings it"
+        ) from None
+    from tussle.batch.report.drawing import printable
+    from tussle.batch.report.sections import answer, headline, notes
+
+    folder, results = files("tussle.batch.report"), data.results
+    environment = jinja2.Environment(
+        autoescape=True, finalize=lambda value: value if hasattr(value, "__html__") else printable(str(value))
     )
-    return Report(place / INDEX, tuple(pictures), notes)
+    return environment.from_string(folder.joinpath("page.html.j2").read_text(encoding="utf-8")).render(
+        title=str(results.info.get("name") or "A batch of games"),
+        version=str(results.info.get("tussle", "")),
+        source="a batch in memory" if results.path is None else f"the batch {results.path.resolve().name}",
+        style=folder.joinpath("page.css").read_text(encoding="utf-8"),
+        answer=answer(data),
+        notes=notes(data),
+        headline=headline(data),
+        sections=sections,
+        pictures=pictures,
+    )

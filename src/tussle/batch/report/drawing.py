@@ -9,24 +9,19 @@ import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from html import escape
 from typing import TYPE_CHECKING, Any
-from xml.etree import ElementTree as ET
 
 from tussle.errors import MissingExtraError, visible
+from tussle.palette import GRID, INK, MUTED, PAPER
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 WIDTH = 4.4
-"""Of a plot [inch]: its letters stay legible where a telephone shows it 370 pixels wide."""
+"""Of a plot [inch]: its text stays legible where a telephone shows it 370 pixels wide."""
 
-INK, MUTED, GRID, PAPER = "#20252b", "#5f6a76", "#dfe3e8", "#fefefe"
-"""Of letters, of what stands back, of helping lines, of the ground; the page puts its own in their place."""
-
-# Okabe and Ito (2008), "Color Universal Design": told apart with any kind of colour vision. Its black is the ink of the page, and
-# its yellow, too pale for thin lines on white, comes last.
-PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", INK, "#f0e442")
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 
 STYLE: dict[str, Any] = {
@@ -126,20 +121,9 @@ def blank(height: float, n_rows: int = 1, n_columns: int = 1, **options: Any) ->
     return figure, figure.subplots(n_rows, n_columns, squeeze=False, **options)
 
 
-def colour_of(team: int) -> str:
-    """A team's colour, the same in all plots."""
-    return PALETTE[(team - 1) % len(PALETTE)]
-
-
 def marker_of(team: int) -> str:
     """A team's marker, for those who do not see its colour."""
     return MARKERS[(team - 1) % len(MARKERS)]
-
-
-def mixed(colour: str, other: str, share: float) -> str:
-    """A colour with some share of another in it."""
-    a, b = (tuple(int(c[i : i + 2], 16) for i in (1, 3, 5)) for c in (colour, other))
-    return "#" + "".join(f"{round(x + (y - x) * share):02x}" for x, y in zip(a, b, strict=True))
 
 
 def rule_x(axes: Axes) -> None:
@@ -232,56 +216,32 @@ def lettering(figure: Figure) -> Iterator[set[str]]:
 
 
 def inlined(svg: str, name: str, title: str) -> str:
-    """An SVG file as an element of a page: no address, no identifier that another picture has, the colours of the page.
+    """An SVG file of Matplotlib as an element of a page, with the colours of the page and identifiers that no other picture has.
 
     Args:
-        svg: What Matplotlib wrote.
-        name: Begins each identifier that is kept.
+        svg: The file.
+        name: Begins each identifier.
         title: What the picture shows.
     """
-    root = ET.fromstring(svg)  # noqa: S314  Matplotlib wrote it a moment ago
-    for child in list(root):
-        if _bare(child.tag) == "metadata" or child.find(f"{_SVG}style") is not None:
-            root.remove(child)  # the style holds for a whole page; page.css says it of its pictures
-    used = {
-        text for node in root.iter() for value in node.attrib.values() for text in _REFERENCE.findall(value)
-    }
-    for node in root.iter():
-        node.tag = _bare(node.tag)
-        attributes = {_bare(key): value for key, value in node.attrib.items()}
-        if attributes.get("id") in used:
-            attributes["id"] = f"{name}-{attributes['id']}"
-        else:
-            attributes.pop("id", None)
-        node.attrib.clear()
-        node.attrib.update({key: _on_page(key, value, name) for key, value in attributes.items()})
-        node.text, node.tail = _trimmed(node.text), _trimmed(node.tail)
-    view = root.get("viewBox", "")
-    root.attrib.clear()
-    root.attrib.update({"viewBox": view, "role": "img", "aria-label": printable(title)})
-    return ET.tostring(root, encoding="unicode")
+    body = re.sub(
+        r"<metadata>.*?</metadata>|<style.*?</style>|<!--.*?-->|\n\s*",
+        " ",
+        svg[svg.index("<svg") :],
+        flags=re.DOTALL,
+    )
+    view = re.search(r'viewBox="[^"]*"', body)
+    assert view is not None
+    body = re.sub(r"<[^>]+>", lambda tag: _on_page(tag[0], name), body[body.index(">") + 1 :])
+    body = re.sub(r">\s+<", "><", body)
+    return f'<svg {view[0]} role="img" aria-label="{escape(printable(title))}">{body.strip()}'
 
 
-_SVG = "{http://www.w3.org/2000/svg}"
-_REFERENCE = re.compile(r"(?:^|url\()#([\w-]+)")
+def _on_page(tag: str, name: str) -> str:
+    """A tag of Matplotlib's, whose attributes hold no text from outside."""
+    tag = re.sub(r'( id="|href="#|url\(#)', rf"\g<1>{name}-", tag).replace("xlink:href", "href")
+    for colour, variable in _ON_PAGE.items():
+        tag = tag.replace(colour, variable)
+    return re.sub(r"\s+", " ", tag)
+
+
 _ON_PAGE = {INK: "var(--ink)", MUTED: "var(--muted)", GRID: "var(--grid)", PAPER: "var(--paper)"}
-
-
-def _bare(name: str) -> str:
-    return name.rsplit("}", 1)[-1]
-
-
-def _trimmed(text: str | None) -> str | None:
-    return None if text is None or not text.strip() else text
-
-
-def _on_page(key: str, value: str, name: str) -> str:
-    """An attribute as it stands in the page."""
-    if key == "href":
-        return value.replace("#", f"#{name}-", 1)
-    if key == "clip-path":
-        return value.replace("url(#", f"url(#{name}-")
-    if key == "style":
-        for colour, variable in _ON_PAGE.items():
-            value = value.replace(colour, variable)
-    return re.sub(r"\s+", " ", value) if key == "d" else value

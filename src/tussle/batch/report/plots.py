@@ -1,7 +1,4 @@
-"""Plots of what came out: who won, by how much, how scores spread, how long games took, who was left when.
-
-Each takes plain numbers and gives a figure; `house_style` is to be around them.
-"""
+"""The plots of a report. Each function takes numbers and returns a figure; `house_style` must be around the calls."""
 
 from __future__ import annotations
 
@@ -12,214 +9,188 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tussle.batch.report.drawing import INK, MUTED, PAPER, blank, legend_above, rule_x, rule_y, shortened
-from tussle.batch.report.words import estimate, percent
+from tussle.batch.report.drawing import blank, legend_above, rule_x, rule_y, shortened
+from tussle.batch.report.formatting import estimate, percent, signed
+from tussle.batch.report.report_data import Axis
+from tussle.palette import INK, MUTED, NEUTRAL, PAPER, SEQUENTIAL, mixed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-ROW = 0.34
-"""Height of a row of a plot whose rows have names [inch]."""
+    from tussle.batch.sensitivity import Effect
+    from tussle.batch.statistics import Share
 
-END_COLOURS = {"time": "#8d97a3", "one_team": "#4a78a8", "all_dead": "#b5894b"}
-"""Shades for why games ended; no team has them."""
-END_WORDS = {
-    "time": "the end time was reached",
-    "one_team": "one team was left",
-    "all_dead": "nobody was left",
-}
+MOST_TICKS = 8
+"""Values that are all written at an axis."""
+END_COLOURS = dict(zip(("time", "one_team", "all_dead"), NEUTRAL, strict=True))
+END_TEXTS = {"time": "end time reached", "one_team": "one team left", "all_dead": "nobody left"}
+"""Ways in which games end."""
+Limits = tuple[float, float] | None
+"""Ends of an axis of values; None for those that fit the values."""
 
 
 @dataclass(frozen=True)
-class Bar:
-    """A share with its interval, as one row.
+class Series:
+    """Values with intervals, told apart from others by colour and marker.
 
     Args:
-        name: Of the row.
-        colour: Of the bar.
-        share: What it shows, from 0 to 1.
-        low: Lower end of the interval.
-        high: Upper end.
-        text: What stands beside it.
+        name: Of the series.
+        colour: Of its marks or its line.
+        marker: Shape of its marks, or dashes of its line, as Matplotlib says it.
+        mean: The values, (n,); NaN where there is none.
+        low: Lower ends of the intervals, (n,); NaN where there is none.
+        high: Upper ends, (n,).
+        x: Where the values lie, (n,); None where all series share their places.
+        dots: Positions and values of single points, each (n_points,), which are shown faintly; None for none.
     """
 
     name: str
     colour: str
-    share: float
-    low: float
-    high: float
-    text: str
-
-
-@dataclass(frozen=True)
-class Spread:
-    """Values of one quantity, one per run.
-
-    Args:
-        name: Of the row.
-        colour: Of the bars.
-        values: The values, (n,).
-    """
-
-    name: str
-    colour: str
-    values: np.ndarray
-
-
-@dataclass(frozen=True)
-class Curve:
-    """A mean over time with its interval.
-
-    Args:
-        name: Of the line.
-        colour: Of the line.
-        dashes: How it is drawn, as Matplotlib says it: "-", "--", ...
-        t: Times [s], (n,).
-        mean: Mean at these times, (n,).
-        low: Lower end, (n,).
-        high: Upper end, (n,).
-    """
-
-    name: str
-    colour: str
-    dashes: str
-    t: np.ndarray
+    marker: Any
     mean: np.ndarray
     low: np.ndarray
     high: np.ndarray
+    x: np.ndarray | None = None
+    dots: tuple[np.ndarray, np.ndarray] | None = None
 
 
-def share_bars(bars: Sequence[Bar]) -> Figure:
-    """Shares as horizontal bars with thin intervals, and what there is to say to the right of them."""
-    figure, axes = blank(0.55 + ROW * len(bars))
-    (plot,) = axes.flat
-    rows = np.arange(len(bars))[::-1]
-    plot.barh(rows, [b.share for b in bars], height=0.62, color=[b.colour for b in bars])
-    for row, bar in zip(rows, bars, strict=True):
-        plot.plot([bar.low, bar.high], [row, row], color=PAPER, linewidth=3.0, solid_capstyle="butt")
-        plot.plot([bar.low, bar.high], [row, row], color=INK, linewidth=1.1, solid_capstyle="butt")
-        plot.text(1.02, row, bar.text, va="center", transform=plot.get_yaxis_transform())
-    _name_rows(plot, rows, [b.name for b in bars])
-    _shares(plot.xaxis)
-    plot.set_xlim(0.0, _round_share(max(b.high for b in bars)))
-    plot.set_xlabel("share of the games")
-    rule_x(plot)
+def series_of(name: str, colour: str, marker: str, rows: Any) -> Series:
+    """A series from (value, low, high) for each place; None for what is not known."""
+    table = np.array(rows, dtype=float).reshape(-1, 3)
+    return Series(name, colour, marker, *table.T)
+
+
+# -- who won, how much, how long --------------------------------------------------------------------------------------------
+
+
+def share_bars(shares: Sequence[Share], colours: Sequence[str]) -> Figure:
+    """Shares as horizontal bars with their intervals and numbers."""
+    figure, ((plot,),) = blank(0.55 + 0.34 * len(shares))
+    rows = np.arange(len(shares))[::-1]
+    value, low, high = (np.array([getattr(s, name) for s in shares]) for name in ("value", "low", "high"))
+    plot.barh(rows, value, height=0.62, color=list(colours))
+    for colour, width in ((PAPER, 3.0), (INK, 1.1)):
+        plot.hlines(rows, low, high, color=colour, linewidth=width)
+    for row, share in zip(rows, shares, strict=True):
+        text = f"{percent(share.value)}  ({share.n:,})"
+        plot.text(1.02, row, text, va="center", transform=plot.get_yaxis_transform())
+    _name_rows(plot, [s.name for s in shares])
+    plot.set_xlim(0.0, min(math.ceil(high.max() * 10.0 + 0.2) / 10.0, 1.0))
+    _value_axis(plot.xaxis, "share of the games", is_share=True)
     return figure
 
 
 def stacked_shares(names: Sequence[str], parts: Sequence[tuple[str, str, np.ndarray]]) -> Figure:
-    """Each row a whole, divided.
+    """Rows that are each divided into parts.
 
     Args:
         names: Names of the rows.
         parts: Name, colour and shares (n_rows,) of each part, from left to right.
     """
-    figure, axes = blank(0.8 + 0.24 * len(names))
-    (plot,) = axes.flat
-    rows = np.arange(len(names))[::-1]
-    left = np.zeros(len(names))
-    handles = []
+    figure, ((plot,),) = blank(0.8 + 0.24 * len(names))
+    left, handles = np.zeros(len(names)), []
     for name, colour, shares in parts:
+        rows = np.arange(len(names))[::-1]
         bars = plot.barh(rows, shares, left=left, height=0.72, color=colour, edgecolor=PAPER, linewidth=0.5)
         handles.append((bars[0], name))
         left = left + shares
-    _name_rows(plot, rows, names)
-    _shares(plot.xaxis)
+    _name_rows(plot, names)
     plot.set_xlim(0.0, 1.0)
-    plot.set_xlabel("share of the games")
-    rule_x(plot)
+    _value_axis(plot.xaxis, "share of the games", is_share=True)
     legend_above(figure, handles)
     return figure
 
 
-def distributions(spreads: Sequence[Spread], label: str) -> Figure:
-    """Histograms one below the other on the same axis; a dot for the mean, a line for the middle half of the games."""
-    figure, axes = blank(0.5 + 0.72 * len(spreads), len(spreads), sharex=True, gridspec_kw={"hspace": 0.05})
-    edges = edges_for(inside(np.concatenate([s.values for s in spreads])))
-    tallest = max(np.histogram(s.values, edges)[0].max() for s in spreads)
-    for plot, spread in zip(axes.flat, spreads, strict=True):
-        counts = np.histogram(spread.values, edges)[0]
-        plot.stairs(counts, edges, fill=True, color=spread.colour, alpha=0.75, linewidth=0)
-        quarter, three = np.quantile(spread.values, [0.25, 0.75])
+def distributions(
+    values: Sequence[np.ndarray], names: Sequence[str], colours: Sequence[str], label: str
+) -> Figure:
+    """Histograms one below the other on one axis, with the mean as a dot and the middle half of the games as a line."""
+    figure, axes = blank(0.5 + 0.72 * len(values), len(values), sharex=True, gridspec_kw={"hspace": 0.05})
+    edges = edges_for(np.concatenate(values))
+    tallest = max(np.histogram(v, edges)[0].max() for v in values)
+    for plot, some, name, colour in zip(axes.flat, values, names, colours, strict=True):
+        plot.hist(some, edges, color=colour, alpha=0.75, histtype="stepfilled", linewidth=0)
         below = -0.14 * tallest
-        plot.plot([quarter, three], [below, below], color=spread.colour, linewidth=2.4, solid_capstyle="butt")
-        plot.plot([spread.values.mean()], [below], "o", color=INK, markersize=3.6, markeredgecolor=PAPER)
+        plot.hlines(below, *np.quantile(some, [0.25, 0.75]), color=colour, linewidth=2.4)
+        plot.plot([some.mean()], [below], "o", color=INK, markersize=3.6, markeredgecolor=PAPER)
         plot.set_ylim(-0.26 * tallest, 1.05 * tallest)
         plot.set_yticks([])
-        plot.spines["left"].set_visible(False)
-        plot.grid(True, axis="x")
-        plot.set_ylabel(shortened(spread.name, 16), rotation=0, ha="right", va="center")
-        told = f"mean {estimate(spread.values.mean())}"
-        if len(spread.values) > 1:
-            told += f"\nsd {estimate(spread.values.std(ddof=1))}"
-        plot.text(1.02, 0.5, told, va="center", transform=plot.transAxes, fontsize=8, linespacing=1.4)
+        plot.set_ylabel(shortened(name, 16), rotation=0, ha="right", va="center")
+        spread = f"\nsd {estimate(some.std(ddof=1))}" if len(some) > 1 else ""
+        plot.text(
+            1.02,
+            0.5,
+            f"mean {estimate(some.mean())}{spread}",
+            va="center",
+            transform=plot.transAxes,
+            fontsize=8,
+        )
+        rule_x(plot)
+    axes[-1, 0].set_xlim(edges[0], edges[-1])
     axes[-1, 0].set_xlabel(label)
     return figure
 
 
 def margins(values: np.ndarray, first: tuple[str, str], second: tuple[str, str], label: str) -> Figure:
-    """Histogram of a difference, its two sides in the colours of who was ahead.
+    """Histogram of a difference, its two sides in the colours of the team that is ahead.
 
     Args:
         values: Second minus first, (n,).
-        first: Name and colour of the side that leads where it is negative.
+        first: Name and colour of the team that leads where the difference is negative.
         second: Name and colour of the other.
         label: Of the axis.
     """
-    figure, axes = blank(2.5)
-    (plot,) = axes.flat
-    edges = edges_for(inside(values), is_about_zero=True)
-    counts = np.histogram(values, edges)[0]
-    centre = (edges[1:] + edges[:-1]) / 2.0
-    is_middle = (edges[:-1] < 0.0) & (edges[1:] > 0.0)
-    colours = np.where(centre < 0.0, first[1], second[1]).astype(object)
-    colours[is_middle] = END_COLOURS["time"]
-    plot.bar(centre, counts, width=np.diff(edges), color=list(colours), edgecolor=PAPER, linewidth=0.3)
+    figure, ((plot,),) = blank(2.5)
+    edges = edges_for(values)
+    width = edges[1] - edges[0]
+    if width % 2.0 == 0.0:
+        width += 1.0  # of whole numbers, the bin about 0 takes as many from both sides
+    steps = np.arange(math.floor(edges[0] / width), math.ceil(edges[-1] / width) + 2)
+    counts, edges = np.histogram(values, (steps - 0.5) * width)
+    colours = np.select([steps[:-1] < 0, steps[:-1] > 0], [first[1], second[1]], END_COLOURS["time"])
+    plot.bar(steps[:-1] * width, counts, width=width, color=list(colours), edgecolor=PAPER, linewidth=0.3)
     plot.axvline(values.mean(), color=INK, linewidth=1.0)
     plot.set_ylabel("games")
     plot.set_xlabel(label)
-    for (name, colour), x, side in ((first, 0.0, "left"), (second, 1.0, "right")):
-        mark = f"◂ {shortened(name, 16)} ahead" if side == "left" else f"{shortened(name, 16)} ahead ▸"
-        plot.text(x, 1.03, mark, ha=side, va="bottom", color=colour, transform=plot.transAxes)
+    for x, side, (name, colour), text in (
+        (0.0, "left", first, "◂ {} ahead"),
+        (1.0, "right", second, "{} ahead ▸"),
+    ):
+        where = {"ha": side, "va": "bottom", "transform": plot.transAxes}
+        plot.text(x, 1.03, text.format(shortened(name, 16)), color=colour, **where)
     rule_y(plot)
     return figure
 
 
 def lengths(ends: Mapping[str, np.ndarray]) -> Figure:
-    """When games ended, stacked by why.
+    """When games ended, stacked by the reason.
 
     Args:
-        ends: Times [s] of the games that ended for each reason.
+        ends: Reason -> times [s] of the games that ended for it.
     """
-    figure, axes = blank(2.4)
-    (plot,) = axes.flat
-    edges = edges_for(np.concatenate(list(ends.values())), fewest=20)
-    base = np.zeros(len(edges) - 1)
-    handles = []
-    for end, t in ends.items():
-        counts = np.histogram(t, edges)[0]
-        colour = END_COLOURS.get(end, MUTED)
-        patch = plot.stairs(base + counts, edges, baseline=base, fill=True, color=colour, linewidth=0)
-        handles.append((patch, f"{END_WORDS.get(end, end)} ({len(t):,})"))
-        base = base + counts
+    figure, ((plot,),) = blank(2.4)
+    edges = edges_for(np.concatenate(list(ends.values())))
+    colours = [END_COLOURS.get(end, MUTED) for end in ends]
+    *_, patches = plot.hist(list(ends.values()), edges, stacked=True, histtype="stepfilled", color=colours)
+    shown = patches if len(ends) > 1 else [patches]
+    names = (f"{END_TEXTS.get(end, end)} ({len(t):,})" for end, t in ends.items())
+    legend_above(figure, [(patch[0], name) for patch, name in zip(shown, names, strict=True)])
     plot.set_xlabel("length of the game [s]")
     plot.set_ylabel("games")
     rule_y(plot)
-    legend_above(figure, handles)
     return figure
 
 
-def curves_over_time(curves: Sequence[Curve], label: str) -> Figure:
-    """Means over time, each with its interval as a band."""
-    figure, axes = blank(2.7)
-    (plot,) = axes.flat
+def over_time(curves: Sequence[Series], label: str) -> Figure:
+    """Means over time [s], each with its interval as a band."""
+    figure, ((plot,),) = blank(2.7)
     handles = []
     for curve in curves:
-        plot.fill_between(curve.t, curve.low, curve.high, color=curve.colour, alpha=0.22, linewidth=0)
-        (line,) = plot.plot(curve.t, curve.mean, color=curve.colour, linestyle=curve.dashes)
+        plot.fill_between(curve.x, curve.low, curve.high, color=curve.colour, alpha=0.22, linewidth=0)
+        (line,) = plot.plot(curve.x, curve.mean, color=curve.colour, linestyle=curve.marker)
         handles.append((line, curve.name))
-    plot.set_xlim(min(c.t[0] for c in curves), max(c.t[-1] for c in curves))
+    plot.margins(x=0.0)
     plot.set_ylim(bottom=0.0)
     plot.set_xlabel("time [s]")
     plot.set_ylabel(label)
@@ -229,10 +200,7 @@ def curves_over_time(curves: Sequence[Curve], label: str) -> Figure:
 
 
 def inside(values: np.ndarray) -> np.ndarray:
-    """Values without the few, one in a hundred at each end at the most, that would press all others into a corner.
-
-    They are left out where the axis would be more than twice as long with them.
-    """
+    """Values without the few, one in a hundred at each end at the most, that would more than double the axis."""
     low, high = np.quantile(values, [0.01, 0.99])
     span = max(float(high - low), 1e-300)
     if values.max() - high <= span and low - values.min() <= span:
@@ -240,43 +208,220 @@ def inside(values: np.ndarray) -> np.ndarray:
     return np.asarray(values[(values >= low - span) & (values <= high + span)])
 
 
-def edges_for(values: np.ndarray, *, fewest: int = 8, is_about_zero: bool = False) -> np.ndarray:
-    """Ends of the bins of a histogram: the width by Freedman and Diaconis (1981), whole numbers for whole numbers.
-
-    Args:
-        values: What is counted, (n,).
-        fewest: Number of bins that there are at least, unless the values are whole numbers.
-        is_about_zero: One bin lies about 0, so that what is positive and what is negative fall apart.
-    """
+def edges_for(values: np.ndarray) -> np.ndarray:
+    """Ends of the bins of a histogram, by NumPy's rule and at most 50; of whole numbers, each bin holds equally many of them."""
+    values = inside(values)
     low, high = float(values.min()), float(values.max())
-    spread = float(np.subtract(*np.quantile(values, [0.75, 0.25])))
-    width = 2.0 * spread / len(values) ** (1.0 / 3.0)
-    span = high - low
-    if not 0.0 < span / 50.0 < math.inf:
+    if not 0.0 < (high - low) / 50.0 < math.inf:
         return np.array([low - 0.5, low + 0.5])
     is_whole = bool(np.all(values == np.round(values)))
-    width = min(max(width, span / 50.0), span / fewest)
+    found = np.histogram_bin_edges(values, "fd")
+    width = max(float(found[1] - found[0]), (high - low) / 50.0)
     if is_whole:
         width = max(float(np.round(width)), 1.0)
-        if is_about_zero and width % 2.0 == 0.0:
-            width += 1.0  # the bin about 0 takes as many from both sides
-    if is_about_zero:
-        below, above = np.ceil(max(-low, 0.0) / width - 0.5), np.ceil(max(high, 0.0) / width - 0.5)
-        return np.asarray((np.arange(-max(below, 0.0), max(above, 0.0) + 2.0) - 0.5) * width)
-    start = low - 0.5 if is_whole else low
-    n_bins = int(np.ceil((high - start + (0.5 if is_whole else 0.0)) / width - 1e-9))
-    return np.asarray(start + width * np.arange(n_bins + 1))
+        low -= 0.5
+    else:
+        width = min(width, (high - low) / 8.0)
+    n_bins = math.ceil((high - low + (0.5 if is_whole else 0.0)) / width - 1e-9)
+    return np.asarray(low + width * np.arange(n_bins + 1))
 
 
-def _name_rows(plot: Axes, rows: Any, names: Sequence[str]) -> None:
-    plot.set_yticks(rows, [shortened(name) for name in names])
+# -- what the varied values do ----------------------------------------------------------------------------------------------
+
+
+def along(
+    axis: Axis, series: Sequence[Series], label: str, *, is_share: bool = False, limits: Limits = None
+) -> Figure:
+    """Means along a range, joined by thin lines, with their intervals as bars."""
+    figure, ((plot,),) = blank(2.7)
+    handles = []
+    for each in series:
+        if each.dots is not None:
+            plot.plot(
+                *each.dots, "o", color=each.colour, alpha=0.28, markersize=2.0, markeredgewidth=0, zorder=1.5
+            )
+        handles.append((_marks(plot, each, axis.position), each.name))
+    if axis.is_log:
+        _make_log(plot, "x")
+    if 0 < len(axis.texts) <= MOST_TICKS:
+        plot.set_xticks(axis.position, axis.texts)
+    plot.set_xlabel(axis_label(axis))
+    _value_axis(plot.yaxis, label, is_share=is_share)
+    if limits is not None:
+        plot.set_ylim(*limits)
+    rule_y(plot)
+    legend_above(figure, handles)
+    return figure
+
+
+def in_rows(
+    names: Sequence[str], series: Sequence[Series], label: str, *,
+    is_share: bool = False, is_difference: bool = False, limits: Limits = None,
+) -> Figure:  # fmt: skip
+    """Means in rows that have names, with their intervals; differences with a line at 0."""
+    figure, ((plot,),) = blank(0.75 + len(names) * (0.15 + 0.15 * len(series)))
+    if is_difference:
+        plot.axvline(0.0, color=MUTED, linewidth=0.8)
+    _rows_of_marks(figure, plot, series, len(names))
+    _name_rows(plot, names)
+    _value_axis(plot.xaxis, label, is_share=is_share, is_difference=is_difference)
+    if limits is not None:
+        plot.set_xlim(*limits)
+    return figure
+
+
+def effect_strengths(effects: Sequence[Effect]) -> Figure:
+    """How strongly a quantity follows each variable: rank correlation, and parts of its variance where they are known."""
+    parts = [
+        series_of("alone", INK, "s", [(e.first_order, e.first_low, e.first_high) for e in effects]),
+        series_of("with others", MUTED, "D", [(e.total, e.total_low, e.total_high) for e in effects]),
+    ]
+    ranks = [series_of("", INK, "o", [(e.rank_correlation, e.rank_low, e.rank_high) for e in effects])]
+    kinds = [
+        (found, label)
+        for some, label in ((ranks, "rank correlation"), (parts, "share of the variance"))
+        if (found := [s for s in some if np.isfinite(s.mean).any()])
+    ]
+    figure, axes = blank(0.85 + 0.3 * len(effects), 1, len(kinds), sharey=True)
+    figure.set_layout_engine("constrained", wspace=0.08)
+    for plot, (series, label) in zip(axes.flat, kinds, strict=True):
+        plot.axvline(0.0, color=MUTED, linewidth=0.8)
+        _rows_of_marks(figure, plot, series, len(effects))
+        lowest = -1.05 if label == "rank correlation" else -0.05
+        plot.set_xlim(min(lowest, plot.get_xlim()[0]), max(1.05, plot.get_xlim()[1]))
+        plot.xaxis.set_major_formatter(lambda v, _: f"{v:g}".replace("-", "−"))
+        plot.set_xlabel(label)
+        rule_x(plot)
+    _name_rows(axes[0, 0], [e.variable for e in effects])
+    return figure
+
+
+def heat_map(
+    across: Axis,
+    up: Axis,
+    value: np.ndarray,
+    label: str,
+    ends: tuple[str, ...] = (),
+    *,
+    is_share: bool = False,
+) -> Figure:
+    """A quantity over two variables as colour; grey where there are no games.
+
+    Args:
+        across: The variable from left to right.
+        up: The variable from below to above.
+        value: Means, (up.n_places, across.n_places); NaN where there are no games.
+        label: What it is.
+        ends: Colours of the two sides of a difference; empty for what is no difference.
+        is_share: Values are shares.
+    """
+    from matplotlib.colors import LinearSegmentedColormap, Normalize
+
+    shown = np.ma.masked_invalid(value)
+    if ends:
+        largest = max(float(np.abs(shown).max()), 1e-9)
+        colours = [mixed(ends[0], INK, 0.12), "#f4f4f2", mixed(ends[1], INK, 0.12)]
+        norm = Normalize(-largest, largest)
+    else:
+        colours, norm = (
+            list(SEQUENTIAL),
+            Normalize(0.0 if is_share else float(shown.min()), float(shown.max())),
+        )
+    figure, ((plot,),) = blank(3.5)
+    x, y = (a.edges if not a.texts else np.arange(a.n_places + 1) - 0.5 for a in (across, up))
+    plot.set_facecolor(mixed(MUTED, "#ffffff", 0.55))
+    colour_map = LinearSegmentedColormap.from_list("tussle", colours)
+    mesh = plot.pcolormesh(x, y, shown, cmap=colour_map, norm=norm, edgecolors=PAPER, linewidth=0.4)
+    plot.set_xlabel(axis_label(across))
+    plot.set_ylabel(axis_label(up))
+    plot.spines[:].set_visible(False)
+    _map_ticks(plot, across, "x")
+    _map_ticks(plot, up, "y")
+    if value.size <= 64 and across.texts and up.texts:
+        _write_cells(plot, value, mesh, is_share=is_share, is_difference=bool(ends))
+    bar = figure.colorbar(mesh, ax=plot, aspect=28, pad=0.02, label=label)
+    bar.outline.set_visible(False)
+    if bar.solids is not None:
+        bar.solids.set_rasterized(True)
+    if is_share:
+        bar.ax.yaxis.set_major_formatter(lambda v, _: percent(abs(v), 0))
+    return figure
+
+
+# -- parts of plots ---------------------------------------------------------------------------------------------------------
+
+
+def axis_label(axis: Axis) -> str:
+    """Name of a variable with its unit."""
+    return shortened(axis.variable.name, 44) + (f" [{shortened(axis.unit, 12)}]" if axis.unit else "")
+
+
+def _rows_of_marks(figure: Figure, plot: Axes, series: Sequence[Series], n_rows: int) -> None:
+    """Marks in rows from the top, those of several series beside each other, with a legend."""
+    rows, handles = np.arange(n_rows)[::-1].astype(float), []
+    for i, each in enumerate(series):
+        shift = 0.36 * (0.5 - i / (len(series) - 1)) if len(series) > 1 else 0.0
+        handles.append((_marks(plot, each, rows + shift, is_flat=True), each.name))
+    legend_above(figure, handles)
+
+
+def _marks(plot: Axes, each: Series, place: np.ndarray, *, is_flat: bool = False) -> Any:
+    """Markers with bars; lying where `is_flat`, else joined by a line."""
+    bars = np.nan_to_num(np.maximum([each.mean - each.low, each.high - each.mean], 0.0))
+    x, y = (each.mean, place) if is_flat else (place, each.mean)
+    return plot.errorbar(
+        x, y, xerr=bars if is_flat else None, yerr=None if is_flat else bars, color=each.colour, marker=each.marker, elinewidth=1.0,
+        linestyle="none" if is_flat else "-", linewidth=0.9, markeredgecolor=PAPER, markeredgewidth=0.5,
+    )  # fmt: skip
+
+
+def _name_rows(plot: Axes, names: Sequence[str]) -> None:
+    plot.set_yticks(range(len(names))[::-1], [shortened(name, 28) for name in names])
     plot.set_ylim(-0.6, len(names) - 0.4)
+    rule_x(plot)
 
 
-def _shares(axis: Any) -> None:
-    axis.set_major_formatter(lambda x, _: percent(x, 0))
+def _value_axis(axis: Any, label: str, *, is_share: bool, is_difference: bool = False) -> None:
+    axis.set_label_text(label)
+    if is_share and is_difference:
+        axis.set_major_formatter(lambda v, _: signed(f"{round(100.0 * v, 6):g}".replace("-", "−")))
+    elif is_share:
+        axis.set_major_formatter(lambda v, _: percent(v, 0))
 
 
-def _round_share(largest: float) -> float:
-    """The next tenth above a share, but 1 at the most."""
-    return min(max(math.ceil(largest * 10.0 + 0.2) / 10.0, 0.1), 1.0)
+def _map_ticks(plot: Axes, axis: Axis, which: str) -> None:
+    if axis.texts:
+        names = [shortened(text, 14) for text in axis.texts]
+        is_crowded = which == "x" and sum(map(len, names)) + 2 * len(names) > 46
+        turned: dict[str, Any] = (
+            {"rotation": 40, "ha": "right", "rotation_mode": "anchor"} if is_crowded else {}
+        )
+        (plot.set_xticks if which == "x" else plot.set_yticks)(range(axis.n_places), names, **turned)
+    elif axis.is_log:
+        _make_log(plot, which)
+
+
+def _make_log(plot: Axes, which: str) -> None:
+    """A logarithmic axis whose numbers are written out."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    plot.set(**{f"{which}scale": "log"})
+    axis = plot.xaxis if which == "x" else plot.yaxis
+    low, high = axis.get_view_interval()
+    axis.set_major_locator(LogLocator(subs=(1.0,) if high > 30.0 * low else (1.0, 2.0, 5.0), numticks=8))
+    axis.set_major_formatter(lambda v, _: f"{v:g}")
+    axis.set_minor_formatter(NullFormatter())
+
+
+def _write_cells(plot: Axes, values: np.ndarray, mesh: Any, *, is_share: bool, is_difference: bool) -> None:
+    """The value in each cell, all with the decimals with which the largest shows three digits; shares in whole percent."""
+    largest = float(np.nanmax(np.abs(values)))
+    digits = 0 if is_share or largest == 0.0 else max(0, 2 - math.floor(math.log10(largest)))
+    for (row, column), value in np.ndenumerate(values):
+        if np.isfinite(value):
+            red, green, blue, _ = mesh.to_rgba(value)
+            is_dark = 0.299 * red + 0.587 * green + 0.114 * blue < 0.55
+            number = round(value * (100.0 if is_share else 1.0), digits) + 0.0
+            text = f"{number:{'+' if is_difference else ''},.{digits}f}".replace("-", "−")
+            colour = "#ffffff" if is_dark else "#111111"
+            plot.text(column, row, text, ha="center", va="center", fontsize=7.5, color=colour)

@@ -8,7 +8,6 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from importlib import import_module
 from inspect import signature
 from typing import TYPE_CHECKING, Any
 
@@ -53,7 +52,7 @@ class Proposer:
         choices = [v.name for v in variables if isinstance(v, Choice)]
         if sampler == "cmaes" and choices:
             raise ParameterError(f"cmaes searches ranges, and {choices[0]} is a choice; tpe searches both")
-        require_optuna("cmaes" if sampler == "cmaes" else "optuna")
+        require_optuna(with_cmaes=sampler == "cmaes")
         import optuna
 
         self._variables, self._seed, self._per_round = tuple(variables), seed, per_round
@@ -144,19 +143,21 @@ def new_study(is_minimized: bool, storage: Any = None) -> optuna.Study:
     )
 
 
-def require_optuna(*more: str) -> None:
-    """Import Optuna and what it needs beside.
+def require_optuna(*, with_cmaes: bool = False) -> None:
+    """Import Optuna, and what its CMA-ES needs.
 
     Raises:
         MissingExtraError: One of them is not installed.
     """
-    for package in dict.fromkeys(("optuna", *more)):
-        try:
-            import_module(package)
-        except ImportError as error:
-            raise MissingExtraError(
-                f"optimisation needs {package}, which cannot be imported ({error}); pip install 'tussle[batch]' brings it"
-            ) from None
+    try:
+        import optuna  # noqa: F401
+
+        if with_cmaes:
+            import cmaes  # type: ignore[import-untyped]  # noqa: F401
+    except ImportError as error:
+        raise MissingExtraError(
+            f"optimisation needs {error.name}, which cannot be imported ({error}); pip install 'tussle[batch]' brings it"
+        ) from None
 
 
 @contextmanager

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tussle.batch.report.drawing import INK, MUTED, colour_of, rule_y
+from tussle.batch.report.drawing import rule_y
 from tussle.errors import ParameterError
+from tussle.palette import INK, MUTED, colour_of
 from tussle.view.plots.choice import Tracks
 from tussle.view.plots.sheet import Handle, add_head, line_look, line_sign, mark_sign, sheet, time_axis
 

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tussle.batch.report.drawing import INK, MUTED, PAPER, colour_of, mixed, rule_y, shortened
-from tussle.batch.report.drawing import PALETTE as COLOURS
+from tussle.batch.report.drawing import rule_y, shortened
 from tussle.errors import ParameterError
+from tussle.palette import INK, MUTED, PAPER, colour_of, mixed
+from tussle.palette import TEAM_COLOURS as COLOURS
 from tussle.view.plots.choice import Choice, Tracks
 from tussle.view.plots.sheet import Handle, add_head, line_look, line_sign, mark_sign, sheet, time_axis
 from tussle.view.recording import Recording

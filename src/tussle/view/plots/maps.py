@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tussle.batch.report.drawing import INK, MUTED, PAPER, WIDTH, colour_of, marker_of, mixed
+from tussle.batch.report.drawing import WIDTH, marker_of
+from tussle.palette import INK, MUTED, PAPER, colour_of, mixed
 from tussle.view.plots.choice import Tracks
 from tussle.view.plots.sheet import Handle, add_head, line_sign, mark_sign, sheet
 

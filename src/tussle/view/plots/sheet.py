@@ -11,15 +11,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tussle.batch.report.drawing import (
-    MUTED,
     UNDATED,
     WIDTH,
-    colour_of,
     house_style,
     lettering,
     shortened,
 )
 from tussle.errors import ParameterError, ViewError, listed, nearest_name
+from tussle.palette import MUTED, colour_of
 from tussle.view.plots.choice import Tracks
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""Numbers and counts as sentences write them."""
+"""Numbers and counts as the report writes them."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 import re
 
 NARROW = "\u00a0"
-"""Stands between a number and its unit, and keeps them in one line."""
+"""Keeps a number and its unit on one line."""
 
 
 def number(value: float) -> str:
@@ -21,9 +21,17 @@ def estimate(value: float) -> str:
         return "–"
     size = abs(value)
     if size >= 1e7 or 0.0 < size < 1e-4:
-        return f"{value:.3g}".replace("e+0", "e").replace("e+", "e").replace("e-0", "e-").replace("-", "−")
+        mantissa, _, exponent = f"{value:.2e}".partition("e")
+        return f"{float(mantissa):g}e{int(exponent)}".replace("-", "−")
     digits = 0 if size >= 100.0 else 2 if value == 0.0 else 2 - math.floor(math.log10(size))
     return f"{value:,.{digits}f}".replace("-", "−")
+
+
+def interval(low: float, high: float, scale: float = 1.0, unit: str = "") -> str:
+    """An interval: "0.12 to 0.34"; "–" where there is none."""
+    if not (math.isfinite(low) and math.isfinite(high)):
+        return "–"
+    return f"{estimate(scale * low)} to {estimate(scale * high)}{unit}"
 
 
 def percent(share: float, digits: int = 1) -> str:
@@ -36,11 +44,9 @@ def signed(text: str) -> str:
     return text if text.startswith(("−", "–")) or text == "0" else f"+{text}"
 
 
-def count(n: int, one: str = "", many: str = "") -> str:
-    """How many there are: "1,000", "1 game", "1,000 games"."""
-    if not one:
-        return f"{n:,}"
-    return f"{n:,} {one if n == 1 else many or one + 's'}"
+def count(n: int, noun: str = "") -> str:
+    """A count: "1,000", "1 game", "1,000 games"."""
+    return f"{n:,} {noun}{'' if n == 1 else 's'}" if noun else f"{n:,}"
 
 
 def p_value(p: float) -> str:
@@ -51,17 +57,15 @@ def p_value(p: float) -> str:
 
 
 def seconds(value: float) -> str:
-    """A duration: "0.4 s", "12 s", "3 min", "5.2 h"."""
+    """A duration: "0.4 s", "12 s", "3.3 min", "5.2 h"."""
     if not math.isfinite(value):
         return "–"
-    for limit, size, unit in ((90.0, 1.0, "s"), (5400.0, 60.0, "min"), (float("inf"), 3600.0, "h")):
-        if value < limit:
-            return f"{value / size:.{1 if value / size < 10.0 else 0}f}{NARROW}{unit}"
-    raise AssertionError(value)
+    size, unit = (1.0, "s") if value < 90.0 else (60.0, "min") if value < 5400.0 else (3600.0, "h")
+    return f"{value / size:.{1 if value / size < 10.0 else 0}f}{NARROW}{unit}"
 
 
 def capital(text: str) -> str:
-    """A text as a heading begins."""
+    """A text with a capital."""
     return text[:1].upper() + text[1:]
 
 

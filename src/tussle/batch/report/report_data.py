@@ -1,0 +1,407 @@
+"""The data of a report: which teams compete, which quantities are shown, what varies, and the means behind the plots."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from tussle.batch.report.drawing import marker_of
+from tussle.batch.report.formatting import file_name
+from tussle.batch.results import Results
+from tussle.batch.sampling import method_for
+from tussle.batch.selection import written
+from tussle.batch.statistics import wilson
+from tussle.batch.variables import Choice, Range, Variable
+from tussle.errors import MissingExtraError
+from tussle.palette import MUTED, colour_of
+
+_TITLES = {
+    "wins": "games won by {}",
+    "score": "score of {}",
+    "alive": "{} left at the end",
+    "lost": "{} lost",
+}
+_OF_TEAM = re.compile(r"(wins|score|alive|lost)\[(-?\d+)\]")
+
+DRAWN_POINTS = ("lhs", "sobol", "saltelli", "product")
+"""Ways of sampling in which the points are drawn from ranges, so that other points could as well have been."""
+MOST_VARIABLES = 6
+"""Variables with plots of their own; of more, those with the strongest effects."""
+MOST_LEVELS = 12
+"""A range with no more values than this is shown value by value."""
+MOST_BINS = 12
+POINTS_PER_BIN = 8
+WIDE_RATIO = 50.0
+"""Chosen numbers whose ratio is at least this are shown on a logarithmic axis."""
+FEWEST_SEEDS = 10
+"""Below this many seeds, how much differs from seed to seed cannot be told; the interval then holds for these seeds only."""
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A quantity that is plotted.
+
+    Args:
+        expression: As `Results.quantity` takes it.
+        name: Of the team, or of the quantity where it has none.
+        team: Its team; None for a quantity of no one team.
+        label: Of the axis that it is plotted on.
+        is_share: It is 0 or 1 in each run.
+    """
+
+    expression: str
+    name: str
+    team: int | None
+    label: str
+    is_share: bool = False
+
+    @property
+    def colour(self) -> str:
+        return MUTED if self.team is None else colour_of(self.team)
+
+    @property
+    def marker(self) -> str:
+        return "o" if self.team is None else marker_of(self.team)
+
+
+# -- variables as axes ------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A variable as an axis of places: its values where they are few, else bins.
+
+    Args:
+        variable: The variable.
+        index: The place of each point, (n_points,).
+        position: Where the places lie, (n_places,): values of the variable, or 0, 1, 2, ... where these are no numbers.
+        texts: The values as texts; empty for bins.
+        edges: Ends of the bins, (n_places + 1,); empty where the places are values.
+        is_number: Positions are values of the variable.
+    """
+
+    variable: Variable
+    index: np.ndarray
+    position: np.ndarray
+    texts: tuple[str, ...]
+    edges: np.ndarray
+    is_number: bool
+
+    @property
+    def n_places(self) -> int:
+        return len(self.position)
+
+    @property
+    def unit(self) -> str:
+        return getattr(self.variable, "unit", "")
+
+    @property
+    def is_log(self) -> bool:
+        """It is read by ratios."""
+        if isinstance(self.variable, Range):
+            return self.variable.is_log
+        low, high = float(self.position.min()), float(self.position.max())
+        return self.is_number and low > 0.0 and high >= WIDE_RATIO * low
+
+    def place_text(self, place: int) -> str:
+        """A place as a text: "20 kt", "from 20 to 22.5 kt", "keep"."""
+        unit = f" {self.unit}" if self.unit else ""
+        if self.texts:
+            return f"{self.texts[place]}{unit}"
+        low, high = (f"{edge:.3g}" for edge in self.edges[place : place + 2])
+        return f"from {low} to {high}{unit}"
+
+
+def axis_of(
+    variable: Variable, points: Sequence[dict[str, Any]], n_bins: int = MOST_BINS, *, is_even: bool = False
+) -> Axis:
+    """A variable as an axis.
+
+    Args:
+        variable: The variable.
+        points: The values at each point.
+        n_bins: Most bins.
+        is_even: Bins have equal widths, or ratios on a logarithmic axis; else they hold equally many points.
+    """
+    given = [point[variable.name] for point in points]
+    if not all(isinstance(value, (int, float)) and not isinstance(value, bool) for value in given):
+        names = [written(value) for value in given]
+        order = [written(value) for value in variable.values] if isinstance(variable, Choice) else []
+        texts = sorted(
+            dict.fromkeys(names), key=lambda text: order.index(text) if text in order else len(order)
+        )
+        index = np.array([texts.index(name) for name in names], dtype=np.int64)
+        return Axis(variable, index, np.arange(float(len(texts))), tuple(texts), np.empty(0), False)
+    values = np.array(given, dtype=float)
+    levels, index = np.unique(values, return_inverse=True)
+    if len(levels) <= MOST_LEVELS:
+        return Axis(variable, index, levels, tuple(f"{v:.6g}" for v in levels), np.empty(0), True)
+    if is_even:
+        space = np.geomspace if isinstance(variable, Range) and variable.is_log else np.linspace
+        edges = space(values.min(), values.max(), n_bins + 1)
+    else:
+        n_bins = int(np.clip(len(values) // POINTS_PER_BIN, 2, n_bins))
+        edges = np.unique(np.quantile(values, np.linspace(0.0, 1.0, n_bins + 1)))
+    index = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, len(edges) - 2)
+    return Axis(variable, index, _mean_by(values, index, len(edges) - 1), (), edges, True)
+
+
+def _mean_by(values: np.ndarray, group: np.ndarray, n_groups: int) -> np.ndarray:
+    """Mean of the known values of each group, (n_groups,); NaN for none."""
+    is_known = np.isfinite(values)
+    n = np.bincount(group[is_known], minlength=n_groups)
+    total = np.bincount(group[is_known], weights=values[is_known], minlength=n_groups)
+    return np.asarray(total / np.where(n > 0, n, np.nan))
+
+
+# -- means with intervals ---------------------------------------------------------------------------------------------------
+
+
+def clustered_mean(
+    values: np.ndarray, seed: np.ndarray, draw: np.ndarray | None, *, is_share: bool
+) -> tuple[float, float, float]:
+    """Mean of runs and its 95 % interval, for runs that are not independent; NaN where there is none.
+
+    Runs of one seed share their chance, and runs of one draw of points share their values. The variance is clustered by both
+    (Cameron, Gelbach and Miller 2011), or by one where the other has too few clusters; the interval is Student's with one degree of
+    freedom less than there are clusters. Of a share it is Wilson's, for as many independent runs as have this variance (Kish).
+
+    Args:
+        values: Value of each run, (n,); NaN is left out.
+        seed: Its seed, (n,).
+        draw: Its draw of points, (n,); None where the points were chosen, not drawn.
+        is_share: The values are 0 and 1.
+    """
+    is_known = np.isfinite(values)
+    values = values[is_known]
+    clusters = [np.unique(by[is_known], return_inverse=True)[1] for by in (draw, seed) if by is not None]
+    if len(clusters) == 2 and (
+        clusters[1].max(initial=-1) + 1 < FEWEST_SEEDS or clusters[0].max(initial=-1) < 1
+    ):
+        clusters = clusters[:1]
+    n_clusters = min((int(c.max(initial=-1)) + 1 for c in clusters), default=0)
+    if not len(values):
+        return math.nan, math.nan, math.nan
+    mean = float(values.mean())
+    if n_clusters < 2:
+        return mean, math.nan, math.nan
+    if np.ptp(values) == 0.0:
+        return (mean, *wilson(mean * n_clusters, n_clusters)) if is_share else (mean, mean, mean)
+    half, error = max(
+        _half_width(values, c)
+        for c in ([np.stack(clusters, axis=1)] if len(clusters) == 2 else []) + clusters
+    )
+    if not is_share:
+        return mean, mean - half, mean + half
+    n = (
+        min(max(mean * (1.0 - mean) / error**2, float(n_clusters)), float(len(values)))
+        if error
+        else float(len(values))
+    )
+    return (mean, *wilson(mean * n, n))
+
+
+def _half_width(values: np.ndarray, clusters: np.ndarray) -> tuple[float, float]:
+    """Half of Student's interval of a mean with clustered errors, and its standard error; 0 where the variance is negative."""
+    from statsmodels.regression.linear_model import OLS
+
+    with np.errstate(invalid="ignore"):
+        fit = OLS(values, np.ones(len(values))).fit(
+            cov_type="cluster", cov_kwds={"groups": clusters}, use_t=True
+        )
+        low, high = fit.conf_int()[0]
+        return max(float(high - low) / 2.0, 0.0) if high >= low else 0.0, float(np.nan_to_num(fit.bse[0]))
+
+
+class ReportData:
+    """What is worth showing of a batch.
+
+    Args:
+        results: Its results.
+        more: Quantities to be shown beside those that the report chooses.
+
+    Raises:
+        ParameterError: There is no such quantity.
+        MissingExtraError: Statsmodels is not installed.
+    """
+
+    def __init__(self, results: Results, more: Sequence[str] = ()) -> None:
+        try:
+            import statsmodels.regression.linear_model  # noqa: F401
+        except ImportError as error:
+            raise MissingExtraError(
+                f"the report needs statsmodels, which cannot be imported ({error}); pip install 'tussle[batch]' brings it"
+            ) from None
+        self.results = results
+        self.points = results.points
+        self.more = tuple(Measure(e, self.title(e), None, self.title(e)) for e in more)
+        self.point: np.ndarray = np.asarray(results.runs["point"].to_numpy(), dtype=np.int64)
+        self.seed: np.ndarray = np.asarray(results.runs["seed"].to_numpy())
+        for measure in self.more:
+            results.quantity(measure.expression)
+
+    # -- names --------------------------------------------------------------------------------------------------------------
+
+    def name_of(self, team: int) -> str:
+        """The name of a team."""
+        return self.results.teams.get(team) or f"team {team}"
+
+    def title(self, expression: str) -> str:
+        """The name of a quantity."""
+        found = _OF_TEAM.fullmatch(expression)
+        if found is not None:
+            return _TITLES[found[1]].format(self.name_of(int(found[2])))
+        return "length of the game [s]" if expression == "t" else self.results.title(expression)
+
+    def point_name(self, point: int) -> str:
+        """The values of a point, without the name where one variable varies."""
+        label = self.results.label(point)
+        return label.split("=", 1)[1] if len(self.results.variables) == 1 else label
+
+    # -- runs and points ----------------------------------------------------------------------------------------------------
+
+    @property
+    def n_good(self) -> int:
+        """Runs that did not fail."""
+        return self.results.n_runs - self.results.n_failed
+
+    @property
+    def has_points(self) -> bool:
+        """There is more than one point."""
+        return len(self.points) > 1
+
+    @cached_property
+    def method(self) -> str:
+        """How the points were sampled."""
+        return method_for(self.results.variables, str(self.results.info.get("sample") or ""))
+
+    @property
+    def is_drawn(self) -> bool:
+        """Points were drawn from ranges."""
+        return self.method in DRAWN_POINTS
+
+    @cached_property
+    def draw(self) -> np.ndarray | None:
+        """Which draw each run's point comes from, (n_runs,): points of one draw share values; None where points were chosen."""
+        if not self.is_drawn:
+            return None
+        n_choices = math.prod(len(v.values) for v in self.results.variables if isinstance(v, Choice))
+        per_draw = {"saltelli": len(self.results.variables) + 2, "product": n_choices}.get(self.method, 1)
+        return np.asarray(self.point // per_draw)
+
+    def known(self, expression: str) -> np.ndarray:
+        """The known values of a quantity; none for one that nobody reports."""
+        is_name = re.fullmatch(r"[\w.]+(\[-?\d+\])?", expression)
+        if is_name and expression not in self.results.quantities:
+            return np.empty(0)
+        values = self.results.quantity(expression)
+        return np.asarray(values[np.isfinite(values)])
+
+    def mean_by_point(self, measure: Measure) -> np.ndarray:
+        """Mean of a quantity at each point, (n_points,); NaN without games."""
+        return _mean_by(self.results.quantity(measure.expression), self.point, len(self.points))
+
+    def cells(self, measure: Measure, across: Axis, up: Axis) -> np.ndarray:
+        """Mean of a quantity in each cell of two axes, (up.n_places, across.n_places); NaN without games."""
+        cell = (up.index * across.n_places + across.index)[self.point]
+        means = _mean_by(self.results.quantity(measure.expression), cell, up.n_places * across.n_places)
+        return means.reshape(up.n_places, across.n_places)
+
+    def means_at(self, axis: Axis, measure: Measure) -> np.ndarray:
+        """Mean of a quantity at each place of an axis, lower and upper end of its interval, (n_places, 3)."""
+        values, place = self.results.quantity(measure.expression), axis.index[self.point]
+        rows = [place == i for i in range(axis.n_places)]
+        draw = self.draw
+        return np.array(
+            [
+                clustered_mean(
+                    values[r], self.seed[r], None if draw is None else draw[r], is_share=measure.is_share
+                )
+                for r in rows
+            ]
+        )
+
+    # -- what is shown ------------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def rivals(self) -> tuple[int, ...]:
+        """Teams that score or win in some game, those with more wins first."""
+        found = {}
+        for team in self.results.teams:
+            scores, wins = (self.known(f"{name}[{team}]") for name in ("score", "wins"))
+            if np.any(scores != 0.0) or np.any(wins > 0.0):
+                found[team] = float(wins.sum())
+        return tuple(sorted(found, key=lambda team: (-found[team], team)))
+
+    @cached_property
+    def wins(self) -> tuple[Measure, ...]:
+        """Who wins; empty where nobody can."""
+        teams = [t for t in self.rivals if f"wins[{t}]" in self.results.quantities]
+        return tuple(Measure(f"wins[{t}]", self.name_of(t), t, "share of the games won", True) for t in teams)
+
+    @cached_property
+    def scores(self) -> tuple[Measure, ...]:
+        """How much each team scores; without scores, how many of each are left at the end."""
+        if self.rivals:
+            return tuple(Measure(f"score[{t}]", self.name_of(t), t, "score") for t in sorted(self.rivals))
+        teams = [t for t in self.results.teams if varies(self.known(f"alive[{t}]"))]
+        return tuple(Measure(f"alive[{t}]", self.name_of(t), t, "left at the end") for t in teams)
+
+    @property
+    def measures(self) -> tuple[Measure, ...]:
+        """All that is shown."""
+        return (*self.wins, *self.scores, *self.more)
+
+    @property
+    def groups(self) -> list[tuple[str, tuple[Measure, ...]]]:
+        """Measures that share a plot, with the beginning of its file's name."""
+        found = [("wins", self.wins), ("score" if self.rivals else "left", self.scores)]
+        found += [(file_name(m.expression), (m,)) for m in self.more]
+        return [(stem, measures) for stem, measures in found if measures]
+
+    @cached_property
+    def variables(self) -> tuple[Variable, ...]:
+        """What really varies over the points."""
+        return tuple(v for v in self.results.variables if len({repr(p[v.name]) for p in self.points}) > 1)
+
+    def by_strength(self, *measures: Measure) -> list[Variable]:
+        """The variables, those first that explain most of the variance of the runs of any of some quantities, by default of all."""
+
+        def strength(variable: Variable) -> float:
+            axis = axis_of(variable, self.points)
+            group = axis.index[self.point]
+            return max(
+                (_explained(self.results.quantity(m.expression), group) for m in measures or self.measures),
+                default=0.0,
+            )
+
+        return sorted(self.variables, key=lambda v: -strength(v))
+
+    @cached_property
+    def shown_variables(self) -> tuple[Variable, ...]:
+        """The variables that get plots, in the order in which they were given."""
+        if len(self.variables) <= MOST_VARIABLES:
+            return self.variables
+        ranked = self.by_strength()[:MOST_VARIABLES]
+        return tuple(v for v in self.variables if v in ranked)
+
+
+def varies(values: np.ndarray) -> bool:
+    """Not all of them are the same."""
+    return bool(len(values)) and bool(np.ptp(values) > 0.0)
+
+
+def _explained(values: np.ndarray, group: np.ndarray) -> float:
+    """Share of the variance of runs that is between groups (the correlation ratio)."""
+    is_known = np.isfinite(values)
+    values, group = values[is_known], group[is_known]
+    if not varies(values):
+        return 0.0
+    means = _mean_by(values, group, int(group.max()) + 1)[group]
+    return float(np.var(means) / np.var(values))

@@ -1,0 +1,490 @@
+"""The sections of a report, from top to bottom, as sentences, plots and tables."""
+
+from __future__ import annotations
+
+import itertools
+import shlex
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tussle.batch.report import plots
+from tussle.batch.report.formatting import (
+    capital,
+    count,
+    estimate,
+    file_name,
+    interval,
+    number,
+    percent,
+    seconds,
+    sentence,
+)
+from tussle.batch.report.report_data import Measure, ReportData, axis_of, varies
+from tussle.batch.selection import written
+from tussle.batch.statistics import BLOCKS_FROM
+from tussle.batch.variables import Range
+from tussle.palette import PAPER, colour_of, mixed
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MOST_BARS = 20
+"""Points with a bar each."""
+MOST_MEANS = 60
+MOST_FAILED = 50
+MOST_SLOW = 10
+SMALL = 5
+"""Teams that have so many times fewer entities than the largest get a plot of their own."""
+MOST_CURVES = 6
+"""Points whose curves can be told apart in one plot."""
+METHODS = {
+    "lhs": "a Latin hypercube",
+    "sobol": "a scrambled Sobol sequence",
+    "saltelli": "Saltelli's rows for variance-based indices",
+    "grid": "all combinations of the values",
+    "list": "values taken together, one after another",
+    "product": "all choices at each point of a Latin hypercube of the ranges",
+}
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A plot with its text.
+
+    Args:
+        name: Of its files, without an ending.
+        title: What it shows.
+        caption: How to read it.
+        draw: Makes the figure.
+    """
+
+    name: str
+    title: str
+    caption: str
+    draw: Callable[[], Figure]
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table with its text.
+
+    Args:
+        title: What it shows; empty where the section says it.
+        columns: Name and kind of each column: "text", "number" (aligned right) or "code".
+        rows: Cells as they are shown, row by row.
+        caption: How to read it.
+    """
+
+    title: str
+    columns: Sequence[tuple[str, str]]
+    rows: Sequence[Sequence[str]]
+    caption: str = ""
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of the page under one heading.
+
+    Args:
+        name: Its identifier.
+        title: Its heading.
+        lead: Sentences under the heading, one paragraph each.
+        plots: Its plots.
+        tables: Its tables.
+        facts: Names and values, as a list.
+    """
+
+    name: str
+    title: str
+    lead: Sequence[str] = ()
+    plots: Sequence[Plot] = ()
+    tables: Sequence[Table] = ()
+    facts: Sequence[tuple[str, str]] = ()
+
+    @property
+    def is_empty(self) -> bool:
+        return not (self.lead or self.plots or self.tables or self.facts)
+
+
+def numbers(*names: str) -> list[tuple[str, str]]:
+    """Columns of numbers."""
+    return [(name, "number") for name in names]
+
+
+# -- who won ----------------------------------------------------------------------------------------------------------------
+
+
+def won(data: ReportData) -> Section:
+    """Who won how often, and by how much."""
+    if not data.wins:
+        return Section("won", "Who won")
+    shares = [s for s in data.results.shares() if s.team is None or s.team in data.rivals]
+    shares.sort(key=lambda s: (s.team is None, -s.n, s.team or 0))
+    colours = [plots.END_COLOURS["time"] if s.team is None else colour_of(s.team) for s in shares]
+    blocks = ""
+    if data.has_points:
+        is_shared = not data.results.info.get("independent") and len(np.unique(data.seed)) >= BLOCKS_FROM
+        blocks = f", over all points; {'games of one seed count as one block' if is_shared else 'each game counts by itself'}"
+    caption = (
+        f"Bar: share of the {count(data.n_good, 'game')}. Line: its 95 % interval (Wilson){blocks}. A tie is a game with two highest"
+        " scores."
+    )
+    found = [Plot("wins", "Games won", caption, lambda: plots.share_bars(shares, colours))]
+    if len(data.wins) >= 2:
+        found.append(_margin(data))
+    if 1 < len(data.points) <= MOST_BARS:
+        found.append(_by_point(data))
+    return Section("won", "Who won", plots=found)
+
+
+def _margin(data: ReportData) -> Plot:
+    """By how much the team with most wins was ahead of the next."""
+    ahead, behind = data.rivals[:2]
+    values = data.known(f"score[{ahead}]-score[{behind}]")
+    first, second = ((data.name_of(t), colour_of(t)) for t in (behind, ahead))
+    return Plot(
+        "margin",
+        f"Score of {second[0]} minus score of {first[0]}",
+        f"Height: number of games. Line: the mean, {estimate(values.mean())}. Grey: about equal, ties among them.{_outside(values)}",
+        lambda: plots.margins(values, first, second, "difference of the scores"),
+    )
+
+
+def _by_point(data: ReportData) -> Plot:
+    rows = data.results.shares_by_point()
+    teams = sorted(m.team for m in data.wins if m.team is not None)
+    parts = []
+    for team in [*teams[:1], None, *teams[1:]]:
+        shares = np.nan_to_num([next(s.value for s in row if s.team == team) for row in rows])
+        look = ("ties", plots.END_COLOURS["time"]) if team is None else (data.name_of(team), colour_of(team))
+        if shares.any():
+            parts.append((*look, shares))
+    names = [data.point_name(i) for i in range(len(data.points))]
+    what = f"by {data.results.variables[0].name}" if len(data.results.variables) == 1 else "at each point"
+    return Plot(
+        "wins-by-point", f"Games won {what}", "Each bar holds all games of one point.", lambda: plots.stacked_shares(names, parts)
+    )  # fmt: skip
+
+
+def _outside(values: np.ndarray) -> str:
+    """What the caption says of games whose values the plot does not reach."""
+    n = len(values) - len(plots.inside(values))
+    far = f"from {number(values.min())} to {number(values.max())}"
+    return f" The values go {far}; {count(n)} of {count(len(values))} lie beyond the plot." if n else ""
+
+
+# -- scores -----------------------------------------------------------------------------------------------------------------
+
+
+def scores(data: ReportData) -> Section:
+    """How much each team scored, and the means of all quantities."""
+    found = []
+    for measures in (data.scores, *((measure,) for measure in data.more)):
+        varied = [m for m in measures if varies(data.known(m.expression))]
+        if varied:
+            found.append(_distribution(data, varied))
+    means = _means(data)
+    title = "How much was scored" if data.rivals else "Quantities"
+    return Section("scores", title, plots=found, tables=[means] if means.rows else [])
+
+
+def _distribution(data: ReportData, measures: Sequence[Measure]) -> Plot:
+    has_teams, label = measures[0].team is not None, measures[0].label
+    values = [data.known(m.expression) for m in measures]
+    names, colours = [m.name if has_teams else "" for m in measures], [m.colour for m in measures]
+    return Plot(
+        "scores" if has_teams else f"distribution-{file_name(measures[0].expression)}",
+        "Distribution of the scores" if has_teams and data.rivals else capital(label),
+        "Height: number of games, on one scale. Dot: mean. Line: the middle half of the games."
+        + _outside(np.concatenate(values)),
+        lambda: plots.distributions(values, names, colours, label),
+    )
+
+
+def _means(data: ReportData) -> Table:
+    """Means of all quantities that vary."""
+    results = data.results
+
+    def is_score_again(name: str) -> bool:
+        """A metric reports the team's score once more."""
+        plugin, _, score = name.rpartition(".")
+        return (
+            bool(plugin)
+            and score.startswith("score[")
+            and np.array_equal(data.known(name), data.known(score))
+        )
+
+    names = [q for q in results.quantities if not q.startswith(("wins[", "ties", "start[", "steps"))]
+    names = [q for q in names if varies(data.known(q)) and not is_score_again(q)]
+    rows = [
+        (
+            data.title(m.name), estimate(m.value), interval(m.low, m.high), estimate(m.sd),
+            *(number(m.quantiles[q]) for q in (0.05, 0.5, 0.95)), count(m.n),
+        )
+        for m in results.means([*(m.expression for m in data.more), *names[:MOST_MEANS]])
+    ]  # fmt: skip
+    columns = [
+        ("quantity", "text"),
+        *numbers("mean", "95 % interval", "sd", "5 %", "median", "95 %", "games"),
+    ]
+    caption = "The interval is that of the mean. 5 %, median and 95 % are quantiles of the games. Constant quantities are left out."
+    if len(names) > MOST_MEANS:
+        caption += f" {len(names) - MOST_MEANS} more quantities are in the tables of the batch."
+    return Table("All quantities", columns, rows, caption)
+
+
+# -- the games --------------------------------------------------------------------------------------------------------------
+
+
+def left(data: ReportData) -> Section:
+    """How many of each team were left over time."""
+    losses = {t: data.known(f"lost[{t}]") for t in data.results.teams}
+    teams = [t for t, lost in losses.items() if np.any(lost > 0.0)]
+    if not teams:
+        return Section("left", "Who was left")
+    size = {team: float(data.known(f"start[{team}]").max(initial=0.0)) for team in teams}
+    large = [team for team in teams if size[team] * SMALL >= max(size.values())]
+    found = [_left(data, some) for some in (large, [t for t in teams if t not in large]) if some]
+    if 1 < len(data.points) <= MOST_CURVES:
+        found += [_left_by_point(data, team) for team in teams]
+    return Section("left", "Who was left", plots=found)
+
+
+def _left(data: ReportData, teams: Sequence[int]) -> Plot:
+    names = ", ".join(map(data.name_of, teams)) if len(teams) <= 4 else f"{len(teams)} teams"
+    return Plot(
+        f"left-{'-'.join(map(str, teams))}",
+        f"{names} left over time",
+        "Mean number of each team that is left. Band: 95 % interval of the mean at each time. Games that ended keep their last number.",
+        lambda: plots.over_time(
+            [_curve(data, t, None, data.name_of(t), colour_of(t), "-") for t in teams],
+            f"{names} left" if len(teams) == 1 else "number left",
+        ),
+    )
+
+
+def _left_by_point(data: ReportData, team: int) -> Plot:
+    n, name = len(data.points), data.name_of(team)
+    dashes = ["-", "--", "-.", ":", (0, (5, 1)), (0, (1, 1))]
+    ramp = [mixed(colour_of(team), PAPER, 0.45 * (1.0 - i / (n - 1))) for i in range(n)]
+    return Plot(
+        f"left-{team}-by-point",
+        f"{name} left, by {data.results.variables[0].name if len(data.results.variables) == 1 else 'point'}",
+        "Mean number left at each point, with its 95 % interval.",
+        lambda: plots.over_time(
+            [_curve(data, team, i, data.point_name(i), ramp[i], dashes[i]) for i in range(n)], f"{name} left"
+        ),
+    )
+
+
+def _curve(
+    data: ReportData, team: int, point: int | None, name: str, colour: str, dashes: Any
+) -> plots.Series:
+    s = data.results.survival(team, point)
+    return plots.Series(name, colour, dashes, s.mean, s.low, s.high, s.t)
+
+
+def ended(data: ReportData) -> Section:
+    """When and why games ended."""
+    runs, title = data.results.runs, "How the games ended"
+    reason, t = np.array(runs["end"].to_pylist()), np.asarray(runs["t"].to_numpy())
+    known = [*plots.END_TEXTS, *sorted({*reason} - {*plots.END_TEXTS, "error"})]
+    ends = {str(end): t[reason == end] for end in known if np.any(reason == end)}
+    if not ends:
+        return Section("ended", title)
+    every = np.concatenate(list(ends.values()))
+    why = "; ".join(
+        f"{plots.END_TEXTS.get(end, end)}: {count(len(times), 'game')}" for end, times in ends.items()
+    )
+    if not varies(every):
+        return Section("ended", title, lead=[f"Length of every game: {number(every[0])} s. {capital(why)}."])
+    caption = f"Height: number of games. Mean {estimate(every.mean())} s, median {number(float(np.median(every)))} s. {capital(why)}."
+    return Section(
+        "ended", title, plots=[Plot("lengths", "Length of the games", caption, lambda: plots.lengths(ends))]
+    )
+
+
+def look_at(data: ReportData) -> Section:
+    """Games that failed, and those that took longest, with the commands that play them again."""
+    results = data.results
+    is_file = (results.info.get("mission") or {}).get("made_in") != "python"
+    folder = results.path.resolve().name if results.path is not None and is_file else None
+
+    def table(
+        title: str,
+        rows: Sequence[dict[str, Any]],
+        columns: Sequence[tuple[str, str]],
+        cells: Any,
+        caption: str,
+    ) -> Table:
+        values = [("values", "text")] if data.has_points else []
+        replay = [("play it again", "code")] if folder is not None else []
+        body = [
+            (
+                str(row["run"]), str(row["seed"]), *([results.label(row["point"])] if values else []), *cells(row),
+                *([f"tussle run --from {shlex.quote(str(folder) + ':' + str(row['run']))}"] if replay else []),
+            )
+            for row in rows
+        ]  # fmt: skip
+        return Table(title, [*numbers("run", "seed"), *values, *columns, *replay], body, caption)
+
+    tables = []
+    if n := results.n_failed:
+        more = f" {count(n - MOST_FAILED)} more are in the tables of the batch." if n > MOST_FAILED else ""
+        rows = results.failed().slice(0, MOST_FAILED).to_pylist()
+        tables.append(
+            table(
+                f"{count(n, 'game')} failed", rows, [("error", "text")], lambda row: [row["error"] or ""],
+                f"Failed games are in no share, mean or plot.{more}",
+            )
+        )  # fmt: skip
+    if rows := results.slowest(MOST_SLOW).to_pylist():
+        tables.append(
+            table(
+                "Slowest games", rows, numbers("CPU time", "length [s]"), lambda row: [seconds(row["cpu_s"]), number(row["t"])],
+                "CPU time of a game that was played in a stack is its part of the stack's.",
+            )
+        )  # fmt: skip
+    lead = [
+        "Enter the commands in the folder that holds the batch. Each checks that the game ends in the same state."
+    ]
+    return Section(
+        "look-at", "Games to look at", lead=lead if folder is not None and tables else [], tables=tables
+    )
+
+
+# -- how it was made --------------------------------------------------------------------------------------------------------
+
+
+def making(data: ReportData) -> Section:
+    """How the batch was made."""
+    results, info = data.results, data.results.info
+    facts = [(name, text) for name, text in _facts(info) if text]
+    rows = [(v.name, _values_of(v)) for v in results.variables]
+    caption = f"{count(len(data.points), 'point')}: {METHODS[data.method]}"
+    caption += f", drawn with seed {info.get('sample_seed', 0)}." if data.is_drawn else "."
+    tables = [Table("What varied", [("name", "code"), ("values", "text")], rows, caption)] if rows else []
+    return Section("making", "How this was made", tables=tables, facts=facts)
+
+
+def _facts(info: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    about, timings = info.get("mission") or {}, info.get("timings") or {}
+    yield "command", shlex.join(str(part) for part in info.get("command") or ())
+    yield "mission", str(about.get("file") or "made in Python")
+    yield "settings", ", ".join(f"{name}={value}" for name, value in (about.get("settings") or {}).items())
+    start, end, dt = (number(float(info[name])) for name in ("start", "end", "dt"))
+    yield "game", f"steps of {dt} s, from {start} s to {end} s"
+    n = int(info["n_runs" if info.get("independent") else "n_seeds"])
+    seeds = f"{info['first_seed']} to {int(info['first_seed']) + n - 1}" if n > 1 else str(info["first_seed"])
+    sharing = "one for each game" if info.get("independent") else "the same at each point"
+    yield "seeds", seeds if int(info["n_points"]) == 1 else f"{seeds}, {sharing}"
+    yield "played until", str(info.get("until") or "")
+    yield "played", str(timings.get("began") or "").replace("T", " ").replace("+00:00", " UTC")
+    yield "took", seconds(float(timings["wall_s"])) if timings.get("wall_s") else ""
+    yield "versions", ", ".join(f"{name} {version}" for name, version in (info.get("versions") or {}).items())
+    yield "fingerprint", str(info.get("fingerprint") or "")
+
+
+def _values_of(variable: Any) -> str:
+    if not isinstance(variable, Range):
+        shown = [written(value) for value in itertools.islice(variable.values, 12)]
+        more = len(variable.values) - len(shown)
+        return ", ".join(shown) + (f" and {count(more)} more" if more > 0 else "")
+    parts = [f"{variable.low:g} to {variable.high:g} {variable.unit}".rstrip()]
+    parts += ["whole numbers"] if variable.is_int else []
+    parts += ["evenly by the logarithm"] if variable.is_log else []
+    parts += [f"{variable.levels} values"] if variable.levels else []
+    return ", ".join(parts)
+
+
+# -- the head ---------------------------------------------------------------------------------------------------------------
+
+
+def answer(data: ReportData) -> str:
+    """The result in one or two sentences."""
+    results = data.results
+    if not results.n_runs:
+        return "No game is finished yet."
+    if not data.n_good:
+        return (
+            f"All {count(results.n_runs, 'game')} failed." if results.n_runs > 1 else "The only game failed."
+        )
+    games = count(data.n_good, "game") + (
+        f" over {count(len(data.points), 'point')}" if data.has_points else ""
+    )
+    if not data.wins:
+        return f"{_who_was_left(data)} in {games}."
+    shares = [s for s in results.shares() if s.n > 0]
+    ties = sum(s.n for s in shares if s.team is None)
+    winners = sorted((s for s in shares if s.team is not None), key=lambda s: -s.n)
+    if not winners:
+        return f"All {games} ended in ties." if data.n_good > 1 else "The only game ended in a tie."
+    ends = [f"{100.0 * s.low:.1f} to {100.0 * s.high:.1f}" for s in winners]
+    first = winners[0]
+    parts = [
+        f"{first.name} won {count(first.n)} of {games} ({percent(first.value)}, 95 % interval {ends[0]})"
+    ]
+    parts += [
+        f"{s.name} {count(s.n)} ({percent(s.value)}, {e})"
+        for s, e in zip(winners[1:3], ends[1:], strict=False)
+    ]
+    parts += [f"other teams {count(sum(s.n for s in winners[3:]))}"] if winners[3:] else []
+    parts += [count(ties, "tie")] if ties else []
+    return " ".join([", ".join(parts) + ".", *_most_and_least(data)])
+
+
+def _most_and_least(data: ReportData) -> Iterator[str]:
+    """Where the first of the winners won most and least, along the strongest variable; nothing where chance could have done it."""
+    if not data.variables:
+        return
+    leader = data.wins[0]
+    variable = data.by_strength(leader)[0]
+    axis = axis_of(variable, data.points, 4)
+    mean, low, high = data.means_at(axis, leader).T
+    if not np.isfinite(mean).any():
+        return
+    most, least = int(np.nanargmax(mean)), int(np.nanargmin(mean))
+    if low[most] > high[least]:
+        best, worst = (f"{variable.name} {axis.place_text(i)} ({percent(mean[i])})" for i in (most, least))
+        yield f"{leader.name} won most with {best} and least with {worst}."
+
+
+def _who_was_left(data: ReportData) -> str:
+    """Where nobody scores, how many of each team were left."""
+    found = []
+    for measure in data.scores:
+        left_, start = data.results.means([measure.expression, measure.expression.replace("alive", "start")])
+        text = f"{estimate(left_.value)} of {number(start.value)} {measure.name}"
+        found.append(f"{text} (95 % interval {interval(left_.low, left_.high)})")
+    if found:
+        return f"{' and '.join(found)} were left on average"
+    teams = [t for t in data.results.teams if f"alive[{t}]" in data.results.quantities]
+    return f"All of {' and of '.join(map(data.name_of, teams))} were left" if teams else "Nothing was counted"
+
+
+def notes(data: ReportData) -> list[str]:
+    """What a reader must know before the rest."""
+    results = data.results
+    found = [sentence(note) for note in results.notes]
+    if results.n_failed:
+        found.append(
+            f"{count(results.n_failed, 'game')} of {count(results.n_runs)} failed and {'is' if results.n_failed == 1 else 'are'} in no"
+            " number; the section “Games to look at” lists the errors."
+        )
+    if stopped := results.info.get("stopped_by"):
+        found.append(
+            f"The batch ended by its rule: {stopped}. An interval that made the batch stop is no test."
+        )
+    return found
+
+
+def headline(data: ReportData) -> list[tuple[str, str]]:
+    """The few numbers under the answer."""
+    found = [("games", count(data.results.n_runs))]
+    if data.has_points:
+        found += [("points", count(len(data.points))), ("variables", count(len(data.variables)))]
+    cpu = np.asarray(data.results.runs["cpu_s"].to_numpy(zero_copy_only=False), dtype=float)
+    return [*found, ("teams", count(len(data.results.teams))), ("CPU time", seconds(float(np.nansum(cpu))))]
