@@ -367,7 +367,7 @@ class Batch:
         Args:
             directory: Batch directory, where finished runs are kept at once; None keeps all in memory.
             executor: Who plays; by default all cores of this machine.
-            until: Stop when the interval of a result is narrow enough, such as "score[2]±0.5"; see `Until`.
+            until: Stop when the interval of a result is narrow enough, such as "score[2]:0.5"; see `Until`.
             command: What `batch.json` is to name as the command.
             on_progress: Called after each finished run, and now and then.
 

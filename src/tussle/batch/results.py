@@ -59,12 +59,13 @@ class Results:
         table: One row per run, team and metric.
         alive: Entities of each run and team whenever their number changes.
         runs: One row per finished run: keys, variables, how it ended, and each quantity.
+        n_distinct: Distinct games among the runs that did not fail: runs of one point with one final state are copies.
     """
 
     def __init__(self, stored: Stored) -> None:
         self.path: Path | None = stored.path
         self.info: dict[str, Any] = stored.info
-        self.notes: list[str] = stored.notes
+        self.notes: list[str] = list(stored.notes)
         self.design: pa.Table = stored.design
         self.table: pa.Table = stored.table
         self.alive: pa.Table = stored.alive
@@ -73,6 +74,13 @@ class Results:
         self._point: np.ndarray = facts["point"].to_numpy()
         self._seed_index: np.ndarray = self._run // max(1, len(self.points))
         self._is_failed = run_table.is_failed(facts)
+        self._game = run_table.distinct_games(facts, self._is_failed)
+        self.n_distinct: int = len(np.unique(self._game[~self._is_failed]))
+        if n_copies := self.n_runs - self.n_failed - self.n_distinct:
+            self.notes.append(
+                f"{n_copies:,} of {self.n_runs:,} runs are copies of another run of their point: they end in the same state; "
+                f"intervals count the {self.n_distinct:,} distinct games"
+            )
         self._columns = self._quantities_of(facts)
         names = [v.name for v in self.variables]
         keyed = run_table.with_values(facts, self.design, names, self._columns)
@@ -214,14 +222,24 @@ class Results:
 
     def means_by_point(self, expression: str) -> list[Mean]:
         """The mean of a quantity at each point, without gathering its runs anew for each."""
-        return means_of(expression, self._by_point(self.quantity(expression)))
+        values, n = self._by_point(self.quantity(expression)), range(len(self.points))
+        if self._has_copies:
+            return [
+                mean_of(expression, values[i], games)
+                for i, games in zip(n, self._by_point(self._game), strict=True)
+            ]
+        return means_of(expression, values)
 
     def shares_by_point(self) -> list[list[Share]]:
         """Games that each team won at each point."""
         names = self._outcomes()
         columns = [self._by_point(self._columns[column]) for _, _, column in names]
+        games = self._by_point(self._game) if self._has_copies else [None] * len(self.points)
         return [
-            [share_of(name, team, rows[i]) for (name, team, _), rows in zip(names, columns, strict=True)]
+            [
+                share_of(name, team, rows[i], games[i])
+                for (name, team, _), rows in zip(names, columns, strict=True)
+            ]
             for i in range(len(self.points))
         ]
 
@@ -262,16 +280,17 @@ class Results:
             ParameterError: There is no such quantity or point, or no two points that can be paired.
         """
         firsts, seconds = paired_points(self.variables, self.points, a, b)
-        matrix = self.by_seed(expression)
-        blocks = None
-        if len(firsts) > 1 and len(matrix) >= BLOCKS_FROM and not self.info["independent"]:
-            blocks = np.repeat(np.arange(len(matrix)), len(firsts))
+        matrix, games, blocks = self.by_seed(expression), self._games_by_seed, None
+        is_by_seed = len(firsts) > 1 and len(matrix) >= BLOCKS_FROM and not self.info["independent"]
+        if is_by_seed:
+            blocks = np.repeat(_numbered(games), len(firsts))
+        elif self._has_copies:
+            blocks = _numbered(np.stack([games[:, firsts].ravel(), games[:, seconds].ravel()], axis=1))
         names = (str(a), str(b))
         if is_number(a) or is_number(b):
             names = (self.label(firsts[0]), self.label(seconds[0]))
-        return paired_difference(
-            expression, names, matrix[:, firsts].ravel(), matrix[:, seconds].ravel(), blocks
-        )
+        values = matrix[:, firsts].ravel(), matrix[:, seconds].ravel()
+        return paired_difference(expression, names, *values, blocks, are_copies=not is_by_seed)
 
     def by_seed(self, expression: str) -> np.ndarray:
         """A quantity by seed and point, (n_seeds, n_points); NaN where it failed or is not finished."""
@@ -279,6 +298,25 @@ class Results:
         matrix = np.full((n_seeds, len(self.points)), np.nan)
         matrix[self._seed_index, self._point] = self.quantity(expression)
         return matrix
+
+    def seed_blocks(self, points: Sequence[int]) -> np.ndarray:
+        """A number for the seed of each run, (n_runs,), the same for seeds whose games are copies of each other at some points.
+
+        Args:
+            points: These.
+        """
+        return np.asarray(_numbered(self._games_by_seed[:, list(points)])[self._seed_index])
+
+    @property
+    def _has_copies(self) -> bool:
+        return self.n_distinct < self.n_runs - self.n_failed
+
+    @property
+    def _games_by_seed(self) -> np.ndarray:
+        """Number of the distinct game of each seed and point, (n_seeds, n_points); -1 where it is not finished."""
+        games = np.full((int(self._seed_index.max(initial=-1)) + 1, len(self.points)), -1)
+        games[self._seed_index, self._point] = self._game
+        return games
 
     def select(self, text: str) -> list[int]:
         """The points at which variables have the values that a text such as "tactic=keep, prey_speed=20" names.
@@ -373,15 +411,20 @@ class Results:
         return np.ones(self.n_runs, bool) if point is None else self._point == known_point(self.points, point)
 
     def _blocks(self, rows: np.ndarray, point: int | None) -> np.ndarray | None:
-        """Block of each of these runs; None where they count as independent."""
-        if point is not None or len(self.points) == 1 or self.info["independent"]:
-            return None
-        seeds = self._seed_index[rows]
-        return seeds if len(np.unique(seeds)) >= BLOCKS_FROM else None
+        """Block of each of these runs: their seed, over all points, or else their distinct game; None where runs are independent."""
+        is_shared = point is None and len(self.points) > 1 and not self.info["independent"]
+        if is_shared and len(np.unique(self._seed_index[rows])) >= BLOCKS_FROM:
+            return np.asarray(self.seed_blocks(range(len(self.points)))[rows])
+        return self._game[rows] if self._has_copies else None
 
     def __repr__(self) -> str:
         failed = f", {self.n_failed} failed" if self.n_failed else ""
         return f"<Results {str(self.path)!r}: {self.n_runs} of {self.n_planned} runs{failed}>"
+
+
+def _numbered(rows: np.ndarray) -> np.ndarray:
+    """A number for each row, (n,), the same for equal rows."""
+    return np.asarray(np.unique(rows, axis=0, return_inverse=True)[1]).ravel()
 
 
 def _original(value: Any, variable: Variable) -> Any:

@@ -75,3 +75,18 @@ def with_values(
     for name in names:
         columns[f"varied {name}" if name in FACTS or name in taken else name] = values[name]
     return columns | {name: runs[name] for name in FACTS}
+
+
+def distinct_games(runs: pa.Table, failed: np.ndarray) -> np.ndarray:
+    """A number for each run, (n_runs,): the same for runs of one point that ended in the same state, which are copies of one game.
+
+    Args:
+        runs: One row per run.
+        failed: Which runs failed, (n_runs,): none of them is a copy.
+    """
+    text = pc.fill_null(runs["state_hash"].combine_chunks(), "").dictionary_encode()
+    hashes = text.indices.to_numpy().astype(np.int64)
+    is_known = ~failed & (np.array([*text.dictionary.to_pylist(), ""], dtype=object)[hashes] != "")
+    own = np.where(is_known, 0, 1 + np.arange(len(failed)))  # apart from all others
+    keys = np.stack([runs["point"].to_numpy().astype(np.int64), hashes, own], axis=1)
+    return np.asarray(np.unique(keys, axis=0, return_inverse=True)[1]).ravel()

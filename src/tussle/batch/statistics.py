@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from statistics import NormalDist
 
 import numpy as np
 
@@ -117,16 +116,14 @@ class Comparison:
 # -- shares ---------------------------------------------------------------------------------------------------------------
 
 
-def wilson(k: float, n: float, level: float = LEVEL) -> tuple[float, float]:
-    """Interval of a share, k of n (Wilson, JASA 22 (1927), 209-212); NaN for n = 0."""
+def wilson(k: float, n: float) -> tuple[float, float]:
+    """Wilson's interval of a share, k of n, which are rounded to whole numbers; NaN for n = 0."""
     if n <= 0:
         return math.nan, math.nan
-    z2 = NormalDist().inv_cdf(0.5 + level / 2.0) ** 2
-    p = k / n
-    middle = (p + z2 / (2.0 * n)) / (1.0 + z2 / n)
-    half = math.sqrt(z2) / (1.0 + z2 / n) * math.sqrt(p * (1.0 - p) / n + z2 / (4.0 * n * n))
-    low = 0.0 if k <= 0 else max(0.0, middle - half)  # exactly; rounding would leave 1e-17
-    return low, 1.0 if k >= n else min(1.0, middle + half)
+    from scipy.stats import binomtest
+
+    found = binomtest(round(k), round(n)).proportion_ci(LEVEL, method="wilson")
+    return float(found.low), float(found.high)
 
 
 def share_of(name: str, team: int | None, won: np.ndarray, blocks: np.ndarray | None = None) -> Share:
@@ -159,7 +156,7 @@ def effective_size(won: np.ndarray, blocks: np.ndarray | None) -> float:
     share = float(won.mean())
     variance = float(sums.var(ddof=1)) / len(sums) if len(sums) > 1 else 0.0
     if variance == 0.0:  # always or never so
-        return float(n)
+        return float(len(sums))
     return min(max(share * (1.0 - share) / variance, float(len(sums))), float(n))
 
 
@@ -312,7 +309,13 @@ def sign_test(n_greater: int, n_less: int) -> float:
 
 
 def paired_difference(
-    quantity: str, names: tuple[str, str], a: np.ndarray, b: np.ndarray, blocks: np.ndarray | None = None
+    quantity: str,
+    names: tuple[str, str],
+    a: np.ndarray,
+    b: np.ndarray,
+    blocks: np.ndarray | None = None,
+    *,
+    are_copies: bool = False,
 ) -> Comparison:
     """What b has more than a.
 
@@ -322,14 +325,17 @@ def paired_difference(
         a: Value of each pair's first run, (n,).
         b: Value of each pair's second run, (n,).
         blocks: Number of the block that each pair belongs to, (n,); None where pairs are independent.
+        are_copies: The pairs of a block are copies of one pair, so that the sign test counts each block once.
     """
     is_known = np.isfinite(a) & np.isfinite(b)
     a, b = a[is_known], b[is_known]
-    more = b - a
+    more, own = b - a, None if blocks is None else blocks[is_known]
     n_greater, n_less = int((more > 0.0).sum()), int((more < 0.0).sum())
-    mean = mean_of(quantity, more, None if blocks is None else blocks[is_known])
+    mean = mean_of(quantity, more, own)
+    signs = np.sign(more if own is None or not are_copies else more[np.unique(own, return_index=True)[1]])
     mean_a, mean_b = (float(v.mean()) if len(v) else math.nan for v in (a, b))
     return Comparison(
         quantity, *names, len(more), mean_a, mean_b, mean.value, mean.low, mean.high,
-        n_greater, n_less, len(more) - n_greater - n_less, sign_test(n_greater, n_less),
+        n_greater, n_less, len(more) - n_greater - n_less,
+        sign_test(int((signs > 0.0).sum()), int((signs < 0.0).sum())),
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""When a batch has been played often enough: as soon as a result is known to within a given width."""
+"""The rule by which a batch ends when a result is known to within a given width."""
 
 from __future__ import annotations
 
@@ -17,8 +17,11 @@ from tussle.errors import ParameterError
 FEWEST_RUNS = 20
 """With fewer a standard deviation is too uncertain to stop by; several equal scores at the beginning would have none."""
 
-TAKES = "it takes ±WIDTH for the wins of all teams, or QUANTITY±WIDTH, such as ±0.02, score[2]±0.5 or wins[2]+-0.02"
-SIGN = re.compile(r"±|\+/?-")
+TAKES = (
+    "it takes WIDTH for the wins of all teams, or QUANTITY:WIDTH, such as 0.02, score[2]:0.5 or wins[2]:0.02"
+)
+SIGN = re.compile(r":|±|\+/?-")
+"""Stands before the width; ± and its spellings are those of earlier versions."""
 Columns = Mapping[str, np.ndarray]
 
 
@@ -36,15 +39,14 @@ class Until:
 
     @staticmethod
     def parse(text: str) -> Until:
-        """Read "±0.02", "score[2]±0.5" or, where the sign cannot be typed, "score[2]+-0.5".
+        """Read "0.02" or "score[2]:0.5".
 
         Raises:
             ParameterError: It is written otherwise, or asks for an impossible width.
         """
         signs = list(SIGN.finditer(text))
-        if not signs:
-            raise ParameterError(f"until {text!r}: there is no ±; {TAKES}")
-        name, number = text[: signs[-1].start()].strip(), text[signs[-1].end() :].strip()
+        name, number = (text[: signs[-1].start()], text[signs[-1].end() :]) if signs else ("", text)
+        name, number = name.strip(), number.strip()
         try:
             half_width = float(number)
         except ValueError:
@@ -86,12 +88,12 @@ class Until:
         wins = [values for name, values in columns.items() if name.startswith("wins[")]
         if not wins:
             raise ParameterError(
-                f"until {self}: these games have no scores, so nobody wins; name a quantity, as in t±0.5"
+                f"until {self}: these games have no scores, so nobody wins; name a quantity, as in t:0.5"
             )
         return max(_half(values, is_share=True) for values in wins)
 
     def __str__(self) -> str:
-        return f"{self.quantity or ''}±{self.half_width!r}"
+        return f"{self.quantity}:{self.half_width!r}" if self.quantity else repr(self.half_width)
 
 
 def _half(values: np.ndarray, is_share: bool) -> float:

@@ -111,8 +111,8 @@ Independent = Annotated[
 UntilWidth = Annotated[
     str | None,
     typer.Option(
-        metavar="±WIDTH",
-        help="Stop when a result is known well enough: ±0.02 (wins of each team), 'score[2]±0.5'.",
+        metavar="WIDTH",
+        help="Stop when half of a 95 % interval is this narrow: 0.02 (share of wins of each team), 'score[2]:0.5'.",
         show_default=False,
     ),
 ]

@@ -48,6 +48,8 @@ def show_batch(results: Results, directory: Path, wall: float, n_new: int) -> in
         parts.append(points_table(results))
     parts += [shares_table(results), _ending(results, directory, wall, n_new), ""]
     put(*parts)
+    for note in results.notes:
+        say_note(note)
     if results.n_failed == results.n_runs:
         say_error(f"all runs failed; the first: {results.failed()['error'][0].as_py()}")
         return PLUGIN_FAILED
@@ -105,7 +107,7 @@ def _mean(results: Results, name: str) -> str:
     mean = results.means([name])[0]
     if not mean.n:
         return ""
-    if mean.n == 1 or mean.high == mean.low:
+    if not mean.high > mean.low:
         return f"{mean.value:.6g}"
     digits = max(0, 1 - math.floor(math.log10(mean.high - mean.low)))
     return f"{mean.value:.{digits}f} ({mean.low:.{digits}f}–{mean.high:.{digits}f})"

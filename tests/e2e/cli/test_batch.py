@@ -133,11 +133,11 @@ def test_a_sweep_file_says_what_varies_and_the_command_line_comes_before_it(here
 
 
 def test_it_stops_when_enough_is_known(here, folder):
-    command = ("batch", "chance.xml", "--until", "score[1]±0.6", "--out", "out", *PLUGINS)
+    command = ("batch", "chance.xml", "--until", "score[1]:0.6", "--out", "out", *PLUGINS)
     code, out, _ = here(*command, "--processes", 1)
     assert code == 0
     n = load_batch(folder / "out").info["n_seeds"]
-    assert f" stopped  score[1]±0.6 is reached with {n} seeds\n" in out
+    assert f" stopped  score[1]:0.6 is reached with {n} seeds\n" in out
     assert f" {n} runs · seeds 1 to {n}\n" in out
     assert here(*command)[2] == f"note: {n} of {n} runs were there already, in out\n"
 
@@ -249,8 +249,8 @@ WRONG = {
     "end before start": (["chance.xml", "--end", "0"], 1, "--end 0 is not allowed"),
     "end is no time": (["chance.xml", "--end", "soon"], 1, "--end: 'soon' is not a number"),
     "no such method": (["chance.xml", "--vary", "odds=0.1:0.3", "--sample", "lsh"], 1, "(did you mean 'lhs'?)"),
-    "until without width": (["chance.xml", "--until", "score[1]"], 1, "until 'score[1]': there is no ±"),
-    "until nothing": (["chance.xml", "--until", "score[9]±1"], 1, "there is no 'score[9]'"),
+    "until without width": (["chance.xml", "--until", "score[1]"], 1, "until 'score[1]': 'score[1]' is no number"),
+    "until nothing": (["chance.xml", "--until", "score[9]:1"], 1, "there is no 'score[9]'"),
     "log out of range": (["chance.xml", "--log", "3,12", "--runs", "12"], 1, "--log '12' is not allowed; the batch has runs 0 to 11"),
     "log is no number": (["chance.xml", "--log", "a"], 1, "--log 'a' is not allowed; it takes numbers of runs"),
     "sweep is not there": (["chance.xml", "--sweep", "sweep.toml"], 1, "sweep.toml"),

@@ -6,6 +6,7 @@ import dataclasses
 import math
 import time
 
+import bowl
 import numpy as np
 import pandas as pd
 import polars as pl
@@ -13,7 +14,7 @@ import pyarrow as pa
 import pytest
 from made_batches import START, made_batch, write_batch
 
-from tussle.batch import load_batch
+from tussle.batch import Batch, InProcess, load_batch
 from tussle.batch import results as results_module
 from tussle.batch.results import Results
 from tussle.batch.statistics import mean_interval, wilson
@@ -314,3 +315,51 @@ def test_large_batches_are_tabled_without_a_loop_over_runs():
     assert results.n_runs == n_runs
     np.testing.assert_array_equal(results.quantity("A.m7"), columns["value"][7::n_metrics])
     assert spent < 0.5 * as_objects  # no Python object is made of each row
+
+
+# -- copies ---------------------------------------------------------------------------------------------------------------
+
+
+def test_seeds_that_give_one_final_state_are_copies_and_not_observations():
+    same = dict.fromkeys(range(30), "a" * 16)
+    copies = Results(made_batch({2: np.full((30, 1), 3.0), 3: np.zeros((30, 1))}, hashes=same))
+    distinct = Results(made_batch({2: np.full((30, 1), 3.0), 3: np.zeros((30, 1))}))
+    assert (copies.n_distinct, distinct.n_distinct) == (1, 30)
+    assert distinct.notes == []
+    (note,) = copies.notes
+    assert "29 of 30 runs are copies" in note
+    share, mean = copies.shares()[0], copies.means(["score[2]"])[0]
+    assert (share.n, share.of, mean.n, mean.value) == (30, 30, 30, 3.0)
+    assert (share.low, share.high) == wilson(1, 1)
+    assert np.isnan(mean.low)
+    assert distinct.shares()[0].low == wilson(30, 30)[0]
+
+
+def test_intervals_of_points_and_comparisons_count_distinct_games():
+    variable = Choice("tactic", ("keep", "switch"))
+    luck = np.random.default_rng(1).normal(size=(5, 1))
+    scores = {2: np.tile(np.hstack([luck, luck + 1.0]), (4, 1)), 3: np.zeros((20, 2))}
+    hashes = {run: f"{run % 10:016x}" for run in range(40)}  # four copies of five seeds
+    options = {"variables": [variable], "points": [{"tactic": "keep"}, {"tactic": "switch"}]}
+    copied = Results(made_batch(scores, hashes=hashes, **options))
+    once = Results(made_batch({t: v[:5] for t, v in scores.items()}, **options))
+    assert copied.n_distinct == 10
+    for many, few in zip(copied.means_by_point("score[2]"), once.means_by_point("score[2]"), strict=True):
+        np.testing.assert_allclose([many.low, many.high], [few.low, few.high])
+    many, few = (r.compare("score[2]", "tactic=keep", "tactic=switch") for r in (copied, once))
+    assert (many.n, few.n) == (20, 5)
+    assert many.p == few.p == pytest.approx(0.0625)
+
+
+def test_a_game_without_chance_gives_one_distinct_game():
+    results = Batch(bowl.mission(), runs=5).play(executor=InProcess())
+    assert (results.n_runs, results.n_distinct) == (5, 1)
+
+
+def test_failed_runs_are_no_copies():
+    same = dict.fromkeys(range(6), "a" * 16)
+    results = Results(
+        made_batch({2: np.ones((6, 1)), 3: np.zeros((6, 1))}, hashes=same, failed={0: "x", 1: "x"})
+    )
+    assert results.n_distinct == 1
+    assert "3 of 6 runs are copies" in results.notes[0]

@@ -31,7 +31,7 @@ class Enough(Exception):
     pass
 
 
-@pytest.mark.parametrize("rule", ["score[1]±0.6", "±0.2", "lost[2]±0.3"])
+@pytest.mark.parametrize("rule", ["score[1]:0.6", "0.2", "lost[2]:0.3"])
 def test_where_a_batch_stops_does_not_depend_on_who_plays_nor_on_interruptions(mission, tmp_path, rule):
     reference = until_batch(mission).play(tmp_path / "reference", InProcess(1), until=rule)
     n = reference.info["n_seeds"]
@@ -40,11 +40,11 @@ def test_where_a_batch_stops_does_not_depend_on_who_plays_nor_on_interruptions(m
     assert n % ROUND == 0
     assert reference.n_runs == reference.n_planned == 2 * n
     # It is the first round with which it is enough.
-    name = rule.partition("±")[0] or "wins[1]"
+    name = rule.rpartition(":")[0] or "wins[1]"
     half, width = (_widths(reference, name, k) for k in (n - ROUND, n))
-    wanted = float(rule.partition("±")[2])
+    wanted = float(rule.rpartition(":")[2])
     assert width <= wanted * 1.0000001
-    assert n == 20 or half > wanted or rule == "±0.2"
+    assert n == 20 or half > wanted or rule == "0.2"
     assert rows(until_batch(mission).play(executor=InProcess(64), until=rule)) == rows(reference)
 
     def watch(progress):
@@ -68,22 +68,22 @@ def _widths(results, name, n_seeds):
 
 
 def test_processes_stop_where_this_process_does(mission):
-    reference = rows(until_batch(mission).play(executor=InProcess(1), until="score[1]±0.6"))
-    assert rows(until_batch(mission).play(executor=Processes(2, 5), until="score[1]±0.6")) == reference
+    reference = rows(until_batch(mission).play(executor=InProcess(1), until="score[1]:0.6"))
+    assert rows(until_batch(mission).play(executor=Processes(2, 5), until="score[1]:0.6")) == reference
 
 
 def test_a_narrower_rule_goes_on_and_a_wider_one_has_enough(mission, tmp_path):
     path = tmp_path / "out"
-    first, n_first = counted(until_batch(mission), path, "score[1]±0.6")
-    assert counted(until_batch(mission), path, "score[1]±0.6")[1] == 0
-    second, n_second = counted(until_batch(mission), path, "score[1]±0.4")
+    first, n_first = counted(until_batch(mission), path, "score[1]:0.6")
+    assert counted(until_batch(mission), path, "score[1]:0.6")[1] == 0
+    second, n_second = counted(until_batch(mission), path, "score[1]:0.4")
     assert n_second > 0
     assert second.n_runs > first.n_runs
     assert n_first >= first.n_runs
-    assert rows(second) == rows(until_batch(mission).play(executor=InProcess(7), until="score[1]±0.4"))
-    third, n_third = counted(until_batch(mission), path, "score[1]±0.6")
+    assert rows(second) == rows(until_batch(mission).play(executor=InProcess(7), until="score[1]:0.4"))
+    third, n_third = counted(until_batch(mission), path, "score[1]:0.6")
     assert (n_third, third.n_runs) == (0, second.n_runs)
-    assert third.info["stopped_by"] == "score[1]±0.6"
+    assert third.info["stopped_by"] == "score[1]:0.6"
     # Without a rule, it has as many as are asked for and never fewer than are there.
     n_seeds = second.info["n_seeds"]
     assert counted(until_batch(mission, 5), path)[1] == 0
@@ -97,7 +97,7 @@ def test_a_rule_drops_nothing_that_was_asked_for_before(mission, tmp_path):
 
     path = tmp_path / "out"
     before = batch(60).play(path, InProcess())
-    after, n = counted(batch(None), path, "score[1]±0.9")
+    after, n = counted(batch(None), path, "score[1]:0.9")
     assert n == 0
     assert rows(after) == rows(before)
 
@@ -108,34 +108,34 @@ def test_a_rule_drops_nothing_that_was_asked_for_before(mission, tmp_path):
     path = tmp_path / "cut"
     with pytest.raises(Enough):
         batch(60).play(path, InProcess(1), on_progress=watch)
-    after, n = counted(batch(None), path, "score[1]±0.9")
+    after, n = counted(batch(None), path, "score[1]:0.9")
     assert (n, after.info["n_seeds"]) == (1, 44)  # the other game of the last seed
 
 
 def test_a_rule_that_is_not_reached_ends_with_the_runs(mission, tmp_path):
-    results = until_batch(mission, 25).play(tmp_path / "out", InProcess(), until="score[1]±0.01")
-    assert (results.n_runs, results.info["stopped_by"], results.info["until"]) == (50, None, "score[1]±0.01")
-    _, n = counted(until_batch(mission, 30), tmp_path / "out", "score[1]±0.01")
+    results = until_batch(mission, 25).play(tmp_path / "out", InProcess(), until="score[1]:0.01")
+    assert (results.n_runs, results.info["stopped_by"], results.info["until"]) == (50, None, "score[1]:0.01")
+    _, n = counted(until_batch(mission, 30), tmp_path / "out", "score[1]:0.01")
     assert n == 10
 
 
 def test_runs_that_fail_do_not_hold_up_the_end(mission):
     batch = until_batch(mission, settings={"how": "step"})
-    results = batch.play(executor=InProcess(32), until="score[1]±0.6")
-    assert results.info["stopped_by"] == "score[1]±0.6"
+    results = batch.play(executor=InProcess(32), until="score[1]:0.6")
+    assert results.info["stopped_by"] == "score[1]:0.6"
     assert 0 < results.n_failed < results.n_runs < 1000
 
 
 def test_a_rule_that_means_nothing_is_told(mission, tmp_path):
-    with pytest.raises(ParameterError, match="there is no ±"):
+    with pytest.raises(ParameterError, match="no number"):
         until_batch(mission).play(tmp_path / "out", until="score[1]")
     for directory in (tmp_path / "out", None):
         with pytest.raises(ParameterError, match=r"there is no 'score\[9\]'"):
-            until_batch(mission).play(directory, InProcess(), until="score[9]±0.5")
+            until_batch(mission).play(directory, InProcess(), until="score[9]:0.5")
     assert not (tmp_path / "out").exists()
     unscored = Batch(game().replace(metrics=[]), runs=None)
     with pytest.raises(ParameterError, match="these games have no scores"):
-        unscored.play(until="±0.1")
+        unscored.play(until="0.1")
 
 
 class Late(Metric):
@@ -145,7 +145,7 @@ class Late(Metric):
 
 def test_a_rule_may_be_about_what_only_whole_games_have():
     batch = Batch(game(odds=0.0).replace(metrics=[Late()]), runs=None)
-    results = batch.play(executor=InProcess(), until="Late.late±0.1")
+    results = batch.play(executor=InProcess(), until="Late.late:0.1")
     assert results.info["n_seeds"] == 20
 
 

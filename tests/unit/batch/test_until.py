@@ -19,13 +19,12 @@ def wins(k: int, n: int) -> np.ndarray:
 @pytest.mark.parametrize(
     ("text", "quantity", "half_width"),
     [
+        ("0.02", None, 0.02),
+        (" 2e-2 ", None, 0.02),
+        ("score[2] : 0.5", "score[2]", 0.5),
+        ("score[2] - score[3]:20", "score[2] - score[3]", 20.0),
         ("±0.02", None, 0.02),
-        ("+-0.02", None, 0.02),
-        ("+/-0.02", None, 0.02),
-        (" score[2] ± 0.5 ", "score[2]", 0.5),
-        ("wins[2]+-2e-2", "wins[2]", 0.02),
-        ("score[2]+-1±3", "score[2]+-1", 3.0),
-        ("score[2] - score[3] +/- 20", "score[2] - score[3]", 20.0),
+        ("score[2]+-1+-3", "score[2]+-1", 3.0),
     ],
 )
 def test_a_rule_is_read_and_written_again(text, quantity, half_width):
@@ -37,23 +36,22 @@ def test_a_rule_is_read_and_written_again(text, quantity, half_width):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("0.02", "there is no ±"),
-        ("score[2]-0.5", "there is no ±"),
-        ("±", "'' is no number"),
-        ("±2%", "2 % is written 0.02"),
-        ("±0", "it takes a number > 0"),
-        ("±-1", "it takes a number > 0"),
-        ("±nan", "it takes a number > 0"),
-        ("±inf", "it takes a number > 0"),
-        ("±2", "shares lie between 0 and 1"),
-        ("wins[2]±0.5", "shares lie between 0 and 1"),
-        ("score[±1", "cannot be read"),
+        ("score[2]-0.5", "no number"),
+        ("", "no number"),
+        ("score[2]:", "no number"),
+        ("2%", "2 % is written 0.02"),
+        ("0", "> 0"),
+        ("-1", "> 0"),
+        ("nan", "> 0"),
+        ("inf", "> 0"),
+        ("2", "between 0 and 1"),
+        ("wins[2]:0.5", "between 0 and 1"),
+        ("score[:1", "cannot be read"),
     ],
 )
 def test_what_is_no_rule_is_refused(text, words):
-    with pytest.raises(ParameterError) as error:
+    with pytest.raises(ParameterError, match=words):
         Until.parse(text)
-    assert words in str(error.value)
 
 
 def test_a_share_is_as_wide_as_wilsons_interval():
@@ -65,19 +63,19 @@ def test_a_share_is_as_wide_as_wilsons_interval():
         "t": np.arange(100.0),
     }
     assert (
-        Until.parse("±0.1").width(columns) == (high - low) / 2.0
+        Until.parse("0.1").width(columns) == (high - low) / 2.0
     )  # the widest of the teams; ties are nobody's win
-    assert Until.parse("wins[2]±0.1").width(columns) == (high - low) / 2.0
-    assert Until.parse("wins[3]±0.1").width(columns) < 0.03
-    assert Until.parse("±0.096").is_met([columns])
-    assert not Until.parse("±0.094").is_met([columns])
+    assert Until.parse("wins[2]:0.1").width(columns) == (high - low) / 2.0
+    assert Until.parse("wins[3]:0.1").width(columns) < 0.03
+    assert Until.parse("0.096").is_met([columns])
+    assert not Until.parse("0.094").is_met([columns])
 
 
 def test_a_mean_is_as_wide_as_its_normal_interval():
     values = np.random.default_rng(1).normal(size=400)
-    width = Until.parse("score[2]±1").width({"score[2]": values})
+    width = Until.parse("score[2]:1").width({"score[2]": values})
     assert width == pytest.approx(1.959964 * values.std(ddof=1) / 20.0, rel=1e-6)
-    assert Until.parse("2*score[2]-1±1").width({"score[2]": values}) == pytest.approx(2.0 * width)
+    assert Until.parse("2*score[2]-1:1").width({"score[2]": values}) == pytest.approx(2.0 * width)
 
 
 def test_failed_runs_count_for_nothing():
@@ -87,34 +85,34 @@ def test_failed_runs_count_for_nothing():
         "t": np.concatenate([np.arange(60.0), failed]),
     }
     without = {name: values[:60] for name, values in columns.items()}
-    for text in ("±0.1", "t±1"):
+    for text in (":0.1", "t:1"):
         assert Until.parse(text).width(columns) == Until.parse(text).width(without)
 
 
 def test_every_point_is_to_be_known():
     good, bad = {"wins[1]": wins(0, 200)}, {"wins[1]": wins(100, 200)}
-    rule = Until.parse("±0.02")
+    rule = Until.parse("0.02")
     assert rule.is_met([good, good])
     assert not rule.is_met([good, bad])
 
 
 def test_a_few_runs_are_never_enough():
-    rule = Until.parse("score[1]±1")
+    rule = Until.parse("score[1]:1")
     equal = {"score[1]": np.full(FEWEST_RUNS - 1, 3.0), "wins[1]": np.full(FEWEST_RUNS - 1, 1.0)}
     assert rule.width(equal) == math.inf
-    assert Until.parse("±0.4").width(equal) == math.inf
+    assert Until.parse("0.4").width(equal) == math.inf
     assert rule.is_met([{"score[1]": np.full(FEWEST_RUNS, 3.0)}])
 
 
 def test_where_all_runs_failed_it_is_not_enough_and_no_error():
     nothing = {"t": np.full(30, np.nan)}
-    for text in ("±0.02", "score[2]±1"):
+    for text in (":0.02", "score[2]:1"):
         assert Until.parse(text).width(nothing) == math.inf
         assert Until.parse(text).width({}) == math.inf
 
 
 def test_a_result_that_the_runs_do_not_have_is_told():
     with pytest.raises(ParameterError, match="nobody wins; name a quantity"):
-        Until.parse("±0.02").is_met([{"t": np.arange(30.0)}])
+        Until.parse("0.02").is_met([{"t": np.arange(30.0)}])
     with pytest.raises(ParameterError, match=r"there is no 'score\[9\]'"):
-        Until.parse("score[9]±1").is_met([{"score[1]": np.arange(30.0)}])
+        Until.parse("score[9]:1").is_met([{"score[1]": np.arange(30.0)}])

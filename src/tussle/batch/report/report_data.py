@@ -315,17 +315,14 @@ class ReportData:
 
     def means_at(self, axis: Axis, measure: Measure) -> np.ndarray:
         """Mean of a quantity at each place of an axis, lower and upper end of its interval, (n_places, 3)."""
-        values, place = self.results.quantity(measure.expression), axis.index[self.point]
-        rows = [place == i for i in range(axis.n_places)]
-        draw = self.draw
-        return np.array(
-            [
-                clustered_mean(
-                    values[r], self.seed[r], None if draw is None else draw[r], is_share=measure.is_share
-                )
-                for r in rows
-            ]
-        )
+        values, draw = self.results.quantity(measure.expression), self.draw
+        found = []
+        for place in range(axis.n_places):
+            points = np.flatnonzero(axis.index == place).tolist()
+            rows, seed = np.isin(self.point, points), self.results.seed_blocks(points)
+            drawn = None if draw is None else draw[rows]
+            found.append(clustered_mean(values[rows], seed[rows], drawn, is_share=measure.is_share))
+        return np.array(found)
 
     # -- what is shown ------------------------------------------------------------------------------------------------------
 
