@@ -1,4 +1,4 @@
-"""What each variable does to a quantity: rank correlation, and its part of the variance."""
+"""What each variable does to a quantity: its rank correlation, and its part of the variance."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from tussle.batch.factorial import Part, as_factorial, parts_of_variance
 from tussle.batch.statistics import BLOCKS_FROM, LEVEL, SEED
 from tussle.batch.variables import Range, Variable
 from tussle.errors import MissingExtraError
@@ -20,6 +19,13 @@ FROM_POINTS = 64
 N_HARMONICS = 4
 """SALib's default of 10 adds noise at a few hundred points; responses of a game have no finer structure."""
 N_RESAMPLES = 200
+MOST_LEVELS = 30
+"""Of a factor of an analysis of variance."""
+
+Points = Sequence[dict[str, Any]]
+Number = float | None
+Parts = tuple[Number, Number, Number, Number, Number, Number]
+"""First order with the ends of its interval, then total with the ends of its interval."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +44,7 @@ class Effect:
         total_low: Lower end of its interval.
         total_high: Upper end.
         method: How the parts were found: "sobol", "rbd_fast", "levels", "anova", or "" where they were not.
-        note: What was done with which values, and what limits it.
+        note: The values and methods that were used, and their limits.
     """
 
     variable: str
@@ -54,8 +60,13 @@ class Effect:
     method: str = ""
     note: str = ""
 
-
-Points = Sequence[dict[str, Any]]
+    def having(self, parts: Parts, method: str, note: str) -> Effect:
+        """The same with parts of the variance."""
+        names = ("first_order", "first_low", "first_high", "total", "total_low", "total_high")
+        found: dict[str, Any] = dict(zip(names, parts, strict=True))
+        return replace(
+            self, **found, method=method, note="; ".join(text for text in (self.note, note) if text)
+        )
 
 
 def effects(variables: Sequence[Variable], points: Points, matrix: np.ndarray, step: int = 0) -> list[Effect]:
@@ -81,6 +92,10 @@ def effects(variables: Sequence[Variable], points: Points, matrix: np.ndarray, s
     return _by_given_data(found, variables, points, _means(matrix))
 
 
+def _without_parts(found: Sequence[Effect], reason: str) -> list[Effect]:
+    return [replace(e, note=f"{e.note}; no parts of the variance: {reason}") for e in found]
+
+
 # -- rank correlation -----------------------------------------------------------------------------------------------------
 
 
@@ -99,20 +114,18 @@ def rank_effects(
     if step:
         chosen = chosen[(chosen % step == 0) | (chosen % step == step - 1)]
     if len(chosen) >= BLOCKS_FROM:
-        place, y = chosen, _means(matrix)[chosen]
-        note = "rank correlation over the points' means"
+        place, y, over = chosen, _means(matrix)[chosen], "the points' means"
     else:
-        place, y = np.tile(np.arange(matrix.shape[1]), len(matrix)), matrix.ravel()
-        note = "rank correlation over runs"
+        place, y, over = np.tile(np.arange(matrix.shape[1]), len(matrix)), matrix.ravel(), "runs"
     is_known = np.isfinite(y)
-    place, y = place[is_known], y[is_known]
     found = []
     for variable in variables:
-        x = _numbers(variable, points)
-        ends = (math.nan,) * 3 if x is None else spearman(x[place], y)
-        found.append(
-            Effect(variable.name, *ends, note=note if x is not None else f"{variable.name} has no order")
-        )
+        values = [point[variable.name] for point in points]
+        if any(isinstance(value, (str, bool)) for value in values):
+            found.append(Effect(variable.name, *(math.nan,) * 3, note=f"{variable.name} has no order"))
+            continue
+        x = np.array(values, dtype=np.float64)[place[is_known]]
+        found.append(Effect(variable.name, *spearman(x, y[is_known]), note=f"rank correlation over {over}"))
     return found
 
 
@@ -134,83 +147,36 @@ def spearman(x: np.ndarray, y: np.ndarray) -> tuple[float, float, float]:
     return r, math.tanh(math.atanh(r) - half), math.tanh(math.atanh(r) + half)
 
 
-def _numbers(variable: Variable, points: Points) -> np.ndarray | None:
-    """Values at the points as numbers, (n_points,); None for a variable without order."""
-    values = [point[variable.name] for point in points]
-    if any(isinstance(value, (str, bool)) for value in values):
-        return None
-    return np.array(values, dtype=np.float64)
-
-
 def _means(matrix: np.ndarray) -> np.ndarray:
     """Mean over the seeds that are known, by point, (n_points,)."""
     is_known = np.isfinite(matrix)
     n = is_known.sum(axis=0)
-    total = np.where(is_known, matrix, 0.0).sum(axis=0)
-    return np.where(n > 0, total / np.maximum(n, 1), np.nan)
+    return np.where(n > 0, np.where(is_known, matrix, 0.0).sum(axis=0) / np.maximum(n, 1), np.nan)
 
 
-# -- parts of the variance ------------------------------------------------------------------------------------------------
+# -- SALib ----------------------------------------------------------------------------------------------------------------
 
 
 def _by_saltelli(found: list[Effect], y: np.ndarray) -> list[Effect]:
-    """Indices of a sample that was made for them; seed noise that means leave counts as total effect of each variable."""
+    """Indices of a sample that was made for them."""
     k = len(found)
     rows = y.reshape(-1, k + 2)
     whole = rows[np.isfinite(rows).all(axis=1)]
     note = f"Saltelli's indices of {len(whole)} base rows, over the points' means"
     if len(whole) < len(rows):
         note += f"; {len(rows) - len(whole)} rows lack a run and are left out"
-    note += "; what is left of seed noise in the means counts into every total"
+    note += "; seed noise that is left in the means counts into every total"
     if len(whole) < 2 or np.ptp(whole) == 0.0:
-        return [replace(e, note=f"{e.note}; no indices: the quantity does not vary") for e in found]
+        return _without_parts(found, "the quantity does not vary")
     problem = {"num_vars": k, "names": [e.variable for e in found], "bounds": [[0.0, 1.0]] * k}
-    sobol, _ = _salib()
-    indices = sobol.analyze(
+    indices = _salib("sobol").analyze(
         problem, whole.ravel(), calc_second_order=False, num_resamples=N_RESAMPLES, seed=SEED
     )
-    done = []
     columns = (indices[name].tolist() for name in ("S1", "S1_conf", "ST", "ST_conf"))
-    for e, s, s_half, t, t_half in zip(found, *columns, strict=True):
-        first = _first(e, s, s - s_half, s + s_half, "sobol", note)
-        done.append(replace(first, total=t, total_low=t - t_half, total_high=t + t_half))
-    return done
-
-
-def _by_anova(found: list[Effect], values: np.ndarray, n_seeds: int) -> list[Effect]:
-    """Parts of the variance of a full factorial, what seeds do included."""
-    parts = parts_of_variance(values)
-    if parts is None:
-        reason = "the quantity does not vary" if len(values) else "no seed has been played at every point"
-        return [replace(e, note=f"{e.note}; no parts of the variance: {reason}") for e in found]
-    note = f"analysis of variance over all {np.prod(values.shape[1:])} combinations × {parts.n_seeds} seeds"
-    if parts.n_seeds < n_seeds:
-        note += f"; {n_seeds - parts.n_seeds} seeds lack a run and are left out"
-    if parts.n_seeds < BLOCKS_FROM:
-        note += f"; intervals take {BLOCKS_FROM} seeds"
-    done = []
-    for e, first, total in zip(found, parts.first, parts.total, strict=True):
-        made = replace(
-            e,
-            first_order=first.share,
-            first_low=first.low,
-            first_high=first.high,
-            method="anova",
-            note=f"{e.note}; {note}",
-        )
-        if parts.noise is not None:  # else it would be taken for interaction
-            made = replace(made, total=total.share, total_low=total.low, total_high=total.high)
-        done.append(made)
-    if len(found) > 1:
-        done.append(_rest("interaction" if parts.noise else "interaction and seed", parts.interaction, note))
-    if parts.noise is not None:
-        done.append(_rest("seed", parts.noise, note))
-    return done
-
-
-def _rest(name: str, part: Part, note: str) -> Effect:
-    nan = math.nan
-    return Effect(name, nan, nan, nan, part.share, part.low, part.high, method="anova", note=note)
+    return [
+        e.having((s, s - s_half, s + s_half, t, t - t_half, t + t_half), "sobol", note)
+        for e, s, s_half, t, t_half in zip(found, *columns, strict=True)
+    ]
 
 
 def _by_given_data(
@@ -220,34 +186,26 @@ def _by_given_data(
     is_known = np.isfinite(y)
     y, n = y[is_known], int(is_known.sum())
     if n < FROM_POINTS or np.ptp(y) == 0.0:
-        reason = f"they take {FROM_POINTS} points" if n < FROM_POINTS else "the quantity does not vary"
-        return [replace(e, note=f"{e.note}; no parts of the variance: {reason}") for e in found]
+        return _without_parts(
+            found, f"they take {FROM_POINTS} points" if n < FROM_POINTS else "the quantity does not vary"
+        )
     note = f"part of the variance of {n} points' means, in which some seed noise is left"
     done = []
     for e, variable in zip(found, variables, strict=True):
         values = [point[variable.name] for point, known in zip(points, is_known, strict=True) if known]
-        if isinstance(variable, Range):
-            try:
-                first, half = _rbd_fast(np.array(values, dtype=np.float64), y)
-            except MissingExtraError as error:
-                done.append(replace(e, note=f"{e.note}; {error}"))
-                continue
-            done.append(_first(e, first, first - half, first + half, "rbd_fast", f"{note}; RBD-FAST"))
-        else:
-            first, low, high = correlation_ratio(values, y)
-            done.append(_first(e, first, low, high, "levels", f"{note}; between the values of the choice"))
+        if not isinstance(variable, Range):
+            parts = (*correlation_ratio(values, y), None, None, None)
+            done.append(e.having(parts, "levels", f"{note}; between the values of the choice"))
+            continue
+        try:
+            first, half = _rbd_fast(np.array(values, dtype=np.float64), y)
+        except MissingExtraError as error:
+            done.append(replace(e, note=f"{e.note}; {error}"))
+            continue
+        done.append(
+            e.having((first, first - half, first + half, None, None, None), "rbd_fast", f"{note}; RBD-FAST")
+        )
     return done
-
-
-def _first(effect: Effect, share: float, low: float, high: float, method: str, note: str) -> Effect:
-    return replace(
-        effect,
-        first_order=share,
-        first_low=low,
-        first_high=high,
-        method=method,
-        note=f"{effect.note}; {note}",
-    )
 
 
 def _rbd_fast(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
@@ -258,9 +216,28 @@ def _rbd_fast(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
     if np.ptp(x) == 0.0:
         return 0.0, 0.0
     problem = {"num_vars": 1, "names": ["x"], "bounds": [[0.0, 1.0]]}
-    _, rbd_fast = _salib()
-    found = rbd_fast.analyze(problem, x[:, None], y, M=N_HARMONICS, num_resamples=N_RESAMPLES, seed=SEED)
+    found = _salib("rbd_fast").analyze(
+        problem, x[:, None], y, M=N_HARMONICS, num_resamples=N_RESAMPLES, seed=SEED
+    )
     return float(found["S1"][0]), float(found["S1_conf"][0])
+
+
+def _salib(name: str) -> Any:
+    """A module of `SALib.analyze`.
+
+    Raises:
+        MissingExtraError: It is not installed.
+    """
+    try:
+        from SALib.analyze import rbd_fast, sobol
+    except ImportError as error:
+        raise MissingExtraError(
+            f"parts of the variance need SALib, which is not installed: pip install 'tussle[batch]' ({error})"
+        ) from None
+    return {"sobol": sobol, "rbd_fast": rbd_fast}[name]
+
+
+# -- choices and factorials -----------------------------------------------------------------------------------------------
 
 
 def correlation_ratio(labels: Sequence[Any], y: np.ndarray) -> tuple[float, float, float]:
@@ -285,16 +262,73 @@ def _epsilon_squared(level: np.ndarray, y: np.ndarray, n_levels: int) -> float:
     return (between - (n_levels - 1) * (whole - between) / (n - n_levels)) / whole
 
 
-def _salib() -> tuple[Any, Any]:
-    """SALib's modules `sobol` and `rbd_fast`.
+def as_factorial(columns: Sequence[Sequence[Any]], matrix: np.ndarray) -> np.ndarray | None:
+    """Values by seed and level of each factor, (n_seeds, levels of the first factor, ...); None for points that are no full factorial.
 
-    Raises:
-        MissingExtraError: It is not installed.
+    Args:
+        columns: Value of each factor at each point.
+        matrix: Quantity by seed and point, (n_seeds, n_points); seeds that lack a point are left out.
     """
-    try:
-        from SALib.analyze import rbd_fast, sobol
-    except ImportError as error:
-        raise MissingExtraError(
-            f"parts of the variance need SALib, which is not installed: pip install 'tussle[batch]' ({error})"
-        ) from None
-    return sobol, rbd_fast
+    codes = [{value: i for i, value in enumerate(dict.fromkeys(column))} for column in columns]
+    shape, n_points = tuple(map(len, codes)), matrix.shape[1]
+    if min(shape) < 2 or max(shape) > MOST_LEVELS or np.prod(shape, dtype=float) != n_points:
+        return None
+    level = [np.array([code[v] for v in column]) for code, column in zip(codes, columns, strict=True)]
+    place = np.ravel_multi_index(tuple(level), shape)
+    if len(np.unique(place)) != n_points:
+        return None
+    ordered = np.empty_like(matrix)
+    ordered[:, place] = matrix
+    whole: np.ndarray = ordered[np.isfinite(ordered).all(axis=1)]
+    return whole.reshape(-1, *shape)
+
+
+def _by_anova(found: list[Effect], values: np.ndarray, n_seeds: int) -> list[Effect]:
+    """Parts of the variance of a full factorial, the part of the seeds included."""
+    n, k = len(values), len(found)
+    if not n or np.ptp(values) == 0.0:
+        return _without_parts(
+            found, "the quantity does not vary" if n else "no seed has been played at every point"
+        )
+    shares = np.full((3, 2 * k + 2), np.nan)
+    shares[0] = variance_shares(values)
+    note = f"analysis of variance over all {np.prod(values.shape[1:])} combinations × {n} seeds"
+    note += f"; {n_seeds - n} seeds lack a run and are left out" if n < n_seeds else ""
+    if n >= BLOCKS_FROM:
+        draws = np.random.default_rng(SEED).integers(n, size=(2 * N_RESAMPLES, n))
+        shares[1:] = np.quantile([variance_shares(values[draw]) for draw in draws], (0.025, 0.975), axis=0)
+    else:
+        note += f"; intervals take {BLOCKS_FROM} seeds"
+    parts = [tuple(None if math.isnan(v) else v for v in column) for column in shares.T.tolist()]
+    nothing = (None, None, None)  # of one seed, the total would be taken for interaction
+    done = [
+        e.having((*first, *(total if n > 1 else nothing)), "anova", note)  # type: ignore[arg-type]
+        for e, first, total in zip(found, parts[:k], parts[k : 2 * k], strict=True)
+    ]
+    rest = [("interaction" if n > 1 else "interaction and seed", parts[-2])] if k > 1 else []
+    rest += [("seed", parts[-1])] if n > 1 else []
+    for name, part in rest:
+        done.append(Effect(name, *(math.nan,) * 3).having((*part, *nothing), "anova", note))  # type: ignore[arg-type]
+    return done
+
+
+def variance_shares(values: np.ndarray) -> np.ndarray:
+    """Parts of the variance: first order of each factor (eta squared), total of each, interaction, seeds; (2 n_factors + 2,).
+
+    Analysis of variance of a full factorial (Montgomery, Design and Analysis of Experiments, section 5.4). Written out, since a
+    linear model would have one column for each combination.
+
+    Args:
+        values: By seed and level of each factor, as `as_factorial` gives them.
+    """
+    n_factors = values.ndim - 1
+    centered = values - values.mean()
+    whole = float((centered**2).mean())
+    if whole == 0.0:
+        return np.zeros(2 * n_factors + 2)
+    cells = centered.mean(axis=0)
+    between = float((cells**2).mean())
+    others = [tuple(axis for axis in range(n_factors) if axis != factor) for factor in range(n_factors)]
+    first = [float((cells.mean(axis=axes) ** 2).mean()) for axes in others]
+    total = [between - float((cells.mean(axis=factor) ** 2).mean()) for factor in range(n_factors)]
+    return np.array([*first, *total, between - sum(first), whole - between]) / whole

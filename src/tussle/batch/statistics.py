@@ -34,12 +34,12 @@ SEED = 20180101
 
 @dataclass(frozen=True)
 class Share:
-    """How many of the runs were so.
+    """How many of the runs had one outcome.
 
     Attributes:
         name: Of the team, or "ties".
         team: Its number; None for ties.
-        n: Runs that were so.
+        n: Runs with it.
         of: Runs.
         value: n / of.
         low: Lower end of Wilson's interval.
@@ -205,23 +205,20 @@ def means_of(name: str, rows: Sequence[np.ndarray]) -> list[Mean]:
         rows: Its values for the runs of each point.
     """
     known = [row[np.isfinite(row)] for row in rows]
-    found: list[Mean | None] = [None] * len(rows)
     sizes = np.array([len(row) for row in known])
+    found: dict[int, Mean] = {}
     for n in np.unique(sizes).tolist():
         places = np.flatnonzero(sizes == n).tolist()
         same = np.array([known[i] for i in places])
         low, high = mean_intervals(same)
-        sd = same.std(axis=1, ddof=1) if n > 1 else np.full(len(same), np.nan)
-        quantiles = (
-            np.quantile(same, QUANTILES, axis=1).T if n else np.full((len(same), len(QUANTILES)), np.nan)
-        )
-        mean = same.mean(axis=1) if n else np.full(len(same), np.nan)
-        numbers = zip(
-            mean.tolist(), low.tolist(), high.tolist(), sd.tolist(), quantiles.tolist(), strict=True
-        )
-        for i, (m, lower, upper, spread, q) in zip(places, numbers, strict=True):
+        nothing = np.full(len(same), np.nan)
+        sd = same.std(axis=1, ddof=1) if n > 1 else nothing
+        mean = same.mean(axis=1) if n else nothing
+        quantiles = np.quantile(same, QUANTILES, axis=1).T if n else np.tile(nothing[:, None], len(QUANTILES))
+        numbers = zip(places, *(v.tolist() for v in (mean, low, high, sd, quantiles)), strict=True)
+        for i, m, lower, upper, spread, q in numbers:
             found[i] = Mean(name, n, m, lower, upper, spread, dict(zip(QUANTILES, q, strict=True)))
-    return [mean for mean in found if mean is not None]
+    return [found[i] for i in range(len(rows))]
 
 
 def mean_interval(values: np.ndarray) -> tuple[float, float]:

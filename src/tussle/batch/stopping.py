@@ -1,4 +1,4 @@
-"""When a batch that is played until a result is known may stop, whatever the order in which its runs are finished."""
+"""When a batch with a rule such as `--until 0.02` stops, independent of the order in which its runs are finished."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ ROUND = 10
 
 
 class Stop:
-    """Watches the runs of a batch until a result is known well enough.
+    """Watches the runs of a batch until its rule is met.
 
-    It looks only at whole rounds of seeds of all points, so that the answer does not depend on who plays.
+    It looks only at whole rounds of seeds of all points, so that the result does not depend on the executor.
 
     Args:
         rule: When it is enough.

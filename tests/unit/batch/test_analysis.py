@@ -6,7 +6,6 @@ import json
 import math
 
 import numpy as np
-import pytest
 from made_batches import made_batch
 
 from tussle.batch.analysis import analyse
@@ -14,7 +13,7 @@ from tussle.batch.results import Results
 from tussle.batch.sampling import sample
 from tussle.batch.sensitivity import Effect
 from tussle.batch.variables import Choice, Range
-from tussle.errors import MissingExtraError, ParameterError
+from tussle.errors import MissingExtraError
 
 TACTIC = Choice("tactic", ("keep", "switch", "rest"))
 SPEED = Range("speed", 20.0, 30.0, levels=2)
@@ -43,39 +42,12 @@ def test_a_batch_without_variables_has_shares_and_means_only():
     ]
 
 
-def test_points_are_looked_at_by_the_scores_that_differ():
-    results = batch([SPEED])
-    found = analyse(results)
-    assert [p.label for p in found.points] == ["speed=20", "speed=30"]
-    assert [mean.name for mean in found.points[0].means] == ["score[2]"]  # prey score nothing, ever
-    assert found.points[1].means == results.means(["score[2]"], 1)
-    assert found.points[1].shares == results.shares(1)
-    assert list(found.sensitivity) == ["score[2]"]
-
-
 def test_without_scores_points_are_looked_at_by_what_is_left():
     alive = {run: [(1, 0.0, 50), (1, 5.0, run)] for run in range(20)}
     hits = {"A.hits": {None: np.ones((10, 2))}}
     points = [{"speed": 20.0}, {"speed": 30.0}]
     results = Results(made_batch({}, metrics=hits, alive=alive, variables=[SPEED], points=points))
     assert [mean.name for mean in analyse(results).points[0].means] == ["alive[1]"]
-
-
-def test_asked_for_quantities_take_the_place_of_the_usual():
-    found = analyse(batch([SPEED]), ["score[2]/t", "t", "t"])
-    assert [mean.name for mean in found.means] == ["score[2]/t", "t"]
-    assert [mean.name for mean in found.points[0].means] == ["score[2]/t", "t"]
-    assert list(found.sensitivity) == ["score[2]/t"]  # the time is always the same
-    with pytest.raises(ParameterError, match=r"there is no 'scores\[2\]'"):
-        analyse(batch([SPEED]), ["scores[2]"])
-
-
-def test_each_choice_is_compared_with_its_first():
-    found = analyse(batch([TACTIC, SPEED], "grid")).comparisons
-    assert [(c.quantity, c.a, c.b, c.n) for c in found] == [
-        ("score[2]", "tactic=keep", "tactic=switch", 50),
-        ("score[2]", "tactic=keep", "tactic=rest", 50),
-    ]
 
 
 def test_what_is_asked_to_be_compared_is():

@@ -17,8 +17,7 @@ import optuna
 import pyarrow.parquet as pq
 import pytest
 
-from tussle.batch.executors import InProcess, Processes
-from tussle.batch.search.evaluation import WORTH_PROCESSES, RoundPlayer
+from tussle.batch.executors import InProcess
 from tussle.batch.search.optimization import MOST_TRIALS, Optimization, optimize
 from tussle.batch.search.study_store import StudyStore, load_study, notes_on_versions
 from tussle.batch.variables import Range
@@ -97,17 +96,6 @@ def test_common_random_numbers():
     assert study.is_clear
 
 
-def test_noise_is_told():
-    study = search(
-        source=bowl.mission(rough=3.0),
-        vary={"Bowl.x": (2.9, 3.1), "Bowl.y": (-1.0, -0.9)},
-        runs=24,
-        trials=24,
-    )
-    assert study.lead.low < 0.0 < study.lead.high
-    assert not study.is_clear
-
-
 def test_the_objective_is_the_mean_of_the_runs(game):
     study = search(
         source=game, vary=["x=0:1"], plugin_files=[PLUGIN], settings={"luck": 3}, runs=5, first_seed=7
@@ -118,16 +106,6 @@ def test_the_objective_is_the_mean_of_the_runs(game):
         assert trial.by_seed == pytest.approx([height + 3 * v for v in luck], abs=1e-12)
         assert trial.objective == pytest.approx(np.mean(trial.by_seed), abs=1e-12)
         assert trial.low < trial.objective < trial.high
-
-
-def test_units_reach_the_mission():
-    def made(speed):
-        assert speed.endswith(" kt")
-        return bowl.mission(x=float(speed.removesuffix(" kt")))
-
-    study = search(source=made, vary=["speed=1:5 kt"], trials=8)
-    for trial in study.trials:
-        assert trial.objective == pytest.approx(bowl.TOP - (trial.values["speed"] - bowl.BEST_X) ** 2)
 
 
 def test_importances():
@@ -162,19 +140,6 @@ def test_processes_and_stacks_change_nothing():
     assert facts(search(trials=16, runs=4, executor=None, processes=2)) == whole
 
 
-def test_short_rounds_are_played_in_this_process(monkeypatch):
-    asked = []
-    monkeypatch.setattr(Processes, "play", lambda self, *a: (asked.append(1), InProcess().play(*a))[1])
-    player, mission = RoundPlayer(), Optimization(bowl.mission(), "t", vary=PLACE, runs=64).mission
-    batch = mission.batch([{"Bowl.x": 1.0, "Bowl.y": 0.0}])
-    n_processes = batch.executor().n if isinstance(batch.executor(), Processes) else 1
-    player.play(batch, lambda _: None)
-    assert len(asked) == (n_processes > 1)
-    assert player.cpu_s < WORTH_PROCESSES
-    player.play(batch, lambda _: None)
-    assert len(asked) == (n_processes > 1)
-
-
 # -- what fails -----------------------------------------------------------------------------------------------------------
 
 
@@ -189,12 +154,6 @@ def test_a_trial_with_a_failed_run_is_failed_and_the_search_goes_on():
         assert math.isnan(trial.objective)
     assert study.best.values["Bowl.x"] < 2.0
     assert set(study.table["state"].to_pylist()) == {"complete", "failed"}
-
-
-@pytest.mark.parametrize("sampler", ["tpe", "cmaes", "random"])
-def test_failures_do_not_stop_a_sampler(sampler):
-    study = search(source=bowl.mission(fails_from=0.0), sampler=sampler, trials=40)
-    assert study.best.values["Bowl.x"] < 0.0
 
 
 def test_what_is_no_number_is_a_failure():
@@ -483,16 +442,3 @@ def test_other_versions_are_told(tmp_path):
     now = study.info["versions"]["optuna"]
     assert note.startswith(f"the search was begun with optuna 4.2.0, now {now}: trials from 8 on may differ")
     assert notes_on_versions({"versions": versions}, study.info, 0) == []
-
-
-def test_progress():
-    seen = []
-
-    def look(progress):
-        seen.append((progress.n_done, progress.n_round, progress.played, progress.best is not None))
-
-    search(trials=20, on_progress=look)
-    assert seen[0] == (0, 0, 0.0, False)
-    assert seen[-1] == (20, 0, 0.0, True)
-    assert (16, 4, 1.0, True) in seen
-    assert [n for n, *_ in seen] == sorted(n for n, *_ in seen)

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
 from hypothesis import strategies as st
 
-from tussle.batch.quantities import LONGEST_TEXT, Quantity, column_name
+from tussle.batch.quantities import LONGEST_TEXT, Quantity
 from tussle.errors import ParameterError
 
 COLUMNS = {
@@ -46,14 +45,6 @@ def test_an_expression_has_the_value_that_it_says(text, values):
     np.testing.assert_array_equal(Quantity.parse(text).evaluate(COLUMNS), [*values, np.nan])
 
 
-def test_names_are_told_once_and_in_order():
-    assert Quantity.parse("score[3]-score[2]*Cap.hits+score[3]").names(COLUMNS) == [
-        "score[3]",
-        "score[2]",
-        "Cap.hits[3]",
-    ]
-
-
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -90,18 +81,6 @@ def test_long_and_deep_texts_are_refused_or_read():
         Quantity.parse("t" * (LONGEST_TEXT + 1))
 
 
-@pytest.mark.parametrize(
-    ("metric", "team", "name"),
-    [
-        ("score", 2, "score[2]"), ("ties", None, "ties"), ("A.b", -1, "A.b[-1]"),
-        ("my metric.x", 1, '"my metric.x"[1]'), ("A.lambda", None, '"A.lambda"'), ("ﬁ", None, '"ﬁ"'), ('a"b', 3, '"a\\"b"[3]'),
-    ],
-)  # fmt: skip
-def test_a_column_can_be_asked_for_by_its_name(metric, team, name):
-    assert column_name(metric, team) == name
-    assert Quantity.parse(name).evaluate({name: np.array([1.0])}) == [1.0]
-
-
 def test_shares_are_told_from_other_numbers():
     assert [Quantity.parse(t).is_share for t in ("wins[2]", "wins", "ties", "score[2]", "wins[2]-wins[-1]", "-ties")] == [
         True, True, True, False, False, False,
@@ -117,12 +96,3 @@ EXPRESSIONS = st.recursive(
     ),
     max_leaves=12,
 )
-
-
-@given(EXPRESSIONS.filter(lambda text: any(c in text for c in "abc") and len(text) <= LONGEST_TEXT))
-def test_arithmetic_is_that_of_python(text):
-    columns = {"a": np.array([1.5, -2.0]), "b[1]": np.array([3.0, 0.25]), "c.d[2]": np.array([-7.0, 8.0])}
-    for i in range(2):
-        plain = text.replace("c.d[2]", f"({columns['c.d[2]'][i]})").replace("b[1]", f"({columns['b[1]'][i]})")
-        expected = eval(plain.replace("a", f"({columns['a'][i]})"))
-        assert Quantity.parse(text).evaluate(columns)[i] == expected

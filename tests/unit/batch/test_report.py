@@ -8,7 +8,6 @@ from html.parser import HTMLParser
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
-import numpy as np
 import pytest
 from made_batches import made_batch, write_batch
 from reported_batches import choices, noise, ranges, scores_of_the_paper
@@ -17,7 +16,7 @@ from tussle.batch import load_batch
 from tussle.batch.report import INDEX, write_report
 from tussle.batch.results import Results
 from tussle.batch.sampling import sample
-from tussle.batch.variables import Choice, Range
+from tussle.batch.variables import Choice
 from tussle.errors import MissingExtraError, RecordError
 
 VOID = {"meta", "br", "hr", "img", "link", "input"}
@@ -128,13 +127,6 @@ def test_every_plot_lies_beside_the_page_and_has_a_caption(of_paper):
     assert html.count("<figcaption>") == len(names)
 
 
-def test_colours_of_the_page_stand_in_the_plots_for_those_of_the_files(of_paper):
-    batch, _, html = of_paper
-    assert "var(--ink)" in html
-    assert "#20252b" in (batch / "report" / "wins.svg").read_text()
-    assert "#20252b" not in html[html.index("</style>") :]
-
-
 def test_the_page_answers_and_has_its_sections(of_paper, of_choices):
     _, page, _ = of_paper
     assert "keepers won 593 of 1,000 games (59.3 %, 95 % interval 56.2 to 62.3)" in page.text
@@ -214,16 +206,6 @@ def test_the_same_batch_gives_the_same_bytes_whatever_the_user_has_set(tmp_path)
 
 
 # -- that it stays small, and what it cannot do ------------------------------------------------------------------------------------
-
-
-def test_the_page_of_many_points_stays_small(tmp_path):
-    variables = [Range("x", 0.0, 1.0)]
-    points = sample(variables, "sobol", 4096, 1)
-    mean = np.array([5.0 + 20.0 * p["x"] for p in points])
-    scores = {2: np.random.default_rng(5).poisson(mean, (1, 4096)), 3: noise(4096, 1, 15.0)}
-    page, html = written(made_batch(scores, variables=variables, points=points, sample="sobol"), tmp_path)
-    assert len(html) < 300_000
-    assert "4,096 games" in page.text
 
 
 @pytest.mark.parametrize("package", ["matplotlib", "jinja2", "statsmodels.regression.linear_model"])

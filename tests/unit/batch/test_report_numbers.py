@@ -10,15 +10,7 @@ from scipy.stats import binomtest, t
 
 from tussle.batch.report.drawing import blank, house_style, inlined, pictured, printable, shortened
 from tussle.batch.report.formatting import (
-    count,
-    estimate,
-    file_name,
     number,
-    p_value,
-    percent,
-    seconds,
-    sentence,
-    signed,
 )
 from tussle.batch.report.plots import edges_for, inside
 from tussle.batch.report.report_data import axis_of, clustered_mean
@@ -46,14 +38,6 @@ def test_texts_are_places_in_the_order_of_the_choice():
     tactic = Choice("tactic", ("rest", "keep", 3))
     axis = axis_of(tactic, [{"tactic": v} for v in ("keep", "3", "rest", "keep")])
     assert (axis.texts, list(axis.index), axis.is_number) == (("rest", "keep", "3"), [1, 2, 0, 1], False)
-
-
-def test_numbers_to_choose_from_lie_on_an_axis_by_ratio_where_they_are_far_apart():
-    near, far = (
-        axis_of(Choice("n", values), [{"n": v} for v in values]) for values in ((1, 2, 4), (1, 10, 100))
-    )
-    assert (near.is_number, near.is_log) == (True, False)
-    assert far.is_log
 
 
 def test_bins_of_maps_are_of_equal_width_or_ratio():
@@ -130,14 +114,6 @@ def test_bins_hold_all_values(kind):
     assert (np.diff(edges) > 0.0).all()
 
 
-def test_bins_of_whole_numbers_hold_equally_many_of_them():
-    edges = edges_for(np.arange(0.0, 200.0))
-    width = np.diff(edges)
-    assert np.allclose(width, width[0])
-    assert width[0] == round(width[0])
-    assert (edges % 1.0 == 0.5).all()
-
-
 def test_only_what_would_double_the_axis_is_left_outside():
     values = np.append(np.random.default_rng(7).normal(0.0, 1.0, 1000), [5.0, 1e6])
     assert set(values) - set(inside(values)) == {1e6}
@@ -155,29 +131,6 @@ def test_only_what_would_double_the_axis_is_left_outside():
 )  # fmt: skip
 def test_numbers_have_the_digits_that_count(value, text):
     assert number(value) == text
-
-
-def test_other_formats():
-    assert estimate(9.0) == "9.00"
-    assert percent(0.593).replace("\u00a0", " ") == "59.3 %"
-    assert percent(float("nan")) == "–"
-    assert [signed("3"), signed("−3"), signed("–"), signed("0")] == ["+3", "−3", "–", "0"]
-    assert [count(1000), count(1, "game"), count(2000, "game")] == ["1,000", "1 game", "2,000 games"]
-    assert [p_value(0.0004), p_value(0.0123), p_value(0.5), p_value(float("nan"))] == [
-        "< 0.001",
-        "0.012",
-        "0.50",
-        "–",
-    ]
-    assert [seconds(s).replace("\u00a0", " ") for s in (0.42, 12.0, 200.0, 20000.0)] == [
-        "0.4 s",
-        "12 s",
-        "3.3 min",
-        "5.6 h",
-    ]
-    assert seconds(float("nan")) == "–"
-    assert [sentence("so it is"), sentence(" Is it so? ")] == ["So it is.", "Is it so?"]
-    assert [file_name("score[2]-t"), file_name("…"), len(file_name("x" * 99))] == ["score_2_t", "x", 40]
 
 
 def test_long_names_lose_their_middle_and_wide_letters_count_twice():

@@ -46,11 +46,6 @@ def test_it_tells_how_the_batch_was_made(paper):
         assert f"\n{fact}" in said
 
 
-def test_each_slow_game_has_the_command_that_plays_it_again(paper):
-    commands = re.findall(r"tussle run --from paper:(\d+)", texts_of(paper))
-    assert commands == [str(6 + 7 * i) for i in range(10)]  # made batches take 1 + run % 7 seconds
-
-
 def test_a_mission_made_in_python_has_no_such_command(tmp_path):
     stored = choices()
     stored.info["mission"] = {"made_in": "python"}
@@ -89,12 +84,6 @@ def test_a_choice_has_paired_differences():
     assert "+3.00 3.00 to 3.00 40 / 0 / 0 < 0.001" in said
     assert "score of switchers tactic=keep → tactic=switch 40 " in said
     assert "0 / 0 / 40 1.00" in said  # of team 3, which the choice does not change
-
-
-def test_games_with_seeds_of_their_own_are_not_said_to_share_them():
-    said = texts_of(choices(independent=True))
-    assert "each has a seed of its own" in said
-    assert "the same seed" not in said
 
 
 def test_values_that_cannot_be_named_are_said_not_to_be_compared():
@@ -151,14 +140,6 @@ def test_without_scores_it_tells_who_was_left():
     assert "left" in names_of(stored)
 
 
-def test_games_of_different_length_are_told_with_their_reasons():
-    lengths = {run: [(1, 0.0, 50), (1, 60.0 + run, 0), (2, 0.0, 5), (2, 60.0 + run, 5)] for run in range(20)}
-    stored = made_batch({2: noise(1, 20, 5.0), 3: noise(1, 20, 5.0, 1)}, alive=lengths)
-    said = texts_of(stored)
-    assert "Mean 69.5 s, median 69.5 s. End time reached: 20 games." in said
-    assert "Length of every game: 100 s. End time reached: 80 games." in texts_of(choices())
-
-
 def test_a_quantity_that_is_asked_for_has_plots_of_its_own():
     names = names_of(choices(), ["score[2]-score[3]"])
     assert {
@@ -189,13 +170,6 @@ def test_many_variables_and_points_are_gathered_and_it_is_said():
     assert "ranges are cut into 14 equal parts" in said
 
 
-def test_far_values_are_said_to_lie_beyond_the_plot():
-    scores = noise(1, 300, 9.0)
-    scores[7] = 5000
-    said = texts_of(made_batch({2: scores, 3: noise(1, 300, 9.0, 1)}))
-    assert re.search(r"The values go from \d+ to 5,000; 1 of 600 lie beyond the plot.", said)
-
-
 def test_teams_of_other_sizes_have_a_plot_of_their_own():
     lost = {
         run: [
@@ -212,11 +186,3 @@ def test_teams_of_other_sizes_have_a_plot_of_their_own():
     }
     names = names_of(made_batch({2: noise(1, 10, 5.0), 3: noise(1, 10, 5.0, 1)}, alive=lost))
     assert {"left-1", "left-2-3"} <= names
-
-
-def test_a_score_that_a_plugin_reports_as_well_is_counted_once():
-    second, third = noise(1, 10, 5.0), noise(1, 10, 5.0, 1)
-    stored = made_batch({2: second, 3: third}, metrics={"M.score": {2: second, 3: third + 1}})
-    said = texts_of(stored)
-    assert "M.score of keepers" not in said
-    assert "M.score of switchers" in said

@@ -56,18 +56,6 @@ def test_what_selects_nothing_is_told(text, words):
     assert words in str(error.value)
 
 
-def test_values_that_are_there_but_never_together_are_told():
-    points = [{"a": 1, "b": 1}, {"a": 2, "b": 2}]
-    with pytest.raises(ParameterError, match="no point has all of them"):
-        select_points([Choice("a", (1, 2)), Choice("b", (1, 2))], points, "a=1, b=2")
-
-
-def test_many_values_are_not_all_listed():
-    points = [{"x": float(i)} for i in range(100)]
-    with pytest.raises(ParameterError, match="and 88 more"):
-        select_points([Range("x", 0.0, 99.0)], points, "x=0.5")
-
-
 def test_pairs_agree_in_all_that_is_not_named():
     assert paired_points(VARIABLES, POINTS, "tactic=keep", "tactic=switch") == ([0, 1, 2, 3], [4, 5, 6, 7])
     assert paired_points(VARIABLES, POINTS, "n=10", "n=5") == ([1, 3, 5, 7, 9, 11], [0, 2, 4, 6, 8, 10])

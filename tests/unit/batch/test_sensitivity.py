@@ -10,10 +10,9 @@ import pytest
 from made_batches import made_batch
 from scipy.stats import spearmanr
 
-from tussle.batch.factorial import as_factorial, parts_of_variance
 from tussle.batch.results import Results
 from tussle.batch.sampling import sample
-from tussle.batch.sensitivity import FROM_POINTS, correlation_ratio, spearman
+from tussle.batch.sensitivity import FROM_POINTS, as_factorial, spearman
 from tussle.batch.variables import Choice, Range
 from tussle.errors import MissingExtraError
 
@@ -53,18 +52,6 @@ def test_saltellis_indices_are_those_of_the_ishigami_function(saltelli_points):
         assert e.total_low <= total <= e.total_high
 
 
-def test_saltellis_indices_are_of_the_means_over_seeds(saltelli_points):
-    scores = np.array([[1.0], [-1.0]]) + ishigami(saltelli_points)
-    found = results_of(scores, variables=ISHIGAMI, points=saltelli_points, sample="saltelli").sensitivity(
-        "score[2]"
-    )
-    alone = results_of(
-        ishigami(saltelli_points), variables=ISHIGAMI, points=saltelli_points, sample="saltelli"
-    )
-    for e, f in zip(found, alone.sensitivity("score[2]"), strict=True):
-        assert (e.first_order, e.total) == pytest.approx((f.first_order, f.total))
-
-
 def test_rows_that_lack_a_run_are_left_out_and_told(saltelli_points):
     batch = {
         "variables": ISHIGAMI,
@@ -76,16 +63,6 @@ def test_rows_that_lack_a_run_are_left_out_and_told(saltelli_points):
     assert "510 base rows" in found[0].note
     assert "2 rows lack a run and are left out" in found[0].note
     assert found[1].first_order == pytest.approx(0.4424, abs=0.06)
-
-
-def test_the_same_batch_has_the_same_indices(saltelli_points):
-    results = results_of(
-        ishigami(saltelli_points), variables=ISHIGAMI, points=saltelli_points, sample="saltelli"
-    )
-    np.random.seed(1)  # noqa: NPY002 - SALib may draw from it
-    first = results.sensitivity("score[2]")
-    np.random.seed(2)  # noqa: NPY002
-    assert results.sensitivity("score[2]") == first
 
 
 # -- any sample -----------------------------------------------------------------------------------------------------------
@@ -114,13 +91,6 @@ def test_a_choice_among_ranges_has_the_part_between_its_values():
     assert found[1].first_low < 0.4 < found[1].first_high
     assert math.isnan(found[1].rank_correlation)
     assert "tactic has no order" in found[1].note
-
-
-def test_a_choice_without_effect_has_no_part_on_average():
-    rng = np.random.default_rng(4)
-    labels = ["a", "b", "c", "d"] * 20
-    parts = [correlation_ratio(labels, rng.normal(size=80))[0] for _ in range(40)]
-    assert np.mean(parts) == pytest.approx(0.0, abs=0.02)  # eta squared, uncorrected, would have 3/79
 
 
 def test_few_points_have_no_parts_and_the_note_says_so():
@@ -190,12 +160,6 @@ def test_seeds_that_lack_a_point_are_left_out_and_told():
     assert "2 seeds lack a run and are left out" in found[0].note
 
 
-def test_without_a_whole_seed_there_are_no_parts():
-    found = results_of(**grid_scores(2, noise=1.0), failed={1: "boom", 6: "boom"}).sensitivity("score[2]")
-    assert all(e.first_order is None for e in found)
-    assert "no seed has been played at every point" in found[0].note
-
-
 def test_points_are_a_factorial_in_any_order_or_none():
     rng = np.random.default_rng(6)
     columns = [("a", "a", "b", "b", "a", "b"), (1, 2, 3, 1, 3, 2)]
@@ -205,7 +169,6 @@ def test_points_are_a_factorial_in_any_order_or_none():
     twice = [("a", "a", "b", "b"), (1, 1, 2, 2)]
     assert as_factorial(twice, rng.normal(size=(3, 4))) is None
     assert as_factorial([tuple(range(200))], rng.normal(size=(3, 200))) is None
-    assert parts_of_variance(np.ones((3, 2))) is None
 
 
 # -- rank correlation -----------------------------------------------------------------------------------------------------
@@ -219,14 +182,6 @@ def test_the_rank_correlation_is_that_of_the_points_means():
     assert found[0].rank_correlation == pytest.approx(expected)
     assert found[0].rank_low < expected < found[0].rank_high
     assert "over the points' means" in found[0].note
-
-
-def test_with_few_points_it_is_that_of_the_runs():
-    results = results_of(**grid_scores(30, noise=3.0))
-    found = results.sensitivity("score[2]")[0]
-    runs = results.runs
-    assert found.rank_correlation == pytest.approx(spearmanr(runs["x"], runs["score[2]"]).statistic)
-    assert "over runs" in found.note
 
 
 def test_its_interval_holds_as_often_as_it_says():

@@ -8,7 +8,7 @@ import pytest
 from gambles import counted, game, rows
 
 from tussle.api import Metric
-from tussle.batch import Batch, InProcess, Processes
+from tussle.batch import Batch, InProcess
 from tussle.batch.stopping import ROUND, quantities_of
 from tussle.batch.tasks import Finished
 from tussle.errors import ParameterError
@@ -65,11 +65,6 @@ def _widths(results, name, n_seeds):
     """Half the widest of the intervals of a mean at the points, with so many seeds."""
     matrix = results.by_seed(name)[:n_seeds]
     return max(1.96 * matrix.std(axis=0, ddof=1) / np.sqrt(n_seeds))
-
-
-def test_processes_stop_where_this_process_does(mission):
-    reference = rows(until_batch(mission).play(executor=InProcess(1), until="score[1]:0.6"))
-    assert rows(until_batch(mission).play(executor=Processes(2, 5), until="score[1]:0.6")) == reference
 
 
 def test_a_narrower_rule_goes_on_and_a_wider_one_has_enough(mission, tmp_path):
@@ -147,12 +142,6 @@ def test_a_rule_may_be_about_what_only_whole_games_have():
     batch = Batch(game(odds=0.0).replace(metrics=[Late()]), runs=None)
     results = batch.play(executor=InProcess(), until="Late.late:0.1")
     assert results.info["n_seeds"] == 20
-
-
-def test_there_are_no_more_runs_than_can_be_kept(mission):
-    assert until_batch(mission).plan.n_seeds == 100_000
-    many = Batch(game(), runs=None, points=[{"Roulette.odds": i / 1000} for i in range(1000)])
-    assert many.plan.n_seeds == 1000
 
 
 def test_what_a_run_is_asked_for_is_what_results_call_it(mission):

@@ -48,17 +48,6 @@ def test_a_run_that_ends_early_stays_as_it_ended():
     assert found.mean[np.searchsorted(found.t, 3.0)] == 2.0
 
 
-def test_failed_runs_are_left_out_and_points_kept_apart():
-    alive = {run: [(1, 0.0, 10), (1, 10.0, run)] for run in range(6)}
-    scores = np.zeros((3, 2))
-    batch = made_batch({1: scores}, points=[{}, {}], alive=alive, failed={4: "boom"})
-    results = Results(batch)
-    assert results.survival(1).n == 5
-    assert results.survival(1).mean[-1] == pytest.approx((0 + 1 + 2 + 3 + 5) / 5)
-    assert results.survival(1, 0).mean[-1] == pytest.approx((0 + 2) / 2)
-    assert results.survival(1, 1).mean[-1] == pytest.approx((1 + 3 + 5) / 3)
-
-
 def test_one_run_has_no_interval_and_none_no_mean():
     one = Results(made_batch({1: [[0.0], [0.0]]}, failed={1: "boom"})).survival(1)
     assert one.n == 1

@@ -81,27 +81,6 @@ def share_bars(shares: Sequence[Share], colours: Sequence[str]) -> Figure:
     return figure
 
 
-def stacked_shares(names: Sequence[str], parts: Sequence[tuple[str, str, np.ndarray]]) -> Figure:
-    """Rows that are each divided into parts.
-
-    Args:
-        names: Names of the rows.
-        parts: Name, colour and shares (n_rows,) of each part, from left to right.
-    """
-    figure, ((plot,),) = blank(0.8 + 0.24 * len(names))
-    left, handles = np.zeros(len(names)), []
-    for name, colour, shares in parts:
-        rows = np.arange(len(names))[::-1]
-        bars = plot.barh(rows, shares, left=left, height=0.72, color=colour, edgecolor=PAPER, linewidth=0.5)
-        handles.append((bars[0], name))
-        left = left + shares
-    _name_rows(plot, names)
-    plot.set_xlim(0.0, 1.0)
-    _value_axis(plot.xaxis, "share of the games", is_share=True)
-    legend_above(figure, handles)
-    return figure
-
-
 def distributions(
     values: Sequence[np.ndarray], names: Sequence[str], colours: Sequence[str], label: str
 ) -> Figure:

@@ -31,8 +31,6 @@ from tussle.palette import PAPER, colour_of, mixed
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-MOST_BARS = 20
-"""Points with a bar each."""
 MOST_MEANS = 60
 MOST_FAILED = 50
 MOST_SLOW = 10
@@ -135,8 +133,6 @@ def won(data: ReportData) -> Section:
     found = [Plot("wins", "Games won", caption, lambda: plots.share_bars(shares, colours))]
     if len(data.wins) >= 2:
         found.append(_margin(data))
-    if 1 < len(data.points) <= MOST_BARS:
-        found.append(_by_point(data))
     return Section("won", "Who won", plots=found)
 
 
@@ -151,22 +147,6 @@ def _margin(data: ReportData) -> Plot:
         f"Height: number of games. Line: the mean, {estimate(values.mean())}. Grey: about equal, ties among them.{_outside(values)}",
         lambda: plots.margins(values, first, second, "difference of the scores"),
     )
-
-
-def _by_point(data: ReportData) -> Plot:
-    rows = data.results.shares_by_point()
-    teams = sorted(m.team for m in data.wins if m.team is not None)
-    parts = []
-    for team in [*teams[:1], None, *teams[1:]]:
-        shares = np.nan_to_num([next(s.value for s in row if s.team == team) for row in rows])
-        look = ("ties", plots.END_COLOURS["time"]) if team is None else (data.name_of(team), colour_of(team))
-        if shares.any():
-            parts.append((*look, shares))
-    names = [data.point_name(i) for i in range(len(data.points))]
-    what = f"by {data.results.variables[0].name}" if len(data.results.variables) == 1 else "at each point"
-    return Plot(
-        "wins-by-point", f"Games won {what}", "Each bar holds all games of one point.", lambda: plots.stacked_shares(names, parts)
-    )  # fmt: skip
 
 
 def _outside(values: np.ndarray) -> str:

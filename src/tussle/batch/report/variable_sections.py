@@ -181,47 +181,22 @@ def _maps_of(
 
 def strengths(data: ReportData) -> Section:
     """How strongly the quantities follow each variable."""
-    found, rows, remarks = [], list[list[str]](), dict[str, None]()
+    found, remarks = [], dict[str, None]()
     for measure in data.measures if data.variables else ():
-        shown = sorted(
-            (e for e in _effects(data, measure) if _strength(e) is not None),
-            key=lambda e: -(_strength(e) or 0.0),
-        )
-        shown = shown[:MOST_PLACES]
-        if not shown:
-            continue
-        title = data.title(measure.expression)
-        found.append(
-            Plot(
-                f"strengths-{file_name(measure.expression)}", f"What {title} depends on",
-                "Mark: estimate, the strongest at the top. Bar: its 95 % interval.",
-                lambda shown=shown: plots.effect_strengths(shown),  # type: ignore[misc]
-            )
-        )  # fmt: skip
-        rows += [[title, e.variable, *_strength_cells(e)] for e in shown]
-        remarks |= dict.fromkeys(part for e in shown for part in e.note.split("; ") if part)
-    names = [
-        "quantity",
-        "variable",
-        "rank correlation",
-        "95 % interval",
-        "alone",
-        "95 % interval",
-        "with others",
-        "95 % interval",
-    ]
-    kept = [i for i in range(len(names)) if i < 2 or any(row[i - i % 2] != "–" for row in rows)]
-    columns = [(names[i], "text" if i < 2 else "number") for i in kept]
-    table = Table(
-        "In numbers", columns, [[row[i] for i in kept] for row in rows], sentence("; ".join(remarks))
-    )
+        known = [e for e in _effects(data, measure) if _strength(e) is not None]
+        shown = sorted(known, key=lambda e: -(_strength(e) or 0.0))[:MOST_PLACES]
+        if shown:
+            title = f"What {data.title(measure.expression)} depends on"
+            caption = "Mark: estimate, the strongest at the top. Bar: its 95 % interval."
+            name = f"strengths-{file_name(measure.expression)}"
+            found.append(Plot(name, title, caption, lambda shown=shown: plots.effect_strengths(shown)))  # type: ignore[misc]
+            remarks |= dict.fromkeys(part for e in shown for part in e.note.split("; ") if part)
     lead = [
         "Rank correlation: 1 or −1 where the quantity always rises or falls with the variable, 0 where it does not follow it.",
         "Share of the variance: the part that a variable makes alone, or with others. Interaction: the part of variables together only.",
+        sentence("; ".join(remarks)),
     ]
-    return Section(
-        "strengths", "Which variables matter", lead if found else [], found, [table] if found else []
-    )
+    return Section("strengths", "Which variables matter", lead if found else [], found)
 
 
 def _effects(data: ReportData, measure: Measure) -> list[Effect]:
@@ -236,22 +211,6 @@ def _effects(data: ReportData, measure: Measure) -> list[Effect]:
 def _strength(effect: Effect) -> float | None:
     values = (effect.total, effect.first_order, effect.rank_correlation)
     return next((abs(v) for v in values if v is not None and np.isfinite(v)), None)
-
-
-def _strength_cells(e: Effect) -> list[str]:
-    cells = []
-    for value, low, high in (
-        (e.rank_correlation, e.rank_low, e.rank_high),
-        (e.first_order, e.first_low, e.first_high),
-        (e.total, e.total_low, e.total_high),
-    ):
-        ends = [_hundredths(low), _hundredths(high)]
-        cells += [_hundredths(value), "–" if "–" in ends else " to ".join(ends)]
-    return cells
-
-
-def _hundredths(value: float | None) -> str:
-    return "–" if value is None or not np.isfinite(value) else f"{value:z.2f}".replace("-", "−")
 
 
 # -- differences ------------------------------------------------------------------------------------------------------------
