@@ -55,7 +55,7 @@ def search(
         plugin_files=tuple(source.plugin_files), ends_by_time=source.end is not None, strict=source.strict,
         allow_large=source.allow_large, **options,
     )  # fmt: skip
-    loaded = optimization.content.loaded
+    loaded = optimization.evaluator.corners.loaded
     for note in loaded.notes if loaded is not None else ():
         if FOR_VIEWER not in note:
             say_note(note)

@@ -58,7 +58,7 @@ def show_study(
     Returns:
         The exit code: that of a failed plugin where all trials failed.
     """
-    loaded = optimization.content.loaded
+    loaded = optimization.evaluator.corners.loaded
     name = (loaded.mission.name if loaded is not None else "") or study.info["name"]
     title = Text.assemble(" ", (name, "bold"), (f"\n {_facts(study)}", "dim"))
     legend = Text(" the best first; in parentheses: 95 % intervals\n", style="dim italic")

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from tussle.batch.batch import Batch
 from tussle.batch.executors import Executor, InProcess
+from tussle.batch.points import settings_of
 from tussle.batch.quantities import Quantity
-from tussle.batch.search.searched_mission import SearchedMission
 from tussle.batch.search.trials import Point, Trial, key_of_values
 from tussle.batch.statistics import means_of
-from tussle.errors import ParameterError, TussleError
+from tussle.batch.variables import Value, Variable
+from tussle.errors import BatchError, ParameterError, TussleError
+from tussle.mission import Mission
 
 if TYPE_CHECKING:
     from tussle.batch.progress import Progress
@@ -53,17 +56,79 @@ class RoundPlayer:
         return results
 
 
-@dataclass(frozen=True)
 class Evaluator:
-    """Plays sets of values and makes trials of them.
+    """Plays sets of values of a mission and makes trials of them.
+
+    Args:
+        source: A mission file, the name of one that ships, a `Mission`, or a function of the varied values that makes one.
+        variables: What varies.
+        quantity: Its mean over the games is the objective.
+        runs: Games of each set of values.
+        first_seed: Seeds of the games count up from here.
+        options: Further arguments of `Batch`.
 
     Attributes:
-        mission: What is played.
-        quantity: Its mean over the games is the objective.
+        corners: A batch of low, middle and high values, so far as they can be played; its fingerprint is that of the mission.
+
+    Raises:
+        TussleError: The mission cannot be read, or cannot be played with any of these values.
     """
 
-    mission: SearchedMission
-    quantity: Quantity
+    def __init__(
+        self,
+        source: str | Path | Mission | Callable[..., Mission],
+        variables: Sequence[Variable],
+        quantity: Quantity,
+        runs: int,
+        first_seed: int,
+        options: Mapping[str, Any],
+    ) -> None:
+        self.source, self.variables, self.quantity = source, variables, quantity
+        self.runs, self.first_seed, self.options = runs, first_seed, options
+        self.corners = self._corners()
+
+    def _corners(self) -> Batch:
+        points = [{v.name: v.value_at(share) for v in self.variables} for share in (0.0, 0.5, 1.0)]
+        return self._playable(points)[0] or self.batch(points)
+
+    def check_same(self) -> None:
+        """Read the mission again and compare.
+
+        Raises:
+            BatchError: It, or a plugin file, has changed.
+        """
+        if self._corners().fingerprint != self.corners.fingerprint:
+            raise BatchError(
+                f"{self.corners.name}: the mission or a plugin file has changed during the search; finished rounds are kept"
+            )
+
+    def batch(self, points: Sequence[Point]) -> Batch:
+        """All games of some sets of values.
+
+        Raises:
+            TussleError: The mission cannot be played with one of them.
+        """
+        return Batch(
+            self.source, points=list(map(self._settings, points)), runs=self.runs, first_seed=self.first_seed, **self.options
+        )  # fmt: skip
+
+    def _settings(self, point: Point) -> dict[str, Value]:
+        return settings_of(point, self.variables, is_argument=callable(self.source))
+
+    def _playable(self, points: Sequence[Point]) -> tuple[Batch | None, dict[int, str]]:
+        """A batch of those sets of values that can be played, and the errors of the others, by place."""
+        try:
+            return self.batch(points), {}
+        except TussleError:
+            errors = {}
+        for i, point in enumerate(points):
+            try:
+                self.batch([point])
+            except TussleError as error:
+                values = ", ".join(f"{k}={v}" for k, v in self._settings(point).items())
+                errors[i] = str(error).removeprefix(f"point 0 ({values}): ")
+        playable = [point for i, point in enumerate(points) if i not in errors]
+        return self.batch(playable) if playable else None, errors
 
     def check(self, points: Sequence[Point]) -> None:
         """Begin a game with the first values that allow it, and look for the quantity among its results.
@@ -75,7 +140,7 @@ class Evaluator:
         errors = []
         for point in points:
             try:
-                batch = self.mission.batch([point])
+                batch = self.batch([point])
                 batch.check()
             except TussleError as error:
                 errors.append(error)
@@ -89,7 +154,7 @@ class Evaluator:
         mission = batch.mission
         short = mission.replace(end=mission.start + mission.dt).ending_by_time()
         for game in (short, mission):
-            one = Batch(game, runs=1, first_seed=self.mission.first_seed, run_timeout=batch.patience)
+            one = Batch(game, runs=1, first_seed=self.first_seed, run_timeout=batch.patience)
             results = one.play(executor=InProcess(1))
             if results.n_failed:
                 return  # the trials tell the failure
@@ -128,10 +193,10 @@ class Evaluator:
         self, points: Sequence[Point], player: RoundPlayer, on_progress: Callable[[Progress], None]
     ) -> list[Trial]:
         """Trials of different values, not numbered yet."""
-        batch, errors = self.mission.batch_of_playable(points)
+        batch, errors = self._playable(points)
         playable = [point for i, point in enumerate(points) if i not in errors]
         played = iter(self._trials_of(playable, player.play(batch, on_progress)) if batch is not None else ())
-        nan, n = math.nan, self.mission.runs
+        nan, n = math.nan, self.runs
         return [
             Trial(0, 0, dict(point), nan, nan, nan, n, errors[i], ()) if i in errors else next(played)
             for i, point in enumerate(points)
@@ -142,7 +207,7 @@ class Evaluator:
         text, error_of = str(self.quantity), dict[int, str]()
         for row in results.failed().select(["point", "seed", "error"]).to_pylist():
             error_of.setdefault(row["point"], f"seed {row['seed']}: {row['error']}")
-        by_seed = np.full((self.mission.runs, len(points)), np.nan)
+        by_seed = np.full((self.runs, len(points)), np.nan)
         unknown = ""
         if results.n_failed < results.n_runs:
             try:
@@ -156,7 +221,7 @@ class Evaluator:
             if len(bad):
                 failure = (
                     error_of.get(i, unknown)
-                    or f"seed {self.mission.first_seed + int(bad[0])}: {text} is {row[bad[0]]}"
+                    or f"seed {self.first_seed + int(bad[0])}: {text} is {row[bad[0]]}"
                 )
                 numbers = (math.nan,) * 3
             found.append(Trial(0, 0, dict(points[i]), *numbers, len(bad), failure, tuple(row.tolist())))

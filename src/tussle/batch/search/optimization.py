@@ -15,7 +15,6 @@ from tussle.batch.executors import Executor
 from tussle.batch.quantities import Quantity
 from tussle.batch.search.evaluation import Evaluator, RoundPlayer
 from tussle.batch.search.proposals import Proposer
-from tussle.batch.search.searched_mission import SearchedMission
 from tussle.batch.search.study import Study, best_of
 from tussle.batch.search.study_store import StudyStore, notes_on_versions, versions_of_samplers
 from tussle.batch.search.trials import MOST_TRIALS, Point, Trial
@@ -113,26 +112,16 @@ class Optimization:
         self.variables, self.sampler, self.is_minimized = variables, sampler, minimize
         self.sample_seed, self.per_round = sample_seed, per_round
         self._first = self._proposer().propose()
-        self.mission = SearchedMission(
-            mission,
-            variables,
-            runs,
-            first_seed,
-            settings,
-            tuple(plugin_files),
-            ends_by_time,
-            run_timeout,
-            options,
-        )
-        self.content = self.mission.read()
-        self.evaluator = Evaluator(self.mission, self.quantity)
+        options |= {"settings": settings, "plugin_files": tuple(plugin_files), "ends_by_time": ends_by_time}
+        options["run_timeout"] = run_timeout
+        self.evaluator = Evaluator(mission, variables, self.quantity, runs, first_seed, options)
 
     # -- what is searched ---------------------------------------------------------------------------------------------------
 
     @property
     def name(self) -> str:
-        """Short name of the mission."""
-        return self.content.name
+        """Short name of the mission, fit for a file."""
+        return self.evaluator.corners.default_directory().name.rpartition("-")[0]
 
     @property
     def info(self) -> dict[str, Any]:
@@ -140,17 +129,17 @@ class Optimization:
         said = {
             "tussle": versions()["tussle"],
             "name": self.name,
-            "mission": self.mission.about(self.content),
+            "mission": self.evaluator.corners.info()["mission"],
             "objective": str(self.quantity),
             "direction": "minimize" if self.is_minimized else "maximize",
             "variables": [about(v) for v in self.variables],
-            "runs": self.mission.runs,
-            "first_seed": self.mission.first_seed,
+            "runs": self.evaluator.runs,
+            "first_seed": self.evaluator.first_seed,
             "sampler": self.sampler,
             "sample_seed": self.sample_seed,
             "per_round": self.per_round,
         }
-        text = json.dumps([said, self.content.hash], default=str)
+        text = json.dumps([said, self.evaluator.corners.fingerprint], default=str)
         fingerprint = hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
         return {"format": 2, "fingerprint": fingerprint, **said, "versions": versions_of_samplers()}
 
@@ -237,7 +226,7 @@ class Optimization:
         tell: Callable[[SearchProgress], None],
     ) -> list[Trial]:
         """The trials of some values of the round under way."""
-        self.content.check_same(self.mission.read())
+        self.evaluator.check_same()
         progress.n_round = len(points)
 
         def on_progress(batch: Progress) -> None:
