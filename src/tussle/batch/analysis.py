@@ -1,4 +1,4 @@
-"""All that is said about a batch at once: for the terminal, for programs as JSON, for the report."""
+"""The analysis of a batch: shares, means, comparisons and sensitivity, for the terminal and as JSON."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MOST_PAIRED_POINTS = 20
 
 @dataclass(frozen=True)
 class PointResult:
-    """What came of the runs of a point.
+    """Results of the runs of one point.
 
     Attributes:
         point: Its number.
@@ -32,7 +32,7 @@ class PointResult:
         values: Its values by name.
         n: Finished runs that did not fail.
         n_failed: Runs that failed.
-        shares: Who won.
+        shares: Share of the games that each team won.
         means: Of the quantities.
     """
 
@@ -47,11 +47,11 @@ class PointResult:
 
 @dataclass(frozen=True)
 class Failure:
-    """Runs that failed in the same way.
+    """Runs that failed with the same error.
 
     Attributes:
-        error: What was said.
-        n: How many runs.
+        error: The error.
+        n: Number of runs.
         run: The first of them.
         seed: Its seed.
         point: Its values.
@@ -66,29 +66,29 @@ class Failure:
 
 @dataclass(frozen=True)
 class Analysis:
-    """What came of a batch.
+    """The analysis of a batch.
 
     Attributes:
         name: Of the mission.
         path: The batch directory.
         n_runs: Finished runs, failed ones included.
-        n_failed: Runs that failed; they are in nothing else.
-        n_planned: Runs that were to be played.
+        n_failed: Runs that failed; no other number counts them.
+        n_planned: Planned runs.
         n_points: Points.
         n_seeds: Games of each point.
         first_seed: Of them.
-        paired_by: What the runs of a comparison's pair have in common: their seed, or only their order.
+        paired_by: "seed" where the runs of a pair share their seed, else "order".
         stopped_by: Rule that ended the batch before its last run; None for none.
         variables: What was varied.
-        quantities: What is looked at.
-        titles: The same with the teams' names.
-        shares: Who won, over all points.
-        means: Over all points.
+        quantities: The quantities that are analysed.
+        titles: Quantity -> its name with the teams' names.
+        shares: Share of the games that each team won, over all points.
+        means: Means over all points.
         points: Point by point; empty where nothing varies.
         comparisons: Paired by seed.
         sensitivity: Quantity -> what each variable does to it.
         failures: Most frequent first.
-        notes: What is missing, one line each.
+        notes: What the reader must know, one line each.
     """
 
     name: str
@@ -130,11 +130,11 @@ def _plain(value: Any) -> Any:
 def analyse(
     results: Results, quantities: Sequence[str] = (), compare: Sequence[tuple[int | str, int | str]] = ()
 ) -> Analysis:
-    """Look at a batch.
+    """Analyse a batch.
 
     Args:
         results: The batch.
-        quantities: What to look at; by default the scores, what is left of each team and the time at the end.
+        quantities: What is analysed; by default the scores, what is left of each team and the time at the end.
         compare: Pairs of points, or of values that select points; by default the values of each choice with its first.
 
     Raises:
@@ -169,7 +169,7 @@ def analyse(
 
 
 def leading(results: Results) -> list[str]:
-    """The quantities by which points are looked at where nobody says which: scores, else what is left, if they differ at all."""
+    """The default quantities of points and comparisons: scores, else numbers left, if they vary, else the time."""
     for metric in ("score", "alive"):
         names = [column_name(metric, team) for team in results.teams]
         found = [name for name in names if name in results.quantities and _varies(results.quantity(name))]

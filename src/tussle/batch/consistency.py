@@ -1,4 +1,4 @@
-"""Whether the tables of a batch directory belong to one another and to what `batch.json` says."""
+"""Checks that the tables of a batch directory agree with each other and with `batch.json`."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ ALWAYS_ALLOWED = 1_000_000
 
 
 def check_design(design: pa.Table, info: Mapping[str, Any], file: Path) -> None:
-    """See that planned runs are numbered, and have points and seeds, as `Plan` says.
+    """Check that the planned runs have the numbers, points and seeds of `Plan`.
 
     Raises:
-        BatchError: One is not.
+        BatchError: A run does not.
     """
     n, n_points = design.num_rows, info["n_points"]
     if not 0 < n <= info["n_runs"] or n % n_points:
@@ -48,7 +48,7 @@ def check_design(design: pa.Table, info: Mapping[str, Any], file: Path) -> None:
 
 
 def _check_varied(design: pa.Table, name: str, is_range: bool, file: Path) -> None:
-    """See that a variable has a column of its own, with a value in each row."""
+    """Check that a variable has one column with a value in each row."""
     if design.column_names.count(name) != 1:
         raise BatchError(f"{file}: has no column {name!r}, which varies by batch.json")
     column = design[name]
@@ -60,10 +60,10 @@ def _check_varied(design: pa.Table, name: str, is_range: bool, file: Path) -> No
 
 
 def check_results(table: pa.Table, design: pa.Table, file: Path) -> None:
-    """See that rows are of runs that are planned, and say the same point and seed, so far as they say any.
+    """Check that all rows belong to planned runs and have their points and seeds.
 
     Raises:
-        BatchError: One is not, or does not.
+        BatchError: A row does not.
     """
     run = table["run"].to_numpy()
     if len(run) and run.max() >= design.num_rows:
@@ -78,12 +78,12 @@ def check_results(table: pa.Table, design: pa.Table, file: Path) -> None:
 
 
 def check_metrics(results: pa.Table, file: Path) -> None:
-    """See that the table of runs is not much larger than the results that it is made of, and that all can be made of it.
+    """Check the metrics: their number, names and values, and that each team with "alive" has "start".
 
-    Expressions can name its columns, means of them can be taken, and whoever is left has begun.
+    The table of runs, with a column per metric and team, must not be much larger than the results.
 
     Raises:
-        BatchError: One of this is not so.
+        BatchError: A check fails.
     """
     metrics = pc.unique(results["metric"])
     n_metrics, n_teams, n_runs = len(metrics), len(pc.unique(results["team"])), len(pc.unique(results["run"]))

@@ -1,4 +1,4 @@
-"""Numbers of a run by name, and sums, differences, products and quotients of them."""
+"""Quantities of a run: named numbers, and arithmetic with them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ TAKES = "it takes names as score[2], ties or CPA.cpa[1], numbers, + - * / and pa
 
 
 def column_name(metric: str, team: int | None) -> str:
-    """What a metric of a team, or of the world, is called: "score[2]", "CPA.cpa[1]", '"my metric.hits"[2]', "ties"."""
+    """The name of a metric of a team, or of the world: "score[2]", "CPA.cpa[1]", '"my metric.hits"[2]', "ties"."""
     is_plain = metric.isascii() and all(
         part.isidentifier() and not keyword.iskeyword(part) for part in metric.split(".")
     )
@@ -32,7 +32,7 @@ def column_name(metric: str, team: int | None) -> str:
 
 @dataclass(frozen=True)
 class Quantity:
-    """A number that each run has, by its expression.
+    """A number of each run, given by an expression.
 
     Attributes:
         text: The expression.
@@ -46,7 +46,7 @@ class Quantity:
         """Read an expression such as "score[2]-score[3]" or "lost[1] / start[1]".
 
         Raises:
-            ParameterError: It is none.
+            ParameterError: The text is no such expression.
         """
         if len(text) > LONGEST_TEXT:
             raise ParameterError(
@@ -65,12 +65,12 @@ class Quantity:
 
     @property
     def is_share(self) -> bool:
-        """It is 1 in runs that a team wins, or that are ties, and 0 in others."""
+        """The quantity is 0 or 1 in each run: wins of a team, or ties."""
         is_name = not isinstance(self._tree, (ast.BinOp, ast.UnaryOp))
         return is_name and next(_names(self._tree, self.text))[0] in SHARES
 
     def names(self, columns: Collection[str]) -> list[str]:
-        """The columns that it is made of, each once, in order.
+        """The columns that the expression names, each once, in order.
 
         Args:
             columns: Names of all that there are.
@@ -82,7 +82,7 @@ class Quantity:
         return list(dict.fromkeys(found))
 
     def evaluate(self, columns: Mapping[str, np.ndarray]) -> np.ndarray:
-        """Its value for each run, (n,); NaN where a part of it is not known and where it divides by zero.
+        """Value for each run, (n,); NaN where a part is not known and where it divides by zero.
 
         Args:
             columns: Name -> value for each run, (n,).
@@ -117,7 +117,7 @@ class Quantity:
 
 
 def _names(node: ast.expr, text: str) -> Iterator[tuple[str, int | None]]:
-    """Metric and team of each name in an expression; refuses all that is not arithmetic."""
+    """Metric and team of each name in an expression; raises for what is not arithmetic."""
     if isinstance(node, ast.BinOp) and isinstance(node.op, OPERATORS):
         yield from _names(node.left, text)
         yield from _names(node.right, text)
@@ -159,7 +159,7 @@ def _refused(node: ast.expr, text: str) -> ParameterError:
 
 
 def _column(metric: str, team: int | None, text: str, columns: Collection[str]) -> str:
-    """The column that is meant; without a team the only one of that metric."""
+    """The column of a metric; without a team the only one of the metric."""
     name = column_name(metric, team)
     if name in columns:
         return name

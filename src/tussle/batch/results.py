@@ -311,7 +311,7 @@ class Results:
     def _has_copies(self) -> bool:
         return self.n_distinct < self.n_runs - self.n_failed
 
-    @property
+    @cached_property
     def _games_by_seed(self) -> np.ndarray:
         """Number of the distinct game of each seed and point, (n_seeds, n_points); -1 where it is not finished."""
         games = np.full((int(self._seed_index.max(initial=-1)) + 1, len(self.points)), -1)

@@ -1,4 +1,4 @@
-"""Which points of what varies are played: chosen by a method, from a seed, the same ones on every machine."""
+"""Chooses the points of a batch by a sampling method and a seed; the same points on every machine."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def sample(
 
 
 def _check_size(method: str, variables: Sequence[Variable], n: int | None) -> None:
-    """Refuse what is too much before it is made, and a number of points that the method does not ask for."""
+    """Refuse too many points before they are made, and a number of points for a method that takes none."""
     drawn = DEFAULT_N.get(method, 0) if n is None else n
     crossed = math.prod(len(_grid_values(v)) for v in variables if method == "grid" or isinstance(v, Choice))
     total = {

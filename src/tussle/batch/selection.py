@@ -1,4 +1,4 @@
-"""Points by the values that they have, and pairs of points that differ in nothing else."""
+"""Selects points by their values, and pairs points that agree in all other values."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ MOST_LISTED = 12
 
 
 def select_points(variables: Sequence[Variable], points: Points, text: str) -> list[int]:
-    """The points that have the values which a text names: "tactic=keep", "tactic=keep, prey_speed=20", or "3" for a point itself.
+    """The points with the values that a text names: "tactic=keep", "tactic=keep, prey_speed=20", or "3" for a point by its number.
 
     Raises:
         ParameterError: There is no such variable, or no such point.
@@ -38,7 +38,7 @@ def select_points(variables: Sequence[Variable], points: Points, text: str) -> l
 
 
 def known_point(points: Points, number: int) -> int:
-    """The number of a point, if there is such a point.
+    """The number of a point that exists.
 
     Raises:
         ParameterError: There is none.
@@ -51,7 +51,7 @@ def known_point(points: Points, number: int) -> int:
 def paired_points(
     variables: Sequence[Variable], points: Points, a: int | str, b: int | str
 ) -> tuple[list[int], list[int]]:
-    """Points of a and, place by place, those points of b that agree with them in all that the texts do not name.
+    """Points of a, and in the same order the points of b that agree with them in all variables that the texts do not name.
 
     Raises:
         ParameterError: There is no such point, or no two points can be paired.
@@ -82,12 +82,12 @@ def paired_points(
 
 
 def is_number(side: int | str) -> bool:
-    """Whether a point is meant by its number."""
+    """Whether a point is given by its number."""
     return not isinstance(side, str) or (side.strip().isascii() and side.strip().isdigit())
 
 
 def written(value: Any) -> str:
-    """A value as it is shown: six digits of a real number."""
+    """A value as a text; real numbers have six digits."""
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
@@ -124,7 +124,7 @@ def _values(variables: Sequence[Variable], text: str) -> list[tuple[Variable, st
 
 
 def _agree(value: Any, said: str, variable: Variable) -> bool:
-    """Whether a value is the one said; of a number the six digits that are shown are enough."""
+    """Whether a text names a value; numbers are compared to six digits."""
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         try:
             number = float(said)

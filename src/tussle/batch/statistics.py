@@ -1,7 +1,6 @@
-"""Shares, means, paired differences, and the intervals in which chance leaves them.
+"""Shares, means and paired differences, with their 95 % intervals.
 
-All intervals are of 95 %. Values that are not finite are runs of which nothing is known; they are left out, and `n` says how many
-were not.
+Values that are not finite are left out; `n` counts the others.
 """
 
 from __future__ import annotations
@@ -80,11 +79,11 @@ class Mean:
 
 @dataclass(frozen=True)
 class Comparison:
-    """What b has more than a, in pairs of runs with the same seed.
+    """The second side minus the first, in pairs of runs with the same seed.
 
     Attributes:
         quantity: What is compared.
-        a: What is compared with.
+        a: The reference.
         b: What is compared.
         n: Pairs.
         mean_a: Mean of a's runs.
@@ -127,12 +126,12 @@ def wilson(k: float, n: float) -> tuple[float, float]:
 
 
 def share_of(name: str, team: int | None, won: np.ndarray, blocks: np.ndarray | None = None) -> Share:
-    """Share of the runs that were so.
+    """Share of the runs with one outcome.
 
     Args:
         name: Of the team, or "ties".
         team: Its number; None for ties.
-        won: 1 where it was so, 0 where not, NaN where the run is not known, (n,).
+        won: 1 for runs with the outcome, 0 for others, NaN for unknown runs, (n,).
         blocks: Number of the block that each run belongs to, (n,); None where runs are independent.
     """
     is_known = np.isfinite(won)
@@ -145,7 +144,7 @@ def share_of(name: str, team: int | None, won: np.ndarray, blocks: np.ndarray | 
 
 
 def effective_size(won: np.ndarray, blocks: np.ndarray | None) -> float:
-    """How many independent runs would give their share the variance that runs in blocks give it.
+    """Number of independent runs whose share has the same variance as that of runs in blocks.
 
     Kish, Survey Sampling (1965), 8.2: n over the design effect. Not less than the blocks, not more than the runs.
     """
@@ -161,7 +160,7 @@ def effective_size(won: np.ndarray, blocks: np.ndarray | None) -> float:
 
 
 def running_result(wins: Mapping[str, int], n: int) -> str:
-    """Who has won so far, on one line: "keepers 59.8 % ±3.0, switchers 35.9 % ±3.0, ties 4.3 %".
+    """The wins so far, on one line: "keepers 59.8 % ±3.0, switchers 35.9 % ±3.0, ties 4.3 %".
 
     Args:
         wins: Name of a team -> runs that it has won; teams without a win are left out.
@@ -276,7 +275,7 @@ def _by_bootstrap(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def block_values(values: np.ndarray, blocks: np.ndarray) -> np.ndarray:
-    """One value for each block, (n_blocks,), whose mean is the mean of all values and varies as that does from block to block.
+    """One value for each block, (n_blocks,): their mean is that of all values, and so is its variance from block to block.
 
     The mean plus what the block adds to it; for blocks of equal size, the mean of the block.
 
@@ -297,7 +296,7 @@ def block_values(values: np.ndarray, blocks: np.ndarray) -> np.ndarray:
 
 
 def sign_test(n_greater: int, n_less: int) -> float:
-    """Probability of signs at least as uneven as these where both are equally likely, exactly; 1 without any."""
+    """Two-sided p of the exact sign test; 1 without any sign."""
     if n_greater + n_less == 0:
         return 1.0
     from scipy.stats import binomtest
@@ -314,7 +313,7 @@ def paired_difference(
     *,
     are_copies: bool = False,
 ) -> Comparison:
-    """What b has more than a.
+    """The second side of pairs minus the first.
 
     Args:
         quantity: What is compared.

@@ -10,7 +10,7 @@ from tussle.batch.tasks import Finished
 from tussle.batch.until import Until
 
 ROUND = 10
-"""Seeds between two looks at whether enough has been played."""
+"""Seeds between two checks of the rule."""
 
 
 class Stop:
@@ -19,12 +19,12 @@ class Stop:
     It looks only at whole rounds of seeds of all points, so that the result does not depend on the executor.
 
     Args:
-        rule: When it is enough.
+        rule: The rule.
         plan: The runs.
-        n_least: Seeds that are kept in any case, such as those of a batch that was complete before it was to be played on.
+        n_least: Seeds that are kept in any case, such as those of a batch that was complete before.
 
     Attributes:
-        n_seeds: Seeds that are enough; None until that is known.
+        n_seeds: Seeds with which the rule is met; None until then.
     """
 
     def __init__(self, rule: Until, plan: Plan, n_least: int = 0) -> None:
@@ -35,7 +35,7 @@ class Stop:
         self._n_whole = 0  # seeds from the first on of which all points are there
 
     def add(self, finished: Finished) -> bool:
-        """A run is finished; true when it is enough."""
+        """Take a finished run into account; true when the rule is met."""
         if self.n_seeds is not None:
             return True
         seed, point = divmod(finished.number, self.plan.n_points)
@@ -72,7 +72,7 @@ class Stop:
 
 
 def quantities_of(finished: Finished) -> dict[str, float]:
-    """All named results of a run, as they are called in expressions; NaN where it failed."""
+    """Quantities of a run by name; NaN where it failed."""
     values = {column_name(name, team): value for team, name, value in finished.metrics}
     scores = [team for team, name, _ in finished.metrics if name == "score"]
     values |= {column_name("wins", team): float(team == finished.winner) for team in scores}

@@ -1,4 +1,4 @@
-"""How many of a team are left as time goes on."""
+"""Mean number of entities of a team that is left, over time."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Survival:
 def survival_of(
     label: str, team: int, run: np.ndarray, t: np.ndarray, alive: np.ndarray, n: int, times: np.ndarray
 ) -> Survival:
-    """Mean number left over time of runs, each a step function that keeps its last value.
+    """Mean of the numbers left in some runs; each run is a step function of time and keeps its last value.
 
     Rather than look each run up at each time, the changes of the sum over runs are summed, of the numbers and of their squares, in
     whole numbers: exact, and one pass over the rows.

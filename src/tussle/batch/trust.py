@@ -1,4 +1,4 @@
-"""Whose code a batch directory holds: that of the user's own batches is known by its hash, kept in the user's state folder."""
+"""Tells the user's own code in batch directories from foreign code, by hashes that are kept in the user's state folder."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tussle.mission import PluginFile
 
 @dataclass(frozen=True)
 class DirectoryCode:
-    """The plugin files that a batch directory holds, as they were when they were read.
+    """The plugin files of a batch directory, as they were read.
 
     Attributes:
         path: The batch directory.
@@ -26,7 +26,7 @@ class DirectoryCode:
 
     @property
     def is_own(self) -> bool:
-        """There is no code, or all of it was once given to a batch by this user."""
+        """There is no code, or this user gave all of it to a batch before."""
         return not self.files or _is_known(digest(self.files))
 
     def __str__(self) -> str:
@@ -44,7 +44,7 @@ def digest(files: Iterable[PluginFile]) -> str:
 
 
 def remember(files: Iterable[PluginFile]) -> None:
-    """Note that the user has given these plugin files to a batch."""
+    """Record that the user gave these plugin files to a batch."""
     file = _file(digest(files))
     try:
         if file is None:

@@ -15,7 +15,7 @@ from tussle.batch.statistics import LEVEL, wilson
 from tussle.errors import ParameterError
 
 FEWEST_RUNS = 20
-"""With fewer a standard deviation is too uncertain to stop by; several equal scores at the beginning would have none."""
+"""With fewer runs a standard deviation is too uncertain to stop by."""
 
 TAKES = (
     "it takes WIDTH for the wins of all teams, or QUANTITY:WIDTH, such as 0.02, score[2]:0.5 or wins[2]:0.02"
@@ -62,13 +62,13 @@ class Until:
         return Until(quantity, half_width)
 
     def is_met(self, columns_by_point: Iterable[Columns]) -> bool:
-        """Whether the result is known well enough at every point.
+        """Whether the interval is narrow enough at every point.
 
         Args:
             columns_by_point: For each point, name -> value for each of its runs, (n,); NaN where a run failed.
 
         Raises:
-            ParameterError: The result is none that the runs have.
+            ParameterError: The runs have no such result.
         """
         return all(self.width(columns) <= self.half_width for columns in columns_by_point)
 
@@ -79,7 +79,7 @@ class Until:
             columns: Name -> value for each run, (n,); NaN where it failed.
 
         Raises:
-            ParameterError: The result is none that the runs have.
+            ParameterError: The runs have no such result.
         """
         if not any(np.isfinite(values).any() for values in columns.values()):
             return math.inf
@@ -97,7 +97,7 @@ class Until:
 
 
 def _half(values: np.ndarray, is_share: bool) -> float:
-    """Half of Wilson's interval of a share, of the normal interval of a mean: both closed forms, since this is asked again and again."""
+    """Half of Wilson's interval of a share, or of the normal interval of a mean."""
     known = values[np.isfinite(values)]
     n = len(known)
     if n < FEWEST_RUNS:

@@ -30,15 +30,15 @@ if TYPE_CHECKING:
 
 @dataclass
 class SearchProgress:
-    """How far a search is.
+    """The progress of a search.
 
     Attributes:
-        n_trials: Trials that are wanted.
-        n_before: Trials that were there before this call.
-        n_done: Trials that are finished, those included.
-        n_failed: Of them, those that failed.
+        n_trials: Trials to play.
+        n_before: Trials from before this call.
+        n_done: Finished trials, those included.
+        n_failed: Failed trials.
         best: The best so far.
-        n_round: Trials of the round under way.
+        n_round: Trials of the running round.
         played: Part of the round that is played, 0 to 1.
     """
 
@@ -225,7 +225,7 @@ class Optimization:
         player: RoundPlayer,
         tell: Callable[[SearchProgress], None],
     ) -> list[Trial]:
-        """The trials of some values of the round under way."""
+        """Play some values of the running round."""
         self.evaluator.check_same()
         progress.n_round = len(points)
 
@@ -283,10 +283,10 @@ def optimize(
 
 
 def _check_whole(name: str, value: Any, least: int, most: int | None = None) -> None:
-    """Refuse what is no whole number, or out of bounds.
+    """Refuse what is not a whole number within bounds.
 
     Raises:
-        ParameterError: It is.
+        ParameterError: The value is not allowed.
     """
     is_whole = isinstance(value, int) and not isinstance(value, bool)
     if not is_whole or value < least or (most is not None and value > most):

@@ -116,7 +116,7 @@ class Study:
         return importances(self.trials, self.variables, self.is_minimized)
 
     def settings(self, values: Mapping[str, Value]) -> dict[str, str]:
-        """Values as a mission file takes them."""
+        """Values as texts for a mission file."""
         return {name: written(value) for name, value in settings_of(values, self.variables).items()}
 
     def label(self, values: Mapping[str, Value]) -> str:

@@ -108,7 +108,7 @@ class StudyStore:
             raise
 
     def _agreed(self, info: dict[str, Any]) -> dict[str, Any]:
-        """What the directory says; written down where it says nothing yet."""
+        """The info of the directory; written if there is none."""
         if not (self.path / STUDY_FILE).exists():
             with told(self.path):
                 put_whole(self.path / STUDY_FILE, json.dumps(info, indent=1, allow_nan=False) + "\n")
@@ -121,7 +121,7 @@ class StudyStore:
         return before
 
     def _repair(self) -> None:
-        """Remove what a killed process may have left: half a line at the end of the journal, and Optuna's own lock."""
+        """Remove what a killed process may leave: a cut line at the end of the journal, and Optuna's lock."""
         journal = self.path / JOURNAL_FILE
         with told(self.path):
             (self.path / f"{JOURNAL_FILE}.lock").unlink(missing_ok=True)
@@ -164,7 +164,7 @@ def _journal(path: Path) -> JournalStorage:
 
 
 def _difference(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
-    """In which words two searches differ."""
+    """The first difference of two searches."""
     for name in COMPARED:
         if before.get(name) != now[name]:
             if isinstance(now[name], (str, int)):
@@ -174,7 +174,7 @@ def _difference(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
 
 
 def read_info(path: Path) -> dict[str, Any]:
-    """What `study.json` of a directory says.
+    """The content of `study.json` in a directory.
 
     Raises:
         BatchError: There is no search, or one that cannot be read.
@@ -188,7 +188,7 @@ def read_info(path: Path) -> dict[str, Any]:
 
 
 def read_trials(path: Path, info: Mapping[str, Any]) -> list[Trial]:
-    """All trials of a journal, of which nobody else's word is taken: it may have been damaged.
+    """All trials of a journal. Each is checked, since the file may be damaged.
 
     Args:
         path: The directory.
@@ -223,7 +223,7 @@ def read_trials(path: Path, info: Mapping[str, Any]) -> list[Trial]:
 
 
 def _against(i: int, trial: Any, info: Mapping[str, Any]) -> str:
-    """What cannot be of a trial in the journal; "" for nothing."""
+    """What is wrong with a trial of the journal; "" for nothing."""
     facts = {"value": trial.value, **trial.user_attrs}
     if i >= MOST_TRIALS or (said := problem(facts, TRIAL, f"trial {i}")):
         return said if i < MOST_TRIALS else f"has more than {MOST_TRIALS:,} trials"
@@ -254,7 +254,7 @@ def load_study(path: str | Path) -> Study:
 
 
 def versions_of_samplers() -> dict[str, str]:
-    """Of Python and of the packages that results and proposals depend on."""
+    """Versions of Python and of the packages that results and proposals depend on."""
     found = versions()
     for name in PROPOSED_BY:
         try:
@@ -265,7 +265,7 @@ def versions_of_samplers() -> dict[str, str]:
 
 
 def notes_on_versions(before: Mapping[str, Any], now: Mapping[str, Any], n: int) -> list[str]:
-    """What is to be said where other versions proposed the trials so far."""
+    """A note where other versions proposed the trials so far."""
     then, today = before.get("versions", {}), now["versions"]
     changed = [
         f"{name} {then.get(name)}, now {today[name]}" for name in PROPOSED_BY if then.get(name) != today[name]
