@@ -7,13 +7,10 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tussle.palette import TEAM_COLOURS, rgb_of
+from tussle.palette import colour_of, rgb_of
 from tussle.view.shapes import MODELS
 
 Colour = tuple[int, int, int]
-
-PALETTE: tuple[Colour, ...] = tuple(map(rgb_of, TEAM_COLOURS))
-"""Colours of teams 1, 2, ..., and again from the first."""
 
 _WORDS: Mapping[str, tuple[str, ...]] = {
     "aircraft": (
@@ -82,7 +79,7 @@ class Looks:
 
     def colour(self, team: int) -> Colour:
         """Red, green, blue of a team, 0 to 255."""
-        return self._by_team.get(team) or PALETTE[(team - 1) % len(PALETTE)]
+        return self._by_team.get(team) or rgb_of(colour_of(team))
 
     def block_colour(self, block: int) -> Colour:
         """Red, green, blue of a block by its number, 0 to 255."""

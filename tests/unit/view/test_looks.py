@@ -2,8 +2,10 @@
 
 import pytest
 
+from tussle.palette import TEAM_COLOURS, rgb_of
 from tussle.view import MODELS, Looks
-from tussle.view.looks import PALETTE
+
+PALETTE = tuple(map(rgb_of, TEAM_COLOURS))
 
 
 def looks(plugins=("Unicycle",), team=1, **entity):
