@@ -62,16 +62,6 @@ def test_what_is_asked_to_be_compared_is():
     ]
 
 
-def test_points_of_a_list_that_agree_in_nothing_are_compared_with_the_first():
-    variables = [Choice("tactic", ("keep", "switch")), Choice("speed", (20, 30))]
-    points = [{"tactic": "keep", "speed": 20}, {"tactic": "switch", "speed": 30}]
-    scores = {2: np.arange(20.0).reshape(10, 2)}
-    found = analyse(Results(made_batch(scores, variables=variables, points=points, sample="list")))
-    assert [(c.a, c.b, c.difference) for c in found.comparisons] == [
-        ("tactic=keep, speed=20", "tactic=switch, speed=30", 1.0)
-    ]
-
-
 def test_failed_runs_are_grouped_by_what_was_said():
     failed = {3: "boom", 4: "bang", 9: "boom", 44: "boom"}
     found = analyse(batch([SPEED], failed=failed)).failures

@@ -168,21 +168,3 @@ def test_many_variables_and_points_are_gathered_and_it_is_said():
     assert "1,024 points in 12 bins" in said
     assert "switchers minus keepers, by x2 and x5" in said  # the map is of the two that matter
     assert "ranges are cut into 14 equal parts" in said
-
-
-def test_teams_of_other_sizes_have_a_plot_of_their_own():
-    lost = {
-        run: [
-            (1, 0.0, 50),
-            (1, 9.0, 20),
-            (1, 100.0, 20),
-            (2, 0.0, 5),
-            (2, 8.0, 4),
-            (2, 100.0, 4),
-            (3, 0.0, 5),
-            (3, 100.0, 3),
-        ]
-        for run in range(10)
-    }
-    names = names_of(made_batch({2: noise(1, 10, 5.0), 3: noise(1, 10, 5.0, 1)}, alive=lost))
-    assert {"left-1", "left-2-3"} <= names

@@ -1,8 +1,6 @@
 """Points: which ones, how many, in which order."""
 
 import itertools
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -133,12 +131,3 @@ def test_saltelli_has_the_rows_of_salib():
 def test_what_is_not_allowed(arguments, said):
     with pytest.raises(ParameterError, match=said):
         sample(*arguments)
-
-
-def test_scipy_is_loaded_only_where_points_are_drawn():
-    script = (
-        "import sys; from tussle.batch.sampling import sample; from tussle.batch.variables import Choice;"
-        "sample([Choice('x', (1, 2))]); print([name for name in sys.modules if name.startswith('scipy.stats')])"
-    )
-    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert run.stdout.strip() == "[]"

@@ -102,16 +102,6 @@ def test_few_points_have_no_parts_and_the_note_says_so():
     assert f"they take {FROM_POINTS} points" in found[0].note
 
 
-@pytest.mark.parametrize("method", ["saltelli", "lhs"])
-def test_a_quantity_that_does_not_vary_has_no_parts(method):
-    points = sample(ISHIGAMI, method, 64, seed=1)
-    results = results_of(np.ones(len(points)), variables=ISHIGAMI, points=points, sample=method)
-    for e in results.sensitivity("score[2]"):
-        assert e.first_order is None
-        assert math.isnan(e.rank_correlation)
-        assert "does not vary" in e.note
-
-
 # -- factorial ------------------------------------------------------------------------------------------------------------
 
 GRID = [Range("x", 0.0, 1.0, levels=2), Choice("tactic", ("keep", "switch"))]
@@ -152,12 +142,6 @@ def test_a_single_seed_leaves_interaction_and_noise_together():
     assert found[0].total is None
     assert found[0].first_low is None
     assert "intervals take 20 seeds" in found[0].note
-
-
-def test_seeds_that_lack_a_point_are_left_out_and_told():
-    found = results_of(**grid_scores(50, noise=1.0), failed={1: "boom", 6: "boom"}).sensitivity("score[2]")
-    assert "48 seeds" in found[0].note
-    assert "2 seeds lack a run and are left out" in found[0].note
 
 
 def test_points_are_a_factorial_in_any_order_or_none():
