@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
@@ -14,7 +14,7 @@ from tussle.errors import MissingExtraError, RecordError
 if TYPE_CHECKING:
     from tussle.batch.report.drawing import Picture
     from tussle.batch.report.report_data import ReportData
-    from tussle.batch.report.sections import Section
+    from tussle.batch.report.sections import Plot, Section
     from tussle.batch.results import Results
 
 INDEX = "index.html"
@@ -85,22 +85,19 @@ def sections_of(data: ReportData) -> list[Section]:
             of_variables.points,
         ]
         chosen = [of_games.won, of_games.scores, *effects, of_games.left, of_games.ended, *chosen]
-    return list(_with_own_names([made for section in chosen if not (made := section(data)).is_empty]))
+    return _with_own_names([made for section in chosen if not (made := section(data)).is_empty])
 
 
-def _with_own_names(sections: Sequence[Section]) -> Iterator[Section]:
+def _with_own_names(sections: Sequence[Section]) -> list[Section]:
     """Sections whose plots have different names, also where files do not tell A from a."""
     seen: Counter[str] = Counter()
-    for section in sections:
-        named = []
-        for plot in section.plots:
-            name = plot.name
-            while seen[name.lower()]:
-                seen[plot.name.lower()] += 1
-                name = f"{plot.name}-{seen[plot.name.lower()]}"
-            seen[name.lower()] += 1
-            named.append(replace(plot, name=name))
-        yield replace(section, plots=named)
+
+    def own(plot: Plot) -> Plot:
+        seen[plot.name.lower()] += 1
+        n = seen[plot.name.lower()]
+        return plot if n == 1 else own(replace(plot, name=f"{plot.name}-{n}"))
+
+    return [replace(section, plots=list(map(own, section.plots))) for section in sections]
 
 
 def _page(data: ReportData, sections: Sequence[Section], pictures: dict[str, Picture]) -> str:
