@@ -82,7 +82,7 @@ def optimize(
         raise typer.BadParameter("--objective is missing: a quantity such as 'score[3]-score[2]'")
     if not vary:
         raise typer.BadParameter("--vary is missing: speed=20:30, gain=1e-3:10:log, tactic=keep,switch")
-    with told(debug):
+    with reported(debug):
         from tussle.cli.optimize_course import search
 
         source = mission_source(mission, settings, more, seed, end, strict, plugin_files, allow_large)
