@@ -70,7 +70,7 @@ def cli(*words: str | Path) -> None:
         TussleError: That of the command.
     """
     told: list[BaseException] = []
-    with mock.patch.object(terminal, "_tell", told.append):
+    with mock.patch.object(terminal, "_report", told.append):
         result = CliRunner().invoke(commands.app, [str(word) for word in words])
     if told:
         raise told[0]
