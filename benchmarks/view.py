@@ -2,7 +2,7 @@
 
     python benchmarks/view.py [--sizes 2000 20000] [--repeats 1] [--json FILE]
 
-Sizes are numbers of Boids, at the density of `scale.py`. The viewer is a process that speaks viser's protocol and draws nothing, because
+Sizes are numbers of Boids, at the density of `scale.py`. The viewer is a process that speaks the page's protocol and draws nothing, because
 a browser without a graphics card would take CPU time from the measurement. Per size:
 
 * paced: the game at 60 steps per second. `page` is the CPU time of the server threads (all but the game's) and `frames` the number of
@@ -99,10 +99,10 @@ def paced(simulation: Simulation) -> dict[str, float]:
         time.sleep(2.0)
         alone = between(SECONDS / 2)
         watcher = Watcher(page.url)
-        while not page.visitors():
+        while not page.n_readers:
             time.sleep(0.1)
         time.sleep(2.0)
-        (frames, size), began, pushed = watcher.received(), time.perf_counter(), page.pusher.n_pushed
+        (frames, size), began, pushed = watcher.received(), time.perf_counter(), page.publisher.n_made
         watched = between(SECONDS)
         (frames2, size2), wall = watcher.received(), time.perf_counter() - began
         watcher.close()
@@ -110,7 +110,7 @@ def paced(simulation: Simulation) -> dict[str, float]:
             "page_cpu": watched["page"] - alone["page"],
             "game_cpu_alone": alone["game"],
             "game_cpu_watched": watched["game"],
-            "pushed": (page.pusher.n_pushed - pushed) / wall,
+            "pushed": (page.publisher.n_made - pushed) / wall,
             "frames": (frames2 - frames) / wall,
             "MB_per_s": (size2 - size) / wall / 1e6,
             "steps_per_s": live.steps_per_second,
@@ -125,17 +125,17 @@ def free(n: int) -> dict[str, float]:
         Page(live) as page,
     ):
         watcher = Watcher(page.url)
-        while not page.visitors() or live.step_number < 5:
+        while not page.n_readers or live.step_number < 5:
             time.sleep(0.1)
         first, began, pushed, wall = (
             live.step_number,
             cpu_by_thread(),
-            page.pusher.n_pushed,
+            page.publisher.n_made,
             time.perf_counter(),
         )
         time.sleep(SECONDS)
         last, watched = live.step_number, cpu_by_thread()["game"] - began["game"]
-        rate = (page.pusher.n_pushed - pushed) / (time.perf_counter() - wall)
+        rate = (page.publisher.n_made - pushed) / (time.perf_counter() - wall)
         watcher.close()
     with Simulation(boids(n), 1) as simulation:
         simulation.step(first)

@@ -18,21 +18,20 @@ from tussle.api import Autonomy, Output
 from tussle.mission import read_mission
 from tussle.stock import SingleIntegrator
 from tussle.view import Live, Recording
-from tussle.view.page.comparing import Comparison
+from tussle.view.page.compare import Comparison
 from tussle.view.page.server import Page
 
 IMAGES = Path(__file__).resolve().parents[2] / "docs" / "images"
-SIZE = {"width": 900, "height": 480}
+SIZE = {"width": 1100, "height": 640}
 GAME = "predator_prey"
 
 
 def shoot(watched: Watched, name: str) -> None:
-    """Save the window as a picture, without what the browser says about itself."""
-    for button in watched.tab.locator(".mantine-Notification-closeButton").all():
-        button.click()
-    watched.tab.wait_for_timeout(1500)
-    watched.await_drawing()
-    watched.tab.screenshot(path=IMAGES / f"view-{name}.png", timeout=300_000)
+    """Save the window as a picture."""
+    watched.wait("player.isDrawn")
+    watched.tab.wait_for_timeout(3500)  # until nothing is said any more
+    path = IMAGES / f"{name}.png"
+    watched.tab.screenshot(path=path, timeout=300_000)
 
 
 @contextmanager
@@ -44,46 +43,59 @@ def shown(browser: Browser, page: Page) -> Iterator[Watched]:
 
 
 def chase(browser: Browser) -> None:
-    """Predators in the flock, seen from behind one of them."""
+    """Predators in the flock, live."""
     loaded = read_mission(GAME)
     with (
         Simulation(loaded.mission, 1) as simulation,
-        Live(simulation, is_paused=True, viewer=loaded.viewer) as live,
+        Live(simulation, pace=16.0, viewer=loaded.viewer) as live,
+        shown(browser, Page(live)) as watched,
     ):
-        page = Page(live, mission=loaded.mission, viewer=loaded.viewer)
-        with shown(browser, page) as watched:
-            live.step(480)
-            live.settle(300.0)
-            page.display.has_trails, page.display.model_scale = True, 0.6
-            page.display.trail_time = 6.0
-            page.display.version += 1
-            watched.visitor.choose(int(live.frame().id[live.frame().team == 2][0]))
-            watched.visitor.set_mode("behind")
-            watched.wait(lambda: watched.reads("step 480"))
-            shoot(watched, "chase")
+        watched.until(lambda: live.step_number >= 600)
+        live.pause()
+        live.settle()
+        watched.wait(f"player.frame === {live.step_number}")
+        who = int(live.frame().id[live.frame().team == 2][0])
+        watched.tab.mouse.click(*watched.wait(f"player.pixelOf({who})"))
+        watched.wait(f"player.status.entity && player.frame === {live.step_number}")
+        shoot(watched, "view-chase")
+
+
+def recorded(folder: Path, *speeds: str) -> list[Recording]:
+    """The same game with prey of some speeds [m/s]."""
+    runs = []
+    for speed in speeds:
+        loaded = read_mission(GAME, {"prey": "30", "prey.Boids.max_speed": speed})
+        with Simulation(loaded.mission, 1) as game, Recorder(game, folder / speed, mission_text=loaded.text):
+            game.run(until=40.0)
+        runs.append(Recording(folder / speed))
+    return runs
 
 
 def two_runs(browser: Browser) -> None:
-    """The same game with one number changed."""
-    folder = Path(tempfile.mkdtemp(prefix="runs"))
-    for name, speed in (("a", "30"), ("b", "27")):
-        loaded = read_mission(GAME, {"prey": "30", "prey.Boids.max_speed": speed})
-        with Simulation(loaded.mission, 1) as game, Recorder(game, folder / name, mission_text=loaded.text):
-            game.run(until=40.0)
-    pair = Comparison(
-        Recording(folder / "a"), Recording(folder / "b"), is_over_each_other=True, is_paused=True
+    """The same game with one number changed, one over the other."""
+    with tempfile.TemporaryDirectory() as folder:
+        pair = Comparison(*recorded(Path(folder), "30", "27"), is_over_each_other=True)
+        with shown(browser, Page(pair, is_paused=True)) as watched:
+            seek(watched, 12.0)
+            shoot(watched, "view-two-runs")
+
+
+def replay(browser: Browser) -> None:
+    """A recorded run on a light page."""
+    with tempfile.TemporaryDirectory() as folder:
+        (run,) = recorded(Path(folder), "30")
+        with shown(browser, Page(run, is_paused=True)) as watched:
+            seek(watched, 25.0)
+            watched.press("k")
+            shoot(watched, "view-replay")
+
+
+def seek(watched: Watched, t: float) -> None:
+    """Put the slider at a time [s]."""
+    watched.tab.locator("#time").evaluate(
+        "(s, t) => { s.value = String(t); s.dispatchEvent(new Event('input')); }", t
     )
-    page = Page(pair, mission=pair.mission, viewer=pair.viewer)
-    with shown(browser, page) as watched:
-        pair.seek(32.0)
-        page.display.has_trails = True
-        page.display.version += 1
-        watched.visitor.choose(int(pair.frame().id[3]))
-        watched.visitor.set_mode("follow")
-        watched.visitor.zoom(is_nearer=False)
-        watched.wait(lambda: watched.reads("t = 32.00 s"))
-        shoot(watched, "two-runs")
-    shutil.rmtree(folder)
+    watched.wait(f"Math.abs(player.t - {t}) < 1e-6 && player.isDrawn")
 
 
 class Hesitant(Autonomy):
@@ -119,16 +131,23 @@ def shapes(browser: Browser) -> None:
         "grid_spacing": 10.0,
         "scale": 2.0,
     }
-    with Simulation(mission, 1) as simulation, Live(simulation, is_paused=True, viewer=viewer) as live:
-        page = Page(live, viewer=viewer)
-        with shown(browser, page) as watched:
-            watched.wait(lambda: live._sketchbook.is_open)
-            live.step(30)
-            watched.wait(lambda: watched.reads("step 30"))
-            shoot(watched, "shapes")
+    with (
+        Simulation(mission, 1) as simulation,
+        Live(simulation, is_paused=True, viewer=viewer) as live,
+        shown(browser, Page(live)) as watched,
+    ):
+        watched.until(lambda: live._sketchbook.is_open)
+        live.step(30)
+        watched.wait("player.frame === 30 && player.shapes.length > 1")
+        shoot(watched, "view-shapes")
 
 
-PICTURES: dict[str, Callable[[Browser], None]] = {"chase": chase, "two-runs": two_runs, "shapes": shapes}
+PICTURES: dict[str, Callable[[Browser], None]] = {
+    "chase": chase,
+    "two-runs": two_runs,
+    "replay": replay,
+    "shapes": shapes,
+}
 
 
 def main() -> None:

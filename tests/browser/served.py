@@ -1,31 +1,23 @@
-"""Opens a served page in a real browser, and finds things in its picture."""
+"""Opens a served page in a real browser."""
 
 from __future__ import annotations
 
-import math
 import os
 import signal
-import time
 from pathlib import Path
 
-import numpy as np
 from playwright.sync_api import Browser
 from playwright.sync_api import Page as Tab
+from waiting import wait_until
 
 from tussle.view.page.server import Page
 
-# viser's page says these where everything is well: a note to its authors, and what drawing without a graphics card is.
-HARMLESS = (
-    "THREE.Clock: This module has been deprecated",
-    "GPU stall due to ReadPixels",
-    "Software WebGL",
-    "GL_INVALID_OPERATION: glDrawElementsInstanced",  # of the software renderer; seen once
-)
+# What drawing without a graphics card says of itself.
+HARMLESS = ("GPU stall due to ReadPixels", "Software WebGL")
 SMALL = {"width": 820, "height": 520}
-UNHURRIED = {"gui_update_period": "300"}
-"""Time between frames [ms]: each takes a browser without a graphics card about as long, and it looks after the panel in between."""
-PATIENCE = 90.0
-"""A browser that draws without a graphics card on a busy machine [s]."""
+UNHURRIED = {"gui_update_period": "200"}
+"""Time between frames [ms]: a browser without a graphics card draws no faster."""
+READY = "Boolean(window.player && player.isReady)"
 
 
 class Watched:
@@ -35,23 +27,16 @@ class Watched:
         browser: The browser.
         page: The page that is served.
         size: Of the window.
-        is_awaited: Wait until the first picture is drawn.
     """
 
-    def __init__(
-        self, browser: Browser, page: Page, size: dict[str, int] | None = None, *, is_awaited: bool = True
-    ) -> None:
+    def __init__(self, browser: Browser, page: Page, size: dict[str, int] | None = None) -> None:
         self.page = page
         self.trouble: list[str] = []
-        known = {id(v) for v in page.visitors()}
-        self.tab: Tab = browser.new_page(viewport=size or SMALL)
-        self.tab.set_default_timeout(1e3 * PATIENCE)
+        self.tab: Tab = browser.new_page(viewport=size or SMALL, reduced_motion="reduce")
+        self.tab.set_default_timeout(90_000)
         self._listen()
         self.tab.goto(page.url)
-        self.visitor = self.wait(lambda: next((v for v in page.visitors() if id(v) not in known), None))
-        self.tab.get_by_text("step ").first.wait_for()
-        if is_awaited:
-            self.await_drawing()
+        self.wait(READY)
 
     def _listen(self) -> None:
         tab, url = self.tab, self.page.url
@@ -61,9 +46,7 @@ class Watched:
                 self.trouble.append(f"console {message.type}: {message.text[:300]}")
 
         def look(address: str) -> None:
-            if not address.startswith(
-                (url, url.replace("http", "ws"), "data:", f"blob:{url.rpartition('/')[0]}/")
-            ):
+            if not address.startswith((url, url.replace("http", "ws"), "data:", "blob:")):
                 self.trouble.append(f"request: {address[:200]}")
 
         tab.on("console", hear)
@@ -72,50 +55,27 @@ class Watched:
         tab.on("websocket", lambda socket: look(socket.url))
         tab.on("requestfailed", lambda request: self.trouble.append(f"failed: {request.url[:200]}"))
 
-    def await_drawing(self) -> None:
-        """Wait until the picture is there and the browser has time again: its first takes long without a graphics card."""
-        self.tab.evaluate(
-            "() => new Promise(done => {"
-            "  let n = 0; const count = () => ++n < 10 ? requestAnimationFrame(count) : done(n);"
-            "  requestAnimationFrame(count); })"
-        )
+    def wait(self, expression: str) -> object:
+        """The value of an expression of the page as soon as it is true."""
+        assert self.page.error is None, self.page.error
+        return wait_until(self.tab, expression, 90.0)
 
-    def wait(self, condition, timeout: float = PATIENCE):
-        """Wait until it holds, while the browser goes on; what it gave."""
-        until = time.monotonic() + timeout
-        while not (given := condition()):
-            assert time.monotonic() < until, "it does not come"
-            assert self.page.error is None, self.page.error
+    def until(self, condition):
+        """Wait until a condition of the game holds, while the browser goes on."""
+        for _ in range(3000):
+            if given := condition():
+                return given
             self.tab.wait_for_timeout(30)
-        return given
+        raise AssertionError("it does not come")
 
     def button(self, name: str) -> None:
-        """Press a button of the panel."""
+        """Press a button of the page."""
         self.tab.get_by_role("button", name=name, exact=True).first.click()
 
     def press(self, key: str) -> None:
         """Press a key of the keyboard, which nobody is typing into a field with."""
-        self.tab.evaluate("document.activeElement && document.activeElement.blur()")
+        self.tab.evaluate("() => document.activeElement && document.activeElement.blur()")
         self.tab.keyboard.press(key)
-
-    def reads(self, text: str) -> bool:
-        """Whether this stands on the page."""
-        return self.tab.get_by_text(text).count() > 0
-
-    def place_of(self, point) -> tuple[float, float]:
-        """Where a point of the world [m], (3,), is in the window [pixels]."""
-        camera = self.visitor._client.camera
-        forward = camera.look_at - camera.position
-        forward /= np.linalg.norm(forward)
-        right = np.cross(forward, [0.0, 0.0, 1.0])
-        right /= np.linalg.norm(right)
-        up = np.cross(right, forward)
-        seen = np.asarray(point) - camera.position
-        scale = 0.5 * camera.image_height / math.tan(0.5 * camera.fov) / (seen @ forward)
-        box = self.tab.locator("canvas").first.bounding_box()
-        x = box["x"] + box["width"] * (0.5 + scale * (seen @ right) / camera.image_width)
-        y = box["y"] + box["height"] * (0.5 - scale * (seen @ up) / camera.image_height)
-        return x, y
 
     def close(self) -> None:
         self.tab.close()

@@ -34,7 +34,7 @@ def hunted(tmp_path_factory):
     folder = tmp_path_factory.mktemp("hunted")
     recording = Recording(record(hunt(n_prey=8, end=20.0), folder / "run"))
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr("tussle.view.export.tracks.N_ROWS", 1)
+        patched.setattr("tussle.view.page.recorded.FILE_STATES", 1)
         export = write_html(recording, folder / "page.html")
     return recording, export
 
@@ -157,13 +157,13 @@ def test_between_frames_it_goes_the_straight_way(page, hunted):
 
 
 def test_a_mark_tells_what_happened_and_jumps_there(page, hunted):
-    marks = page.evaluate("() => player.happenings")
+    marks = page.evaluate("() => player.events")
     assert not [m for m in marks if m["kind"] == "birth" and m["t"] == 0.0]
     captures = [m for m in marks if m["kind"] == "capture"]
     assert captures
     # A capture tells of the death as well.
     assert not [m for m in marks if m["kind"] == "death" and m["id"] in {c["other"] for c in captures}]
-    capture, box = captures[0], page.locator("#happenings").bounding_box()
+    capture, box = captures[0], page.locator("#events").bounding_box()
     share = capture["t"] / hunted[0].t[-1]
     x, y = box["x"] + 7.5 + share * (box["width"] - 15), box["y"] + 12
     page.mouse.move(x, y)
@@ -176,7 +176,7 @@ def test_a_mark_tells_what_happened_and_jumps_there(page, hunted):
 
 
 def test_keys_go_from_one_happening_to_the_next(page):
-    times = sorted({m["t"] for m in page.evaluate("() => player.happenings")} - {0.0})
+    times = sorted({m["t"] for m in page.evaluate("() => player.events")} - {0.0})
     for t in times[:3]:
         page.keyboard.press("PageDown")
         wait_until(page, f"player.t === {t!r}")
@@ -304,7 +304,7 @@ def n_blue_and_vermilion(page):
 
 
 def test_entities_are_drawn_in_the_colours_of_their_teams(page, hunted):
-    happened = [m["t"] for m in page.evaluate("() => player.happenings")]
+    happened = [m["t"] for m in page.evaluate("() => player.events")]
     # What happens flashes for a second, in a colour that is like the hunters'.
     seek(page, next(t for t in hunted[0].t.tolist() if all(not t - 1.0 < h <= t for h in happened)))
     if page.evaluate("() => player.drawn.labels"):

@@ -5,7 +5,8 @@ import signal
 import numpy as np
 import pytest
 from recorded_games import hunt
-from served import SMALL, UNHURRIED, Watched, another_browser, family_of, send_all
+from served import UNHURRIED, Watched, another_browser, family_of, send_all
+from watched_plugins import clickable
 
 from tussle import Simulation
 from tussle.view import Live
@@ -39,66 +40,64 @@ def at(live, step):
 
 
 def test_the_page_shows_the_beginning(game):
-    _, _, watched = game
-    watched.wait(lambda: watched.reads("tussle · hunt"))
-    watched.wait(lambda: watched.reads("t = 0.00 s"))
-    for text in ("prey", "hunters", "Camera", "Entity", "Show"):
-        assert watched.reads(text)
-    assert watched.tab.get_by_role("button", name="Share").count() == 0
-
-
-def test_step_moves_the_clock_by_one_dt_and_back_again(game):
     live, _, watched = game
-    watched.button("Step")
-    watched.wait(at(live, 1))
-    watched.wait(lambda: watched.reads("t = 0.10 s"))
-    watched.button("Back")
-    watched.wait(at(live, 0))
-    watched.wait(lambda: watched.reads("t = 0.00 s"))
+    assert watched.tab.locator("#head h1").inner_text() == "hunt"
+    watched.wait("player.t === 0 && player.frame === 0")
+    assert sorted(watched.tab.evaluate("() => player.ids")) == live.frame().id.tolist()
+    assert watched.tab.locator("#teams .team").count() == 2
 
 
-def test_pause_stops_the_clock(game):
+def test_buttons_step_play_and_pause(game):
     live, _, watched = game
+    watched.button("A step on")
+    watched.until(at(live, 1))
+    watched.wait("player.frame === 1")
+    watched.button("A step back")
+    watched.until(at(live, 0))
+    watched.wait("player.frame === 0")
     watched.button("Play")
-    watched.wait(lambda: live.step_number > 2)
+    watched.until(lambda: live.step_number > 2)
     watched.button("Pause")
-    watched.wait(lambda: live.is_paused and live.settle())
+    watched.until(lambda: live.is_paused and live.settle())
     there = live.step_number
+    watched.wait(f"player.frame === {there} && !player.isPlaying")
     watched.tab.wait_for_timeout(400)
     assert live.step_number == there
-    watched.wait(lambda: watched.reads(f"t = {live.t:.2f} s"))
 
 
 def test_keys_of_a_real_keyboard(game):
-    live, page, watched = game
-    display, visitor = page.display, watched.visitor
+    live, _, watched = game
     live.seek(0.0)
     live.settle()
     for key, holds in (
-        ("Space", at(live, 1)), ("Backspace", at(live, 0)), ("b", lambda: not live.is_paused), ("b", lambda: live.is_paused),
-        ("]", lambda: live.warp == 2.0), ("[", lambda: live.warp == 1.0), ("m", lambda: live.warp == np.inf),
-        ("m", lambda: live.warp == 1.0), ("-", lambda: display.model_scale < 0.9), ("0", lambda: display.model_scale == 1.0),
-        ("Shift++", lambda: display.model_scale > 1.2), ("=", lambda: display.model_scale > 1.5),
-        ("0", lambda: display.model_scale == 1.0), ("w", lambda: display.is_wireframe), ("s", lambda: not display.is_wireframe),
-        ("t", lambda: display.has_trails), ("g", lambda: display.has_links), ("g", lambda: not display.has_links),
-        ("ArrowRight", lambda: visitor.chosen == 1), ("ArrowRight", lambda: visitor.chosen == 2),
-        ("ArrowLeft", lambda: visitor.chosen == 1), ("Shift+N", lambda: display.label_scale < 1.0),
-        ("n", lambda: display.label_scale == 1.0), (";", lambda: len(live.injections) == 1),
+        (".", at(live, 1)), (",", at(live, 0)), ("Backspace", at(live, 0)), ("b", lambda: not live.is_paused),
+        ("Space", lambda: live.is_paused), ("]", lambda: live.warp == 2.0), ("[", lambda: live.warp == 1.0),
+        ("m", lambda: live.warp == np.inf), ("m", lambda: live.warp == 1.0), (";", lambda: len(live.injections) == 1),
     ):  # fmt: skip
         watched.press(key)
-        watched.wait(holds, 40.0)
+        watched.until(holds)
+        watched.wait(f"player.status.isPaused === {str(live.is_paused).lower()} && (player.status.warp ?? 0) === "
+                     f"{0 if live.warp == np.inf else live.warp}")  # fmt: skip
 
 
-def test_keys_that_jump_to_events(game):
+def test_keys_and_marks_that_jump_to_events(game):
     live, _, watched = game
     live.step(60)
     live.settle()
+    watched.wait("player.events.length > 2 && player.frame >= 60")
     live.seek(0.0)
     live.settle()
-    times = sorted({h.t for h in live.happenings if h.t > 0.0})
-    for key, t in ((".", times[0]), (".", times[1]), (",", times[0])):
+    watched.wait("player.t === 0")
+    times = sorted({h.t for h in live.events if h.t > 0.0})
+    for key, t in (("PageDown", times[0]), ("PageDown", times[1]), ("PageUp", times[0])):
         watched.press(key)
-        watched.wait(lambda t=t: live.t == pytest.approx(t))
+        watched.until(lambda t=t: live.t == pytest.approx(t))
+        watched.wait(f"Math.abs(player.t - {t}) < 1e-6")
+    box = watched.tab.locator("#events").bounding_box()
+    marks = watched.tab.evaluate("() => player.events")
+    share = marks[-1]["t"] / live.span[1]
+    watched.tab.mouse.click(box["x"] + 7.5 + share * (box["width"] - 15), box["y"] + 12)
+    watched.until(lambda: live.t > times[1])
 
 
 def test_the_slider_goes_back_and_the_future_is_the_same(game):
@@ -107,70 +106,88 @@ def test_the_slider_goes_back_and_the_future_is_the_same(game):
     live.step(30)
     live.settle()
     future = live.simulation.state_hash()
-    time_field = watched.tab.locator("input[inputmode=decimal]:visible").first
-    watched.wait(lambda: time_field.input_value() == "3")
-    time_field.fill("1.2")
-    watched.wait(at(live, 12))
+    watched.wait("player.frame === 30")
+    watched.tab.locator("#time").evaluate("(s) => { s.value = '1.2'; s.dispatchEvent(new Event('input')); }")
+    watched.until(at(live, 12))
     live.step(18)
-    watched.wait(at(live, 30))
+    watched.until(at(live, 30))
     assert live.simulation.state_hash() == future
 
 
 def test_a_click_on_an_entity_chooses_it_and_the_camera_follows_it(game):
     live, page, watched = game
-    visitor = watched.visitor
-    visitor.see_whole()
-    visitor.choose(None)
-    page.display.model_scale = 4.0
-    page.display.version += 1
-    frame = live.frame()
-    # Nobody stands before the hunter who is nearest to the camera.
-    eye = visitor._client.camera.position
-    row = int(np.linalg.norm(frame.pos - eye, axis=1).argmin())
-    who = int(frame.id[row])
-
-    def is_chosen():
-        watched.tab.mouse.click(*watched.place_of(frame.pos[row]))
-        watched.tab.wait_for_timeout(700)
-        return visitor.chosen is not None
-
-    watched.wait(is_chosen)
-    assert visitor.chosen == who
-    watched.wait(lambda: watched.reads(f"{live.blocks[int(frame.block[row])]} {who}"))
+    watched.press("o")
+    watched.wait("player.mode === 'overview' && player.isDrawn")
+    who = int(live.frame().id[-1])
+    watched.tab.mouse.click(*watched.wait(f"player.pixelOf({who})"))
+    watched.wait("player.chosen > 0")
+    who = watched.tab.evaluate("() => player.chosen")
+    watched.until(lambda: page.publisher.readers[0].chosen == who)
+    watched.wait(f"player.status.entity && player.status.entity.id === {who}")
+    watched.wait("document.querySelectorAll('#sections h3').length > 0")
     watched.press("a")
-    watched.wait(lambda: visitor.camera.mode == "follow")
-    before = np.array(frame.pos[row])
+    watched.wait("player.mode === 'follow'")
     live.step(10)
     live.settle()
-    now = watched.wait(lambda: live.frame().row_of(who) >= 0 and live.frame()).pos[live.frame().row_of(who)]
-    assert np.linalg.norm(now - before) > 5.0
-    camera = visitor._client.camera
-    watched.wait(lambda: np.allclose(camera.look_at, now, atol=0.5))
-    page.display.model_scale = 1.0
+    frame = live.frame()
+    east, north, _ = frame.pos[frame.row_of(who)]
+    watched.wait(f"Math.hypot(player.camera.target[0] - {east}, player.camera.target[1] - {north}) < 0.5")
+    watched.press("Escape")
+    watched.wait("player.chosen === 0")
+
+
+def test_trails_lead_back_after_a_jump(game):
+    live, _, watched = game
+    live.step(80)
+    live.settle()
+    live.seek(6.0)
+    live.settle()
+    watched.wait("Math.abs(player.t - 6) < 1e-6 && player.trailPoints > 100")
 
 
 def test_two_browsers_watch_on_their_own_and_steer_together(chromium, game):
     live, page, watched = game
     other = Watched(chromium, page, {"width": 500, "height": 360})
     try:
-        other.visitor.choose(3)
-        assert watched.visitor.chosen != 3
+        other.press("ArrowRight")
+        other.wait("player.chosen > 0")
+        assert watched.tab.evaluate("() => player.chosen") == 0
         there = live.step_number
-        other.button("Step")
-        other.wait(at(live, there + 1))
+        other.button("A step on")
+        other.until(at(live, there + 1))
         for one in (watched, other):
-            one.wait(lambda one=one: one.reads(f"t = {live.t:.2f} s"))
+            one.wait(f"player.frame === {there + 1}")
         assert not other.trouble
     finally:
         other.close()
-    watched.wait(lambda: len(page.visitors()) == 1)
+    watched.until(lambda: page.n_readers == 1)
+
+
+def test_a_point_is_picked_and_shapes_of_plugins_are_seen(chromium):
+    with (
+        Simulation(clickable(), 1) as simulation,
+        Live(simulation, is_paused=True) as live,
+        Page(live, viewer=UNHURRIED) as page,
+    ):
+        watched = Watched(chromium, page)
+        watched.press("p")
+        watched.tab.mouse.click(400, 300)
+        watched.until(lambda: len(live.injections) == 1)
+        assert live.injections[0].fields["pos"][2] == pytest.approx(0.0, abs=1e-6)
+        watched.tab.mouse.click(400, 300)
+        watched.until(lambda: live._sketchbook.is_open)
+        live.step()
+        watched.wait("player.shapes.some(([kind, n]) => kind === 'arrows' && n === 3)")
+        assert len(live.injections) == 1, "a second click is no second point"
+        watched.close()
+        assert not watched.trouble
 
 
 def test_a_browser_that_hangs_holds_up_neither_game_nor_page(chromium, game):
     live, page, watched = game
     flag = "--tussle-hangs"
     browser = another_browser(chromium, flag)
-    hanging = Watched(browser, page, SMALL, is_awaited=False)
+    hanging = Watched(browser, page)
     family = family_of(flag)
     assert len(family) > 1
     live.seek(0.0)
@@ -183,14 +200,14 @@ def test_a_browser_that_hangs_holds_up_neither_game_nor_page(chromium, game):
         live.settle()
         live.warp = 5.0
         live.resume()
-        pushed = page.pusher.n_pushed
-        watched.wait(lambda: live.step_number >= 100)
+        made = page.publisher.n_made
+        watched.until(lambda: live.step_number >= 100)
         live.pause()
         live.seek(10.0)
         live.settle()
         assert live.simulation.state_hash() == calm
-        assert page.pusher.n_pushed > pushed + 1
-        watched.wait(lambda: watched.reads("t = 10.00 s"))
+        assert page.publisher.n_made > made + 1
+        watched.wait("Math.abs(player.t - 10) < 1e-6")
     finally:
         send_all(family, signal.SIGCONT)
         live.warp = 1.0

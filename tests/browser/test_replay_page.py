@@ -1,55 +1,76 @@
-"""A recorded run in a real browser: it plays, and jumps to an event."""
+"""Recorded runs, served, in a real browser: the same page as the offline one, fed chunk by chunk."""
+
+import math
 
 import pytest
 from recorded_games import hunt
-from served import UNHURRIED, Watched
+from served import Watched
 
 from tussle import Recorder, Simulation
 from tussle.view import Recording
-from tussle.view.page.replaying import Replay
+from tussle.view.page import recorded as recorded_data
+from tussle.view.page.compare import Comparison
 from tussle.view.page.server import Page
 
 
 @pytest.fixture(scope="module")
-def replayed(chromium, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("runs") / "run"
-    with (
-        Simulation(hunt(n_prey=6, end=60.0, end_conditions="time"), 3) as simulation,
-        Recorder(simulation, folder),
-    ):
-        simulation.step(200)
-    replay = Replay(Recording(folder), is_paused=True)
-    with Page(replay, mission=replay.mission, viewer=replay.viewer | UNHURRIED) as page:
+def runs(tmp_path_factory):
+    base = tmp_path_factory.mktemp("runs")
+    for name, seed in (("a", 3), ("b", 4)):
+        mission = hunt(n_prey=6, end=20.0, end_conditions="time")
+        with Simulation(mission, seed) as simulation, Recorder(simulation, base / name):
+            simulation.run()
+    return [Recording(base / name, is_mapped=True) for name in "ab"]
+
+
+def test_a_recorded_run_plays_jumps_and_shows_what_was_recorded(chromium, runs, monkeypatch):
+    monkeypatch.setattr(recorded_data, "SERVED_STATES", 60)
+    with Page(runs[0], is_paused=True) as page:
         watched = Watched(chromium, page)
-        yield replay, watched
+        watched.wait("player.t === 0 && !player.isPlaying && player.isDrawn")
+        watched.button("Play")
+        watched.wait("player.t > 0.3")
+        watched.button("Pause")
+        watched.wait("!player.isPlaying")
+        for t in (15.0, 2.0, 9.5):
+            watched.tab.locator("#time").evaluate(
+                "(s, t) => { s.value = String(t); s.dispatchEvent(new Event('input')); }", t
+            )
+            watched.wait(f"Math.abs(player.t - {t}) < 1e-6 && player.isDrawn")
+            frame = runs[0].at(t)
+            assert sorted(watched.tab.evaluate("() => player.ids")) == frame.id.tolist()
+            for row, who in enumerate(frame.id.tolist()):
+                pos = watched.tab.evaluate("(id) => player.stateOf(id).pos", who)
+                assert math.dist(pos, frame.pos[row]) < 0.01
+        watched.press("Home")
+        first = min(event.t for event in runs[0].events if event.t > 0.0)
+        watched.press("PageDown")
+        watched.wait(f"player.t === {first!r}")
         watched.close()
         assert not watched.trouble, "\n".join(watched.trouble)
 
 
-def test_a_recorded_run_plays_and_stands_still(replayed):
-    replay, watched = replayed
-    watched.wait(lambda: watched.reads("t = 0.00 s"))
-    watched.button("Play")
-    watched.wait(lambda: replay.t > 0.3)
-    watched.button("Pause")
-    watched.wait(lambda: replay.is_paused)
-    watched.wait(lambda: watched.reads(f"t = {replay.frame().t:.2f} s"))
+def test_each_browser_has_its_own_time_of_a_recorded_run(chromium, runs):
+    with Page(runs[0], is_paused=True) as page:
+        one, other = Watched(chromium, page), Watched(chromium, page)
+        one.press("End")
+        one.wait("player.t > 19")
+        assert other.tab.evaluate("() => player.t") == 0.0
+        one.close()
+        other.close()
 
 
-def test_an_event_is_jumped_to(replayed):
-    replay, watched = replayed
-    replay.seek(0.0)
-    first = min(h.t for h in replay.happenings if h.t > 0.0)
-    watched.button("Next event")
-    watched.wait(lambda: replay.t == first)
-    watched.wait(lambda: watched.reads(f"t = {first:.2f} s"))
-    assert watched.reads("death") or watched.reads("birth")
-
-
-def test_one_frame_on_and_back(replayed):
-    replay, watched = replayed
-    replay.seek(1.0)
-    watched.button("Step")
-    watched.wait(lambda: replay.t == pytest.approx(1.1))
-    watched.button("Back")
-    watched.wait(lambda: replay.t == pytest.approx(1.0))
+def test_two_runs_are_seen_together_from_where_they_differ(chromium, runs):
+    with Page(Comparison(*runs, is_over_each_other=True), is_paused=True) as page:
+        watched = Watched(chromium, page)
+        watched.wait("player.isDrawn")
+        assert "they differ first at t = 0 s" in watched.tab.locator("#lead").inner_text()
+        assert len(watched.tab.evaluate("() => player.ids")) == sum(len(run.frame(0)) for run in runs)
+        watched.press("ArrowRight")
+        watched.wait("player.chosen > 0 && player.isDrawn")
+        assert watched.tab.locator("#chosen h2").inner_text() == "A prey 1"
+        watched.press("ArrowLeft")
+        watched.wait("player.chosen > 1 && player.isDrawn")
+        assert watched.tab.locator("#chosen h2").inner_text().startswith("B hunters ")
+        watched.close()
+        assert not watched.trouble, "\n".join(watched.trouble)

@@ -43,8 +43,8 @@ class Source:
         n_worlds = len(recording.run.info.get("worlds", ()))
         if self.world is None and n_worlds > 1:
             say_note(f"the run has {n_worlds} worlds; world 0 is shown, --world selects another")
-        # Looks and scenery are read now, so that their notes are printed once, before the outputs.
-        for note in dict.fromkeys([*recording.looks.notes, *recording.scenery.notes, *recording.notes]):
+        # Style and scenery are read now, so that their notes are printed once, before the outputs.
+        for note in dict.fromkeys([*recording.style.notes, *recording.scenery.notes, *recording.notes]):
             say_note(note)
         return recording
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -54,28 +54,17 @@ def replay(
         raise typer.BadParameter("--over draws two runs in one place, and there is only one")
     with reported(debug):
         from tussle.cli.interrupt import Interrupt
-        from tussle.errors import ViewError
-        from tussle.view.page.comparing import Comparison
-        from tussle.view.page.replaying import Replay
+        from tussle.view.page.compare import Comparison
         from tussle.view.page.server import Page
         from tussle.view.recording import Recording
 
         files = tuple(plugin_files or ())
-        first = Recording(run, world, files)
-        if not first.n_frames:
-            raise ViewError(f"{run}: nothing was recorded")
-        source: Any = (
-            Replay(first, warp=warp, is_paused=paused)
-            if other is None
-            else Comparison(
-                first, Recording(other, world, files), is_over_each_other=over, warp=warp, is_paused=paused
-            )
-        )
+        first = Recording(run, world, files, is_mapped=True)
+        second = None if other is None else Recording(other, world, files, is_mapped=True)
+        game = first if second is None else Comparison(first, second, is_over_each_other=over)
         with ExitStack() as stack:
             interrupt = stack.enter_context(Interrupt())
-            page = stack.enter_context(
-                Page(source, host=host, port=port, mission=source.mission, viewer=source.viewer)
-            )
+            page = stack.enter_context(Page(game, host=host, port=port, warp=warp, is_paused=paused))
             announce(page, not no_browser)
             code = watch(page, interrupt, lambda: False)
     raise typer.Exit(code)

@@ -128,7 +128,7 @@ def play_live(
             is_paused=is_paused or bool(viewer.get("start_paused", False)),
         )  # fmt: skip
         stack.callback(live.stop)
-        page = stack.enter_context(Page(live, mission=mission, viewer=viewer, **address))
+        page = stack.enter_context(Page(live, **address))
         announce(page, is_opened)
         speed = Speed(began)
         speed.begin(float(simulation.t[0]))

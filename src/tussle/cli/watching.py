@@ -64,7 +64,7 @@ def announce(page: Page, is_opened: bool) -> None:
     """Say where the page is, and open it where there is a browser to do so."""
     for note in page.notes:
         say_note(note)
-    out().print(f"{page.source.name}: {page.url}  (Ctrl-C ends it)", soft_wrap=True)
+    out().print(f"{page.game.name}: {page.url}  (Ctrl-C ends it)", soft_wrap=True)
     if not page.is_local:
         say(
             "warning",
@@ -94,8 +94,8 @@ def watch(page: Page, interrupt: Interrupt, is_done: Callable[[], bool]) -> int:
         for text in page.errors[n_said:]:
             n_said += 1
             say_error(text)
-        if page.source.error is not None and page.source.error is not told:
-            told = page.source.error
+        if page.game_error is not None and page.game_error is not told:
+            told = page.game_error
             say_error(str(told))
             err().print("The page shows how it came to that: it can be wound back. Ctrl-C ends it.")
         time.sleep(NAP)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Callable, Iterator
 from functools import cached_property
 from importlib import import_module
 from importlib.util import find_spec
@@ -15,7 +16,7 @@ import pyarrow.csv
 from tussle.documents import read_text
 from tussle.errors import MissingExtraError, ParameterError, RecordError, listed, nearest_name
 from tussle.mission.limits import Limits
-from tussle.record.arrow_file import read_batches
+from tussle.record.arrow_file import mapped_batches, read_batches
 from tussle.record.schema import (
     EVENTS,
     EVENTS_FILE,
@@ -50,20 +51,22 @@ class Run:
     Args:
         path: The directory.
         frames: "pandas", "polars", or "" for the first of them that is installed.
+        is_mapped: States stay in their file until they are used, and no value of theirs is checked.
 
     Attributes:
         info: Content of `run.json`; empty if it is missing.
         notes: What is missing, one line each; empty for a complete run.
     """
 
-    def __init__(self, path: Path, frames: str) -> None:
+    def __init__(self, path: Path, frames: str, *, is_mapped: bool = False) -> None:
         self.path = path
         self._frames = frames
         self.info: dict[str, Any] = {}
         self.notes: list[str] = []
         self._read_info()
-        self.trajectory_table = self._read_table(TRAJECTORY_FILE, TRAJECTORY, TRAJECTORY_RULES)
-        self.events_table = self._read_table(EVENTS_FILE, EVENTS, EVENTS_RULES)
+        read = mapped_batches if is_mapped else read_batches
+        self.trajectory_table = self._read_table(TRAJECTORY_FILE, TRAJECTORY, TRAJECTORY_RULES, read)
+        self.events_table = self._read_table(EVENTS_FILE, EVENTS, EVENTS_RULES, read_batches)
 
     def _read_info(self) -> None:
         path = self.path / RUN_FILE
@@ -81,9 +84,11 @@ class Run:
         if self.info["interrupted"]:
             self.notes.append(f"the run was interrupted: {self.info['interrupted']}")
 
-    def _read_table(self, name: str, schema: pa.Schema, rules: Rules) -> pa.Table:
+    def _read_table(
+        self, name: str, schema: pa.Schema, rules: Rules, read: Callable[..., Iterator[pa.RecordBatch]]
+    ) -> pa.Table:
         path, notes = self.path / name, list[str]()
-        table = pa.Table.from_batches(read_batches(path, notes, RecordError, schema, rules), schema)
+        table = pa.Table.from_batches(read(path, notes, RecordError, schema, rules), schema)
         written = self.info.get("files", {}).get(name)
         if not notes and written is not None:
             found = {"bytes": path.stat().st_size, "rows": table.num_rows}
@@ -153,12 +158,13 @@ class Run:
         return f"<Run {str(self.path)!r}: {self.trajectory_table.num_rows} states, {state}>"
 
 
-def load_run(path: str | Path, frames: str = "") -> Run:
+def load_run(path: str | Path, frames: str = "", *, is_mapped: bool = False) -> Run:
     """Load a run directory. Of a run that is still going on or was killed, load what was written.
 
     Args:
         path: The directory.
         frames: "pandas" or "polars"; by default the first of them that is installed.
+        is_mapped: States stay in their file until they are used, and no value of theirs is checked.
 
     Raises:
         RecordError: It is not a run directory.
@@ -178,4 +184,4 @@ def load_run(path: str | Path, frames: str = "") -> Run:
             else f"it has none of {', '.join(FILES)}"
         )
         raise RecordError(f"{place}: it is not a run directory; {reason}")
-    return Run(place, frames)
+    return Run(place, frames, is_mapped=is_mapped)

@@ -8,22 +8,22 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from tussle.view.frame import Frame, Happening, frame_of
+    from tussle.view.frame import Event, Frame, frame_of
     from tussle.view.live import Live
-    from tussle.view.looks import Looks
     from tussle.view.recording import Recording
     from tussle.view.scenery import Scenery, scenery_of
     from tussle.view.shapes import MODELS, Mesh
+    from tussle.view.style import Style
 
 __all__ = [
     "MODELS",
+    "Event",
     "Frame",
-    "Happening",
     "Live",
-    "Looks",
     "Mesh",
     "Recording",
     "Scenery",
+    "Style",
     "frame_of",
     "scenery_of",
 ]
@@ -31,9 +31,9 @@ __all__ = [
 _LAZY = {
     "MODELS": "shapes",
     "Frame": "frame",
-    "Happening": "frame",
+    "Event": "frame",
     "Live": "live",
-    "Looks": "looks",
+    "Style": "style",
     "Mesh": "shapes",
     "Recording": "recording",
     "Scenery": "scenery",

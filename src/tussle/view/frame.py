@@ -46,7 +46,7 @@ class Frame:
 
 
 @dataclass(frozen=True, slots=True)
-class Happening:
+class Event:
     """Something that happened in a game.
 
     Attributes:

@@ -16,15 +16,15 @@ from tussle.engine.simulation import Simulation
 from tussle.engine.step_end import world_result
 from tussle.errors import ParameterError, PluginError
 from tussle.messages import CustomKeyPress, Message, WorldPointClicked
-from tussle.view.conductor import Conductor, Order
 from tussle.view.drawn import Shape, Sketchbook
 from tussle.view.entity import EntityState, entity_state
-from tussle.view.frame import Frame, Happening, Lens
-from tussle.view.looks import Looks
-from tussle.view.offers import LINGER, Offer
+from tussle.view.frame import Event, Frame, Lens
+from tussle.view.latest import LINGER, LatestValue
 from tussle.view.pacing import Pace, checked_warp, faster, slower
+from tussle.view.playback import Order, PlaybackController
 from tussle.view.player import Injection, Player
 from tussle.view.scenery import Scenery, scenery_of
+from tussle.view.style import Style
 
 FRAME_PERIOD = 1.0 / 30.0
 """Least time between two frames [s]: browsers are sent no more."""
@@ -89,34 +89,38 @@ class Live:
         self._sketchbook = Sketchbook(simulation, world)
         self._pace = Pace(checked_warp(pace))
         self._player = Player(simulation, world, snapshot_every, 1e6 * memory)
-        self._conductor = Conductor(self._player, self._pace, self._sketchbook, is_paused, self._renew)
-        ring = self._conductor.ring
-        self._frame: Offer[Frame] = Offer(Lens(simulation, world).frame, FRAME_PERIOD, ring)
-        self._shapes: Offer[tuple[Shape, ...]] = Offer(self._sketchbook.shapes, FRAME_PERIOD, ring)
-        self._result: Offer[WorldResult | None] = Offer(self._make_result, RESULT_PERIOD, ring)
-        self._entities: dict[int, Offer[EntityState | None]] = {}
+        self._playback = PlaybackController(
+            self._player, self._pace, self._sketchbook, is_paused, self._renew
+        )
+        ring = self._playback.ring
+        self._frame: LatestValue[Frame] = LatestValue(Lens(simulation, world).frame, FRAME_PERIOD, ring)
+        self._shapes: LatestValue[tuple[Shape, ...]] = LatestValue(
+            self._sketchbook.shapes, FRAME_PERIOD, ring
+        )
+        self._result: LatestValue[WorldResult | None] = LatestValue(self._make_result, RESULT_PERIOD, ring)
+        self._entities: dict[int, LatestValue[EntityState | None]] = {}
         self._renew(True)
         self._thread: threading.Thread | None = None
         if threaded:
-            self._thread = threading.Thread(target=self._conductor.run, name="tussle live", daemon=True)
+            self._thread = threading.Thread(target=self._playback.run, name="tussle live", daemon=True)
             self._thread.start()
 
     # -- controls -----------------------------------------------------------------------------------------------------------------
 
     def _give(self, do: Callable[[], None], *, is_seek: bool = False, may_cut_in: bool = False) -> None:
-        self._conductor.give(Order(do, is_seek, may_cut_in))
+        self._playback.give(Order(do, is_seek, may_cut_in))
         if self._thread is None:
-            self._conductor.drain()
+            self._playback.drain()
 
     def pause(self) -> None:
         """Stand still after the step in hand."""
-        self._conductor.is_paused = True
-        self._conductor.ring()
+        self._playback.is_paused = True
+        self._playback.ring()
 
     def resume(self) -> None:
         """Go on, when what was ordered before is done."""
-        self._conductor.is_paused = False
-        self._conductor.ring()
+        self._playback.is_paused = False
+        self._playback.ring()
 
     def toggle(self) -> None:
         """Pause, or go on."""
@@ -125,7 +129,7 @@ class Live:
     def step(self, n: int = 1) -> None:
         """Make exactly n steps and stand still; a game that goes on is paused first."""
         self.pause()
-        self._give(lambda: self._conductor.move(n))
+        self._give(lambda: self._playback.move(n))
 
     def step_back(self, n: int = 1) -> None:
         """Go back n steps and stand still."""
@@ -138,7 +142,7 @@ class Live:
             ParameterError: The time is not a number.
         """
         step = self._step_at(t)
-        self._give(lambda: self._conductor.go(step), is_seek=True, may_cut_in=True)
+        self._give(lambda: self._playback.go(step), is_seek=True, may_cut_in=True)
 
     def reset(self, seed: int | None = None) -> None:
         """Begin anew, with another seed where one is given, and stand still or go on as now.
@@ -149,16 +153,14 @@ class Live:
         if seed is not None and (isinstance(seed, bool) or not isinstance(seed, (int, np.integer))):
             raise ParameterError(f"seed = {seed!r} is not allowed; it takes a whole number")
         number = None if seed is None else int(seed)
-        self._give(lambda: self._conductor.begin_anew(number), may_cut_in=True)
+        self._give(lambda: self._playback.begin_anew(number), may_cut_in=True)
 
-    def publish(
-        self, type_: type[Message], *, network: str = "GlobalNetwork", topic: str = "", **fields: Any
-    ) -> None:
+    def publish(self, type_: type[Message], *, network: str = "", topic: str = "", **fields: Any) -> None:
         """Say something to the plugins: part of the next step, and of every replay of it. What is wrong with it is told in `notes`."""
-        self._give(lambda: self._conductor.say(type_, network, topic, fields))
+        self._give(lambda: self._playback.say(type_, network, topic, fields))
 
     def publish_click(self, point: Any) -> None:
-        """Tell the plugins of a point in the world that somebody has picked [m], (3,): `WorldPointClicked` on the GlobalNetwork.
+        """Tell the plugins of a point that somebody has picked [m], (3,): `WorldPointClicked`, on the network that reaches everyone.
 
         Raises:
             ParameterError: It is not three finite numbers.
@@ -169,7 +171,7 @@ class Live:
         self.publish(WorldPointClicked, pos=pos)
 
     def publish_key(self, key: str) -> None:
-        """Tell the plugins of a key that was pressed: `CustomKeyPress` on the GlobalNetwork."""
+        """Tell the plugins of a key that was pressed: `CustomKeyPress` on the network that reaches everyone."""
         self.publish(CustomKeyPress, key=key)
 
     @property
@@ -181,7 +183,7 @@ class Live:
     def warp(self, warp: float | None) -> None:
         self._pace.warp = checked_warp(warp)
         self._pace.restart()
-        self._conductor.ring()
+        self._playback.ring()
 
     def faster(self) -> None:
         """Warp up: doubled below 2, then one more."""
@@ -193,7 +195,7 @@ class Live:
 
     def stop(self, timeout: float = 10.0) -> None:
         """End the thread after the step in hand, and leave the simulation to whoever made it. A second call does nothing."""
-        self._conductor.end()
+        self._playback.end()
         if self._thread is not None:
             self._thread.join(timeout)
             if self._thread.is_alive():
@@ -232,12 +234,12 @@ class Live:
     @property
     def step_number(self) -> int:
         """Number of the step that begins with what is shown; during a seek, that where it began."""
-        return self._conductor.shown[0]
+        return self._playback.shown[0]
 
     @property
     def t(self) -> float:
         """Time of what is shown [s]."""
-        return self._time_of(self._conductor.shown[0])
+        return self._time_of(self._playback.shown[0])
 
     @property
     def span(self) -> tuple[float, float]:
@@ -250,28 +252,28 @@ class Live:
 
     @property
     def is_paused(self) -> bool:
-        return self._conductor.is_paused
+        return self._playback.is_paused
 
     @property
     def is_over(self) -> bool:
         """The world has ended, or something has failed: it can only be wound back or begun anew."""
-        return self._conductor.shown[1]
+        return self._playback.shown[1]
 
     @property
     def is_seeking(self) -> bool:
         """It is on its way to another time; what is shown is where it was."""
-        return self._conductor.is_seeking
+        return self._playback.is_seeking
 
     @property
     def epoch(self) -> int:
         """How often the game has jumped in time or begun anew: trails end there."""
-        return self._conductor.epoch
+        return self._playback.epoch
 
     @property
     def error(self) -> Exception | None:
         """What stopped the game; None while nothing has. It still can be wound back."""
         ended = self.simulation.state.results[self.world]
-        return self._conductor.error or (ended.error if ended is not None and self.is_over else None)
+        return self._playback.error or (ended.error if ended is not None and self.is_over else None)
 
     @property
     def notes(self) -> list[str]:
@@ -281,17 +283,17 @@ class Live:
     @property
     def warp_reached(self) -> float:
         """Simulated seconds per second over the last second; 0 while it stands still."""
-        return self._conductor.speed.speed()[0]
+        return self._playback.speed.speed()[0]
 
     @property
     def steps_per_second(self) -> float:
         """Over the last second; 0 while it stands still."""
-        return self._conductor.speed.speed()[1]
+        return self._playback.speed.speed()[1]
 
     @property
-    def happenings(self) -> list[Happening]:
+    def events(self) -> list[Event]:
         """Events in order, those after the present too where it was wound back."""
-        return list(self._player.happenings)
+        return list(self._player.events)
 
     @property
     def injections(self) -> list[Injection]:
@@ -329,33 +331,38 @@ class Live:
         """Body, plugin columns and messages of an entity; None where it is not there, and when it is asked for first."""
         if who not in self._entities:
             make = lambda: entity_state(self.simulation, self.world, who)  # noqa: E731
-            self._entities[who] = Offer(make, STATE_PERIOD, self._conductor.ring)
+            self._entities[who] = LatestValue(make, STATE_PERIOD, self._playback.ring)
         return self._taken(self._entities[who])  # type: ignore[no-any-return]
 
-    def _taken(self, offer: Offer[Any]) -> Any:
-        value = offer.take()
+    def _taken(self, latest: LatestValue[Any]) -> Any:
+        value = latest.take()
         if self._thread is None:
             self._renew(True)
-            value = offer.value
+            value = latest.value
         return value
 
     def _renew(self, is_still: bool) -> None:
         """Make anew what is asked for; between two steps, by whoever makes them."""
-        conductor, version = self._conductor, self._conductor.version
-        if conductor.is_seeking:
+        playback, version = self._playback, self._playback.version
+        if playback.is_seeking:
             return
-        offers: list[Offer[Any]] = [self._frame, self._result, self._shapes, *list(self._entities.values())]
-        for offer in offers:
+        values: list[LatestValue[Any]] = [
+            self._frame,
+            self._result,
+            self._shapes,
+            *list(self._entities.values()),
+        ]
+        for latest in values:
             try:
-                offer.renew(version, is_still=is_still, always=is_still and offer is self._frame)
+                latest.renew(version, is_still=is_still, always=is_still and latest is self._frame)
             except Exception as error:  # noqa: BLE001 - the game goes on, whatever cannot be seen of it
                 self._player.note(f"not all can be seen: {type(error).__name__}: {error}")
         if self._shapes.idle_for < 4.0 * LINGER:
             self._sketchbook.open()
         else:
             self._sketchbook.close()
-        for who, offer in list(self._entities.items()):
-            if offer.idle_for > FORGET_AFTER:
+        for who, latest in list(self._entities.items()):
+            if latest.idle_for > FORGET_AFTER:
                 self._entities.pop(who, None)
 
     def _make_result(self) -> WorldResult | None:
@@ -393,10 +400,10 @@ class Live:
         }
 
     @cached_property
-    def looks(self) -> Looks:
+    def style(self) -> Style:
         """Colours and models of the entities."""
         plugins = [[type(p).__name__ for p in b.plugins] for b in self.simulation.mission.blocks]
-        return Looks(self.blocks, self.block_teams, plugins, self.viewer)
+        return Style(self.blocks, self.block_teams, plugins, self.viewer)
 
     @cached_property
     def scenery(self) -> Scenery:

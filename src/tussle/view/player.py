@@ -9,14 +9,14 @@ import numpy as np
 
 from tussle.engine.simulation import Simulation
 from tussle.messages import Batch, Message
-from tussle.record import Events as Happenings
-from tussle.view.frame import Happening, frame_of
+from tussle.record import Events
+from tussle.view.frame import Event, frame_of
 from tussle.view.timeline import History, Timeline
 
 if TYPE_CHECKING:
     from tussle.record import Recorder
 
-MOST_HAPPENINGS = 100_000
+MOST_EVENTS = 100_000
 """Events that are kept; collisions beyond that are not."""
 
 
@@ -27,14 +27,14 @@ class Injection:
     Attributes:
         step: The step that it is part of.
         type: The message type.
-        network: The network that carries it.
+        network: The network that carries it; "" is the one that reaches everyone.
         topic: Its topic; "" is the type's name.
         fields: Field -> value.
     """
 
     step: int
     type: type[Message]
-    network: str = "GlobalNetwork"
+    network: str = ""
     topic: str = ""
     fields: dict[str, Any] = field(default_factory=dict)
 
@@ -58,7 +58,7 @@ class Player:
         history: Frames as they went by.
         step: Step that the world is in.
         injections: What was said from outside, in order of its steps.
-        happenings: Births, deaths, captures, collisions, ends, in order.
+        events: Births, deaths, captures, collisions, ends, in order.
         notes: What the user should know, one line each.
         is_broken: A step failed; only winding back helps.
     """
@@ -68,7 +68,7 @@ class Player:
         self.timeline = Timeline(simulation, world, every, 0.5 * limit)
         self.history = History(simulation, world, 0.5 * limit)
         self.injections: list[Injection] = []
-        self.happenings: list[Happening] = []
+        self.events: list[Event] = []
         self.notes: list[str] = []
         self.is_broken = False
         self.step = self._read_step()
@@ -166,7 +166,7 @@ class Player:
             self.timeline.forget_after(step)
             self.history.forget_after(step)
             self.injections[:] = [said for said in self.injections if said.step <= step]
-            self._forget_happenings(step)
+            self._forget_events(step)
             self._told = step
         self.injections.append(Injection(step, type_, network, topic, fields))
 
@@ -181,7 +181,7 @@ class Player:
         for part in (self.timeline, self.history):
             part.clear()
         self.injections.clear()
-        self.happenings.clear()
+        self.events.clear()
         self.is_broken = False
         self.simulation.reset([self.world], None if seed is None else [seed])
         self.first_step = self._told = self.step = self._read_step()
@@ -224,23 +224,23 @@ class Player:
     def _tell_of_those_who_are_there(self) -> None:
         frame = frame_of(self.simulation, self.world)
         names = self.simulation.state.context.block_names
-        self.happenings += [
-            Happening(frame.t, "birth", int(who), 0, names[block])
+        self.events += [
+            Event(frame.t, "birth", int(who), 0, names[block])
             for who, block in zip(frame.id, frame.block, strict=True)
         ]
 
-    def _hear(self, told: Happenings) -> None:
+    def _hear(self, told: Events) -> None:
         clock = self.simulation.state.context.clock
         for i in range(len(told)):
             if told.world[i] != self.world:
                 continue
-            if len(self.happenings) >= MOST_HAPPENINGS and told.kind == "collision":
-                self.note(f"of the collisions, those after the {MOST_HAPPENINGS}th event are not kept")
+            if len(self.events) >= MOST_EVENTS and told.kind == "collision":
+                self.note(f"of the collisions, those after the {MOST_EVENTS}th event are not kept")
                 return
             t = float(clock.start + told.step[i] * clock.dt)
-            self.happenings.append(Happening(t, told.kind, int(told.id[i]), int(told.other[i]), told.text[i]))
+            self.events.append(Event(t, told.kind, int(told.id[i]), int(told.other[i]), told.text[i]))
 
-    def _forget_happenings(self, step: int) -> None:
+    def _forget_events(self, step: int) -> None:
         clock = self.simulation.state.context.clock
         limit = clock.start + (step - 0.5) * clock.dt
-        self.happenings[:] = [h for h in self.happenings if h.t < limit]
+        self.events[:] = [h for h in self.events if h.t < limit]

@@ -1,4 +1,4 @@
-"""A recorded run as frames and happenings, at any time of it."""
+"""A recorded run as frames and events, at any time of it."""
 
 from __future__ import annotations
 
@@ -14,12 +14,14 @@ from tussle.errors import RecordError, TussleError
 from tussle.mission import Loaded, Mission, read_mission
 from tussle.record import Run, load_run
 from tussle.record.schema import MISSION_FILE, RUN_FILE, TRAJECTORY_FILE
-from tussle.view.frame import Frame, Happening, empty_frame
-from tussle.view.looks import Looks
+from tussle.view.frame import Event, Frame, empty_frame
 from tussle.view.scenery import Scenery, scenery_of
+from tussle.view.style import Style
 
 MOST_EMPTY = 5_000_000
 """Moments without anybody that are made up from what is said of steps; in memory they take some 300 MB."""
+MOST_SAMPLED = 60
+"""Frames that stand for a run which stays in its file."""
 POS, QUAT, VEL = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("vx", "vy", "vz")
 
 
@@ -32,6 +34,8 @@ class Recording:
         path: The run directory.
         world: Number of the world.
         plugin_files: Python files whose plugins the run's mission names.
+        is_mapped: States stay in their file, and are checked when a frame is first made of them: a run of any size opens at once. Its
+            extent and its teams are then those of at most `MOST_SAMPLED` frames, spread evenly.
 
     Attributes:
         run: The run directory as it was loaded.
@@ -42,15 +46,26 @@ class Recording:
         t: Time of each frame [s], (T,), ascending.
         steps: Step of each frame, (T,).
         notes: What is missing, one line each.
+        id_shift: What ids of a second run are counted on from, which this one has not: 0.
 
     Raises:
         RecordError: It is no run directory, or has no such world.
     """
 
-    def __init__(self, path: str | Path, world: int = 0, plugin_files: tuple[str | Path, ...] = ()) -> None:
+    id_shift = 0
+
+    def __init__(
+        self,
+        path: str | Path,
+        world: int = 0,
+        plugin_files: tuple[str | Path, ...] = (),
+        *,
+        is_mapped: bool = False,
+    ) -> None:
         self.path = Path(path)
         self.world = world
-        self.run: Run = load_run(self.path)
+        self.run: Run = load_run(self.path, is_mapped=is_mapped)
+        self._is_mapped = is_mapped
         self.notes: list[str] = list(self.run.notes)
         self._plugin_files = plugin_files
         table = self.run.trajectory_table
@@ -67,26 +82,39 @@ class Recording:
         column = self.run.trajectory_table[name]
         return np.concatenate([np.zeros(0, np.int32), *(c.to_numpy() for c in column.chunks)])
 
+    def _frame_starts(self) -> np.ndarray:
+        """Row, world and step at the beginning of each frame, (3, n): rows of one world and step are side by side."""
+        parts = [np.zeros((3, 0), np.int64)]
+        before: tuple[int, int] | None = None
+        for batch, start in zip(self._batches, self._starts, strict=False):
+            world, step = (batch[name].to_numpy() for name in ("world", "step"))
+            if not len(step):
+                continue
+            rows = np.flatnonzero((step[1:] != step[:-1]) | (world[1:] != world[:-1])) + 1
+            if before != (world[0], step[0]):
+                rows = np.concatenate([[0], rows])
+            before = world[-1], step[-1]
+            parts.append(np.stack([rows + start, world[rows], step[rows]]))
+        return np.concatenate(parts, axis=1)
+
     def _find_frames(self) -> None:
-        """Where in the table each frame lies: rows of one world and step are side by side."""
-        worlds, step = self._whole("world"), self._whole("step")
+        """Where in the table each frame lies."""
+        first, worlds, step = self._frame_starts()
+        last = np.concatenate([first[1:], self._starts[-1:]])[: len(first)]
         n_worlds = max(len(self.run.info.get("worlds", ())), int(worlds.max(initial=-1)) + 1)
         if not 0 <= self.world < max(n_worlds, 1):
             raise RecordError(
                 f"{self.path}: there is no world {self.world}; there are worlds 0 to {n_worlds - 1}"
             )
-        cuts = np.flatnonzero((np.diff(worlds) != 0) | (np.diff(step) != 0)) + 1
-        first = np.concatenate([[0], cuts]).astype(np.int64) if len(step) else np.zeros(0, np.int64)
-        last = np.concatenate([first[1:], [len(step)]]).astype(np.int64)[: len(first)]
-        wrong = np.setdiff1d(np.flatnonzero(np.diff(self._whole("id")) <= 0) + 1, cuts)
-        if len(wrong):
-            raise RecordError(
-                f"{self.path / TRAJECTORY_FILE}: the ids of a step do not ascend in row {wrong[0]}"
-            )
-        mine = np.flatnonzero(worlds[first] == self.world)
-        mine = mine[np.argsort(step[first[mine]], kind="stable")]
-        self._first, self._last = first[mine], last[mine]
-        self.steps = step[self._first].astype(np.int64)
+        if not self._is_mapped:
+            wrong = np.setdiff1d(np.flatnonzero(np.diff(self._whole("id")) <= 0) + 1, first)
+            if len(wrong):
+                raise RecordError(
+                    f"{self.path / TRAJECTORY_FILE}: the ids of a step do not ascend in row {wrong[0]}"
+                )
+        mine = np.flatnonzero(worlds == self.world)
+        mine = mine[np.argsort(step[mine], kind="stable")]
+        self._first, self._last, self.steps = first[mine], last[mine], step[mine]
         if (np.diff(self.steps) <= 0).any():
             raise RecordError(f"{self.path / TRAJECTORY_FILE}: the rows of a step do not stand together")
         self._set_times()
@@ -96,12 +124,21 @@ class Recording:
 
     def _set_times(self) -> None:
         """Times of the frames; start and step length as `run.json` says, else as the table shows."""
-        self.t = self._whole("t")[self._first].astype(np.float64)
+        self.t = self._at_rows("t", self._first)
         said = self.run.info.get("mission", {})
         self.start, self.dt = float(said.get("start", 0.0)), float(said.get("dt", 1.0))
         if not said and len(self.steps) > 1:
             self.dt = float(self.t[-1] - self.t[0]) / float(self.steps[-1] - self.steps[0])
             self.start = float(self.t[0]) - float(self.steps[0]) * self.dt
+
+    def _at_rows(self, name: str, rows: np.ndarray) -> np.ndarray:
+        """Values of a real column in some rows, (n,); others are not read."""
+        found, order = np.empty(len(rows)), np.argsort(rows, kind="stable")
+        edges = np.searchsorted(rows[order], self._starts)
+        for number in np.flatnonzero(np.diff(edges)):
+            here = order[edges[number] : edges[number + 1]]
+            found[here] = self._batches[number][name].to_numpy()[rows[here] - self._starts[number]]
+        return found
 
     def _usual_stride(self) -> int:
         """The most steps between two frames with somebody in them."""
@@ -153,10 +190,10 @@ class Recording:
             raise RecordError(
                 f"{self.path / TRAJECTORY_FILE}: its blocks are not {', '.join(names)}, as in {RUN_FILE} and the first rows"
             )
-        seen = self._teams_seen()
+        self.blocks: list[str] = names
+        seen = self._teams_sampled() if self._is_mapped else self._teams_seen()
         for block, team in sorted(seen):
             teams.setdefault(names[block], team)
-        self.blocks: list[str] = names
         self.block_teams: list[int] = [teams.get(name, 0) for name in names]
         by_team: dict[int, list[str]] = {}
         for name, team in [
@@ -179,11 +216,33 @@ class Recording:
             found |= set(zip(block[first].tolist(), team[first].tolist(), strict=True))
         return found
 
+    @property
+    def _sample(self) -> list[int]:
+        """Frames that stand for all where all are too many to be read."""
+        places = np.linspace(0, self.n_frames - 1, min(self.n_frames, MOST_SAMPLED))
+        return [int(i) for i in np.unique(places.astype(np.int64))]
+
+    def _teams_sampled(self) -> set[tuple[int, int]]:
+        """(block, team) of the entities of some frames."""
+        frames = [self.frame(i) for i in self._sample]
+        return {pair for f in frames for pair in set(zip(f.block.tolist(), f.team.tolist(), strict=True))}
+
     # -- frames ---------------------------------------------------------------------------------------------------------------
 
     @property
     def n_frames(self) -> int:
         return len(self.t)
+
+    @property
+    def counts(self) -> np.ndarray:
+        """Entities of each frame, (T,)."""
+        counts: np.ndarray = self._last - self._first
+        return counts
+
+    @property
+    def is_complete(self) -> bool:
+        """All that was to be played has been, and all of it is here."""
+        return self.run.is_complete
 
     def frame(self, i: int) -> Frame:
         """The frame by its number; -1 is the last.
@@ -199,7 +258,27 @@ class Recording:
         ids, team = (self._column(first, last, name) for name in ("id", "team"))
         block = self._column(first, last, "block")
         pos, quat, vel = (self._columns(first, last, names) for names in (POS, QUAT, VEL))
+        if self._is_mapped:
+            self._check(step, ids, block, pos, quat)
         return Frame(t, step, ids, team, block, pos, quat, vel, self._column(first, last, "health"))
+
+    def _check(
+        self, step: int, ids: np.ndarray, block: np.ndarray, pos: np.ndarray, quat: np.ndarray
+    ) -> None:
+        """See that the rows of a frame are what they are in a table that was checked as a whole.
+
+        Raises:
+            RecordError: They are not.
+        """
+        wrong = ""
+        if (np.diff(ids) <= 0).any() or ids[0] < 0:
+            wrong = "the ids do not ascend from 0 or more"
+        elif block.min() < 0 or block.max() >= len(self.blocks):
+            wrong = f"there are {len(self.blocks)} blocks, and not a block {block.max()}"
+        elif not (np.isfinite(pos).all() and np.isfinite(quat).all()):
+            wrong = "a position or an attitude is not finite"
+        if wrong:
+            raise RecordError(f"{self.path / TRAJECTORY_FILE}: step {step}: {wrong}")
 
     def at(self, t: float) -> Frame:
         """The last frame that is not after a time [s]; the first for times before it.
@@ -240,18 +319,21 @@ class Recording:
         """Lower and upper corner of a box around all positions [m], each (3,)."""
         if not (self._last > self._first).any():
             return np.zeros(3), np.zeros(3)
+        if self._is_mapped:
+            pos = np.concatenate([self.frame(i).pos for i in self._sample])
+            return pos.min(axis=0, initial=np.inf), pos.max(axis=0, initial=-np.inf)
         is_mine = self._whole("world") == self.world
         columns = [self._whole(name)[is_mine] for name in POS]
         return np.array([c.min() for c in columns]), np.array([c.max() for c in columns])
 
     @cached_property
-    def happenings(self) -> list[Happening]:
+    def events(self) -> list[Event]:
         """Births, deaths, captures, collisions and the end, in order."""
         table = self.run.events_table
         mine = table.filter(pa.array(np.asarray(table["world"]) == self.world)) if len(table) else table
         rows = [mine[name].to_pylist() for name in ("t", "kind", "id", "other", "text")]
-        found = [Happening(*row) for row in zip(*rows, strict=True)]
-        return sorted(found, key=lambda happening: happening.t)
+        found = [Event(*row) for row in zip(*rows, strict=True)]
+        return sorted(found, key=lambda event: event.t)
 
     # -- the mission ------------------------------------------------------------------------------------------------------------
 
@@ -286,9 +368,9 @@ class Recording:
         return str(said) if said else self.path.resolve().name
 
     @cached_property
-    def looks(self) -> Looks:
+    def style(self) -> Style:
         """Colours and models of the entities."""
-        return Looks(self.blocks, self.block_teams, self._plugins, self.viewer)
+        return Style(self.blocks, self.block_teams, self._plugins, self.viewer)
 
     @cached_property
     def scenery(self) -> Scenery:

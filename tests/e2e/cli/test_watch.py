@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from urllib.request import urlopen
 
 import pytest
 from cli_process import COMMAND, environment
@@ -34,14 +35,14 @@ class Broken(Predator):
 
 FAILING = """\
 from tussle.stock import Predator
-from tussle.view.page.trails import Trails
+from tussle.view.page.publisher import Publisher
 
 
-def broken(self, frame):
-    raise RuntimeError("trails are broken")
+def broken(self):
+    raise RuntimeError("shapes are broken")
 
 
-Trails.show = broken
+Publisher._make_drawing = broken
 
 
 class Hunter(Predator):
@@ -88,9 +89,9 @@ def test_a_game_is_served_steered_and_ended_with_its_summary(watching, folder):
         watching("view", "game.xml", "n=6", "--paused", "--record", "kept") as command,
         PageClient(command.url) as client,
     ):
-        client.wait(lambda: client.text("t = 0.00 s"))
-        client.set("Run", "Step")
-        client.wait(lambda: client.text("t = 0.10 s"))
+        client.wait(lambda: client.t == 0.0)
+        client.order("step", n=1)
+        client.wait(lambda: client.t == pytest.approx(0.1))
         code, out, err = command.end()
     assert code == 0, "Ctrl-C is the way to end it"
     assert "A small game" in out
@@ -133,11 +134,13 @@ def test_other_hosts_are_warned_of(watching):
 def test_a_run_is_replayed_and_two_are_compared(tussle, watching):
     tussle("run", "game.xml", "--out", "a")
     tussle("run", "game.xml", "--seed", "8", "--out", "b")
-    with watching("replay", "a", "--paused") as command, PageClient(command.url) as client:
-        client.wait(lambda: client.text("t = 0.00 s"))
+    with watching("replay", "a", "--paused") as command:
+        assert '"isPlaying":false' in page_of(command)
         assert command.end()[0] == 0
-    with watching("replay", "a", "b", "--over", "--paused") as command, PageClient(command.url) as client:
-        client.wait(lambda: client.text("they differ first at t = 0 s"))
+    with watching("replay", "a", "b", "--over", "--pace", "3") as command:
+        page = page_of(command)
+        assert "they differ first at t = 0 s" in page
+        assert '"warp":3.0' in page
         code, _, err = command.end()
     assert code == 0
     assert "note: they differ first" in err
@@ -168,10 +171,10 @@ def recorded(folder):
     return json.loads((folder / "run.json").read_text())
 
 
-def steps_shown(client):
-    """The number of the step that is shown."""
-    found = re.search(r"step ([\d,]+) ", client.text("frames/s"))
-    return int(found[1].replace(",", "")) if found else 0
+def page_of(command):
+    """The text of the page that is served."""
+    with urlopen(command.url, timeout=60) as answer:
+        return answer.read().decode()
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -180,7 +183,7 @@ def test_a_signal_closes_the_recording(watching, folder, tussle, number):
         watching("view", "game.xml", "--record", "kept") as command,
         PageClient(command.url) as client,
     ):
-        client.wait(lambda: steps_shown(client) > 5)
+        client.wait(lambda: client.t > 0.55)
         command.end(number)
     assert recorded(folder / "kept")
     assert Recording(folder / "kept").n_frames > 5
@@ -196,21 +199,25 @@ def test_what_fails_before_the_game_begins_closes_the_recording(tussle, folder):
     assert "cannot be served" in str(recorded(folder / "kept"))
 
 
-@pytest.mark.parametrize("label", ["Trails [s]", "Radius [m]", "Time [s]", "Run"])
-def test_what_a_page_sends_ends_no_game(watching, folder, label):
+def test_what_a_page_sends_ends_no_game(watching, folder):
     with (
         watching("view", "game.xml", "--paused", "--record", "kept") as command,
         PageClient(command.url) as client,
     ):
-        client.set("Trails", True)
-        client.set("Rings", True)
-        for value in (0, math.nan, -1.0, "x", 1e308):
-            client.set(label, value)
-        client.set("Run", "Step")
-        client.wait(lambda: client.text("t = 0.10 s"))
+        for command_name, field in (
+            ("seek", "t"),
+            ("step", "n"),
+            ("history", "seconds"),
+            ("warp", "value"),
+            ("nosuch", "x"),
+        ):
+            for value in (math.nan, "x", 1e308, [], {}):
+                client.order(command_name, **{field: value})
+        client.order("step", n=1)
+        client.wait(lambda: client.t == pytest.approx(0.1))
         time.sleep(0.6)
-        client.set("Run", "Step")
-        client.wait(lambda: client.text("t = 0.20 s"))
+        client.order("step", n=1)
+        client.wait(lambda: client.t == pytest.approx(0.2))
         code, _, err = command.end()
     assert code == 0
     assert "Traceback" not in err
@@ -223,9 +230,9 @@ def test_an_error_of_the_page_is_said_in_the_terminal_and_the_game_goes_on(watch
         watching("view", "game.xml", "--plugin-path", "failing.py", "--record", "kept") as command,
         PageClient(command.url) as client,
     ):
-        client.wait(lambda: client.text("trails are broken"))
-        client.wait(lambda: steps_shown(client) > 20)
+        client.wait(lambda: client.says("shapes are broken"))
+        client.wait(lambda: client.t > 2.0)
         code, _, err = command.end()
     assert code == 0
-    assert err.count("RuntimeError: trails are broken") == 1
+    assert err.count("RuntimeError: shapes are broken") == 1
     assert recorded(folder / "kept")

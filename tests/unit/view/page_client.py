@@ -1,127 +1,104 @@
-"""Speaks to the page as a browser does, without drawing: viser's protocol over a websocket."""
+"""Speaks to the page of a live game as a browser does, without drawing."""
 
 from __future__ import annotations
 
+import asyncio
+import json
+import struct
 import threading
 import time
-from collections import Counter
 from importlib import import_module
 
 import numpy as np
-
-# They come with viser, which is why they are not dependencies of their own.
-connect = import_module("websockets.sync.client").connect
-msgpack = import_module("msgspec.msgpack")
-zstandard = import_module("zstandard")
+from page_reader import read_chunk
 
 
 class PageClient:
-    """A browser without a picture: keeps what the server says of the scene and the panel, and clicks what is asked for.
+    """A browser without a picture: keeps what the server sends, and orders what is asked for.
 
     Args:
         url: Of the page.
         is_reading: Take what the server sends; without, it is a browser that hangs.
 
     Attributes:
-        nodes: Name of a node of the scene -> its properties.
-        inputs: Id of an element of the panel -> its properties, "value" among them.
-        commands: Id of a command -> its properties.
-        camera: Last position and target that the server has asked for.
-        n_frames: Batches in which entities were moved.
+        status: The last status.
+        frame: The last frame: id -> what was seen of it, and its time.
+        events: All events, as rows.
+        refusals: Why values were not taken.
+        n_frames: Frames that were received.
         n_bytes: All that was received.
-        kinds: Type of a message -> how many were received.
+        error: Code with which the server closed the socket; None while it is open.
     """
 
     def __init__(self, url: str, *, is_reading: bool = True) -> None:
-        viser = import_module("viser")
-        self.nodes: dict[str, dict] = {}
-        self.inputs: dict[str, dict] = {}
-        self.commands: dict[str, dict] = {}
-        self.camera: dict[str, tuple] = {}
-        self.notifications: list[dict] = []
+        self.status: dict = {}
+        self.frame: dict = {}
+        self.t = float("nan")
+        self.events: list = []
+        self.refusals: list[str] = []
+        self.drawn: dict = {}
+        self.past: list = []
         self.n_frames = self.n_bytes = 0
-        self.kinds: Counter[str] = Counter()
-        self.error: Exception | None = None
-        self._socket = connect(
-            url.replace("http", "ws", 1), subprotocols=[f"viser-v{viser.__version__}"], max_size=None,
-            compression=None, open_timeout=300, max_queue=16,
-        )  # fmt: skip
-        self.send_camera((0.0, -100.0, 50.0), (0.0, 0.0, 0.0))
-        self._thread = threading.Thread(target=self._read, daemon=True)
-        if is_reading:
-            self._thread.start()
+        self.error: int | None = None
+        self._url, self._is_reading = url, is_reading
+        self._is_open = threading.Event()
+        self._refused: Exception | None = None
+        self._thread = threading.Thread(target=lambda: asyncio.run(self._run()), daemon=True)
+        self._thread.start()
+        self._is_open.wait()
+        if self._refused:
+            raise self._refused
 
-    def send_camera(self, position: tuple, target: tuple) -> None:
-        """Say where the camera is: the first of these makes a connection a client."""
-        self.send(
-            "ViewerCameraMessage", wxyz=(1.0, 0.0, 0.0, 0.0), position=position, fov=0.9, near=0.1, far=1e4,
-            image_height=400, image_width=600, look_at=target, up_direction=(0.0, 0.0, 1.0),
-        )  # fmt: skip
-
-    def send(self, kind: str, **fields) -> None:
-        self._socket.send(msgpack.encode({"type": kind, **fields}))
-
-    def close(self) -> None:
-        self._socket.close()
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_) -> None:
-        self.close()
-
-    # -- what the server says -------------------------------------------------------------------------------------------------------
-
-    def _read(self) -> None:
+    async def _run(self) -> None:
+        aiohttp = import_module("aiohttp")
+        self._loop, self._task = asyncio.get_running_loop(), asyncio.current_task()
         try:
-            for raw in self._socket:
-                self._take(raw)
-        except Exception as error:  # noqa: BLE001 - a closed connection among them
-            self.error = error
+            async with aiohttp.ClientSession() as session:
+                timeout = aiohttp.ClientWSTimeout(ws_close=0.5)
+                async with session.ws_connect(self._url, max_msg_size=0, timeout=timeout) as self._socket:
+                    self._is_open.set()
+                    if not self._is_reading:
+                        await asyncio.Event().wait()
+                    async for message in self._socket:
+                        self._take(message.data)
+                    self.error = self._socket.close_code
+        except aiohttp.ClientError as error:
+            self._refused = error
+        except asyncio.CancelledError:
+            pass
+        finally:
+            self._is_open.set()
 
-    def _take(self, raw: bytes) -> None:
-        self.n_bytes += len(raw)
-        n = int.from_bytes(raw[8:16], "little")
-        packed = msgpack.decode(zstandard.ZstdDecompressor().decompress(raw[16 : 16 + n]))
-        place, arrays = 16 + n, []
-        for length in packed["binaryBufferLengths"]:
-            place += -place % 8
-            arrays.append(raw[place : place + length])
-            place += length
-        moved = False
-        for message in packed["messages"]:
-            moved |= self._note(_filled(message, arrays))
-        self.n_frames += moved
-
-    def _note(self, message: dict) -> bool:
-        kind, name = message["type"], message.get("name", "")
-        self.kinds[kind] += 1
-        if kind == "SceneNodeUpdateMessage":
-            self.nodes.setdefault(name, {}).update(message["updates"])
-            return name.startswith("/entities") and "batched_positions" in message["updates"]
-        if kind == "GuiUpdateMessage":
-            self.inputs.setdefault(message["uuid"], {}).update(message["updates"])
-        elif kind == "RegisterCommandMessage":
-            self.commands[message["uuid"]] = message["props"]
-        elif kind == "RemoveSceneNodeMessage":
-            self.nodes.pop(name, None)
-        elif kind == "SetSceneNodeVisibilityMessage":
-            self.nodes.setdefault(name, {})["visible"] = message["visible"]
-        elif kind == "SetPositionMessage":
-            self.nodes.setdefault(name, {})["position"] = message["position"]
-        elif kind in ("SetCameraPositionMessage", "SetCameraLookAtMessage") and not message.get("initial"):
-            self.camera["position" if "Position" in kind else "target"] = (
-                message.get("position") or message["look_at"]
-            )
-        elif kind == "NotificationShowMessage":
-            self.notifications.append(message["props"])
-        elif kind.startswith("Gui") and "props" in message:
-            self.inputs[message["uuid"]] = {**message["props"], "value": message.get("value")}
-        elif "props" in message and name:
-            self.nodes[name] = message["props"]
-        return False
+    def _take(self, data: str | bytes) -> None:
+        self.n_bytes += len(data)
+        if isinstance(data, str):
+            self.status = json.loads(data)
+            events = self.status["events"]
+            self.events[events["from"] :] = events["rows"]
+            self.refusals += [self.status["refusal"]] if self.status["refusal"] else []
+            return
+        (length,) = struct.unpack_from("<I", data)
+        header, body = json.loads(data[4 : 4 + length]), data[4 + length :]
+        if header["kind"] == "drawn":
+            self.drawn = header
+        else:
+            chunk = read_chunk(body)
+            if header["kind"] == "past":
+                self.past.append((header["seconds"], chunk))
+            else:
+                self.frame, self.t = chunk.frames[-1], float(chunk.t[-1])
+                self.n_frames += 1
 
     # -- what somebody does -----------------------------------------------------------------------------------------------------------
+
+    def send(self, text: str | bytes) -> None:
+        """Send anything."""
+        send = self._socket.send_bytes if isinstance(text, bytes) else self._socket.send_str
+        asyncio.run_coroutine_threadsafe(send(text), self._loop).result(60)
+
+    def order(self, do: str, **fields) -> None:
+        """Send a command."""
+        self.send(json.dumps({"do": do, **fields}))
 
     def wait(self, condition, timeout: float = 300.0):
         """Wait until it holds, and return what it gave."""
@@ -131,58 +108,23 @@ class PageClient:
             time.sleep(0.01)
         return given
 
-    def id_of(self, label: str) -> str:
-        """Id of an element of the panel, once it is there."""
-        return self.wait(
-            lambda: next((k for k, v in list(self.inputs.items()) if v.get("label") == label), None)
-        )
+    def says(self, part: str) -> bool:
+        """Whether one of the notes on the page has this part."""
+        return any(part in note for note in self.status.get("notes", ()))
 
-    def value(self, label: str):
-        return self.inputs[self.id_of(label)]["value"]
+    @property
+    def positions(self) -> np.ndarray:
+        """Where the entities are drawn [m], (n, 3), by their ids."""
+        return np.array([self.frame[who].pos for who in sorted(self.frame)])
 
-    def set(self, label: str, value) -> None:
-        """Set an element, or press the button of a group that is called so."""
-        self.send("GuiUpdateMessage", uuid=self.id_of(label), updates={"value": value})
+    def close(self) -> None:
+        """Go away."""
+        if self._thread.is_alive():
+            self._loop.call_soon_threadsafe(self._task.cancel)
+            self._thread.join(300)
 
-    def text(self, part: str) -> str:
-        """The HTML or Markdown of the panel that holds this part; "" without one."""
-        for element in list(self.inputs.values()):
-            for key in ("content", "_markdown"):
-                if part in (element.get(key) or ""):
-                    return element[key]
-        return ""
+    def __enter__(self):
+        return self
 
-    def press(self, label: str) -> None:
-        """Press a key, called as its help calls it."""
-        key = self.wait(
-            lambda: next((k for k, v in list(self.commands.items()) if v["description"] == label), None)
-        )
-        self.send("CommandTriggerMessage", uuid=key)
-
-    def click(self, node: str, instance: int) -> None:
-        """Click one of a batch of meshes."""
-        self.wait(lambda: node in self.nodes)
-        self.send(
-            "SceneNodeClickMessage", name=node, instance_index=instance, ray_origin=(0.0, 0.0, 0.0),
-            ray_direction=(1.0, 0.0, 0.0), screen_pos=(0.5, 0.5), modifier=None, owner="",
-        )  # fmt: skip
-
-    def click_ground(self, origin: tuple, direction: tuple) -> None:
-        """Click into the scene, along a ray."""
-        self.send(
-            "ScenePointerMessage", event_type="click", ray_origin=origin, ray_direction=direction,
-            screen_pos=((0.5, 0.5),), modifier=None,
-        )  # fmt: skip
-
-    def positions(self, model: str) -> np.ndarray:
-        """Where the entities of a model are drawn [m], (n, 3)."""
-        return np.frombuffer(self.nodes[f"/entities/{model}"]["batched_positions"], np.float32).reshape(-1, 3)
-
-
-def _filled(value, arrays: list[bytes]):
-    """A message with its arrays in place, as bytes."""
-    if isinstance(value, dict):
-        if "__binary_index" in value:
-            return arrays[value["__binary_index"]]
-        return {key: _filled(item, arrays) for key, item in value.items()}
-    return [_filled(item, arrays) for item in value] if isinstance(value, list) else value
+    def __exit__(self, *_) -> None:
+        self.close()

@@ -1,10 +1,11 @@
-"""Reads the data of an offline page, from what the format says and with nothing of what writes it."""
+"""Reads chunks of frames and offline pages, from what the format says and with nothing of what writes them."""
 
 from __future__ import annotations
 
 import base64
 import json
 import re
+import struct
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
@@ -52,57 +53,72 @@ class Seen:
     """One entity in one frame."""
 
     team: int
-    block: str
+    block: int
     pos: np.ndarray
     quat: np.ndarray
     health: float
 
 
+@dataclass
+class ChunkData:
+    """A chunk: times of its frames, id -> entity of each, and its tracks."""
+
+    first: int
+    t: np.ndarray
+    frames: list[dict[int, Seen]]
+    tracks: dict[str, list[int]]
+    step: float
+    full_health: float
+
+
+def read_chunk(raw: bytes) -> ChunkData:
+    """A chunk of frames; blocks are numbers."""
+    data = Bytes(raw)
+    *low, step, full_health = struct.unpack("<5d", data.take(40))
+    first, n_frames, n_tracks = struct.unpack("<3I", data.take(12))
+    t = data.reals(n_frames)
+    tracks = {name: data.ints(n_tracks) for name in ("id", "team", "block", "first", "last")}
+    counts = [last - begin + 1 for begin, last in zip(tracks["first"], tracks["last"], strict=True)]
+    x, y, z, largest, *others, health = (data.column(counts) for _ in range(8))
+    assert data.at == len(data.data)
+    pos = np.array(low) + step * np.stack([x, y, z], 1)
+    three = np.stack(others, 1) * np.sqrt(0.5) / 2047
+    quat = np.zeros((len(pos), 4))
+    for row, leader in enumerate(largest):
+        quat[row, [(leader + k) % 4 for k in (1, 2, 3)]] = three[row]
+        quat[row, leader] = np.sqrt(1.0 - (three[row] ** 2).sum())
+    frames: list[dict[int, Seen]] = [{} for _ in t]
+    row = 0
+    for k, count in enumerate(counts):
+        for i in range(count):
+            seen = Seen(
+                tracks["team"][k], tracks["block"][k], pos[row], quat[row], health[row] / 255 * full_health
+            )
+            assert tracks["id"][k] not in frames[tracks["first"][k] + i]
+            frames[tracks["first"][k] + i][tracks["id"][k]] = seen
+            row += 1
+    return ChunkData(first, t, frames, tracks, step, full_health)
+
+
 class PageReader:
-    """The first recording of a page."""
+    """What stands on an offline page."""
 
     def __init__(self, path: Path) -> None:
         self.text = path.read_text(encoding="utf-8")
         scripts = re.findall(r'<script type="([^"]*)" id="([^"]*)">([^<]*)</script>', self.text)
         self.blobs = {name: text for _, name, text in scripts}
         self.document = json.loads(self.blobs["document"])
-        self.layer = self.document["layers"][0]
-        index = Bytes(self.blob("index"))
-        self.t = index.reals(self.layer["nFrames"])
-        names = ("id", "team", "block", "first", "last")
-        self.tracks = {name: index.ints(self.layer["nTracks"]) for name in names}
-        assert index.at == len(index.data)
+        self.t = Bytes(self.blob("times")).reals(self.document["nFrames"])
+        self.events = json.loads(self.blob("events"))
+        self.chunks = [read_chunk(self.blob(f"chunk-{i}")) for i in range(len(self.document["chunks"]))]
         self.frames: list[dict[int, Seen]] = [{} for _ in self.t]
-        for i, (first, last) in enumerate(self.layer["pieces"]):
-            self._read_piece(Bytes(self.blob(f"piece-{i}")), first, last)
-        self.happenings = json.loads(self.blob("happenings"))
+        for (first, last), chunk in zip(self.document["chunks"], self.chunks, strict=True):
+            assert (chunk.first, len(chunk.t)) == (first, last - first + 1)
+            assert (chunk.t == self.t[first : last + 1]).all()
+            for i, seen in enumerate(chunk.frames):
+                # The frame at which one chunk ends and the next begins is in both.
+                assert not self.frames[first + i] or sorted(self.frames[first + i]) == sorted(seen)
+                self.frames[first + i] = seen
 
     def blob(self, name: str) -> bytes:
         return zlib.decompress(base64.b64decode(self.blobs[f"data-{name}"], validate=True))
-
-    def _read_piece(self, data: Bytes, first: int, last: int) -> None:
-        tracks, layer = self.tracks, self.layer
-        who = [
-            k for k in range(layer["nTracks"]) if tracks["first"][k] <= last and tracks["last"][k] >= first
-        ]
-        begin = [max(tracks["first"][k], first) for k in who]
-        counts = [min(tracks["last"][k], last) - b + 1 for k, b in zip(who, begin, strict=True)]
-        x, y, z, largest, *others, health = (data.column(counts) for _ in range(8))
-        assert data.at == len(data.data)
-        pos = np.array(layer["low"]) + layer["step"] * np.stack([x, y, z], 1)
-        three = np.stack(others, 1) * np.sqrt(0.5) / layer["attitudeUnit"]
-        quat = np.zeros((len(pos), 4))
-        for row, leader in enumerate(largest):
-            quat[row, [(leader + k) % 4 for k in (1, 2, 3)]] = three[row]
-            quat[row, leader] = np.sqrt(1.0 - (three[row] ** 2).sum())
-        row = 0
-        for k, b, count in zip(who, begin, counts, strict=True):
-            block = layer["blocks"][tracks["block"][k]]["name"]
-            for frame in range(b, b + count):
-                share = health[row] / layer["healthSteps"] * layer["fullHealth"]
-                seen = Seen(tracks["team"][k], block, pos[row], quat[row], share)
-                known = self.frames[frame].setdefault(tracks["id"][k], seen)
-                # The frame at which one piece ends and the next begins is in both.
-                assert (known.pos == seen.pos).all()
-                assert (known.quat == seen.quat).all()
-                row += 1

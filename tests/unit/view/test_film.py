@@ -113,7 +113,7 @@ def test_entities_are_drawn_in_their_colours_where_the_projection_says(flown, ca
     size = (320, 240)
     moments = Moments(flown, 0.0, 4.0, 1.0, 10.0)
     eye = camera(moments, size)
-    stage = Stage(flown.looks, flown.scenery, size)
+    stage = Stage(flown.style, flown.scenery, size)
     try:
         for t in (0.0, 1.55, 4.0):
             frame, view = moments.at(t), eye.view(t)
@@ -122,8 +122,8 @@ def test_entities_are_drawn_in_their_colours_where_the_projection_says(flown, ca
             assert (depth > 0.0).all()
             for row, at in enumerate(pixels):
                 if (at > 0.0).all() and (at < size).all():
-                    assert has_colour(picture, flown.looks.colour(int(frame.team[row])), at)
-            assert not has_colour(picture, flown.looks.colour(1), (3, 3))
+                    assert has_colour(picture, flown.style.colour(int(frame.team[row])), at)
+            assert not has_colour(picture, flown.style.colour(1), (3, 3))
             if camera is not Follow:
                 assert ((pixels > 0.0) & (pixels < size)).all()
     finally:
@@ -145,7 +145,7 @@ def test_a_nose_points_along_the_way(flown):
     )
     half = 8.0
     view = View(frame.pos[row] + (0, 0, 50.0), frame.pos[row], np.array([0.0, 1.0, 0.0]), half, True, 14.0)
-    stage = Stage(flown.looks, flown.scenery, size)
+    stage = Stage(flown.style, flown.scenery, size)
     picture = stage.draw(one, view)[..., :3].astype(int)
     stage.close()
     blue = picture[..., 2] - picture[..., 0] > 60
@@ -161,7 +161,7 @@ def test_a_nose_points_along_the_way(flown):
 
 
 def test_who_is_gone_is_not_drawn_and_a_ring_says_where(hunted):
-    death = next(h for h in hunted.happenings if h.kind == "death")
+    death = next(h for h in hunted.events if h.kind == "death")
     moments = Moments(hunted, 0.0, 12.0, 1.0, 10.0)
     view = Overview(moments, SMALL).view(death.t)
     tracks = Tracks(moments, 0.0)
@@ -175,7 +175,7 @@ def test_who_is_gone_is_not_drawn_and_a_ring_says_where(hunted):
     )
     assert (colours[:, 3] > 150.0).all()
     faded, _ = tracks.lines(moments.at(min(death.t + 0.9, 12.0)), view)
-    others = [h for h in hunted.happenings if h.kind == "death" and death.t + 0.1 < h.t <= death.t + 0.9]
+    others = [h for h in hunted.events if h.kind == "death" and death.t + 0.1 < h.t <= death.t + 0.9]
     assert len(faded) == len(ends) * len(others)
 
 
@@ -222,7 +222,7 @@ def test_scenery_is_drawn(flown):
     )
 
     def drawn(**things):
-        stage = Stage(flown.looks, Scenery(Origin(), 0.0, 0.0, low, high, 10.0, **things), (160, 120))
+        stage = Stage(flown.style, Scenery(Origin(), 0.0, 0.0, low, high, 10.0, **things), (160, 120))
         picture = stage.draw(nobody, view)[..., :3].astype(int)
         stage.close()
         return picture
@@ -307,7 +307,7 @@ def test_zoom_comes_nearer_and_scale_makes_models_larger(flown):
 
 def test_the_eye_flies_behind_whom_it_follows_and_stays_where_that_is_lost(hunted):
     moments = Moments(hunted, 0.0, 12.0, 1.0, 25.0)
-    death = next(h for h in hunted.happenings if h.kind == "death")
+    death = next(h for h in hunted.events if h.kind == "death")
     camera = Follow(moments, SMALL, who=death.id)
     for t in np.linspace(0.0, death.t, 5):
         frame, view = moments.at(float(t)), camera.view(float(t))
@@ -430,7 +430,7 @@ def test_a_gif_is_small_and_has_half_the_pictures(flown, tmp_path):
     assert len(np.unique(seen[0].reshape(-1, 3), axis=0)) <= encoders.GIF_COLOURS
     view = Overview(Moments(flown, 0.0, 0.8, 1.0, 25.0), (960, 540)).view(0.0)
     for row, at in enumerate(view.project(flown.frame(0).pos, (640, 360))[0]):
-        assert has_colour(seen[0], flown.looks.colour(row + 1), at, reach=5)
+        assert has_colour(seen[0], flown.style.colour(row + 1), at, reach=5)
     assert [p.name for p in tmp_path.iterdir()] == ["a.gif"]
 
 

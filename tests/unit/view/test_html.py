@@ -7,7 +7,6 @@ import hashlib
 import math
 import re
 from dataclasses import replace
-from importlib.resources import files
 
 import numpy as np
 import pytest
@@ -19,8 +18,8 @@ from tussle.errors import ParameterError, ViewError
 from tussle.mission import read_mission
 from tussle.stock import Boids, Still, Unicycle
 from tussle.view import Recording
-from tussle.view.export import html
-from tussle.view.export.html import kept_frames, write_html
+from tussle.view.export.html import write_html
+from tussle.view.page.recorded import kept_frames
 from tussle.view.terrain import Terrain
 
 HOSTILE = "</script><script>alert(1)</script><!-- {{script}} '\"&amp;\u2028"
@@ -49,21 +48,21 @@ def assert_same(page, recording, export, kept=None):
     kept = range(recording.n_frames) if kept is None else kept
     assert len(page.t) == export.n_frames == len(kept)
     assert (page.t == recording.t[kept]).all()
-    assert page.layer["positionError"] == export.position_error
-    assert page.layer["angleError"] == export.angle_error
+    assert page.document["positionError"] == export.position_error
+    assert page.document["angleError"] == export.angle_error
     for i, number in enumerate(kept):
         frame, seen = recording.frame(number), page.frames[i]
         assert sorted(seen) == frame.id.tolist()
         rows = [seen[int(k)] for k in frame.id]
         assert [row.team for row in rows] == frame.team.tolist()
-        assert [row.block for row in rows] == [recording.blocks[b] for b in frame.block]
+        assert [row.block for row in rows] == frame.block.tolist()
         if rows:
             off = np.linalg.norm(np.array([row.pos for row in rows]) - frame.pos, axis=1)
             # The last bits of positions of some thousand metres.
             assert off.max() <= export.position_error + 1e-11
             assert angle(np.array([row.quat for row in rows]), frame.quat).max() <= export.angle_error
             shares = np.array([row.health for row in rows]) - frame.health
-            assert np.abs(shares).max() <= page.layer["fullHealth"] / 510 + 1e-12
+            assert np.abs(shares).max() <= page.chunks[0].full_health / 510 + 1e-12
     assert export.n_states == sum(len(recording.frame(number)) for number in kept)
 
 
@@ -77,21 +76,21 @@ def test_the_page_holds_what_was_recorded(hunted, tmp_path, world):
     assert export.angle_error < math.radians(0.1)
     assert export.n_bytes == (tmp_path / "page.html").stat().st_size
     assert export.n_entities == 14
-    told = zip(*(page.happenings[name] for name in ("t", "kind", "id", "other", "text")), strict=True)
-    assert list(told) == [(h.t, h.kind, h.id, h.other, h.text) for h in recording.happenings]
-    assert len(page.tracks["id"]) == 14
-    assert {"capture", "birth", "death", "end"} <= set(page.happenings["kind"])
-    assert dict(page.layer["facts"])["World"] == f"{world} of 2"
-    assert dict(page.layer["facts"])["Seed"] == str(world + 1)
+    told = zip(*(page.events[name] for name in ("t", "kind", "id", "other", "text")), strict=True)
+    assert list(told) == [(h.t, h.kind, h.id, h.other, h.text) for h in recording.events]
+    assert page.document["nEntities"] == 14
+    assert {"capture", "birth", "death", "end"} <= set(page.events["kind"])
+    assert dict(page.document["facts"])["World"] == f"{world} of 2"
+    assert dict(page.document["facts"])["Seed"] == str(world + 1)
 
 
 def test_many_pieces_hold_what_one_holds(hunted, tmp_path, monkeypatch):
     recording = Recording(hunted)
-    monkeypatch.setattr("tussle.view.export.tracks.N_ROWS", 1)
-    monkeypatch.setattr("tussle.view.export.tracks.LEAST_FRAMES", 4)
+    monkeypatch.setattr("tussle.view.page.recorded.FILE_STATES", 1)
+    monkeypatch.setattr("tussle.view.page.recorded.FILE_FRAMES", 4)
     export = write_html(recording, tmp_path / "page.html")
     page = PageReader(tmp_path / "page.html")
-    assert len(page.layer["pieces"]) > 10
+    assert len(page.chunks) > 10
     assert_same(page, recording, export)
 
 
@@ -103,8 +102,8 @@ def test_frames_of_a_period_and_the_last_are_kept(hunted, tmp_path):
     assert_same(page, recording, export, kept)
     assert recording.t[kept][:4] == pytest.approx([0.0, 0.8, 1.5, 2.3])
     assert page.t[-1] == recording.t[-1]
-    assert len(page.happenings["t"]) == len(recording.happenings)
-    assert "one every 0.75 s" in dict(page.layer["facts"])["Frames"]
+    assert len(page.events["t"]) == len(recording.events)
+    assert "one every 0.75 s" in dict(page.document["facts"])["Frames"]
 
 
 def test_times_that_are_a_whole_number_of_periods_are_kept_in_spite_of_rounding():
@@ -139,15 +138,15 @@ def test_of_a_run_that_was_cut_short_there_is_what_there_is(tmp_path):
     export = write_html(recording, tmp_path / "page.html")
     page = PageReader(tmp_path / "page.html")
     assert_same(page, recording, export)
-    assert page.layer["isComplete"] is False
-    assert page.layer["notes"] == list(export.notes)
+    assert page.document["isComplete"] is False
+    assert page.document["notes"] == list(export.notes)
     assert any("run.json is missing" in note for note in export.notes)
     assert 20 < export.n_frames < 31
 
 
 def test_a_whole_run_says_that_it_is_whole(hunted, tmp_path):
     write_html(Recording(hunted), tmp_path / "page.html")
-    assert PageReader(tmp_path / "page.html").layer["isComplete"] is True
+    assert PageReader(tmp_path / "page.html").document["isComplete"] is True
 
 
 def test_a_run_without_states_is_refused(tmp_path):
@@ -161,7 +160,7 @@ def test_a_run_without_states_is_refused(tmp_path):
 
 
 def test_a_file_that_cannot_be_written_is_told_and_nothing_is_left(hunted, tmp_path):
-    with pytest.raises(ViewError, match=r"nowhere.page.html: the page cannot be written: No such file"):
+    with pytest.raises(ViewError, match=r"nowhere.page.html: cannot be written: No such file"):
         write_html(Recording(hunted), tmp_path / "nowhere" / "page.html")
     (tmp_path / "page.html").mkdir()
     with pytest.raises(ViewError, match="cannot be written"):
@@ -176,7 +175,7 @@ def test_who_is_gone_for_good_leaves_frames_without_anybody(tmp_path):
     page = PageReader(tmp_path / "page.html")
     assert_same(page, recording, export)
     assert page.frames[-1] == {}
-    assert "collision" in page.happenings["kind"]
+    assert "collision" in page.events["kind"]
 
 
 def test_a_game_in_one_point_and_one_across_a_continent_keep_their_places(tmp_path):
@@ -232,7 +231,7 @@ def hostile(tmp_path_factory):
 def test_names_are_data_and_nothing_else(hostile):
     page = PageReader(hostile)
     assert page.document["title"] == HOSTILE
-    assert page.layer["blocks"][0]["name"].startswith("a<b>&")
+    assert page.document["blocks"][0]["name"].startswith("a<b>&")
     assert "<script>alert" not in page.text
     assert page.text.count("</script>") == len(page.blobs) + 1
     assert not set("<>&") & set(page.blobs["document"])
@@ -261,12 +260,6 @@ def test_the_page_names_no_other_place(hostile):
     assert re.findall(r'href="([^"]*)"', text) == ["data:,"]
 
 
-def test_all_files_of_the_player_are_on_the_page():
-    folder = files("tussle.view.export").joinpath("page")
-    assert {f.name for f in folder.iterdir()} == {"page.html", "page.css", *html.SCRIPTS}
-    assert len(set(html.SCRIPTS)) == len(html.SCRIPTS)
-
-
 # -- what stands still --------------------------------------------------------------------------------------------------------------
 
 HARBOUR = """<?xml version="1.0"?>
@@ -293,7 +286,7 @@ def harbour(tmp_path):
 def test_bases_boundaries_and_looks_are_those_of_the_mission(harbour, tmp_path):
     write_html(harbour, tmp_path / "page.html", title="Evening")
     page = PageReader(tmp_path / "page.html")
-    scenery, layer = page.document["scenery"], page.layer
+    scenery, layer = page.document["scenery"], page.document
     assert page.document["title"] == "Evening"
     assert scenery["background"] == [24, 40, 58]
     assert scenery["bases"] == [{"team": 1, "pos": [-200.0, -120.0, 5.0], "radius": 30.0, "opacity": 0.5}]
@@ -308,12 +301,12 @@ def test_bases_boundaries_and_looks_are_those_of_the_mission(harbour, tmp_path):
     assert layer["teams"] == [{"id": 1, "name": "patrol", "colour": [1, 2, 3]}]
     assert set(page.document["models"]) == {"quadrotor", "sphere"}
     # The smallest body is twenty steps long.
-    assert layer["step"] <= 0.05 / 20
+    assert page.chunks[0].step <= 0.05 / 20
 
 
 @pytest.mark.parametrize("n", [7, 70])
 def test_the_terrain_is_what_it_was(harbour, tmp_path, monkeypatch, n):
-    monkeypatch.setattr("tussle.view.export.still.MOST_HEIGHTS", 300)
+    monkeypatch.setattr("tussle.view.page.document.MOST_HEIGHTS", 300)
     x, y = np.linspace(-100, 100, n), np.linspace(-50, 50, 5)
     hills = Terrain(x, y, 10.0 * np.sin(x / 20.0) + y[:, None] / 7.0)
     harbour.__dict__["scenery"] = replace(harbour.scenery, terrain=hills)

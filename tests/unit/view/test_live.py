@@ -28,7 +28,7 @@ def watch_everything(live, stop):
     """What a page does, as fast as it can."""
     while not stop.is_set():
         frame = live.frame()
-        live.result(), live.shapes(), live.happenings, live.notes, live.warp_reached, live.span
+        live.result(), live.shapes(), live.events, live.notes, live.warp_reached, live.span
         if len(frame):
             live.entity(int(frame.id[0]))
         live.frame_at(frame.t - 1.0)
@@ -57,7 +57,7 @@ def test_the_golden_hashes_with_all_controls_used_and_a_viewer_that_never_sleeps
         live.toggle()
         live.seek(sim.mission.start + STEPS[name] * sim.mission.dt)
         assert live.settle()
-        wait_for(lambda: not live._conductor.is_seeking and live.step_number == STEPS[name])
+        wait_for(lambda: not live._playback.is_seeking and live.step_number == STEPS[name])
         stop.set()
         viewer.join()
         assert live.error is None
@@ -174,7 +174,7 @@ def test_time_goes_as_fast_as_is_wanted():
 
 def test_a_game_that_is_all_but_stopped_still_hears():
     with Live(Simulation(clickable()), pace=1e-320) as live:
-        wait_for(lambda: live._conductor._wait is not None)
+        wait_for(lambda: live._playback._wait is not None)
         live.step(3)
         wait_for(lambda: live.step_number >= 3)
 
@@ -256,7 +256,7 @@ def test_beginning_anew_with_the_same_and_with_another_seed(live):
     live.settle()
     assert not live.is_over
     assert live.span == (0.0, 0.0)
-    assert [(h.t, h.kind, h.id) for h in live.happenings] == [(0.0, "birth", i) for i in (1, 2, 3)]
+    assert [(h.t, h.kind, h.id) for h in live.events] == [(0.0, "birth", i) for i in (1, 2, 3)]
 
 
 def test_controls_return_at_once_while_a_step_takes_long():
@@ -376,17 +376,17 @@ def test_happenings_and_the_result_so_far():
     game = hunt()
     live = Live(Simulation(game), threaded=False)
     live.step(60)
-    told = live.happenings
+    told = live.events
     births, deaths = ([h for h in told if h.kind == kind] for kind in ("birth", "death"))
     assert [h.text for h in births] == ["prey"] * 12 + ["hunters"] * 3 + ["late"] * 3
     assert sum(live.result().alive.values()) == 15 + 3 - len(deaths)
     assert told[-1].kind == "end"
     live.seek(1.0)
-    assert live.happenings == told
+    assert live.events == told
     assert live.result().t == pytest.approx(1.0)
     assert live.result().state_hash == ""
     live.step(50)
-    assert live.happenings == told
+    assert live.events == told
     assert live.result().end == "time"
     assert live.result().state_hash == live.simulation.state_hash()
 
@@ -399,7 +399,7 @@ def test_one_world_of_a_stack_is_watched_until_it_ends():
         wait_for(lambda: live.is_over)
         assert live.step_number == alone.steps[0]
         assert sim.state_hash(1) == alone.state_hash()
-        assert live.happenings[-1].kind == "end"
+        assert live.events[-1].kind == "end"
         live.pause()
         live.seek(2.0)
         wait_for(lambda: not live.is_seeking and live.step_number == 20)
@@ -417,8 +417,8 @@ def test_what_stands_still_and_how_it_looks():
     assert live.blocks == ["prey", "late", "hunters"]
     assert live.block_teams == [1, 1, 2]
     assert live.teams == {1: "prey, late", 2: "hunters"}
-    assert live.looks.block_colour(0) == (1, 2, 3)
-    assert [live.looks.model(b) for b in range(3)] == ["car", "aircraft", "aircraft"]
+    assert live.style.block_colour(0) == (1, 2, 3)
+    assert [live.style.model(b) for b in range(3)] == ["car", "aircraft", "aircraft"]
     assert live.scenery.grid_step == 11.0
 
 

@@ -143,9 +143,9 @@ def test_models_are_there_from_birth_to_death_in_their_colours(opened, hunted):
             assert entity["frame_id"] == entity["id"]
             block = hunted.blocks.index(entity["id"].split("/")[0])
             surface = entity["triangles"][0]
-            assert len(surface["points"]) == len(MODELS[hunted.looks.model(block)].vertices)
+            assert len(surface["points"]) == len(MODELS[hunted.style.model(block)].vertices)
             colour = [round(255 * surface["color"][c]) for c in "rgb"]
-            assert tuple(colour) == hunted.looks.block_colour(block)
+            assert tuple(colour) == hunted.style.block_colour(block)
     for k in range(hunted.n_frames):
         frame = hunted.frame(k)
         now = round(frame.t * 1e9)
@@ -158,7 +158,7 @@ def test_models_are_there_from_birth_to_death_in_their_colours(opened, hunted):
 
 def test_who_jumps_into_the_file_soon_sees_all_who_are_there(opened, hunted):
     """The last message before tells all of them, except for the first second after a birth."""
-    births = [h.t for h in hunted.happenings if h.kind == "birth"]
+    births = [h.t for h in hunted.events if h.kind == "birth"]
     assert any(t > 0.0 for t in births)
     for topic in ("/models", "/labels"):
         messages = opened.messages[topic]
@@ -179,16 +179,16 @@ def test_labels_are_ids(opened):
 
 def test_events_are_all_told_in_words(opened, hunted):
     told = opened.messages["/events"]
-    assert [ns for ns, _ in told] == [round(h.t * 1e9) for h in hunted.happenings]
-    assert [m["name"] for _, m in told] == [h.kind for h in hunted.happenings]
+    assert [ns for ns, _ in told] == [round(h.t * 1e9) for h in hunted.events]
+    assert [m["name"] for _, m in told] == [h.kind for h in hunted.events]
     levels = {m["name"]: m["level"] for _, m in told}
     assert levels == {"birth": 1, "death": 2, "capture": 3, "end": 2}
     words = [m["message"] for _, m in told]
-    death = next(h for h in hunted.happenings if h.kind == "death")
+    death = next(h for h in hunted.events if h.kind == "death")
     prey = next(w for w in words if w.endswith("is born") and w.split("/")[1].startswith(f"{death.id} "))
     assert f"{prey.split(' ')[0]} is gone: captured by hunters/{death.other}" in words
     assert any(w.startswith(f"hunters/{death.other} captures {prey.split(' ')[0]}") for w in words)
-    assert words[-1] == f"end: {hunted.happenings[-1].text}"
+    assert words[-1] == f"end: {hunted.events[-1].text}"
 
 
 def test_teams_are_counted(opened, hunted):
@@ -207,7 +207,7 @@ def test_fewer_moments_keep_all_events_and_the_last_moment(hunted, tmp_path):
     times = [ns for ns, _ in opened.messages["/tf"]]
     assert times[:-1] == [2 * SECOND * k for k in range(len(times) - 1)]
     assert times[-1] == round(hunted.t[-1] * 1e9)
-    assert len(opened.messages["/events"]) == len(hunted.happenings)
+    assert len(opened.messages["/events"]) == len(hunted.events)
     assert opened.times == sorted(opened.times)
     assert told == [(k, report.n_frames) for k in range(1, report.n_frames + 1)]
 
@@ -249,7 +249,7 @@ def test_what_stands_is_in_the_scene(hunted, monkeypatch):
     assert found["base 1"]["spheres"][0]["pose"]["position"] == {"x": 1.0, "y": 2.0, "z": 3.0}
     assert len(found["zone"]["lines"][0]["points"]) == 24
     blue, grey = (found[n]["triangles"][0]["color"] for n in ("zone", "free"))
-    assert tuple(round(255 * blue[c]) for c in "rgb") == hunted.looks.colour(2)
+    assert tuple(round(255 * blue[c]) for c in "rgb") == hunted.style.colour(2)
     assert blue != grey
     assert len(found["terrain"]["triangles"][0]["indices"]) == 3 * 2 * 3 * 4
     assert ("latitude [deg]", "29") in [(n["key"], n["value"]) for n in found["origin"]["metadata"]]

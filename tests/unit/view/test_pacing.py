@@ -4,7 +4,7 @@ import pytest
 
 from tussle.errors import ParameterError
 from tussle.view import offers, pacing
-from tussle.view.offers import LINGER, Offer
+from tussle.view.latest import LINGER, LatestValue
 from tussle.view.pacing import Allowance, Pace, Speedometer, checked_warp, faster, slower
 
 
@@ -123,7 +123,7 @@ def test_warps():
 
 def test_an_offer_is_made_while_asked_for_and_no_oftener_than_its_period(clock):
     made, rung = [], []
-    offer = Offer(lambda: made.append(clock.now) or len(made), 0.1, lambda: rung.append(1))
+    offer = LatestValue(lambda: made.append(clock.now) or len(made), 0.1, lambda: rung.append(1))
     for version in range(100):
         clock.now += 0.01
         offer.renew(version)

@@ -9,9 +9,7 @@ from tussle import Simulation
 from tussle.api.draw import KINDS
 from tussle.view import Live
 from tussle.view.drawn import Shape
-from tussle.view.page.colours import DRAWN
-from tussle.view.page.drawn import Drawn
-from tussle.view.page.reading import ATTRIBUTES, read_drawing
+from tussle.view.page.drawing import ATTRIBUTES, DRAWN, drawing_message, read_drawing
 from tussle.view.page.server import Page
 
 
@@ -113,61 +111,32 @@ def test_a_cone_points_where_it_is_told(direction):
     assert scale[0] == pytest.approx([3.0, 3.0, 3.0])
 
 
-class Notebook:
-    """What would be drawn, in the place of a scene: the calls that make a node, and what becomes of it."""
-
-    def __init__(self):
-        self.nodes = {}
-        self.n_made = 0
-
-    def __getattr__(self, method):
-        def add(name, *args, **properties):
-            self.n_made += 1
-            node = self.nodes[name] = Node(self, name, args, properties)
-            return node
-
-        return add
+NUMBERS = {"points": 7, "lines": 9, "arrows": 9, "sphere": 14, "box": 14, "cone": 14}
 
 
-class Node:
-    def __init__(self, book, name, args, properties):
-        self.__dict__.update(properties, book=book, name=name, points=args[0] if args else None)
-
-    def remove(self):
-        del self.book.nodes[self.name]
-
-
-def test_alike_shapes_share_a_node_and_what_is_no_longer_drawn_goes():
-    book = Notebook()
-    drawn = Drawn(book)
+def test_the_message_holds_every_kind_as_it_is_read():
     shapes = tuple(shape(kind, **given) for kind, given in EXAMPLES.items())
-    drawn.show((*shapes, shape("sphere", pos=(9.0, 9.0, 9.0))), 1.0)
-    assert set(book.nodes) == {
-        "/drawn/points 0", "/drawn/lines", "/drawn/arrows", "/drawn/sphere", "/drawn/box", "/drawn/cone", "/drawn/text 0",
-        "/drawn/mesh 0",
-    }  # fmt: skip
-    assert len(book.nodes["/drawn/sphere"].batched_positions) == 4
-    assert len(book.nodes["/drawn/points 0"].points) == 6, "points and clouds of one size"
-    drawn.show(shapes[:1], 1.0)
-    assert set(book.nodes) == {"/drawn/points 0"}
-    drawn.show((), 1.0)
-    assert not book.nodes
+    header, data, notes = drawing_message((*shapes, shape("sphere", pos=(9.0, 8.0, 7.0), radius=1.5)))
+    assert not notes
+    counts = {part["kind"]: part["n"] for part in header["parts"]}
+    assert counts == {"points": 6, "lines": 2, "arrows": 3, "sphere": 4, "box": 1, "cone": 1, "mesh": 1}
+    assert header["texts"] == [["here", 0.0, 0.0, 5.0]]
+    assert header["width"] == 3.0
+    numbers = np.frombuffer(data, "<f4")
+    ends = [part["at"] + part["n"] * NUMBERS[part["kind"]] for part in header["parts"][:-1]]
+    assert ends == [part["at"] for part in header["parts"][1:]]
+    at = {part["kind"]: part["at"] for part in header["parts"]}
+    assert numbers[at["points"] : at["points"] + 7].tolist() == [0.0, 3.0, 6.0, 0.0, *DRAWN]
+    last = numbers[at["sphere"] + 3 * 14 : at["sphere"] + 4 * 14]
+    assert last.tolist() == [9.0, 8.0, 7.0, 1.0, 0.0, 0.0, 0.0, 3.0, 3.0, 3.0, *DRAWN, 1.0]
+    mesh = numbers[at["mesh"] :]
+    assert len(mesh) == 11 + 9 + 3
+    assert mesh[-3:].tolist() == [0.0, 1.0, 2.0]
 
 
-def test_what_moves_is_updated_and_not_made_anew():
-    book = Notebook()
-    drawn = Drawn(book)
-    moving = ("points", "line", "vectors", "sphere", "box", "cone", "text")
-    drawn.show(tuple(shape(kind, **EXAMPLES[kind]) for kind in moving), 1.0)
-    made = book.n_made
-    moved = [
-        shape(kind, **(EXAMPLES[kind] | {"pos": np.asarray(EXAMPLES[kind]["pos"]) + 1.0})) for kind in moving
-    ]
-    drawn.show(tuple(moved), 1.0)
-    assert book.n_made == made
-    assert book.nodes["/drawn/points 0"].points[0].tolist() == [1.0, 4.0, 7.0]
-    assert book.nodes["/drawn/sphere"].batched_positions[0].tolist() == [1.0, 4.0, 7.0]
-    assert book.nodes["/drawn/text 0"].position == (1.0, 1.0, 6.0)
+def test_nothing_drawn_is_a_message_without_parts():
+    header, data, _ = drawing_message(())
+    assert (header["parts"], header["texts"], data) == ([], [], b"")
 
 
 def test_all_kinds_reach_a_browser():
@@ -177,13 +146,14 @@ def test_all_kinds_reach_a_browser():
         Page(live) as page,
         PageClient(page.url) as client,
     ):
-        client.wait(page.visitors)
+        client.wait(lambda: page.n_readers)
         draw = simulation.state.context.draw
         client.wait(lambda: draw.sinks)
         for kind, given in EXAMPLES.items():
             getattr(draw, kind)(**given, lifetime=100.0)
         draw.box(pos=(0.0, 0.0, 0.0), sise=1.0, lifetime=100.0)
         live.step()
-        client.wait(lambda: sum(name.startswith("/drawn/") for name in list(client.nodes)) == 8)
-        client.wait(lambda: client.text("did you mean &#x27;size&#x27;?"))
+        kinds = {"points", "lines", "arrows", "sphere", "box", "cone", "mesh"}
+        client.wait(lambda: {part["kind"] for part in client.drawn.get("parts", ())} == kinds)
+        client.wait(lambda: client.says("did you mean 'size'?"))
         assert page.error is None

@@ -1,5 +1,8 @@
-"""The page of a live game, as one sees it who speaks viser's protocol: what is sent, and what each control does."""
+"""The page of a live game, as one sees it who speaks its protocol: what is sent, and what each command does."""
 
+import math
+import struct
+import threading
 import time
 
 import numpy as np
@@ -8,8 +11,9 @@ from page_client import PageClient
 from recorded_games import hunt
 from watched_plugins import clickable, failing
 
-from tussle import Simulation
+from tussle import Block, Mission, Simulation
 from tussle.messages import CustomKeyPress, WorldPointClicked
+from tussle.stock import Still
 from tussle.view import Live
 from tussle.view.page.server import Page
 
@@ -23,7 +27,7 @@ def game():
         Page(live) as page,
         PageClient(page.url) as client,
     ):
-        client.wait(page.visitors)
+        client.wait(lambda: client.n_frames and client.status)
         yield live, page, client
         assert page.error is None
 
@@ -34,210 +38,239 @@ def stands_at(live, step):
 
 def test_entities_are_sent_where_they_are(game):
     live, _, client = game
-    client.wait(lambda: "/entities/aircraft" in client.nodes)
-    assert np.allclose(client.positions("aircraft"), live.frame().pos, atol=1e-3)
+    assert sorted(client.frame) == live.frame().id.tolist()
     live.step(5)
-    client.wait(lambda: client.n_frames)
-    client.wait(lambda: np.allclose(client.positions("aircraft"), live.frame().pos, atol=1e-3))
+    client.wait(lambda: client.t == pytest.approx(0.5))
+    frame = live.frame()
+    for row, who in enumerate(frame.id.tolist()):
+        seen = client.frame[who]
+        assert np.abs(seen.pos - frame.pos[row]).max() <= 0.001 + 1e-9
+        assert abs(seen.quat @ frame.quat[row]) > 1.0 - 1e-6
+        assert (seen.team, seen.block, seen.health) == (frame.team[row], frame.block[row], 1.0)
 
 
-def test_pause_stops_the_clock_and_play_moves_it(game):
+def test_pause_stops_the_clock_and_resume_moves_it(game):
     live, _, client = game
-    client.set("Run", "Play")
+    client.order("resume")
     client.wait(lambda: live.step_number > 3)
-    client.set("Run", "Pause")
-    client.wait(lambda: live.is_paused)
-    live.settle()
+    client.order("pause")
+    client.wait(lambda: live.is_paused and live.settle())
     there = live.step_number
     time.sleep(0.3)
     assert live.step_number == there
-    assert client.wait(lambda: client.text("paused"))
+    client.wait(lambda: client.status["isPaused"] and client.status["step"] == there)
 
 
-def test_step_and_step_back_move_by_one(game):
+def test_a_step_back_and_a_seek_lead_to_the_same_future(game):
     live, _, client = game
-    client.set("Run", "Step")
-    client.wait(stands_at(live, 1))
-    first = live.simulation.state_hash()
-    client.set("Run", "Step")
-    client.wait(stands_at(live, 2))
-    client.set("Run", "Back")
-    client.wait(stands_at(live, 1))
-    assert live.simulation.state_hash() == first
-
-
-def test_the_slider_goes_back_and_the_future_is_the_same(game):
-    live, _, client = game
-    live.step(40)
+    client.order("step", n=40)
     client.wait(stands_at(live, 40))
     future = live.simulation.state_hash()
-    client.wait(lambda: client.value("Time [s]") == pytest.approx(live.t))
-    client.set("Time [s]", 1.0)
+    client.order("step", n=-1)
+    client.wait(stands_at(live, 39))
+    client.order("seek", t=1.0)
     client.wait(stands_at(live, 10))
-    live.step(30)
+    client.wait(lambda: client.t == pytest.approx(1.0))
+    client.order("seek", t=1e9)
     client.wait(stands_at(live, 40))
     assert live.simulation.state_hash() == future
+    client.wait(lambda: client.status["epoch"] == live.epoch)
 
 
-def test_speed_buttons(game):
+def test_speeds(game):
     live, _, client = game
-    for button, warp in (("Max", np.inf), ("1 ×", 1.0), ("Faster", 2.0), ("Faster", 3.0), ("Slower", 2.0)):
-        client.set("Speed", button)
+    for command, fields, warp in (
+        ("warp", {"value": None}, math.inf), ("warp", {"value": 1}, 1.0), ("faster", {}, 2.0), ("slower", {}, 1.0),
+    ):  # fmt: skip
+        client.order(command, **fields)
         client.wait(lambda warp=warp: live.warp == warp)
+    client.wait(lambda: client.status["warp"] == 1.0)
 
 
-def test_a_click_selects_and_is_followed(game):
+def test_the_chosen_entity_is_told_with_its_plugins_to_who_chose_it(game):
     live, page, client = game
-    visitor = page.visitors()[0]
     who = max(live.frame().id.tolist())
-    client.click("/entities/aircraft", live.frame().row_of(who))
-    client.wait(lambda: visitor.chosen == who)
-    about = client.wait(lambda: client.text("Predator"))
-    assert f"hunters {who}" in about
-
-    def is_looked_at():
-        frame = live.frame()
-        return np.allclose(client.camera.get("target", np.nan), frame.pos[frame.row_of(who)], atol=1e-2)
-
-    client.set("Mode", "follow")
-    client.wait(is_looked_at)
-    before = client.camera["target"]
-    live.step(20)
-    client.wait(stands_at(live, 20))
-    client.wait(is_looked_at)
-    assert np.linalg.norm(np.subtract(client.camera["target"], before)) > 10.0
-
-
-def test_each_browser_has_a_camera_and_a_choice_of_its_own(game):
-    _, page, client = game
     with PageClient(page.url) as other:
-        other.wait(lambda: len(page.visitors()) == 2)
-        client.set("Entity", 2)
-        client.wait(lambda: sorted(str(v.chosen) for v in page.visitors()) == ["2", "None"])
-        other.wait(lambda: other.text("Click an entity"))
-    client.wait(lambda: len(page.visitors()) == 1)
+        client.order("choose", id=who)
+        told = client.wait(lambda: client.status["entity"])
+        assert told["id"] == who
+        assert any(title == "Predator" for title, _ in told["sections"])
+        other.wait(lambda: other.status)
+        assert other.status["entity"] is None
+        client.wait(lambda: page.n_readers == 2)
+    client.wait(lambda: page.n_readers == 1)
+
+
+def test_only_the_first_of_several_steers_where_one_steers():
+    with (
+        Simulation(hunt(), 3) as simulation,
+        Live(simulation, is_paused=True) as live,
+        Page(live, one_steers=True) as page,
+        PageClient(page.url) as first,
+        PageClient(page.url) as second,
+    ):
+        second.wait(lambda: second.status and not second.status["steers"])
+        second.order("step", n=1)
+        second.wait(lambda: second.refusals == ["another browser steers this game"])
+        second.order("choose", id=1)
+        second.wait(lambda: second.status["entity"])
+        first.order("step", n=1)
+        first.wait(stands_at(live, 1))
+        first.close()
+        second.wait(lambda: second.status["steers"])
+        second.order("step", n=1)
+        second.wait(stands_at(live, 2))
 
 
 def test_closing_all_browsers_leaves_the_game_going(game):
     live, page, client = game
     live.resume()
     client.close()
-    client.wait(lambda: not page.visitors())
-    there = live.step_number
+    client.wait(lambda: not page.n_readers)
+    there, made = live.step_number, page.publisher.n_made
     client.wait(lambda: live.step_number > there + 5)
-    pushed = page.pusher.n_pushed
-    time.sleep(0.4)
-    assert page.pusher.n_pushed - pushed <= 1, "nobody watches, and yet frames are made"
+    assert page.publisher.n_made - made <= 1, "nobody watches, and yet frames are made"
 
 
-def test_a_browser_that_hangs_holds_up_nobody(game):
-    live, page, client = game
-    with PageClient(page.url, is_reading=False):
-        client.wait(lambda: len(page.visitors()) == 2)
-        live.resume()
-        there, seen = live.step_number, client.n_frames
-        client.wait(lambda: live.step_number > there + 20 and client.n_frames > seen + 5)
-        buffer = page._server._websock_server._broadcast_buffer
-        held = len(buffer.message_from_id)
-        client.wait(lambda: live.step_number > there + 60)
-        assert len(buffer.message_from_id) <= held + 50, "what a slow browser has not taken is kept for it"
+def test_a_browser_that_hangs_holds_up_nobody_and_costs_no_memory():
+    crowd = Block(name="all", count=20_000, placement="uniform", half_width=(500, 500, 100), motion=Still())
+    with (
+        Simulation(Mission(blocks=[crowd], end=1e6), 3) as simulation,
+        Live(simulation, pace=None) as live,
+        Page(live) as page,
+        PageClient(page.url, is_reading=False) as hanging,
+        PageClient(page.url) as client,
+    ):
+        client.wait(lambda: page.n_readers == 2)
+        reader = page.publisher.readers[0]
+        client.wait(lambda: page.publisher.n_made - reader.frame_sent > 10)
+        held = reader.socket._req.transport.get_write_buffer_size()
+        assert held < 2 * len(page.publisher._frame), "what a slow browser has not taken is kept for it"
+        seen, there = client.n_frames, live.step_number
+        client.wait(lambda: client.n_frames > seen + 3 and live.step_number > there + 3)
+        assert hanging.n_frames == 0
 
 
-def test_a_point_of_the_ground_is_told_to_the_plugins():
+def test_events_are_told_once_and_again_where_the_game_takes_another_course(game):
+    live, _, client = game
+    live.step(60)
+    live.settle()
+    client.wait(lambda: len(client.events) == len(live.events) > 14)
+    assert client.events[-1] == [getattr(live.events[-1], k) for k in ("t", "kind", "id", "other", "text")]
+    client.wait(lambda: client.status["events"]["rows"] == [])
+    client.order("seek", t=1.0)
+    client.order("key", key=";")
+    client.wait(lambda: live.injections)
+    live.settle()
+    client.wait(lambda: len(client.events) == len(live.events) < 60)
+    assert client.events[-1][0] < 1.0 + 1e-9
+
+
+def test_a_point_and_a_key_are_told_to_the_plugins():
     with (
         Simulation(clickable(), 1) as simulation,
         Live(simulation, is_paused=True) as live,
         Page(live) as page,
         PageClient(page.url) as client,
     ):
-        client.wait(page.visitors)
-        client.press("O")
-        client.wait(lambda: client.notifications)
-        client.click_ground((0.0, 0.0, 100.0), (0.3, 0.4, -1.0))
-        client.wait(lambda: live.injections)
-        (said,) = live.injections
-        assert said.type is WorldPointClicked
-        assert np.allclose(said.fields["pos"], (30.0, 40.0, 0.0))
-        client.click_ground((0.0, 0.0, 100.0), (0.3, 0.4, -1.0))
-        client.press(";")
+        client.order("point", pos=[30.0, 40.0, 0.0])
+        client.order("key", key=";")
         client.wait(lambda: len(live.injections) == 2)
-        assert live.injections[1].type is CustomKeyPress, "a second click is no second point"
-
-
-def test_a_click_into_the_sky_is_no_point():
-    with (
-        Simulation(clickable(), 1) as simulation,
-        Live(simulation, is_paused=True) as live,
-        Page(live) as page,
-        PageClient(page.url) as client,
-    ):
-        client.wait(page.visitors)
-        client.press("O")
-        client.wait(lambda: client.notifications)
-        client.click_ground((0.0, 0.0, 100.0), (0.3, 0.4, 1.0))
-        client.wait(lambda: len(client.notifications) == 2)
-        assert not live.injections
-
-
-def test_what_plugins_draw_is_seen():
-    with (
-        Simulation(clickable(), 1) as simulation,
-        Live(simulation, is_paused=True) as live,
-        Page(live) as page,
-        PageClient(page.url) as client,
-    ):
-        client.wait(page.visitors)
+        point, key = live.injections
+        assert (point.type, key.type) == (WorldPointClicked, CustomKeyPress)
+        assert point.fields["pos"].tolist() == [30.0, 40.0, 0.0]
         client.wait(lambda: live._sketchbook.is_open)
         live.step()
-        client.wait(lambda: "/drawn/arrows" in client.nodes and "/drawn/text 0" in client.nodes)
-        assert client.nodes["/drawn/text 0"]["text"] == "goal"
+        client.wait(lambda: {"arrows"} == {part["kind"] for part in client.drawn.get("parts", ())})
+        assert client.drawn["texts"][0][0] == "goal"
 
 
 def test_begin_anew_with_another_seed(game):
     live, _, client = game
     live.step(5)
-    client.set("Seed", 11)
-    client.wait(lambda: client.value("Seed"))
-    button = client.id_of("Begin anew")
-    time.sleep(0.1)
-    client.send("GuiUpdateMessage", uuid=button, updates={"value": True})
+    client.order("reset", seed=11)
     client.wait(lambda: live.seed == 11)
     client.wait(stands_at(live, 0))
+    client.wait(lambda: client.status["seed"] == 11)
 
 
-def test_the_numbers_say_what_goes_on(game):
+def test_the_status_says_what_goes_on(game):
     live, _, client = game
     live.step(30)
-    numbers = client.wait(lambda: client.text("step 30"))
-    for part in ("t = 3.00 s", "paused", "team 1", "prey", "hunters", "× real time", "frames/s", "score"):
-        assert part in numbers
-    client.wait(lambda: "capture" in client.text("step 30"))
+    client.wait(lambda: client.status["step"] == 30 and client.status["scores"])
+    status = client.status
+    assert status["span"] == [0.0, pytest.approx(3.0)]
+    assert (status["isPaused"], status["isOver"], status["error"]) == (True, False, None)
+    assert set(status["scores"]) <= {"1", "2"}
+    assert status["metrics"]
 
 
-def test_a_plugin_that_fails_is_told_on_the_page():
+def test_a_look_back_holds_what_was_seen(game):
+    live, _, client = game
+    live.step(30)
+    client.wait(lambda: client.t == pytest.approx(3.0))
+    client.order("history", seconds=1.0)
+    seconds, chunk = client.wait(lambda: client.past and client.past[-1])
+    assert seconds == 1.0
+    assert chunk.t[0] == pytest.approx(2.0, abs=0.11)
+    assert chunk.t[-1] == pytest.approx(3.0)
+    assert (np.diff(chunk.t) > 0.0).all()
+    then = live.frame_at(float(chunk.t[0]))
+    assert sorted(chunk.frames[0]) == then.id.tolist()
+    assert np.allclose(chunk.frames[0][1].pos, then.pos[then.row_of(1)], atol=0.01)
+
+
+def test_a_plugin_that_fails_is_told_and_the_game_can_be_wound_back():
     with (
         Simulation(failing(), 1) as simulation,
         Live(simulation, pace=None) as live,
         Page(live) as page,
         PageClient(page.url) as client,
     ):
-        client.wait(lambda: client.text("it is late"))
+        client.wait(lambda: "it is late" in (client.status.get("error") or ""))
+        assert page.game_error is live.error
         there = live.step_number
-        client.set("Run", "Back")
+        client.order("step", n=-1)
         client.wait(stands_at(live, there - 1))
+        client.wait(lambda: client.status["error"] is None)
 
 
-def test_who_is_gone_is_drawn_no_more_and_said_to_be_gone():
+def test_the_missions_time_between_frames_counts():
     with (
-        Simulation(hunt(end=30.0, end_conditions="time"), 3) as simulation,
-        Live(simulation, is_paused=True, pace=None) as live,
-        Page(live) as page,
-        PageClient(page.url) as client,
+        Simulation(hunt(end=60.0, end_conditions="time"), 3) as simulation,
+        Live(simulation, viewer={"gui_update_period": "200"}) as live,
     ):
-        client.wait(page.visitors)
-        live.step(60)
-        live.settle()
-        dead = next(h.id for h in live.happenings if h.kind == "death")
-        client.wait(lambda: len(client.positions("aircraft")) == len(live.frame()))
-        client.set("Entity", dead)
-        client.wait(lambda: client.text("is not there at this time"))
+        with Page(live) as page, PageClient(page.url) as client:
+            client.wait(lambda: client.n_frames >= 2)
+            began, seen = time.monotonic(), client.n_frames
+            client.wait(lambda: client.n_frames >= seen + 4)
+            assert time.monotonic() - began > 0.5
+        with Page(live, viewer={"gui_update_period": "soon"}) as page:
+            assert (
+                "gui_update_period 'soon' is no time in ms; frames are sent as fast as can be" in page.notes
+            )
+
+
+def test_a_page_that_ends_leaves_no_thread_and_no_port():
+    with Simulation(hunt(), 1) as simulation, Live(simulation, is_paused=True) as live:
+        before = threading.active_count()
+        page = Page(live)
+        client, hanging = PageClient(page.url), PageClient(page.url, is_reading=False)
+        client.wait(lambda: client.n_frames and page.n_readers == 2)
+        page.stop()
+        page.stop()
+        client.wait(lambda: client.error is not None)
+        hanging.close()
+        client.wait(lambda: threading.active_count() <= before)
+        with pytest.raises(OSError, match="Cannot connect"):
+            PageClient(page.url)
+
+
+def test_the_header_of_a_message_leaves_its_numbers_on_whole_words():
+    from tussle.view.page.publisher import message
+
+    for kind in ("a", "ab", "abc", "abcd"):
+        data = message({"kind": kind}, b"1234")
+        (length,) = struct.unpack_from("<I", data)
+        assert length % 4 == 0
+        assert data[4 + length :] == b"1234"

@@ -1,17 +1,22 @@
-"""Recorded runs behind the controls of a live game: time, events, and where two of them part."""
+"""Recorded runs as the page reads them, and where two of them part."""
 
-import time
+import json
+from itertools import pairwise
+from urllib.error import HTTPError
+from urllib.request import urlopen
 
 import numpy as np
+import pyarrow as pa
 import pytest
-from page_client import PageClient
+from page_reader import Bytes, read_chunk
 from recorded_games import hunt
 
 from tussle import Recorder, Simulation
-from tussle.errors import ViewError
+from tussle.errors import RecordError, ViewError
 from tussle.view import Recording
-from tussle.view.page.comparing import Comparison, first_difference, what_differs
-from tussle.view.page.replaying import PlayHead, Replay
+from tussle.view.page import recorded as recorded_data
+from tussle.view.page.compare import Comparison, first_difference, what_differs
+from tussle.view.page.recorded import RecordedData, chunk_bounds
 from tussle.view.page.server import Page
 
 
@@ -32,88 +37,97 @@ def runs(tmp_path_factory):
     )
 
 
-# -- the place in time ------------------------------------------------------------------------------------------------------------
-
-
-def test_the_head_moves_with_the_clock_and_stops_at_the_end():
-    head = PlayHead(np.arange(5) * 0.1, warp=4.0)
-    time.sleep(0.02)
-    assert 0.0 < head.t <= 0.4
-    time.sleep(0.15)
-    assert head.t == head.last == pytest.approx(0.4)
-    assert head.pace == 0.0
-    head.warp = 1e-6
-    head.resume()
-    assert head.t < 0.4, "at the end, it plays again"
-
-
-def test_the_head_stands_still_where_it_is_put():
-    head = PlayHead(np.arange(5) * 0.1, is_paused=True)
-    head.seek(0.25)
-    assert head.t == 0.25
-    head.step(1)
-    assert head.t == pytest.approx(0.3)
-    head.step(-1)
-    assert head.t == pytest.approx(0.2)
-    head.step(-9)
-    assert head.t == 0.0
-    head.step(99)
-    assert head.t == pytest.approx(0.4)
-    head.seek(-7.0)
-    assert head.t == 0.0
-
-
-def test_another_warp_starts_from_the_present():
-    head = PlayHead(np.arange(1000) * 0.1, warp=100.0)
-    time.sleep(0.05)
-    head.warp = 1e-6
-    t = head.t
-    assert t > 2.0
-    time.sleep(0.02)
-    assert head.t == pytest.approx(t, abs=1e-3)
-
-
 # -- one run ----------------------------------------------------------------------------------------------------------------------
 
 
-def test_a_replay_shows_what_was_recorded(runs):
-    replay = Replay(Recording(runs[0]), is_paused=True)
-    replay.seek(2.05)
-    assert replay.frame().step == 20
-    replay.step()
-    assert replay.frame().step == 21
-    replay.step_back(2)
-    assert replay.frame().step == 19
-    who = int(replay.frame().id[2])
-    state = replay.entity(who)
-    assert np.array_equal(state.body["pos"].value, replay.frame().pos[2])
-    assert state.body["speed"].value == pytest.approx(np.linalg.norm(replay.frame().vel[2]))
-    assert replay.entity(10_000) is None
+def test_chunks_cover_all_frames_and_share_their_ends():
+    counts = np.full(1000, 100)
+    bounds = chunk_bounds(counts, 3000, 4)
+    assert bounds[0][0] == 0
+    assert bounds[-1][1] == 999
+    assert all(a[1] == b[0] for a, b in pairwise(bounds))
+    assert {last - first for first, last in bounds[:-1]} == {29}
+    assert chunk_bounds(np.array([5]), 100, 4) == [(0, 0)]
+    assert chunk_bounds(np.full(9, 10**6), 100, 4) == [(0, 3), (3, 6), (6, 8)]
+    assert chunk_bounds(np.zeros(5000, int), 100, 4)[0] == (0, 1023)
 
 
-def test_a_replay_on_the_page_plays_and_jumps_to_events(runs):
-    replay = Replay(Recording(runs[0]), is_paused=True)
-    with Page(replay, mission=replay.mission, viewer=replay.viewer) as page, PageClient(page.url) as client:
-        client.wait(page.visitors)
-        client.set("Jump", "Next event")
-        first = min(h.t for h in replay.happenings if h.t > 0.0)
-        client.wait(lambda: replay.t == first)
-        client.wait(lambda: client.value("Time [s]") == pytest.approx(first))
-        events = client.inputs[client.id_of("Event")]["options"]
-        assert len(events) > 3
-        client.set("Event", events[-1])
-        client.wait(lambda: replay.t > first)
-        t = replay.t
-        assert events[-1].split()[1] == f"{t:.2f}"
-        client.set("Jump", "Last event")
-        client.wait(lambda: replay.t < t)
-        client.set("Time [s]", 1.0)
-        client.wait(lambda: replay.t == 1.0)
-        client.set("Run", "Play")
-        client.wait(lambda: replay.t > 1.2)
-        client.wait(lambda: np.allclose(client.positions("aircraft"), page.source.frame().pos, atol=30.0))
-        assert not [c for c in client.commands.values() if c["description"] == "O"], "nobody hears of a point"
-        assert page.error is None
+@pytest.mark.parametrize("is_mapped", [False, True])
+def test_a_served_run_is_what_was_recorded(runs, monkeypatch, is_mapped):
+    monkeypatch.setattr(recorded_data, "SERVED_STATES", 100)
+    recording = Recording(runs[0], is_mapped=is_mapped)
+    with Page(recording, warp=2.0, is_paused=True) as page:
+
+        def blob(name):
+            with urlopen(f"{page.url}/{name}", timeout=60) as answer:
+                return answer.read()
+
+        document = json.loads(blob("").split(b'id="document">')[1].split(b"</script>")[0])
+        assert (document["source"], document["warp"], document["isPlaying"]) == ("range", 2.0, False)
+        assert (Bytes(blob("times")).reals(document["nFrames"]) == recording.t).all()
+        assert len(document["chunks"]) > 5
+        for i, (first, last) in enumerate(document["chunks"]):
+            chunk = read_chunk(blob(f"chunk-{i}"))
+            for k in range(first, last + 1):
+                frame, seen = recording.frame(k), chunk.frames[k - first]
+                assert sorted(seen) == frame.id.tolist()
+                off = np.array([seen[who].pos for who in frame.id.tolist()]) - frame.pos
+                assert np.linalg.norm(off, axis=1).max() <= document["positionError"] + 1e-11
+        assert len(json.loads(blob("events"))["t"]) == len(recording.events)
+        assert sum(n[0] for n in document["curves"]["n"]) == len(recording.frame(0))
+        with pytest.raises(HTTPError, match="404"):
+            blob("chunk-999")
+
+
+def test_data_that_cannot_be_made_is_told_and_the_page_goes_on(runs, monkeypatch):
+    with Page(Recording(runs[0])) as page:
+
+        def fail(*_):
+            raise RuntimeError("no such thing")
+
+        monkeypatch.setattr(recorded_data, "pack", fail)
+        with pytest.raises(HTTPError, match="500") as told:
+            urlopen(f"{page.url}/chunk-0", timeout=60)
+        assert b"the page: RuntimeError: no such thing" in told.value.read()
+        assert isinstance(page.error, RuntimeError)
+        with urlopen(f"{page.url}/times", timeout=60) as answer:
+            assert answer.status == 200
+
+
+def test_a_run_that_stays_in_its_file_is_the_same_run(runs):
+    whole, mapped = Recording(runs[0]), Recording(runs[0], is_mapped=True)
+    assert (mapped.t == whole.t).all()
+    assert (mapped.counts == whole.counts).all()
+    assert (mapped.blocks, mapped.teams, mapped.is_complete) == (whole.blocks, whole.teams, True)
+    for i in (0, 17, -1):
+        for name in ("id", "team", "block", "pos", "quat", "vel", "health"):
+            assert (getattr(mapped.frame(i), name) == getattr(whole.frame(i), name)).all()
+    for one, other in zip(mapped.extent, whole.extent, strict=True):
+        assert one == pytest.approx(other, abs=1.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "told"),
+    [("x", np.nan, "not finite"), ("id", 3, "ids do not ascend"), ("qw", np.inf, "not finite")],
+)
+def test_a_wrong_value_of_a_run_that_stays_in_its_file_is_told_when_it_is_seen(
+    tmp_path, monkeypatch, name, value, told
+):
+    monkeypatch.setattr("tussle.view.recording.MOST_SAMPLED", 2)
+    directory = recorded(tmp_path / "run")
+    path = directory / "trajectory.arrow"
+    batches = list(pa.ipc.open_stream(path.read_bytes()))
+    schema = batches[0].schema
+    with pa.OSFile(str(path), "wb") as file, pa.ipc.new_stream(file, schema) as writer:
+        for batch in batches:
+            values, rows = np.asarray(batch[name]).copy(), np.flatnonzero(np.asarray(batch["step"]) == 5)
+            values[rows[7:8]] = value
+            columns = [pa.array(values) if field.name == name else batch[field.name] for field in schema]
+            writer.write_batch(pa.RecordBatch.from_arrays(columns, schema=schema))
+    recording = Recording(directory, is_mapped=True)
+    recording.frame(4)
+    with pytest.raises(RecordError, match=f"step 5: .*{told}"):
+        recording.frame(5)
 
 
 # -- two runs ---------------------------------------------------------------------------------------------------------------------
@@ -122,17 +136,18 @@ def test_a_replay_on_the_page_plays_and_jumps_to_events(runs):
 def test_the_same_game_twice_does_not_differ(runs):
     one, longer = Recording(runs[0]), Recording(runs[1])
     assert first_difference(one, longer) is None
-    notes = Comparison(one, longer).notes
-    assert any("do not differ up to t = 4 s" in note for note in notes)
+    assert "do not differ up to t = 4 s" in Comparison(one, longer).lead
 
 
 def test_two_runs_begin_where_they_part_and_say_what_differs(runs):
-    a, b = Recording(runs[0]), Recording(runs[2])
-    pair = Comparison(a, b, is_paused=True)
+    pair = Comparison(Recording(runs[0]), Recording(runs[2]))
     assert pair.difference.step == 0
-    assert pair.t == 0.0
-    assert any("they differ first at t = 0 s (step 0): pos of entities" in note for note in pair.notes)
-    assert any(h.kind == "difference" for h in pair.happenings)
+    assert "they differ first at t = 0 s (step 0): pos of entities" in pair.lead
+    assert pair.lead in pair.notes
+    assert any(event.kind == "difference" for event in pair.events)
+    with Page(pair) as page, urlopen(page.url, timeout=60) as answer:
+        assert b"they differ first at t = 0 s" in answer.read()
+        assert pair.lead in page.notes
 
 
 def test_the_first_difference_is_found_after_a_common_beginning(tmp_path):
@@ -150,27 +165,26 @@ def test_the_first_difference_is_found_after_a_common_beginning(tmp_path):
 
 def test_runs_side_by_side_stand_apart_and_over_each_other_do_not(runs):
     a, b = Recording(runs[0]), Recording(runs[2])
-    beside, over = Comparison(a, b, is_paused=True), Comparison(a, b, is_over_each_other=True, is_paused=True)
+    beside, over = Comparison(a, b), Comparison(a, b, is_over_each_other=True)
     n = len(a.at(0.0))
-    assert beside.frame().pos[n:, 0].min() > beside.frame().pos[:n, 0].max()
-    assert np.array_equal(over.frame().pos[n:], b.at(0.0).pos)
-    frame = over.frame()
+    assert beside.frame(0).pos[n:, 0].min() > beside.frame(0).pos[:n, 0].max()
+    assert np.array_equal(over.frame(0).pos[n:], b.at(0.0).pos)
+    frame = over.frame(0)
     assert (np.diff(frame.id) > 0).all()
-    assert over.name_of(frame, 0).startswith("A prey 1")
-    assert over.name_of(frame, n).startswith("B prey 1")
-    assert over.looks.block_colour(0) != over.looks.block_colour(len(a.blocks))
-    assert over.entity(int(frame.id[n])).block == "B prey"
+    assert (frame.id[n:] - over.id_shift == b.frame(0).id).all()
+    assert [over.blocks[frame.block[i]] for i in (0, n)] == ["A prey", "B prey"]
+    assert over.style.block_colour(0) != over.style.block_colour(len(a.blocks))
+    assert over.counts[0] == len(frame)
+    assert (beside.scenery.high[0] - beside.scenery.low[0]) > (over.scenery.high[0] - over.scenery.low[0])
 
 
-def test_two_runs_on_the_page(runs):
-    pair = Comparison(Recording(runs[0]), Recording(runs[2]), is_paused=True)
-    with Page(pair, mission=pair.mission, viewer=pair.viewer) as page, PageClient(page.url) as client:
-        client.wait(page.visitors)
-        client.wait(lambda: client.text("they differ first"))
-        assert len(client.positions("aircraft")) == len(pair.frame())
-        client.press("Space")
-        client.wait(lambda: pair.t > 0.0)
-        assert page.error is None
+def test_one_that_has_ended_stays_as_it_was(runs):
+    pair = Comparison(Recording(runs[0]), Recording(runs[1]))
+    assert len(pair.t) == 51
+    last = pair.frame(50)
+    assert (last.pos[: len(pair.a.frame(-1))] == pair.a.frame(-1).pos).all()
+    data = RecordedData(pair, is_file=False)
+    assert sorted(read_chunk(data.blob("chunk-0")).frames[0]) == pair.frame(0).id.tolist()
 
 
 def test_who_is_in_one_run_only_is_named(runs):
@@ -181,10 +195,12 @@ def test_who_is_in_one_run_only_is_named(runs):
     assert what_differs(frame, frame) == ""
 
 
-def test_a_run_without_moments_cannot_be_compared(runs, tmp_path):
+def test_a_run_without_moments_cannot_be_compared_or_served(runs, tmp_path):
     with Simulation(hunt(), 3) as simulation, Recorder(simulation, tmp_path / "none"):
         pass
     empty = Recording(tmp_path / "none")
     empty.t = empty.t[:0]
     with pytest.raises(ViewError, match="nothing was recorded"):
         Comparison(Recording(runs[0]), empty)
+    with pytest.raises(ViewError, match="nothing was recorded"):
+        Page(empty)

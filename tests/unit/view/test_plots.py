@@ -361,8 +361,8 @@ def test_two_that_have_no_distance_are_told(hunted, tmp_path):
     with pytest.raises(ParameterError, match="from entity 3 to itself"):
         distance(Recording(hunted), 3, 3)
     recording = Recording(hunted)
-    dead = next(h for h in recording.happenings if h.kind == "death")
-    late = next(h for h in recording.happenings if h.kind == "birth" and h.t > dead.t)
+    dead = next(h for h in recording.events if h.kind == "death")
+    late = next(h for h in recording.events if h.kind == "birth" and h.t > dead.t)
     with pytest.raises(
         ParameterError, match=f"entities {dead.id} and {late.id} are never there together: {dead.id} is"
     ):
@@ -380,7 +380,7 @@ def test_who_is_left_is_counted_in_each_frame_and_deaths_are_marked_on_the_curve
         t, n = curves[colour].get_data()
         assert list(n) == [int((recording.at(x).team == team).sum()) for x in t]
     crosses = [line for line in figure.axes[0].lines if line.get_marker() == "x"]
-    deaths = [h for h in recording.happenings if h.kind == "death"]
+    deaths = [h for h in recording.events if h.kind == "death"]
     assert len(crosses) == len(deaths) > 0
     for cross, death in zip(crosses, sorted(deaths, key=lambda h: h.t), strict=True):
         (t,), (n,) = cross.get_data()
@@ -392,7 +392,7 @@ def test_who_is_left_is_counted_in_each_frame_and_deaths_are_marked_on_the_curve
 def test_captures_are_counted_for_who_made_them_and_collisions_for_all(hunted, collided):
     recording = Recording(hunted)
     figure = captures(Tracks(recording))
-    caught = [h.t for h in recording.happenings if h.kind == "capture"]
+    caught = [h.t for h in recording.events if h.kind == "capture"]
     (curve,) = lines_by_colour(figure.axes[0]).values()
     assert (curve.get_color(), curve.get_ydata()[-1]) == (COLOURS[2], len(caught))
     np.testing.assert_array_equal(curve.get_xdata()[1:-1], caught)

@@ -70,7 +70,7 @@ def test_what_it_says_of_the_mission_without_having_the_file(played):
     assert recording.mission is None
     assert recording.viewer == {}
     assert recording.notes == ["mission.xml is not there: a mission that was built in Python leaves none"]
-    assert [recording.looks.model(b) for b in range(3)] == ["aircraft"] * 3
+    assert [recording.style.model(b) for b in range(3)] == ["aircraft"] * 3
 
 
 def test_the_extent_holds_all_positions_of_its_world_and_no_others(played):
@@ -85,7 +85,7 @@ def test_the_extent_holds_all_positions_of_its_world_and_no_others(played):
 def test_happenings_are_those_of_its_world_in_order(played):
     for world in range(3):
         recording = Recording(played[0], world)
-        told = recording.happenings
+        told = recording.events
         assert [h.t for h in told] == sorted(h.t for h in told)
         assert [h.kind for h in told].count("birth") == 9
         deaths = [h for h in told if h.kind == "death"]
@@ -193,8 +193,8 @@ def test_the_mission_of_the_run_with_its_colours(tmp_path):
     assert recording.mission == loaded.mission
     assert recording.viewer == loaded.viewer
     assert recording.name == loaded.mission.name
-    assert recording.looks.block_colour(0) == (77, 77, 255)
-    assert recording.looks.model(0) == "aircraft"
+    assert recording.style.block_colour(0) == (77, 77, 255)
+    assert recording.style.model(0) == "aircraft"
     assert recording.notes == []
 
 

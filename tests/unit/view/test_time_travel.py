@@ -145,14 +145,14 @@ def test_happenings_of_a_future_that_will_not_be_are_forgotten():
     game = hunt()
     live = Live(Simulation(game.replace(blocks=[*game.blocks, block])), threaded=False)
     live.step(60)
-    all_told = live.happenings
+    all_told = live.events
     assert {h.kind for h in all_told} >= {"birth", "death", "end"}
     live.seek(1.2)
     live.publish_click((1.0, 2.0, 3.0))
-    assert live.happenings == [h for h in all_told if h.t < 1.15]
+    assert live.events == [h for h in all_told if h.t < 1.15]
     live.step(60)
-    assert [h.kind for h in live.happenings].count("birth") == [h.kind for h in all_told].count("birth")
-    assert live.happenings[-1].kind == "end"
+    assert [h.kind for h in live.events].count("birth") == [h.kind for h in all_told].count("birth")
+    assert live.events[-1].kind == "end"
 
 
 # -- recorders ------------------------------------------------------------------------------------------------------------------------

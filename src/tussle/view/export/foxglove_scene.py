@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from tussle.view.export.foxglove_schemas import LINE_LIST, PRIMITIVES
-from tussle.view.looks import Colour
 from tussle.view.recording import Recording
 from tussle.view.scenery import Scenery
 from tussle.view.shapes import Mesh
+from tussle.view.style import Colour
 
 Json = dict[str, Any]
 
@@ -113,18 +113,18 @@ def text(words: str, rgb: Colour, at: Sequence[float]) -> Json:
 
 def standing(recording: Recording, ns: int) -> list[Json]:
     """Bases, boundaries, terrain and origin of a run."""
-    scenery, looks = recording.scenery, recording.looks
+    scenery, style = recording.scenery, recording.style
     found = [_origin(scenery, ns)] if scenery.origin_length > 0.0 else []
     for i, base in enumerate(scenery.bases, 1):
         size = {"x": 2.0 * base.radius, "y": 2.0 * base.radius, "z": 2.0 * base.radius}
         sphere = {
             "pose": pose(base.pos.tolist()),
             "size": size,
-            "color": colour(looks.colour(base.team), 0.35 * base.opacity),
+            "color": colour(style.colour(base.team), 0.35 * base.opacity),
         }
         found.append(entity(f"base {i}", WORLD, ns, notes=[("team", str(base.team))], spheres=[sphere]))
     for region in scenery.boundaries:
-        rgb = looks.colour(region.team) if region.team else NOBODYS  # team 0 is nobody's
+        rgb = style.colour(region.team) if region.team else NOBODYS  # team 0 is nobody's
         surface = triangles(region.mesh, rgb, 0.3 if region.is_wall else 0.06)
         found.append(entity(region.name, WORLD, ns, triangles=[surface], lines=[lines(region.outline, rgb)]))
     if scenery.terrain is not None:

@@ -25,11 +25,11 @@ import numpy as np
 from tussle.errors import MissingExtraError, ParameterError, ViewError
 from tussle.view.export import foxglove_schemas as schemas
 from tussle.view.export.film.survey import crowd_of
-from tussle.view.export.foxglove_cast import Cast, Log
+from tussle.view.export.foxglove_entities import Log, SceneEntities
 from tussle.view.export.foxglove_scene import WORLD, as_json, stamp, standing
-from tussle.view.export.html import kept_frames
 from tussle.view.export.whole_file import whole_file
 from tussle.view.frame import Frame
+from tussle.view.page.recorded import kept_frames
 from tussle.view.recording import Recording
 
 CHUNK = 1 << 20
@@ -98,16 +98,16 @@ def write_mcap(
         part.open("wb") as file,
         Messages(file, recording, report) as messages,
     ):
-        cast = Cast(recording, kept, messages.put, messages.ns, scale * usual_scale(recording))
+        entities = SceneEntities(recording, kept, messages.put, messages.ns, scale * usual_scale(recording))
         first = float(recording.t[0])
         messages.put("/scene", first, {"deletions": [], "entities": standing(recording, messages.ns(first))})
-        log = Log(recording, messages.put, messages.ns, cast)
+        log = Log(recording, messages.put, messages.ns, entities)
         for n, i in enumerate(kept, 1):
             frame = recording.frame(int(i))
-            cast.meet(frame)
+            entities.meet(frame)
             log.until(frame.t)
-            cast.tell(frame)
-            messages.put_transforms(frame, cast)
+            entities.tell(frame)
+            messages.put_transforms(frame, entities)
             messages.put_teams(frame)
             if show is not None:
                 show(n, len(kept))
@@ -123,7 +123,7 @@ def usual_scale(recording: Recording) -> float:
         for i in np.unique(np.linspace(0, recording.n_frames - 1, N_SPACINGS).round())
     ]
     known = [s for s in spacings if math.isfinite(s)]
-    longest = max((recording.looks.scale(b) for b in range(len(recording.blocks))), default=1.0)
+    longest = max((recording.style.scale(b) for b in range(len(recording.blocks))), default=1.0)
     return max(1.0, SPACING * float(np.median(known)) / longest) if known else 1.0
 
 
@@ -186,12 +186,12 @@ class Messages:
         self._writer.add_message(self._channels[topic], ns, data, ns, n)
         self._report.n_messages[topic] = n + 1
 
-    def put_transforms(self, frame: Frame, cast: Cast) -> None:
+    def put_transforms(self, frame: Frame, entities: SceneEntities) -> None:
         """Add where all entities are; put together by hand, for there are millions of them."""
         ns = self.ns(frame.t)
         when = as_json(stamp(ns)).decode()
         parts = [
-            f'{{"timestamp":{when},"parent_frame_id":"{WORLD}","child_frame_id":{cast.quoted[who]},'
+            f'{{"timestamp":{when},"parent_frame_id":"{WORLD}","child_frame_id":{entities.quoted[who]},'
             f'"translation":{{"x":{x:.4f},"y":{y:.4f},"z":{z:.4f}}},'
             f'"rotation":{{"x":{qx:.6f},"y":{qy:.6f},"z":{qz:.6f},"w":{qw:.6f}}}}}'
             for who, (x, y, z), (qw, qx, qy, qz) in zip(

@@ -8,6 +8,8 @@ import secrets
 import socket
 from collections.abc import Sequence
 
+from tussle.errors import ViewError
+
 LOOPBACK_NAMES = ("127.0.0.1", "localhost", "[::1]")
 EVERYWHERE = ("0.0.0.0", "::")  # noqa: S104 - they are compared, not bound
 TOKEN_BYTES = 16
@@ -15,8 +17,9 @@ MOST_BROWSERS = 32
 """That are connected at once."""
 MOST_BYTES = 16 * 1024
 """Of one message from a browser; the longest that a control sends has some hundred."""
-MOST_MESSAGES = 200
-"""From one browser in a second, and at once: it sends 50 while the view is turned. More wait."""
+PORT = 8123
+"""Where it is served when no port is asked for and this one is free; else at one of the next."""
+MOST_PORTS = 100
 HEADERS = {
     "Referrer-Policy": "no-referrer",
     "Content-Security-Policy": "frame-ancestors 'none'",
@@ -62,10 +65,6 @@ class Access:
             return "The address is not complete: take all of it from where tussle was started.\n"
         return ""
 
-    def path_within(self, path: str) -> str:
-        """The part of a path behind the token."""
-        return "/" + path.removeprefix(f"/{self.token}").removeprefix("/")
-
     def _is_served(self, host: str) -> bool:
         name, _, port = host.lower().rpartition(":")
         if port != str(self._port):
@@ -80,3 +79,31 @@ def _is_own(name: str) -> bool:
     except ValueError:
         return name == socket.gethostname().lower()
     return True
+
+
+def bound_socket(host: str, wanted: int | None) -> socket.socket:
+    """A socket at a port that can be served at: the one that is wanted, or the first free one.
+
+    Raises:
+        ViewError: There is none, the one that is wanted is taken, or the host is not this machine's.
+    """
+    ports = [wanted] if wanted is not None else list(range(PORT, PORT + MOST_PORTS))
+    refusal: OSError | None = None
+    for port in ports:
+        try:
+            family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+            bound = socket.socket(family, kind, protocol)
+        except OSError as error:
+            refusal = error
+            break
+        try:
+            bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            bound.bind(address)
+            bound.listen()
+        except OSError as error:
+            refusal = error
+            bound.close()
+        else:
+            return bound
+    where = f"port {wanted}" if wanted is not None else f"ports {PORT} to {PORT + MOST_PORTS - 1}"
+    raise ViewError(f"the page cannot be served at {host}, {where}: {refusal}")

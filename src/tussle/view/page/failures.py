@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import traceback
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 from tussle.errors import TussleError
 
@@ -14,9 +13,6 @@ MOST_FAILURES = 20
 """That are listed."""
 LONGEST = 300
 """Characters of one."""
-
-Safe = Callable[[Callable[[Any], Any]], Callable[[Any], Awaitable[None]]]
-"""Makes what a control does into a callback whose errors are told."""
 
 
 class Failures:
@@ -31,14 +27,14 @@ class Failures:
         self.texts: list[str] = []
         self.last: BaseException | None = None
 
-    def tell(self, error: BaseException) -> None:
-        """Put an error on the list."""
+    def tell(self, error: BaseException) -> str:
+        """Put an error on the list; its line."""
         self.last = error
         text = _in_words(error)
-        if text in self.texts or len(self.texts) > MOST_FAILURES:
-            return
-        is_full = len(self.texts) == MOST_FAILURES
-        self.texts.append("further errors of the page are not listed" if is_full else text)
+        if text not in self.texts and len(self.texts) <= MOST_FAILURES:
+            is_full = len(self.texts) == MOST_FAILURES
+            self.texts.append("further errors of the page are not listed" if is_full else text)
+        return text
 
     @contextlib.contextmanager
     def caught(self) -> Iterator[None]:
@@ -47,18 +43,6 @@ class Failures:
             yield
         except Exception as error:  # noqa: BLE001 - whatever it is, whoever watches reads it
             self.tell(error)
-
-    def safe(self, do: Callable[[Any], Any]) -> Callable[[Any], Awaitable[None]]:
-        """A callback that does this, and tells where it fails.
-
-        It is asynchronous, so that what browsers send is done in its order, each with the value of its own.
-        """
-
-        async def told(event: Any) -> None:
-            with self.caught():
-                do(event)
-
-        return told
 
 
 def _in_words(error: BaseException) -> str:

@@ -1,227 +1,185 @@
-"""Serves the page."""
+"""Serves the page of a game: live, recorded, or two recorded ones."""
 
 from __future__ import annotations
 
-import contextlib
+import asyncio
 import ipaddress
+import logging
 import threading
-from collections.abc import Iterator, Mapping
-from typing import Any, Self
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Self
 
 from tussle.errors import MissingExtraError, ViewError
 from tussle.mission import Mission
-from tussle.view.frame import Frame
 from tussle.view.live import Live
-from tussle.view.page.access import Access
-from tussle.view.page.camera import FIELD_OF_VIEW, opening
-from tussle.view.page.comparing import Comparison
-from tussle.view.page.display import Display
-from tussle.view.page.drawn import Drawn
+from tussle.view.page.access import HEADERS, MOST_BROWSERS, MOST_BYTES, Access, bound_socket
+from tussle.view.page.assemble import page_html
+from tussle.view.page.compare import Comparison
+from tussle.view.page.document import game_document, terrain_bytes
 from tussle.view.page.failures import Failures
-from tussle.view.page.ground import background_image, draw_ground, light
-from tussle.view.page.guard import Guard, bound_socket
-from tussle.view.page.keyboard import Keyboard
-from tussle.view.page.labels import Labels
-from tussle.view.page.overlays import Overlays
-from tussle.view.page.panel import Panel
-from tussle.view.page.pusher import Parts, Pusher
-from tussle.view.page.source import Source
-from tussle.view.page.stage import Stage
-from tussle.view.page.trails import Trails
-from tussle.view.page.visitor import Visitor
+from tussle.view.page.publisher import Publisher
+from tussle.view.page.recorded import RecordedData
+from tussle.view.recording import Recording
+
+if TYPE_CHECKING:
+    from aiohttp import web
 
 LOOPBACK = "127.0.0.1"
 MOST_PERIOD = 60.0
 """Between two frames [s]: longer is no moving picture."""
-TEAL = (0, 110, 120)
 
 
 class Page:
     """A game on a page in the browser, from when this is made until `stop`.
 
     Nothing on the page reads files or runs code, and it asks no other server for anything. Only who has the whole address opens it,
-    and what a browser sends is checked before anything is done (`tussle.view.page.access`, `tussle.view.page.incoming`). Closing all
-    browsers leaves the game going; a browser that is slow sees fewer frames and holds nothing up.
+    and what a browser sends is checked before anything is done (`tussle.view.page.access`, `tussle.view.page.commands`). Closing all
+    browsers leaves the game going; a browser that is slow sees fewer frames and holds nothing up. All browsers share the time of a
+    live game; of a recorded one, each has its own.
 
     Args:
-        source: The game. The page does not stop it when it is stopped itself.
+        game: The game. The page does not stop it when it is stopped itself.
         host: Address that it is served at; others than the loopback's can be reached from other machines.
         port: Its port; None takes the first free one from 8123 on.
-        mission: The mission, for how far plugins reach; None where it is not known.
-        viewer: What the mission file says for the viewer, see `tussle.mission.Loaded`.
+        mission: The mission, for how far plugins reach; None takes that of the game.
+        viewer: What the mission file says for the viewer, see `tussle.mission.Loaded`; None takes that of the game.
+        warp: Simulated seconds per second at which a recorded game begins; None is as fast as can be shown.
+        is_paused: Whether a recorded game stands still at first.
+        one_steers: Of a live game, only the browser that came first steers it; otherwise all do.
 
     Attributes:
+        game: The game.
         host: Where it is served.
-        display: What is shown.
+        port: Its port.
         url: Its whole address, as typed on this machine.
         is_local: Only this machine can reach it.
+        notes: What the user should know, one line each.
 
     Raises:
-        MissingExtraError: viser is not installed.
-        ViewError: It cannot be served there, or not by this version of viser.
+        MissingExtraError: aiohttp is not installed.
+        ViewError: It cannot be served there, or there is nothing to show.
     """
 
     def __init__(
         self,
-        source: Source,
+        game: Live | Recording | Comparison,
         *,
         host: str = LOOPBACK,
         port: int | None = None,
         mission: Mission | None = None,
         viewer: Mapping[str, Any] | None = None,
+        warp: float | None = 1.0,
+        is_paused: bool = False,
+        one_steers: bool = False,
     ) -> None:
-        viser = _viser()
-        self.source, self.host = source, host or LOOPBACK
-        viewer = viewer or {}
-        frame = source.frame()
-        self.display = Display.of(frame, source.looks, source.scenery, viewer, mission)
-        self._visitors: dict[int, Visitor] = {}
-        self._lock = threading.Lock()
+        _check_extra()
+        self.game, self.host = game, host or LOOPBACK
         self._failures = Failures()
-        self._own_notes: list[str] = []
-        self._period = self._read_period(viewer.get("gui_update_period"))
-        self._opening = opening(source.scenery, viewer.get("camera"))
-        self._own_notes += self._opening.notes
-        self._server = self._start(viser, port)
-        self._is_stopped = False
-        try:
-            self._set_scene(frame)
-        except BaseException:
-            self._stop_serving()
-            raise
-        self._server.on_client_connect(self._failures.safe(self._welcome))
-        self._server.on_client_disconnect(self._failures.safe(self._farewell))
-
-    def _start(self, viser: Any, port: int | None) -> Any:
-        """Viser's server, behind a guard."""
+        viewer = dict(game.viewer if viewer is None else viewer)
+        notes: list[str] = []
+        self._data: RecordedData | None = None
+        self.publisher: Publisher | None = None
+        if isinstance(game, Live):
+            self.publisher = Publisher(game, self._failures, _period(viewer, notes), one_steers)
+            document = (
+                game_document(game, mission or game.simulation.mission, viewer) | self.publisher.document()
+            )
+            self._terrain = terrain_bytes(game.scenery)
+        else:
+            self._data = RecordedData(game, is_file=False, viewer=viewer)
+            begins = (
+                game.difference.t if isinstance(game, Comparison) and game.difference else float(game.t[0])
+            )
+            lead = game.lead if isinstance(game, Comparison) else ""
+            document = self._data.document(begins=begins, warp=warp, isPlaying=not is_paused, lead=lead)
+        document["notes"] = self.notes = [*notes, *document["notes"]]
+        self._html = page_html(document)
         bound = bound_socket(self.host, port)
         address, self.port = bound.getsockname()[:2]
         self.is_local = ipaddress.ip_address(address).is_loopback
-        access = Access(self.host, self.port)
-        self.url = access.url
-        guard = Guard(bound, access, self._find, self._refuse, self._failures.tell)
-        try:
-            with guard.in_place(), _silence():
-                server = _server_class(viser)(
-                    host=self.host, port=self.port, label=f"tussle · {self.source.name}", verbose=False
-                )
-                if not guard.is_in_place:
-                    server.stop()
-        except BaseException:
-            bound.close()
-            raise
-        if not guard.is_in_place:
-            bound.close()
-            raise ViewError("viser did not start its server as expected; without its guard nothing is served")
-        return server
-
-    def _set_scene(self, frame: Frame) -> None:
-        server, source, display = self._server, self.source, self.display
-        gui, scene, looks, blocks = server.gui, server.scene, source.looks, len(source.blocks)
-        gui.configure_theme(
-            show_share_button=False, show_logo=False, control_width="medium", brand_color=TEAL
+        self._access = Access(self.host, self.port)
+        self.url = self._access.url
+        self._bound = bound
+        is_up = threading.Event()
+        self._thread = threading.Thread(
+            target=lambda: asyncio.run(self._serve(is_up)), name="tussle page", daemon=True
         )
-        gui.main_panel.dock_right()
-        light(scene)
-        if source.scenery.background is not None:
-            scene.set_background_image(background_image(source.scenery))
-        self._set_first_view()
-        draw_ground(scene, source.scenery, looks)
-        if isinstance(source, Comparison) and source.shift.any():
-            scene.add_frame("/beside", show_axes=False, position=tuple(source.shift))
-            draw_ground(scene, source.b.scenery, looks, "/beside", has_grid=False)
-        safe = self._failures.safe
-        panel = Panel(gui, source, display, self.visitor, safe)
-        Keyboard(gui, source, panel, self.visitor, safe)
-        stage = Stage(scene, blocks, looks, display, self._clicked, safe)
-        parts = Parts(
-            stage, Labels(scene, display, self.name_of), Trails(scene, source, looks, blocks, display),
-            Overlays(scene, looks, blocks, display), Drawn(scene), panel,
-        )  # fmt: skip
-        stage.show(frame)
-        panel.show(frame, 0.0)
-        self.pusher = Pusher(server, source, display, parts, self.visitors, self._failures, self._period)
+        self._thread.start()
+        is_up.wait()
 
-    def _read_period(self, text: Any) -> float:
-        """Time between frames as the mission has it, in ms there [s]; 0 where it says nothing of use."""
+    # -- the server -----------------------------------------------------------------------------------------------------------------
+
+    async def _serve(self, is_up: threading.Event) -> None:
+        """Serve until `stop`."""
+        from aiohttp import web
+
+        self._loop, self._stopping = asyncio.get_running_loop(), asyncio.Event()
+        self._loop.set_exception_handler(
+            lambda _, context: self._failures.tell(context.get("exception") or ViewError(context["message"]))
+        )
+        app = web.Application()
+        app.router.add_get("/{tail:.*}", self._admit)
+        app.on_response_prepare.append(_set_headers)
+        log = logging.getLogger(__name__)  # silent: a traceback for each port scan is no news
+        log.addHandler(logging.NullHandler())
+        log.propagate = False
+        runner = web.AppRunner(app, access_log=None, logger=log, handle_signals=False, shutdown_timeout=0.1)
+        await runner.setup()
+        await web.SockSite(runner, self._bound).start()
+        tasks = [asyncio.create_task(self.publisher.run())] if self.publisher else []
+        is_up.set()
+        await self._stopping.wait()
+        for task in tasks:
+            task.cancel()
+        await runner.cleanup()
+
+    async def _admit(self, request: web.Request) -> web.StreamResponse:
+        """Answer a request, or refuse it."""
+        from aiohttp import web
+
+        headers = request.headers
+        reason = self._access.refusal(
+            request.raw_path, headers.getall("Host", []), headers.getall("Origin", [])
+        )
+        return web.Response(status=403, text=reason) if reason else await self._answer(request)
+
+    async def _answer(self, request: web.Request) -> web.StreamResponse:
+        """The page, its socket, or data by name."""
+        from aiohttp import web
+
+        name = request.path.strip("/").partition("/")[2]
+        if not name and "Upgrade" in request.headers and self.publisher is not None:
+            if len(self.publisher.readers) >= MOST_BROWSERS:
+                return web.Response(status=403, text=f"{MOST_BROWSERS} browsers watch already.\n")
+            socket = web.WebSocketResponse(max_msg_size=MOST_BYTES, compress=False, timeout=1.0)
+            await socket.prepare(request)
+            await self.publisher.serve(socket)
+            return socket
+        if not name:
+            return web.Response(text=self._html, content_type="text/html")
+        data = None
         try:
-            period = 0.0 if text is None else 1e-3 * float(text)
-        except ValueError:
-            period = -1.0
-        if not 0.0 <= period < MOST_PERIOD:
-            self._own_notes.append(
-                f"gui_update_period {text!r} is no time in ms; frames are sent as fast as can be"
-            )
-            return 0.0
-        return period
+            if self._data is not None:
+                data = await asyncio.to_thread(self._data.blob, name)
+            elif name == "terrain":
+                data = self._terrain
+        except Exception as error:  # noqa: BLE001 - whatever it is, whoever watches reads it, and the page goes on
+            return web.Response(status=500, text=self._failures.tell(error))
+        if data is None:
+            return web.Response(status=404, text="There is nothing of this name.\n")
+        return web.Response(body=data, content_type="application/octet-stream")
 
-    def _set_first_view(self) -> None:
-        view, camera = self._opening.view, self._server.initial_camera
-        size = self.source.scenery.size
-        camera.position, camera.look_at = tuple(view.position), tuple(view.target)
-        camera.fov = FIELD_OF_VIEW
-        camera.near, camera.far = 1e-4 * size, 100.0 * size
-
-    # -- who watches --------------------------------------------------------------------------------------------------------------
-
-    def _welcome(self, client: Any) -> None:
-        visitor = Visitor(client, self.source, self.display, self.name_of, self._failures.safe)
-        if self._opening.follow is not None:
-            visitor.choose(self._opening.follow)
-        visitor.set_mode(self._opening.mode)
-        with self._lock:
-            self._visitors[client.client_id] = visitor
-
-    def _farewell(self, client: Any) -> None:
-        with self._lock:
-            self._visitors.pop(client.client_id, None)
-
-    def visitors(self) -> list[Visitor]:
-        """Those who watch now."""
-        with self._lock:
-            return list(self._visitors.values())
-
-    def visitor(self, number: int) -> Visitor | None:
-        """One who watches, by the number of its client; None once it is gone."""
-        with self._lock:
-            return self._visitors.get(number)
-
-    def _clicked(self, number: int, who: int) -> None:
-        visitor = self.visitor(number)
-        if visitor is not None:
-            visitor.choose(who)
-
-    def name_of(self, frame: Frame, row: int) -> str:
-        """What to call the entity in a row of a frame: its block's name and its id."""
-        if isinstance(self.source, Comparison):
-            return self.source.name_of(frame, row)
-        return f"{self.source.blocks[int(frame.block[row])]} {int(frame.id[row])}"
-
-    # -- what they send -----------------------------------------------------------------------------------------------------------
-
-    def _visitor_on(self, connection: Any) -> Visitor | None:
-        connections = self._server._websock_server._live_connections
-        return self.visitor(next((n for n, other in list(connections.items()) if other is connection), -1))
-
-    def _find(self, connection: Any, uuid: str) -> Any:
-        """The control with an id, of the shared panel or of a browser's own; None where there is none."""
-        visitor = self._visitor_on(connection)
-        panels = [self._server.gui] if visitor is None else [self._server.gui, visitor.gui]
-        found = (panel._gui_input_handle_from_uuid.get(uuid) for panel in panels)
-        return next((control for control in found if control is not None), None)
-
-    def _refuse(self, connection: Any, label: str, reason: str) -> None:
-        visitor = self._visitor_on(connection)
-        if visitor is not None:
-            visitor.refuse(label, reason)
-
-    # -- the server ---------------------------------------------------------------------------------------------------------------
+    # -- what it says ---------------------------------------------------------------------------------------------------------------
 
     @property
-    def notes(self) -> list[str]:
-        """What the user should know, one line each."""
-        notes = [*self._own_notes, *self.source.looks.notes, *self.source.scenery.notes, *self.source.notes]
-        return list(dict.fromkeys(notes))
+    def n_readers(self) -> int:
+        """Browsers that watch a live game now."""
+        return len(self.publisher.readers) if self.publisher else 0
+
+    @property
+    def game_error(self) -> Exception | None:
+        """What stopped a live game; None while nothing has."""
+        return self.game.error if isinstance(self.game, Live) else None
 
     @property
     def error(self) -> BaseException | None:
@@ -233,20 +191,11 @@ class Page:
         """What has failed on the page itself, one line each; they are on the page too."""
         return self._failures.texts
 
-    @property
-    def is_live(self) -> bool:
-        return isinstance(self.source, Live)
-
     def stop(self) -> None:
         """Serve no more. A second call does nothing."""
-        if not self._is_stopped:
-            self._is_stopped = True
-            self.pusher.stop()
-            self._stop_serving()
-
-    def _stop_serving(self) -> None:
-        with _silence():
-            self._server.stop()
+        if self._thread.is_alive():
+            self._loop.call_soon_threadsafe(self._stopping.set)
+            self._thread.join(10.0)
 
     def __enter__(self) -> Self:
         return self
@@ -255,36 +204,29 @@ class Page:
         self.stop()
 
 
-def _viser() -> Any:
+async def _set_headers(_: web.Request, response: web.StreamResponse) -> None:
+    response.headers.update(HEADERS)
+    response.headers.popall("Server", None)
+
+
+def _check_extra() -> None:
     try:
-        import viser
+        import aiohttp  # noqa: F401
     except ImportError as error:
         raise MissingExtraError(
-            "the page needs viser, which is not installed: pip install 'tussle[view]'"
+            "the page needs aiohttp, which is not installed: pip install 'tussle[view]'"
             " (tussle export makes pages and films of a recorded run without it)"
         ) from error
-    return viser
 
 
-def _server_class(viser: Any) -> Any:
-    class Server(viser.ViserServer):  # type: ignore[misc]
-        """viser's server without its tunnel: a message from a browser must not put the game on the internet."""
-
-        def request_share_url(self, verbose: bool = True) -> str | None:
-            """Shares nothing."""
-            return None
-
-    return Server
-
-
-@contextlib.contextmanager
-def _silence() -> Iterator[None]:
-    """Against viser, which prints its address and its end whatever it is told."""
-    import rich
-
-    console = rich.get_console()
-    before, console.quiet = console.quiet, True
+def _period(viewer: Mapping[str, Any], notes: list[str]) -> float:
+    """Time between frames as the mission has it, in ms there [s]; 0 where it says nothing of use, which goes to `notes`."""
+    text = viewer.get("gui_update_period")
     try:
-        yield
-    finally:
-        console.quiet = before
+        period = 0.0 if text is None else 1e-3 * float(text)
+    except ValueError:
+        period = -1.0
+    if not 0.0 <= period < MOST_PERIOD:
+        notes.append(f"gui_update_period {text!r} is no time in ms; frames are sent as fast as can be")
+        return 0.0
+    return period

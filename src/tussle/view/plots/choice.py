@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from tussle.errors import ParameterError, ViewError, listed
-from tussle.view.frame import Happening
+from tussle.view.frame import Event
 from tussle.view.recording import Recording
 
 
@@ -119,16 +119,16 @@ class Tracks:
         return np.unique(np.linspace(0, len(self) - 1, min(most, len(self))).round().astype(int))
 
     @cached_property
-    def happenings(self) -> list[Happening]:
+    def events(self) -> list[Event]:
         """What happened in the span."""
         low, high, slack = self.frame_times[0], self.frame_times[-1], 1e-6 * self.recording.dt
-        return [h for h in self.recording.happenings if low - slack <= h.t <= high + slack]
+        return [h for h in self.recording.events if low - slack <= h.t <= high + slack]
 
     @cached_property
-    def deaths(self) -> dict[int, Happening]:
+    def deaths(self) -> dict[int, Event]:
         """How those ended that died in the span."""
         chosen = set(self.who.tolist())
-        return {h.id: h for h in self.happenings if h.kind == "death" and h.id in chosen}
+        return {h.id: h for h in self.events if h.kind == "death" and h.id in chosen}
 
     @cached_property
     def team_of(self) -> dict[int, int]:

@@ -91,7 +91,7 @@ def _is_chosen(tracks: Tracks, who: int) -> bool:
 def _captures(tracks: Tracks) -> dict[int, list[float]]:
     """Times of the captures by each team [s]; of chosen captors."""
     found: dict[int, list[float]] = {}
-    for h in tracks.happenings:
+    for h in tracks.events:
         if h.kind == "capture" and h.id in tracks.team_of and _is_chosen(tracks, h.id):
             found.setdefault(tracks.team_of[h.id], []).append(h.t)
     return found
@@ -101,7 +101,7 @@ def _collisions(tracks: Tracks) -> list[float]:
     """Times of the collisions in which a chosen one took part [s]."""
     return [
         h.t
-        for h in tracks.happenings
+        for h in tracks.events
         if h.kind == "collision" and (_is_chosen(tracks, h.id) or _is_chosen(tracks, h.other))
     ]
 
@@ -139,7 +139,7 @@ def _mark_deaths(axes: Axes, tracks: Tracks, team: int, n: np.ndarray) -> set[st
 
 def _causes(tracks: Tracks) -> dict[str, str]:
     """Mark of each cause of death in the recording."""
-    texts = sorted({h.text for h in tracks.recording.happenings if h.kind == "death"})
+    texts = sorted({h.text for h in tracks.recording.events if h.kind == "death"})
     last = len(CAUSE_MARKS) - 1
     return {text: CAUSE_MARKS[min(i, last)] for i, text in enumerate(texts)}
 

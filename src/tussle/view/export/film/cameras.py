@@ -48,8 +48,8 @@ class Camera(ABC):
         self.smallest = min(LARGEST, max(SMALLEST, LEGIBLE / size[0]))
         self.zoom = zoom
         self.scale = scale
-        looks, n = moments.recording.looks, len(moments.recording.blocks)
-        self.longest = max((looks.scale(i) for i in range(n)), default=1.0)
+        style, n = moments.recording.style, len(moments.recording.blocks)
+        self.longest = max((style.scale(i) for i in range(n)), default=1.0)
 
     @abstractmethod
     def view(self, t: float) -> View:

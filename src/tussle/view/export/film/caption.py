@@ -67,7 +67,7 @@ class Caption:
             write(picture, f"{self._speed:g} ×", ((2 + width) * u, 52 * u), 15.0 * u, FAINT, anchor="right")
         for i, (team, name, n) in enumerate(lines):
             y = (81 + 25 * i) * u
-            fill(picture, (30 * u, y - 12 * u, 44 * u, y + 2 * u), self._recording.looks.colour(team), 1.0)
+            fill(picture, (30 * u, y - 12 * u, 44 * u, y + 2 * u), self._recording.style.colour(team), 1.0)
             write(picture, name[:28], (54 * u, y), 15.0 * u, INK)
             write(picture, f"{n:,}", ((2 + width) * u, y), 15.0 * u, INK, is_bold=True, anchor="right")
 

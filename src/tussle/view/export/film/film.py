@@ -184,7 +184,7 @@ class Easel:
         self.drawn = (round(larger * options.size[0]), round(larger * options.size[1]))
         recording = moments.recording
         self._moments, self._camera, self._report = moments, camera, report
-        self._stage = Stage(recording.looks, recording.scenery, self.drawn, larger)
+        self._stage = Stage(recording.style, recording.scenery, self.drawn, larger)
         trail = usual_trail(moments, camera) if options.trails is None else options.trails
         self._tracks = Tracks(moments, trail)
         self._caption = Caption(recording, self.drawn, speed, options.captions, options.labels)

@@ -10,9 +10,9 @@ from tussle.view.export.film import ground
 from tussle.view.export.film.view import ANGLE, View
 from tussle.view.export.film.window import drawing_window
 from tussle.view.frame import Frame
-from tussle.view.looks import Looks
 from tussle.view.scenery import Scenery
 from tussle.view.shapes import MODELS, Mesh, ball
+from tussle.view.style import Style
 from tussle.view.terrain import Terrain
 
 MOST_SHADOWS = 600
@@ -35,7 +35,7 @@ class Stage:
     visible.
 
     Args:
-        looks: Colours and models of the entities.
+        style: Colours and models of the entities.
         scenery: What stands still.
         size: Width and height of the pictures [pixels].
         line_width: Width of lines [pixels].
@@ -46,14 +46,14 @@ class Stage:
     """
 
     def __init__(
-        self, looks: Looks, scenery: Scenery, size: tuple[int, int], line_width: float = 1.5
+        self, style: Style, scenery: Scenery, size: tuple[int, int], line_width: float = 1.5
     ) -> None:
         with drawing_window():
             import pyvista
 
             pv: Any = pyvista
             self._plotter = pv.Plotter(off_screen=True, window_size=list(size), lighting="none")
-        self.looks, self.scenery, self.size = looks, scenery, size
+        self.style, self.scenery, self.size = style, scenery, size
         self.tints = ground.Tints.on(scenery.background)
         self._line_width = line_width
         self._pyvista = pv
@@ -133,17 +133,17 @@ class Stage:
         self._grid = self._add_lines(self._below)
 
     def _set_scenery(self) -> None:
-        scenery, looks = self.scenery, self.looks
+        scenery, style = self.scenery, self.style
         low = max(scenery.size * 1e-4, 0.01)
         for base in scenery.bases:
-            rgb = looks.colour(base.team)
+            rgb = style.colour(base.team)
             dome = ball(3).placed(2.0 * base.radius, base.pos.tolist())
             self._add_surface(self._above, _tinted(dome, (*rgb, 70.0 * base.opacity)))
             circle = _circle(base.pos, base.radius)
             circle[:, 2] = max(scenery.ground, 0.0) + low
             self._set_lines(self._add_lines(self._below, 2.0), *_inked(circle, (*rgb, 220.0)))
         for region in scenery.boundaries:
-            rgb = looks.colour(region.team) if region.team else EDGE  # team 0 is nobody's
+            rgb = style.colour(region.team) if region.team else EDGE  # team 0 is nobody's
             # A plane has no edges but those of the piece that is shown.
             self._add_surface(self._above, _tinted(region.mesh, (*rgb, 60.0 if region.is_wall else 12.0)))
             ends = region.outline.reshape(-1, 3).astype(float)
@@ -212,7 +212,7 @@ class Stage:
         self._set_lines(self._grid, *ground.grid_lines(view, z, width, self.tints.line))
 
     def _place_models(self, frame: Frame, view: View) -> None:
-        names = [self.looks.model(b) for b in range(int(frame.block.max(initial=-1)) + 1)]
+        names = [self.style.model(b) for b in range(int(frame.block.max(initial=-1)) + 1)]
         model_of = np.array([*names, ""])[frame.block]
         for name in sorted({*names, *self._models}):
             if name not in self._models:
@@ -241,8 +241,8 @@ class _Crowd:
         self._actor.visibility = self._shadow.visibility = len(rows) > 0
         if not len(rows):
             return
-        block, looks = frame.block[rows], self._stage.looks
-        lengths = np.array([max(looks.scale(b), least) for b in range(int(block.max()) + 1)])
+        block, style = frame.block[rows], self._stage.style
+        lengths = np.array([max(style.scale(b), least) for b in range(int(block.max()) + 1)])
         turned = self._vertices @ (rotations(frame.quat[rows]) * lengths[block, None, None]).transpose(
             0, 2, 1
         )
@@ -259,7 +259,7 @@ class _Crowd:
     def _rebuild(self, points: np.ndarray) -> None:
         n, v = len(self._drawn), len(self._vertices)
         faces = (self._faces + v * np.arange(n)[:, None, None]).reshape(-1, 3)
-        colours = np.array([self._stage.looks.block_colour(int(b)) for b in self._drawn], np.uint8)
+        colours = np.array([self._stage.style.block_colour(int(b)) for b in self._drawn], np.uint8)
         for actor, rgb in (
             (self._actor, colours),
             (self._shadow, np.tile(np.array(self._stage.tints.shadow, np.uint8), (n, 1))),

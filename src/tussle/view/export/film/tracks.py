@@ -36,10 +36,10 @@ class Tracks:
         self._length = length
         recording = moments.recording
         self._colours = np.array(
-            [recording.looks.block_colour(b) for b in range(len(recording.blocks))] or [(0, 0, 0)]
+            [recording.style.block_colour(b) for b in range(len(recording.blocks))] or [(0, 0, 0)]
         )
         self._past: dict[int, Frame] = {}
-        deaths = [h for h in recording.happenings if h.kind == "death"]
+        deaths = [h for h in recording.events if h.kind == "death"]
         self._deaths = deaths
         self._death_times = np.array([h.t for h in deaths])
 

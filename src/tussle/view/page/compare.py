@@ -1,0 +1,258 @@
+"""Two recorded runs seen together, from the first moment at which they differ."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tussle.errors import ViewError
+from tussle.mission import Mission
+from tussle.view.frame import Event, Frame
+from tussle.view.scenery import Scenery
+from tussle.view.style import Colour, Style
+
+if TYPE_CHECKING:
+    from tussle.view.recording import Recording
+
+PALE = 0.55
+"""Share of `PAPER` in the second run's colours."""
+PAPER: Colour = (200, 205, 212)
+GAP = 0.15
+"""Between two runs side by side, of their width."""
+MOST_NAMED = 4
+"""Entities that are named where two runs differ."""
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Where two runs part.
+
+    Attributes:
+        t: Time of the first moment at which they differ [s].
+        step: Its step.
+        text: What differs, in a line.
+    """
+
+    t: float
+    step: int
+    text: str
+
+
+def first_difference(a: Recording, b: Recording) -> Difference | None:
+    """The first moment that both runs have and that is not the same in both; None where all of these are the same.
+
+    A run that is shorter than the other differs from it only in its end, which is no moment of both.
+    """
+    common, in_a, in_b = np.intersect1d(a.steps, b.steps, assume_unique=True, return_indices=True)
+    for step, i, j in zip(common, in_a, in_b, strict=True):
+        one, other = a.frame(int(i)), b.frame(int(j))
+        text = what_differs(one, other)
+        if text:
+            return Difference(one.t, int(step), text)
+    return None
+
+
+def what_differs(a: Frame, b: Frame) -> str:
+    """In what two moments differ, in words; "" where they are the same."""
+    if not np.array_equal(a.id, b.id):
+        only_a, only_b = np.setdiff1d(a.id, b.id), np.setdiff1d(b.id, a.id)
+        parts = [f"{_named(ids)} only in {name}" for ids, name in ((only_a, "A"), (only_b, "B")) if len(ids)]
+        return "; ".join(parts)
+    found: list[tuple[str, np.ndarray, str]] = []
+    for name, unit in (("pos", "m"), ("vel", "m/s"), ("quat", ""), ("health", "")):
+        one, other = getattr(a, name), getattr(b, name)
+        same = (one == other) | (np.isnan(one) & np.isnan(other))
+        rows = np.flatnonzero(~(same if same.ndim == 1 else same.all(axis=1)))
+        if len(rows):
+            found.append((name, rows, unit))
+    for name in ("team", "block"):
+        rows = np.flatnonzero(getattr(a, name) != getattr(b, name))
+        if len(rows):
+            found.append((name, rows, ""))
+    if not found:
+        return ""
+    name, rows, unit = found[0]
+    gaps = np.abs(np.asarray(getattr(a, name)[rows], float) - getattr(b, name)[rows])
+    gap = float(np.linalg.norm(gaps, axis=-1).max()) if gaps.ndim > 1 else float(gaps.max())
+    also = f" (and {', '.join(n for n, _, _ in found[1:])})" if len(found) > 1 else ""
+    return f"{name} of {_named(a.id[rows])} of {len(a)}, by up to {gap:.3g} {unit}".rstrip() + also
+
+
+def _named(ids: np.ndarray) -> str:
+    """A few ids in words."""
+    some = ", ".join(str(i) for i in ids[:MOST_NAMED])
+    more = f" and {len(ids) - MOST_NAMED:,} more" if len(ids) > MOST_NAMED else ""
+    return f"{'entity' if len(ids) == 1 else 'entities'} {some}{more}"
+
+
+class Comparison:
+    """Two recorded runs as one recording: the second has paler colours, and stands beside the first or over it.
+
+    Ids of the second run are counted on from the first one's (`id_shift`); a run that has ended stays as it was at its end.
+
+    Args:
+        a: The first run.
+        b: The second.
+        is_over_each_other: Both in the same place.
+
+    Attributes:
+        t: Times of the frames of both [s], (T,), ascending.
+        shift: How far the second run is moved so as to stand beside the first [m], (3,).
+        difference: Where they part; None where they do not.
+        id_shift: What is added to the ids of the second run.
+
+    Raises:
+        ViewError: One of them has no moments.
+    """
+
+    def __init__(self, a: Recording, b: Recording, *, is_over_each_other: bool = False) -> None:
+        for run in (a, b):
+            if not run.n_frames:
+                raise ViewError(f"{run.path}: nothing was recorded")
+        self.a, self.b = a, b
+        self.path = a.path
+        self.t: np.ndarray = np.union1d(a.t, b.t)
+        self.shift = np.zeros(3) if is_over_each_other else _place_beside(a, b)
+        self.id_shift = 10 ** len(str(_largest_id(a)))
+        self.blocks = [*(f"A {name}" for name in a.blocks), *(f"B {name}" for name in b.blocks)]
+        self.block_teams = [*a.block_teams, *b.block_teams]
+        self.teams = b.teams | a.teams
+        self.style: Any = _Both(a.style, b.style, len(a.blocks))
+        self.difference = first_difference(a, b)
+
+    @property
+    def name(self) -> str:
+        return f"{self.a.path.name} and {self.b.path.name}"
+
+    @property
+    def mission(self) -> Mission | None:
+        return self.a.mission
+
+    @property
+    def viewer(self) -> dict[str, Any]:
+        return self.a.viewer
+
+    @property
+    def is_complete(self) -> bool:
+        return self.a.is_complete and self.b.is_complete
+
+    @cached_property
+    def scenery(self) -> Scenery:
+        """That of the first run, that of the second where it stands beside it, and room for both."""
+        one, other = self.a.scenery, self.b.scenery
+        low, high = np.minimum(one.low, other.low + self.shift), np.maximum(one.high, other.high + self.shift)
+        if not self.shift.any():
+            return replace(one, low=low, high=high)
+        bases = [replace(base, pos=base.pos + self.shift) for base in other.bases]
+        regions = [
+            replace(
+                r,
+                mesh=r.mesh.placed(at=self.shift.tolist()),
+                outline=r.outline + self.shift.astype(np.float32),
+            )
+            for r in other.boundaries
+        ]
+        return replace(
+            one, low=low, high=high, bases=[*one.bases, *bases], boundaries=[*one.boundaries, *regions]
+        )
+
+    @property
+    def extent(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper corner of a box around all positions [m], each (3,)."""
+        (low, high), (low_b, high_b) = self.a.extent, self.b.extent
+        return np.minimum(low, low_b + self.shift), np.maximum(high, high_b + self.shift)
+
+    @property
+    def lead(self) -> str:
+        """Where they part, in a line."""
+        if self.difference is None:
+            both = min(self.a.t[-1], self.b.t[-1])
+            return f"they do not differ up to t = {both:g} s, where the shorter one ends"
+        d = self.difference
+        return f"they differ first at t = {d.t:g} s (step {d.step:,}): {d.text}"
+
+    @property
+    def notes(self) -> list[str]:
+        said = f"A is {self.a.path.name}; B, paler, is {self.b.path.name}"
+        own = [f"{name}: {note}" for name, run in (("A", self.a), ("B", self.b)) for note in run.notes]
+        return [said, self.lead, *own]
+
+    @cached_property
+    def _pairs(self) -> tuple[np.ndarray, np.ndarray]:
+        """Number of the frame of each run that belongs to each time, (T,) each."""
+        a, b = ([run.index_at(float(t)) for t in self.t] for run in (self.a, self.b))
+        return np.array(a), np.array(b)
+
+    @property
+    def counts(self) -> np.ndarray:
+        """Entities of each frame, (T,)."""
+        a, b = self._pairs
+        counts: np.ndarray = self.a.counts[a] + self.b.counts[b]
+        return counts
+
+    def frame(self, i: int) -> Frame:
+        """Both runs at a time, by its number."""
+        a, b = (run.frame(int(pair[i])) for run, pair in zip((self.a, self.b), self._pairs, strict=True))
+        return Frame(
+            float(self.t[i]), max(a.step, b.step), np.concatenate([a.id, b.id + np.int32(self.id_shift)]),
+            np.concatenate([a.team, b.team]), np.concatenate([a.block, b.block + np.int32(len(self.a.blocks))]),
+            np.concatenate([a.pos, b.pos + self.shift]), np.concatenate([a.quat, b.quat]),
+            np.concatenate([a.vel, b.vel]), np.concatenate([a.health, b.health]),
+        )  # fmt: skip
+
+    @cached_property
+    def events(self) -> list[Event]:
+        """Events of both, and where they part. Texts are of the run itself: a birth's is the name of its block."""
+        shift = self.id_shift
+        found = [replace(e, text=f"A {e.text}" if e.kind == "birth" else e.text) for e in self.a.events]
+        found += [
+            replace(
+                e, id=e.id and e.id + shift, other=e.other and e.other + shift,
+                text=f"B {e.text}" if e.kind == "birth" else e.text,
+            )
+            for e in self.b.events
+        ]  # fmt: skip
+        if self.difference is not None:
+            found.append(Event(self.difference.t, "difference", 0, 0, "A and B part"))
+        return sorted(found, key=lambda event: event.t)
+
+
+class _Both:
+    """The looks of two runs: the second's blocks come after the first's, in paler colours."""
+
+    def __init__(self, a: Style, b: Style, n_first: int) -> None:
+        self._a, self._b, self._n = a, b, n_first
+        self.notes = [*a.notes, *(note for note in b.notes if note not in a.notes)]
+
+    def colour(self, team: int) -> Colour:
+        return self._a.colour(team)
+
+    def block_colour(self, block: int) -> Colour:
+        if block < self._n:
+            return self._a.block_colour(block)
+        return _paler(self._b.block_colour(block - self._n))
+
+    def model(self, block: int) -> str:
+        return self._a.model(block) if block < self._n else self._b.model(block - self._n)
+
+    def scale(self, block: int) -> float:
+        return self._a.scale(block) if block < self._n else self._b.scale(block - self._n)
+
+
+def _paler(colour: Colour) -> Colour:
+    red, green, blue = (round((1.0 - PALE) * c + PALE * p) for c, p in zip(colour, PAPER, strict=True))
+    return red, green, blue
+
+
+def _place_beside(a: Recording, b: Recording) -> np.ndarray:
+    """How far the second run is moved so that it stands east of the first [m], (3,)."""
+    width = max(float(a.scenery.high[0] - a.scenery.low[0]), float(b.scenery.high[0] - b.scenery.low[0]))
+    return np.array([float(a.scenery.high[0] - b.scenery.low[0]) + GAP * width, 0.0, 0.0])
+
+
+def _largest_id(run: Recording) -> int:
+    """Of all who were ever there: those at the beginning, and those whose birth is an event."""
+    return max(int(run.frame(0).id.max(initial=0)), max((h.id for h in run.events), default=0))

@@ -1,0 +1,242 @@
+"""What the page is told once about a game: names, colours, models, what stands still, how it is seen at first."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+import numpy as np
+
+from tussle import __version__
+from tussle.mission import Mission
+from tussle.view.page.packing import ints
+from tussle.view.scenery import Base, Region, Scenery
+from tussle.view.shapes import MODELS, Mesh
+from tussle.view.style import Style
+from tussle.view.terrain import Terrain
+
+FORMAT = 2
+"""Version of the document and of the chunks, told to whoever reads them from a file."""
+MOST_HEIGHTS = 250_000
+"""Heights of the terrain on the page: with some half a million triangles a browser still draws without effort."""
+HEIGHT_STEPS = 65_535
+RANGES = ("range", "comms_range", "max_range", "detection_range", "sensing_range", "sphere_of_influence")
+ANGLES = ("fov_az", "fov", "field_of_view", "fov_el")
+"""Parameters of plugins that say how far entities hear or see, and in which angle."""
+
+
+class Game(Protocol):
+    """What live games, recordings and comparisons of two recordings have in common."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def blocks(self) -> list[str]: ...
+    @property
+    def block_teams(self) -> list[int]: ...
+    @property
+    def teams(self) -> dict[int, str]: ...
+    @property
+    def style(self) -> Style: ...
+    @property
+    def scenery(self) -> Scenery: ...
+    @property
+    def notes(self) -> list[str]: ...
+
+
+def game_document(
+    game: Game,
+    mission: Mission | None = None,
+    viewer: Mapping[str, Any] | None = None,
+    title: str | None = None,
+) -> dict[str, Any]:
+    """The part of the document that live and recorded games share.
+
+    Args:
+        game: The game.
+        mission: The mission, whose plugins say how far they see; None where it is not known.
+        viewer: What the mission file says for the viewer, see `tussle.mission.Loaded`.
+        title: Heading of the page; None is the game's name.
+    """
+    viewer, style, scenery = viewer or {}, game.style, game.scenery
+    notes = [*style.notes, *scenery.notes, *filter(None, [terrain_note(scenery)])]
+    opening = opening_data(viewer.get("camera"), notes)
+    reach, angle = reach_of(mission)
+    blocks = blocks_data(game.blocks, game.block_teams, style)
+    return {
+        "format": FORMAT,
+        "generator": f"tussle {__version__}",
+        "title": game.name if title is None else title,
+        "blocks": blocks,
+        "teams": [
+            {"id": team, "name": name, "colour": list(style.colour(team))}
+            for team, name in game.teams.items()
+        ],
+        "models": models_data({block["model"] for block in blocks} | {"sphere"}),
+        "scenery": scenery_data(scenery),
+        "opening": opening,
+        "reach": reach,
+        "angle": math.degrees(angle),
+        "scale": float(viewer.get("scale") or 1.0),
+        "hasTrails": bool(viewer.get("plot_tracks", False)),
+        "notes": list(dict.fromkeys([*notes, *game.notes])),
+    }
+
+
+def opening_data(said: Mapping[str, Any] | None, notes: list[str]) -> dict[str, Any] | None:
+    """How the mission's `<camera>` wants the game to be seen at first; None without one. What it says wrongly goes to `notes`.
+
+    Args:
+        said: The attributes of the tag.
+        notes: Receives a line for each attribute that is left out.
+    """
+    if not said:
+        return None
+
+    def vector(name: str) -> list[float] | None:
+        if name not in said:
+            return None
+        try:
+            found = [float(part) for part in str(said[name]).replace(",", " ").split()]
+        except ValueError:
+            found = []
+        if len(found) == 3 and all(map(math.isfinite, found)):
+            return found
+        notes.append(f"camera {name} {said[name]!r} is not x, y, z in m; it is left out")
+        return None
+
+    target, position = vector("focal_point"), vector("pos")
+    mode = {"follow": "follow", "offset": "behind", "free": "free"}.get(str(said.get("mode", "free")).lower())
+    if mode is None:
+        notes.append(f"camera mode {said['mode']!r} is none of free, follow, offset; it is free")
+    follow = str(said.get("follow_id", ""))
+    if follow and not follow.isdigit():
+        notes.append(f"camera follow_id {follow!r} is no id; nobody is followed")
+    who = int(follow) if follow.isdigit() else 0
+    return {"position": position, "target": target, "mode": mode or "free", "follow": who}
+
+
+def reach_of(mission: Mission | None) -> tuple[float, float]:
+    """How far entities hear or see [m], and the full angle in which they see [rad]; 0 where no plugin says.
+
+    The first parameter that names a range counts, networks before others: a range of what is heard is what links are about.
+    """
+    reach = angle = 0.0
+    plugins = [] if mission is None else [*mission.networks, *(p for b in mission.blocks for p in b.plugins)]
+    for plugin in plugins:
+        for name, value in plugin.values.items():
+            if not isinstance(value, (int, float)) or isinstance(value, bool) or not 0.0 < value < 1e6:
+                continue
+            if not reach and name in RANGES:
+                reach = float(value)
+            if not angle and name in ANGLES and value < 2.0 * np.pi - 1e-6:
+                angle = float(value)
+    return reach, angle
+
+
+def rounded(values: np.ndarray, digits: int) -> list[Any]:
+    """Numbers in as few characters as they need, in the array's shape."""
+    flat: list[Any] = np.round(np.asarray(values, np.float64), digits).tolist()
+    return flat
+
+
+def digits_for(size: float) -> int:
+    """Decimals of coordinates that are good to a hundred-thousandth of a size [m], and to a millimetre."""
+    return max(3, 5 - math.floor(math.log10(max(size, 1e-9))))
+
+
+def mesh_data(mesh: Mesh, digits: int) -> dict[str, Any]:
+    """Corners and triangles, each as one list of numbers."""
+    return {"vertices": rounded(mesh.vertices.ravel(), digits), "faces": mesh.faces.ravel().tolist()}
+
+
+def models_data(names: set[str]) -> dict[str, Any]:
+    """The models that a game needs, by name."""
+    return {name: mesh_data(MODELS[name], 4) for name in MODELS if name in names}
+
+
+def blocks_data(names: list[str], teams: list[int], style: Style) -> list[dict[str, Any]]:
+    """Name, team, colour, model and scale of each block."""
+    return [
+        {
+            "name": name,
+            "team": teams[i],
+            "colour": list(style.block_colour(i)),
+            "model": style.model(i),
+            "scale": style.scale(i),
+        }
+        for i, name in enumerate(names)
+    ]
+
+
+def scenery_data(scenery: Scenery) -> dict[str, Any]:
+    """Extent, grid, axes, bases, regions and background; of the terrain, what `terrain_bytes` leaves out."""
+    digits = digits_for(scenery.size)
+    return {
+        "low": rounded(scenery.low, digits),
+        "high": rounded(scenery.high, digits),
+        "ground": scenery.ground,
+        "gridStep": scenery.grid_step,
+        "originLength": scenery.origin_length,
+        "background": scenery.background and list(scenery.background),
+        "bases": [_base_data(base, digits) for base in scenery.bases],
+        "regions": [_region_data(region, digits) for region in scenery.boundaries],
+        "terrain": scenery.terrain and _terrain_data(scenery.terrain.thinned(MOST_HEIGHTS)),
+    }
+
+
+def _base_data(base: Base, digits: int) -> dict[str, Any]:
+    return {
+        "team": base.team,
+        "pos": rounded(base.pos, digits),
+        "radius": base.radius,
+        "opacity": base.opacity,
+    }
+
+
+def _region_data(region: Region, digits: int) -> dict[str, Any]:
+    return {
+        "name": region.name,
+        "team": region.team,
+        "isWall": region.is_wall,
+        "mesh": mesh_data(region.mesh, digits),
+        "outline": rounded(region.outline.ravel(), digits),
+    }
+
+
+# -- terrain --------------------------------------------------------------------------------------------------------------------
+
+
+def _terrain_data(terrain: Terrain) -> dict[str, Any]:
+    low, high = float(terrain.height.min()), float(terrain.height.max())
+    return {
+        "x": rounded(terrain.x, 3),
+        "y": rounded(terrain.y, 3),
+        "low": low,
+        "step": (high - low) / HEIGHT_STEPS,
+    }
+
+
+def terrain_bytes(scenery: Scenery) -> bytes | None:
+    """Heights in steps above the lowest, row by row as differences to the point before; None without a terrain."""
+    if scenery.terrain is None:
+        return None
+    height = scenery.terrain.thinned(MOST_HEIGHTS).height
+    low, high = float(height.min()), float(height.max())
+    steps = np.rint((height - low) * (HEIGHT_STEPS / (high - low) if high > low else 0.0)).astype(np.int64)
+    return ints(np.diff(steps.ravel(), prepend=np.int64(0)))
+
+
+def terrain_note(scenery: Scenery) -> str:
+    """What of the terrain is left out; "" where nothing is."""
+    terrain = scenery.terrain
+    thin = None if terrain is None else terrain.thinned(MOST_HEIGHTS)
+    if terrain is None or thin is None or thin.height.size == terrain.height.size:
+        return ""
+    return f"the terrain has {_size(terrain)} heights; {_size(thin)} are shown"
+
+
+def _size(terrain: Terrain) -> str:
+    """Such as "300 x 200"."""
+    return f"{len(terrain.x)} x {len(terrain.y)}"

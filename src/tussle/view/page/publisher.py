@@ -1,0 +1,271 @@
+"""Sends a live game to the browsers that watch it, and takes what they order."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import math
+import struct
+import time
+from collections import deque
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tussle.errors import ParameterError
+from tussle.view.frame import Event, Frame
+from tussle.view.live import Live
+from tussle.view.page.chunks import FULL_HEALTH, UNIT, pack, step_of
+from tussle.view.page.commands import LARGEST_ID, Command, game_commands, number, read_command, whole
+from tussle.view.page.drawing import drawing_message
+from tussle.view.page.failures import Failures
+from tussle.view.page.formatting import entity_sections, result_rows
+
+if TYPE_CHECKING:
+    from aiohttp.web import WebSocketResponse
+
+PERIOD = 1.0 / 30.0
+"""Least time between two frames [s]."""
+STATUS_PERIOD = 0.25
+"""Time between two readings of what nobody reads faster: numbers, notes, events, the chosen entity [s]."""
+NAP = 0.1
+"""While nobody watches [s]."""
+MOST_MESSAGES = 200
+"""From one browser in a second, and at once. More wait."""
+MOST_EVENTS = 2000
+"""Of one message."""
+REFUSAL_PERIOD = 1.0
+"""Least time between two messages about refused values [s]."""
+PAST_FRAMES, PAST_STATES = 120, 60_000
+"""Of a look back, at most."""
+MOST_LOOKS = 4
+"""Back, that wait to be sent to a browser."""
+
+
+class Reader:
+    """A browser that watches.
+
+    Attributes:
+        socket: Its websocket.
+        chosen: Id of the entity whose state it reads; 0 for nobody.
+        wake: There is something to be sent.
+    """
+
+    def __init__(self, socket: WebSocketResponse) -> None:
+        self.socket = socket
+        self.chosen = 0
+        self.wake = asyncio.Event()
+        self.wake.set()
+        self.frame_sent = self.drawn_sent = 0
+        self.status_due = 0.0
+        self.past: deque[bytes] = deque(maxlen=MOST_LOOKS)
+        self.refusal: str | None = None
+        self.refused_at = -REFUSAL_PERIOD
+        self.events_sent: list[Event] = []
+        self.free_at = 0.0
+
+    def choose(self, id: int) -> None:  # noqa: A002 - as the page calls it
+        """Read of this entity; 0 is nobody."""
+        self.chosen = id
+
+
+class Publisher:
+    """Makes each frame once, whoever watches. To each browser goes the newest when it has taken the one before.
+
+    While nobody watches, the game is asked for nothing. All methods but `n_readers` are called in the server's loop.
+
+    Args:
+        live: The game.
+        failures: Told of what fails.
+        period: Time between two frames [s], no less than `PERIOD`.
+        one_steers: Only the browser that came first, of those that watch, may steer.
+
+    Attributes:
+        readers: Those who watch now, in the order in which they came.
+        n_made: Frames that were made.
+    """
+
+    def __init__(self, live: Live, failures: Failures, period: float, one_steers: bool) -> None:
+        self._live, self._failures, self._one_steers = live, failures, one_steers
+        self._period = max(period, PERIOD)
+        self.readers: list[Reader] = []
+        self.n_made = 0
+        self._moments: deque[float] = deque(maxlen=64)
+        self._seen: tuple[Frame, int] | None = None
+        self._frame = self._drawn = b""
+        self._shapes: tuple[Any, ...] = ()
+        self._n_drawn = 0
+        self._drawing_notes: list[str] = []
+        self._commands = game_commands(live)
+
+    def document(self) -> dict[str, Any]:
+        """What a page is told of a live game at once, beside what it shares with recorded ones."""
+        return {
+            "source": "socket", "facts": [], "idShift": 0, "isComplete": True, "attitudeUnit": UNIT,
+            "healthSteps": FULL_HEALTH, "seed": min(self._live.seed, LARGEST_ID),
+        }  # fmt: skip
+
+    @cached_property
+    def _step(self) -> float:
+        scenery, style = self._live.scenery, self._live.style
+        smallest = min((style.scale(i) for i in range(len(self._live.blocks))), default=1.0)
+        return step_of(scenery.low, scenery.high, smallest)
+
+    async def run(self) -> None:
+        """Make frames while somebody watches."""
+        while True:
+            if self.readers:
+                with self._failures.caught():
+                    self._make_frame()
+                with self._failures.caught():
+                    self._make_drawing()
+                for reader in self.readers:
+                    reader.wake.set()
+            await asyncio.sleep(self._period if self.readers else NAP)
+
+    def _make_frame(self) -> None:
+        frame, epoch = self._live.frame(), self._live.epoch
+        if self._seen is None or frame is not self._seen[0] or epoch != self._seen[1]:
+            self._seen = frame, epoch
+            self._frame = message({"kind": "frame", "epoch": epoch}, pack(frame.step, [frame], self._step))
+            self.n_made += 1
+            self._moments.append(time.monotonic())
+
+    def _make_drawing(self) -> None:
+        shapes = self._live.shapes()
+        if len(shapes) == len(self._shapes) and all(
+            a is b for a, b in zip(shapes, self._shapes, strict=True)
+        ):
+            return
+        self._shapes = shapes
+        header, data, notes = drawing_message(shapes)
+        self._drawing_notes += [note for note in notes if note not in self._drawing_notes]
+        self._drawn = message({"kind": "drawn", **header}, data)
+        self._n_drawn += 1
+
+    # -- one browser ----------------------------------------------------------------------------------------------------------------
+
+    async def serve(self, socket: WebSocketResponse) -> None:
+        """Send to a browser and take what it sends, until it goes."""
+        reader = Reader(socket)
+        self.readers.append(reader)
+        sender = asyncio.create_task(self._send(reader))
+        try:
+            while not socket.closed:
+                now = time.monotonic()
+                reader.free_at = max(reader.free_at, now - 1.0) + 1.0 / MOST_MESSAGES
+                await asyncio.sleep(max(0.0, reader.free_at - now))
+                received = await socket.receive()
+                if received.data is None or socket.closed:
+                    break
+                self._take(reader, received.data)
+        finally:
+            self.readers.remove(reader)
+            sender.cancel()
+
+    async def _send(self, reader: Reader) -> None:
+        """Send what is new. A browser that takes nothing is waited for here, and misses what is made meanwhile."""
+        socket = reader.socket
+        try:
+            while True:
+                await reader.wake.wait()
+                reader.wake.clear()
+                if time.monotonic() >= reader.status_due:
+                    reader.status_due = time.monotonic() + STATUS_PERIOD
+                    with self._failures.caught():
+                        text = json.dumps(self._status(reader))
+                        await socket.send_str(text)
+                while reader.past:
+                    await socket.send_bytes(reader.past.popleft())
+                if reader.drawn_sent != self._n_drawn:
+                    reader.drawn_sent = self._n_drawn
+                    await socket.send_bytes(self._drawn)
+                if reader.frame_sent != self.n_made:
+                    reader.frame_sent = self.n_made
+                    await socket.send_bytes(self._frame)
+        except (ConnectionError, RuntimeError):  # it has gone; `serve` hears of it too
+            return
+
+    def _status(self, reader: Reader) -> dict[str, Any]:
+        live, result = self._live, self._live.result()
+        refusal, reader.refusal = reader.refusal, None
+        warp = live.warp
+        error = live.error
+        now = time.monotonic()
+        return {
+            "kind": "status", "t": live.t, "step": live.step_number, "span": live.span, "epoch": live.epoch, "seed": live.seed,
+            "isPaused": live.is_paused, "isOver": live.is_over, "isSeeking": live.is_seeking,
+            "warp": None if math.isinf(warp) else warp, "reached": live.warp_reached,
+            "rate": sum(now - moment <= 1.0 for moment in self._moments),
+            "notes": [*live.notes, *self._drawing_notes, *self._failures.texts], "error": None if error is None else str(error),
+            "scores": {} if result is None else {str(k): float(v) for k, v in result.scores.items()},
+            "metrics": [] if result is None else result_rows(result), "events": self._new_events(reader),
+            "entity": self._entity(reader), "refusal": refusal, "steers": self._may_steer(reader),
+        }  # fmt: skip
+
+    def _new_events(self, reader: Reader) -> dict[str, Any]:
+        """Events that a browser has not been sent, and how many of those before still hold."""
+        events, sent = self._live.events, reader.events_sent
+        n = len(sent)
+        if n > len(events) or (n and events[n - 1] is not sent[-1]):
+            n = 0
+        new = events[n : n + MOST_EVENTS]
+        reader.events_sent = events[: n + len(new)]
+        return {"from": n, "rows": [[e.t, e.kind, e.id, e.other, e.text] for e in new]}
+
+    def _entity(self, reader: Reader) -> dict[str, Any] | None:
+        state = self._live.entity(reader.chosen) if reader.chosen else None
+        return None if state is None else {"id": state.id, "sections": entity_sections(state)}
+
+    # -- what they send ---------------------------------------------------------------------------------------------------------------
+
+    def _may_steer(self, reader: Reader) -> bool:
+        return not self._one_steers or self.readers[0] is reader
+
+    def _take(self, reader: Reader, text: Any) -> None:
+        """Do what a browser orders; what is no command is ignored."""
+        commands = self._commands | {
+            "choose": Command(reader.choose, {"id": whole(0, LARGEST_ID)}, steers=False),
+            "history": Command(
+                lambda seconds: self._look_back(reader, seconds), {"seconds": number(0.0, 1e9)}, steers=False
+            ),
+        }
+        with self._failures.caught():
+            try:
+                read = read_command(text, commands)
+                if read is None:
+                    return
+                command = commands[read[0]]
+                if command.steers and not self._may_steer(reader):
+                    raise ParameterError("another browser steers this game")
+                command.do(**read[1])
+            except ParameterError as error:
+                self._refuse(reader, str(error))
+            for each in self.readers:
+                each.status_due = 0.0
+
+    def _refuse(self, reader: Reader, reason: str) -> None:
+        """Say that a value was not taken; of many in a row, the first."""
+        now = time.monotonic()
+        if now - reader.refused_at >= REFUSAL_PERIOD:
+            reader.refused_at, reader.refusal = now, reason
+
+    def _look_back(self, reader: Reader, seconds: float) -> None:
+        """Send what was seen over the last seconds, in as many frames as are needed for trails."""
+        live = self._live
+        now = live.frame()
+        n = max(2, min(PAST_FRAMES, PAST_STATES // max(len(now), 1)))
+        frames = {
+            f.step: f for f in map(live.frame_at, np.linspace(max(now.t - seconds, live.span[0]), now.t, n))
+        }
+        past = [frames[step] for step in sorted(frames)]
+        header = {"kind": "past", "epoch": live.epoch, "seconds": seconds}
+        reader.past.append(message(header, pack(past[0].step, past, self._step)))
+
+
+def message(header: dict[str, Any], data: bytes) -> bytes:
+    """A binary message: length of the header, header as JSON padded to four bytes, data."""
+    text = json.dumps(header, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 4)
+    return struct.pack("<I", len(text)) + text + data

@@ -1,0 +1,221 @@
+"""A recorded game as the page reads it: a document, and blobs by name, each made when it is asked for."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+
+from tussle.errors import ParameterError, ViewError
+from tussle.view.page.chunks import ANGLE_ERROR, FULL_HEALTH, UNIT, pack, position_error, step_of
+from tussle.view.page.compare import Comparison
+from tussle.view.page.document import game_document, terrain_bytes
+from tussle.view.page.packing import reals
+from tussle.view.recording import Recording
+
+FILE_STATES, FILE_FRAMES = 150_000, 32
+"""States of a chunk in a file, about, and its least frames: with fewer the first states of its tracks weigh too much."""
+SERVED_STATES, SERVED_FRAMES = 30_000, 4
+"""Of a chunk that is served: some hundredths of a second of work for both ends, so that a jump in time is not felt."""
+MOST_FRAMES = 1024
+"""Frames of a chunk: with more a page has to read too much before it shows anything."""
+CURVE_POINTS = 240
+"""Moments at which entities are counted for the curves of the teams."""
+LEAP_OF_EXTENT = 0.25
+"""Share of the diagonal of all positions above which a move counts as a jump: across a closed world it is 0.57 or more."""
+
+
+class RecordedData:
+    """What a page is told of a recorded run, or of two.
+
+    Args:
+        game: The run; of one that was cut short, what there is.
+        is_file: For a file that is whole by itself; otherwise for a page that asks for one chunk after another.
+        period: Time between frames that are kept [s]; None keeps all.
+        title: Heading of the page; None is the game's name.
+        viewer: What the mission file says for the viewer; None is what the run's own mission says.
+
+    Attributes:
+        kept: Numbers of the frames that are kept, (F,).
+        chunks: First and last frame of each chunk, counted in `kept`. The last frame of a chunk is the first of the next.
+
+    Raises:
+        ParameterError: The period is not allowed.
+        ViewError: There is nothing to show.
+    """
+
+    def __init__(
+        self,
+        game: Recording | Comparison,
+        *,
+        is_file: bool,
+        period: float | None = None,
+        title: str | None = None,
+        viewer: dict[str, Any] | None = None,
+    ) -> None:
+        if period is not None and not 0.0 < period < math.inf:
+            raise ParameterError(f"period = {period!r} is not allowed; it takes a number of seconds > 0")
+        self._game, self._period, self._is_file = game, period, is_file
+        self.kept = kept_frames(game.t, period)
+        if not len(self.kept):
+            raise ViewError(
+                f"{game.path}: nothing was recorded: the run holds no states, so there is nothing to play"
+            )
+        n_states, n_frames = (FILE_STATES, FILE_FRAMES) if is_file else (SERVED_STATES, SERVED_FRAMES)
+        self.counts = game.counts[self.kept]
+        self.chunks = chunk_bounds(self.counts, n_states, n_frames)
+        low, high = game.extent
+        self._leap = LEAP_OF_EXTENT * float(np.linalg.norm(high - low))
+        smallest = min((game.style.scale(i) for i in range(len(game.blocks))), default=1.0)
+        self.step = step_of(low, high, smallest)
+        self._title, self._viewer = title, game.viewer if viewer is None else viewer
+        self._terrain = terrain_bytes(game.scenery)
+
+    @property
+    def n_entities(self) -> int:
+        """Ids that were ever there: at the beginning, or born since."""
+        first = set(self._game.frame(0).id.tolist())
+        return len(first | {event.id for event in self._game.events if event.kind == "birth"})
+
+    def document(self, **more: Any) -> dict[str, Any]:
+        """What the page is told at once.
+
+        Args:
+            **more: Further entries, such as the time at which it begins.
+        """
+        game = self._game
+        facts = game_facts(game)
+        facts += [
+            (
+                "Frames",
+                grouped(len(self.kept))
+                + (f" of {grouped(len(game.t))}, one every {self._period:g} s" if self._period else ""),
+            ),
+            ("Entities", f"{grouped(self.n_entities)}, in {grouped(int(self.counts.sum()))} states"),
+        ]
+        return {
+            **game_document(game, game.mission, self._viewer, self._title),
+            "source": "embedded" if self._is_file else "range",
+            "facts": facts,
+            "idShift": game.id_shift,
+            "isComplete": game.is_complete,
+            "nFrames": len(self.kept),
+            "nStates": int(self.counts.sum()),
+            "nEntities": self.n_entities,
+            "mostAtOnce": int(self.counts.max()),
+            "attitudeUnit": UNIT,
+            "healthSteps": FULL_HEALTH,
+            "positionError": position_error(self.step),
+            "angleError": ANGLE_ERROR,
+            "chunks": self.chunks,
+            "curves": self._curves(),
+            **more,
+        }
+
+    def _curves(self) -> dict[str, Any]:
+        """Entities of each team over time."""
+        places = np.unique(np.linspace(0, len(self.kept) - 1, CURVE_POINTS).round().astype(np.int64))
+        teams = list(self._game.teams)
+        rows = [self._game.frame(int(self.kept[i])).team for i in places]
+        return {
+            "t": self._game.t[self.kept[places]].tolist(),
+            "n": [[int((row == team).sum()) for row in rows] for team in teams],
+        }
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the blobs."""
+        terrain = [] if self._terrain is None else ["terrain"]
+        return ["times", "events", *terrain, *(f"chunk-{i}" for i in range(len(self.chunks)))]
+
+    def blob(self, name: str) -> bytes | None:
+        """A blob by its name; None where there is none of that name."""
+        if name == "times":
+            return reals(self._game.t[self.kept])
+        if name == "events":
+            columns = ("t", "kind", "id", "other", "text")
+            return compact_json(
+                {c: [getattr(event, c) for event in self._game.events] for c in columns}
+            ).encode()
+        if name == "terrain":
+            return self._terrain
+        kind, _, number = name.partition("-")
+        if kind != "chunk" or not number.isdecimal() or len(number) > 9 or int(number) >= len(self.chunks):
+            return None
+        first, last = self.chunks[int(number)]
+        frames = [self._game.frame(int(i)) for i in self.kept[first : last + 1]]
+        return pack(first, frames, self.step, self._leap)
+
+
+def kept_frames(t: np.ndarray, period: float | None) -> np.ndarray:
+    """Numbers of the frames that are kept: the first of each period, and the last.
+
+    Args:
+        t: Times of all frames [s], (T,), ascending.
+        period: [s]; None keeps all.
+    """
+    if period is None or not len(t):
+        return np.arange(len(t))
+    number = np.floor((t - t[0]) / max(period, 1e-9 * float(t[-1] - t[0])) + 1e-6)
+    is_kept = np.diff(number, prepend=-1.0) > 0.0
+    is_kept[-1] = True
+    return np.flatnonzero(is_kept)
+
+
+def chunk_bounds(counts: np.ndarray, n_states: int, least_frames: int) -> list[tuple[int, int]]:
+    """First and last frame of chunks with about so many states, each of which begins with the last frame of the one before.
+
+    Args:
+        counts: States of each frame, (F,), F > 0.
+        n_states: States of a chunk.
+        least_frames: Frames that it has at least, at most being `MOST_FRAMES`.
+    """
+    total, last = np.cumsum(counts), len(counts) - 1
+    bounds: list[tuple[int, int]] = []
+    first = 0
+    while first < last or not bounds:
+        full = int(np.searchsorted(total, total[first] - counts[first] + n_states))
+        end = min(max(full, first + max(least_frames, 2) - 1), first + MOST_FRAMES - 1, last)
+        bounds.append((first, end))
+        first = end
+    return bounds
+
+
+def game_facts(game: Recording | Comparison) -> list[tuple[str, str]]:
+    """Names and values for the page's reader."""
+    if isinstance(game, Comparison):
+        both = (("A", game.a), ("B", game.b))
+        return [(f"{name}: {key}", value) for name, run in both for key, value in game_facts(run)]
+    info, t = game.run.info, game.t
+    worlds = info.get("worlds", [])
+    facts = [("Run", game.path.resolve().name), ("Mission", game.name)]
+    if game.world < len(worlds):
+        world = worlds[game.world]
+        facts.append(("Seed", str(world["seed"])))
+        if len(worlds) > 1:
+            facts.append(("World", f"{game.world} of {len(worlds)}"))
+        if world["scores"]:
+            facts.append(
+                ("Score", ", ".join(f"team {team}: {score:g}" for team, score in world["scores"].items()))
+            )
+    facts.append(("Time", f"{t[0]:g} s to {t[-1]:g} s"))
+    if info:
+        facts.append(("Step", f"{game.dt:g} s"))
+        facts.append(("Played by", f"tussle {info.get('versions', {}).get('tussle', '')}".strip()))
+    return facts
+
+
+def grouped(count: int) -> str:
+    """A count with narrow spaces between thousands, as the page's script writes it."""
+    return f"{count:,}".replace(",", "\u202f")
+
+
+def compact_json(data: object) -> str:
+    """JSON without blanks.
+
+    Raises:
+        ValueError: A number is not finite.
+    """
+    return json.dumps(data, separators=(",", ":"), allow_nan=False)

@@ -1,0 +1,198 @@
+// The eye: it looks at a point from a distance. What is wished for and what is seen now are two; the second runs after the first.
+
+import { add, between, cross, halfTurn, minus, norm, perspective, scaled } from './geometry.js';
+import { turned } from './chunk.js';
+
+const FIELD_OF_VIEW = (45 * Math.PI) / 180;
+/** Seconds in which the view makes 63 of 100 of its way to what is wished for; the overview, which moves by itself, is calmer. */
+const HASTE = { free: 0.07, follow: 0.07, behind: 0.09, overview: 0.35 };
+export const STEEPEST = Math.PI / 2;
+/** Nearest that an overview comes [m]. */
+const LEAST_DISTANCE = 6;
+/** Where the eye is at first, seen from what it looks at: south, a little west, and above. */
+export const FIRST_YAW = (-115 * Math.PI) / 180;
+export const FIRST_PITCH = 0.5;
+
+/** Of mode `overview` it keeps all in view; `follow` keeps to an entity, `behind` turns with it as well; `free` stays where it is put. */
+export class Camera {
+  constructor(size) {
+    this.size = size;
+    this.mode = 'overview';
+    this.base = [0, 0, 0];
+    this.heading = 0;
+    this.wish = { at: [0, 0, 0], yaw: FIRST_YAW, pitch: FIRST_PITCH, zoom: Math.log(size) };
+    this.now = structuredClone(this.wish);
+    this.past = [];
+  }
+
+  /** The point that is looked at. */
+  get target() {
+    return add(this.base, this.now.at);
+  }
+
+  get distance() {
+    return Math.exp(this.now.zoom);
+  }
+
+  /** Take up another mode without moving: what it adds by itself is taken off the rest. */
+  enter(mode, base, heading) {
+    const fixed = mode === 'follow' || mode === 'behind' ? base : [0, 0, 0];
+    const turn = mode === 'behind' ? heading : 0;
+    for (const state of [this.wish, this.now]) {
+      state.at = minus(add(state.at, this.base), fixed);
+      state.yaw = halfTurn(state.yaw + this.heading - turn);
+    }
+    // The shorter way round.
+    this.now.yaw = this.wish.yaw + halfTurn(this.now.yaw - this.wish.yaw);
+    this.base = fixed;
+    this.heading = turn;
+    this.mode = mode;
+    if (mode === 'follow' || mode === 'behind') this.wish.at = [0, 0, 0];
+    if (mode === 'behind') {
+      this.now.yaw = Math.PI + halfTurn(this.now.yaw - Math.PI);
+      this.wish.yaw = Math.PI;
+      this.wish.pitch = between(this.wish.pitch, 0.1, 0.45);
+    }
+  }
+
+  /** Look from a place at another at once, freely; what is null stays. */
+  look(from, at) {
+    const target = at || this.target;
+    const eye = from || add(target, scaled(this.axes().away, this.distance));
+    const gap = minus(eye, target);
+    this.enter('free', [0, 0, 0], 0);
+    this.wish = { at: target, yaw: Math.atan2(gap[1], gap[0]), pitch: Math.asin(gap[2] / (norm(gap) || 1)), zoom: Math.log(norm(gap) || 1) };
+    this.now = structuredClone(this.wish);
+  }
+
+  /** Keep to an entity that has moved on. */
+  track(place, heading) {
+    if (this.mode === 'follow' || this.mode === 'behind') this.base = place;
+    if (this.mode === 'behind') this.heading += halfTurn(heading - this.heading);
+  }
+
+  /** Remember the view, so that `undo` comes back to it. */
+  remember(extra) {
+    this.past.push({ wish: structuredClone(this.wish), mode: this.mode, base: this.base, heading: this.heading, extra });
+    if (this.past.length > 50) this.past.shift();
+  }
+
+  /** The view before the last change, and what was remembered with it; null where there is none. */
+  undo() {
+    const last = this.past.pop();
+    if (!last) return null;
+    const { target } = this;
+    const yaw = this.now.yaw + this.heading;
+    Object.assign(this, { wish: last.wish, mode: last.mode, base: last.base, heading: last.heading });
+    this.now.at = minus(target, this.base);
+    this.now.yaw = this.wish.yaw + halfTurn(yaw - this.heading - this.wish.yaw);
+    return last.extra;
+  }
+
+  turn(yaw, pitch) {
+    this.wish.yaw += yaw;
+    this.wish.pitch = between(this.wish.pitch + pitch, -STEEPEST, STEEPEST);
+  }
+
+  /** Move what is looked at by pixels of the view. */
+  pan(right, up, height) {
+    const perPixel = (2 * Math.tan(FIELD_OF_VIEW / 2) * Math.exp(this.wish.zoom)) / height;
+    const axes = this.axes();
+    this.wish.at = add(this.wish.at, add(scaled(axes.right, right * perPixel), scaled(axes.up, up * perPixel)));
+  }
+
+  /** Come nearer by a factor, towards a place that keeps its pixel; null comes nearer to what is looked at. */
+  zoom(factor, place = null) {
+    const before = this.wish.zoom;
+    this.wish.zoom = between(before + Math.log(factor), Math.log(0.3), Math.log(this.size * 40));
+    if (!place) return;
+    const share = 1 - Math.exp(this.wish.zoom - before);
+    this.wish.at = add(this.wish.at, scaled(minus(place, add(this.base, this.wish.at)), share));
+  }
+
+  /** Run after what is wished for; true while there is way to go. */
+  step(seconds, isCalm) {
+    const { now, wish } = this;
+    const shareIn = (haste) => (isCalm ? 1 : 1 - Math.exp(-seconds / haste));
+    const [share, turned] = [shareIn(HASTE[this.mode]), shareIn(HASTE.free)];
+    const gap = minus(wish.at, now.at);
+    const isFar = norm(gap) > 2e-4 * this.distance || Math.abs(wish.yaw - now.yaw) + Math.abs(wish.pitch - now.pitch) > 2e-4 ||
+      Math.abs(wish.zoom - now.zoom) > 2e-4;
+    now.at = isFar ? add(now.at, scaled(gap, share)) : wish.at;
+    for (const name of ['yaw', 'pitch', 'zoom']) {
+      now[name] = isFar ? now[name] + (name === 'zoom' ? share : turned) * (wish[name] - now[name]) : wish[name];
+    }
+    return isFar;
+  }
+
+  /** Right, up, and away from what is looked at, also straight from above. */
+  axes(state = this.now) {
+    const yaw = state.yaw + this.heading;
+    const [level, height] = [Math.cos(state.pitch), Math.sin(state.pitch)];
+    const away = [level * Math.cos(yaw), level * Math.sin(yaw), height];
+    const right = [-Math.sin(yaw), Math.cos(yaw), 0];
+    return { right, up: cross(away, right), away };
+  }
+
+  /** All that is needed to draw: places of the world are taken relative to an anchor near them, for 32 bits are few. */
+  view(width, height, anchor) {
+    const { right, up, away } = this.axes();
+    const { distance } = this;
+    const eye = add(this.target, scaled(away, distance));
+    const near = Math.max(0.02 * distance, 0.02);
+    const far = 4 * (distance + this.size) + 100;
+    const clip = perspective(minus(eye, anchor), right, up, away, FIELD_OF_VIEW, width / height, near, far);
+    return { clip, eye, right, up, away, width, height, anchor, near, far, distance, perPixel: (2 * Math.tan(FIELD_OF_VIEW / 2)) / height };
+  }
+
+  /**
+   * Wish for a view of places from the direction that is wished for. `each` calls a function with x, y and z of every place; `room` is
+   * what panels leave of the view: shares left, right, top, bottom.
+   */
+  fit(each, aspect, room) {
+    const { right, up, away } = this.axes(this.wish);
+    const axes = [right, up, away];
+    const low = [Infinity, Infinity, Infinity];
+    const high = [-Infinity, -Infinity, -Infinity];
+    each((x, y, z) => {
+      for (let k = 0; k < 3; k++) {
+        const along = axes[k][0] * x + axes[k][1] * y + axes[k][2] * z;
+        low[k] = Math.min(low[k], along);
+        high[k] = Math.max(high[k], along);
+      }
+    });
+    if (low[0] === Infinity) return;
+    const middle = scaled(add(low, high), 0.5);
+    const tangent = Math.tan(FIELD_OF_VIEW / 2);
+    const wide = 1 / (tangent * aspect * (1 - room.left - room.right));
+    const tall = 1 / (tangent * (1 - room.top - room.bottom));
+    let distance = LEAST_DISTANCE;
+    each((x, y, z) => {
+      const across = Math.abs(right[0] * x + right[1] * y + right[2] * z - middle[0]) * wide;
+      const upward = Math.abs(up[0] * x + up[1] * y + up[2] * z - middle[1]) * tall;
+      distance = Math.max(distance, Math.max(across, upward) + away[0] * x + away[1] * y + away[2] * z - middle[2]);
+    });
+    const shift = [(room.right - room.left) * tangent * aspect * distance, (room.top - room.bottom) * tangent * distance, 0];
+    const at = add(middle, shift);
+    this.wish.at = add(scaled(right, at[0]), add(scaled(up, at[1]), scaled(away, at[2])));
+    this.wish.zoom = Math.log(distance);
+  }
+}
+
+/** Pixel of a place and how far before the eye it is; null behind the eye. */
+export function pixelOf(view, place) {
+  const { clip, anchor } = view;
+  const [x, y, z] = minus(place, anchor);
+  const w = clip[3] * x + clip[7] * y + clip[11] * z + clip[15];
+  if (w <= view.near) return null;
+  const across = (clip[0] * x + clip[4] * y + clip[8] * z + clip[12]) / w;
+  const upward = (clip[1] * x + clip[5] * y + clip[9] * z + clip[13]) / w;
+  return [(0.5 + 0.5 * across) * view.width, (0.5 - 0.5 * upward) * view.height, w];
+}
+
+/** The place behind a pixel, as far away as what is looked at. */
+export function placeBehind(view, camera, x, y) {
+  const right = (x - 0.5 * view.width) * view.perPixel * view.distance;
+  const up = (0.5 * view.height - y) * view.perPixel * view.distance;
+  return add(camera.target, add(scaled(view.right, right), scaled(view.up, up)));
+}

@@ -1,0 +1,95 @@
+// What keys and buttons do. The help page is this list.
+
+import { element } from './formatting.js';
+
+/** Groups of [keys, what they do, name of the action]; the keys are those of the existing system where it has them. */
+const KEYS = [
+  ['Time', [
+    [[' ', 'b'], 'play, pause', 'play'],
+    [['.', ','], 'a frame on, a frame back', 'forth', 'back'],
+    [[']', '['], 'faster, slower', 'faster', 'slower'],
+    [['m'], 'as fast as can be, and back', 'hurry'],
+    [['PageDown', 'PageUp'], 'next event, event before', 'nextEvent', 'lastEvent'],
+    [['Home', 'End'], 'to the beginning, to the end', 'begin', 'end'],
+  ]],
+  ['Camera', [
+    [['o'], 'all in view', 'overview'],
+    [['v'], 'from above', 'top'],
+    [['a'], 'follow, behind, free', 'mode'],
+    [['ArrowRight', 'ArrowLeft'], 'follow the next, the one before', 'nextEntity', 'lastEntity'],
+    [['z', 'Z'], 'nearer, farther', 'nearer', 'farther'],
+    [['r'], 'the view of the beginning', 'reset'],
+    [['u'], 'the view before', 'undo'],
+    [['Escape'], 'let go', 'unchoose'],
+  ]],
+  ['Picture', [
+    [['+', '-'], 'larger, smaller models', 'larger', 'smaller'],
+    [['0'], 'models in their size', 'usualSize'],
+    [['t', 'T'], 'trails: longer, shorter', 'trails', 'shorterTrails'],
+    [['l'], 'labels', 'labels'],
+    [['n', 'N'], 'larger, smaller labels', 'largerText', 'smallerText'],
+    [['w', 's'], 'wireframe, solid', 'wire', 'solid'],
+    [['g'], 'grid and axes', 'grid'],
+    [['x'], 'links between those in reach', 'links'],
+    [['k'], 'dark, light', 'theme'],
+    [['c'], 'save the picture', 'save'],
+  ]],
+  ['Live game', [
+    [['p'], 'pick a point of the ground, which plugins are told', 'pick'],
+    [[';'], 'a key for the plugins', 'customKey'],
+  ]],
+  ['Page', [
+    [['h', '?'], 'keys', 'help'],
+    [['i'], 'about this run', 'info'],
+    [['d'], 'how it is drawn', 'settings'],
+  ]],
+];
+const NAMES = { ' ': 'space', Backspace: 'Backspace', PageDown: 'PgDn', PageUp: 'PgUp', ArrowRight: '→', ArrowLeft: '←', Escape: 'Esc', '-': '−' };
+
+/** Key -> name of its action. */
+function bindings() {
+  const found = new Map();
+  for (const [, entries] of KEYS) {
+    for (const [keys, , ...actions] of entries) keys.forEach((key, i) => found.set(key, actions[Math.min(i, actions.length - 1)]));
+  }
+  // Keys that lie beside those above, or are another way to write them.
+  return found.set('Backspace', 'back').set('=', 'larger').set('_', 'smaller').set('A', 'reset').set('H', 'help');
+}
+
+export function fillHelp(box, isLive) {
+  box.replaceChildren(...KEYS.filter(([title]) => isLive || title !== 'Live game').map(([title, entries]) => {
+    const group = element('section');
+    group.append(element('h3', '', title));
+    for (const [keys, what] of entries) {
+      const line = element('div', 'key');
+      const names = element('span');
+      names.append(...keys.map((key) => element('kbd', '', NAMES[key] || key)));
+      line.append(names, element('span', '', what));
+      group.append(line);
+    }
+    return group;
+  }));
+}
+
+/** Listen to keys and to buttons with `data-do`. */
+export function listen(actions) {
+  const keys = bindings();
+  document.addEventListener('keydown', (event) => {
+    if (event.ctrlKey || event.metaKey || event.altKey || document.querySelector('dialog[open]')) return;
+    const isInField = event.target instanceof HTMLInputElement && ['range', 'number'].includes(event.target.type) && event.target.id !== 'time';
+    const isButton = event.target instanceof HTMLElement && event.target.closest('button, input[type="checkbox"]');
+    if (isInField && (event.key.startsWith('Arrow') || event.target.type === 'number')) return;
+    if (isButton && (event.key === ' ' || event.key === 'Enter')) return;
+    const action = keys.get(event.key);
+    if (!action) return;
+    event.preventDefault();
+    actions[action]();
+  });
+  document.addEventListener('click', (event) => {
+    const button = event.target instanceof Element && event.target.closest('[data-do]');
+    if (!button) return;
+    actions[button.dataset.do]();
+    // A key goes to the page again, not to the button that was clicked last.
+    if (event.detail > 0) button.blur();
+  });
+}

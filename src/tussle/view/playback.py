@@ -1,0 +1,228 @@
+"""Carries out what those who watch a game order, between its steps, and plays on in between."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any
+
+from tussle.errors import PluginError, TussleError
+from tussle.messages import Message
+from tussle.view.drawn import Sketchbook
+from tussle.view.pacing import Pace, Speedometer
+from tussle.view.player import Player
+
+LONGEST_WAIT = 60.0
+"""Time for which it sleeps at once [s]: no clock of the system counts to the next step of a game that is all but stopped."""
+BURST = 0.004
+"""Time for which steps are made before anything else is looked after [s]: short against the 33 ms between two frames."""
+
+
+@dataclass(frozen=True, eq=False)
+class Order:
+    """Something to be done between two steps.
+
+    Attributes:
+        do: Does it.
+        is_seek: It goes to a place in time, so that a later one makes it pointless.
+        may_cut_in: It need not wait until those before have got where they go.
+    """
+
+    do: Callable[[], None]
+    is_seek: bool = False
+    may_cut_in: bool = False
+
+
+class PlaybackController:
+    """Plays a game and carries out orders, in one thread or in whoever gives them.
+
+    Args:
+        player: The game.
+        pace: How fast it is played.
+        sketchbook: What its plugins draw.
+        is_paused: Stand still until told otherwise.
+        on_moment: Called between steps every few ms, and when it comes to a stand; told whether it stands still.
+
+    Attributes:
+        is_paused: It stands still when all orders are carried out.
+        error: What stopped the game.
+        version: Counts changes of what there is to be seen.
+        epoch: Counts jumps in time.
+        shown: Step of what is to be seen, and whether the world is over there: during a seek, that where it began.
+    """
+
+    def __init__(
+        self,
+        player: Player,
+        pace: Pace,
+        sketchbook: Sketchbook,
+        is_paused: bool,
+        on_moment: Callable[[bool], None],
+    ) -> None:
+        self.player, self.pace, self.sketchbook = player, pace, sketchbook
+        self.speed = Speedometer()
+        self.is_paused = is_paused
+        self.error: Exception | None = None
+        self.version = self.epoch = 0
+        self.shown = player.step, player.is_over
+        self._on_moment = on_moment
+        self._orders: deque[Order] = deque()
+        self._goal: int | None = None
+        self._is_going = False
+        self._wait: float | None = None
+        self._bell = threading.Event()
+        self._is_stopping = False
+
+    # -- from any thread --------------------------------------------------------------------------------------------------------
+
+    def give(self, order: Order) -> None:
+        """Have something done between two steps."""
+        if order.is_seek:
+            for other in list(self._orders):
+                if other.is_seek:
+                    self._take_back(other)
+        self._orders.append(order)
+        self._bell.set()
+
+    def _take_back(self, order: Order) -> None:
+        with suppress(ValueError):  # it has been taken up meanwhile
+            self._orders.remove(order)
+
+    def ring(self) -> None:
+        """Wake it where it sleeps: there is something to be looked after."""
+        self._bell.set()
+
+    def end(self) -> None:
+        """Return from `run` after the step in hand."""
+        self._is_stopping = True
+        self._bell.set()
+
+    @property
+    def is_seeking(self) -> bool:
+        """It is on its way to another time through steps that have been seen before."""
+        return self._is_going and self.player.step < self.player.last_step
+
+    # -- the loop -----------------------------------------------------------------------------------------------------------------
+
+    def run(self) -> None:
+        """Carry out orders and play, until `end`."""
+        while not self._is_stopping:
+            self._bell.clear()
+            has_worked = self.work(may_play=True)
+            self._on_moment(not has_worked and self._wait is None)
+            if not has_worked:
+                self._sleep()
+
+    def _sleep(self) -> None:
+        began = time.perf_counter()
+        self._bell.wait(None if self._wait is None else min(self._wait, LONGEST_WAIT))
+        self.player.rest(time.perf_counter() - began)
+
+    def drain(self) -> None:
+        """Carry out all orders, and return."""
+        while self.work(may_play=False):
+            pass
+
+    def work(self, may_play: bool) -> bool:
+        """Do the next thing; False where there is nothing to be done now."""
+        self._wait = None
+        if self._orders and (self._goal is None or self._orders[0].may_cut_in):
+            self._carry_out(self._orders.popleft())
+        elif self._goal is not None:
+            self._advance_to(self._goal)
+        elif may_play and not self.is_paused and not self.player.is_over:
+            return self._play()
+        else:
+            self.pace.restart()
+            self.speed.restart()
+            return False
+        return True
+
+    def _carry_out(self, order: Order) -> None:
+        try:
+            order.do()
+        except Exception as error:  # noqa: BLE001 - whatever it is, whoever watches reads it, and nothing hangs
+            if isinstance(error, TussleError) and not isinstance(error, PluginError):
+                self.player.note(str(error))
+            else:
+                self._fail(error)
+        self._changed()
+
+    def _play(self) -> bool:
+        player = self.player
+        clock = player.simulation.state.context.clock
+        until = time.perf_counter() + BURST
+        while True:
+            left = self.pace.wait(float(clock.start + player.step * clock.dt), clock.dt)
+            if left > 0.0:
+                self._wait = left
+                return False
+            self._advance()
+            self.speed.read(float(clock.start + player.step * clock.dt), player.step)
+            if player.is_over or self._orders or self.is_paused or time.perf_counter() > until:
+                return True
+
+    def _advance_to(self, goal: int) -> None:
+        until = time.perf_counter() + BURST
+        while self.player.step < goal and not self.player.is_over:
+            self._advance()
+            if self._orders or self._is_stopping or time.perf_counter() > until:
+                break
+        if self.player.step >= goal or self.player.is_over:
+            self._goal, self._is_going = None, False
+            self.pace.restart()
+            self._changed()
+
+    def _advance(self) -> None:
+        if self.sketchbook.is_open:
+            self.sketchbook.turn_page()
+        try:
+            self.player.advance()
+        except Exception as error:  # noqa: BLE001 - whatever a plugin does, whoever watches reads it
+            self._fail(error)
+        self._changed()
+
+    def _fail(self, error: Exception) -> None:
+        self.error, self.is_paused, self.player.is_broken = error, True, True
+        self._goal, self._is_going = None, False
+
+    def _changed(self) -> None:
+        if not self.is_seeking:
+            self.version += 1
+            self.shown = self.player.step, self.player.is_over
+
+    # -- orders -------------------------------------------------------------------------------------------------------------------
+
+    def move(self, n: int) -> None:
+        """Make n steps, or go back -n."""
+        if n < 0:
+            self.go(self.player.step + n)
+        else:
+            self._goal = self.player.step + n
+
+    def go(self, step: int) -> None:
+        """Go to a step, back or forth."""
+        was_broken = self.player.is_broken
+        self._is_going = True
+        self._goal = self.player.wind(step)
+        self.epoch += 1
+        self.sketchbook.clear()
+        if was_broken and not self.player.is_broken:
+            self.error = None
+
+    def begin_anew(self, seed: int | None) -> None:
+        """Begin anew, with another seed where one is given."""
+        self._goal, self._is_going, self.error = None, False, None
+        self.epoch += 1
+        self.sketchbook.clear()
+        self.player.reset(seed)
+        self.pace.restart()
+        self.speed.restart()
+
+    def say(self, type_: type[Message], network: str, topic: str, fields: dict[str, Any]) -> None:
+        """Say something to the plugins."""
+        self.player.publish(type_, network, topic, fields)

@@ -1,0 +1,150 @@
+"""How entities are drawn: colours of teams and blocks, and which model a block gets."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from tussle.palette import colour_of, rgb_of
+from tussle.view.shapes import MODELS
+
+Colour = tuple[int, int, int]
+
+_WORDS: Mapping[str, tuple[str, ...]] = {
+    "aircraft": (
+        *("zephyr", "cessna", "aircraft", "airplane", "plane", "fixedwing", "fixed", "wing", "glider", "jet"),
+        *("f15", "f16", "c172", "uav", "skywalker", "bird"),
+    ),
+    "quadrotor": ("iris", "quad", "quadrotor", "multirotor", "copter", "rotor", "hexacopter", "drone"),
+    "car": ("volkswagen", "car", "truck", "pioneer", "husky", "turtlebot", "ugv", "rover", "jeep", "ackermann"),
+    "boat": (
+        *("seaangler", "angler", "boat", "ship", "usv", "uuv", "auv", "vessel", "submarine", "kayak"),
+        *("wamv", "torpedo", "heron"),
+    ),
+    "sphere": ("sphere", "ball", "point", "marble", "oscillator"),
+}  # fmt: skip
+"""Words in the names that mission files give to models."""
+
+_MOTION_WORDS: Mapping[str, tuple[str, ...]] = {
+    "aircraft": ("unicycle", "aircraft", "wing", "jsbsim"),
+    "quadrotor": ("rotor", "quad", "copter"),
+    "car": ("car", "ackermann", "drive", "ground"),
+    "boat": ("boat", "ship", "vessel", "usv"),
+}
+"""Words in the names of motion models."""
+
+
+class Style:
+    """Colours and models of a mission's entities.
+
+    A block is coloured as its `<color>` says, else as its team. A team has the colour of its first block that has one, else one of
+    a palette by its number. The model is what `visual_model` comes nearest to, else what suits the motion model; `visual_rpy`,
+    which turns the existing system's meshes, turns none of these, whose noses point forward as they are.
+
+    Args:
+        blocks: Names of the blocks.
+        teams: Team of each block.
+        plugins: Names of the classes of each block's plugins, by which one without a model of its own is given one.
+        viewer: What the mission file says for the viewer, see `tussle.mission.Loaded`.
+
+    Attributes:
+        notes: What the mission asks for and does not get, one line each.
+    """
+
+    def __init__(
+        self,
+        blocks: Sequence[str],
+        teams: Sequence[int],
+        plugins: Sequence[Sequence[str]] = (),
+        viewer: Mapping[str, Any] | None = None,
+    ) -> None:
+        self.notes: list[str] = []
+        self._teams = list(teams)
+        entities = (viewer or {}).get("entities", {})
+        own = [entities.get(name, {}) for name in blocks]
+        self._colours = [self._read_colour(name, s.get("color")) for name, s in zip(blocks, own, strict=True)]
+        self._scales = [
+            self._read_scale(name, s.get("visual_scale")) for name, s in zip(blocks, own, strict=True)
+        ]
+        self._models = [
+            self._read_model(name, s.get("visual_model"), plugins[i] if i < len(plugins) else ())
+            for i, (name, s) in enumerate(zip(blocks, own, strict=True))
+        ]
+        self._by_team: dict[int, Colour] = {}
+        for team, colour in zip(teams, self._colours, strict=True):
+            if colour is not None:
+                self._by_team.setdefault(team, colour)
+
+    def colour(self, team: int) -> Colour:
+        """Red, green, blue of a team, 0 to 255."""
+        return self._by_team.get(team) or rgb_of(colour_of(team))
+
+    def block_colour(self, block: int) -> Colour:
+        """Red, green, blue of a block by its number, 0 to 255."""
+        return self._colours[block] or self.colour(self._teams[block])
+
+    def model(self, block: int) -> str:
+        """Name of the model of a block by its number, in `MODELS`."""
+        return self._models[block]
+
+    def scale(self, block: int) -> float:
+        """How much larger than the model a block's entities are drawn."""
+        return self._scales[block]
+
+    # -- what the mission file says -------------------------------------------------------------------------------------------
+
+    def _read_colour(self, block: str, text: str | None) -> Colour | None:
+        if text is None:
+            return None
+        numbers = re.findall(r"-?\d+(?:\.\d+)?", text)
+        values = [round(float(n)) for n in numbers]
+        if len(values) != 3 or not all(0 <= v <= 255 for v in values):
+            self.notes.append(
+                f"block {block!r}: color {text!r} is not three numbers from 0 to 255; the team's is taken"
+            )
+            return None
+        return values[0], values[1], values[2]
+
+    def _read_scale(self, block: str, text: str | None) -> float:
+        try:
+            scale = 1.0 if text is None else float(text)
+        except ValueError:
+            scale = -1.0
+        if 0.0 < scale < float("inf"):
+            return scale
+        self.notes.append(f"block {block!r}: visual_scale {text!r} is not a number > 0; 1 is taken")
+        return 1.0
+
+    def _read_model(self, block: str, asked: str | None, plugins: Sequence[str]) -> str:
+        suitable = next((m for p in plugins if (m := _model_by_words(p, _MOTION_WORDS))), "sphere")
+        if not asked:
+            return suitable
+        found = _model_by_words(asked, _WORDS) or _model_by_likeness(asked)
+        if not found:
+            self.notes.append(
+                f"block {block!r}: there is nothing like visual_model {asked!r} here; it is drawn as {suitable}"
+            )
+        return found or suitable
+
+
+def _model_by_words(name: str, words: Mapping[str, tuple[str, ...]]) -> str:
+    """The model one of whose words stands in a name; "" where none does. Short words count only when they stand alone."""
+    parts = set(re.findall(r"[A-Z]?[a-z]+\d*|[A-Z]+(?![a-z])\d*", name)) | {name}
+    parts = {p.lower() for p in parts}
+    whole = re.sub(r"[^a-z0-9]", "", name.lower())
+    for model, known in words.items():
+        if any(word in parts or (len(word) > 4 and word in whole) for word in known):
+            return model
+    return ""
+
+
+def _model_by_likeness(name: str) -> str:
+    """The model with a word that is written nearly like a name; "" without one."""
+    by_word = {word: model for model, words in _WORDS.items() for word in words}
+    close = difflib.get_close_matches(name.lower(), by_word, n=1, cutoff=0.7)
+    return by_word[close[0]] if close else ""
+
+
+assert set(_WORDS) == set(MODELS)
