@@ -37,7 +37,7 @@ WATCH = """
 import sys, time
 sys.path.insert(0, sys.argv[2])
 from page_client import PageClient
-client = PageClient(sys.argv[1])
+client = PageClient(sys.argv[1], is_counting=True)
 for line in sys.stdin:
     print(client.n_frames, client.n_bytes, flush=True)
 """

@@ -47,16 +47,14 @@ def chase(browser: Browser) -> None:
     loaded = read_mission(GAME)
     with (
         Simulation(loaded.mission, 1) as simulation,
-        Live(simulation, pace=16.0, viewer=loaded.viewer) as live,
+        Live(simulation, is_paused=True, viewer=loaded.viewer) as live,
         shown(browser, Page(live)) as watched,
     ):
-        watched.until(lambda: live.step_number >= 600)
-        live.pause()
-        live.settle()
-        watched.wait(f"player.frame === {live.step_number}")
-        who = int(live.frame().id[live.frame().team == 2][0])
-        watched.tab.mouse.click(*watched.wait(f"player.pixelOf({who})"))
-        watched.wait(f"player.status.entity && player.frame === {live.step_number}")
+        live.step(600)
+        watched.wait("player.frame === 600")
+        watched.press("ArrowRight")
+        watched.press("o")
+        watched.wait("player.status.entity")
         shoot(watched, "view-chase")
 
 

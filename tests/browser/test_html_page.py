@@ -470,7 +470,7 @@ def test_a_page_that_was_cut_or_damaged_says_so(watched, hunted, tmp_path):
     page.goto(cut.as_uri())
     assert "not whole" in page.locator("#sorry").inner_text()
     damaged = tmp_path / "damaged.html"
-    start = text.index(">", text.index('id="data-piece-0"')) + 1
+    start = text.index(">", text.index('id="data-chunk-0"')) + 1
     damaged.write_text(text[:start] + "AAAA" + text[start + 4 :], encoding="utf-8")
     page = watched(damaged.as_uri())
     page.goto(damaged.as_uri())

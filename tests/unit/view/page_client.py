@@ -19,6 +19,7 @@ class PageClient:
     Args:
         url: Of the page.
         is_reading: Take what the server sends; without, it is a browser that hangs.
+        is_counting: Count frames, and look into none.
 
     Attributes:
         status: The last status.
@@ -30,7 +31,7 @@ class PageClient:
         error: Code with which the server closed the socket; None while it is open.
     """
 
-    def __init__(self, url: str, *, is_reading: bool = True) -> None:
+    def __init__(self, url: str, *, is_reading: bool = True, is_counting: bool = False) -> None:
         self.status: dict = {}
         self.frame: dict = {}
         self.t = float("nan")
@@ -40,7 +41,7 @@ class PageClient:
         self.past: list = []
         self.n_frames = self.n_bytes = 0
         self.error: int | None = None
-        self._url, self._is_reading = url, is_reading
+        self._url, self._is_reading, self._is_counting = url, is_reading, is_counting
         self._is_open = threading.Event()
         self._refused: Exception | None = None
         self._thread = threading.Thread(target=lambda: asyncio.run(self._run()), daemon=True)
@@ -71,6 +72,9 @@ class PageClient:
 
     def _take(self, data: str | bytes) -> None:
         self.n_bytes += len(data)
+        if self._is_counting:
+            self.n_frames += not isinstance(data, str)
+            return
         if isinstance(data, str):
             self.status = json.loads(data)
             events = self.status["events"]

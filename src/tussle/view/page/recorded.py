@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from tussle.errors import ParameterError, ViewError
+from tussle.mission import Mission
 from tussle.view.page.chunks import ANGLE_ERROR, FULL_HEALTH, UNIT, pack, position_error, step_of
 from tussle.view.page.compare import Comparison
 from tussle.view.page.document import game_document, terrain_bytes
@@ -17,7 +18,7 @@ from tussle.view.recording import Recording
 
 FILE_STATES, FILE_FRAMES = 150_000, 32
 """States of a chunk in a file, about, and its least frames: with fewer the first states of its tracks weigh too much."""
-SERVED_STATES, SERVED_FRAMES = 30_000, 4
+SERVED_STATES, SERVED_FRAMES = 20_000, 4
 """Of a chunk that is served: some hundredths of a second of work for both ends, so that a jump in time is not felt."""
 MOST_FRAMES = 1024
 """Frames of a chunk: with more a page has to read too much before it shows anything."""
@@ -35,6 +36,7 @@ class RecordedData:
         is_file: For a file that is whole by itself; otherwise for a page that asks for one chunk after another.
         period: Time between frames that are kept [s]; None keeps all.
         title: Heading of the page; None is the game's name.
+        mission: What was played; None is the run's own mission.
         viewer: What the mission file says for the viewer; None is what the run's own mission says.
 
     Attributes:
@@ -53,6 +55,7 @@ class RecordedData:
         is_file: bool,
         period: float | None = None,
         title: str | None = None,
+        mission: Mission | None = None,
         viewer: dict[str, Any] | None = None,
     ) -> None:
         if period is not None and not 0.0 < period < math.inf:
@@ -70,7 +73,8 @@ class RecordedData:
         self._leap = LEAP_OF_EXTENT * float(np.linalg.norm(high - low))
         smallest = min((game.style.scale(i) for i in range(len(game.blocks))), default=1.0)
         self.step = step_of(low, high, smallest)
-        self._title, self._viewer = title, game.viewer if viewer is None else viewer
+        self._title, self._mission = title, mission or game.mission
+        self._viewer = game.viewer if viewer is None else viewer
         self._terrain = terrain_bytes(game.scenery)
 
     @property
@@ -96,7 +100,7 @@ class RecordedData:
             ("Entities", f"{grouped(self.n_entities)}, in {grouped(int(self.counts.sum()))} states"),
         ]
         return {
-            **game_document(game, game.mission, self._viewer, self._title),
+            **game_document(game, self._mission, self._viewer, self._title),
             "source": "embedded" if self._is_file else "range",
             "facts": facts,
             "idShift": game.id_shift,

@@ -86,7 +86,7 @@ class Page:
             )
             self._terrain = terrain_bytes(game.scenery)
         else:
-            self._data = RecordedData(game, is_file=False, viewer=viewer)
+            self._data = RecordedData(game, is_file=False, mission=mission, viewer=viewer)
             begins = (
                 game.difference.t if isinstance(game, Comparison) and game.difference else float(game.t[0])
             )
@@ -101,13 +101,17 @@ class Page:
         self.url = self._access.url
         self._bound = bound
         is_up = threading.Event()
-        self._thread = threading.Thread(
-            target=lambda: asyncio.run(self._serve(is_up)), name="tussle page", daemon=True
-        )
+        self._thread = threading.Thread(target=lambda: self._run(is_up), name="tussle page", daemon=True)
         self._thread.start()
         is_up.wait()
 
     # -- the server -----------------------------------------------------------------------------------------------------------------
+
+    def _run(self, is_up: threading.Event) -> None:
+        """The server's thread: whoever waits for it is told when it is up, and when it fails before."""
+        with self._failures.caught():
+            asyncio.run(self._serve(is_up))
+        is_up.set()
 
     async def _serve(self, is_up: threading.Event) -> None:
         """Serve until `stop`."""

@@ -50,7 +50,7 @@ class Player {
       cones: false, links: false, ringRadius: reach, coneRange: reach, coneAngle: Math.round(page.angle) || 60, linkRange: reach,
     };
     this.isCalm = window.matchMedia('(prefers-reduced-motion: reduce)').matches;
-    const failed = (error) => sorry(`The data of this page cannot be read: ${error.message}`);
+    const failed = (error) => sorry(`The data of this page is missing or damaged: ${error.message}`);
     this.layer = source.isLive ? new Live(page, () => this.look()) : new Recorded(page, source, () => this.look(), failed);
   }
 
