@@ -13,13 +13,19 @@ class Clock {
     this.layer = layer;
     this.slider = document.getElementById('time');
     this.parts = document.querySelectorAll('#clock b, #clock span');
+    this.span();
+  }
+
+  /** Let the slider reach as far as the game. */
+  span() {
+    this.slider.min = String(this.layer.start);
+    this.slider.max = String(this.layer.end);
   }
 
   show() {
     const { layer, t } = this;
     const { start, end } = layer;
-    this.slider.min = String(start);
-    this.slider.max = String(end);
+    this.span();
     say(this.parts[0], t.toFixed(this.decimals));
     say(this.parts[1], `/ ${end.toFixed(this.decimals)} s`);
     if (document.activeElement !== this.slider || this.isPlaying) this.slider.value = String(t);
