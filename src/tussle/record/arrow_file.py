@@ -34,6 +34,8 @@ def read_batches(
     error: type[TussleError],
     schema: pa.Schema | None = None,
     rules: Rules | None = None,
+    *,
+    is_mapped: bool = False,
 ) -> Iterator[pa.RecordBatch]:
     """Yield the complete batches of a file, in order.
 
@@ -43,6 +45,7 @@ def read_batches(
         error: Class of the errors that are raised.
         schema: Required columns; None for any.
         rules: Allowed values by column.
+        is_mapped: Leave the rows in the file, which is mapped into memory, and check no values.
 
     Raises:
         TussleError: As `error`: the file is not a regular file, has other columns, is compressed, or a batch is invalid.
@@ -56,59 +59,25 @@ def read_batches(
         if not end:
             notes.append(f"{path.name} is truncated before its first batch")
             return
-        with pa.OSFile(str(path), "rb") as file, pa.ipc.open_stream(file.get_stream(0, end)) as reader:
+        with pa.memory_map(str(path)) if is_mapped else pa.OSFile(str(path), "rb") as file:
+            reader = pa.ipc.open_stream(file.read_buffer(end) if is_mapped else file.get_stream(0, end))
             if schema is not None:
                 _check_schema(reader.schema, schema)
             while (batch := _next(reader)) is not None:
                 if schema is not None:
                     batch = pa.RecordBatch.from_arrays(batch.columns, schema=schema)
-                _check_batch(batch)
-                check_values(zip(batch.schema.names, batch.columns, strict=True), rules or {}, path, error)
+                batch.validate(full=not is_mapped)
+                _check_columns(batch)
+                if not is_mapped:
+                    check_values(
+                        zip(batch.schema.names, batch.columns, strict=True), rules or {}, path, error
+                    )
                 n += 1
                 yield batch
     except (_InvalidStreamError, pa.ArrowException, OSError, ValueError) as reason:
         raise error(f"{path}: cannot be read: {reason}") from None
     if is_truncated:
         notes.append(f"{path.name} is truncated after {n} complete batches")
-
-
-def mapped_batches(
-    path: Path, notes: list[str], error: type[TussleError], schema: pa.Schema, rules: Rules
-) -> Iterator[pa.RecordBatch]:
-    """All whole batches of a file as they lie in it: their rows are not read, and no value is checked.
-
-    Args:
-        path: The file.
-        notes: Receives what is missing.
-        error: What is raised.
-        schema: The columns that it must have.
-        rules: Not used, since values are not looked at.
-
-    Raises:
-        TussleError: It is no regular file, has other columns, or a message says what cannot be.
-    """
-    if not path.exists() or not path.stat().st_size:
-        yield from read_batches(path, notes, error, schema, rules)
-        return
-    n = 0
-    try:
-        end, cut = _whole(path)
-        if end:
-            with pa.memory_map(str(path)) as file, pa.ipc.open_stream(file.read_buffer(end)) as reader:
-                _check_schema(reader.schema, schema)
-                while (batch := _next(reader)) is not None:
-                    batch.validate()
-                    _check_columns(batch)
-                    n += 1
-                    yield pa.RecordBatch.from_arrays(batch.columns, schema=schema)
-    except (_LyingError, pa.ArrowException, OSError, ValueError) as reason:
-        raise error(f"{path}: cannot be read: {reason}") from None
-    if cut or not end:
-        notes.append(
-            f"{path.name} is cut after {n} whole batches"
-            if end
-            else f"{path.name} is cut before its first batch"
-        )
 
 
 def _next(reader: pa.RecordBatchReader) -> pa.RecordBatch | None:
@@ -133,14 +102,8 @@ def _check_schema(found: pa.Schema, wanted: pa.Schema) -> None:
         raise _InvalidStreamError(difference)
 
 
-def _check_batch(batch: pa.RecordBatch) -> None:
-    """Check that a batch is valid, has no nulls where none are allowed, and stays small when its dictionaries are decoded."""
-    batch.validate(full=True)
-    _check_columns(batch)
-
-
 def _check_columns(batch: pa.RecordBatch) -> None:
-    """See that no column lacks values, and that words are words."""
+    """Check that a batch has no nulls where none are allowed, and stays small when its dictionaries are decoded."""
     for field, column in zip(batch.schema, batch.columns, strict=True):
         if not field.nullable and column.null_count:
             raise _InvalidStreamError(f"column {field.name!r} has nulls")

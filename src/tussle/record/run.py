@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterator
 from functools import cached_property
 from importlib import import_module
 from importlib.util import find_spec
@@ -16,7 +15,7 @@ import pyarrow.csv
 from tussle.documents import read_text
 from tussle.errors import MissingExtraError, ParameterError, RecordError, listed, nearest_name
 from tussle.mission.limits import Limits
-from tussle.record.arrow_file import mapped_batches, read_batches
+from tussle.record.arrow_file import read_batches
 from tussle.record.schema import (
     EVENTS,
     EVENTS_FILE,
@@ -64,9 +63,8 @@ class Run:
         self.info: dict[str, Any] = {}
         self.notes: list[str] = []
         self._read_info()
-        read = mapped_batches if is_mapped else read_batches
-        self.trajectory_table = self._read_table(TRAJECTORY_FILE, TRAJECTORY, TRAJECTORY_RULES, read)
-        self.events_table = self._read_table(EVENTS_FILE, EVENTS, EVENTS_RULES, read_batches)
+        self.trajectory_table = self._read_table(TRAJECTORY_FILE, TRAJECTORY, TRAJECTORY_RULES, is_mapped)
+        self.events_table = self._read_table(EVENTS_FILE, EVENTS, EVENTS_RULES, False)
 
     def _read_info(self) -> None:
         path = self.path / RUN_FILE
@@ -84,11 +82,10 @@ class Run:
         if self.info["interrupted"]:
             self.notes.append(f"the run was interrupted: {self.info['interrupted']}")
 
-    def _read_table(
-        self, name: str, schema: pa.Schema, rules: Rules, read: Callable[..., Iterator[pa.RecordBatch]]
-    ) -> pa.Table:
+    def _read_table(self, name: str, schema: pa.Schema, rules: Rules, is_mapped: bool) -> pa.Table:
         path, notes = self.path / name, list[str]()
-        table = pa.Table.from_batches(read(path, notes, RecordError, schema, rules), schema)
+        batches = read_batches(path, notes, RecordError, schema, rules, is_mapped=is_mapped)
+        table = pa.Table.from_batches(batches, schema)
         written = self.info.get("files", {}).get(name)
         if not notes and written is not None:
             found = {"bytes": path.stat().st_size, "rows": table.num_rows}
