@@ -52,11 +52,10 @@ export class Live extends Layer {
       this.fillCurves(chunk);
       return;
     }
-    const oldest = this.past.length ? this.past[0].t : this.shown.t;
-    const before = [];
-    for (let i = 0; i < chunk.nFrames && chunk.times[i] < oldest - 1e-9; i++) before.push(momentOf(chunk, i));
-    this.past = [...before, ...this.past];
-    for (const moment of before) this.nPast += moment.n;
+    const known = new Set(this.past.map(({ t }) => t));
+    for (let i = 0; i < chunk.nFrames; i++) if (!known.has(chunk.times[i])) this.past.push(momentOf(chunk, i));
+    this.past.sort((a, b) => a.t - b.t);
+    this.nPast = this.past.reduce((sum, each) => sum + each.n, 0);
     this.changed();
   }
 

@@ -24,6 +24,8 @@ import { actionsOf, listenToSettings } from './actions.js';
 const LEAST_SIZE = 18;
 /** Longer than any game [s]. */
 const WHOLE_GAME = 1e9;
+/** Least time between two looks back for the trails [ms]. */
+const LOOK_PERIOD = 2000;
 /** With no more entities than this, labels and short trails are shown from the start. */
 const FEW = { labels: 30, trails: 500 };
 
@@ -44,6 +46,7 @@ class Player {
     this.isReady = false;
     this.isShown = false;
     this.isPicking = false;
+    this.lookedBack = 0;
     const reach = Number((page.reach || 0.05 * this.size).toPrecision(3));
     this.drawn = {
       scale: 0, trail: 0, text: 0, labels: false, wire: false, least: true, grid: true, regions: true, shapes: true, rings: false,
@@ -99,8 +102,11 @@ class Player {
         },
         frame: (header, bytes) => {
           const isJump = header.epoch !== layer.epoch && layer.epoch >= 0;
+          const before = layer.shown.t;
           layer.takeFrame(header, bytes);
-          if (isJump) this.lookBack();
+          // Of a game that is faster than frames are sent, most of a trail is not seen.
+          const isSparse = layer.shown.t - before > 0.1 * TRAIL_LENGTHS[this.drawn.trail] && performance.now() - this.lookedBack > LOOK_PERIOD;
+          if (isJump || isSparse) this.lookBack();
           isThere();
         },
         past: (header, bytes) => layer.takePast(header, bytes),
@@ -131,6 +137,7 @@ class Player {
 
   /** Ask a live game for what was seen before, where trails are to be drawn. */
   lookBack() {
+    this.lookedBack = performance.now();
     const seconds = TRAIL_LENGTHS[this.drawn.trail] || TRAIL_OF_CHOSEN;
     this.order('history', { seconds: Math.min(seconds, 0.1 * WHOLE_GAME) });
   }
