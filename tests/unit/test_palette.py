@@ -6,9 +6,9 @@ import itertools
 
 import numpy as np
 import pytest
+from tussle.view.looks import Looks
 
 from tussle.palette import GRID, MUTED, NEUTRAL, PAPER, TEAM_COLOURS, colour_of, mixed, rgb_of
-from tussle.view.looks import Looks
 
 # Machado, Oliveira and Fernandes, IEEE TVCG 15 (2009), 1291-1298: linear RGB as seen by dichromats.
 VISION = {

@@ -22,6 +22,7 @@ from unittest import mock
 sys.path.insert(0, str(Path(__file__).parent))
 
 from damages import damage, make_bombs
+from tussle.view.page.replaying import Replay
 from typer.testing import CliRunner
 
 from tussle import Simulation
@@ -36,7 +37,6 @@ from tussle.record import Recorder, load_run, read_table
 from tussle.view.export.html import write_html
 from tussle.view.export.mcap_file import write_mcap
 from tussle.view.export.tables import write_tables
-from tussle.view.page.replaying import Replay
 from tussle.view.recording import Recording
 
 SECONDS = 10
