@@ -37,7 +37,7 @@ class Message:
             )
 
 
-class Batch:
+class Messages:
     """Messages of one type as columns, ordered by (world, sender, send order).
 
     Attributes:
@@ -71,7 +71,7 @@ class Batch:
                 f"messages of this type have no field {name!r}{nearest_name(name, fields)}; {listed(fields)}"
             ) from None
 
-    def take(self, index: np.ndarray) -> Batch:
+    def take(self, index: np.ndarray) -> Messages:
         """Select the messages `index`, in that order."""
         data: dict[str, Any] = {}
         for name, column in self.type.fields.items():
@@ -82,17 +82,17 @@ class Batch:
                 data[name] = [values[i] for i in index]
             else:
                 data[name] = np.ascontiguousarray(values[..., index])
-        return Batch(self.type, self.world[index], self.sender[index], data)
+        return Messages(self.type, self.world[index], self.sender[index], data)
 
     @classmethod
-    def empty(cls, type_: type[Message]) -> Batch:
+    def empty(cls, type_: type[Message]) -> Messages:
         """The empty batch of a type; one shared object per type."""
         return _empty(type_)  # type: ignore[arg-type]
 
     @classmethod
     def make(
         cls, type_: type[Message], world: np.ndarray, sender: np.ndarray, values: dict[str, Any]
-    ) -> Batch:
+    ) -> Messages:
         """Make a batch from values by field name; scalars are repeated, missing numbers are 0.
 
         Raises:
@@ -111,7 +111,7 @@ class Batch:
         return cls(type_, np.ascontiguousarray(world, np.int64), np.ascontiguousarray(sender, np.int64), data)
 
     @classmethod
-    def join(cls, batches: list[Batch]) -> Batch:
+    def join(cls, batches: list[Messages]) -> Messages:
         """Concatenate batches in the given order."""
         first = batches[0]
         if len(batches) == 1:
@@ -133,7 +133,7 @@ class Batch:
         )
 
     @classmethod
-    def concatenate(cls, batches: list[Batch]) -> Batch:
+    def concatenate(cls, batches: list[Messages]) -> Messages:
         """Concatenate batches and sort them by (world, sender); the sort is stable."""
         joined = cls.join(batches)
         order = np.lexsort((joined.sender, joined.world))
@@ -141,8 +141,8 @@ class Batch:
 
 
 @cache
-def _empty(type_: Any) -> Batch:
-    return Batch.make(type_, np.zeros(0, np.int64), np.zeros(0, np.int64), {})
+def _empty(type_: Any) -> Messages:
+    return Messages.make(type_, np.zeros(0, np.int64), np.zeros(0, np.int64), {})
 
 
 def _field_values(type_: type[Message], name: str, column: Column, value: Any, n: int) -> Any:

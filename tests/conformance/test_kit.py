@@ -338,7 +338,7 @@ class SoundBehavior(Behavior):
     grade = "portable"
 
     def step(self, g: GroupView) -> None:
-        self.wish[:] = 0.1 * g.pos + g.call("longest_wish")
+        self.desired_velocity[:] = 0.1 * g.pos + g.call("max_desired_speed")
 
 
 SOUND = [v for k, v in list(globals().items()) if k.startswith("Sound")]

@@ -42,7 +42,7 @@ from tussle.columns import (
 )
 from tussle.comms import EVERYONE, SAME_ENTITY
 from tussle.lists import RaggedColumn
-from tussle.messages import Batch, Message
+from tussle.messages import Message, Messages
 from tussle.numeric import wrap
 from tussle.numeric.arrays import unit
 
@@ -50,7 +50,6 @@ __all__ = [
     "EVERYONE",
     "SAME_ENTITY",
     "Autonomy",
-    "Batch",
     "Behavior",
     "Children",
     "Controller",
@@ -70,6 +69,7 @@ __all__ = [
     "Me",
     "Member",
     "Message",
+    "Messages",
     "Metric",
     "MotionBody",
     "MotionModel",

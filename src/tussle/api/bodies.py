@@ -22,7 +22,7 @@ FLOATS = {
     "radius": 1,
     "mass": 1,
 }
-INTS = ("id", "team", "world", "block", "place_in_block")
+INTS = ("id", "team", "world", "block", "block_index")
 STORED_INTS = (*INTS, "born")
 DERIVED = {"yaw": 1, "climb": 1, "roll": 1, "forward": 3, "level_forward": 2}
 N_FLOATS = sum(FLOATS.values())
@@ -66,7 +66,7 @@ class Bodies:
         n_worlds: Number of worlds; world numbers in the table are below it.
         n: Number of rows.
         pos: Position [m], (3, n), world frame; likewise vel [m/s], quat (w, x, y, z), omega [rad/s], force [N], torque [N m],
-            health, radius [m], mass [kg], and id, team, world, block, place_in_block.
+            health, radius [m], mass [kg], and id, team, world, block, block_index.
         loads: Forces and torques, (6, n).
         born: Step of its world in which each entity was born, (n,); 0 for those that are there from the start.
     """
@@ -84,7 +84,7 @@ class Bodies:
     team: np.ndarray
     world: np.ndarray
     block: np.ndarray
-    place_in_block: np.ndarray
+    block_index: np.ndarray
     born: np.ndarray
     loads: np.ndarray
 

@@ -1,6 +1,7 @@
 """Shapes that plugins draw; they cost next to nothing where nobody looks.
 
-`g.draw.vectors(pos=g.pos, direction=self.wish, colour=(255, 0, 0))`. Positions and directions are (3,) or (3, n) [m], world frame:
+`g.draw.vectors(pos=g.pos, direction=self.desired_velocity,
+colour=(255, 0, 0))`. Positions and directions are (3,) or (3, n) [m], world frame:
 
 | kind | draws | attributes, the first being needed |
 |---|---|---|

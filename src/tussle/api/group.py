@@ -45,7 +45,7 @@ class GroupView:
         first: Row of this view's row 0 in the body table.
         dt: Time since this plugin's last call in these worlds [s]; before the first, the period of its calls.
         pos: Position [m], (3, n), world frame. Likewise vel [m/s], quat (w, x, y, z), omega [rad/s], force, torque, health, radius,
-            mass, and the whole numbers id, team, world, block, place_in_block. For autonomies and controllers pos, vel and quat are the
+            mass, and the whole numbers id, team, world, block, block_index. For autonomies and controllers pos, vel and quat are the
             entity's belief where a sensor writes one.
         motion_state: State of the entity's motion model, (m, n), fields in order of declaration: where a planner's rollout begins.
     """
@@ -298,9 +298,7 @@ class GroupView:
 
     def draw_lines(self, law: str, label: str, k: int) -> np.ndarray:
         """The draws of `uniform` and `normal`, (k, n); for easy mode."""
-        return LAWS[law](
-            self._seeds, self._stream(label), self.place_in_block, self.step_count, self.substep, k
-        )
+        return LAWS[law](self._seeds, self._stream(label), self.block_index, self.step_count, self.substep, k)
 
     def uniform_pairs(self, label: str, near: Any, k: int | None = None) -> np.ndarray:
         """Uniform draws in [0, 1), one per pair of `near`, (m,) or (k, m): the same for a pair whatever other entities there are.
@@ -317,7 +315,7 @@ class GroupView:
         row, clock = near.row, self.context.clock
         seeds = self._seeds[row] ^ (self.bodies.id[near.other].astype(np.uint64) * GOLDEN)
         step = clock.step[self.world[row]]
-        out = law(seeds, self._stream(label), self.place_in_block[row], step, self.substep, k or 1)
+        out = law(seeds, self._stream(label), self.block_index[row], step, self.substep, k or 1)
         return out if k is not None else out[0]
 
     def call(self, service: str, *args: Any, **kwargs: Any) -> Any:

@@ -39,7 +39,11 @@ class Behavior(Autonomy):
 
     kind = "behavior"
     gain = Param(1.0, ge=0.0, doc="Weight among the behaviours of one entity.")
-    wish = Output("wish_x wish_y wish_z", unit="m/s", doc="Wanted velocity, world frame.")
+    desired_velocity = Output(
+        "desired_velocity_x desired_velocity_y desired_velocity_z",
+        unit="m/s",
+        doc="Wanted velocity, world frame.",
+    )
 
 
 class Controller(EntityPlugin):

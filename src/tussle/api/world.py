@@ -13,7 +13,7 @@ from tussle.api.context import Context
 from tussle.api.group import GOLDEN, LAWS, GroupView
 from tussle.comms import TopicBuffer
 from tussle.errors import MissionError, ParameterError, listed, nearest_name
-from tussle.messages import Batch, Message
+from tussle.messages import Message, Messages
 
 WRITABLE = ("health", "force", "torque")
 
@@ -171,18 +171,18 @@ class WorldView(GroupView):
 
     # -- messages ---------------------------------------------------------------------------------------------------------
 
-    def inbox(self, type_: type[Message]) -> Batch:
+    def inbox(self, type_: type[Message]) -> Messages:
         """All messages of a type published so far in this step, whatever their topic, ordered by (world, sender)."""
         topics = [t for t in self.by_type.get(type_, ()) if t.sent]
         if not topics:
-            return Batch.empty(type_)
-        return topics[0].outbox() if len(topics) == 1 else Batch.concatenate([t.outbox() for t in topics])
+            return Messages.empty(type_)
+        return topics[0].outbox() if len(topics) == 1 else Messages.concatenate([t.outbox() for t in topics])
 
     def publish(self, type_: type[Message], world: Any, network: str = "", **fields: Any) -> None:
         """Send one message per item of `world` in the name of the world (sender 0)."""
         world = np.atleast_1d(np.asarray(world, np.int64))
         if len(world):
-            batch = Batch.make(type_, world, np.zeros(len(world), np.int64), fields)
+            batch = Messages.make(type_, world, np.zeros(len(world), np.int64), fields)
             self.publish_to(type_, network).add(
                 batch if self.only is None else batch.take(self._spoken_for(world))
             )

@@ -8,14 +8,14 @@ from typing import Any, Final
 
 import numpy as np
 
-from tussle.messages import Batch, Message
+from tussle.messages import Message, Messages
 
 EVERYONE: Final = "everyone"
 SAME_ENTITY: Final = "same entity"
 
 
 @dataclass(slots=True)
-class Parcel:
+class Delivery:
     """Messages with their receivers and delivery times.
 
     Attributes:
@@ -24,11 +24,11 @@ class Parcel:
         to: EVERYONE, SAME_ENTITY, or (message numbers, receivers' ids), each (m,).
     """
 
-    batch: Batch
+    batch: Messages
     due: np.ndarray
     to: Any
 
-    def select(self, keep: np.ndarray) -> Parcel:
+    def select(self, keep: np.ndarray) -> Delivery:
         """The messages where keep, (n,), is true, with their receivers."""
         index = np.flatnonzero(keep)
         to = self.to
@@ -36,7 +36,7 @@ class Parcel:
             number = np.cumsum(keep) - 1
             kept = keep[to[0]]
             to = (number[to[0][kept]], to[1][kept])
-        return Parcel(self.batch.take(index), self.due[index], to)
+        return Delivery(self.batch.take(index), self.due[index], to)
 
 
 class TopicBuffer:
@@ -54,43 +54,43 @@ class TopicBuffer:
         self.network = network
         self.name = name
         self.type = type_
-        self.sent: list[Batch] = []
-        self.queue: list[Parcel] = []
+        self.sent: list[Messages] = []
+        self.queue: list[Delivery] = []
         self.inboxes: list[Inbox] = []
         self.is_published = False
-        self._joined: Batch | None = None
+        self._joined: Messages | None = None
 
-    def add(self, batch: Batch) -> None:
+    def add(self, batch: Messages) -> None:
         """Put messages into this step's outbox."""
         if batch.n:
             self.sent.append(batch)
             self._joined = None
 
-    def outbox(self) -> Batch:
+    def outbox(self) -> Messages:
         """All messages published in this step, ordered by (world, sender)."""
         if self._joined is None or self._joined.n == 0:
-            self._joined = Batch.concatenate(self.sent) if self.sent else Batch.empty(self.type)
+            self._joined = Messages.concatenate(self.sent) if self.sent else Messages.empty(self.type)
         return self._joined
 
     def clear_outbox(self) -> None:
         self.sent.clear()
         self._joined = None
 
-    def post(self, batch: Batch, to: Any, due: np.ndarray) -> None:
+    def post(self, batch: Messages, to: Any, due: np.ndarray) -> None:
         """Queue messages for delivery."""
-        self.queue.append(Parcel(batch, due, to))
+        self.queue.append(Delivery(batch, due, to))
 
     def deliver(self, step: np.ndarray) -> None:
         """Deliver all messages that are due at the end of the worlds' steps, (n_worlds,)."""
-        waiting: list[Parcel] = []
-        for parcel in self.queue:
-            is_due = parcel.due <= step[parcel.batch.world]
-            due = parcel if is_due.all() else parcel.select(is_due)
+        waiting: list[Delivery] = []
+        for delivery in self.queue:
+            is_due = delivery.due <= step[delivery.batch.world]
+            due = delivery if is_due.all() else delivery.select(is_due)
             if due.batch.n:
                 for inbox in self.inboxes:
-                    inbox.parcels.append(due)
+                    inbox.deliveries.append(due)
             if not is_due.all():
-                waiting.append(parcel.select(~is_due))
+                waiting.append(delivery.select(~is_due))
         self.queue = waiting
 
     def drop_worlds(self, gone: np.ndarray) -> None:
@@ -100,17 +100,17 @@ class TopicBuffer:
         self._joined = None
         self.queue = _without(self.queue, gone)
         for inbox in self.inboxes:
-            inbox.parcels = _without(inbox.parcels, gone)
+            inbox.deliveries = _without(inbox.deliveries, gone)
 
 
-def _without(parcels: list[Parcel], gone: np.ndarray) -> list[Parcel]:
+def _without(deliveries: list[Delivery], gone: np.ndarray) -> list[Delivery]:
     kept = []
-    for parcel in parcels:
-        stays = ~gone[parcel.batch.world]
+    for delivery in deliveries:
+        stays = ~gone[delivery.batch.world]
         if stays.all():
-            kept.append(parcel)
+            kept.append(delivery)
         elif stays.any():
-            kept.append(parcel.select(stays))
+            kept.append(delivery.select(stays))
     return kept
 
 
@@ -120,72 +120,74 @@ class Inbox:
     def __init__(self, topic: TopicBuffer, view: Any = None) -> None:
         self.topic = topic
         self.view = view
-        self.parcels: list[Parcel] = []
+        self.deliveries: list[Delivery] = []
         if view is None or not getattr(view, "is_subset", False):
             topic.inboxes.append(self)
 
     def __bool__(self) -> bool:
-        return bool(self.parcels)
+        return bool(self.deliveries)
 
     @property
-    def messages(self) -> Batch:
+    def messages(self) -> Messages:
         """All messages that arrived, for any receiver."""
         return (
-            Batch.concatenate([p.batch for p in self.parcels])
-            if self.parcels
-            else Batch.empty(self.topic.type)
+            Messages.concatenate([p.batch for p in self.deliveries])
+            if self.deliveries
+            else Messages.empty(self.topic.type)
         )
 
-    def pairs(self) -> tuple[np.ndarray, Batch]:
+    def pairs(self) -> tuple[np.ndarray, Messages]:
         """(row, messages): one item per receiving row of the group and message, ordered by row, arrival and sender.
 
         Messages to everyone make rows x messages items; `latest` and `by_row` avoid this.
         """
         rows, batches = [], []
-        for parcel in self.parcels:
-            row, number = self._receivers(parcel) if parcel.to != EVERYONE else self._broadcast_pairs(parcel)
+        for delivery in self.deliveries:
+            row, number = (
+                self._receivers(delivery) if delivery.to != EVERYONE else self._broadcast_pairs(delivery)
+            )
             rows.append(row)
-            batches.append(parcel.batch.take(number))
+            batches.append(delivery.batch.take(number))
         if not rows:
-            return np.zeros(0, np.int64), Batch.empty(self.topic.type)
+            return np.zeros(0, np.int64), Messages.empty(self.topic.type)
         row = np.concatenate(rows)
         order = np.argsort(row, kind="stable")
-        return row[order], Batch.join(batches).take(order)
+        return row[order], Messages.join(batches).take(order)
 
-    def latest(self) -> tuple[np.ndarray, Batch]:
+    def latest(self) -> tuple[np.ndarray, Messages]:
         """(row, messages): the last message of each row that received one."""
         view = self.view
         found_in, number = np.full(view.n, -1), np.zeros(view.n, np.int64)
-        for k in range(len(self.parcels) - 1, -1, -1):
-            parcel = self.parcels[k]
-            if parcel.to == EVERYONE:
-                first, last = self._broadcast_range(parcel)
+        for k in range(len(self.deliveries) - 1, -1, -1):
+            delivery = self.deliveries[k]
+            if delivery.to == EVERYONE:
+                first, last = self._broadcast_range(delivery)
                 rows, numbers = np.flatnonzero(last > first), last[last > first] - 1
             else:
-                rows, numbers = self._receivers(parcel)
+                rows, numbers = self._receivers(delivery)
             is_new = found_in[rows] < 0
             found_in[rows[is_new]] = k
             number[rows[is_new]] = numbers[is_new]  # of several for one row, the last one stays
         rows = np.flatnonzero(found_in >= 0)
-        parts = [(rows[found_in[rows] == k], p.batch) for k, p in enumerate(self.parcels)]
+        parts = [(rows[found_in[rows] == k], p.batch) for k, p in enumerate(self.deliveries)]
         parts = [(mine, batch) for mine, batch in parts if len(mine)]
         if not parts:
-            return rows, Batch.empty(self.topic.type)
-        together = Batch.join([batch.take(number[mine]) for mine, batch in parts])
+            return rows, Messages.empty(self.topic.type)
+        together = Messages.join([batch.take(number[mine]) for mine, batch in parts])
         return rows, together.take(np.argsort(np.concatenate([mine for mine, _ in parts])))
 
-    def by_row(self) -> Callable[[int], list[tuple[Batch, int]]]:
+    def by_row(self) -> Callable[[int], list[tuple[Messages, int]]]:
         """A function that returns the messages of a row, ordered by arrival and sender, each as (batch, message number)."""
-        parts: list[tuple[Batch, np.ndarray, np.ndarray, np.ndarray | None]] = []
-        for parcel in self.parcels:
-            if parcel.to == EVERYONE:
-                parts.append((parcel.batch, *self._broadcast_range(parcel), None))
+        parts: list[tuple[Messages, np.ndarray, np.ndarray, np.ndarray | None]] = []
+        for delivery in self.deliveries:
+            if delivery.to == EVERYONE:
+                parts.append((delivery.batch, *self._broadcast_range(delivery), None))
             else:
-                row, number = self._receivers(parcel)
+                row, number = self._receivers(delivery)
                 edges = np.searchsorted(row, np.arange(self.view.n + 1))
-                parts.append((parcel.batch, edges[:-1], edges[1:], number))
+                parts.append((delivery.batch, edges[:-1], edges[1:], number))
 
-        def of(row: int) -> list[tuple[Batch, int]]:
+        def of(row: int) -> list[tuple[Messages, int]]:
             return [
                 (batch, i if number is None else int(number[i]))
                 for batch, first, last, number in parts
@@ -194,25 +196,25 @@ class Inbox:
 
         return of
 
-    def _broadcast_range(self, parcel: Parcel) -> tuple[np.ndarray, np.ndarray]:
+    def _broadcast_range(self, delivery: Delivery) -> tuple[np.ndarray, np.ndarray]:
         """Range of the messages to everyone that each row receives, (n,): those of its world, if it was born by then."""
-        view, sent = self.view, parcel.batch.world
+        view, sent = self.view, delivery.batch.world
         first, last = np.searchsorted(sent, view.world), np.searchsorted(sent, view.world, side="right")
         # The messages of one world in one parcel were delivered together.
-        was_born = (last > first) & (view.born <= parcel.due[np.minimum(first, len(sent) - 1)])
+        was_born = (last > first) & (view.born <= delivery.due[np.minimum(first, len(sent) - 1)])
         return first, np.where(was_born, last, first)
 
-    def _broadcast_pairs(self, parcel: Parcel) -> tuple[np.ndarray, np.ndarray]:
+    def _broadcast_pairs(self, delivery: Delivery) -> tuple[np.ndarray, np.ndarray]:
         """(row, message number) for each row and message to everyone that it receives, by row."""
-        first, last = self._broadcast_range(parcel)
+        first, last = self._broadcast_range(delivery)
         n = last - first
         row = np.repeat(np.arange(len(n)), n)
         return row, np.arange(len(row)) - np.repeat(np.cumsum(n) - n - first, n)
 
-    def _receivers(self, parcel: Parcel) -> tuple[np.ndarray, np.ndarray]:
+    def _receivers(self, delivery: Delivery) -> tuple[np.ndarray, np.ndarray]:
         """(row, message number) of messages that are not to everyone, by row."""
-        view, batch = self.view, parcel.batch
-        number, ids = (np.arange(batch.n), batch.sender) if isinstance(parcel.to, str) else parcel.to
+        view, batch = self.view, delivery.batch
+        number, ids = (np.arange(batch.n), batch.sender) if isinstance(delivery.to, str) else delivery.to
         row = view.bodies_rows(batch.world[number], ids) - view.first
         here = np.flatnonzero((row >= 0) & (row < view.n))
         here = here[np.argsort(row[here], kind="stable")]
@@ -220,7 +222,7 @@ class Inbox:
 
     def clear(self, heard: np.ndarray | None = None) -> None:
         """Discard the messages that were read: those of the worlds where `heard`, (n_worlds,), is true, by default of all."""
-        self.parcels = [] if heard is None or heard.all() else _without(self.parcels, heard)
+        self.deliveries = [] if heard is None or heard.all() else _without(self.deliveries, heard)
 
 
 class Publisher:
@@ -237,4 +239,4 @@ class Publisher:
         rows = np.flatnonzero(rows) if rows.dtype == bool else rows
         if len(rows):
             view = self.view
-            self.topic.add(Batch.make(self.topic.type, view.world[rows], view.id[rows], fields))
+            self.topic.add(Messages.make(self.topic.type, view.world[rows], view.id[rows], fields))

@@ -90,7 +90,7 @@ def read(state: SimulationState, path: str) -> tuple[np.ndarray, np.ndarray]:
             binding = _binding(group, key) if key else None
             if not len(mine) or (key and binding is None):
                 continue
-            at = bodies.world[rows[mine]], bodies.place_in_block[rows[mine]]
+            at = bodies.world[rows[mine]], bodies.block_index[rows[mine]]
             alive[at] = True
             if binding is None:
                 out[at] = np.moveaxis(_body_column(bodies, name, rows[mine]), -1, 0)
@@ -107,15 +107,15 @@ def read(state: SimulationState, path: str) -> tuple[np.ndarray, np.ndarray]:
 
 def _world_column(state: SimulationState, path: str, name: str) -> np.ndarray:
     head = path.partition(".")[0]
-    referee = next(r for r in state.referees if r.spec.instance_name == head)
-    if name not in referee.places:
+    world_binding = next(r for r in state.world_bindings if r.spec.instance_name == head)
+    if name not in world_binding.places:
         raise ParameterError(f"{path!r} is the same in all worlds, and no column of the simulation")
-    per, place = referee.places[name]
+    per, place = world_binding.places[name]
     if per == "entity":
         raise ParameterError(
             f"{path!r}: a column per entity of a world plugin has no fixed shape and cannot be read"
         )
-    return referee.tables[per].array(place)
+    return world_binding.tables[per].array(place)
 
 
 def write(state: SimulationState, path: str, values: Any) -> None:
@@ -145,7 +145,7 @@ def write(state: SimulationState, path: str, values: Any) -> None:
         if not len(mine) or (key and binding is None):
             continue
         target = getattr(bodies, name) if binding is None else group.table.array(binding.places[name])
-        part = np.moveaxis(given[bodies.world[rows[mine]], bodies.place_in_block[rows[mine]]], 0, -1)
+        part = np.moveaxis(given[bodies.world[rows[mine]], bodies.block_index[rows[mine]]], 0, -1)
         _check_written(path, part, column, is_body=binding is None)
         if binding is None:
             # Rows that are written as they were keep their motion state: taking it over from the attitude would round it.

@@ -12,11 +12,11 @@ from tussle.api.kinds import Interaction, WorldPlugin
 from tussle.api.world import WorldView
 from tussle.engine import failure
 from tussle.engine.births import Room, in_order, joined
-from tussle.engine.referees import Referee
 from tussle.engine.rows import repack, take_over_moves
 from tussle.engine.state import SimulationState
 from tussle.engine.step_end import take_out_dead
-from tussle.engine.subset import call_referee
+from tussle.engine.subset import call_world_plugin
+from tussle.engine.world_bindings import WorldBinding
 from tussle.errors import MissionError
 
 
@@ -41,14 +41,14 @@ def reset(
     for world in chosen:
         state.results[world] = None
         state.parked.pop(int(world), None)
-    state.mail.drop_worlds(mask)
+    state.message_bus.drop_worlds(mask)
     view.births = [
         {k: v if k == "block" else v[..., ~mask[b["world"]]] for k, v in b.items()} for b in view.births
     ]
-    for referee in state.referees:
-        referee.reset(chosen)
+    for world_binding in state.world_bindings:
+        world_binding.reset(chosen)
         if state.overrides.columns:
-            referee.fill_params(state.overrides, chosen)
+            world_binding.fill_params(state.overrides, chosen)
     due = state.births.begin(chosen)
     gone = mask | ~state.running  # worlds that ended last keep their rows as long as nobody runs
     repack(state, gone[state.population.bodies.world], _create(state, due, at_start=True))
@@ -59,22 +59,22 @@ def reset(
 
 
 def _start_referees(state: SimulationState, mask: np.ndarray) -> None:
-    for referee in state.referees:
-        if type(referee.plugin).start is WorldPlugin.start:
+    for world_binding in state.world_bindings:
+        if type(world_binding.plugin).start is WorldPlugin.start:
             continue
         if mask.all():
-            _start(referee, referee.view)
+            _start(world_binding, world_binding.view)
         else:
-            call_referee(state.population, referee, mask, _start)
+            call_world_plugin(state.population, world_binding, mask, _start)
     take_over_moves(state, 0.0)
 
 
-def _start(referee: Referee, view: WorldView) -> None:
-    view.begin(referee.plugin)
+def _start(world_binding: WorldBinding, view: WorldView) -> None:
+    view.begin(world_binding.plugin)
     try:
-        referee.plugin.start(view)
+        world_binding.plugin.start(view)
     except Exception as error:
-        raise failure.in_call(error, referee.plugin, view) from error
+        raise failure.in_call(error, world_binding.plugin, view) from error
 
 
 def _create(state: SimulationState, due: Mapping[int, np.ndarray], at_start: bool = False) -> Bodies | None:

@@ -173,11 +173,11 @@ class Births:
         spec = self.overrides.mission.blocks[block]
         new.world[mine], new.block[mine], new.team[mine] = worlds, block, spec.team
         values = self.overrides.block_values(spec, VALUES, worlds)
-        out = new.id, new.place_in_block, new.pos, new.vel, new.quat, new.health, new.radius, new.mass
+        out = new.id, new.block_index, new.pos, new.vel, new.quat, new.health, new.radius, new.mass
         keys, counts = (self.keys[block], POSITION, HEADING), (self.next_id, self.n_born[block])
         kernels.bear((self.seeds, worlds), keys, *self._placing[block], values, counts, out, mine.start)
         if "pos" not in where and room is not None:
-            self._separate(block, worlds, new.place_in_block[mine], new.pos[:, mine], room)
+            self._separate(block, worlds, new.block_index[mine], new.pos[:, mine], room)
         if spec.velocity is not None:
             new.vel[:, mine] = np.array(spec.velocity)[:, None]
         for name, asked in where.items():

@@ -8,16 +8,16 @@ import numpy as np
 
 from tussle.comms import EVERYONE, SAME_ENTITY, TopicBuffer
 from tussle.engine import failure
-from tussle.engine.referees import Referee
 from tussle.engine.state import SimulationState
+from tussle.engine.world_bindings import WorldBinding
 from tussle.errors import WiringError, listed, nearest_name
-from tussle.messages import Batch, SpawnEntity
+from tussle.messages import Messages, SpawnEntity
 
 
 def deliver(state: SimulationState) -> None:
     """Route what was published in this step, and hand over what is due."""
     step = state.context.clock.step
-    for topic in state.mail.topics.values():
+    for topic in state.message_bus.topics.values():
         if topic.sent:
             if topic.type is SpawnEntity:
                 _ask_for_births(state, topic.outbox())
@@ -28,7 +28,7 @@ def deliver(state: SimulationState) -> None:
             topic.deliver(step)
 
 
-def _ask_for_births(state: SimulationState, batch: Batch) -> None:
+def _ask_for_births(state: SimulationState, batch: Messages) -> None:
     """Turn `SpawnEntity` messages into births at the beginning of the next step, block by block in the mission's order."""
     view = state.world_view
     has_attitude = (batch.quat != 0.0).any(axis=0)
@@ -57,7 +57,7 @@ def _post(state: SimulationState, topic: TopicBuffer) -> None:
         raise failure.in_call(error, network.plugin, network.view) from error
 
 
-def _route(state: SimulationState, topic: TopicBuffer, network: Referee, batch: Batch) -> None:
+def _route(state: SimulationState, topic: TopicBuffer, network: WorldBinding, batch: Messages) -> None:
     clock, view = state.context.clock, network.view
     view.begin(network.plugin, 1.0, clock.dt)
     to = network.plugin.route(view, batch)

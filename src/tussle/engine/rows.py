@@ -19,8 +19,8 @@ def repack(state: SimulationState, gone: np.ndarray | None, new: Bodies | None) 
         state.has_changed = True
     else:
         rows_changed(state)
-    for referee in state.referees:
-        referee.rearrange(index)
+    for world_binding in state.world_bindings:
+        world_binding.rearrange(index)
     if new is not None:
         state.population.begin_rows(newborn)
         if state.events:

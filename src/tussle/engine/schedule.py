@@ -15,12 +15,12 @@ from tussle.columns import Subscribe
 from tussle.engine import failure
 from tussle.engine.delivery import deliver
 from tussle.engine.group import Binding, Group
-from tussle.engine.referees import Referee
 from tussle.engine.rows import take_over_moves
 from tussle.engine.state import SimulationState
 from tussle.engine.steering import Steering, steering_of
 from tussle.engine.step_end import end_step
-from tussle.engine.subset import call_group, call_referee
+from tussle.engine.subset import call_group, call_world_plugin
+from tussle.engine.world_bindings import WorldBinding
 from tussle.errors import PluginError
 from tussle.mission.cadence import Cadence
 
@@ -209,30 +209,30 @@ def _waits_for(group: Group, binding: Binding) -> Callable[[], None] | None:
     return wait if waiting else None
 
 
-def _world_call(state: SimulationState, kind: str, referee: Referee) -> Call:
+def _world_call(state: SimulationState, kind: str, world_binding: WorldBinding) -> Call:
     dt = state.mission.dt
-    cadence = Cadence.of(referee.spec, 1.0 / dt, 1, "mission")
+    cadence = Cadence.of(world_binding.spec, 1.0 / dt, 1, "mission")
 
-    def call(some: Referee, w: Any, dt: float) -> None:
+    def call(some: WorldBinding, w: Any, dt: float) -> None:
         w._caller, w.phase, w.dt = some.plugin, 1.0, dt
         try:
             some.plugin.step(w)
         except Exception as error:
             raise failure.in_call(error, some.plugin, w, None) from error
 
-    label = f"{kind:<12} {referee.spec.instance_name}{_rate_text(referee.spec)}"
+    label = f"{kind:<12} {world_binding.spec.instance_name}{_rate_text(world_binding.spec)}"
     if cadence is None:
-        return Call(label, lambda: call(referee, referee.view, dt))
+        return Call(label, lambda: call(world_binding, world_binding.view, dt))
 
-    def call_part(dt: float) -> Callable[[Referee, Any], None]:
+    def call_part(dt: float) -> Callable[[WorldBinding, Any], None]:
         return lambda some, w: call(some, w, dt)
 
     def run() -> None:
         for since, worlds in _due(state, cadence):
             if worlds is None:
-                call(referee, referee.view, since * dt)
+                call(world_binding, world_binding.view, since * dt)
             else:
-                call_referee(state.population, referee, worlds, call_part(since * dt))
+                call_world_plugin(state.population, world_binding, worlds, call_part(since * dt))
 
     return Call(label, run)
 
@@ -244,9 +244,9 @@ def _label(state: SimulationState, kind: str, group: Group, binding: Binding, su
     return f"{kind:<12} {group.name}{place}: {binding.spec.instance_name}{_rate_text(binding.spec)}{part}"
 
 
-def steps(referee: Referee) -> bool:
+def steps(world_binding: WorldBinding) -> bool:
     """Whether a world plugin has anything to do in a step."""
-    return type(referee.plugin).step is not WorldPlugin.step
+    return type(world_binding.plugin).step is not WorldPlugin.step
 
 
 def _rate_text(plugin: Any) -> str:

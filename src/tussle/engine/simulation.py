@@ -19,7 +19,7 @@ from tussle.engine.snapshot import Snapshot, restore, snapshot, state_hash
 from tussle.engine.state import SimulationState
 from tussle.engine.step_end import take_out_dead, world_result
 from tussle.errors import MissionError, ParameterError, PluginError
-from tussle.messages import Batch, Message
+from tussle.messages import Message, Messages
 from tussle.mission import Mission
 
 if TYPE_CHECKING:
@@ -78,7 +78,7 @@ class Simulation:
         try:
             self.reset(range(self.n_worlds))
             self._schedule: list[Call] | None = compose(self.state)
-            for text in self.state.mail.unheard():
+            for text in self.state.message_bus.unheard():
                 warnings.warn(text, RuntimeWarning, stacklevel=2)
         except Exception:
             self.close()
@@ -260,12 +260,12 @@ class Simulation:
             ParameterError: There is no such world, or the type has no such field.
             WiringError: There is no such network, or the topic carries another type.
         """
-        running, mail = self.state.running, self.state.mail
+        running, message_bus = self.state.running, self.state.message_bus
         chosen = np.flatnonzero(running) if worlds is None else np.array(list(worlds), np.int64)
         if len(chosen) and (chosen.min() < 0 or chosen.max() >= self.n_worlds):
             raise ParameterError(f"publish: there are worlds 0 to {self.n_worlds - 1}, not {chosen.tolist()}")
-        batch = Batch.make(type_, chosen, np.zeros(len(chosen), np.int64), fields)
-        buffer = mail.topic(network, topic or type_.__name__, type_, "publish")
+        batch = Messages.make(type_, chosen, np.zeros(len(chosen), np.int64), fields)
+        buffer = message_bus.topic(network, topic or type_.__name__, type_, "publish")
         buffer.add(batch.take(np.flatnonzero(running[chosen])))
 
     def snapshot(self) -> Snapshot:
@@ -297,7 +297,7 @@ class Simulation:
     def grade(self) -> str:
         """What is promised of the result's bits: that of its weakest plugin."""
         plugins = [b.plugin for g in self.state.population.groups for b in g.walk()]
-        plugins += [r.plugin for r in self.state.referees]
+        plugins += [r.plugin for r in self.state.world_bindings]
         return max((type(p).grade for p in plugins), key=GRADES.index, default="portable")
 
     def describe(self) -> str:

@@ -51,8 +51,8 @@ def snapshot(state: SimulationState) -> Snapshot:
             births.n_left.copy(),
             [a.copy() for a in births.next_time],
         ],
-        "referees": [r.copy() for r in state.referees],
-        "mail": state.mail.save(),
+        "referees": [r.copy() for r in state.world_bindings],
+        "mail": state.message_bus.save(),
         "wishes": list(state.world_view.births),
         "params": state.overrides.save(),
     }
@@ -105,9 +105,9 @@ def restore(state: SimulationState, saved: Snapshot) -> None:
     state.overrides.restore(world["params"])
     state.n_running = int(state.running.sum())
     rows_changed(state)
-    for referee, columns in zip(state.referees, world["referees"], strict=True):
-        referee.restore(columns)
-    state.mail.restore(world["mail"])
+    for world_binding, columns in zip(state.world_bindings, world["referees"], strict=True):
+        world_binding.restore(columns)
+    state.message_bus.restore(world["mail"])
 
 
 def _no_rows(group: Group, first: int) -> tuple[Any, ...]:
@@ -162,13 +162,13 @@ def hashed(state: SimulationState, world: int) -> Iterator[tuple[str, Any]]:
     for _, group, mine in sorted(parts, key=lambda part: part[0]):
         for binding in group.walk():
             yield from _hashed_columns(group, binding, mine)
-    for referee in state.referees:
-        for name in type(referee.spec).states():
-            per, place = referee.places[name]
-            array = referee.tables[per].array(place)
+    for world_binding in state.world_bindings:
+        for name in type(world_binding.spec).states():
+            per, place = world_binding.places[name]
+            array = world_binding.tables[per].array(place)
             mine = rows if per == "entity" else slice(world, world + 1)
-            yield f"{referee.spec.instance_name}.{name}", array[..., mine]
-    for part in state.mail.columns(world):
+            yield f"{world_binding.spec.instance_name}.{name}", array[..., mine]
+    for part in state.message_bus.columns(world):
         yield "mail", part
 
 

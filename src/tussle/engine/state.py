@@ -14,13 +14,13 @@ from tussle.api.context import Context
 from tussle.api.world import WorldView
 from tussle.engine.births import Births
 from tussle.engine.events import Listeners
-from tussle.engine.mail import Mail
+from tussle.engine.message_bus import MessageBus
 from tussle.engine.params import Overrides
 from tussle.engine.population import Population
-from tussle.engine.referees import Referee
 from tussle.engine.result import WorldResult
 from tussle.engine.start_from import RecordedBirths
 from tussle.engine.table import Stored
+from tussle.engine.world_bindings import WorldBinding
 from tussle.errors import PluginError
 from tussle.mission import Mission
 from tussle.stock import advise_controllers
@@ -94,24 +94,24 @@ class SimulationState:
         self.overrides.set(params, np.arange(n))
         given = self.overrides, keys, mission.start
         self.births = Births(*given) if start_from is None else RecordedBirths(*given, start_from)
-        mail = self.mail = Mail([p.instance_name for p in mission.networks])
-        context.topic, context.fail = mail.topic, self.record_failure
+        message_bus = self.message_bus = MessageBus([p.instance_name for p in mission.networks])
+        context.topic, context.fail = message_bus.topic, self.record_failure
         self.events = Listeners(context)
         self.population = Population(context, self.overrides, advise_controllers)
         nobody = self.population.bodies
         self.checked = nobody.pos, nobody.quat, nobody.health, np.empty(0, bool)
         view = self.world_view = WorldView(self.population.bodies, context)
-        view.templates, view.publish_to, view.by_type = blocks, mail.publish_to, mail.by_type
+        view.templates, view.publish_to, view.by_type = blocks, message_bus.publish_to, message_bus.by_type
 
-        def bind(specs: Sequence[Any]) -> list[Referee]:
-            return [Referee.bind(p, view, self.overrides) for p in specs]
+        def bind(specs: Sequence[Any]) -> list[WorldBinding]:
+            return [WorldBinding.bind(p, view, self.overrides) for p in specs]
 
         self.networks = {r.spec.instance_name: r for r in bind(mission.networks)}
         self.interactions, self.metrics = bind(mission.interactions), bind(mission.metrics)
         self.population.prepare()
 
     @property
-    def referees(self) -> list[Referee]:
+    def world_bindings(self) -> list[WorldBinding]:
         """All world plugins."""
         return [*self.interactions, *self.metrics, *self.networks.values()]
 

@@ -103,7 +103,7 @@ def _end_and_park(state: SimulationState, over: Mapping[int, str]) -> None:
         repack(state, np.isin(bodies.world, list(over)), None)
         mask = np.zeros(state.n_worlds, bool)
         mask[list(over)] = True
-        state.mail.drop_worlds(mask)
+        state.message_bus.drop_worlds(mask)
     else:
         state.population.close_handles()
 
@@ -142,17 +142,19 @@ def world_result(state: SimulationState, world: int, reason: str, is_hashed: boo
     steps = int(clock.step[world])
     result = WorldResult(world, int(state.context.seeds[world]), reason, steps, float(clock.t[world]), alive)
     scores: dict[int, float] = {}
-    for referee in [*state.interactions, *state.metrics]:
-        referee.view.begin(referee.plugin)
+    for world_binding in [*state.interactions, *state.metrics]:
+        world_binding.view.begin(world_binding.plugin)
         try:
-            found = referee.plugin.result_of(referee.view, world)
+            found = world_binding.plugin.result_of(world_binding.view, world)
         except Exception as error:
             if reason == "error":  # something has failed already, and this may come of it
                 continue
-            raise failure.raised(error, referee.plugin, where="result", step=steps, world=world) from error
+            raise failure.raised(
+                error, world_binding.plugin, where="result", step=steps, world=world
+            ) from error
         if found:
-            result.metrics[referee.spec.instance_name] = found
-        for team, score in (found.get("score") or {}).items() if referee in state.metrics else ():
+            result.metrics[world_binding.spec.instance_name] = found
+        for team, score in (found.get("score") or {}).items() if world_binding in state.metrics else ():
             scores[team] = scores.get(team, 0.0) + score
     result.scores = scores
     if is_hashed:

@@ -13,8 +13,8 @@ from tussle.api.world import WorldView
 from tussle.comms import Inbox, Publisher
 from tussle.engine.group import Binding, Group
 from tussle.engine.population import Population
-from tussle.engine.referees import Referee
 from tussle.engine.table import Table
+from tussle.engine.world_bindings import WorldBinding
 
 
 def _sub_bodies(bodies: Bodies, rows: np.ndarray) -> Bodies:
@@ -42,7 +42,7 @@ def _sub_binding(binding: Binding, view: Any, rows: np.ndarray) -> Binding:
             plugin.__dict__[name] = Publisher(value.topic, view)
         elif isinstance(value, Inbox):
             inbox = Inbox(value.topic, view)
-            inbox.parcels = list(value.parcels)
+            inbox.deliveries = list(value.deliveries)
             plugin.__dict__[name] = inbox
     children = iter(sub.children)
     for name in type(plugin).children():
@@ -96,11 +96,14 @@ def call_group(
                 binding.handles[name][row] = part.plugin.__dict__[name][k]
 
 
-def call_referee(
-    population: Population, referee: Referee, worlds: np.ndarray, action: Callable[[Referee, WorldView], None]
+def call_world_plugin(
+    population: Population,
+    world_binding: WorldBinding,
+    worlds: np.ndarray,
+    action: Callable[[WorldBinding, WorldView], None],
 ) -> None:
     """Do something with a world plugin in some worlds only."""
-    bodies, view = population.bodies, referee.view
+    bodies, view = population.bodies, world_binding.view
     rows = np.flatnonzero(worlds[bodies.world])
     sub_bodies = _sub_bodies(bodies, rows)
     sub_view = copy.copy(view)
@@ -108,12 +111,12 @@ def call_referee(
     sub_view.deaths, sub_view.moved, sub_view.births = [], [], []
     sub_view.only = worlds
     sub_view.reset(sub_bodies, 0, len(rows))
-    sub = copy.copy(referee)
-    sub.plugin = object.__new__(type(referee.plugin))
-    sub.plugin.__dict__.update(referee.plugin.__dict__)
+    sub = copy.copy(world_binding)
+    sub.plugin = object.__new__(type(world_binding.plugin))
+    sub.plugin.__dict__.update(world_binding.plugin.__dict__)
     sub.tables = {
         per: _sub_table(table, rows if per == "entity" else np.arange(table.n))
-        for per, table in referee.tables.items()
+        for per, table in world_binding.tables.items()
         if table.places  # a table without columns is not kept at the number of rows
     }
     for name, value in list(sub.plugin.__dict__.items()):
@@ -122,7 +125,7 @@ def call_referee(
     sub.attach()
     action(sub, sub_view)
     for per, part in sub.tables.items():
-        table = referee.tables[per]
+        table = world_binding.tables[per]
         index = rows if per == "entity" else np.flatnonzero(worlds)
         for dtype, array in part.arrays.items():
             table.arrays[dtype][:, index] = array if per == "entity" else array[:, index]

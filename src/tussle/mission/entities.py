@@ -16,7 +16,7 @@ from tussle.mission.node import Budget, Node
 from tussle.mission.plugin_tags import PluginReader, PluginTag
 from tussle.mission.problems import Place, Problems
 from tussle.mission.spec import BLOCK_VALUES, RUN, Block
-from tussle.mission.tags import BASE, ENTITY, ENTITY_ATTRIBUTES, MANY, Known
+from tussle.mission.tags import BASE, ENTITY, ENTITY_ATTRIBUTES, MANY, TagSpec
 from tussle.scene import Base, Origin
 from tussle.texts import FALSE, shown, truth
 
@@ -96,7 +96,7 @@ class Fields:
     """
 
     node: Node
-    known: Mapping[str, Known]
+    known: Mapping[str, TagSpec]
     problems: Problems
     found: dict[str, Node] = field(default_factory=dict)
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from tussle import stock
 
 
-class Known(NamedTuple):
+class TagSpec(NamedTuple):
     """A tag or attribute.
 
     Attributes:
@@ -27,20 +27,20 @@ class Known(NamedTuple):
     bound: str = ""
 
 
-def _viewer(doc: str, default: str = "", reads: str = "text", unit: str = "") -> Known:
-    return Known(doc, default, unit, "viewer", reads)
+def _viewer(doc: str, default: str = "", reads: str = "text", unit: str = "") -> TagSpec:
+    return TagSpec(doc, default, unit, "viewer", reads)
 
 
-def _log(doc: str, default: str = "", reads: str = "text") -> Known:
-    return Known(doc, default, "", "log", reads)
+def _log(doc: str, default: str = "", reads: str = "text") -> TagSpec:
+    return TagSpec(doc, default, "", "log", reads)
 
 
 RUN = {
-    "start": Known("Time of the first step.", "0", "s"),
-    "end": Known("Time at which the condition `time` ends the mission.", "50", "s"),
-    "dt": Known("Length of a step.", "0.00833333", "s", bound="> 0"),
-    "motion_multiplier": Known("Substeps of controllers and motion per step.", "1", reads="whole"),
-    "update": Known(
+    "start": TagSpec("Time of the first step.", "0", "s"),
+    "end": TagSpec("Time at which the condition `time` ends the mission.", "50", "s"),
+    "dt": TagSpec("Length of a step.", "0.00833333", "s", bound="> 0"),
+    "motion_multiplier": TagSpec("Substeps of controllers and motion per step.", "1", reads="whole"),
+    "update": TagSpec(
         "`synchronous`: all entities decide on the states at the start of the step; `sequential`: the entities decide and move one "
         "after another (addition to the format).",
         "synchronous",
@@ -57,28 +57,28 @@ RUN = {
 """Attributes of <run>."""
 
 WORLD = {
-    "run": Known("Times and steps; its attributes are below.", reads="text"),
-    "end_condition": Known(
+    "run": TagSpec("Times and steps; its attributes are below.", reads="text"),
+    "end_condition": TagSpec(
         "Any of `time`, `one_team`, `all_dead`, `none`, separated by commas.", "time", reads="words"
     ),
-    "seed": Known("Seed of all random numbers, an integer.", "none", reads="text"),
-    "latitude_origin": Known("Latitude of the world frame's origin.", "29", "deg"),
-    "longitude_origin": Known("Its longitude, east positive.", "-95", "deg"),
-    "altitude_origin": Known("Its height above the ellipsoid.", "0", "m"),
-    "network": Known(
+    "seed": TagSpec("Seed of all random numbers, an integer.", "none", reads="text"),
+    "latitude_origin": TagSpec("Latitude of the world frame's origin.", "29", "deg"),
+    "longitude_origin": TagSpec("Its longitude, east positive.", "-95", "deg"),
+    "altitude_origin": TagSpec("Its height above the ellipsoid.", "0", "m"),
+    "network": TagSpec(
         "A network, by its plugin's name; attributes are parameters. `GlobalNetwork` is always there.",
         reads="text",
     ),
-    "entity_interaction": Known("An interaction plugin; they run in the order of the file.", reads="text"),
-    "metrics": Known("A metric plugin.", reads="text"),
-    "param_common": Known(
+    "entity_interaction": TagSpec("An interaction plugin; they run in the order of the file.", reads="text"),
+    "metrics": TagSpec("A metric plugin.", reads="text"),
+    "param_common": TagSpec(
         "Parameters that plugin tags take with `param_common='NAME'`: one child tag each.", reads="text"
     ),
-    "entity_common": Known(
+    "entity_common": TagSpec(
         "Tags that entities take with `entity_common='NAME'`; the entity's own tags take precedence.",
         reads="text",
     ),
-    "entity": Known("A block of entities with the same plugins; its tags are below.", reads="text"),
+    "entity": TagSpec("A block of entities with the same plugins; its tags are below.", reads="text"),
     "multi_threaded": _log("Threads; results do not depend on them."),
     "output_type": _log("Kinds of output of the existing system; a run directory has all of them."),
     "no_bin_logging": _log("Whether to leave out the trajectory.", "false", "truth"),
@@ -106,100 +106,104 @@ WORLD = {
 """Tags of <runscript>."""
 
 ENTITY = {
-    "name": Known("Name of the block, for paths such as `prey.Boids.gain`.", "team_ID", reads="text"),
-    "team_id": Known("Team.", "0", reads="whole"),
-    "id": Known(
+    "name": TagSpec("Name of the block, for paths such as `prey.Boids.gain`.", "team_ID", reads="text"),
+    "team_id": TagSpec("Team.", "0", reads="whole"),
+    "id": TagSpec(
         "Id of the first entity; ignored here, ids count up in the order of the file.", "next", reads="whole"
     ),
-    "count": Known("Total number of entities.", "1", reads="whole"),
-    "health": Known("Initial health; an entity is removed at 0.", "1", bound="> 0"),
-    "radius": Known("Body radius.", "1", "m", bound="> 0"),
-    "mass": Known("Mass (addition to the format).", "1", "kg", bound="> 0"),
-    "x": Known("Start position of the first entity, East.", "0", "m"),
-    "y": Known("North.", "0", "m"),
-    "z": Known("Up.", "0", "m"),
-    "latitude": Known("Start position instead of x, y, z, if all three are given.", "", "deg"),
-    "longitude": Known("East positive.", "", "deg"),
-    "altitude": Known("Above the ellipsoid.", "", "m"),
-    "heading": Known("Counter-clockwise from East.", "0", "deg"),
-    "roll": Known("Right wing down positive.", "0", "deg"),
-    "pitch": Known("Nose **down** positive, as always in this format.", "0", "deg"),
-    "vx": Known("Initial velocity, East.", "0", "m/s"),
-    "vy": Known("North.", "0", "m/s"),
-    "vz": Known("Up.", "0", "m/s"),
-    "speed": Known("Initial speed along the heading, if vx, vy, vz are 0.", "0", "m/s", bound=">= 0"),
-    "placement": Known("`normal` or `uniform` (addition to the format).", "normal", reads="text"),
-    "variance_x": Known(
+    "count": TagSpec("Total number of entities.", "1", reads="whole"),
+    "health": TagSpec("Initial health; an entity is removed at 0.", "1", bound="> 0"),
+    "radius": TagSpec("Body radius.", "1", "m", bound="> 0"),
+    "mass": TagSpec("Mass (addition to the format).", "1", "kg", bound="> 0"),
+    "x": TagSpec("Start position of the first entity, East.", "0", "m"),
+    "y": TagSpec("North.", "0", "m"),
+    "z": TagSpec("Up.", "0", "m"),
+    "latitude": TagSpec("Start position instead of x, y, z, if all three are given.", "", "deg"),
+    "longitude": TagSpec("East positive.", "", "deg"),
+    "altitude": TagSpec("Above the ellipsoid.", "", "m"),
+    "heading": TagSpec("Counter-clockwise from East.", "0", "deg"),
+    "roll": TagSpec("Right wing down positive.", "0", "deg"),
+    "pitch": TagSpec("Nose **down** positive, as always in this format.", "0", "deg"),
+    "vx": TagSpec("Initial velocity, East.", "0", "m/s"),
+    "vy": TagSpec("North.", "0", "m/s"),
+    "vz": TagSpec("Up.", "0", "m/s"),
+    "speed": TagSpec("Initial speed along the heading, if vx, vy, vz are 0.", "0", "m/s", bound=">= 0"),
+    "placement": TagSpec("`normal` or `uniform` (addition to the format).", "normal", reads="text"),
+    "variance_x": TagSpec(
         "Variance (not standard deviation) of the start position of all but the first.",
         "100",
         "m^2",
         bound=">= 0",
     ),
-    "variance_y": Known("The same, North.", "100", "m^2", bound=">= 0"),
-    "variance_z": Known("The same, up.", "0", "m^2", bound=">= 0"),
-    "half_width_x": Known(
+    "variance_y": TagSpec("The same, North.", "100", "m^2", bound=">= 0"),
+    "variance_z": TagSpec("The same, up.", "0", "m^2", bound=">= 0"),
+    "half_width_x": TagSpec(
         "With uniform placement: largest distance of all but the first from it (addition).",
         "0",
         "m",
         bound=">= 0",
     ),
-    "half_width_y": Known("The same, North.", "0", "m", bound=">= 0"),
-    "half_width_z": Known("The same, up.", "0", "m", bound=">= 0"),
-    "variance_heading": Known("Variance of the heading.", "0", "deg^2", bound=">= 0"),
-    "use_variance_all_ents": Known("Place the first entity at random too.", "false", reads="truth"),
-    "generate_rate": Known(
+    "half_width_y": TagSpec("The same, North.", "0", "m", bound=">= 0"),
+    "half_width_z": TagSpec("The same, up.", "0", "m", bound=">= 0"),
+    "variance_heading": TagSpec("Variance of the heading.", "0", "deg^2", bound=">= 0"),
+    "use_variance_all_ents": TagSpec("Place the first entity at random too.", "false", reads="truth"),
+    "generate_rate": TagSpec(
         "Births per second in each slot, `a / b` or a number; needs generate_count > 0.", "none", "1/s"
     ),
-    "generate_count": Known(
+    "generate_count": TagSpec(
         "Slots: birth sequences that run in parallel (the total is `count`).", "none", reads="whole"
     ),
-    "generate_start_time": Known("Time of the first birth.", "0", "s"),
-    "generate_time_variance": Known("Standard deviation of the time between births.", "0", "s", bound=">= 0"),
-    "autonomy": Known("An autonomy; several run in the order of the file.", "none", reads="text"),
-    "controller": Known("A controller; several are chained in the order of the file.", "none", reads="text"),
-    "motion_model": Known("The motion model.", stock.UNMOVED, reads="text"),
-    "sensor": Known("A sensor; several are allowed.", "none", reads="text"),
-    "base": Known("A base of the team; its tags are below.", "none", reads="text"),
-    "connect_entity": Known("0 turned off the wiring check; here it is always on.", "1", reads="text"),
+    "generate_start_time": TagSpec("Time of the first birth.", "0", "s"),
+    "generate_time_variance": TagSpec(
+        "Standard deviation of the time between births.", "0", "s", bound=">= 0"
+    ),
+    "autonomy": TagSpec("An autonomy; several run in the order of the file.", "none", reads="text"),
+    "controller": TagSpec(
+        "A controller; several are chained in the order of the file.", "none", reads="text"
+    ),
+    "motion_model": TagSpec("The motion model.", stock.UNMOVED, reads="text"),
+    "sensor": TagSpec("A sensor; several are allowed.", "none", reads="text"),
+    "base": TagSpec("A base of the team; its tags are below.", "none", reads="text"),
+    "connect_entity": TagSpec("0 turned off the wiring check; here it is always on.", "1", reads="text"),
     "color": _viewer("Red, green, blue, 0 to 255."),
     "visual_model": _viewer("Name of the model that is drawn."),
     "visual_scale": _viewer("Scale of that model."),
     "visual_rpy": _viewer("Attitude of that model."),
-    "script_name": Known(
+    "script_name": TagSpec(
         "Flight script of JSBSim models, which are not in tussle yet.", "none", reads="text"
     ),
 }
 """Tags of <entity> and <entity_common>."""
 
 ENTITY_ATTRIBUTES = {
-    "tag": Known("Name by which plugins spawn further entities of this block.", reads="text"),
-    "entity_common": Known("Name of the <entity_common> whose tags it takes.", reads="text"),
+    "tag": TagSpec("Name by which plugins spawn further entities of this block.", reads="text"),
+    "entity_common": TagSpec("Name of the <entity_common> whose tags it takes.", reads="text"),
 }
 
 BASE = {
-    "x": Known("Centre, East.", "-1", "m"),
-    "y": Known("North.", "-1", "m"),
-    "z": Known("Up.", "-1", "m"),
-    "latitude": Known("Centre instead of x, y, z, if all three are given.", "", "deg"),
-    "longitude": Known("East positive.", "", "deg"),
-    "altitude": Known("Above the ellipsoid.", "", "m"),
-    "radius": Known("Radius.", "25", "m", bound="> 0"),
-    "opacity": Known("Opacity in the viewer, 0 to 1.", "1"),
+    "x": TagSpec("Centre, East.", "-1", "m"),
+    "y": TagSpec("North.", "-1", "m"),
+    "z": TagSpec("Up.", "-1", "m"),
+    "latitude": TagSpec("Centre instead of x, y, z, if all three are given.", "", "deg"),
+    "longitude": TagSpec("East positive.", "", "deg"),
+    "altitude": TagSpec("Above the ellipsoid.", "", "m"),
+    "radius": TagSpec("Radius.", "25", "m", bound="> 0"),
+    "opacity": TagSpec("Opacity in the viewer, 0 to 1.", "1"),
 }
 """Tags of <base>."""
 
 PLUGIN = {
-    "name": Known(
+    "name": TagSpec(
         "Instance name, for several of the same plugin in one entity or in the world.",
         "the plugin's",
         reads="text",
     ),
-    "loop_rate": Known(
+    "loop_rate": TagSpec(
         "Calls per second of an autonomy, controller or sensor, at most one per step (controller: per substep); 0 is one per step.",
         "0",
         "1/s",
     ),
-    "param_common": Known(
+    "param_common": TagSpec(
         "Name of a <param_common>; the tag's own attributes take precedence.", "none", reads="text"
     ),
 }

@@ -22,7 +22,7 @@ from tussle.mission.plugin_tags import PluginReader
 from tussle.mission.problems import Place, Problems
 from tussle.mission.source import Reader, Source, find_mission
 from tussle.mission.spec import MISSION_VALUES, Mission, end_conditions
-from tussle.mission.tags import RUN, SEED_ATTRIBUTES, WORLD, Known
+from tussle.mission.tags import RUN, SEED_ATTRIBUTES, WORLD, TagSpec
 from tussle.scene import Scene
 from tussle.texts import shown, truth
 
@@ -276,7 +276,7 @@ class _WorldReader:
                 for attribute in node.attributes:
                     self.problems.unknown(node.where(attribute), f"attribute of <{node.tag}>", attribute, ())
 
-    def _keep(self, into: dict[str, Any], name: str, node: Node, known: Known, label: str) -> None:
+    def _keep(self, into: dict[str, Any], name: str, node: Node, known: TagSpec, label: str) -> None:
         """Store a setting that the game does not depend on; with attributes it is a dict, with its text under "value"."""
         try:
             value: Any = node.text

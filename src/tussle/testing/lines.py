@@ -62,9 +62,9 @@ def lines_of(sim: Simulation) -> dict[Key, Line]:
                 label = f"{group.name}.{'.'.join(binding.path)}.{name}"
                 world = bodies.world[group.first : group.last]
                 add(group.table, place, type(binding.spec).columns[name], label, world)
-    for referee in sim.state.referees:
-        for name, (per, place) in referee.places.items():
-            label = f"{referee.spec.instance_name}.{name}"
+    for world_binding in sim.state.world_bindings:
+        for name, (per, place) in world_binding.places.items():
+            label = f"{world_binding.spec.instance_name}.{name}"
             world = bodies.world if per == "entity" else worlds
-            add(referee.tables[per], place, type(referee.spec).columns[name], label, world)
+            add(world_binding.tables[per], place, type(world_binding.spec).columns[name], label, world)
     return found

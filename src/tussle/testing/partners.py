@@ -9,7 +9,6 @@ import numpy as np
 
 from tussle.api import (
     Autonomy,
-    Batch,
     Behavior,
     EntityRef,
     Field,
@@ -18,6 +17,7 @@ from tussle.api import (
     Input,
     Interaction,
     Message,
+    Messages,
     MotionBody,
     MotionModel,
     Output,
@@ -114,7 +114,7 @@ def filled(message: type[Message], g: GroupView, rows: np.ndarray, nearest: np.n
     return out
 
 
-def message_signal(batch: Batch) -> np.ndarray:
+def message_signal(batch: Messages) -> np.ndarray:
     """A number per message that depends on all of its numbers, (n,)."""
     total = signal(batch.sender, 0.0, 1.0)
     for name, column in batch.type.fields.items():
@@ -203,7 +203,7 @@ class SignalBehavior(Behavior):
     grade = "portable"
 
     def step(self, g: GroupView) -> None:
-        self.wish[:] = [6.0 * signal(g.id, g.step_count, k) for k in range(3)]
+        self.desired_velocity[:] = [6.0 * signal(g.id, g.step_count, k) for k in range(3)]
 
 
 class Reaper(Interaction):

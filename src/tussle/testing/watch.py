@@ -12,8 +12,8 @@ import numpy as np
 from tussle.api import GroupView, Interaction, MotionModel, Plugin, WorldView
 from tussle.api.pairs import Pairs
 from tussle.engine.group import Binding, Group
-from tussle.engine.referees import Referee
 from tussle.engine.simulation import Simulation
+from tussle.engine.world_bindings import WorldBinding
 from tussle.errors import ConformanceError
 from tussle.testing.declarations import MACHINERY, own_classes
 from tussle.testing.game import SEEDS, STEPS, Game
@@ -79,9 +79,9 @@ def _bound(sim: Simulation, cls: type[Plugin]) -> Iterator[tuple[Any, Callable[[
         for binding in group.walk():
             if type(binding.spec) is cls:
                 yield binding.plugin, partial(_own, group, binding)
-    for referee in sim.state.referees:
-        if type(referee.spec) is cls:
-            yield referee.plugin, partial(_own_of_world, sim, referee)
+    for world_binding in sim.state.world_bindings:
+        if type(world_binding.spec) is cls:
+            yield world_binding.plugin, partial(_own_of_world, sim, world_binding)
 
 
 class Watch:
@@ -168,13 +168,15 @@ def _own(group: Group, binding: Binding, hook: str) -> Own:
     return own
 
 
-def _own_of_world(sim: Simulation, referee: Referee, hook: str) -> Own:
+def _own_of_world(sim: Simulation, world_binding: WorldBinding, hook: str) -> Own:
     """What a world plugin may write: its states; an interaction also health, forces, and the bodies that it moves by `w.move`."""
     if hook not in {"start", "step"}:
         return {}
-    places = [referee.places[name] for name in type(referee.spec).states()]
-    own: Own = {key: slice(None) for per, place in places for key in keys_of(referee.tables[per], place)}
-    if isinstance(referee.spec, Interaction):
+    places = [world_binding.places[name] for name in type(world_binding.spec).states()]
+    own: Own = {
+        key: slice(None) for per, place in places for key in keys_of(world_binding.tables[per], place)
+    }
+    if isinstance(world_binding.spec, Interaction):
         view: WorldView = sim.state.world_view
         moved = np.unique(np.concatenate([np.zeros(0, np.int64), *view.moved]))
         own |= {("body", i): moved for i, k in enumerate(BODY_ROWS) if k in {"pos", "vel", "quat"}}

@@ -11,7 +11,7 @@ import numpy as np
 from tussle.api.bodies import BODY_UNITS, DERIVED, FLOATS, derive
 from tussle.columns import Subscribe
 from tussle.comms import EVERYONE, SAME_ENTITY
-from tussle.comms.topic import Parcel, TopicBuffer
+from tussle.comms.topic import Delivery, TopicBuffer
 from tussle.engine.group import Group
 from tussle.engine.simulation import Simulation
 from tussle.engine.table import Stored, Table
@@ -39,7 +39,7 @@ class Reading:
 
 
 @dataclass(frozen=True)
-class Letter:
+class ShownMessage:
     """A message.
 
     Attributes:
@@ -76,8 +76,8 @@ class EntityState:
     block: str
     body: dict[str, Reading]
     plugins: dict[str, dict[str, Reading]] = field(default_factory=dict)
-    heard: list[Letter] = field(default_factory=list)
-    said: list[Letter] = field(default_factory=list)
+    heard: list[ShownMessage] = field(default_factory=list)
+    said: list[ShownMessage] = field(default_factory=list)
 
 
 def entity_state(simulation: Simulation, world: int, who: int) -> EntityState | None:
@@ -140,20 +140,20 @@ def _read_plugins(group: Group, row: int, held: Table | Stored, into: dict[str, 
                 columns[name] = Reading(binding.spec.values[name], *about)
 
 
-def _heard(group: Group, world: int, who: int) -> list[Letter]:
-    letters: list[Letter] = []
+def _heard(group: Group, world: int, who: int) -> list[ShownMessage]:
+    letters: list[ShownMessage] = []
     for binding in group.walk():
         for name, column in type(binding.spec).columns.items():
             if isinstance(column, Subscribe):
                 inbox = binding.plugin.__dict__[name]
-                for parcel in inbox.parcels:
-                    letters += _letters(inbox.topic, parcel, _for_whom(parcel, world, who))
+                for delivery in inbox.deliveries:
+                    letters += _letters(inbox.topic, delivery, _for_whom(delivery, world, who))
     return letters[-MOST_MESSAGES:]
 
 
-def _for_whom(parcel: Parcel, world: int, who: int) -> np.ndarray:
+def _for_whom(delivery: Delivery, world: int, who: int) -> np.ndarray:
     """Numbers of the messages in a parcel that an entity hears."""
-    batch, to = parcel.batch, parcel.to
+    batch, to = delivery.batch, delivery.to
     if isinstance(to, str):
         assert to in (EVERYONE, SAME_ENTITY)
         mine = batch.world == world
@@ -162,25 +162,25 @@ def _for_whom(parcel: Parcel, world: int, who: int) -> np.ndarray:
     return np.asarray(number[(receiver == who) & (batch.world[number] == world)])
 
 
-def _said(simulation: Simulation, world: int, who: int) -> list[Letter]:
-    letters: list[Letter] = []
-    for topic in simulation.state.mail.topics.values():
-        for parcel in _under_way(topic):
-            mine = (parcel.batch.world == world) & (parcel.batch.sender == who)
-            letters += _letters(topic, parcel, np.flatnonzero(mine))
+def _said(simulation: Simulation, world: int, who: int) -> list[ShownMessage]:
+    letters: list[ShownMessage] = []
+    for topic in simulation.state.message_bus.topics.values():
+        for delivery in _under_way(topic):
+            mine = (delivery.batch.world == world) & (delivery.batch.sender == who)
+            letters += _letters(topic, delivery, np.flatnonzero(mine))
     return letters[-MOST_MESSAGES:]
 
 
-def _under_way(topic: TopicBuffer) -> Iterator[Parcel]:
+def _under_way(topic: TopicBuffer) -> Iterator[Delivery]:
     """Parcels that are queued or lie in an inbox, each once."""
-    known: dict[int, Parcel] = {id(p): p for p in topic.queue}
+    known: dict[int, Delivery] = {id(p): p for p in topic.queue}
     for inbox in topic.inboxes:
-        known |= {id(p): p for p in inbox.parcels}
+        known |= {id(p): p for p in inbox.deliveries}
     yield from known.values()
 
 
-def _letters(topic: TopicBuffer, parcel: Parcel, numbers: np.ndarray) -> list[Letter]:
-    batch = parcel.batch
+def _letters(topic: TopicBuffer, delivery: Delivery, numbers: np.ndarray) -> list[ShownMessage]:
+    batch = delivery.batch
     letters = []
     for i in numbers[-MOST_MESSAGES:]:
         fields: dict[str, Any] = {}
@@ -191,5 +191,5 @@ def _letters(topic: TopicBuffer, parcel: Parcel, numbers: np.ndarray) -> list[Le
                 fields[name] = values[int(i)]
             else:
                 fields[name] = _plain(values[..., i])
-        letters.append(Letter(f"{topic.network}/{topic.name}", int(batch.sender[i]), fields))
+        letters.append(ShownMessage(f"{topic.network}/{topic.name}", int(batch.sender[i]), fields))
     return letters

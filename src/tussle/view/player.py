@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tussle.engine.simulation import Simulation
-from tussle.messages import Batch, Message
+from tussle.messages import Message, Messages
 from tussle.record import Events
 from tussle.view.frame import Event, frame_of
 from tussle.view.timeline import History, Timeline
@@ -173,7 +173,7 @@ class Player:
     def _check(self, type_: type[Message], network: str, topic: str, fields: dict[str, Any]) -> None:
         """Say it in no world at all, so that what is wrong with it shows now and not in the step."""
         self.simulation.publish(type_, [], network=network, topic=topic)
-        Batch.make(type_, np.zeros(1, np.int64), np.zeros(1, np.int64), fields)
+        Messages.make(type_, np.zeros(1, np.int64), np.zeros(1, np.int64), fields)
 
     def reset(self, seed: int | None) -> None:
         """Begin the world anew, with another seed where one is given."""

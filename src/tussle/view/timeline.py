@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 
 from tussle.api.bodies import FLOATS, OFFSETS
-from tussle.comms.topic import Parcel
+from tussle.comms.topic import Delivery
 from tussle.engine.simulation import Simulation
 from tussle.engine.snapshot import Snapshot
 from tussle.engine.state import Parked
 from tussle.engine.table import Stored
 from tussle.errors import SnapshotError
 from tussle.lists import RaggedColumn
-from tussle.messages import Batch
+from tussle.messages import Messages
 from tussle.view.frame import Frame, Lens
 from tussle.view.pacing import Allowance
 
@@ -208,12 +208,12 @@ def memory_of(item: Any) -> int:
         return sum(memory_of(value) for value in item.values())
     if isinstance(item, (list, tuple)):
         return sum(memory_of(value) for value in item)
-    if isinstance(item, Parcel):
+    if isinstance(item, Delivery):
         return memory_of([item.batch, item.due, item.to])
     if isinstance(item, Parked):
         return memory_of([item.bodies.floats, item.bodies.ints, item.tables])
     if isinstance(item, Stored):
         return memory_of([item.arrays, item.lists])
-    if isinstance(item, (Snapshot, Batch, RaggedColumn)):
+    if isinstance(item, (Snapshot, Messages, RaggedColumn)):
         return sum(memory_of(value) for name, value in vars(item).items() if name != "mission")
     return 0

@@ -8,18 +8,18 @@ import pickle
 import numpy as np
 import pytest
 from design_plugins import Chaser
-from small_worlds import Note, Parcel
+from small_worlds import Delivery, Note
 
 from tussle import Block, Mission, Simulation
 from tussle.api import (
     Autonomy,
-    Batch,
     Children,
     EntityRef,
     Field,
     Handle,
     Input,
     Message,
+    Messages,
     Output,
     Param,
     Publish,
@@ -256,42 +256,42 @@ def test_ragged_columns():
 
 
 def test_batches_of_messages():
-    one = Batch.make(Note, np.array([1, 0]), np.array([7, 3]), {"value": [10, 20]})
-    two = Batch.make(Note, np.array([0]), np.array([1]), {"value": 30})
-    both = Batch.concatenate([one, two])
+    one = Messages.make(Note, np.array([1, 0]), np.array([7, 3]), {"value": [10, 20]})
+    two = Messages.make(Note, np.array([0]), np.array([1]), {"value": 30})
+    both = Messages.concatenate([one, two])
     assert both.world.tolist() == [0, 0, 1]
     assert both.sender.tolist() == [1, 3, 7]
     assert both.value.tolist() == [30, 20, 10]
-    assert len(Batch.empty(Note)) == 0
+    assert len(Messages.empty(Note)) == 0
     with pytest.raises(
         AttributeError,
         match=r"messages of this type have no field 'valu' \(did you mean 'value'\?\); there are: value",
     ):
         _ = both.valu
     with pytest.raises(ParameterError, match=r"Note.value: shape \(3,\) does not fit \(2,\)"):
-        Batch.make(Note, np.zeros(2, int), np.zeros(2, int), {"value": [1, 2, 3]})
+        Messages.make(Note, np.zeros(2, int), np.zeros(2, int), {"value": [1, 2, 3]})
     one = np.zeros(1, int)
     for points, text in (
         ([[1, 2]], r".*row 0 has shape \(2,\); expected \(2, m\)"),
         ([(1, 2), (3, 4)], r"expected an array \(2, m\) for all messages, or a list of 1"),
         (
-            RaggedColumn.empty(2, Parcel.fields["points"]),
+            RaggedColumn.empty(2, Delivery.fields["points"]),
             r"2 lists with items of shape \(2,\); expected 1 lists with items of shape \(2,\)",
         ),
     ):
         with pytest.raises(ParameterError, match=f"Parcel.points: {text}"):
-            Batch.make(Parcel, one, one, {"points": points})
+            Messages.make(Delivery, one, one, {"points": points})
     with pytest.raises(ParameterError, match=r"Parcel.thing: 3 objects; expected one object, or a list of 2"):
-        Batch.make(Parcel, np.zeros(2, int), np.zeros(2, int), {"thing": ["a", "b", "c"]})
-    captured = Batch.make(EntityCaptured, np.zeros(2, int), np.zeros(2, int), {"source": [1, 2]})
+        Messages.make(Delivery, np.zeros(2, int), np.zeros(2, int), {"thing": ["a", "b", "c"]})
+    captured = Messages.make(EntityCaptured, np.zeros(2, int), np.zeros(2, int), {"source": [1, 2]})
     assert captured.source_team.tolist() == [0, 0]
 
 
 def test_messages_keep_the_order_of_saying():
-    first = Batch.make(Note, np.zeros(2, int), np.array([5, 5]), {"value": [1, 2]})
-    second = Batch.make(Note, np.zeros(1, int), np.array([5]), {"value": 3})
-    assert Batch.concatenate([first, second]).value.tolist() == [1, 2, 3]
-    assert Batch.concatenate([second, first]).value.tolist() == [3, 1, 2]
+    first = Messages.make(Note, np.zeros(2, int), np.array([5, 5]), {"value": [1, 2]})
+    second = Messages.make(Note, np.zeros(1, int), np.array([5]), {"value": 3})
+    assert Messages.concatenate([first, second]).value.tolist() == [1, 2, 3]
+    assert Messages.concatenate([second, first]).value.tolist() == [3, 1, 2]
 
 
 @pytest.mark.parametrize("unit", ["deg", "kt", "m deg"])

@@ -124,7 +124,7 @@ class Claims(Autonomy):
         self.say.publish(g.id == 1, target=3)
 
 
-class Referee(EasyInteraction):
+class WorldBinding(EasyInteraction):
     """Judges captures: who claims who is nearer than that has it."""
 
     reach = Param(20.0, unit="m")
@@ -156,7 +156,7 @@ def test_a_referee_and_a_metric():
         block("a", team=1, autonomy=[Drift(), Claims()]),
         block("b", team=2, count=3, position=(10, 0, 0)),
     )
-    sim = played(Referee(), Score(), blocks=blocks, seeds=[1, 2], steps=10)
+    sim = played(WorldBinding(), Score(), blocks=blocks, seeds=[1, 2], steps=10)
     assert [r.metrics["Score"] for r in sim.result()] == [{"score": {1: 1, 2: 0}, "total": 1}] * 2
     assert [r.scores for r in sim.result()] == [{1: 1.0, 2: 0.0}] * 2
     assert sim.read("b.pos")[1].tolist() == [[True, False, True]] * 2

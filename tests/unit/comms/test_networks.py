@@ -7,11 +7,11 @@ import tracemalloc
 import numpy as np
 import pytest
 from small_worlds import (
+    Delivery,
     EasyListener,
     Listener,
     Note,
     NoteMetric,
-    Parcel,
     Reaper,
     Talker,
     alone,
@@ -262,7 +262,7 @@ def test_a_network_that_is_not_there_is_refused():
 
 def test_one_topic_carries_one_type():
     class Shout(Autonomy):
-        shouts = Publish(Parcel, topic="Note")
+        shouts = Publish(Delivery, topic="Note")
 
         def step(self, g):
             pass
@@ -358,24 +358,24 @@ def test_a_network_without_a_route_is_told_so():
 
 
 class Sender(Autonomy):
-    parcels = Publish(Parcel)
+    deliveries = Publish(Delivery)
 
     def step(self, g):
         rows = np.flatnonzero(g.step_count == 1)
         points = [np.repeat([[1.0], [2.0]], i % 3, axis=1) for i in g.id[rows]]
-        self.parcels.publish(
+        self.deliveries.publish(
             rows, value=g.id[rows] * 10, points=points, thing=[{"id": int(i)} for i in g.id[rows]]
         )
 
 
 class Receiver(Autonomy):
-    parcels = Subscribe(Parcel)
+    deliveries = Subscribe(Delivery)
     n_points = State(dtype=int)
     sum_y = State()
     ids = State(dtype=int)
 
     def step(self, g):
-        rows, heard_ = self.parcels.pairs()
+        rows, heard_ = self.deliveries.pairs()
         for i, row in enumerate(rows):
             self.n_points[row] += heard_.points[i].shape[1]
             self.sum_y[row] += heard_.points[i][1].sum()

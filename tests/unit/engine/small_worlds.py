@@ -53,7 +53,7 @@ class Note(Message):
     value = Field(dtype=int)
 
 
-class Parcel(Message):
+class Delivery(Message):
     """A number, a list of points and any object."""
 
     value = Field(dtype=int)

@@ -400,7 +400,7 @@ def shy(contacts, *others, noise=QUIET, **values):
     ]
     sim = Simulation(mission(me, *there))
     sim.step(2)
-    return sim.read("me.MotorSchemas.AvoidEntityMS.wish")[0][0, 0].tolist()
+    return sim.read("me.MotorSchemas.AvoidEntityMS.desired_velocity")[0][0, 0].tolist()
 
 
 @pytest.mark.parametrize(
@@ -419,8 +419,8 @@ def test_avoidance_of_contacts_without_noise_is_that_of_the_truth(others):
 
 
 def test_avoidance_of_noisy_contacts_is_from_where_they_are_reported():
-    wish = shy("noisy", ((7.0, 0, 0), 1), noise={**QUIET, "pos_noise_0": (-14.0, 0.0)})
-    assert wish == pytest.approx([3.0, 0.0, 0.0])
+    desired_velocity = shy("noisy", ((7.0, 0, 0), 1), noise={**QUIET, "pos_noise_0": (-14.0, 0.0)})
+    assert desired_velocity == pytest.approx([3.0, 0.0, 0.0])
 
 
 def test_contacts_that_no_sensor_reports_are_missed():
@@ -444,12 +444,12 @@ def test_a_behaviour_reads_channels_that_do_not_lie_side_by_side():
         across = Input("wind_z wind_x", unit="m/s")
 
         def step(self, g):
-            self.wish[:2] = self.across
+            self.desired_velocity[:2] = self.across
 
     game = mission(block(autonomy=MotorSchemas(behaviors=[Sail()]), motion=Still(), sensor=Wind()))
     sim = Simulation(game)
     sim.step(3)
-    assert sim.read("a.MotorSchemas.Sail.wish")[0][0, 0].tolist() == [4.0, 2.0, 0.0]
+    assert sim.read("a.MotorSchemas.Sail.desired_velocity")[0][0, 0].tolist() == [4.0, 2.0, 0.0]
 
 
 def test_avoidance_of_contacts_conforms():

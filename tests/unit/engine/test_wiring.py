@@ -372,7 +372,7 @@ class Push(Behavior):
 
     def step(self, g):
         self.n[:] += 1
-        self.wish[:] = self.to * g.call("factor")
+        self.desired_velocity[:] = self.to * g.call("factor")
 
 
 class Sum(Autonomy):
@@ -385,7 +385,7 @@ class Sum(Autonomy):
         self.velocity[:] = 0.0
         for part in self.parts:
             part.step(g)
-            self.velocity += part.gain * part.wish
+            self.velocity += part.gain * part.desired_velocity
 
     @service
     def factor(self, g):
@@ -401,7 +401,7 @@ def test_children_have_columns_and_channels_of_their_own():
     )
     sim.run()
     assert sim.read("a.vel")[0].tolist() == [[[2.0, 3.0, 2.0]] * 2, [[2.0, 6.0, 2.0]] * 2]
-    assert sim.read("a.Sum.North.wish")[0][0, 0].tolist() == [0.0, 6.0, 0.0]
+    assert sim.read("a.Sum.North.desired_velocity")[0][0, 0].tolist() == [0.0, 6.0, 0.0]
     assert sim.read("a.Sum.Up.n")[0].tolist() == [[10, 10], [10, 10]]
 
 

@@ -132,7 +132,7 @@ TABLES = {
 }  # fmt: skip
 
 
-def row(name: str, known: tags.Known) -> str:
+def row(name: str, known: tags.TagSpec) -> str:
     """The line of the page about a tag."""
     words = {
         "truth": "true/false",

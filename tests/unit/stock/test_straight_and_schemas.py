@@ -135,7 +135,7 @@ class Wish(Behavior):
     to = Param((0.0, 0.0, 0.0), fields="x y z", unit="m/s")
 
     def step(self, g):
-        self.wish[:] = self.to
+        self.desired_velocity[:] = self.to
 
 
 def schemas(*behaviors, **values):
@@ -190,7 +190,7 @@ def test_motor_schemas_write_the_same_as_a_velocity():
 def test_each_behaviour_draws_its_own_numbers_and_so_does_who_steps_them():
     class Gambler(Behavior):
         def step(self, g):
-            self.wish[:] = g.uniform("dice", 3)
+            self.desired_velocity[:] = g.uniform("dice", 3)
 
     class Nest(Autonomy):
         inner = Children(Behavior)
@@ -208,9 +208,12 @@ def test_each_behaviour_draws_its_own_numbers_and_so_does_who_steps_them():
         return sim.read(path)[0][0, 0].tolist()
 
     nest = Nest(inner=[Gambler(), Gambler(name="other")])
-    first, second = drawn(nest, "a.Nest.Gambler.wish"), drawn(nest, "a.Nest.other.wish")
+    first, second = (
+        drawn(nest, "a.Nest.Gambler.desired_velocity"),
+        drawn(nest, "a.Nest.other.desired_velocity"),
+    )
     assert first != second
-    assert first == drawn(Nest(inner=[Gambler()]), "a.Nest.Gambler.wish")
+    assert first == drawn(Nest(inner=[Gambler()]), "a.Nest.Gambler.desired_velocity")
     assert drawn(nest, "a.Nest.drawn") == drawn(Nest(), "a.Nest.drawn")
 
 
@@ -224,7 +227,7 @@ def avoiding(*others, **values):
     ]
     sim = Simulation(mission(me, *there))
     sim.step()
-    return sim.read("a.MotorSchemas.AvoidEntityMS.wish")[0][0, 0].tolist()
+    return sim.read("a.MotorSchemas.AvoidEntityMS.desired_velocity")[0][0, 0].tolist()
 
 
 def test_avoidance_grows_towards_the_minimum_range():
@@ -236,9 +239,9 @@ def test_avoidance_grows_towards_the_minimum_range():
 
 
 def test_within_the_minimum_range_nothing_else_counts():
-    wish = avoiding(((3.0, 0, 0), 1), ((0, 5.0, 0), 1))
-    assert wish[0] < -1e9
-    assert abs(wish[1] / wish[0]) < 1e-9
+    desired_velocity = avoiding(((3.0, 0, 0), 1), ((0, 5.0, 0), 1))
+    assert desired_velocity[0] < -1e9
+    assert abs(desired_velocity[1] / desired_velocity[0]) < 1e-9
 
 
 def test_others_are_avoided_if_asked_and_the_one_at_the_same_place_never():
@@ -254,7 +257,7 @@ def going(steps=1, **values):
     )
     sim = Simulation(mission(mover, end=5.0))
     sim.step(steps)
-    return sim, sim.read("a.MotorSchemas.MoveToGoalMS.wish")[0][0, 0].tolist()
+    return sim, sim.read("a.MotorSchemas.MoveToGoalMS.desired_velocity")[0][0, 0].tolist()
 
 
 def test_move_to_goal_goes_at_half_the_distance_a_second():
@@ -275,9 +278,9 @@ def test_integral_and_derivative_of_the_distance():
 
 
 def test_the_goal_may_lie_straight_ahead():
-    sim, wish = going(use_initial_heading=True)
+    sim, desired_velocity = going(use_initial_heading=True)
     assert sim.read("a.MotorSchemas.MoveToGoalMS.target")[0][0, 0] == pytest.approx([0.0, 1e6, 0.0], abs=1e-6)
-    assert wish == pytest.approx([0.0, 5e5, 0.0], abs=1e-6)
+    assert desired_velocity == pytest.approx([0.0, 5e5, 0.0], abs=1e-6)
 
 
 class Guide(Autonomy):
@@ -323,6 +326,6 @@ def test_who_is_born_later_has_no_kick_of_the_derivative_either():
     )
     sim = Simulation(mission(late))
     sim.step(6)
-    wish, alive = sim.read("a.MotorSchemas.MoveToGoalMS.wish")
+    desired_velocity, alive = sim.read("a.MotorSchemas.MoveToGoalMS.desired_velocity")
     assert alive.all()
-    assert wish.tolist() == [[[0.0, 0.0, 0.0]]]
+    assert desired_velocity.tolist() == [[[0.0, 0.0, 0.0]]]

@@ -11,7 +11,7 @@ from recorded_games import hunt
 from tussle import Simulation
 from tussle.mission import read_mission
 from tussle.view import Live
-from tussle.view.entity import EntityState, Letter, Reading
+from tussle.view.entity import EntityState, Reading, ShownMessage
 from tussle.view.page import formatting
 from tussle.view.page.assemble import MODULES, SERVED, page_html
 from tussle.view.page.document import game_document, opening_data, reach_of
@@ -95,7 +95,8 @@ def test_units_of_fields_that_are_alike_are_said_once():
 def test_an_entity_is_told_with_its_plugins_and_messages():
     state = EntityState(
         0.0, 0, 1, 1, "drone", {"pos": Reading(np.zeros(3), "m"), "force": Reading(0.0)},
-        {"Mine": {"goal": Reading(2.0, "m")}, "Empty": {}}, [Letter("Net/Topic", 0, {"x": 1})], [Letter("Net/Topic", 2, {})],
+        {"Mine": {"goal": Reading(2.0, "m")}, "Empty": {}},
+        [ShownMessage("Net/Topic", 0, {"x": 1})], [ShownMessage("Net/Topic", 2, {})],
     )  # fmt: skip
     assert formatting.entity_sections(state) == [
         ("", [("pos", "0  0  0 m")]),

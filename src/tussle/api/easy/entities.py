@@ -6,7 +6,16 @@ import math
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from tussle.api.easy.looks import DrawIn, Look
-from tussle.api.easy.values import BODY, NUMBERS, VECTORS, Columns, Heard, Write, plain, write_number
+from tussle.api.easy.values import (
+    BODY,
+    NUMBERS,
+    VECTORS,
+    Columns,
+    ReceivedMessage,
+    Write,
+    plain,
+    write_number,
+)
 from tussle.columns import Publish
 from tussle.errors import ParameterError, listed, nearest_name
 from tussle.scene import Scene
@@ -264,12 +273,12 @@ class Me(Seeing):
         """End this entity's world with an error at the end of the step; the others go on."""
         self._look.g.fail(self._row, why)
 
-    def _messages(self, topic: str) -> list[Heard]:
+    def _messages(self, topic: str) -> list[ReceivedMessage]:
         look = self._look
         of_row = look.heard.get(topic)
         if of_row is None:
             of_row = look.heard[topic] = look.own[topic].by_row()
-        return [Heard(self, batch, i) for batch, i in of_row(self._row)]
+        return [ReceivedMessage(self, batch, i) for batch, i in of_row(self._row)]
 
     def publish(self, topic: str, **fields: Any) -> None:
         """Send a message to a `Publish` column; fields that refer to entities take entities."""

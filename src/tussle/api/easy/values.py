@@ -21,7 +21,7 @@ from tussle.columns import (
     Subscribe,
 )
 from tussle.errors import DeclarationError, ParameterError
-from tussle.messages import Batch
+from tussle.messages import Messages
 
 VECTORS = {
     "pos": "Position [m], (3,), world frame.",
@@ -196,12 +196,12 @@ class PerTeam(MutableMapping[int, Any]):
         return repr(dict(self))
 
 
-class Heard:
+class ReceivedMessage:
     """One message: its fields as attributes, and `sender`; both it and what fields refer to are entities, or None when gone."""
 
     __slots__ = ("_batch", "_i", "_of")
 
-    def __init__(self, of: Any, batch: Batch, i: int) -> None:
+    def __init__(self, of: Any, batch: Messages, i: int) -> None:
         self._of, self._batch, self._i = of, batch, i
 
     def __getattr__(self, name: str) -> Any:

@@ -10,7 +10,7 @@ import numpy as np
 from tussle.api.easy.entities import Entity, Other, Seeing, offered, square_between
 from tussle.api.easy.looks import DrawIn, Draws
 from tussle.api.easy.search import Search
-from tussle.api.easy.values import BODY, Cells, Columns, Heard, Write, make_type, plain
+from tussle.api.easy.values import BODY, Cells, Columns, ReceivedMessage, Write, make_type, plain
 from tussle.api.world import WorldView
 from tussle.columns import Column, State
 from tussle.errors import ParameterError, listed, nearest_name
@@ -187,11 +187,11 @@ class OneWorld:
 
     # -- messages, chance, time -----------------------------------------------------------------------------------------------
 
-    def inbox(self, type_: type[Message]) -> list[Heard]:
+    def inbox(self, type_: type[Message]) -> list[ReceivedMessage]:
         """All messages of a type published so far in this step in this world, whatever their topic, by sender."""
         batch = self._look.g.inbox(type_)
         first, last = np.searchsorted(batch.world, (self._row, self._row + 1)).tolist()
-        return [Heard(self, batch, i) for i in range(first, last)]
+        return [ReceivedMessage(self, batch, i) for i in range(first, last)]
 
     def publish(self, type_: type[Message], network: str = "", **fields: Any) -> None:
         """Send a message in the name of the world; fields that refer to entities take entities."""

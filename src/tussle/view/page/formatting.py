@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tussle.engine.result import WorldResult
-from tussle.view.entity import EntityState, Letter, Reading
+from tussle.view.entity import EntityState, Reading, ShownMessage
 
 MOST_ITEMS = 6
 """Of a list, in a reading or a message."""
@@ -67,6 +67,6 @@ def reading(value: Reading) -> str:
     return f"{number(value.value)} {unit}".rstrip()
 
 
-def _letter(letter: Letter) -> Row:
+def _letter(letter: ShownMessage) -> Row:
     fields = "; ".join(f"{name} {number(value)}" for name, value in letter.fields.items())
     return letter.topic, f"{letter.sender or 'world'}: {fields}"

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tussle.api import Batch, Network, Param, WorldView
+from tussle.api import Messages, Network, Param, WorldView
 
 
 class New(Network):
@@ -12,7 +12,7 @@ class New(Network):
 
     radius = Param(400.0, unit="m", ge=0.0, doc="Range of the radio.")
 
-    def route(self, w: WorldView, messages: Batch) -> tuple[np.ndarray, np.ndarray]:
+    def route(self, w: WorldView, messages: Messages) -> tuple[np.ndarray, np.ndarray]:
         """Return, for each delivery, the index of the message and the row of the receiver."""
         sender = w.rows_at(messages.world, messages.sender)
         near = w.near(self.radius[w.world])  # pairs (row, other), ordered by row

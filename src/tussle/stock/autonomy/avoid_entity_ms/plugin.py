@@ -54,7 +54,7 @@ class AvoidEntityMS(Behavior):
 
     def step(self, g: GroupView) -> None:
         away = self._from_seen(g) if self.contacts == "noisy" else self.push(g).values
-        self.wish[:] = away * g.call("longest_wish")
+        self.desired_velocity[:] = away * g.call("max_desired_speed")
 
     def _from_seen(self, g: GroupView) -> np.ndarray:
         """Sum `push` over the measured entities, relative to the entity's believed position, (3, n)."""
@@ -67,5 +67,5 @@ class AvoidEntityMS(Behavior):
             i = row[k]
             own = self.sphere_of_influence[i], self.minimum_range[i], self.avoid_non_team[i]
             push[:, k] = law(x[k], y[k], z[k], distance[k], g.team[i], self.seen.data[1, k], *own) or 0.0
-        wish: np.ndarray = self.seen.sum(push)
-        return wish
+        velocity: np.ndarray = self.seen.sum(push)
+        return velocity

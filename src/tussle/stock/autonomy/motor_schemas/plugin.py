@@ -40,10 +40,12 @@ class MotorSchemas(Autonomy):
         weight = np.zeros(g.n)
         for behavior in self.behaviors:
             g.step(behavior)
-            wish = behavior.wish
-            length = np.sqrt(wish[0] * wish[0] + wish[1] * wish[1] + wish[2] * wish[2])
+            velocity = behavior.desired_velocity
+            length = np.sqrt(
+                velocity[0] * velocity[0] + velocity[1] * velocity[1] + velocity[2] * velocity[2]
+            )
             shorter = np.minimum(1.0, self.max_speed / np.where(length > 0.0, length, 1.0))
-            total += behavior.gain * shorter * wish
+            total += behavior.gain * shorter * velocity
             weight += np.where(length > 0.0, behavior.gain, 0.0)
         wished = weight > 0.0
         v = np.where(wished, total / np.where(wished, weight, 1.0), self.max_speed * g.forward)
@@ -54,6 +56,6 @@ class MotorSchemas(Autonomy):
         self.velocity[2] = np.where(self.add_lower_bound_to_vz, np.maximum(v[2], self.vz_lower_bound), v[2])
 
     @service
-    def longest_wish(self, g: GroupView) -> np.ndarray:
+    def max_desired_speed(self, g: GroupView) -> np.ndarray:
         """Return the largest speed of a behaviour [m/s], (n,)."""
         return np.asarray(self.max_speed)

@@ -50,4 +50,4 @@ class MoveToGoalMS(Behavior):
         self.integral[:] = np.where(distance > band, 0.0, self.integral + distance * g.dt)
         speed = kp * distance + ki * self.integral + kd * (distance - self.previous) / g.dt
         self.previous[:] = distance
-        self.wish[:] = unit(offset) * speed
+        self.desired_velocity[:] = unit(offset) * speed

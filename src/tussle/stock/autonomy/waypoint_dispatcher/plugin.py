@@ -6,8 +6,8 @@ import numpy as np
 
 from tussle.api import (
     Autonomy,
-    Batch,
     GroupView,
+    Messages,
     Param,
     Publish,
     State,
@@ -72,7 +72,7 @@ class WaypointDispatcher(Autonomy):
         is_there = np.sqrt(dx * dx + dy * dy + dz * dz) <= tolerance
         self._advance(rows[is_there])
 
-    def _start_lists(self, rows: np.ndarray, heard: Batch) -> None:
+    def _start_lists(self, rows: np.ndarray, heard: Messages) -> None:
         """Start the lists that the rows received."""
         for number, row in enumerate(rows):
             points = heard.points[number]

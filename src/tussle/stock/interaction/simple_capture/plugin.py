@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tussle.api import Interaction, Param, WorldView
-from tussle.messages import Batch, CaptureEntity, EntityCaptured
+from tussle.messages import CaptureEntity, EntityCaptured, Messages
 
 
 class SimpleCapture(Interaction):
@@ -41,7 +41,7 @@ class SimpleCapture(Interaction):
         )  # fmt: skip
         self._apply(w, np.unique(target))
 
-    def _valid(self, w: WorldView, claims: Batch) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _valid(self, w: WorldView, claims: Messages) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the rows of captor and captured, and the world, of each valid and credited claim."""
         source, target = w.rows_at(claims.world, claims.sender), w.rows_at(claims.world, claims.target)
         is_there = (source >= 0) & (target >= 0)

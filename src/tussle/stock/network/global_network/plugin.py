@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tussle.api import EVERYONE, Batch, Network, WorldView
+from tussle.api import EVERYONE, Messages, Network, WorldView
 
 
 class GlobalNetwork(Network):
@@ -10,5 +10,5 @@ class GlobalNetwork(Network):
 
     grade = "portable"
 
-    def route(self, w: WorldView, messages: Batch) -> str:
+    def route(self, w: WorldView, messages: Messages) -> str:
         return EVERYONE

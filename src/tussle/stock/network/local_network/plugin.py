@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tussle.api import SAME_ENTITY, Batch, Network, WorldView
+from tussle.api import SAME_ENTITY, Messages, Network, WorldView
 
 
 class LocalNetwork(Network):
@@ -10,5 +10,5 @@ class LocalNetwork(Network):
 
     grade = "portable"
 
-    def route(self, w: WorldView, messages: Batch) -> str:
+    def route(self, w: WorldView, messages: Messages) -> str:
         return SAME_ENTITY

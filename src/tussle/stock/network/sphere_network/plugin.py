@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tussle.api import Batch, Network, Param, WorldView
+from tussle.api import Messages, Network, Param, WorldView
 
 
 class SphereNetwork(Network):
@@ -24,7 +24,7 @@ class SphereNetwork(Network):
     comms_boundary_altitude = Param(0.0, unit="m", doc="Altitude of the plane.")
     comms_boundary_epsilon = Param(0.0, unit="m", ge=0.0, doc="Distance by which both sides overlap.")
 
-    def route(self, w: WorldView, messages: Batch) -> tuple[np.ndarray, np.ndarray]:
+    def route(self, w: WorldView, messages: Messages) -> tuple[np.ndarray, np.ndarray]:
         sender = w.rows_at(messages.world, messages.sender)
         pairs = w.near(self.range[w.world])
         first, last = np.searchsorted(pairs.row, sender), np.searchsorted(pairs.row, sender, side="right")
@@ -47,7 +47,7 @@ class SphereNetwork(Network):
         return np.asarray(same_side | ~self.filter_comms_plane[world])
 
     def _is_transmitted(
-        self, w: WorldView, messages: Batch, number: np.ndarray, receiver: np.ndarray
+        self, w: WorldView, messages: Messages, number: np.ndarray, receiver: np.ndarray
     ) -> np.ndarray:
         # Draws are keyed by sender, index of the message among the sender's in this step, and receiver, so other senders and
         # receivers do not affect them.

@@ -18,7 +18,7 @@ from tussle.lists import RaggedColumn
 
 
 @dataclass
-class Referee:
+class WorldBinding:
     """One world plugin.
 
     Attributes:
@@ -40,14 +40,14 @@ class Referee:
     memory: list[tuple[Place, Any]] = field(default_factory=list)
 
     @classmethod
-    def bind(cls, spec: Any, view: WorldView, overrides: Overrides) -> Referee:
+    def bind(cls, spec: Any, view: WorldView, overrides: Overrides) -> WorldBinding:
         """Bind a plugin of the mission to all worlds.
 
         Raises:
             DeclarationError: It declares a column that only entities' plugins have.
             WiringError: A topic belongs to a network that is not there.
         """
-        referee = cls(spec.bound(), spec, view)
+        world_binding = cls(spec.bound(), spec, view)
         n_worlds, n_teams = view.n_worlds, len(view.teams)
         for name, column in type(spec).columns.items():
             is_list = isinstance(column, State) and column.ragged
@@ -57,29 +57,29 @@ class Referee:
                 )
             if isinstance(column, Param) and column.ragged:
                 own = [np.transpose(spec.values[name])] * n_worlds
-                referee.plugin.__dict__[name] = RaggedColumn.from_rows(own, column).read_only()
+                world_binding.plugin.__dict__[name] = RaggedColumn.from_rows(own, column).read_only()
             elif isinstance(column, Param) and column.is_row_data:
-                referee._add("world", name, column.dtype, len(column.fields), column.default)
+                world_binding._add("world", name, column.dtype, len(column.fields), column.default)
             elif isinstance(column, State):
                 k = n_teams if column.per == "team" else len(column.fields)
                 per = "world" if column.per == "team" else column.per
-                referee._add(per, name, column.dtype, k, column.default)
+                world_binding._add(per, name, column.dtype, k, column.default)
                 if per == "world":
-                    referee.memory.append((referee.places[name][1], column.default))
+                    world_binding.memory.append((world_binding.places[name][1], column.default))
             elif isinstance(column, Publish):
                 topic = view.context.topic(column.network, column.topic, column.message, spec.instance_name)
-                referee.plugin.__dict__[name] = Publisher(topic, view)
+                world_binding.plugin.__dict__[name] = Publisher(topic, view)
             elif isinstance(column, Subscribe):
                 raise WiringError(
                     f"{spec.instance_name}.{name}: a world plugin reads w.inbox({column.message.__name__}) instead of a Subscribe"
                 )
-        referee.tables["world"].allocate(n_worlds)
-        referee.tables["entity"].allocate(view.n)
-        referee.fill_params(overrides, np.arange(n_worlds))
+        world_binding.tables["world"].allocate(n_worlds)
+        world_binding.tables["entity"].allocate(view.n)
+        world_binding.fill_params(overrides, np.arange(n_worlds))
         for service in type(spec).services:
-            view.context.services[service] = getattr(referee.plugin, service)
-        referee.attach()
-        return referee
+            view.context.services[service] = getattr(world_binding.plugin, service)
+        world_binding.attach()
+        return world_binding
 
     def _add(self, per: str, name: str, dtype: type, k: int, default: Any) -> None:
         self.places[name] = (per, self.tables[per].add(name, dtype, k, default))

@@ -9,11 +9,11 @@ import numpy as np
 from tussle.comms import TopicBuffer
 from tussle.errors import WiringError, listed, nearest_name
 from tussle.lists import RaggedColumn
-from tussle.messages import Batch, Message
+from tussle.messages import Message, Messages
 from tussle.stock import ALWAYS_THERE
 
 
-class Mail:
+class MessageBus:
     """All topics of a simulation.
 
     Attributes:
@@ -74,7 +74,7 @@ class Mail:
     def save(self) -> Any:
         """Outboxes, queues and inboxes; batches and parcels are never written to, so the lists are enough."""
         return {
-            key: (t.type, list(t.queue), [list(i.parcels) for i in t.inboxes], list(t.sent))
+            key: (t.type, list(t.queue), [list(i.deliveries) for i in t.inboxes], list(t.sent))
             for key, t in self.topics.items()
         }
 
@@ -82,14 +82,14 @@ class Mail:
         for (network, name), (type_, *_) in saved.items():
             self.topic(network, name, type_, "snapshot")
         for key, topic in self.topics.items():
-            _, queue, parcels, sent = saved.get(
+            _, queue, deliveries, sent = saved.get(
                 key, (None, [], [], [])
             )  # a topic or group that came later has had nothing then
             topic.queue = list(queue)
             topic.clear_outbox()
             topic.sent.extend(sent)
             for i, inbox in enumerate(topic.inboxes):
-                inbox.parcels = list(parcels[i]) if i < len(parcels) else []
+                inbox.deliveries = list(deliveries[i]) if i < len(deliveries) else []
 
     def columns(self, world: int) -> list[bytes]:
         """What is on its way in one world, for the state hash."""
@@ -100,10 +100,10 @@ class Mail:
             said = topic.outbox() if topic.sent else None  # from outside, or by a referee at the start
             if said is not None and (mine := np.flatnonzero(said.world == world)).size:
                 found.append(b"|".join([name, b"said", *_numbers(said.take(mine))]))
-            for parcel in topic.queue:
-                mine = parcel.batch.world == world
+            for delivery in topic.queue:
+                mine = delivery.batch.world == world
                 if mine.any():
-                    part = parcel.select(mine)
+                    part = delivery.select(mine)
                     to = (
                         part.to.encode()
                         if isinstance(part.to, str)
@@ -124,7 +124,7 @@ class Mail:
         return found
 
 
-def _numbers(batch: Batch) -> list[bytes]:
+def _numbers(batch: Messages) -> list[bytes]:
     values: list[bytes] = [batch.sender.tobytes()]
     for value in batch.data.values():
         if isinstance(value, RaggedColumn):
