@@ -1,4 +1,4 @@
-"""Range and nearest-neighbour queries over all worlds of a stack, and the block loop for kernels."""
+"""Range and nearest-neighbour queries over all worlds of a stack, and blocks of queries for kernels."""
 
 from tussle.neighbors.index import Blocks, Index
 from tussle.neighbors.lane_count import LANES

@@ -1,11 +1,11 @@
-"""From a function of numbers to the same function of eight lanes: what an `if` decides is computed both ways and chosen per lane.
+"""Translate a scalar function into one that computes eight SIMD lanes: both branches of an `if` run, and a mask selects per lane.
 
-The function's source is read once and written anew over the functions of `lanes`: an assignment under an `if` becomes a
-choice between the new and the old value, a `return` in a branch a choice between results. Every operation is the one that
-the author wrote, in the same order, so a lane's bits are those of the function called for that lane alone.
+The function's source is parsed and rewritten with the functions of `lanes`. An assignment under an `if` becomes a select between
+the new and the old value, a `return` in a branch a select between results. Every operation is the one in the source, in the same
+order, so each lane has the bits of a scalar call.
 
-Rejected: a loop over eight lanes around the function, left to LLVM's vectoriser. It is 13 times slower for three sums, and 21
-times for six with an `if`: nothing is vectorised, and nothing says so.
+Rejected: a loop over eight lanes around the function, left to LLVM's vectoriser. It is 13 times slower for three sums and 21
+times slower for six sums with an `if`: nothing is vectorised, without any warning.
 """
 
 from __future__ import annotations
@@ -39,14 +39,14 @@ LANE_FUNCTIONS = (
     "splat", "choose", "truth", "number", "joined", "lane_of", "lanes_sqrt", "lanes_abs"
 )  # fmt: skip
 TAKES = (
-    "it takes assignments, if, elif, else, return, + - * /, ** with a small whole number, comparisons, and, or, not, "
-    "x if c else y, abs, min, max, sqrt, the functions of tussle.numeric, and functions like itself"
+    f"supported are assignments, if, elif, else, return, + - * /, ** with a whole exponent from 1 to {MOST_POWER}, comparisons, and, or, "
+    "not, x if c else y, abs, min, max, sqrt, the functions of tussle.numeric and math, and functions written with these"
 )
 
 
 @dataclass(frozen=True)
 class Value:
-    """A local variable of the code that is written: its name, and whether it is a mask instead of eight numbers."""
+    """A local variable of the generated code: its name, and whether it is a mask or eight numbers."""
 
     name: str
     is_mask: bool = False
@@ -54,7 +54,7 @@ class Value:
 
 @dataclass(frozen=True)
 class Result:
-    """What a path through a function returns, and the mask of the lanes in which it is not None; "" is all of them."""
+    """Return values of one path through a function; `counts` names the mask of the lanes that do not return None, "" means all."""
 
     values: tuple[Value, ...]
     counts: str = ""
@@ -62,12 +62,12 @@ class Result:
 
 @dataclass(frozen=True)
 class LaneCode:
-    """A function of numbers written anew for lanes.
+    """A scalar function translated to lanes.
 
     Attributes:
-        function: Takes lanes and returns a tuple of the results, and behind them, if `can_skip`, the mask of the lanes that count.
-        masks: Which results are masks.
-        can_skip: It returns None for some.
+        function: Takes lanes and returns a tuple of the results, followed, if `can_skip`, by the mask of the lanes that count.
+        masks: Whether each result is a mask.
+        can_skip: Whether it can return None.
     """
 
     function: Device
@@ -76,56 +76,56 @@ class LaneCode:
 
 
 def lane_code(function: Callable[..., Any], inside: tuple[Any, ...] = ()) -> LaneCode:
-    """The function for lanes.
+    """Translate a scalar function to lanes.
 
     Args:
-        function: A plain function of numbers; see `TAKES`.
-        inside: Functions that are being written, to find one that calls itself.
+        function: A plain function of numbers; `TAKES` lists what it may contain.
+        inside: Functions whose translation is in progress, to detect recursion.
 
     Raises:
-        DeclarationError: Its source cannot be found, or it has something that cannot be done for eight lanes at once.
+        DeclarationError: The source is not found, or contains something that cannot be translated.
     """
     writer = Writer(function, inside)
     result = writer.block(writer.tree.body, {a.arg: Value(a.arg) for a in writer.tree.args.args})
     if result is None:
-        raise writer.refusal(writer.tree, "it returns nothing")
+        raise writer.refusal(writer.tree, "it returns no value")
     names = [value.name for value in result.values] + ([result.counts] if result.counts else [])
     text = "\n    ".join([
         f"def {writer.tree.name}({', '.join(a.arg for a in writer.tree.args.args)}):",
         *writer.lines,
         f"return ({', '.join(names)},)",
     ])  # fmt: skip
-    exec(text + "\n", writer.scope)  # noqa: S102 - written above from a checked tree
+    exec(text + "\n", writer.scope)  # noqa: S102 - the text above is generated from a checked tree
     made = writer.scope[writer.tree.name]
     made.__module__, made.__qualname__ = function.__module__, f"{function.__qualname__}.lanes"
     return LaneCode(device(made), tuple(value.is_mask for value in result.values), bool(result.counts))
 
 
 def source_of(function: Callable[..., Any]) -> ast.FunctionDef:
-    """Tree of a function's source, with the line numbers of its file.
+    """Syntax tree of a function, with the line numbers of its file.
 
     Raises:
-        DeclarationError: There is no source, or it is no plain function.
+        DeclarationError: The source is not found, or is not a function with plain arguments.
     """
     try:
         lines, first = inspect.getsourcelines(function)
         tree = ast.parse(textwrap.dedent("".join(lines))).body[0]
     except (OSError, TypeError, SyntaxError):
         raise DeclarationError(
-            f"{label(function)}: the source cannot be found; a neighbour law is a function with `def` in a file or notebook"
+            f"{label(function)}: source not found; define the neighbour law with `def` in a file or notebook"
         ) from None
     if not isinstance(tree, ast.FunctionDef):
-        raise DeclarationError(f"{label(function)}: a neighbour law is a function with `def`")
+        raise DeclarationError(f"{label(function)}: a neighbour law must be defined with `def`")
     ast.increment_lineno(tree, first - 1)
     if tree.args.vararg or tree.args.kwarg or tree.args.kwonlyargs or tree.args.defaults:
         raise DeclarationError(
-            f"{label(function)}: a neighbour law takes plain arguments, without * and defaults"
+            f"{label(function)}: a neighbour law takes plain arguments, without *, ** or defaults"
         )
     return tree
 
 
 class Writer:
-    """Writes one function anew, line by line; every value gets a name of its own."""
+    """Generates the lane code of one function, line by line; each value gets its own name."""
 
     def __init__(self, function: Callable[..., Any], inside: tuple[Any, ...]) -> None:
         self.function, self.inside = function, (*inside, function)
@@ -137,26 +137,26 @@ class Writer:
         self.outside |= {name: cell.cell_contents for name, cell in closure}
 
     def refusal(self, node: ast.AST, why: str) -> DeclarationError:
-        """The error for a place in the source."""
+        """Error with the file and line of a node."""
         code, line = self.function.__code__, getattr(node, "lineno", self.function.__code__.co_firstlineno)
         return DeclarationError(f"{code.co_filename}:{line}: {self.function.__qualname__}: {why}; {TAKES}")
 
     def new(self, text: str, is_mask: bool = False) -> Value:
-        """A line that names a value."""
+        """Append a line that assigns a new value."""
         value = Value(f"_{len(self.lines)}", is_mask)
         self.lines.append(f"{value.name} = {text}")
         return value
 
     def number(self, value: Value) -> str:
-        """Name of the value as eight numbers."""
+        """Name of the value converted to eight numbers."""
         return self.new(f"number({value.name})").name if value.is_mask else value.name
 
     def truth(self, value: Value) -> str:
-        """Name of the value as a mask."""
+        """Name of the value converted to a mask."""
         return value.name if value.is_mask else self.new(f"truth({value.name})", True).name
 
     def chosen(self, mask: str, yes: Value, no: Value) -> Value:
-        """Per lane one of two values."""
+        """Select one of two values per lane."""
         if yes == no:
             return yes
         if yes.is_mask and no.is_mask:
@@ -166,7 +166,7 @@ class Writer:
     # -- statements -------------------------------------------------------------------------------------------------------
 
     def block(self, statements: Sequence[ast.stmt], env: dict[str, Value]) -> Result | None:
-        """Write statements; `env` holds the value of each variable, and is changed. None where they end without a return."""
+        """Generate statements and update `env`, the value of each variable. Returns None if they end without a `return`."""
         for place, statement in enumerate(statements):
             if isinstance(statement, ast.Return):
                 return self.result(statement, env)
@@ -189,7 +189,7 @@ class Writer:
         return None
 
     def either(self, node: ast.If, mask: str, yes: Result | None, no: Result | None) -> Result | None:
-        """Result of an `if` whose branches return."""
+        """Combine the results of an `if` whose branches return."""
         if yes is None and no is None:
             return None
         if no is None or yes is None:
@@ -212,13 +212,13 @@ class Writer:
         return Result(values, self.chosen(mask, *every).name)
 
     def result(self, node: ast.Return, env: dict[str, Value]) -> Result | None:
-        """What a return gives; None for None."""
+        """Result of a `return` statement; None if it returns None."""
         if node.value is None or (isinstance(node.value, ast.Constant) and node.value.value is None):
             return None
         return Result(tuple(self.values(node.value, env)))
 
     def assignment(self, node: ast.stmt, env: dict[str, Value]) -> None:
-        """Write a statement that is neither `if` nor `return`."""
+        """Generate a statement that is neither `if` nor `return`."""
         if isinstance(node, ast.Pass) or (
             isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
         ):
@@ -232,7 +232,7 @@ class Writer:
         if isinstance(node, ast.AnnAssign) and node.value is not None:
             node = ast.copy_location(ast.Assign([node.target], node.value), node)
         if not isinstance(node, ast.Assign):
-            raise self.refusal(node, f"it has a `{type(node).__name__.lower()}`")
+            raise self.refusal(node, f"`{type(node).__name__.lower()}` is not supported")
         for target in node.targets:
             names = target.elts if isinstance(target, ast.Tuple) else [target]
             values = (
@@ -241,7 +241,9 @@ class Writer:
                 else [self.value(node.value, env)]
             )
             if len(names) != len(values) or not all(isinstance(name, ast.Name) for name in names):
-                raise self.refusal(node, f"it assigns {len(values)} values to {ast.unparse(target)}")
+                raise self.refusal(
+                    node, f"{len(values)} values cannot be assigned to `{ast.unparse(target)}`"
+                )
             env.update(
                 (name.id, value)
                 for name, value in zip(names, values, strict=True)
@@ -251,13 +253,13 @@ class Writer:
     # -- expressions ------------------------------------------------------------------------------------------------------
 
     def values(self, node: ast.expr, env: dict[str, Value]) -> list[Value]:
-        """Values of a tuple, of a call that returns one, or the one of any other expression."""
+        """Values of a tuple or of a call that returns one; one value for any other expression."""
         if isinstance(node, ast.Tuple):
             return [self.value(each, env) for each in node.elts]
         return self.call(node, env) if isinstance(node, ast.Call) else [self.value(node, env)]
 
     def value(self, node: ast.expr, env: dict[str, Value]) -> Value:
-        """Write an expression."""
+        """Generate an expression."""
         if isinstance(node, ast.Name) and node.id in env:
             return env[node.id]
         if isinstance(node, (ast.Constant, ast.Name, ast.Attribute)):
@@ -265,7 +267,7 @@ class Writer:
         if isinstance(node, ast.Call):
             found = self.call(node, env)
             if len(found) != 1:
-                raise self.refusal(node, f"`{ast.unparse(node)}` gives {len(found)} values")
+                raise self.refusal(node, f"`{ast.unparse(node)}` returns {len(found)} values, not one")
             return found[0]
         if isinstance(node, ast.IfExp):
             mask = self.truth(self.value(node.test, env))
@@ -281,10 +283,10 @@ class Writer:
             return self.new(f"-{inner}") if isinstance(node.op, ast.USub) else Value(inner)
         if isinstance(node, ast.BinOp):
             return self.arithmetic(node, env)
-        raise self.refusal(node, f"it has `{ast.unparse(node)}`")
+        raise self.refusal(node, f"`{ast.unparse(node)}` is not supported")
 
     def constant(self, node: ast.expr, value: Any) -> Value:
-        """A number that is written down, or that a name outside stands for."""
+        """A literal number, or the number bound to a name outside the function."""
         if isinstance(value, (bool, np.bool_)):
             return self.new(f"truth(splat({float(value)}))", True)
         if isinstance(value, (int, float, np.number)):
@@ -294,7 +296,7 @@ class Writer:
         raise self.refusal(node, f"`{ast.unparse(node)}` is not a number")
 
     def object(self, node: ast.expr) -> Any:
-        """What a name or an attribute outside the function stands for."""
+        """Object bound to a name or attribute outside the function."""
         if isinstance(node, ast.Name):
             if node.id not in self.outside:
                 raise self.refusal(node, f"`{node.id}` is not defined")
@@ -303,10 +305,10 @@ class Writer:
             holder = self.object(node.value)
             if isinstance(holder, (types.ModuleType, type)) and hasattr(holder, node.attr):
                 return getattr(holder, node.attr)
-        raise self.refusal(node, f"it has `{ast.unparse(node)}`")
+        raise self.refusal(node, f"`{ast.unparse(node)}` is not supported")
 
     def logic(self, node: ast.BoolOp, env: dict[str, Value]) -> Value:
-        """`and` and `or`: one of the operands, as in Python."""
+        """`and` and `or`, which select one of their operands as in Python."""
         found = self.value(node.values[0], env)
         for each in node.values[1:]:
             other = self.value(each, env)
@@ -320,9 +322,9 @@ class Writer:
         return found
 
     def comparison(self, node: ast.Compare, env: dict[str, Value]) -> Value:
-        """A comparison, or a chain of them."""
+        """A comparison, possibly chained."""
         if not all(type(op) in COMPARISONS for op in node.ops):
-            raise self.refusal(node, f"it has `{ast.unparse(node)}`")
+            raise self.refusal(node, f"`{ast.unparse(node)}` is not supported")
         operands = [self.number(self.value(each, env)) for each in (node.left, *node.comparators)]
         masks = []
         for (a, b), op in zip(pairwise(operands), node.ops, strict=True):
@@ -330,23 +332,23 @@ class Writer:
         return masks[0] if len(masks) == 1 else self.new(" & ".join(mask.name for mask in masks), True)
 
     def arithmetic(self, node: ast.BinOp, env: dict[str, Value]) -> Value:
-        """An operation on two numbers."""
+        """A binary operation on numbers."""
         if isinstance(node.op, ast.Pow):
             power = node.right.value if isinstance(node.right, ast.Constant) else None
             if not isinstance(power, int) or not 1 <= power <= MOST_POWER:
-                raise self.refusal(node, f"it has `{ast.unparse(node)}`")
+                raise self.refusal(node, f"`{ast.unparse(node)}` is not supported")
             base = self.number(self.value(node.left, env))
             return self.new(" * ".join([base] * power))
         if type(node.op) not in ARITHMETIC:
-            raise self.refusal(node, f"it has `{ast.unparse(node)}`")
+            raise self.refusal(node, f"`{ast.unparse(node)}` is not supported")
         left, right = (self.number(self.value(each, env)) for each in (node.left, node.right))
         return self.new(f"{left} {ARITHMETIC[type(node.op)]} {right}")
 
     def call(self, node: ast.Call, env: dict[str, Value]) -> list[Value]:
-        """A call of a function that is known when the code is written."""
+        """A call of a function that is known at translation time."""
         function = self.object(node.func)
         if node.keywords or any(isinstance(each, ast.Starred) for each in node.args):
-            raise self.refusal(node, f"`{ast.unparse(node)}` has named or starred arguments")
+            raise self.refusal(node, f"`{ast.unparse(node)}` has keyword or starred arguments")
         given = [self.value(each, env) for each in node.args]
         if isinstance(function, types.FunctionType):
             return self.inner(node, function, given)
@@ -366,10 +368,10 @@ class Writer:
             return [self.lane_by_lane(each, names) for each in (numeric.sin, numeric.cos)]
         if isinstance(function, Device) or getattr(function, "__module__", "") == "math":
             return [self.lane_by_lane(function, names)]
-        raise self.refusal(node, f"it calls `{ast.unparse(node.func)}`")
+        raise self.refusal(node, f"`{ast.unparse(node.func)}` cannot be called here")
 
     def inner(self, node: ast.Call, function: Any, given: list[Value]) -> list[Value]:
-        """A call of another plain function, which is written for lanes too."""
+        """A call of another plain function, which is translated too."""
         if function in self.inside:
             raise self.refusal(node, f"`{function.__name__}` calls itself")
         code = lane_code(function, self.inside)
@@ -381,7 +383,7 @@ class Writer:
         return [self.new(f"{every}[{place}]", is_mask) for place, is_mask in enumerate(code.masks)]
 
     def lane_by_lane(self, function: Any, names: list[str]) -> Value:
-        """A call of a compiled function, eight times."""
+        """Call a compiled function once per lane."""
         name = f"each_{len(self.scope)}"
         self.scope[name] = function
         one = (f"{name}({', '.join(f'lane_of({a}, {k})' for a in names)})" for k in range(LANES))
@@ -389,5 +391,5 @@ class Writer:
 
 
 def has_return(node: ast.AST) -> bool:
-    """Whether there is a return in a statement."""
+    """Whether a statement contains a `return`."""
     return any(isinstance(each, ast.Return) for each in ast.walk(node))

@@ -1,6 +1,6 @@
-"""Numbers that the functions on lanes and their machine code share."""
+"""Constants shared by the lane functions and their code generators."""
 
 LANES = 8
-"""Agents per block. Eight doubles are one AVX-512 register; on narrower CPUs eight still amortise the candidate's loads."""
+"""Agents per block. Eight doubles fill one AVX-512 register; on narrower CPUs eight still amortise loading the candidate."""
 
 RSQRT_MAGIC = 0x5FE6EB50C7B537A9

@@ -1,12 +1,12 @@
-"""Eight doubles in one SIMD register, as a value type inside kernels.
+"""A vector of eight doubles as a value type in kernels, and a mask of eight booleans.
 
-A kernel that treats eight agents as lanes writes `dx = x - own_x` and `total += choose(inside, dx, 0.0)` for all
-eight at once. Every operation is the plain IEEE one per lane, in the order written, so a lane's bits do not depend on its
-neighbours or on the CPU: LLVM only picks the register width (one AVX-512 register, two AVX ones, four SSE ones).
+A kernel that treats eight agents as lanes writes `dx = x - own_x` and `total += choose(inside, dx, 0.0)` for all eight at once.
+Every operation is the IEEE operation per lane, in the order written, so the bits of a lane do not depend on the other lanes or on
+the CPU. LLVM only selects the register width (one AVX-512 register, two AVX registers, four SSE registers).
 
-Relying on the loop vectoriser instead was slower by a factor of three: it keeps accumulators in memory between candidates.
+Rejected: the loop vectoriser. It was three times slower because it keeps accumulators in memory between candidates.
 
-With the compiler off the same functions work on NumPy arrays of 8.
+Outside compiled code the same functions work on NumPy arrays of length 8.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ from tussle.numeric.kernel import device
 
 @cache
 def generators() -> str:
-    """Digest of the code generators: machine code made by others must not be taken from the cache."""
+    """Digest of the code generators; part of cache keys, so that machine code of another version is not loaded."""
     return hashlib.blake2b(
         Path(__file__).with_name("lanes_codegen.py").read_bytes(), digest_size=16
     ).hexdigest()
 
 
 class LaneFunction:
-    """A function on lanes: NumPy when called from Python, a few instructions inside a kernel.
+    """A function on lanes: NumPy code when called from Python, a few instructions in a kernel.
 
-    The code generators, and Numba with them, are imported when a kernel is first compiled that names such a function.
+    Numba and the code generators are imported when the first kernel that uses such a function is compiled.
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
@@ -43,7 +43,7 @@ class LaneFunction:
 
     @property
     def targetoptions(self) -> dict[str, str]:
-        """What the machine code depends on besides the Python code: part of the key of every kernel that uses the function."""
+        """What the machine code depends on besides the Python code; part of the cache key of every kernel that uses the function."""
         return {"generators": generators()}
 
     @property
@@ -64,62 +64,62 @@ def splat(value: Any) -> Any:
 
 @LaneFunction
 def load(array: Any, start: int) -> Any:
-    """Elements start ... start + 7 of a contiguous float64 array; no bounds check, so the array has LANES spare elements."""
+    """Load elements start to start + 7 of a contiguous float64 array. No bounds check: allocate LANES spare elements."""
     found = array[start : start + LANES]
     return np.concatenate([found, np.zeros(LANES - len(found))])
 
 
 @LaneFunction
 def store(array: Any, start: int, lanes: Any) -> None:
-    """Write eight lanes to elements start ... start + 7 of a contiguous float64 array; no bounds check."""
+    """Store eight lanes to elements start to start + 7 of a contiguous float64 array. No bounds check."""
     array[start : start + LANES] = lanes
 
 
 @LaneFunction
 def load_some(array: Any, start: int, count: int) -> Any:
-    """As load, but lanes from `count` on are 0 and not read: for the end of an array."""
+    """Like `load` for the end of an array: lanes from `count` on are not read and are 0."""
     return load(array[: start + count], start)
 
 
 @LaneFunction
 def store_some(array: Any, start: int, count: int, lanes: Any) -> None:
-    """As store, but lanes from `count` on are not written."""
+    """Like `store`, but lanes from `count` on are not written."""
     array[start : start + count] = lanes[:count]
 
 
 @LaneFunction
 def choose(mask: Any, yes: Any, no: Any) -> Any:
-    """Per lane `yes` where the mask holds, else `no`; what is not chosen may be NaN."""
+    """Select per lane `yes` where the mask is true, else `no`; a NaN in the other operand does not propagate."""
     return np.where(mask, yes, no)
 
 
 @LaneFunction
 def truth(lanes: Any) -> Any:
-    """Per lane whether the number is not 0; NaN is not."""
+    """Mask of the lanes that are not 0; NaN counts as true."""
     return lanes != 0.0
 
 
 @LaneFunction
 def number(mask: Any) -> Any:
-    """Per lane 1 where the mask holds, else 0."""
+    """Convert a mask to numbers: 1 where true, else 0."""
     return mask.astype(np.float64)
 
 
 @LaneFunction
 def joined(a: Any, b: Any, c: Any, d: Any, e: Any, f: Any, g: Any, h: Any) -> Any:
-    """Lanes of eight numbers."""
+    """Make lanes of eight numbers."""
     return np.array([a, b, c, d, e, f, g, h])
 
 
 @LaneFunction
 def bits(mask: Any) -> int:
-    """The mask as an integer, lane 0 in the lowest bit."""
+    """Convert a mask to an integer, lane 0 in the lowest bit."""
     return int(np.packbits(mask, bitorder="little")[0])
 
 
 @LaneFunction
 def lane_of(lanes: Any, lane: int) -> float:
-    """One lane's number."""
+    """Number in one lane."""
     return float(lanes[lane])
 
 
@@ -131,13 +131,13 @@ def below(count: int) -> Any:
 
 @LaneFunction
 def lowest(hits: int) -> int:
-    """Number of the lowest bit that is set; `hits` is not 0. `hits &= hits - 1` then clears it."""
+    """Index of the lowest set bit of `hits`, which must not be 0. `hits &= hits - 1` clears that bit."""
     return (hits & -hits).bit_length() - 1
 
 
 @LaneFunction
 def ones(hits: int) -> int:
-    """How many bits are set."""
+    """Number of set bits."""
     return hits.bit_count()
 
 
@@ -155,7 +155,7 @@ def lanes_abs(lanes: Any) -> Any:
 
 @LaneFunction
 def rsqrt_guess(lanes: Any) -> Any:
-    """1 / sqrt within 3.5 percent by integer arithmetic on the exponent: exact to reproduce on every machine."""
+    """Approximate 1 / sqrt within 3.5 percent by integer arithmetic on the bits, with the same result on every machine."""
     return (np.int64(RSQRT_MAGIC) - (lanes.view(np.int64) >> 1)).view(np.float64)
 
 
@@ -163,8 +163,8 @@ def rsqrt_guess(lanes: Any) -> Any:
 def inverse_sqrt(square: Any) -> Any:
     """1 / sqrt(square) per lane within 3 ulp; finite at 0.
 
-    Four Newton steps from an integer guess. Only multiplications and subtractions: a quarter of the time of a square root and
-    a division, and unlike the CPU's own estimate instruction the same bits everywhere.
+    Four Newton steps from `rsqrt_guess`. It takes a quarter of the time of a square root and a division, and unlike the CPU's
+    estimate instruction gives the same bits on every machine.
     """
     half = 0.5 * square
     root = rsqrt_guess(square)

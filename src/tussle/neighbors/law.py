@@ -1,4 +1,4 @@
-"""A neighbour law as data: a function of a pair, and how what it gives is reduced."""
+"""A neighbour law: a function of a pair of entities, and the reduction of each of its results."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from tussle.numeric.rk4 import label
 
 REDUCTIONS = ("sum", "mean", "min", "max", "count", "nearest", "each")
 PAIR = ("offset_x", "offset_y", "offset_z", "distance", "distance_squared", "inverse_distance")
-"""Arguments that belong to a pair; the others are columns, of the other one with the prefix OTHER."""
+"""Arguments that describe the pair. All others are columns of the row, or with the prefix OTHER columns of the neighbour."""
 OTHER = "other_"
 TEAMS = (None, "own", "other")
 
 
 @dataclass(frozen=True, eq=False)
 class Law:
-    """What an entity makes of each neighbour, and how that is reduced to one number a row.
+    """A function called for each pair of a row and a neighbour in range, and how its results are reduced per row.
 
     Attributes:
-        function: Takes the names of a pair, returns the contributions in order, or None where the pair does not count.
+        function: Takes the arguments by name and returns the contributions in order, or None to skip the pair.
         arguments: Names of its arguments.
-        radii: Columns or numbers [m]; a neighbour is nearer than every one of them.
-        teams: None for all, "own" or "other".
-        reductions: Name -> reduction of each contribution.
+        radii: Columns or numbers [m]; a neighbour must be nearer than all of them.
+        teams: None for all teams, "own" or "other".
+        reductions: Contribution name -> reduction.
     """
 
     function: Callable[..., Any]
@@ -38,30 +38,30 @@ class Law:
         for name, reduction in self.reductions.items():
             if reduction not in REDUCTIONS:
                 raise DeclarationError(
-                    f"{label(self.function)}: {name}={reduction!r} is no reduction{nearest_name(str(reduction), REDUCTIONS)}; "
+                    f"{label(self.function)}: {name}={reduction!r} is not a reduction{nearest_name(str(reduction), REDUCTIONS)}; "
                     f"{listed(REDUCTIONS)}"
                 )
         if self.teams not in TEAMS:
             raise DeclarationError(
-                f"{label(self.function)}: teams={self.teams!r} is not None, 'own' or 'other'"
+                f"{label(self.function)}: teams={self.teams!r} must be None, 'own' or 'other'"
             )
         if self.lists and set(self.reductions.values()) != {"each"}:
             raise DeclarationError(
-                f"{label(self.function)}: a law that lists its pairs reduces every contribution by 'each', or none"
+                f"{label(self.function)}: use the reduction 'each' for all contributions or for none"
             )
 
     @property
     def lists(self) -> bool:
-        """Whether it gives one value for each pair, instead of one for each row."""
+        """Whether the law gives one value per pair instead of one per row."""
         return "each" in self.reductions.values()
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What it reads of each pair: its arguments, and what its reductions need."""
+        """Values needed for each pair: the arguments, and those used by the reductions."""
         return (*self.arguments, *(["other_id"] if "nearest" in self.reductions.values() else []))
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Names of the columns that it reads, those of the other one with their prefix."""
+        """Columns that the law reads; those of the neighbour keep their prefix."""
         radii = [radius for radius in self.radii if isinstance(radius, str)]
         return tuple(dict.fromkeys(name for name in (*self.names, *radii) if name not in PAIR))

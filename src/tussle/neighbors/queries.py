@@ -1,4 +1,4 @@
-"""Pairs in range and nearest neighbours for NumPy code, and sums over the pairs of each row."""
+"""Range and nearest-neighbour queries for NumPy code."""
 
 from __future__ import annotations
 
@@ -15,36 +15,36 @@ Teams = str | int | None
 
 @dataclass(frozen=True, slots=True)
 class Pairs:
-    """Everyone near each row, by row, then in the index's order. Pairs of row i are start[i] ... start[i + 1] - 1."""
+    """All pairs of a row and an entity in range, ordered by row, then as in the index. Row i has pairs start[i] to start[i + 1] - 1."""
 
     row: Longs
-    """Row of the group, (m,)."""
+    """Row in the group, (m,)."""
     other: Longs
-    """Row of the table, (m,)."""
+    """Row of the neighbour in the table, (m,)."""
     offset: Floats
-    """From the row to the other [m], (3, m), world frame."""
+    """Vector from the row to the neighbour [m], (3, m), world frame."""
     distance: Floats
     """Length of the offset [m], (m,)."""
     count: Longs
-    """Pairs of each row, (n,)."""
+    """Number of pairs of each row, (n,)."""
     start: Longs
-    """First pair of each row, and behind it the number of all, (n + 1,)."""
+    """First pair of each row, then the total number of pairs, (n + 1,)."""
 
 
 def team_filter(
     index: Index, team: NDArray[np.int64] | None, teams: Teams, first: int, last: int
 ) -> tuple[int, Floats, Floats]:
-    """Mode, team by place and team to compare with by row, of the filter `teams`: None, "own", "other" or a number."""
+    """Filter `teams` (None, "own", "other" or a team number) as a mode, team by place and wanted team by row."""
     n = last - first
     if teams is None:
         return search.ANY, index.points[0], np.zeros(n)
     if team is None:
-        raise ValueError(f"a filter teams={teams!r} needs the table's teams")
+        raise ValueError(f"teams={teams!r} needs the argument team, the teams of the table")
     by_row = team.astype(np.float64)
     if isinstance(teams, str):
         modes = {"own": search.SAME, "other": search.DIFFERENT}
         if teams not in modes:
-            raise ValueError(f'teams={teams!r} is not None, "own", "other" or a team number')
+            raise ValueError(f'teams={teams!r} must be None, "own", "other" or a team number')
         return modes[teams], index.gather(by_row), np.ascontiguousarray(by_row[first:last])
     return search.SAME, index.gather(by_row), np.full(n, float(teams))
 
@@ -60,10 +60,21 @@ def pairs(
     team: Longs | None = None,
     teams: Teams = None,
 ) -> Pairs:
-    """Everyone nearer than `radius` (n,) [m] to the rows [first, last) of the table, taken to be at x, y, z (n,) [m].
+    """Find all entities nearer than a radius to rows of the table. A row is never its own neighbour.
 
-    `team` (N,) is the table's column, needed for a filter. A row is never near itself. Any radius is correct; the index's reach
-    only decides what is fast.
+    Args:
+        index: Spatial index of the table. Results are correct for any radius; the reach of the index only affects speed.
+        first: First row of the table to query.
+        last: One after the last row.
+        x: Assumed east positions of these rows [m], (n,); they may differ from those in the table.
+        y: North positions [m], (n,).
+        z: Up positions [m], (n,).
+        radius: Radius of each row [m], (n,).
+        team: Teams of the table, (N,); required unless `teams` is None.
+        teams: None for all, "own", "other", or a team number.
+
+    Raises:
+        ValueError: `teams` has another value, or `team` is missing.
     """
     n = last - first
     mode, by_place, wanted = team_filter(index, team, teams, first, last)
@@ -94,9 +105,12 @@ def nearest(
     team: Longs | None = None,
     teams: Teams = None,
 ) -> tuple[Longs, Floats]:
-    """The k nearest rows of the table to each of the rows [first, last), by (distance, id), at any distance; not oneself.
+    """Find the k nearest entities to each of the rows [first, last), by (distance, id), at any distance, without the row itself.
 
-    Returns rows (k, n), -1 where there are fewer, and distances (k, n) [m], inf there.
+    Arguments are those of `pairs`. Returns rows of the table (k, n) and distances [m] (k, n), -1 and inf if there are fewer.
+
+    Raises:
+        ValueError: `teams` has another value, or `team` is missing.
     """
     n = last - first
     mode, by_place, wanted = team_filter(index, team, teams, first, last)

@@ -1,7 +1,8 @@
-"""Kernels of range and nearest-neighbour queries. The query's position is given: it may differ from the table's (a belief).
+"""Kernels of range and nearest-neighbour queries. The query position may differ from that in the table, e.g. an estimate.
 
-A `table` is the tuple (world_start, keys, strip_start, world_strip, inverse_cell, sx, sy, sz, team) of an index, `team` by place
-as float64. A team filter is a mode, ANY, SAME or DIFFERENT, and the number it compares with.
+A `table` is the tuple (world_start, keys, strip_start, world_strip, inverse_cell, sx, sy, sz, team) of an index, with `team` by
+place as float64. A team filter is a mode, ANY, SAME or DIFFERENT, and the team number `wanted`. A place is an entity's position
+in the sorted order of the index, `me` the place of the querying entity.
 """
 
 from __future__ import annotations
@@ -18,29 +19,29 @@ from tussle.numeric.kernel import device, kernel
 ANY, SAME, DIFFERENT = 0, 1, 2
 
 TABLE = "(I I I2 I F F2 F)"
-"""Kernel code of what makes a table: `Index.table`, and behind it team by place."""
+"""Signature of the arrays of a table: `Index.table`, then team by place."""
 
 
 @device
 def table_of(arrays):
-    """The table."""
+    """Table of the arrays passed to a kernel."""
     world_start, keys, strips, world_strip, inverse_cell, points, team = arrays
     return world_start, keys, strips[0], world_strip, inverse_cell, points[0], points[1], points[2], team
 
 
 SMALL_WORLD = 3000
-"""Up to this many entities the nearest is sought by looking at all: 8 at a time that costs 0.25 ns each."""
+"""Up to this many entities, a nearest-neighbour query scans all of them: 8 at a time, 0.25 ns each."""
 
 TINY_WORLD = 400
-"""Up to this many, the smallest distance is found first, without branches, and then whose it is."""
+"""Up to this many entities, a branch-free pass first finds the smallest distance, then a second pass finds its entity."""
 
 ROUNDING_CELLS = 1e-6
-"""How far floor(pos / cell) may be off by rounding, in cells: positions reach 2^30 cells at 53 bits."""
+"""Bound of the rounding error of pos / cell, in cells: positions reach 2^30 cells at 53 bits."""
 
 
 @device
 def squares(sx, sy, sz, p, x, y, z):
-    """Squared distances of places p ... p + 7 from a point."""
+    """Squared distances of places p to p + 7 from a point."""
     dx = load(sx, p) - x
     dy = load(sy, p) - y
     dz = load(sz, p) - z
@@ -49,7 +50,7 @@ def squares(sx, sy, sz, p, x, y, z):
 
 @device
 def chosen(hit, team, p, mode, wanted):
-    """The bits of `hit` whose teams pass the filter."""
+    """Bits of `hit` whose team passes the filter."""
     if mode == ANY:
         return hit
     same = bits(load(team, p) == wanted)
@@ -58,7 +59,10 @@ def chosen(hit, team, p, mode, wanted):
 
 @device
 def range_run(me, x, y, z, radius2, mode, wanted, table, start, end, found, done):
-    """Append the places in [start, end) nearer than the radius to `found`, as far as there is room; returns how many in all."""
+    """Append the places in [start, end) nearer than the radius to `found`, up to its size; an empty `found` only counts.
+
+    Returns the number found so far, starting from `done`.
+    """
     sx, sy, sz, team = table[5], table[6], table[7], table[8]
     for p in range(start, end, LANES):
         hit = bits(squares(sx, sy, sz, p, x, y, z) < radius2) & ((1 << min(LANES, end - p)) - 1)
@@ -80,7 +84,7 @@ def range_run(me, x, y, z, radius2, mode, wanted, table, start, end, found, done
 
 @device
 def first_strip(keys, strip_start, start, end, shift, row):
-    """First of the strips [start, end) whose row is not below `row`."""
+    """First of the strips [start, end) whose cell row is at least `row`."""
     while start < end:
         middle = (start + end) >> 1
         if keys[strip_start[middle]] >> shift < row:
@@ -92,7 +96,7 @@ def first_strip(keys, strip_start, start, end, shift, row):
 
 @device
 def in_range(w, me, x, y, z, radius, mode, wanted, table, found, done):
-    """Append the places of world w nearer than `radius` to (x, y, z) to `found`, in order; `me` is the place left out."""
+    """Append the places of world w nearer than `radius` to (x, y, z), without `me`, to `found` in order; see `range_run`."""
     world_start, keys, strip_start, world_strip, inverse_cell = (
         table[0],
         table[1],
@@ -131,7 +135,7 @@ def in_range(w, me, x, y, z, radius, mode, wanted, table, found, done):
 
 @device
 def insert(square, rank, place, best, ranks, places, k):
-    """Put a candidate into the k best by (squared distance, rank); returns the distance that the next must not exceed."""
+    """Insert a candidate into the k best by (squared distance, rank). Returns the squared distance that later ones must not exceed."""
     if square > best[k - 1] or (square == best[k - 1] and rank > ranks[k - 1]):
         return best[k - 1]
     j = k - 1
@@ -148,7 +152,7 @@ def insert(square, rank, place, best, ranks, places, k):
 
 @device
 def nearest_run(me, x, y, z, mode, wanted, table, mask, start, end, worst, best, ranks, places, k):
-    """Offer the places in [start, end) to the k best; returns the distance that the next must not exceed."""
+    """Insert the places in [start, end) into the k best. Returns the squared distance that later ones must not exceed."""
     keys, sx, sy, sz, team = table[1], table[5], table[6], table[7], table[8]
     for p in range(start, end, LANES):
         hit = bits(squares(sx, sy, sz, p, x, y, z) <= worst) & ((1 << min(LANES, end - p)) - 1)
@@ -165,7 +169,7 @@ def nearest_run(me, x, y, z, mode, wanted, table, mask, start, end, worst, best,
 
 @device
 def least_square(x, y, z, mode, wanted, table, start, end, least):
-    """Smallest squared distance per lane, of the places in [start, end) that pass the filter and of `least`."""
+    """Smallest squared distance per lane among `least` and the places in [start, end) that pass the filter."""
     sx, sy, sz, team = table[5], table[6], table[7], table[8]
     for p in range(start, end, LANES):
         square = squares(sx, sy, sz, p, x, y, z)
@@ -180,14 +184,14 @@ def least_square(x, y, z, mode, wanted, table, start, end, least):
 
 @device
 def too_far(cells, cell, worst):
-    """Whether everything `cells` cells away is farther than `worst`, a squared distance, whatever the rounding."""
+    """Whether everything `cells` cells away is farther than sqrt(worst) for any rounding error."""
     gap = (cells - 1.0 - ROUNDING_CELLS) * cell
     return gap > 0.0 and gap * gap * (1.0 - 1e-12) > worst
 
 
 @device
 def nearest_in_strip(me, x, y, z, own, mode, wanted, table, shape, start, end, worst, best, ranks, places, k):
-    """Offer a strip to the k best, outward from cell `own`, LANES places at a time, as far as cells can matter."""
+    """Search a strip outward from cell `own`, LANES places at a time, until the cells are too far."""
     n_bits, cell_bits, cell = shape
     keys = table[1]
     mask = (1 << n_bits) - 1
@@ -209,7 +213,7 @@ def nearest_in_strip(me, x, y, z, own, mode, wanted, table, shape, start, end, w
 
 @device
 def nearest_places(w, me, x, y, z, mode, wanted, table, best, ranks, places, k):
-    """The k nearest places of world w by (squared distance, rank) into `best`, `ranks`, `places`; -1 where there are fewer."""
+    """Write the k nearest places of world w by (squared distance, rank) to `best`, `ranks`, `places`; -1 if there are fewer."""
     world_start, keys, strip_start, world_strip, inverse_cell = (
         table[0],
         table[1],
@@ -227,7 +231,7 @@ def nearest_places(w, me, x, y, z, mode, wanted, table, best, ranks, places, k):
     n_bits = rank_bits(end - start)
     worst = np.inf
     if inverse == 0.0 or end - start <= SMALL_WORLD:
-        # Those next to oneself in order are near as a rule: with them first, few of the others have to be looked at twice.
+        # Places next to `me` in the order are usually near: searching from there first rejects most of the others quickly.
         mask = (1 << n_bits) - 1
         begin = max(me - LANES // 2, start)
         if k == 1 and end - start <= TINY_WORLD:
@@ -278,10 +282,10 @@ def nearest_places(w, me, x, y, z, mode, wanted, table, best, ranks, places, k):
 
 @kernel(f"(F F F F F) i8 (I I) i8 {TABLE} I (Iw Iw) -> i8")
 def pair_places(queries, mode, places, first, arrays, start, out):
-    """Places near each of the rows of a group that begins at row `first` of the table. Returns how many.
+    """Find the places near each row of a group that begins at row `first` of the table. Returns the number of pairs.
 
-    queries: x, y, z, radius [m], wanted team, (n,) each; places: row_world, place (N,). Writes out: count (n,), and with room in
-    `found` also the places, those of row i from start[i] on.
+    queries: x, y, z, radius [m], wanted team, (n,) each. places: row_world, place (N,). out, written: count (n,) and found, the
+    places of row i from start[i] on; an empty `found` only counts.
     """
     x, y, z, radius, wanted = queries
     row_world, place = places
@@ -299,7 +303,7 @@ def pair_places(queries, mode, places, first, arrays, start, out):
 
 @kernel("(F F F) I I F2 I (Iw Iw) F2w Fw")
 def pair_columns(pos, start, found, points, order, rows, offset, distance):
-    """What pairs are asked for, by pair: rows of the group and of the table, offset (3, m) [m], distance [m]."""
+    """Columns of the pairs: rows in the group and in the table, offset [m] (3, m), distance [m] (m,)."""
     x, y, z = pos
     sx, sy, sz = points[0], points[1], points[2]
     row, other = rows
@@ -317,10 +321,10 @@ def pair_columns(pos, start, found, points, order, rows, offset, distance):
 
 @kernel(f"(F F F F) i8 i8 (I I I) i8 {TABLE} I2w F2w")
 def nearest_rows(queries, k, mode, places, first, arrays, other, square):
-    """The k nearest rows of the table, other (k, n) or -1, and their squared distances [m^2], (k, n).
+    """Find the k nearest entities of each row of a group that begins at row `first` of the table.
 
-    queries: x, y, z [m], wanted team, (n,) each, of the rows of a group that begins at row `first` of the table; places: row_world,
-    place, order (N,).
+    queries: x, y, z [m], wanted team, (n,) each. places: row_world, place, order (N,). Written: other, rows of the table or -1,
+    and their squared distances [m^2], (k, n) each.
     """
     x, y, z, wanted = queries
     row_world, place, order = places

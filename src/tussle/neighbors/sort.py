@@ -1,4 +1,4 @@
-"""Sorting of int64 keys that are nearly in order already: from one step to the next few entities change cells."""
+"""Sorting of nearly sorted int64 keys: few entities change cells from one step to the next."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from typing import Any
 from tussle.numeric.kernel import device
 
 MOVES_PER_KEY = 6
-"""Insertion sort gives up after this many moves per key: about what the merge sort costs."""
+"""Insertion sort stops after this many moves per key, about the cost of the merge sort."""
 
 RUN = 16
-"""Length of the runs that the merge sort starts from."""
+"""Length of the initial runs of the merge sort."""
 
 
 @device
 def insertion_sort(keys: Any, start: int, end: int, budget: int) -> bool:
-    """Sort keys[start:end] in place; False when `budget` moves did not suffice (the keys are then permuted, none lost)."""
+    """Sort keys[start:end] in place. Returns False after more than `budget` moves; the keys are then a permutation."""
     for i in range(start + 1, end):
         key = keys[i]
         j = i

@@ -1,8 +1,8 @@
-"""The pair loop around neighbour laws: blocks of eight agents walk their candidates, each agent a lane.
+"""The pair loop of neighbour laws: each block of eight agents loops over its candidates, one agent per lane.
 
-The loop is written for the laws that it runs, as text: their columns become arguments, their contributions accumulators in
-registers. Several laws share one walk: the candidates near a block are found once, and the first loop over them notes which
-are near enough for laws that look less far.
+The loop is generated as source text for its laws: their columns become arguments, their contributions accumulators in
+registers. Several laws share one walk: the candidates near a block are found once, and the first loop over them marks those
+in range of laws with a smaller radius.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ from tussle.numeric.rk4 import label
 
 @dataclass(frozen=True)
 class Walk:
-    """One walk over the neighbours for several laws.
+    """A compiled walk over the neighbours for several laws.
 
     Attributes:
-        own: Columns by row that its kernel takes, in order; "team" among them where laws tell teams apart.
-        other: Columns by place.
-        run: The kernel; eight agents are its lanes.
-        run_single: The same for agents that are each in a world of their own; eight neighbours of one agent are its lanes.
-        n_out: Number of contributions in all.
+        own: Columns by row that the kernel takes, in order; includes "team" if a law filters by team.
+        other: Columns by place that the kernel takes, in order.
+        run: The kernel; its lanes are eight agents.
+        run_single: The kernel for agents that are each in a different world; its lanes are eight neighbours of one agent.
+        n_out: Total number of contributions.
     """
 
     own: tuple[str, ...]
@@ -56,7 +56,7 @@ def squared_gap(x, y, z, box):  # type: ignore[no-untyped-def]
 
 @device
 def find_near(begin, end, span_start, span_end, places, box, reach2, found):  # type: ignore[no-untyped-def]
-    """Places of the spans [begin, end) within reach of the box, into `found`; no branch on a single place. Returns how many."""
+    """Write the places of the spans [begin, end) within reach of the box to `found`, without a branch per place. Returns their number."""
     sx, sy, sz = places
     n = 0
     for s in range(begin, end):
@@ -71,7 +71,7 @@ def find_near(begin, end, span_start, span_end, places, box, reach2, found):  # 
 
 @device
 def find_teams(begin, end, span_start, span_end, places, team, wanted, box, reach2, mates, others):  # type: ignore[no-untyped-def]
-    """As find_near, those of team `wanted` into `mates` and the rest into `others`. Returns how many of each."""
+    """Like `find_near`: places of team `wanted` go to `mates`, the others to `others`. Returns both numbers."""
     sx, sy, sz = places
     n_mates, n_others = 0, 0
     for s in range(begin, end):
@@ -94,7 +94,7 @@ def find_teams(begin, end, span_start, span_end, places, team, wanted, box, reac
 
 @device
 def square_of(radius):  # type: ignore[no-untyped-def]
-    """Squared radius; of one that is not above 0 nobody is within."""
+    """Squared radius; -1 for a radius that is not positive, so that nothing is in range."""
     return radius * radius if radius > 0.0 else -1.0
 
 
@@ -114,15 +114,15 @@ FROM_LANES = [
 
 
 def make_walk(laws: Sequence[Law], where: Law | None, code_of: Callable[[str], str]) -> Walk:
-    """The walk of some laws.
+    """Generate the walk of some laws.
 
     Args:
-        laws: Their order is that of the results.
-        where: A law whose one contribution says whether a pair counts for any of them.
-        code_of: Gives the kernel code (F, I, B) of an own column.
+        laws: In the order of the results.
+        where: A law with one contribution that tells whether a pair counts for the laws.
+        code_of: Returns the signature code (F, I, B) of an own column.
 
     Raises:
-        DeclarationError: A law is not what can be done for eight lanes at once, or returns another number of contributions.
+        DeclarationError: A law cannot be translated to lanes, or returns a different number of contributions than declared.
     """
     scope: dict[str, Any] = {name: getattr(lanes, name) for name in FROM_LANES}
     scope |= {
@@ -147,7 +147,7 @@ def make_walk(laws: Sequence[Law], where: Law | None, code_of: Callable[[str], s
     signature = f"(I2 I2 I) (F2 F2) ({other}) ({own}) {out}"
 
     def written(lines: Iterable[str], suffix: str) -> Kernel:
-        exec("\n".join(lines) + "\n", scope)  # noqa: S102 - written here; what authors wrote is in functions of its own
+        exec("\n".join(lines) + "\n", scope)  # noqa: S102 - generated here; authors' code is in separate functions
         made = scope["walk"]
         made.__module__ = laws[0].function.__module__
         names = (law.function.__qualname__ for law in (*laws, *([where] if where else [])))
@@ -160,11 +160,11 @@ def make_walk(laws: Sequence[Law], where: Law | None, code_of: Callable[[str], s
 
 
 def part_of(law: Law, at: int, scope: dict[str, Any]) -> Part:
-    """A law's function for lanes, put into the walk's scope."""
+    """Translate a law to lanes and add it to the scope of the walk."""
     code = lane_code(law.function)
     if len(code.masks) != len(law.reductions):
         raise DeclarationError(
-            f"{label(law.function)}: it returns {len(code.masks)} contributions; declared are {len(law.reductions)}: "
+            f"{label(law.function)}: it returns {len(code.masks)} contributions, but {len(law.reductions)} are declared: "
             f"{', '.join(law.reductions)}"
         )
     scope[f"law_{at}"] = code.function

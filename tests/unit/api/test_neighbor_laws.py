@@ -281,13 +281,13 @@ def attributes(a):
 @pytest.mark.parametrize(
     ("function", "message"),
     [
-        (loops, "it has a `for`"), (recursive, "`recursive` calls itself"), (nothing, "it returns nothing"),
-        (uneven, "it returns 2 values in one branch and 1 in another"), (sometimes, "`sometimes_none` does not always return"),
+        (loops, "`for`"), (recursive, "`recursive` calls itself"), (nothing, "nothing: it returns no value"),
+        (uneven, "2 values in one branch and 1 in another"), (sometimes, "`sometimes_none` does not always return"),
         (with_default, "takes plain arguments"), (names, "`undefined` is not defined"), (texts, "`'b'` is not a number"),
-        (powers, r"it has `a \*\* 0\.5`"), (remainders, "it has `a % 2.0`"), (members, r"it has `a in \(1\.0, 2\.0\)`"),
-        (named, "has named or starred arguments"), (unpacks, "it assigns 2 values"), (pairs_as_one, "gives 2 values"),
-        (calls, "it calls `str`"), (items, r"it has `a\[0\]`"), (attributes, "it has `np.random.default_rng.missing`"),
-        (eval("lambda a: a"), "the source cannot be found"),
+        (powers, r"`a \*\* 0\.5`"), (remainders, "`a % 2.0`"), (members, r"`a in \(1\.0, 2\.0\)`"),
+        (named, r"`halves\(a, b=a\)`"), (unpacks, r"2 values .*`\(?b, c, d\)?`"), (pairs_as_one, r"`halves\(a, a\)` .*2 values"),
+        (calls, "`str`"), (items, r"`a\[0\]`"), (attributes, "`np.random.default_rng.missing`"),
+        (eval("lambda a: a"), "source not found"),
     ],
 )  # fmt: skip
 def test_what_lanes_cannot_do_is_refused_with_its_line(function, message):
@@ -318,17 +318,15 @@ def test_a_misspelled_argument_is_refused_with_the_nearest_name():
 
 
 def test_wrong_reductions_and_teams_are_refused():
-    with pytest.raises(
-        DeclarationError, match=r"x='summ' is no reduction \(did you mean 'sum'\?\); there are: sum, mean"
-    ):
+    with pytest.raises(DeclarationError, match=r"x='summ' .*did you mean 'sum'.*: sum, mean"):
         plugin(halves, "sight", x="summ")
     with pytest.raises(DeclarationError, match="name the radius and the contributions"):
         plugin(halves, "sight")
-    with pytest.raises(DeclarationError, match="teams='mine' is not None, 'own' or 'other'"):
+    with pytest.raises(DeclarationError, match=r"teams='mine'.*'own' or 'other'"):
         plugin(halves, "sight", teams="mine", x="sum")
     with pytest.raises(DeclarationError, match="name the radius"):
         plugin(halves, x="sum")
-    with pytest.raises(DeclarationError, match="reduces every contribution by 'each', or none"):
+    with pytest.raises(DeclarationError, match="'each' for all contributions or for none"):
         plugin(halves, "sight", x="sum", pair="each")
     with pytest.raises(DeclarationError, match="a law that lists its pairs stands alone"):
         plugin(halves, "sight", x="each", y="each", where=halves)
@@ -345,7 +343,7 @@ def test_another_number_of_contributions_is_refused():
             self.law(g)
 
     with pytest.raises(
-        PluginError, match=r"DeclarationError.*law: it returns 1 contributions; declared are 2: x, n"
+        PluginError, match=r"DeclarationError.*law: .* 1 contributions.* 2 are declared: x, n"
     ):
         play(Short(), motion=Still())
 
