@@ -1,6 +1,6 @@
-"""Arithmetic with the same bits on every machine: elementary functions, quaternions, integration, and the kernels that use them.
+"""Portable numerics, with the same bits on every machine: elementary functions, quaternions, integration, compiled kernels.
 
-The functions work inside jitted code on numbers and from Python on numbers and arrays, element by element, with the same bits.
+The functions take numbers in compiled code, and numbers or arrays (element-wise) in Python, with the same bits.
 """
 
 from tussle.numeric.functions import acos, asin, atan2, cos, exp, log, sin, sincos, tan, wrap

@@ -1,4 +1,4 @@
-"""Portable operations on component-first arrays, each column by itself."""
+"""Portable operations on component-first arrays; columns do not affect each other."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ Floats = NDArray[np.float64]
 
 
 def unit(v: ArrayLike) -> Floats:
-    """Vectors scaled to length 1, (3, n) or any (k, n); the zero vector stays zero."""
+    """Scale vectors (3, n), or any (k, n), to length 1; a zero vector stays zero."""
     vectors = np.asarray(v, dtype=np.float64)
-    # Dividing by the largest component first keeps the square from overflowing and from losing small vectors.
+    # Dividing by the largest component first avoids overflow and underflow of the squares.
     largest = np.abs(vectors[0])
     for component in vectors[1:]:
         largest = np.maximum(largest, np.abs(component))
@@ -26,7 +26,7 @@ def unit(v: ArrayLike) -> Floats:
 
 @kernel("F2 F2 F2w")
 def matmul_columns(w, x, out):
-    """Out = w @ x, the sum over the inner index taken in order for each column: (m, k), (k, n), (m, n)."""
+    """Compute out = w @ x with a fixed summation order for each column: (m, k), (k, n), (m, n)."""
     for i in range(out.shape[0]):
         row = out[i]
         row[:] = 0.0
@@ -38,9 +38,9 @@ def matmul_columns(w, x, out):
 
 
 def matmul(w: ArrayLike, x: ArrayLike) -> Floats:
-    """The product w @ x of (m, k) and (k, n), bit for bit the same for a column whatever other columns there are.
+    """Matrix product of w (m, k) and x (k, n) in a fixed summation order.
 
-    NumPy's own product adds in an order that depends on the processor and on the number of columns.
+    The bits of a column do not depend on other columns. NumPy's product depends on the processor and the number of columns.
 
     Raises:
         ValueError: The inner sizes differ.

@@ -1,13 +1,12 @@
-"""Portable elementary functions of one number: + - * / sqrt, comparisons and selects only, so every machine gives the same bits.
+"""Portable scalar elementary functions: only + - * / sqrt, comparisons, selects and bit operations, so all machines agree.
 
 Reductions and polynomials are those of fdlibm (Sun Microsystems 1993, "Freely Distributable LIBM", files s_sin.c,
 k_sin.c, k_cos.c, s_atan.c, e_asin.c, e_acos.c, e_exp.c, e_log.c), rearranged so that every argument takes the same
-path: both polynomials of a pair are computed and one is selected, which lets a loop over rows run in SIMD lanes. No
-branch, no table, no fused multiply-add.
+path: both polynomials of a pair are computed and one is selected, so a loop over rows can use SIMD. There are no
+branches, tables or fused multiply-adds.
 
-Rounding to an integer adds and takes away 1.5 * 2**52: the low bits of the sum are that integer, in every rounding-
-to-nearest FPU, so neither a rounding instruction nor a conversion between float and int is needed (older CPUs have
-none for lanes of 64 bits).
+Rounding to an integer adds and subtracts 1.5 * 2**52. In round-to-nearest mode the low bits of the sum are that integer, so
+no rounding instruction or conversion between float and int is needed; older CPUs have none for 64-bit lanes.
 """
 
 from __future__ import annotations
@@ -26,16 +25,16 @@ TWO_OVER_PI = 6.36619772367581382433e-01
 PIO2_1 = 1.57079632673412561417e00
 PIO2_2 = 6.07710050630396597660e-11
 PIO2_3 = 2.02226624879595063154e-21
-REDUCED_LIMIT = 0.8  # a little above pi / 4: holds sin and cos within [-1, 1] where the reduction has no digits left (|x| > 1e15)
+REDUCED_LIMIT = 0.8  # a little above pi / 4: keeps sin and cos within [-1, 1] where the reduction has no precision left (|x| > 1e15)
 
 PI = 3.141592653589793
 ONE_OVER_TAU = 0.15915494309189535
 PIO2_HIGH = 1.57079632679489655800e00
 PIO2_LOW = 6.12323399573676603587e-17
-# pi / 4 whose first part has 50 bits, so that its multiples 1 to 4 are exact.
+# pi / 4 in two parts; the first has 50 bits, so its multiples 1 to 4 are exact.
 PIO4_HIGH = 0.7853981633974483
 PIO4_LOW = 3.061616997868383e-17
-STEEPEST = 0.4375  # 7 / 16, as far as the polynomial of the arc tangent holds
+STEEPEST = 0.4375  # 7 / 16, the largest argument of the arc tangent polynomial
 
 LOG2_E = 1.44269504088896338700e00
 LN2_HIGH = 6.93147180369123816490e-01
@@ -45,7 +44,7 @@ SQRT_HALF_BITS = 0x3FE6A09E00000000  # about sqrt(1/2): mantissas are taken from
 
 @device
 def reduce_quarter(x):
-    """Quotient and remainder of x by pi / 2: (quadrant as int, remainder, its rounding error)."""
+    """Reduce x modulo pi / 2. Returns (quadrant as int, remainder, rounding error of the remainder)."""
     shifted = x * TWO_OVER_PI + ROUNDER
     quadrant = np.float64(shifted).view(np.int64)
     k = shifted - ROUNDER
@@ -101,7 +100,7 @@ def cosine_near_zero(x, tail):
 
 @device
 def sincos(x):
-    """Sine and cosine of x [rad] as a pair; below 1 ulp for |x| < 1.6e6, within [-1, 1] beyond; NaN for infinities and NaN."""
+    """Sine and cosine of x [rad] as a pair. Error below 1 ulp for |x| < 1.6e6, values in [-1, 1] beyond; NaN for infinities and NaN."""
     x = float(x)
     quadrant, r, tail = reduce_quarter(x)
     s = sine_near_zero(r, tail)
@@ -117,26 +116,26 @@ def sincos(x):
 
 @device
 def sin(x):
-    """Sine of x [rad]; accuracy as sincos."""
+    """Sine of x [rad]; same accuracy as `sincos`."""
     return sincos(x)[0]
 
 
 @device
 def cos(x):
-    """Cosine of x [rad]; accuracy as sincos."""
+    """Cosine of x [rad]; same accuracy as `sincos`."""
     return sincos(x)[1]
 
 
 @device
 def tan(x):
-    """Tangent of x [rad]; 2 ulp for |x| < 1.6e6."""
+    """Tangent of x [rad]; error within 2 ulp for |x| < 1.6e6."""
     sine, cosine = sincos(x)
     return sine / cosine
 
 
 @device
 def wrap(angle):
-    """The same angle [rad] in (-pi, pi]; angles already there come back unchanged."""
+    """Wrap an angle [rad] to (-pi, pi]; angles already in this range are returned unchanged."""
     angle = float(angle)
     k = (angle * ONE_OVER_TAU + ROUNDER) - ROUNDER
     r = ((angle - k * (4.0 * PIO2_1)) - k * (4.0 * PIO2_2)) - k * (4.0 * PIO2_3)
@@ -183,7 +182,7 @@ def arctangent_near_zero(x):
 
 @device
 def atan2(y, x):
-    """Angle [rad] of the vector (x, y) in [-pi, pi], signed zeros and infinities as in C; 2 ulp."""
+    """Angle [rad] of the vector (x, y) in [-pi, pi]; error within 2 ulp. Signed zeros and infinities are treated as in C."""
     y = float(y)
     x = float(x)
     y_negative = np.float64(y).view(np.int64) < 0
@@ -196,7 +195,7 @@ def atan2(y, x):
     endless = high == math.inf
     low = (1.0 if low == math.inf else 0.0) if endless else low
     high = 1.0 if endless else high
-    # Powers of two keep low + high from overflowing and subnormal quotients exact.
+    # Scaling by powers of two prevents overflow of low + high and keeps quotients of subnormals exact.
     scale = 2.0**-600 if high > 2.0**900 else 1.0
     scale = 2.0**600 if high < 2.0**-900 else scale
     low = low * scale
@@ -244,7 +243,7 @@ def arcsine_ratio(z):
 
 @device
 def arcsine_parts(x):
-    """What asin and acos share: (is |x| below 1/2, ratio, root = sqrt((1 - |x|) / 2), root cut to 32 bits, the rest)."""
+    """Common part of asin and acos: (|x| < 1/2, ratio, root = sqrt((1 - |x|) / 2), root with its low 32 bits cleared, remainder)."""
     ax = -x if x < 0.0 else x
     small = ax < 0.5
     z = x * x if small else (1.0 - ax) * 0.5
@@ -258,7 +257,7 @@ def arcsine_parts(x):
 
 @device
 def asin(x):
-    """Arc sine [rad] of x in [-1, 1], NaN outside; 2 ulp."""
+    """Arc sine [rad] of x in [-1, 1], NaN outside; error within 2 ulp."""
     x = float(x)
     small, ratio, root, cut, rest = arcsine_parts(x)
     p = 2.0 * root * ratio - (PIO2_LOW - 2.0 * rest)
@@ -270,7 +269,7 @@ def asin(x):
 
 @device
 def acos(x):
-    """Arc cosine [rad] of x in [-1, 1], NaN outside; 2 ulp."""
+    """Arc cosine [rad] of x in [-1, 1], NaN outside; error within 2 ulp."""
     x = float(x)
     small, ratio, root, cut, rest = arcsine_parts(x)
     middle = PIO2_HIGH - (x - (PIO2_LOW - x * ratio))
@@ -288,7 +287,7 @@ def power_of_two(k):
 
 @device
 def exp(x):
-    """E ** x; 1 ulp; infinite above 709.78, rounded into the subnormals below -708.4, 0 below -745.13 (e_exp.c)."""
+    """Exponential of x; error within 1 ulp. Infinite above 709.78, subnormal below -708.4, 0 below -745.13 (e_exp.c)."""
     x = float(x)
     bounded = 710.0 if x > 710.0 else x
     bounded = -746.0 if bounded < -746.0 else bounded
@@ -312,13 +311,15 @@ def exp(x):
         )
     )
     y = 1.0 - ((low - (r * c) / (2.0 - c)) - high)
-    half = k >> 1  # in two factors: 2 ** k alone leaves the range of normal numbers before the result does
+    half = (
+        k >> 1
+    )  # two factors, because 2 ** k alone leaves the range of normal numbers before the result does
     return (y * power_of_two(half)) * power_of_two(k - half)
 
 
 @device
 def log(x):
-    """Natural logarithm of x; 1 ulp, subnormals included; -inf at 0, NaN below (e_log.c)."""
+    """Natural logarithm of x; error within 1 ulp, subnormals included. -inf at 0, NaN below 0 (e_log.c)."""
     x = float(x)
     subnormal = x < 2.2250738585072014e-308
     scaled = x * 18014398509481984.0 if subnormal else x  # 2 ** 54

@@ -1,9 +1,8 @@
-"""What a kernel's machine code depends on: the code, constants and frozen globals of every function that it reaches.
+"""Hash of everything a kernel's machine code depends on: bytecode, constants and global values of all functions it reaches.
 
-Numba's own disk cache looks at one source file only and runs old machine code after a callee or an imported constant
-was edited. Here a function is described by its bytecode and constants (neither line numbers nor comments nor its
-docstring), and by everything that its names stand for, followed through plain functions, jitted functions, closures,
-module attributes and overloads.
+Numba's disk cache checks one source file only: it runs outdated machine code after a callee or an imported constant has
+changed. Here a function is hashed by its bytecode and constants (without line numbers, comments and docstring) and by all
+objects that its names refer to, through plain functions, jitted functions, closures, module attributes and overloads.
 """
 
 from __future__ import annotations
@@ -21,17 +20,18 @@ from typing import Any
 
 import numpy as np
 
-# Code of these changes only with a version that is part of every key.
+# The code of these packages changes only with versions that are part of every key.
 FIXED_PACKAGES = frozenset({"numba", "llvmlite", "numpy", "builtins"}) | sys.stdlib_module_names
 STANDARD_LIBRARY = sysconfig.get_paths()["stdlib"] + os.sep
 
 
 class Fingerprint:
-    """A walk over all that a function reaches.
+    """Hash of all objects that a function reaches.
 
     Attributes:
-        holders: The objects with a `py_func` (devices, kernels, Numba's dispatchers) that stand for some of them.
-        opaque: What was reached and cannot be described; code that depends on it must not be kept.
+        digest: The hash, as hexadecimal digits.
+        holders: Reached objects with a `py_func` (devices, kernels, Numba's dispatchers).
+        opaque: Descriptions of reached objects that cannot be hashed. Code that depends on them must not be cached.
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
@@ -53,13 +53,13 @@ class Fingerprint:
         if text is not None:
             self._write("constant", text)
             return
-        # A module is read once for every set of names that functions look up in it.
+        # A module is visited once for each set of names that functions look up in it.
         mark = (id(value), names) if isinstance(value, types.ModuleType) else (id(value), frozenset())
         if mark in self._seen:
             self._write("seen", str(self._seen[mark]))
             return
         self._seen[mark] = len(self._seen)
-        self._kept.append(value)  # an id stays with its object only while that lives
+        self._kept.append(value)  # keeps the object alive, so that its id stays unique
         if isinstance(value, types.FunctionType):
             self._visit_function(value)
         elif isinstance(getattr(value, "py_func", None), types.FunctionType):
@@ -73,7 +73,7 @@ class Fingerprint:
             self._write(type(value).__name__, str(len(value)))
             for item in value:
                 self._visit(item, names)
-        elif isinstance(getattr(value, "_defn", None), types.FunctionType):  # an intrinsic of numba.extending
+        elif isinstance(getattr(value, "_defn", None), types.FunctionType):  # numba.extending.intrinsic
             self._write("intrinsic")
             self._visit(value._defn, names)
         else:
@@ -105,8 +105,8 @@ class Fingerprint:
             self._visit(implementation, frozenset())
 
     def _visit_module(self, module: types.ModuleType, names: frozenset[str]) -> None:
-        # Every name of the function that is an attribute of the module, whether it is read from this module or not: following the
-        # bytecode would find fewer, and this finds never too few.
+        # Visits every name of the function that is an attribute of the module, even if the function reads it elsewhere. This may
+        # visit too many objects, but never too few.
         self._write("module", module.__name__)
         for name in sorted(names):
             if name in vars(module):
@@ -134,7 +134,7 @@ class Fingerprint:
 
 
 def constant(value: Any) -> str | None:
-    """Text that tells an immutable constant from every other, None for anything else."""
+    """Unique text for an immutable constant; None for any other object."""
     if isinstance(value, Enum):
         return f"{type(value).__qualname__}.{value.name}={value.value!r}"
     if value is None or value is Ellipsis or isinstance(value, (bool, int, float, complex, str, bytes)):
@@ -151,7 +151,7 @@ def constant(value: Any) -> str | None:
 
 
 def codes_of(code: types.CodeType) -> Iterator[types.CodeType]:
-    """The code object and all that are nested in it."""
+    """Yield a code object and all code objects nested in it."""
     yield code
     for value in code.co_consts:
         if isinstance(value, types.CodeType):
@@ -159,14 +159,14 @@ def codes_of(code: types.CodeType) -> Iterator[types.CodeType]:
 
 
 def names_of(code: types.CodeType) -> Iterator[str]:
-    """All global and attribute names that the code mentions."""
+    """Yield all global and attribute names in the code."""
     for each in codes_of(code):
         yield from each.co_names
 
 
 @cache
 def code_text(code: types.CodeType, doc: str | None) -> str:
-    """Everything of a code object that its compilation can depend on: no file, no line numbers, no docstring."""
+    """Text of everything in a code object that compilation can depend on, without file, line numbers and docstring."""
     constants = list(code.co_consts)
     if doc is not None and constants and constants[0] == doc:
         constants[0] = None
@@ -187,10 +187,10 @@ def code_text(code: types.CodeType, doc: str | None) -> str:
 
 
 def is_fixed(function: types.FunctionType) -> bool:
-    """Whether a Python function belongs to a package whose version is in every key."""
+    """Whether a Python function belongs to a package whose version is part of every key."""
     if package(function) in {"numba", "llvmlite", "numpy"}:
         return True
-    # By its file and not by its module's name, which a file of the user's may share with one of the standard library.
+    # Checks the file, because a user's module may have the name of a standard library module.
     file = function.__code__.co_filename
     return file.startswith("<frozen ") or (file.startswith(STANDARD_LIBRARY) and "-packages" not in file)
 
@@ -204,7 +204,7 @@ def package(value: Any) -> str:
 
 
 def overloads_of(function: types.FunctionType) -> list[Any]:
-    """What numba.extending.overload has registered as the jitted meaning of a plain function."""
+    """Implementations of a plain function registered with numba.extending.overload."""
     templates = sys.modules.get("numba.core.typing.templates")
     if templates is None:
         return []
@@ -213,7 +213,7 @@ def overloads_of(function: types.FunctionType) -> list[Any]:
 
 @lru_cache(maxsize=1)
 def overload_table(n_entries: int) -> dict[int, list[Any]]:
-    """Registered implementations by the id of the function; read anew when Numba's registry has grown."""
+    """Registered implementations by id of the function; rebuilt when Numba's registry has grown."""
     table: dict[int, list[Any]] = {}
     registry = sys.modules["numba.core.typing.templates"].builtin_registry
     for value, kind in registry.globals[:n_entries]:

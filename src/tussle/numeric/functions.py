@@ -1,4 +1,4 @@
-"""The elementary functions as authors see them: the same name in jitted code, on floats and on arrays, with the same bits."""
+"""Public elementary functions, callable in compiled code on numbers and in Python on floats and arrays, with the same bits."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Floats = NDArray[np.float64]
 
 
 def rows_of(value: ArrayLike) -> Floats:
-    """The value as a contiguous float64 array, without a copy where it is one."""
+    """Convert to a contiguous float64 array, without a copy if it already is one."""
     return np.ascontiguousarray(value, dtype=np.float64)
 
 
@@ -58,7 +58,7 @@ class Unary(Device):
 
 
 class Pair(Device):
-    """A function of one number that gives two."""
+    """A function of one number that returns two."""
 
     def __init__(self, scalar: Device) -> None:
         super().__init__(scalar.py_func)
@@ -130,7 +130,7 @@ class Binary(Device):
 
 
 def name_kernels(scalar: Device, *kernels: Any) -> None:
-    """Give generated kernels the name of their function: files of the cache and errors then say which one it is."""
+    """Name generated kernels after their function, for cache file names and error messages."""
     for each in kernels:
         each.__name__ = f"{scalar.py_func.__name__}_{each.py_func.__name__}"
         each.__qualname__ = each.__name__

@@ -1,8 +1,8 @@
-"""Kernel decorators: one explicit signature, strict IEEE arithmetic, nothing compiled at import, kept on disk by content.
+"""Kernel decorators: one explicit signature, strict IEEE arithmetic, compiled on the first call, cached on disk by content.
 
-Codes of a signature: f8 i8 b1 u8 numbers; F I B U read-only 1-D contiguous arrays of float64, int64, bool, uint64; Fw
-Iw Bw Uw writable ones; F2 F2w ... 2-D C-contiguous. (F F I) is one argument, a tuple of these: what belongs together comes
-together, and costs 0.03 us an array more than by itself. A result follows "->"; several results make a tuple.
+Signature codes: f8 i8 b1 u8 are numbers; F I B U are read-only 1-D contiguous arrays of float64, int64, bool, uint64, and Fw Iw
+Bw Uw writable ones; F2 F2w ... are 2-D C-contiguous. (F F I) is one argument, a tuple, for arrays that belong together; it costs
+0.03 us per array more than separate arguments. Results follow "->"; several results are returned as a tuple.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from tussle.numeric import store
 from tussle.numeric.fingerprint import Fingerprint, package
 
 Code = str | tuple[str, ...]
-FORMAT = 1  # of the files; part of every key
+FORMAT = 1  # version of the file format, part of every key
 LETTERS = {"F": np.float64, "I": np.int64, "B": np.bool_, "U": np.uint64}
 NUMBERS: dict[str, tuple[type, ...]] = {
     "f8": (float, int, np.floating, np.integer),
@@ -38,12 +38,12 @@ NUMBERS: dict[str, tuple[type, ...]] = {
 
 @dataclass
 class Stats:
-    """How many kernels this process has compiled, and how many it has loaded from disk.
+    """Numbers of kernels that this process has compiled and loaded from disk.
 
     Attributes:
-        compiled: Compiled so far.
-        loaded: Loaded so far.
-        on_compile: Called with a kernel's name before it is compiled, so that a program can say what its user waits for.
+        compiled: Number of kernels compiled.
+        loaded: Number of kernels loaded from disk.
+        on_compile: Called with a kernel's name before it is compiled, e.g. to show progress.
     """
 
     compiled: int = 0
@@ -58,7 +58,7 @@ _lock = threading.RLock()
 
 @cache
 def codes() -> dict[str, Any]:
-    """Numba's type of each code of a kernel signature."""
+    """Signature code -> Numba type."""
     from numba import boolean, float64, int64, uint64
     from numba.core.types import Array
 
@@ -72,7 +72,7 @@ def codes() -> dict[str, Any]:
 
 @cache
 def environment() -> str:
-    """What every kernel's machine code depends on besides the code: versions, processor, settings of the compiler."""
+    """What the machine code of every kernel depends on besides its source: versions, processor, compiler settings."""
     import llvmlite
     import numba
     import numba.core.config
@@ -92,19 +92,19 @@ def environment() -> str:
 
 @cache
 def built() -> dict[tuple[str, str], tuple[Any, Any]]:
-    """By name and key, what this process has loaded or compiled; a second kernel of the same content is given the same.
+    """(name, key) -> dispatcher and compile result of this process, shared by kernels of the same content.
 
-    The compiler never frees machine code, so kernels that are made again and again, as that of a motion model's derivative
-    is for every simulation, would take memory for ever.
+    The compiler never frees machine code. Without sharing, kernels that are created repeatedly, such as the derivative of a motion
+    model in each simulation, would leak memory.
     """
     return {}
 
 
 def renamed(function: Any, key: str) -> types.FunctionType:
-    """A copy whose name holds the key.
+    """Copy a function under a qualified name that includes the key.
 
-    Symbols in the machine code are made of the qualified name and a number counted per process; functions of one
-    name from files that different processes wrote would otherwise meet under one symbol.
+    Symbols in machine code consist of the qualified name and a counter of the process. Without the key, functions of the same name
+    from cache files of different processes could have the same symbol.
     """
     copy = types.FunctionType(
         function.__code__,
@@ -116,13 +116,13 @@ def renamed(function: Any, key: str) -> types.FunctionType:
     copy.__kwdefaults__ = function.__kwdefaults__
     copy.__module__ = (
         function.__module__ or "generated"
-    )  # without a module Numba would drag the globals into the file
+    )  # without a module, Numba would store the globals in the file
     copy.__qualname__ = f"{function.__qualname__}_{key}"
     return copy
 
 
 def is_interpreted(function: Callable[..., Any]) -> bool:
-    """Whether NUMBA_DISABLE_JIT asks for a function to be run as the Python that it is, to be debugged; ours stay compiled."""
+    """Whether NUMBA_DISABLE_JIT is set and the function runs as Python, for a debugger. Functions of tussle stay compiled."""
     if package(function) == "tussle":
         return False
     from numba.core import config
@@ -132,7 +132,7 @@ def is_interpreted(function: Callable[..., Any]) -> bool:
 
 @contextmanager
 def compiling() -> Iterator[None]:
-    """Have Numba compile, whatever NUMBA_DISABLE_JIT says."""
+    """Let Numba compile regardless of NUMBA_DISABLE_JIT."""
     from numba.core import config
 
     settings = vars(config)
@@ -153,7 +153,7 @@ def jitted(function: Callable[..., Any], **options: Any) -> Any:
 
 @contextmanager
 def collecting_later() -> Iterator[None]:
-    """Without garbage collection: next to nothing of what the compiler makes is garbage, and looking for it takes a tenth of the time."""
+    """Disable garbage collection. The compiler creates almost no garbage, and collection takes a tenth of the compile time."""
     is_enabled = gc.isenabled()
     gc.disable()
     try:
@@ -164,10 +164,10 @@ def collecting_later() -> Iterator[None]:
 
 
 class Device:
-    """A small function that kernels call; compiled into its callers, with no file of its own.
+    """A small function that kernels call; compiled into its callers, without a cache file of its own.
 
     Args:
-        function: The Python function, also found as `py_func`.
+        function: The Python function, available as `py_func`.
     """
 
     options: ClassVar[dict[str, Any]] = {"error_model": "numpy", "forceinline": True}
@@ -182,13 +182,13 @@ class Device:
         update_wrapper(self, function)
 
     def refresh(self) -> None:
-        """Forget the compiled code if anything that it depends on has changed since, as a global redefined at the prompt."""
+        """Discard the compiled code if anything it depends on has changed, e.g. a global redefined in an interactive shell."""
         if self._dispatcher is not None and Fingerprint(self.py_func).digest != self._digest:
             self._dispatcher = self._for_python = None
 
     @property
     def dispatcher(self) -> Any:
-        """Numba's dispatcher for kernels that call the function, made when first asked for; Python cannot call it."""
+        """Numba's dispatcher for kernels that call the function, created on first access. Python cannot call it."""
         if self._dispatcher is None:
             self._digest = Fingerprint(self.py_func).digest
             self._dispatcher = jitted(
@@ -201,7 +201,7 @@ class Device:
 
     @property
     def _numba_type_(self) -> Any:
-        # Numba asks every unknown object for its type under this name: in jitted code the device is its dispatcher.
+        # Numba reads this attribute of unknown objects: in compiled code the device is its dispatcher.
         return self.dispatcher._numba_type_
 
     def __call__(self, *args: Any) -> Any:
@@ -209,31 +209,31 @@ class Device:
             return self.py_func(*args)
         if self._for_python is None:
             self._for_python = jitted(renamed(self.py_func, Fingerprint(self.py_func).digest), **self.options)
-        with compiling():  # of types that it meets for the first time
+        with compiling():  # argument types may be new
             return self._for_python(*args)
 
 
 def device(function: Callable[..., Any]) -> Any:
-    """Mark a small function that kernels call; it is compiled into its callers."""
+    """Decorator for a small function that kernels call; it is compiled into its callers."""
     return Device(function)
 
 
 class Kernel(Device):
-    """A function over arrays with one explicit signature, compiled or loaded from disk when first called.
+    """A function over arrays with one explicit signature, compiled or loaded from disk on the first call.
 
     Args:
-        function: The Python function, also found as `py_func`.
-        signature: Codes of the arguments, and of the results behind "->".
+        function: The Python function, available as `py_func`.
+        signature: Codes of the arguments, then "->" and codes of the results if there are any.
 
     Raises:
-        ValueError: The signature has an unknown code, or not as many as the function has arguments.
+        ValueError: The signature has an unknown code, or its number of arguments differs from the function's.
     """
 
     options: ClassVar[dict[str, Any]] = {"error_model": "numpy"}
 
     def __new__(cls, *args: Any) -> Self:
-        # A class of its own for each kernel: `__call__` is looked up on the class, and becomes Numba's dispatcher itself
-        # once that exists, so that a call costs hardly more than the dispatcher's.
+        # Each kernel gets its own class: `__call__` is looked up on the class and is replaced by Numba's dispatcher once that
+        # exists, so that a call costs little more than a call of the dispatcher.
         return super().__new__(type("Kernel", (cls,), {"__slots__": ()}))
 
     def __init__(self, function: Callable[..., Any], signature: str) -> None:
@@ -246,12 +246,12 @@ class Kernel(Device):
         wrong = [code for code in (*WORD.findall(arguments), *self.results) if code not in known]
         if wrong or (arrow and not self.results):
             raise ValueError(
-                f"kernel {self.name}: unknown code {wrong} in signature {signature!r}; there are: {', '.join(sorted(known))}"
+                f"kernel {self.name}: unknown code {wrong} in signature {signature!r}; known codes: {', '.join(sorted(known))}"
             )
         n_arguments = self.py_func.__code__.co_argcount
         if n_arguments != len(self.arguments):
             raise ValueError(
-                f"kernel {self.name} has {n_arguments} arguments, its signature {signature!r} has {len(self.arguments)}"
+                f"kernel {self.name} has {n_arguments} arguments, but its signature {signature!r} has {len(self.arguments)}"
             )
         self._compiled: Any = None
         self._main: Any = None
@@ -277,19 +277,19 @@ class Kernel(Device):
 
     @property
     def compiled(self) -> Any:
-        """Numba's compile result, loaded or compiled when first asked for."""
+        """Numba's compile result, loaded or compiled on first access."""
         if self._compiled is None:
             self._build()
         return self._compiled
 
     @property
     def address(self) -> int:
-        """Address of the machine code under Numba's own calling convention."""
+        """Address of the machine code, for Numba's calling convention."""
         result = self.compiled
         return int(result.library.get_pointer_to_function(result.fndesc.llvm_func_name))
 
     def key(self) -> str:
-        """Hash of all that the machine code depends on."""
+        """Hash of everything the machine code depends on."""
         return self._key(Fingerprint(self.py_func))
 
     def _key(self, reached: Fingerprint) -> str:
@@ -299,7 +299,7 @@ class Kernel(Device):
         return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
 
     def assembly(self) -> str:
-        """Assembly text; compiled for the purpose where the kernel came from disk."""
+        """Assembly text, from a separate compilation."""
         with _lock:
             dispatcher = self._new_dispatcher(self.key())
             dispatcher.compile(self.types)
@@ -312,7 +312,7 @@ class Kernel(Device):
         from numba.core.compiler_lock import global_compiler_lock
 
         with _lock, global_compiler_lock:
-            if self._compiled is not None:  # another thread was faster
+            if self._compiled is not None:  # by another thread
                 return
             reached = Fingerprint(self.py_func)
             key = self._key(reached)
@@ -324,7 +324,7 @@ class Kernel(Device):
             type(self).__call__ = staticmethod(main)  # type: ignore[method-assign]
 
     def _made(self, key: str, reached: Fingerprint) -> tuple[Any, Any]:
-        """Numba's dispatcher and its compile result, from disk or compiled."""
+        """Load or compile. Returns Numba's dispatcher and its compile result."""
         main = self._new_dispatcher(key)
         result = None if reached.opaque else load(self.name, key, main.targetctx)
         if result is None and not reached.opaque:
@@ -341,7 +341,7 @@ class Kernel(Device):
         return main, next(iter(main.overloads.values()))
 
     def _compile(self, main: Any, reached: Fingerprint) -> Any:
-        """Have the dispatcher compile; returns Numba's compile result."""
+        """Compile with a dispatcher. Returns Numba's compile result."""
         if stats.on_compile is not None:
             stats.on_compile(self.name)
         for holder in reached.holders:
@@ -353,7 +353,7 @@ class Kernel(Device):
         return next(iter(main.overloads.values()))
 
     def _accept(self, *args: Any) -> Any:
-        """Called by the dispatcher for types it has not met: register them if they fit the one signature, and never compile."""
+        """Called by the dispatcher for new argument types: register them if they match the signature. Never compiles."""
         from numba import typeof
 
         names = self.py_func.__code__.co_varnames
@@ -373,23 +373,23 @@ class Kernel(Device):
         return self._main(*args, **named)
 
     def __reduce__(self) -> str:
-        return self.__qualname__  # pickled by name, as a function is
+        return self.__qualname__  # pickled by name, like a function
 
 
 def grouped(arguments: str) -> tuple[Code, ...]:
-    """The codes of a signature's arguments; those in parentheses as a tuple."""
+    """Split the argument part of a signature into codes; a group in parentheses becomes a tuple."""
     return tuple(
         code or tuple(group.split()) for group, code in re.findall(r"\(([^()]*)\)|([^\s()]+)", arguments)
     )
 
 
 def kernel(signature: str) -> Callable[[Callable[..., Any]], Kernel]:
-    """Compile a function with one explicit signature, on its first call, and keep it on disk."""
+    """Decorator that compiles a function for one explicit signature on its first call and caches it on disk."""
     return lambda function: Kernel(function, signature)
 
 
 def expected(code: Code) -> str:
-    """A code in words."""
+    """Description of a code for error messages."""
     if isinstance(code, tuple):
         return f"a tuple of {len(code)}: {', '.join(expected(each) for each in code)}"
     if code in NUMBERS:
@@ -399,7 +399,7 @@ def expected(code: Code) -> str:
 
 
 def mismatch(code: Code, value: Any) -> str:
-    """What a value is instead of what the code asks for; "" where it fits."""
+    """Description of a value that does not match a code; "" if it matches."""
     if isinstance(code, tuple):
         if not isinstance(value, tuple) or len(value) != len(code):
             return f"{type(value).__name__} of {len(value) if isinstance(value, tuple) else 1}"
@@ -423,7 +423,7 @@ def mismatch(code: Code, value: Any) -> str:
 
 
 def save(name: str, key: str, result: Any) -> None:
-    """Keep a compile result on disk, unless it holds addresses of this process."""
+    """Save a compile result to disk, unless it contains addresses of this process."""
     from numba.core.serialize import dumps
 
     if result.library.has_dynamic_globals or result.lifted:
@@ -431,16 +431,16 @@ def save(name: str, key: str, result: Any) -> None:
     library, description, main, signature, _, _, _, reload_init, referenced = result._reduce()
     if reload_init:
         return
-    # Numba would keep the name of the module and import it when loading; a generated or user's module may not be
-    # importable, and its globals only serve Numba's object mode.
+    # Numba would store the module name and import the module on loading. A generated or user module may not be importable, and
+    # its globals are only needed in object mode.
     environments = [(each.consts, each.env_name) for each in (main, *referenced)]
     store.save(name, key, dumps((library, description, signature, environments)))
 
 
 def load(name: str, key: str, target_context: Any) -> Any:
-    """A compile result from disk, None where there is none."""
+    """Load a compile result from disk; None if there is none."""
     from numba.core.compiler import CompileResult
-    from numba.core.runtime import nrt  # noqa: F401  (defines what the machine code links to)
+    from numba.core.runtime import nrt  # noqa: F401  (defines symbols that the machine code links to)
 
     target_context.refresh()
     content = store.load(name, key)
@@ -453,7 +453,7 @@ def load(name: str, key: str, target_context: Any) -> Any:
 
 
 def restored_environment(consts: list[Any], name: str) -> Any:
-    """The constants that machine code refers to by name."""
+    """Numba environment with the constants of loaded machine code."""
     from numba.core.environment import Environment, lookup_environment
 
     existing = lookup_environment(name)

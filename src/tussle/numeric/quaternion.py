@@ -1,9 +1,8 @@
 """Unit quaternions (w, x, y, z) from the body frame (forward, left, up) to the world frame (east, north, up).
 
-In jitted code every function takes and gives components: `quat_rotate(qw, qx, qy, qz, vx, vy, vz)` gives three
-numbers. From Python the same names take arrays, quaternions (4, n) or (4,), vectors (3, n) or (3,). Angles are those
-of yaw, then pitch, then roll about the turned axes; pitch turns about the left axis, so it is positive with the nose
-down.
+In compiled code every function takes and returns components: `quat_rotate(qw, qx, qy, qz, vx, vy, vz)` returns three
+numbers. In Python the same functions take arrays: quaternions (4, n) or (4,), vectors (3, n) or (3,). Euler angles are
+intrinsic: yaw, then pitch, then roll about the rotated axes. Pitch is about the left axis, so nose down is positive.
 """
 
 from __future__ import annotations
@@ -21,13 +20,13 @@ Floats = NDArray[np.float64]
 
 
 class Columnar(Device):
-    """A function of components in jitted code, of component-first arrays in Python.
+    """A function of components in compiled code and of component-first arrays in Python.
 
     Args:
         scalar: The device function.
         rows: Kernel over the columns of 2-D arrays: inputs, then the output.
-        n_in: Components of each input; 0 is a bare number.
-        n_out: Components of the result; 0 is a bare number.
+        n_in: Number of components of each input; 0 for a scalar.
+        n_out: Number of components of the result; 0 for a scalar.
     """
 
     def __init__(self, scalar: Device, rows: Kernel, n_in: tuple[int, ...], n_out: int) -> None:
@@ -57,7 +56,7 @@ class Columnar(Device):
 
 
 def column_major(array: Floats, size: int, tail: tuple[int, ...]) -> Floats:
-    """The array broadcast to its number of components and the common shape, as (components, n)."""
+    """Broadcast an array to its number of components and the common shape, as (components, n)."""
     if size:
         shaped = np.broadcast_to(
             array.reshape(size, *(1,) * (len(tail) - array.ndim + 1), *array.shape[1:]), (size, *tail)
@@ -69,7 +68,7 @@ def column_major(array: Floats, size: int, tail: tuple[int, ...]) -> Floats:
 
 @device
 def _from_euler(roll, pitch, yaw):
-    """Quaternion of yaw, pitch (nose down), roll [rad]."""
+    """Quaternion from yaw, pitch (positive nose down) and roll [rad]."""
     sr, cr = sincos(0.5 * roll)
     sp, cp = sincos(0.5 * pitch)
     sy, cy = sincos(0.5 * yaw)
@@ -83,7 +82,7 @@ def _from_euler(roll, pitch, yaw):
 
 @device
 def _multiply(aw, ax, ay, az, bw, bx, by, bz):
-    """Hamilton product: first b turns, then a."""
+    """Hamilton product: rotation b, then rotation a."""
     return (
         aw * bw - ax * bx - ay * by - az * bz,
         aw * bx + ax * bw + ay * bz - az * by,
@@ -100,7 +99,7 @@ def _conjugate(w, x, y, z):
 
 @device
 def _normalize(w, x, y, z):
-    """The quaternion scaled to length 1; the identity where the length is zero."""
+    """Scale to length 1; a zero quaternion becomes the identity."""
     length = math.sqrt(w * w + x * x + y * y + z * z)
     zero = length == 0.0
     scale = 1.0 / (1.0 if zero else length)
@@ -109,7 +108,7 @@ def _normalize(w, x, y, z):
 
 @device
 def _rotate(w, x, y, z, vx, vy, vz):
-    """A body vector in the world frame: v + 2 w (q x v) + 2 q x (q x v)."""
+    """Rotate a body vector to the world frame: v + 2 w (q x v) + 2 q x (q x v)."""
     tx = 2.0 * (y * vz - z * vy)
     ty = 2.0 * (z * vx - x * vz)
     tz = 2.0 * (x * vy - y * vx)
@@ -122,7 +121,7 @@ def _rotate(w, x, y, z, vx, vy, vz):
 
 @device
 def _rotate_inverse(w, x, y, z, vx, vy, vz):
-    """A world vector in the body frame."""
+    """Rotate a world vector to the body frame."""
     return _rotate(w, -x, -y, -z, vx, vy, vz)
 
 
@@ -135,7 +134,7 @@ def _to_yaw(w, x, y, z):
 @device
 def _to_pitch(w, x, y, z):
     """Pitch [rad] in [-pi/2, pi/2], positive nose down."""
-    # asin of the sine alone would lose half of the digits near +-90 degrees, and need a clamp.
+    # asin would lose half of the digits near +-90 degrees and need a clamp.
     up_left = 2.0 * (w * x + y * z)
     up_up = 1.0 - 2.0 * (x * x + y * y)
     return atan2(2.0 * (w * y - x * z), math.sqrt(up_left * up_left + up_up * up_up))
@@ -149,7 +148,7 @@ def _to_roll(w, x, y, z):
 
 @kernel("F2 F2 F2 F2w")
 def from_euler_rows(roll, pitch, yaw, out):
-    """Roll, pitch, yaw (1, n) [rad] to quaternions (4, n)."""
+    """Convert roll, pitch, yaw (1, n) [rad] to quaternions (4, n)."""
     for i in range(out.shape[1]):
         out[0, i], out[1, i], out[2, i], out[3, i] = _from_euler(roll[0, i], pitch[0, i], yaw[0, i])
 
@@ -172,14 +171,14 @@ def conjugate_rows(q, out):
 
 @kernel("F2 F2w")
 def normalize_rows(q, out):
-    """Quaternions (4, n) scaled to length 1."""
+    """Scale quaternions (4, n) to length 1."""
     for i in range(out.shape[1]):
         out[0, i], out[1, i], out[2, i], out[3, i] = _normalize(q[0, i], q[1, i], q[2, i], q[3, i])
 
 
 @kernel("F2 F2 F2w")
 def rotate_rows(q, v, out):
-    """Body vectors (3, n) in the world frame."""
+    """Rotate body vectors (3, n) to the world frame."""
     for i in range(out.shape[1]):
         out[0, i], out[1, i], out[2, i] = _rotate(
             q[0, i], q[1, i], q[2, i], q[3, i], v[0, i], v[1, i], v[2, i]
@@ -188,7 +187,7 @@ def rotate_rows(q, v, out):
 
 @kernel("F2 F2 F2w")
 def rotate_inverse_rows(q, v, out):
-    """World vectors (3, n) in the body frame."""
+    """Rotate world vectors (3, n) to the body frame."""
     for i in range(out.shape[1]):
         out[0, i], out[1, i], out[2, i] = _rotate_inverse(
             q[0, i], q[1, i], q[2, i], q[3, i], v[0, i], v[1, i], v[2, i]

@@ -1,4 +1,4 @@
-"""The one Runge-Kutta integrator: fourth order, fixed steps, every row by itself, the derivative a compiled function."""
+"""Fourth-order Runge-Kutta integration with fixed steps; the derivative is a compiled function of one row."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ DERIVATIVE = "Fw Fw Fw Fw"  # x (m,), u (k,), p (q,), dx (m,)
 def compile_derivative(
     function: Callable[..., Any], x_names: Sequence[str], u_names: Sequence[str], p_names: Sequence[str]
 ) -> Kernel:
-    """A state equation written with named numbers, as a kernel `void(x, u, p, dx)` over arrays.
+    """Compile a state equation with named arguments to a kernel `void(x, u, p, dx)` over arrays.
 
     Args:
         function: Takes any of the names, in any order, and returns the time derivative of every state in the order of
-            `x_names` (a number where there is one state). It may use what Numba can compile; `math.cos` and its like
-            make it depend on the machine.
-        x_names: States.
-        u_names: Inputs.
-        p_names: Parameters.
+            `x_names`, or a number if there is one state. Numba must be able to compile it. Functions of `math` such as
+            `math.cos` make results depend on the machine.
+        x_names: Names of the states.
+        u_names: Names of the inputs.
+        p_names: Names of the parameters.
 
     Raises:
-        DeclarationError: An argument is none of the names, or a name is used twice.
+        DeclarationError: An argument is not one of the names, or a name is declared twice.
     """
     where: dict[str, str] = {}
     for array, names in (("x", x_names), ("u", u_names), ("p", p_names)):
@@ -45,7 +45,7 @@ def compile_derivative(
     for name in arguments:
         if name not in where:
             raise DeclarationError(
-                f"{label(function)}: argument {name!r} is no state, input or parameter"
+                f"{label(function)}: argument {name!r} is not a state, input or parameter"
                 f"{nearest_name(name, where)}; {listed(where)}"
             )
     targets = ", ".join(f"dx[{place}]" for place in range(len(x_names)))
@@ -53,7 +53,7 @@ def compile_derivative(
     scope: dict[str, Any] = {
         "function": function if isinstance(function, (Device, Kernel)) else device(function)
     }
-    exec(f"def derivative(x, u, p, dx):\n    {targets} = function({values})\n", scope)  # noqa: S102 - the text holds only checked names
+    exec(f"def derivative(x, u, p, dx):\n    {targets} = function({values})\n", scope)  # noqa: S102 - the text contains only checked names
     wrapper = scope["derivative"]
     wrapper.__module__ = function.__module__
     wrapper.__qualname__ = f"{function.__qualname__}.wrapper"
@@ -62,7 +62,7 @@ def compile_derivative(
 
 
 def label(function: Callable[..., Any]) -> str:
-    """The function's name with its file and line, for messages."""
+    """File, line and name of a function, for messages."""
     plain = getattr(function, "py_func", function)
     code = plain.__code__
     return f"{code.co_filename}:{code.co_firstlineno}: {plain.__qualname__}"
@@ -70,7 +70,7 @@ def label(function: Callable[..., Any]) -> str:
 
 @cache
 def driver() -> Kernel:
-    """The integrating kernel; built when first used, because importing this module must not import the compiler."""
+    """The integration kernel, built on first use because importing this module must not import the compiler."""
     from numba import types
     from numba.core import cgutils
     from numba.extending import intrinsic
@@ -79,7 +79,7 @@ def driver() -> Kernel:
 
     @intrinsic
     def call(typingctx, address, x, u, p, dx):  # type: ignore[no-untyped-def]
-        """Call the compiled derivative at an address. A first-class function object would cost microseconds per call to unbox."""
+        """Call the compiled derivative at an address. Unboxing a first-class function object costs microseconds per call."""
 
         def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
             arguments = signature.args[1:]
@@ -96,7 +96,7 @@ def driver() -> Kernel:
 
 
 def integrating(call: Callable[..., Any]) -> Callable[..., Any]:
-    """The integrating function; `call` calls the derivative that it is given."""
+    """The integration function; `call(derivative, x, u, p, dx)` evaluates the derivative."""
 
     def rk4_rows(derivative, states, inputs, params, dt, substeps):  # type: ignore[no-untyped-def]
         m, n = states.shape
@@ -138,23 +138,23 @@ def integrating(call: Callable[..., Any]) -> Callable[..., Any]:
 def rk4(
     derivative: Kernel, states: Floats, inputs: Floats, params: Floats, dt: float, substeps: int = 1
 ) -> None:
-    """Advance all rows by dt in equal substeps, inputs and parameters held.
+    """Advance all rows by dt in equal substeps, with constant inputs and parameters.
 
     Args:
-        derivative: From `compile_derivative`.
-        states: (m, n), updated in place.
-        inputs: (k, n).
-        params: (q, n).
+        derivative: Kernel from `compile_derivative`.
+        states: States, (m, n), updated in place; one column per row.
+        inputs: Inputs, (k, n).
+        params: Parameters, (q, n).
         dt: Time to advance [s].
-        substeps: Number of Runge-Kutta steps in it.
+        substeps: Number of Runge-Kutta steps.
 
     Raises:
-        ValueError: The arrays differ in their number of rows, or there is no substep.
+        ValueError: The arrays differ in their number of columns, or `substeps` is less than 1.
         DeclarationError: The derivative cannot be compiled.
     """
     if not states.shape[1] == inputs.shape[1] == params.shape[1]:
         raise ValueError(
-            f"rk4: states {states.shape}, inputs {inputs.shape} and params {params.shape} must have equally many columns"
+            f"rk4: states {states.shape}, inputs {inputs.shape} and params {params.shape} must have the same number of columns"
         )
     if substeps < 1:
         raise ValueError(f"rk4: substeps must be at least 1, not {substeps}")
@@ -168,7 +168,7 @@ def address_of(derivative: Kernel) -> int:
     """Address of a compiled derivative.
 
     Raises:
-        DeclarationError: It does not compile.
+        DeclarationError: The derivative cannot be compiled.
     """
     from numba.core.errors import NumbaError
 
@@ -179,10 +179,12 @@ def address_of(derivative: Kernel) -> int:
         function, states = wrapper.__globals__["function"].py_func, wrapper.states  # type: ignore[attr-defined]
         try:
             found = np.atleast_1d(function(*[1.0] * len(inspect.signature(function).parameters)))
-        except Exception:  # noqa: BLE001 - what it does with ones tells nothing then
+        except Exception:  # noqa: BLE001 - a failure for inputs of 1.0 says nothing about the number of results
             found = np.empty(len(states))
         if len(found) != len(states):
-            text = f"returns {len(found)} derivatives; there are {len(states)} states: {', '.join(states)}"
+            text = (
+                f"returns {len(found)} derivatives, but there are {len(states)} states: {', '.join(states)}"
+            )
         else:
             text = f"cannot be compiled: {error}"
         raise DeclarationError(f"{label(function)} {text}") from error

@@ -1,4 +1,4 @@
-"""Reductions over segments of an array: segment i is values[start[i] : start[i + 1]], and each is taken one item after another."""
+"""Reductions over segments of an array, in order. Segment i is values[start[i] : start[i + 1]]."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from tussle.numeric.kernel import kernel
 
 @kernel("I F Fw")
 def segment_sum(start, values, out):
-    """Sums of values[start[i] : start[i + 1]], one after another; 0 of none."""
+    """Sum of each segment; 0 if it is empty."""
     for i in range(out.shape[0]):
         total = 0.0
         for k in range(start[i], start[i + 1]):
@@ -17,7 +17,7 @@ def segment_sum(start, values, out):
 
 @kernel("I F Fw f8")
 def segment_mean(start, values, out, empty):
-    """Means of values[start[i] : start[i + 1]], summed one after another; `empty` of none."""
+    """Mean of each segment; `empty` if it is empty."""
     for i in range(out.shape[0]):
         total = 0.0
         for k in range(start[i], start[i + 1]):
@@ -28,7 +28,7 @@ def segment_mean(start, values, out, empty):
 
 @kernel("I F Fw f8")
 def segment_min(start, values, out, empty):
-    """Least of values[start[i] : start[i + 1]]; `empty` of none."""
+    """Minimum of each segment; `empty` if it is empty."""
     for i in range(out.shape[0]):
         least = empty
         for k in range(start[i], start[i + 1]):
@@ -38,7 +38,7 @@ def segment_min(start, values, out, empty):
 
 @kernel("I F Iw")
 def segment_first_min(start, values, out):
-    """Where values[start[i] : start[i + 1]] is least, the first of equals; -1 of none."""
+    """Index into `values` of the first minimum of each segment; -1 if it is empty."""
     for i in range(out.shape[0]):
         at = -1
         for k in range(start[i], start[i + 1]):

@@ -1,4 +1,4 @@
-"""Compiled kernels on disk: one file per kernel and key, written whole or not at all, old ones of the same name removed."""
+"""Disk cache of compiled kernels: one file per kernel and key, written atomically. Old files of the same kernel are removed."""
 
 from __future__ import annotations
 
@@ -20,28 +20,26 @@ from typing import Any
 
 from tussle.folders import is_private, read_own, user_folder
 
-KEEP = 8  # files per name: a few variants of the code, and of the processor settings that tests use
+KEEP = 8  # files per kernel: a few variants of the code and of the processor settings that tests use
 TOUCH_AFTER = (
-    86400.0  # [s] a file in use is marked as such once a day, so that the removal takes the unused ones
+    86400.0  # [s] the time stamp of a used file is renewed once a day, so that unused files are removed first
 )
 
 
 def directory() -> Path:
-    """Where compiled kernels are kept: $TUSSLE_CACHE_DIR, else a folder in $NUMBA_CACHE_DIR, else in the user's cache folder.
+    """Cache folder: $TUSSLE_CACHE_DIR, else a folder in $NUMBA_CACHE_DIR, else in the user's cache folder.
 
-    What is kept is machine code, so the folder is the user's own and nobody else writes into it: otherwise, and without an absolute
-    path, a folder for temporary files takes its place.
+    The files are machine code, so the folder must belong to the user and be writable only by the user. If it is not, or there is
+    no absolute path to it, a folder for temporary files is used instead.
     """
     chosen = _chosen()
     if chosen is not None and (is_private(chosen) or not os.path.lexists(chosen)):
         return chosen
     warn_once(
-        f"compiled kernels are not kept in {chosen or 'the home of this user'}: the folder must belong to you, and nobody else may "
-        "write into it; a temporary one is used instead, and TUSSLE_CACHE_DIR chooses another"
+        f"compiled kernels are not stored in {chosen or 'your home folder'}: the folder must belong to you and be writable only by "
+        "you; a temporary folder is used instead; set TUSSLE_CACHE_DIR to choose another"
     )
-    shared = (
-        Path(tempfile.gettempdir()) / f"tussle-{os.geteuid()}"
-    )  # the workers of a batch have it in common
+    shared = Path(tempfile.gettempdir()) / f"tussle-{os.geteuid()}"  # used by all workers of a batch
     with suppress(OSError):
         shared.mkdir(mode=0o700)
     return shared if is_private(shared) and not shared.is_symlink() else _only_now()
@@ -52,21 +50,21 @@ def _chosen() -> Path | None:
         if (path := Path(os.environ.get(variable, ""))).is_absolute():
             return path / inner
         if path.parts:
-            warn_once(f"{variable}={path} is ignored: it takes an absolute path")
+            warn_once(f"{variable}={path} is ignored: it must be an absolute path")
     caches = user_folder("XDG_CACHE_HOME", ".cache")
     return None if caches is None else caches / "tussle" / "kernels"
 
 
 @cache
 def _only_now() -> Path:
-    """A folder for this process, removed at its end."""
+    """Temporary folder of this process, removed at exit."""
     folder = tempfile.mkdtemp(prefix="tussle-")
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     return Path(folder)
 
 
 def file_stem(name: str) -> str:
-    """The name as the beginning of a file name; long ones are cut and told apart by a hash."""
+    """Convert a kernel name to the start of a file name; long names are cut and get a hash."""
     plain = re.sub(r"[^A-Za-z0-9_.]", "_", name)
     return (
         plain
@@ -76,7 +74,7 @@ def file_stem(name: str) -> str:
 
 
 def load(name: str, key: str) -> Any:
-    """What was saved under the name and key; None where there is nothing, or nothing readable."""
+    """Load what was saved under a name and key; None if there is no file, or it is unreadable or damaged."""
     path = directory() / f"{file_stem(name)}-{key}.kernel"
     try:
         content, written = read_own(path)
@@ -85,13 +83,13 @@ def load(name: str, key: str) -> Any:
     except OSError:
         return None
     digest, data = content[:32], content[32:]
-    if hashlib.sha256(data).digest() != digest:  # a damaged file: running its machine code could do anything
+    if hashlib.sha256(data).digest() != digest:  # damaged: its machine code must not run
         return None
     return pickle.loads(data)  # noqa: S301 - the user's own file in a folder of the user's own
 
 
 def save(name: str, key: str, data: bytes) -> None:
-    """Keep pickled data under the name and key. Several processes may do so at once: each writes its own file and renames it."""
+    """Save pickled data under a name and key. Concurrent processes are safe: each writes its own file and renames it."""
     folder = directory()
     stem = file_stem(name)
     try:
@@ -106,7 +104,7 @@ def save(name: str, key: str, data: bytes) -> None:
             raise
     except OSError as error:
         warn_once(
-            f"compiled kernels cannot be kept in {folder} ({error}): they compile anew in every process; "
+            f"compiled kernels cannot be stored in {folder} ({error}): every process compiles them again; "
             "set TUSSLE_CACHE_DIR to a writable folder"
         )
         return
@@ -115,24 +113,24 @@ def save(name: str, key: str, data: bytes) -> None:
 
 @contextmanager
 def compile_lock(name: str, key: str) -> Iterator[None]:
-    """A lock between processes: one compiles what is kept under the name and key, the others wait and load it."""
+    """Lock between processes: one compiles the kernel of this name and key, the others wait and load it."""
     path = directory() / f".{file_stem(name)}-{key}.lock"
     try:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         handle = os.open(path, os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o600)
-    except OSError:  # nothing can be kept, and `save` says so
+    except OSError:  # nothing can be stored; `save` warns
         yield
         return
     try:
-        fcntl.flock(handle, fcntl.LOCK_EX)  # of a process that ends, the system takes it back
+        fcntl.flock(handle, fcntl.LOCK_EX)  # released by the system when the process ends
         yield
     finally:
-        path.unlink(missing_ok=True)  # those who wait hold it open
+        path.unlink(missing_ok=True)  # waiting processes have it open
         os.close(handle)
 
 
 def remove_old(folder: Path, stem: str) -> None:
-    """Remove the files of one kernel that were unused for longest, beyond KEEP."""
+    """Remove all but the KEEP most recently used files of one kernel."""
     found = []
     pattern = re.compile(re.escape(stem) + r"-[0-9a-f]{32}\.kernel")
     for path in folder.iterdir():
@@ -147,5 +145,5 @@ def remove_old(folder: Path, stem: str) -> None:
 
 @cache
 def warn_once(text: str) -> None:
-    """Say what the user should know of where kernels are kept."""
+    """Issue a warning once per process."""
     warnings.warn(text, RuntimeWarning, stacklevel=3)

@@ -101,7 +101,7 @@ def test_name_declared_twice_is_refused():
 
 def test_rows_that_do_not_match_and_no_substeps_are_refused():
     derivative = compile_derivative(decay, ["x"], [], [])
-    with pytest.raises(ValueError, match="equally many columns"):
+    with pytest.raises(ValueError, match=r"states \(1, 2\), inputs .* columns"):
         rk4(derivative, np.ones((1, 2)), NONE, np.empty((0, 2)), 1.0)
     with pytest.raises(ValueError, match="at least 1, not 0"):
         rk4(derivative, np.ones((1, 1)), NONE, NONE, 1.0, 0)
@@ -112,7 +112,7 @@ def test_a_derivative_of_another_length_is_told():
         return v
 
     with pytest.raises(
-        DeclarationError, match=r"test_rk4.py:\d+: .*car returns 1 derivatives; there are 2 states: x, v"
+        DeclarationError, match=r"test_rk4.py:\d+: .*car returns 1 derivatives.* 2 states: x, v"
     ):
         rk4(compile_derivative(car, ["x", "v"], [], []), np.ones((2, 1)), NONE, NONE, 1.0)
 
