@@ -1,4 +1,4 @@
-"""The instructions of each function on lanes: types, typing rules and LLVM code for Numba."""
+"""Numba types, typing rules and LLVM code generation of the functions on lanes."""
 
 # Numba has no type annotations.
 # mypy: disable-error-code="no-untyped-call,attr-defined"
@@ -34,7 +34,7 @@ class LanesType(types.Type):
 
 
 class MaskType(types.Type):
-    """Numba type of eight truth values."""
+    """Numba type of eight booleans."""
 
     def __init__(self) -> None:
         super().__init__(name="Mask8")
@@ -57,12 +57,12 @@ class _MaskModel(models.PrimitiveModel):
 
 
 _BY_NAME: dict[str, list[tuple[Any, tuple[Any, ...], Any]]] = defaultdict(list)
-"""Function on lanes -> result, arguments and code generator of each way to call it."""
+"""Function name -> result type, argument types and code generator of each overload."""
 
 
 @cache
 def type_of(function: Callable[..., Any]) -> Any:
-    """Numba's type of a function on lanes, its code generators made known."""
+    """Register the code generators of a function on lanes and return its Numba type."""
     for result, arguments, generate in _BY_NAME[function.__name__]:
         _implement(function, result, *arguments)(generate)
     cpu_target.typing_context.refresh()
@@ -72,11 +72,11 @@ def type_of(function: Callable[..., Any]) -> Any:
 
 @cache
 def _template(function: Callable[..., Any]) -> Any:
-    """What Numba asks for the type of a call of a function; `ways` holds result and arguments of each way to call it."""
+    """Numba's typing template of a function; `ways` holds the result and argument types of each overload."""
 
     class Template(AbstractTemplate):
         key = function
-        metadata = {"target": "cpu"}  # asked first: of an operator's own templates there are dozens  # noqa: RUF012
+        metadata = {"target": "cpu"}  # tried before the operator's own templates, of which there are dozens  # noqa: RUF012
         ways: list[tuple[Any, tuple[Any, ...]]] = []  # noqa: RUF012
 
         def generic(self, args: Any, kws: Any) -> Any:
@@ -93,7 +93,7 @@ def _template(function: Callable[..., Any]) -> Any:
 
 
 def _implement(function: Any, result: Any, *arguments: Any) -> Callable[[Any], Any]:
-    """Register the code generator that follows as `function(*arguments) -> result`; one known by name when it is first asked for."""
+    """Decorator that registers a code generator of `function(*arguments) -> result`; functions given by name register on first use."""
 
     def register(generate: Any) -> Any:
         if isinstance(function, str):
