@@ -1,4 +1,4 @@
-"""The clocks of a stack of worlds."""
+"""Simulated time of a stack of worlds."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import numpy as np
 
 
 class Clock:
-    """Time of each world, computed from its step and never accumulated.
+    """Time of each world, computed from its step number: rounding errors do not accumulate.
 
     Attributes:
-        start: Time of step 0 [s].
+        start: Time at the beginning of step 0 [s].
         dt: Length of a step [s].
-        step: Number of the step each world is in, (n_worlds,), int64.
-        common: The step that all running worlds share, -1 when they differ.
+        step: Current step number of each world, (n_worlds,), int64.
+        common: Step number of all running worlds; -1 if they differ.
     """
 
     def __init__(self, n_worlds: int, start: float, dt: float) -> None:
@@ -22,7 +22,7 @@ class Clock:
         self.common = 0
 
     def at(self, phase: float) -> np.ndarray:
-        """Time of each world after a part of its step [s], (n_worlds,); phase 1 is exactly the beginning of the next."""
+        """Time of each world at a fraction `phase` of its step [s], (n_worlds,); phase 1 is exactly the start of the next step."""
         return self.start + (self.step + phase) * self.dt
 
     @property

@@ -1,4 +1,4 @@
-"""What the views of one simulation share."""
+"""Data shared by all views of one simulation."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ from tussle.scene import Scene
 
 @dataclass
 class Context:
-    """Shared by all views of a simulation.
+    """Data shared by all views of a simulation.
 
     Attributes:
-        clock: The worlds' clocks.
+        clock: Time of each world.
         seeds: Seed of each world, (n_worlds,), uint64.
-        block_names: Names of the entity blocks; the body column `block` counts in them.
-        scene: Origin, ground, boundaries, bases.
+        block_names: Names of the entity blocks; the body column `block` is an index into them.
+        scene: Origin, ground, boundaries and bases.
         teams: Team numbers of the mission, ascending.
-        running: Which worlds have not ended, (n_worlds,).
-        services: Name -> function of the world plugins' services.
-        topic: Gives the topic of (network, name, type).
-        threads: Number of threads that a kernel over blocks may use.
-        draw: Where shapes go.
-        fail: Ends a world with an error; the others go on.
+        running: Whether each world is still running, (n_worlds,).
+        services: Service name -> function, for the services of world plugins.
+        topic: Function that returns the topic of a network, name and message type.
+        threads: Number of threads that `split` may use.
+        draw: Receives the shapes that plugins draw.
+        fail: Ends one world with an error; the others continue.
     """
 
     clock: Clock
@@ -53,11 +53,11 @@ class Context:
         self.block_keys = np.array([stream_key("block", name) for name in self.block_names], np.uint64)
 
     def row_seeds(self, world: np.ndarray, block: np.ndarray) -> np.ndarray:
-        """Key of each row's draws, (n,), uint64: the world's seed mixed with the block's name."""
+        """Random key of each row, (n,), uint64: the seed of its world combined with the name of its block."""
         return np.asarray(self.seeds[world] ^ self.block_keys[block])
 
     def split(self, n: int, run: Callable[[int, int], Any], least: int = 64) -> None:
-        """Call run(first, last) over [0, n), in several threads where that is allowed and there is enough of it."""
+        """Call run(first, last) on consecutive parts of [0, n): in parallel if `threads` > 1 and n >= 2 * least, else in one call."""
         if self.threads == 1 or n < 2 * least:
             run(0, n)
             return
@@ -73,21 +73,21 @@ class Context:
             self._pool = None
 
     def find_service(self, name: str, own: dict[str, Callable[..., Any]]) -> Callable[..., Any]:
-        """The service `name` of the entity's plugins, else of the world's.
+        """The service `name` of the entity's plugins, else of the world plugins.
 
         Raises:
-            TussleError: Nobody offers it.
+            TussleError: No plugin offers it.
         """
         found = own.get(name) or self.services.get(name)
         if found is None:
             allowed = sorted({*own, *self.services})
             raise TussleError(
-                f"nobody offers a service {name!r}{nearest_name(name, allowed)}; {listed(allowed)}"
+                f"no plugin offers a service {name!r}{nearest_name(name, allowed)}; {listed(allowed)}"
             )
         return found
 
 
 @lru_cache(maxsize=4096)
 def stream(plugin: str, label: str) -> int:
-    """Stream number of a plugin instance's draws under a label."""
+    """Random stream number of a plugin instance and a label."""
     return stream_key("plugin", plugin, label)

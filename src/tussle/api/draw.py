@@ -1,22 +1,23 @@
-"""Shapes that plugins draw; they cost next to nothing where nobody looks.
+"""Debug shapes drawn by plugins. Drawing costs almost nothing when no viewer is attached.
 
-`g.draw.vectors(pos=g.pos, direction=self.desired_velocity,
-colour=(255, 0, 0))`. Positions and directions are (3,) or (3, n) [m], world frame:
+Example: `g.draw.vectors(pos=g.pos, direction=self.desired_velocity,
+colour=(255, 0, 0))`. Positions and directions are (3,) or (3, n) [m], world
+frame:
 
-| kind | draws | attributes, the first being needed |
+| kind | draws | attributes; the first is required |
 |---|---|---|
-| points | dots | pos, size [m] |
-| cloud | dots coloured by a value | pos, value (n,), low, high, size [m] |
-| line | a line from one position to the next | pos, width [pixels] |
+| points | points | pos, size [m] |
+| cloud | points coloured by a value | pos, value (n,), low, high, size [m] |
+| line | a polyline through the positions | pos, width [pixels] |
 | vectors | arrows | pos, direction [m] |
-| sphere | balls | pos, radius [m] |
+| sphere | spheres | pos, radius [m] |
 | box | boxes | pos, size [m] (number or (3,)), quat |
-| cone | cones with their tip at pos | pos, direction, length [m], angle (of the whole opening) [rad] |
-| text | words | pos, text |
-| mesh | triangles | vertices (3, v), faces (f, 3), pos, quat |
+| cone | cones with the apex at pos | pos, direction, length [m], angle (full opening angle) [rad] |
+| text | labels | pos, text |
+| mesh | triangle meshes | vertices (3, v), faces (f, 3), pos, quat |
 
-All take `colour` (red, green, blue, 0 to 255: (3,) or (3, n)), `opacity` (0 to 1), `lifetime` [s] of simulated time (until the next step
-without it) and `world` (a number, or one per item: `g.world`), without which a shape is seen in all worlds of a stack.
+All shapes accept `colour` (red, green, blue, 0 to 255; (3,) or (3, n)), `opacity` (0 to 1), `lifetime` [s] in simulated time (default:
+until the next step) and `world` (a number, or one per item such as `g.world`; default: visible in all worlds of the stack).
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ KINDS = ("points", "line", "vectors", "sphere", "box", "cone", "text", "mesh", "
 
 @dataclass
 class Draw:
-    """Hands each drawn shape to `sinks` as (kind, attributes)."""
+    """Pass each drawn shape to all `sinks` as (kind, attributes)."""
 
     sinks: list[Callable[[str, dict[str, Any]], None]] = field(default_factory=list)
 

@@ -1,4 +1,4 @@
-"""Who is near whom, for NumPy code: pairs in range with reductions per row, and nearest others."""
+"""Neighbour queries for NumPy code: pairs in range with reductions per row, and k nearest neighbours."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from tussle.neighbors.index import Index
 
 
 class Pairs(Segments):
-    """Pairs of a row and another entity of its world, ordered by row, each row's in a fixed order.
+    """Pairs of a row and another entity of its world, ordered by row; the order within a row is deterministic.
 
-    Any body column of the other is an attribute too: `near.vel` (3, m), `near.team` (m,), `near.yaw` ...
-    `near[mask]`, (m,) true or false, is the pairs that it keeps.
+    Body columns of the other entity are attributes too: `near.vel` (3, m), `near.team` (m,), `near.yaw` (m,), ...
+    `near[mask]`, with a boolean mask (m,), selects pairs.
 
     Attributes:
-        row: Row of the group, (m,).
-        other: Row of the other in the body table, (m,).
-        offset: From the row to the other [m], (3, m), world frame.
-        distance: Its length [m], (m,).
+        row: Row in the group, (m,).
+        other: Row of the other entity in the body table, (m,).
+        offset: Position of the other entity minus position of the row [m], (3, m), world frame.
+        distance: Length of `offset` [m], (m,).
         count: Number of pairs of each row, (n,).
-        start: First pair of each row, and the end, (n + 1,): where the lists of a `RaggedColumn` begin.
+        start: Index of the first pair of each row, then the number of pairs, (n + 1,), as `start` of a `RaggedColumn`.
     """
 
     items = "pairs"
@@ -46,7 +46,7 @@ class Pairs(Segments):
         mask = np.asarray(mask)
         if mask.dtype != bool or mask.shape != self.row.shape:
             raise ParameterError(
-                f"near[...] takes a mask: true or false for each of the {len(self)} pairs, not {mask.dtype} {mask.shape}"
+                f"near[...] takes a boolean mask of shape ({len(self)},), one per pair, not {mask.dtype} {mask.shape}"
             )
         start = np.concatenate([[0], np.cumsum(mask)])[self.start]
         kept = (
@@ -60,17 +60,17 @@ class Pairs(Segments):
         return Pairs(queries.Pairs(*kept), self._bodies)
 
     def nearest(self) -> np.ndarray:
-        """Pair with the smallest distance of each row, (n,); -1 for rows without pairs."""
+        """Index of the pair with the smallest distance in each row, (n,); -1 for rows without pairs."""
         return self.argmin(self.distance)
 
 
 class Nearest:
-    """The k nearest others of each row.
+    """The k nearest other entities of each row.
 
     Attributes:
-        other: Row in the body table, (k, n); -1 where there are fewer than k.
-        distance: [m], (k, n); infinity there.
-        offset: From the row to the other [m], (3, k, n); 0 there.
+        other: Row in the body table, (k, n), nearest first; -1 where there are fewer than k.
+        distance: Distance [m], (k, n); infinity where `other` is -1.
+        offset: Position of the other entity minus position of the row [m], (3, k, n), world frame; 0 where `other` is -1.
     """
 
     def __init__(self, other: np.ndarray, distance: np.ndarray, offset: np.ndarray) -> None:
@@ -80,14 +80,14 @@ class Nearest:
 def find_pairs(
     index: Index, rows: tuple[int, int], pos: np.ndarray, radius: Any, teams: Any, bodies: BodyView
 ) -> Pairs:
-    """See `GroupView.near`; rows [first, last) of the table are at pos [m], (3, n)."""
+    """See `GroupView.near`. Rows [first, last) of the body table are at `pos` [m], (3, n)."""
     x, y, z = pos
     reach = np.ascontiguousarray(radius, float) if isinstance(radius, np.ndarray) else np.full(len(x), radius)
     return Pairs(queries.pairs(index, *rows, x, y, z, reach, bodies.team, _checked(teams)), bodies)
 
 
 def find_nearest(bodies: Bodies, rows: tuple[int, int], pos: np.ndarray, k: int, teams: Any) -> Nearest:
-    """See `GroupView.nearest`; rows [first, last) of the table are at pos [m], (3, n)."""
+    """See `GroupView.nearest`. Rows [first, last) of the body table are at `pos` [m], (3, n)."""
     index, (x, y, z) = bodies.any_index(), pos
     if isinstance(teams, np.ndarray):
         other, square = np.empty((k, len(x)), np.int64), np.empty((k, len(x)))

@@ -1,4 +1,4 @@
-"""What a world plugin sees: all rows of all worlds, and the means to change them."""
+"""The view of world plugins: all rows of all worlds, with methods that change them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ WRITABLE = ("health", "force", "torque")
 
 
 class WorldBodies(BodyView):
-    """The body table of a world plugin: health, force and torque are writable; pos, vel and quat change through `w.move`."""
+    """The body table of world plugins. health, force and torque are writable; `w.move` changes pos, vel and quat."""
 
     def __getattr__(self, name: str) -> Any:
         if name in WRITABLE:
@@ -30,22 +30,22 @@ class WorldBodies(BodyView):
 
 
 class WorldView(GroupView):
-    """All rows of all worlds; one view serves all world plugins.
+    """All rows of all worlds. One view is shared by all world plugins.
 
-    It is a `GroupView` over the whole table (near, nearest, rows_of, pos ... over all rows) with these beside it.
+    It is a `GroupView` over the whole body table: near, nearest, rows_of, pos and so on cover all rows.
 
     Attributes:
-        n_worlds: Number of worlds, ended ones included; these have no rows.
-        t: Time of the states that are seen [s], (n_worlds,): in `step` that of the step's end, in `start` that of its beginning.
+        n_worlds: Number of worlds, including those that have ended, which have no rows.
+        t: Time of the visible states [s], (n_worlds,): the end of the step in `step`, the beginning of the step in `start`.
         dt: Time since this plugin's last call in these worlds [s].
-        bodies: The table; health, force and torque are writable.
+        bodies: The body table; health, force and torque are writable.
         teams: Team numbers of the mission, ascending, (n_teams,).
         seeds: Seed of each world, (n_worlds,).
     """
 
     def __init__(self, bodies: Bodies, context: Context) -> None:
         super().__init__(bodies, 0, bodies.n, context, context.clock.dt)
-        self.only: np.ndarray | None = None  # worlds that this view speaks for, (n_worlds,); None is all
+        self.only: np.ndarray | None = None  # worlds this call acts on, (n_worlds,); None for all
         self.failing_world: int | None = None
         self.deaths: list[tuple[np.ndarray, str]] = []
         self.moved: list[np.ndarray] = []
@@ -80,17 +80,17 @@ class WorldView(GroupView):
         return self.context.seeds
 
     def team_numbers(self, team: np.ndarray) -> np.ndarray:
-        """Place of each team in `teams`, for per-team columns."""
+        """Index of each team in `teams`: its row in per-team columns."""
         return np.searchsorted(self.teams, team)
 
     def rows_at(self, world: np.ndarray, ids: np.ndarray) -> np.ndarray:
-        """Row of each (world, id), (m,); -1 for id 0 and for those that are gone."""
+        """Row of each (world, id), (m,); -1 for id 0 and for removed entities."""
         return self._bodies.rows_of(np.ascontiguousarray(world, np.int64), ids)
 
     # -- changes ----------------------------------------------------------------------------------------------------------
 
     def kill(self, rows: Any, why: str) -> None:
-        """Remove entities at the end of this step; others still see them until then."""
+        """Remove entities at the end of this step, for the reason `why`. Until then they stay visible."""
         rows = self._rows(rows)
         if len(rows):
             self.deaths.append((rows, why))
@@ -103,7 +103,7 @@ class WorldView(GroupView):
         vel: np.ndarray | None = None,
         quat: np.ndarray | None = None,
     ) -> None:
-        """Put entities elsewhere: pos [m], vel [m/s], (3, m), quat, (4, m); their motion models take it over."""
+        """Set pos [m] (3, m), vel [m/s] (3, m) or quat (4, m) of entities. Their motion models continue from the new state."""
         rows = self._rows(rows)
         if not len(rows):
             return
@@ -113,7 +113,7 @@ class WorldView(GroupView):
                 value = value[:, None] if value.ndim == 1 else value
                 if value.shape[0] != k or value.shape[1] not in (1, len(rows)):
                     raise ParameterError(
-                        f"w.move: {name} has shape {value.shape}; needed is ({k}, {len(rows)})"
+                        f"w.move: {name} has shape {value.shape}; it takes ({k}, {len(rows)})"
                     )
                 getattr(self._bodies, name)[:, rows] = value
         for row in rows:
@@ -121,12 +121,12 @@ class WorldView(GroupView):
         self.moved.append(rows)
 
     def spawn(self, block: str, world: Any, **where: Any) -> None:
-        """Ask for new entities of a block, one per item of `world`; they appear at the beginning of the next step.
+        """Request new entities of a block, one per item of `world`. They are born at the beginning of the next step.
 
         Args:
-            block: Name of the entity block that serves as template.
-            world: World of each, (m,).
-            **where: pos, vel (3, m), quat (4, m), team (m,); what is missing is the block's.
+            block: Name of the entity block used as template.
+            world: World of each entity, (m,).
+            **where: pos [m] (3, m), vel [m/s] (3, m), quat (4, m), team (m,); the block's values by default.
         """
         if block not in self.templates:
             raise MissionError(
@@ -134,7 +134,7 @@ class WorldView(GroupView):
             )
         world = np.atleast_1d(np.asarray(world, np.int64))
         full = {name: self._per_birth(name, value, len(world)) for name, value in where.items()}
-        kept = self._spoken_for(world)
+        kept = self._indices_acted_on(world)
         if len(kept):
             self.births.append(
                 {"block": block, "world": world[kept], **{k: v[..., kept] for k, v in full.items()}}
@@ -143,26 +143,28 @@ class WorldView(GroupView):
     def _per_birth(self, name: str, value: Any, m: int) -> np.ndarray:
         allowed = {"pos": (3,), "vel": (3,), "quat": (4,), "team": ()}
         if name not in allowed:
-            raise ParameterError(f"w.spawn: unknown {name!r}{nearest_name(name, allowed)}; {listed(allowed)}")
+            raise ParameterError(
+                f"w.spawn: unknown argument {name!r}{nearest_name(name, allowed)}; {listed(allowed)}"
+            )
         values, shape = np.asarray(value, float), (*allowed[name], m)
         values = values[:, None] if allowed[name] and values.ndim == 1 else values
         try:
             values = np.broadcast_to(values, shape)
         except ValueError:
-            raise ParameterError(f"w.spawn: {name} has shape {np.shape(value)}; needed is {shape}") from None
+            raise ParameterError(f"w.spawn: {name} has shape {np.shape(value)}; it takes {shape}") from None
         if name == "team" and not np.isin(values, self.teams).all():
             raise ParameterError(
-                f"w.spawn: team = {value!r} is not allowed; teams of the mission are {', '.join(map(str, self.teams))}"
+                f"w.spawn: team = {value!r} is not allowed; the mission has teams {', '.join(map(str, self.teams))}"
             )
         return values
 
     def spoken_for(self) -> list[int]:
-        """Numbers of the worlds that run and that this view speaks for."""
+        """Numbers of the running worlds that this call acts on."""
         running = self.context.running
         return [int(w) for w in np.flatnonzero(running if self.only is None else running & self.only)]
 
-    def _spoken_for(self, world: np.ndarray) -> np.ndarray:
-        """Which of these worlds this view speaks for: all, but for a call on behalf of some."""
+    def _indices_acted_on(self, world: np.ndarray) -> np.ndarray:
+        """Indices of the items of `world`, (m,), that are worlds this call acts on."""
         return np.arange(len(world)) if self.only is None else np.flatnonzero(self.only[world])
 
     def _rows(self, rows: Any) -> np.ndarray:
@@ -172,22 +174,22 @@ class WorldView(GroupView):
     # -- messages ---------------------------------------------------------------------------------------------------------
 
     def inbox(self, type_: type[Message]) -> Messages:
-        """All messages of a type published so far in this step, whatever their topic, ordered by (world, sender)."""
+        """All messages of a type published so far in this step, on any topic, ordered by (world, sender)."""
         topics = [t for t in self.by_type.get(type_, ()) if t.sent]
         if not topics:
             return Messages.empty(type_)
         return topics[0].outbox() if len(topics) == 1 else Messages.concatenate([t.outbox() for t in topics])
 
     def publish(self, type_: type[Message], world: Any, network: str = "", **fields: Any) -> None:
-        """Send one message per item of `world` in the name of the world (sender 0)."""
+        """Publish one message per item of `world` with the world as sender (sender 0)."""
         world = np.atleast_1d(np.asarray(world, np.int64))
         if len(world):
             batch = Messages.make(type_, world, np.zeros(len(world), np.int64), fields)
             self.publish_to(type_, network).add(
-                batch if self.only is None else batch.take(self._spoken_for(world))
+                batch if self.only is None else batch.take(self._indices_acted_on(world))
             )
 
-    # -- chance and services ------------------------------------------------------------------------------------------------
+    # -- random numbers and services ------------------------------------------------------------------------------------------------
 
     def uniform(self, label: str, k: int | None = None) -> np.ndarray:
         """Uniform draws in [0, 1), one per world, (n_worlds,) or (k, n_worlds)."""
@@ -202,7 +204,7 @@ class WorldView(GroupView):
         return LAWS[law](self.context.seeds, self._stream(label), index, clock.step, 0, k)
 
     def uniform_by(self, label: str, world: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """Uniform draws in [0, 1), one per (world, first, second), (m,): keyed by these numbers, not by their place."""
+        """Uniform draws in [0, 1), (m,), keyed by (world, first, second) and not by position in the arrays."""
         seeds = self.context.seeds[world] ^ (first.astype(np.uint64) * GOLDEN)
         draws = rng.uniform(seeds, self._stream(label), second, self.context.clock.step[world], 0, 1)
         return np.asarray(draws[0])

@@ -1,1 +1,1 @@
-"""The engine: plugins, clocks and rows put together."""
+"""The engine: runs the plugins of a mission on the rows of a stack of worlds."""

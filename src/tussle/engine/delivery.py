@@ -1,4 +1,4 @@
-"""From this step's outboxes over the networks to the receivers' next call."""
+"""Message delivery: routing by networks, delays, and spawn requests."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from tussle.messages import Messages, SpawnEntity
 
 
 def deliver(state: SimulationState) -> None:
-    """Route what was published in this step, and hand over what is due."""
+    """Route the messages published in this step, and deliver those that are due."""
     step = state.context.clock.step
     for topic in state.message_bus.topics.values():
         if topic.sent:
             if topic.type is SpawnEntity:
-                _ask_for_births(state, topic.outbox())
+                _request_births(state, topic.outbox())
             if topic.inboxes:
-                _post(state, topic)
+                _send(state, topic)
             topic.clear_outbox()
         if topic.queue:
             topic.deliver(step)
 
 
-def _ask_for_births(state: SimulationState, batch: Messages) -> None:
-    """Turn `SpawnEntity` messages into births at the beginning of the next step, block by block in the mission's order."""
+def _request_births(state: SimulationState, batch: Messages) -> None:
+    """Turn `SpawnEntity` messages into spawn requests for the next step, block by block in the order of the mission."""
     view = state.world_view
     has_attitude = (batch.quat != 0.0).any(axis=0)
     known = {name: k for k, name in enumerate(view.templates)}
@@ -49,7 +49,7 @@ def _ask_for_births(state: SimulationState, batch: Messages) -> None:
             )
 
 
-def _post(state: SimulationState, topic: TopicBuffer) -> None:
+def _send(state: SimulationState, topic: TopicBuffer) -> None:
     network, batch = state.networks[topic.network], topic.outbox()
     try:
         _route(state, topic, network, batch)
@@ -66,7 +66,7 @@ def _route(state: SimulationState, topic: TopicBuffer, network: WorldBinding, ba
         to = (np.asarray(number, np.int64), state.population.bodies.id[np.asarray(rows, np.int64)])
     elif to not in (EVERYONE, SAME_ENTITY):
         raise WiringError(
-            f"{topic.network}.route returned {to!r}; it is EVERYONE, SAME_ENTITY or (message numbers, rows)"
+            f"{topic.network}.route returned {to!r}; it must return EVERYONE, SAME_ENTITY or (message numbers, rows)"
         )
     delay = network.plugin.comm_delay[batch.world]
     steps = np.array([max(0, math.ceil(d / clock.dt - 1e-9)) for d in delay], np.int64)

@@ -1,4 +1,4 @@
-"""What went wrong, told in the author's terms: the plugin's file and line, the entity, the world, the step."""
+"""Errors of plugins, with file and line in the plugin, entity, world and step."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from tussle.errors import PluginError, TussleError
 _OWN = str(Path(__file__).resolve().parents[1])
 
 
-def _place_of(error: BaseException, plugin: Any) -> str:
-    """file:line of the deepest frame in the plugin's own file, else of the deepest frame outside this package."""
+def _location(error: BaseException, plugin: Any) -> str:
+    """file:line of the deepest frame in the plugin's file, else of the deepest frame outside this package."""
     try:
         own_file = inspect.getfile(type(plugin))
     except (OSError, TypeError):
@@ -34,10 +34,10 @@ def _place_of(error: BaseException, plugin: Any) -> str:
 
 
 def raised(error: BaseException, plugin: Any, *, where: str, step: int, world: int | None) -> PluginError:
-    """The error that a plugin has raised; its traceback begins where the plugin's code does."""
+    """The `PluginError` for an exception raised in a plugin. Its cause has a traceback that starts in the plugin's code."""
     if isinstance(error, TussleError) and all(
         frame.filename.startswith(_OWN) for frame in traceback.extract_tb(error.__traceback__)
-    ):  # ours about the plugin, which says itself where
+    ):  # raised by this package: its message names the place
         return PluginError(
             str(error), where=where, step=step, world=world, plugin=plugin.instance_name, cause=error
         )
@@ -48,13 +48,13 @@ def raised(error: BaseException, plugin: Any, *, where: str, step: int, world: i
         place = place.tb_next
     if place is not None and not place.tb_frame.f_code.co_filename.startswith(_OWN):
         error = error.with_traceback(place)
-    text = f"{_place_of(error, plugin)}: {type(error).__name__}: {error}"
+    text = f"{_location(error, plugin)}: {type(error).__name__}: {error}"
     return PluginError(text, where=where, step=step, world=world, plugin=plugin.instance_name, cause=error)
 
 
 def in_call(error: Exception, plugin: Any, view: GroupView, group: Group | None = None) -> PluginError:
-    """The error of a call that has raised: it names plugin and step, and entity and world as far as they are known."""
-    if isinstance(error, PluginError) and error.step is not None:  # of `fail`
+    """The `PluginError` for an exception in a plugin call: with plugin and step, and with entity and world if they are known."""
+    if isinstance(error, PluginError) and error.step is not None:  # raised by `fail`
         return error
     row, view.failing_row = view.failing_row, None
     rows = slice(None) if row is None else slice(row, row + 1)
@@ -73,7 +73,7 @@ def in_call(error: Exception, plugin: Any, view: GroupView, group: Group | None 
 
 
 def not_finite(group: Group, bodies: Bodies, row: int, step: int) -> PluginError:
-    """Who made the position or attitude of a body row not finite: back along the wires to the first output that is not."""
+    """The error for a body row whose state is not finite. Names the first plugin output, in call order, that is not finite."""
     i, world = row - group.first, int(bodies.world[row])
     who = f"{group.block_of(i)} {int(bodies.id[row])}"
     for binding in [*group.autonomies, *group.controllers]:
@@ -92,7 +92,7 @@ def not_finite(group: Group, bodies: Bodies, row: int, step: int) -> PluginError
     )
     motion = group.motion.spec.instance_name
     return PluginError(
-        f"the entity's state is not finite: {values}; all of its inputs are",
+        f"the entity's state is not finite: {values}; all outputs of its autonomies and controllers are finite",
         where=who,
         step=step,
         world=world,

@@ -1,4 +1,4 @@
-"""All topics of a simulation: what was said, what is on its way, who has heard what."""
+"""All topics of a simulation: outboxes, queued messages and inboxes."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ class MessageBus:
         self.by_type: dict[type[Message], list[TopicBuffer]] = {}
 
     def topic(self, network: str, name: str, type_: type[Message], where: str) -> TopicBuffer:
-        """The topic of a network by its name; made when it is asked for first.
+        """The topic of a network by its name; created on first use.
 
         Raises:
-            WiringError: There is no such network, or the topic carries another type.
+            WiringError: The network does not exist, or the topic has another message type.
         """
         network = network or ALWAYS_THERE[0]
         if network not in self.networks:
@@ -49,22 +49,22 @@ class MessageBus:
         return self.topics[key]
 
     def publish_to(self, type_: type[Message], network: str) -> TopicBuffer:
-        """Topic under the type's own name, for what the world says."""
+        """The topic named after the message type, for messages published by world plugins."""
         return self.topic(network, type_.__name__, type_, "world")
 
-    def unheard(self) -> list[str]:
-        """A sentence for each topic that some publish on one network and others listen to on another only."""
+    def network_mismatches(self) -> list[str]:
+        """A warning for each topic name that is published on one network only and subscribed to on another only."""
         topics = self.topics.values()
         return [
-            f"{said.name!r} is published on network {said.network!r} and listened to on {heard.network!r}, so nobody hears it; "
-            "the network of a Publish and of its Subscribe must be one"
-            for heard in topics
-            for said in topics
-            if said.name == heard.name
-            and heard.inboxes
-            and not said.inboxes
-            and said.is_published
-            and not heard.is_published
+            f"topic {sent.name!r} is published on network {sent.network!r} and subscribed to on network {received.network!r}; "
+            "its messages are not received; use the same network for Publish and Subscribe"
+            for received in topics
+            for sent in topics
+            if sent.name == received.name
+            and received.inboxes
+            and not sent.inboxes
+            and sent.is_published
+            and not received.is_published
         ]
 
     def drop_worlds(self, gone: np.ndarray) -> None:
@@ -72,7 +72,7 @@ class MessageBus:
             topic.drop_worlds(gone)
 
     def save(self) -> Any:
-        """Outboxes, queues and inboxes; batches and parcels are never written to, so the lists are enough."""
+        """Copy outboxes, queues and inboxes. Batches and parcels are immutable, so copies of the lists suffice."""
         return {
             key: (t.type, list(t.queue), [list(i.deliveries) for i in t.inboxes], list(t.sent))
             for key, t in self.topics.items()
@@ -82,9 +82,8 @@ class MessageBus:
         for (network, name), (type_, *_) in saved.items():
             self.topic(network, name, type_, "snapshot")
         for key, topic in self.topics.items():
-            _, queue, deliveries, sent = saved.get(
-                key, (None, [], [], [])
-            )  # a topic or group that came later has had nothing then
+            # Topics and inboxes created after the snapshot become empty.
+            _, queue, deliveries, sent = saved.get(key, (None, [], [], []))
             topic.queue = list(queue)
             topic.clear_outbox()
             topic.sent.extend(sent)
@@ -92,14 +91,15 @@ class MessageBus:
                 inbox.deliveries = list(deliveries[i]) if i < len(deliveries) else []
 
     def columns(self, world: int) -> list[bytes]:
-        """What is on its way in one world, for the state hash."""
+        """Undelivered and unread messages of one world, for the state hash."""
         found: list[bytes] = []
         for key in sorted(self.topics):
             topic = self.topics[key]
             name = "/".join(key).encode()
-            said = topic.outbox() if topic.sent else None  # from outside, or by a referee at the start
-            if said is not None and (mine := np.flatnonzero(said.world == world)).size:
-                found.append(b"|".join([name, b"said", *_numbers(said.take(mine))]))
+            # Between steps, an outbox holds messages of `Simulation.publish` and of `start` of world plugins.
+            sent = topic.outbox() if topic.sent else None
+            if sent is not None and (mine := np.flatnonzero(sent.world == world)).size:
+                found.append(b"|".join([name, b"said", *_numbers(sent.take(mine))]))
             for delivery in topic.queue:
                 mine = delivery.batch.world == world
                 if mine.any():
@@ -110,8 +110,8 @@ class MessageBus:
                         else b"".join(np.ascontiguousarray(a).tobytes() for a in part.to)
                     )
                     found.append(b"|".join([name, to, part.due.tobytes(), *_numbers(part.batch)]))
-            # What waits in inboxes counts by who will read it: how many groups a stack has is nothing to a world. Sorted, since
-            # the order of groups is nothing to it either.
+            # Inbox messages are keyed by the receivers' ids and sorted: the hash of a world must not depend on the number or order of
+            # the groups of the stack.
             waiting = []
             for inbox in topic.inboxes:
                 rows, batch = inbox.pairs()

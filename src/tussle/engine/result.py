@@ -1,4 +1,4 @@
-"""What one world's game came to."""
+"""Result of one world."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from typing import Any
 
 @dataclass
 class WorldResult:
-    """The end of one world.
+    """Result of one world, final or so far.
 
     Attributes:
-        world: Number in the stack.
-        seed: Its seed.
-        end: Why it ended: "time", "one_team", "all_dead", "error", or "" while it goes on.
-        steps: Steps made.
-        t: Time at the end [s].
-        alive: Entities left, by team.
-        metrics: Metric or interaction -> name -> value, or -> {team: value}.
-        scores: Sum of the metrics' scores, by team.
+        world: Number of the world in the stack.
+        seed: Seed of the world.
+        end: Why the world ended: "time", "one_team", "all_dead" or "error"; "" while it is running.
+        steps: Number of steps.
+        t: Simulated time at the end [s].
+        alive: Number of living entities, by team.
+        metrics: Name of a metric or interaction -> result name -> value, or {team: value}.
+        scores: Sum of the scores of all metrics, by team.
         state_hash: Hash of the state at the end.
-        error: What went wrong, for end "error".
+        error: The error, if `end` is "error".
     """
 
     world: int
@@ -36,7 +36,7 @@ class WorldResult:
 
     @property
     def winner(self) -> int | None:
-        """Team with the highest score; None for a tie or without scores."""
+        """Team with the highest score; None on a tie or without scores."""
         if not self.scores:
             return None
         best = max(self.scores.values())

@@ -1,4 +1,4 @@
-"""A stack of worlds that plays one mission."""
+"""A stack of worlds that simulates one mission."""
 
 from __future__ import annotations
 
@@ -27,30 +27,30 @@ if TYPE_CHECKING:
 
 
 class Simulation:
-    """Plays a mission in one world per seed, all in step.
+    """Simulate a mission in a stack of worlds, one world per seed.
 
-    World k is bit for bit what it would be alone, whatever the stack.
+    Each world gives the same bits as it does alone, whatever the other worlds of the stack.
 
     Args:
-        mission: What is played.
-        seeds: Seed of each world; a single number is a stack of one.
+        mission: The mission.
+        seeds: Seed of each world; a single number for a stack of one world.
         params: Parameters by path ("prey.Boids.gain", "prey.speed", "SimpleCapture.capture_range"); one value, or one per world.
-        threads: Threads that a step may use; the result is the same with any number.
-        on_error: What an error does that belongs to one world, such as a state that is not finite: "raise" raises it, "record" ends
-            the world with the error in its result, and the others go on. By default "raise" for one world and "record" for several.
-            An exception in a plugin ends the whole stack: with an explicit "record" in the results of all running worlds, else it is
-            raised.
-        start_from: Ids, times of birth and first states, in all worlds, instead of the blocks' placement; see `tussle.read_table`.
+        threads: Number of threads a step may use; results do not depend on it.
+        on_error: What to do on an error of one world, such as a state that is not finite: "raise" raises it, "record" ends the world
+            with the error in its result while the others continue. By default "raise" for one world and "record" for several.
+            An exception in a plugin ends the whole stack: with an explicit "record", it is stored in the results of all running
+            worlds; otherwise it is raised.
+        start_from: Ids, times of birth and initial states for all worlds, in place of the blocks' placement; see `tussle.read_table`.
 
     Attributes:
-        state: All data; what the methods here do is done by functions of it.
-        observers: Called with the simulation at the beginning of each step.
-        events: Who is told of births, deaths, captures, collisions and ends.
+        state: All data of the simulation.
+        observers: Functions called with the simulation at the beginning of each step.
+        events: Listeners for births, deaths, captures, collisions and ends of worlds.
 
     Raises:
-        MissionError: The mission cannot be played.
-        WiringError: Plugins do not fit together.
-        ParameterError: A parameter is unknown or not allowed.
+        MissionError: The mission is invalid, or `seeds` is empty.
+        WiringError: The plugins cannot be connected.
+        ParameterError: A parameter is unknown, or a value is not allowed.
     """
 
     def __init__(
@@ -78,7 +78,7 @@ class Simulation:
         try:
             self.reset(range(self.n_worlds))
             self._schedule: list[Call] | None = compose(self.state)
-            for text in self.state.message_bus.unheard():
+            for text in self.state.message_bus.network_mismatches():
                 warnings.warn(text, RuntimeWarning, stacklevel=2)
         except Exception:
             self.close()
@@ -88,7 +88,7 @@ class Simulation:
         if not isinstance(mission, Mission):
             raise MissionError(f"Simulation needs a Mission, not {mission!r}")
         if not seeds:
-            raise MissionError("seeds is empty; give one number or several")
+            raise MissionError("seeds is empty; it takes one or more numbers")
         _check_seeds(seeds)
         if on_error not in (None, "raise", "record"):
             raise ParameterError(f"on_error = {on_error!r} is not allowed; it is 'raise' or 'record'")
@@ -96,7 +96,7 @@ class Simulation:
             most = Handle.most_worlds(plugin)
             if most is not None and len(seeds) > most:
                 raise MissionError(
-                    f"{plugin.instance_name} takes part in at most {most} worlds of one stack, not {len(seeds)}"
+                    f"{plugin.instance_name} supports at most {most} worlds in one stack, not {len(seeds)}"
                 )
 
     def _forget_schedule(self) -> None:
@@ -111,26 +111,26 @@ class Simulation:
 
     @property
     def steps(self) -> np.ndarray:
-        """Steps made by each world, (n_worlds,)."""
+        """Number of steps completed by each world, (n_worlds,)."""
         return self.state.context.clock.step.copy()
 
     @property
     def is_over(self) -> bool:
-        """No world is running."""
+        """Whether all worlds have ended."""
         return self.state.n_running == 0
 
     @property
     def schedule(self) -> list[Call]:
-        """The calls of a step, in order."""
+        """Calls of one step, in order."""
         if self._schedule is None:
             self._schedule = compose(self.state)
         return self._schedule
 
     def step(self, n: int = 1) -> None:
-        """Make n steps in all running worlds; none where all have ended.
+        """Advance all running worlds by n steps.
 
         Raises:
-            PluginError: With on_error="raise", a plugin failed.
+            PluginError: A plugin failed, and `on_error` does not record it.
         """
         for _ in range(n):
             if not self.state.n_running:
@@ -151,7 +151,7 @@ class Simulation:
             self._stop(error)
 
     def _stop(self, error: PluginError) -> None:
-        """An exception ends the stack."""
+        """End the stack after an exception: record or raise the error."""
         state = self.state
         if state.on_error == "record" and not state.raises_when_all_fail:
             for world in np.flatnonzero(state.running):
@@ -159,11 +159,11 @@ class Simulation:
             state.world_view.moved = []
             take_out_dead(state)
             return
-        # From here on, so that what is printed is the plugin's own lines and not the way through the engine.
+        # Without the engine's traceback, so that only the plugin's lines are printed.
         raise error.with_traceback(None) from error.cause
 
     def run(self, until: float | None = None) -> list[WorldResult]:
-        """Step until all worlds have ended, or have reached the time `until` [s]; waits while paused.
+        """Step until all worlds have ended or reached the time `until` [s]. Waits while paused.
 
         Returns:
             The result of each world so far.
@@ -177,24 +177,24 @@ class Simulation:
         return self.result()
 
     def run_until(self, condition: Callable[[Simulation], bool]) -> None:
-        """Step until condition(self) holds or all worlds have ended."""
+        """Step until condition(self) is true or all worlds have ended. Waits while paused."""
         while self.state.n_running and not condition(self):
             self._resumed.wait()
             self._step()
 
     def pause(self) -> None:
-        """Make `run` wait before its next step; `step` still steps."""
+        """Make `run` and `run_until` wait before the next step. `step` is not affected."""
         self._resumed.clear()
 
     def resume(self) -> None:
-        """Let `run` go on."""
+        """Let `run` and `run_until` continue."""
         self._resumed.set()
 
     @property
     def is_paused(self) -> bool:
         return not self._resumed.is_set()
 
-    # -- beginning and end of worlds ------------------------------------------------------------------------------------------
+    # -- start and end of worlds ------------------------------------------------------------------------------------------
 
     def reset(
         self,
@@ -202,38 +202,43 @@ class Simulation:
         seeds: Sequence[int] | None = None,
         params: Mapping[str, Any] | None = None,
     ) -> None:
-        """Begin some worlds anew, with other seeds and parameters where given; the others are untouched.
+        """Restart some worlds, optionally with new seeds and parameters. The other worlds are not affected.
 
         Args:
             worlds: Numbers of the worlds.
-            seeds: New seed of each; by default its last one.
-            params: As for the constructor, one value or one per world of `worlds`.
+            seeds: New seed of each; by default the previous one.
+            params: As in the constructor; one value, or one per item of `worlds`.
+
+        Raises:
+            ParameterError: A world does not exist or is given twice, or a seed or parameter is not allowed.
         """
-        listed_ = [int(w) for w in worlds]
-        if len(set(listed_)) < len(listed_) or not set(listed_) <= set(range(self.n_worlds)):
+        numbers = [int(w) for w in worlds]
+        if len(set(numbers)) < len(numbers) or not set(numbers) <= set(range(self.n_worlds)):
             raise ParameterError(
-                f"reset: there are worlds 0 to {self.n_worlds - 1}, each once, not {listed_}"
+                f"reset: worlds = {numbers} is not allowed; it takes numbers from 0 to {self.n_worlds - 1}, each once"
             )
         if seeds is not None:
             _check_seeds(seeds)
-            if len(seeds) != len(listed_):
-                raise ParameterError(f"reset: {len(seeds)} seeds for {len(listed_)} worlds")
-        reset(self.state, listed_, seeds, params)
+            if len(seeds) != len(numbers):
+                raise ParameterError(f"reset: {len(seeds)} seeds for {len(numbers)} worlds")
+        reset(self.state, numbers, seeds, params)
 
-    # -- from outside -----------------------------------------------------------------------------------------------------------
+    # -- access between steps -----------------------------------------------------------------------------------------------------------
 
     def read(self, path: str) -> tuple[np.ndarray, np.ndarray]:
-        """A column by path: "predator.pos" -> values (n_worlds, capacity, 3) and who lives (n_worlds, capacity), by place in block.
+        """Values of a column by path, and a mask of living entities.
 
-        The capacity is the block's count, and more only where plugins ask for births beyond it. Who is dead or unborn reads NaN, -1 in
-        whole numbers, false in truth values. Of a ragged column each item is the entity's list, (k, m) or (m,), None where nobody lives.
+        "predator.pos" gives values (n_worlds, capacity, 3) and a mask (n_worlds, capacity), by place in block. The capacity is the
+        block's count; it is larger only if plugins spawn more entities. Dead and unborn entities read NaN, -1 in integer columns and
+        false in boolean columns. In a ragged column, each item is the entity's list, (k, m) or (m,), or None without a living entity.
 
-        Paths: "block.pos", "block.Plugin.column", and for world plugins "SimpleCaptureMetrics.captures" -> (n_worlds, ...), all true.
+        Paths: "block.pos", "block.Plugin.column", and for world plugins "SimpleCaptureMetrics.captures" -> (n_worlds, ...), with a mask
+        of true values.
         """
         return access.read(self.state, path)
 
     def write(self, path: str, values: Any) -> None:
-        """Set a column by path, shaped as `read` gives it; rows of the dead are ignored. A parameter is set for now, not for resets."""
+        """Set a column by path, with values shaped as from `read`. Rows of dead entities are ignored. A reset discards parameter values."""
         access.write(self.state, path, values)
 
     def publish(
@@ -245,43 +250,49 @@ class Simulation:
         topic: str = "",
         **fields: Any,
     ) -> None:
-        """Say something to the plugins from outside, between two steps: part of the next step, in the name of the world (sender 0).
+        """Publish a message between two steps, with the world as sender (sender 0).
 
-        World plugins read it in that step, entities hear it in the one after, as all messages.
+        World plugins read it in the next step; entities receive it in the step after, like all messages.
 
         Args:
-            type_: The message type.
-            worlds: Worlds that it is said in; by default all that are running.
-            network: The network that carries it; by default the one that reaches everyone.
-            topic: By default the type's name.
-            **fields: Of the message; one value, or one per world along the last axis.
+            type_: Message type.
+            worlds: Worlds to publish it in; by default all running worlds. Worlds that have ended are skipped.
+            network: Instance name of the network that carries it; by default the network that reaches everyone.
+            topic: Name of the topic; by default the name of the type.
+            **fields: Fields of the message; one value, or one per world along the last axis.
 
         Raises:
-            ParameterError: There is no such world, or the type has no such field.
-            WiringError: There is no such network, or the topic carries another type.
+            ParameterError: A world or a field does not exist.
+            WiringError: The network does not exist, or the topic has another message type.
         """
         running, message_bus = self.state.running, self.state.message_bus
         chosen = np.flatnonzero(running) if worlds is None else np.array(list(worlds), np.int64)
         if len(chosen) and (chosen.min() < 0 or chosen.max() >= self.n_worlds):
-            raise ParameterError(f"publish: there are worlds 0 to {self.n_worlds - 1}, not {chosen.tolist()}")
+            raise ParameterError(
+                f"publish: worlds = {chosen.tolist()} is not allowed; it takes numbers from 0 to {self.n_worlds - 1}"
+            )
         batch = Messages.make(type_, chosen, np.zeros(len(chosen), np.int64), fields)
         buffer = message_bus.topic(network, topic or type_.__name__, type_, "publish")
         buffer.add(batch.take(np.flatnonzero(running[chosen])))
 
     def snapshot(self) -> Snapshot:
-        """All columns, and nothing else. `restore` goes back to it: the same future, bit for bit."""
+        """Copy all columns. After `restore`, the simulation continues with identical bits.
+
+        Raises:
+            SnapshotError: A plugin holds objects outside the arrays and cannot save them.
+        """
         return snapshot(self.state)
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Go back to a snapshot of this simulation or of one like it.
+        """Restore a snapshot of this simulation, or of one with the same mission and number of worlds.
 
         Raises:
-            SnapshotError: It belongs to another mission or number of worlds.
+            SnapshotError: The snapshot has another mission or number of worlds, or blocks that this simulation has no group for.
         """
         restore(self.state, snapshot)
 
     def result(self) -> list[WorldResult]:
-        """Result of each world, as it stands now for those that go on."""
+        """Result of each world; of running worlds, the result so far."""
         state = self.state
         return [
             r if r is not None and not state.running[w] else world_result(state, w, "")
@@ -289,19 +300,19 @@ class Simulation:
         ]
 
     def state_hash(self, world: int = 0) -> str:
-        """Hash of all columns of one world: equal states, and only these, have equal hashes."""
+        """Hash of all columns of one world. Equal states have equal hashes; different states have different ones."""
         done, state = self.state.results[world], self.state
         return done.state_hash if done is not None and not state.running[world] else state_hash(state, world)
 
     @property
     def grade(self) -> str:
-        """What is promised of the result's bits: that of its weakest plugin."""
+        """Reproducibility grade of the results: the weakest grade of all plugins."""
         plugins = [b.plugin for g in self.state.population.groups for b in g.walk()]
         plugins += [r.plugin for r in self.state.world_bindings]
         return max((type(p).grade for p in plugins), key=GRADES.index, default="portable")
 
     def describe(self) -> str:
-        """The step as a printed list, with the channels that have several writers, and the grade."""
+        """Text with the calls of a step, the channels with several writers, and the grade."""
         lines = [
             f"{self.mission.name or 'mission'}: {self.n_worlds} world(s), dt {self.mission.dt:g} s, update {self.mission.update}"
         ]
@@ -315,7 +326,7 @@ class Simulation:
         return "\n".join([*lines, f"grade: {self.grade}"])
 
     def close(self) -> None:
-        """Release all that plugins hold outside the arrays; called by `with`. A second call does nothing."""
+        """Release threads and all objects that plugins hold outside the arrays. Called at the end of `with`; may be called twice."""
         if not self.is_closed:
             self.is_closed = True
             self.state.population.close_handles()

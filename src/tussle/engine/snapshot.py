@@ -1,4 +1,4 @@
-"""All columns of a simulation: put aside, put back, and hashed."""
+"""Snapshots, their restoration, and the state hash: all columns of a simulation."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ HASHED = ("id", "team", "block", "pos", "vel", "quat", "omega", "force", "torque
 
 @dataclass
 class Snapshot:
-    """All columns of a simulation at one instant."""
+    """Copy of all columns of a simulation."""
 
     mission: Any
     seeds: np.ndarray
@@ -34,8 +34,8 @@ def snapshot(state: SimulationState) -> Snapshot:
     population, births = state.population, state.births
     groups = {}
     for group in population.groups:
-        outside = [_save_handles(b) for b in group.walk()]
-        groups[group.key] = (group.first, group.table.copy(), outside)
+        handles = [_save_handles(b) for b in group.walk()]
+        groups[group.key] = (group.first, group.table.copy(), handles)
     world = {
         "floats": population.bodies.floats.copy(),
         "ints": population.bodies.ints.copy(),
@@ -65,7 +65,7 @@ def _save_handles(binding: Binding) -> dict[str, list[bytes]]:
     def save(h: Any) -> bytes:
         if h is not None and not saves:
             raise SnapshotError(
-                f"{name} holds objects outside the arrays and cannot save them, so no snapshot can be taken"
+                f"{name} holds objects outside the arrays and has no method save_one; no snapshot can be taken"
             )
         return pickle.dumps((h is not None, None if h is None else binding.plugin.save_one(h)))
 
@@ -76,24 +76,25 @@ def restore(state: SimulationState, saved: Snapshot) -> None:
     """See `Simulation.restore`."""
     if saved.mission != state.mission or len(saved.seeds) != state.n_worlds:
         raise SnapshotError(
-            f"the snapshot is of a stack of {len(saved.seeds)} worlds of {saved.mission.name or 'another mission'!r}, not of this"
+            f"the snapshot has {len(saved.seeds)} worlds of mission {saved.mission.name!r}, the simulation {state.n_worlds} of mission "
+            f"{state.mission.name!r}; numbers of worlds and missions must be equal"
         )
     population, births, world = state.population, state.births, saved.world
     if not set(saved.groups) <= {g.key for g in population.groups}:
         raise SnapshotError(
-            "the snapshot has entities of blocks that this simulation has never had; restore it into the simulation it was taken from"
+            "the snapshot has entities of a block that has had none in this simulation; restore it into the simulation it was taken from"
         )
     state.context.seeds[:] = saved.seeds
     population.close_handles()
     population.bodies.replace(world["floats"].copy(), world["ints"].copy())
     for group in population.groups:
         kept = saved.groups.get(group.key)
-        first, held, outside = kept or _no_rows(group, population.bodies.n)
-        group.table.restore(held)
-        for binding, handles in zip(group.walk(), outside, strict=True):
-            binding.handles = {k: [None] * len(held) for k, held in handles.items()}
+        first, table, handles = kept or _no_rows(group, population.bodies.n)
+        group.table.restore(table)
+        for binding, saved_handles in zip(group.walk(), handles, strict=True):
+            binding.handles = {k: [None] * len(objects) for k, objects in saved_handles.items()}
         group.attach(population.bodies, first)
-        _load_handles(state, group, outside)
+        _load_handles(state, group, handles)
     births.next_id, births.n_born, births.n_left = (a.copy() for a in world["births"][:3])
     births.next_time = [a.copy() for a in world["births"][3]]
     clock = state.context.clock
@@ -101,7 +102,7 @@ def restore(state: SimulationState, saved: Snapshot) -> None:
     state.running[:], state.failed[:] = world["running"], world["failed"]
     state.results, state.parked = list(world["results"]), dict(world["parked"])
     state.world_view.births = list(world["wishes"])
-    state.world_view.deaths, state.world_view.moved = [], []  # of a step that was broken off
+    state.world_view.deaths, state.world_view.moved = [], []  # requested in an interrupted step
     state.overrides.restore(world["params"])
     state.n_running = int(state.running.sum())
     rows_changed(state)
@@ -115,8 +116,8 @@ def _no_rows(group: Group, first: int) -> tuple[Any, ...]:
     return first, none, [{k: [] for k in b.handles} for b in group.walk()]
 
 
-def _load_handles(state: SimulationState, group: Group, outside: list[dict[str, list[bytes]]]) -> None:
-    for binding, handles in zip(group.walk(), outside, strict=True):
+def _load_handles(state: SimulationState, group: Group, saved: list[dict[str, list[bytes]]]) -> None:
+    for binding, handles in zip(group.walk(), saved, strict=True):
         binding.view.begin(binding.plugin)
         for name, held in handles.items():
             for row, data in enumerate(held):
@@ -135,7 +136,7 @@ def state_hash(state: SimulationState, world: int) -> str:
 
 
 def hashed(state: SimulationState, world: int) -> Iterator[tuple[str, Any]]:
-    """Name and values of each column of one running world."""
+    """Yield name and values of each hashed column of one running world."""
     bodies = state.population.bodies
     members, world_start, _, _ = bodies.layout()
     rows = members[world_start[world] : world_start[world + 1]]

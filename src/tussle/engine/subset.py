@@ -1,4 +1,4 @@
-"""Some worlds of a stack on their own: for plugins with a rate, and where worlds begin, while the clocks of a stack differ."""
+"""Plugin calls on a subset of the worlds: for plugins with a rate in stacks whose clocks differ, and for the start of some worlds."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def _sub_group(group: Group, bodies: Bodies, first: int, rows: np.ndarray) -> Gr
 def call_group(
     population: Population, group: Group, worlds: np.ndarray, action: Callable[[Group], None]
 ) -> None:
-    """Do something to one group in some worlds only; worlds, (n_worlds,), says which."""
+    """Call action(group) on a copy of the rows of the worlds where `worlds`, (n_worlds,), is true, then copy the results back."""
     bodies = population.bodies
     rows = np.flatnonzero(worlds[bodies.world])
     mine = rows[(rows >= group.first) & (rows < group.last)]
@@ -102,7 +102,7 @@ def call_world_plugin(
     worlds: np.ndarray,
     action: Callable[[WorldBinding, WorldView], None],
 ) -> None:
-    """Do something with a world plugin in some worlds only."""
+    """Call action(referee, view) on a copy of the rows of the worlds where `worlds`, (n_worlds,), is true, then copy the results back."""
     bodies, view = population.bodies, world_binding.view
     rows = np.flatnonzero(worlds[bodies.world])
     sub_bodies = _sub_bodies(bodies, rows)
@@ -117,7 +117,7 @@ def call_world_plugin(
     sub.tables = {
         per: _sub_table(table, rows if per == "entity" else np.arange(table.n))
         for per, table in world_binding.tables.items()
-        if table.places  # a table without columns is not kept at the number of rows
+        if table.places  # a table without columns does not follow the number of rows
     }
     for name, value in list(sub.plugin.__dict__.items()):
         if isinstance(value, Publisher):

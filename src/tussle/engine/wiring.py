@@ -1,4 +1,4 @@
-"""Who writes what whom reads: channels of one entity's plugins, by name, checked for names, units and the fields of lists."""
+"""Connect the channels of an entity's plugins by name, and check their units and list fields."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from typing import Any
 from tussle import units
 from tussle.columns import Channel, Output
 from tussle.engine.table import Place, Table
-from tussle.errors import WiringError, listed, nearest_name
+from tussle.errors import WiringError, nearest_name
 
 BELIEF = {"belief_pos": ("pos", 3, "m"), "belief_vel": ("vel", 3, "m/s"), "belief_quat": ("quat", 4, "")}
 
 
 @dataclass(slots=True)
 class Link:
-    """Where a channel column lies. With `rows`, it is the plugin's own array and is copied from (and, outputs, to) these rows."""
+    """Location of a channel column. With `rows`, a separate array of the plugin: inputs are copied from these rows, outputs to them."""
 
     place: Place
     rows: tuple[int, ...] | None = None
@@ -27,11 +27,11 @@ class Bus:
     """Channels between one stage and the next.
 
     Attributes:
-        row: Channel -> row in the table's float array, of a list its number in the table's lists.
-        unit: Channel -> unit, of a list those of its fields.
-        fields: Channel -> fields of its list; None is a number.
-        writers: Channel -> names of the plugins that write it, in order.
-        read: Channels that somebody reads.
+        row: Channel -> row in the table's float array; for a list, its index in the table's lists.
+        unit: Channel -> its unit; for a list, the units of its fields.
+        fields: Channel -> fields of its list; None for a number.
+        writers: Channel -> names of the plugins that write it, in call order.
+        read: Channels that a plugin reads.
     """
 
     row: dict[str, int] = field(default_factory=dict)
@@ -42,19 +42,19 @@ class Bus:
 
 
 def read_channels(plugin: Any) -> list[tuple[str, Channel]]:
-    """Input columns that a plugin uses, in order of declaration."""
+    """Input columns used by a plugin, in order of declaration."""
     inputs = type(plugin).inputs()
     names = plugin.active_inputs() if hasattr(plugin, "active_inputs") else list(inputs)
     return [(k, inputs[k]) for k in names]
 
 
 class Wiring:
-    """The wires of one group.
+    """Channel connections of one group.
 
     Args:
-        where: Name of the entity block, for messages.
-        table: Table that receives the channel columns.
-        advise: Gives controllers that would join the writers' channels to the reader, for messages.
+        where: Name of the entity block, for error messages.
+        table: Table to which the channel columns are added.
+        advise: Returns controllers that would connect the written channels to the read ones, for error messages.
     """
 
     def __init__(
@@ -71,10 +71,10 @@ class Wiring:
     def connect(
         self, sensors: Sequence[Any], autonomies: Sequence[Any], controllers: Sequence[Any], motion: Any
     ) -> None:
-        """Lay all wires.
+        """Connect sensors, autonomies, controllers and motion model.
 
         Raises:
-            WiringError: An input that nobody writes, or whose writer has another unit or other fields.
+            WiringError: No plugin writes an input's channel, or its writer has another unit or other fields.
         """
         working = [c for c in controllers if not c.passthrough]
         self._check_passthrough(controllers, [*working, motion])
@@ -87,7 +87,7 @@ class Wiring:
         self.sensed = sorted(sense.writers)
         for autonomy in autonomies:
             self._read(autonomy, {}, sense, required=True)
-            for plugin in _inner(autonomy):
+            for plugin in _nested(autonomy):
                 self._read(plugin, {}, sense, required=False)
 
     def _check_passthrough(self, controllers: Sequence[Any], consumers: Sequence[Any]) -> None:
@@ -105,10 +105,10 @@ class Wiring:
             ]
             for channel in needed if offered else []:
                 if channel not in offered:
-                    raise self._missing(following[0], channel, offered, controller.instance_name)
+                    raise self._no_writer(following[0], channel, offered, controller.instance_name)
 
     def _bus(self, producers: Sequence[Any], consumers: Sequence[Any]) -> Bus:
-        """Rows for all channels, the consumers' first and in their order, so that they see them side by side."""
+        """Rows for all channels. Those of the consumers come first, in order, so that inputs are contiguous slices where possible."""
         bus = Bus()
         for plugin in consumers:
             for _, column in read_channels(plugin):
@@ -129,7 +129,7 @@ class Wiring:
                 bus.fields[channel], bus.unit[channel] = form
 
     def _join(
-        self, bus: Bus, producers: Sequence[Any], consumers: Sequence[Any], also: Bus | None = None
+        self, bus: Bus, producers: Sequence[Any], consumers: Sequence[Any], fallback: Bus | None = None
     ) -> None:
         for plugin in producers:
             for column in type(plugin).outputs().values():
@@ -140,7 +140,7 @@ class Wiring:
                 self._check_form(plugin, column, bus)
                 self.links[id(plugin), name] = self._link(column, bus)
         for plugin in consumers:
-            self._read(plugin, bus, also, required=True)
+            self._read(plugin, bus, fallback, required=True)
             if getattr(plugin, "reads_all", False):
                 bus.read.update(bus.writers)
         for channel, names in bus.writers.items():
@@ -151,24 +151,23 @@ class Wiring:
                 if name in BELIEF or any(c in bus.read for c in column.channels):
                     self.wired.setdefault(id(plugin), set()).add(name)
                 if bus.read.isdisjoint(column.channels) and not consumers:
-                    self.wired.setdefault(id(plugin), set()).add(
-                        name
-                    )  # sensors: read by name from outside and by autonomies
+                    # Sensor outputs may be read by autonomies, and by name from outside.
+                    self.wired.setdefault(id(plugin), set()).add(name)
 
-    def _read(self, plugin: Any, bus: Any, also: Bus | None, required: bool) -> None:
+    def _read(self, plugin: Any, bus: Any, fallback: Bus | None, required: bool) -> None:
         for name, column in read_channels(plugin):
             source = None
-            for candidate in (bus, also):
+            for candidate in (bus, fallback):
                 if candidate and all(c in candidate.writers for c in column.channels):
                     source = candidate
                     break
             if source is None:
                 if not column.optional and not required:  # type: ignore[attr-defined]
-                    continue  # who binds it says so
+                    continue  # binding reports the error
                 if not column.optional:  # type: ignore[attr-defined]
-                    written = {c for b in (bus, also) if b for c in b.writers}
+                    written = {c for b in (bus, fallback) if b for c in b.writers}
                     absent = next((c for c in column.channels if c not in written), column.channels[0])
-                    raise self._missing(plugin, absent, written, "")
+                    raise self._no_writer(plugin, absent, written, "")
                 if isinstance(bus, Bus) and all(c in bus.row for c in column.channels):
                     self.links[id(plugin), name] = self._link(column, bus)
                 else:
@@ -179,7 +178,7 @@ class Wiring:
             self.links[id(plugin), name] = self._link(column, source)
 
     def alone(self, column: Channel, key: Any) -> Link | int:
-        """The place of a channel column that is wired to nobody."""
+        """Location of a channel column that is not connected."""
         if column.ragged:
             return self.table.add_list(column)
         return Link(self.table.add(key, float, len(column.fields), column.default))  # type: ignore[attr-defined]
@@ -201,32 +200,32 @@ class Wiring:
             )
             if fields != there:
                 raise WiringError(
-                    f"{at} as {_form_text(fields)}, but it is {_form_text(there)} for the plugin at its other end"
+                    f"{at} as {_form_text(fields)}, but another plugin declares it as {_form_text(there)}"
                 )
             for name, unit, other in zip(fields or ("",), own, bus.unit[channel], strict=True):
                 if not units.compatible(unit, other):
                     of = f", field {name!r}," if name else ""
                     raise WiringError(
-                        f"{at}{of} in {unit or 'no unit'!r}, but it is in {other or 'no unit'!r} for the plugin at its other end"
+                        f"{at}{of} in {unit or 'no unit'!r}, but another plugin declares it in {other or 'no unit'!r}"
                     )
 
-    def _missing(self, reader: Any, channel: str, offered: Iterable[str], through: str) -> WiringError:
+    def _no_writer(self, reader: Any, channel: str, offered: Iterable[str], through: str) -> WiringError:
         offered = sorted(offered)
         fitting = self.advise(offered, [c for _, column in read_channels(reader) for c in column.channels])
-        advice = f"; controllers that would fit between them: {', '.join(fitting)}" if fitting else ""
+        advice = f"; controllers that connect them: {', '.join(fitting)}" if fitting else ""
         by = f" through {through}" if through else ""
         return WiringError(
-            f"{self.where}: nobody writes channel {channel!r} for {reader.instance_name}{by}{nearest_name(channel, offered)}; "
-            f"written are: {', '.join(offered) or 'none'}{advice}"
+            f"{self.where}: no plugin writes channel {channel!r} for {reader.instance_name}{by}{nearest_name(channel, offered)}; "
+            f"written channels: {', '.join(offered) or 'none'}{advice}"
         )
 
 
-def _inner(plugin: Any) -> Iterator[Any]:
-    """All plugins inside one."""
+def _nested(plugin: Any) -> Iterator[Any]:
+    """All plugins nested in a plugin."""
     for name in plugin.children():
         for child in plugin.values[name]:
             yield child
-            yield from _inner(child)
+            yield from _nested(child)
 
 
 def _forms(column: Channel) -> dict[str, tuple[tuple[str, ...] | None, tuple[str, ...]]]:
@@ -241,6 +240,3 @@ def _form_text(fields: tuple[str, ...] | None) -> str:
         return "a number"
     n = len(fields)
     return f"a list of {n} field{'s' * (n > 1)} ({' '.join(fields)})" if n else "a list of numbers"
-
-
-__all__ = ["BELIEF", "Bus", "Link", "Wiring", "listed", "read_channels"]

@@ -244,7 +244,7 @@ WRONG = {
     "low above high": (["chance.xml", "--vary", "odds=0.3:0.1"], 1, "odds: the low bound 0.3 is above the high bound 0.1"),
     "out of bounds": (["chance.xml", "--vary", "odds=0.1,1.3"], 1, "point 1 (odds=1.3): chance.xml:5: "),
     "no such motion model": (["chance.xml", "--vary", "reds.motion_model=Still,Stil"], 1, "(did you mean 'Still'?)"),
-    "nobody steers": (["chance.xml", "--vary", "reds.motion_model=Still,Unicycle"], 1, "block 'reds': nobody writes channel"),
+    "nobody steers": (["chance.xml", "--vary", "reds.motion_model=Still,Unicycle"], 1, "block 'reds': no plugin writes channel"),
     "fewer than none": (["chance.xml", "--vary", "reds.count=-1,2"], 1, "point 0 (reds.count=-1): "),
     "end before start": (["chance.xml", "--end", "0"], 1, "--end 0 is not allowed"),
     "end is no time": (["chance.xml", "--end", "soon"], 1, "--end: 'soon' is not a number"),

@@ -203,7 +203,7 @@ def test_a_plugin_that_fails_ends_the_game_and_what_was_played_is_kept(tussle, f
         (["run", "game.xml", "--plugin-path", "no.py"], 1, "no.py: there is no such plugin file"),
         (["run", "game.xml", "--start-from", "no.csv"], 4, "no.csv"),
         (["run", "game.xml", "--out", "game.xml"], 4, "game.xml"),
-        (["check", "game.xml", "--set", "prey.motion_model=SimpleAircraft"], 1, "game.xml:7: block 'prey': nobody writes"),
+        (["check", "game.xml", "--set", "prey.motion_model=SimpleAircraft"], 1, "game.xml:7: block 'prey': no plugin writes"),
         (["describe", "Boid"], 1, "did you mean 'Boids'?"),
         (["fly"], 2, "fly"),
     ],

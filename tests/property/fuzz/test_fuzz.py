@@ -16,7 +16,9 @@ from histories import difference
 N_MISSIONS = int(os.environ.get("TUSSLE_FUZZ", "200"))
 N_CHECKED = 24
 CHUNK = 10
-pytestmark = pytest.mark.filterwarnings("ignore:.*so nobody hears it")  # random networks often are two
+pytestmark = pytest.mark.filterwarnings(
+    "ignore:.*its messages are not received"
+)  # random networks often are two
 
 
 @pytest.mark.parametrize("first", range(0, N_MISSIONS, CHUNK))

@@ -365,7 +365,7 @@ def test_draws_are_those_of_arrays_one_after_the_other():
 
 def test_one_label_serves_one_law():
     text = failing(lambda self, me: me.uniform("luck") + me.normal("luck"))
-    assert "the label 'luck' has been drawn as uniform in this step" in text
+    assert "label 'luck' is in use for uniform numbers in this step" in text
 
 
 # -- errors -----------------------------------------------------------------------------------------------------------------------
@@ -397,11 +397,11 @@ COLUMNS = {
         ),
         (
             lambda self, me: self.max_speed,
-            "Easy.max_speed has a value of its own for each: read me.max_speed, not self.max_speed",
+            "Easy.max_speed differs between entities: read me.max_speed, not self.max_speed",
         ),
         (
             lambda self, me: self.goal,
-            "Easy.goal has a value of its own for each: read me.goal, not self.goal",
+            "Easy.goal differs between entities: read me.goal, not self.goal",
         ),
         (lambda self, me: setattr(self, "n", 1), "Easy.n is a column: write into it with me.n = value"),
         (
@@ -433,7 +433,7 @@ def test_structural_parameters_are_the_plugins():
 
 
 def test_a_published_column_is_not_read():
-    assert "me.say is sent, not read: me.publish('say', ...)" in failing(
+    assert "me.say cannot be read, only published: me.publish('say', ...)" in failing(
         lambda self, me: me.say, say=Publish(Pair)
     )
 
@@ -460,7 +460,7 @@ def test_a_number_that_is_none_is_told_as_with_arrays():
 
 def test_columns_that_hide_what_me_offers_are_refused():
     with pytest.raises(
-        DeclarationError, match=r"Easy.near: me.near is something else in easy mode; choose another name"
+        DeclarationError, match=r"Easy.near: me.near is an attribute of easy mode; choose another name"
     ):
         does(lambda self, me: None, near=Param(1.0))
     assert does(lambda self, me: None, radius=Param(1.0)).params()["radius"].default == 1.0

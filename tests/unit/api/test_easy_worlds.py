@@ -274,27 +274,30 @@ COLUMNS = {
         ),
         (
             lambda self, w: self.reach,
-            "Judge.reach has a value of its own for each: read w.reach, not self.reach",
+            "Judge.reach differs between worlds: read w.reach, not self.reach",
         ),
         (lambda self, w: setattr(w, "clas", 1), "clas = State(...) on the class, then w.clas = value"),
         (lambda self, w: setattr(w, "reach", 1.0), "Judge: w.reach is read-only"),
         (lambda self, w: setattr(w, "t", 1.0), "Judge: w.t is read-only"),
         (
             lambda self, w: setattr(w, "lost", 1),
-            "Judge: lost has a value per team: write w.lost[team] = value",
+            "Judge: lost has one value per team: write w.lost[team] = value",
         ),
-        (lambda self, w: setattr(w, "age", 1), "Judge: age has a value per entity: write entity.age = value"),
+        (
+            lambda self, w: setattr(w, "age", 1),
+            "Judge: age has one value per entity: write entity.age = value",
+        ),
         (lambda self, w: setattr(w, "n", "many"), "Judge.n takes a number, not 'many'"),
         (lambda self, w: w.lost[9], "w.lost: there is no team 9; there are: 1, 2"),
         (
             lambda self, w: w.distance(w.entities[0], None),
-            "a distance is between two entities, not <entity 1 of team 1> and None",
+            "distance takes two entities, not <entity 1 of team 1> and None",
         ),
-        (lambda self, w: w.lost.pop(1), "w.lost has one number for each team"),
-        (lambda self, w: w.kill(1, "x"), "w.kill takes an entity, of w.entities or of a message, not 1"),
+        (lambda self, w: w.lost.pop(1), "w.lost has one value per team"),
+        (lambda self, w: w.kill(1, "x"), "w.kill takes an entity from w.entities or from a message, not 1"),
         (
             lambda self, w: setattr(w.entities[0], "pos", (0, 0, 0)),
-            "pos of an entity is read-only; pos, vel and quat change by w.move(",
+            "pos of an entity is read-only; w.move(",
         ),
         (
             lambda self, w: setattr(w.entities[0], "aeg", 1),
@@ -303,7 +306,7 @@ COLUMNS = {
         (lambda self, w: w.spawn("c"), "w.spawn: there is no block 'c'"),
         (
             lambda self, w: w.move(w.entities[0], pos=(1.0, 2.0)),
-            "w.move: pos has shape (2, 1); needed is (3, 1)",
+            "w.move: pos has shape (2, 1); it takes (3, 1)",
         ),
         (lambda self, w: w.publish(Note, valeu=1), "Note has no field 'valeu' (did you mean 'value'?)"),
     ],
@@ -329,9 +332,9 @@ def test_the_world_and_the_line_that_failed_are_named():
     [
         (
             {"score": 3.0},
-            "Judge.result_one: 'score' = 3.0 is not allowed; it takes {team: number}, one for each team",
+            "Judge.result_one: 'score' = 3.0 is not allowed; it takes {team: number}, with a number for each team",
         ),
-        ({"score": {1: 2.0}}, "Judge.result_one: 'score' says nothing of team 2"),
+        ({"score": {1: 2.0}}, "Judge.result_one: 'score' has no value for team 2"),
         ({"lost": {1: 2.0, 2: 1.0, 3: 4.0}}, "Judge.result_one: 'lost': there is no team 3; there are: 1, 2"),
         (
             {"name": "red"},
@@ -347,16 +350,18 @@ def test_results_that_mean_nothing(result, text):
 
 
 def test_columns_that_hide_what_w_offers_are_refused():
-    with pytest.raises(DeclarationError, match=r"Judge.entities: w.entities is something else in easy mode"):
+    with pytest.raises(DeclarationError, match=r"Judge.entities: w.entities is an attribute of easy mode"):
         referee(lambda self, w: None, entities=State(per="world"))
     with pytest.raises(
-        DeclarationError, match=r"Judge.distance: an entity.distance is something else in easy mode"
+        DeclarationError, match=r"Judge.distance: an entity.distance is an attribute of easy mode"
     ):
         referee(lambda self, w: None, distance=State())
 
 
 def test_a_published_column_is_not_read():
-    assert "w.say is sent, not read: w.publish(" in failing(lambda self, w: w.say, say=Publish(Note))
+    assert "w.say cannot be read, only published: w.publish(" in failing(
+        lambda self, w: w.say, say=Publish(Note)
+    )
 
 
 # -- stacks -----------------------------------------------------------------------------------------------------------------------

@@ -245,7 +245,8 @@ def test_topic_and_network_can_be_parameters():
         networks=[GlobalNetwork(name="other")],
     )
     with pytest.warns(
-        RuntimeWarning, match="'Quiet' is published on network 'GlobalNetwork' and listened to on 'other'"
+        RuntimeWarning,
+        match="'Quiet' is published on network 'GlobalNetwork' and subscribed to on network 'other'",
     ):
         sim = alone(game, 1)
     assert heard(sim, "b.Listener").tolist() == [[9]]
@@ -435,7 +436,7 @@ def test_services_are_called_by_name():
             g.call("brightnes")
 
     with pytest.raises(
-        PluginError, match=r"nobody offers a service 'brightnes' \(did you mean 'brightness'\?\)"
+        PluginError, match=r"no plugin offers a service 'brightnes' \(did you mean 'brightness'\?\)"
     ):
         Simulation(mission(still("a", Lamp(), Lost()))).step()
 
@@ -453,7 +454,7 @@ def test_a_service_that_is_nowhere_is_an_error_for_world_plugins_too():
         def step(self, w):
             w.call("nothing")
 
-    with pytest.raises(TussleError, match="nobody offers a service 'nothing'; there are none"):
+    with pytest.raises(TussleError, match="no plugin offers a service 'nothing'; there are none"):
         Simulation(mission(still("a"), interactions=[Caller()])).step()
 
 

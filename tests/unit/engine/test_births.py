@@ -301,14 +301,14 @@ def test_w_spawn_takes_one_place_for_all_or_one_each():
         ),
         (
             lambda w: w.spawn("child", [0], speed=3),
-            r"w.spawn: unknown 'speed'; there are: pos, vel, quat, team",
+            r"w.spawn: unknown argument 'speed'; there are: pos, vel, quat, team",
         ),
         (
             lambda w: w.spawn("child", [0], team=7),
-            r"w.spawn: team = 7 is not allowed; teams of the mission are 1, 2",
+            r"w.spawn: team = 7 is not allowed; the mission has teams 1, 2",
         ),
-        (lambda w: w.spawn("child", [0], pos=(1, 2)), r"w.spawn: pos has shape \(2,\); needed is \(3, 1\)"),
-        (lambda w: w.move([0], pos=(1, 2)), r"w.move: pos has shape \(2, 1\); needed is \(3, 1\)"),
+        (lambda w: w.spawn("child", [0], pos=(1, 2)), r"w.spawn: pos has shape \(2,\); it takes \(3, 1\)"),
+        (lambda w: w.move([0], pos=(1, 2)), r"w.move: pos has shape \(2, 1\); it takes \(3, 1\)"),
     ],
 )
 def test_wrong_wishes_are_refused(call, message):

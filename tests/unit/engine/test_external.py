@@ -215,13 +215,13 @@ def test_a_plugin_that_cannot_save_says_so():
 
     with (
         Simulation(game(SingleIntegrator(), autonomy=[Drift(), Mute()])) as sim,
-        pytest.raises(SnapshotError, match="Mute holds objects outside"),
+        pytest.raises(SnapshotError, match=r"Mute .* has no method save_one"),
     ):
         sim.snapshot()
 
 
 def test_largest_stack():
-    with pytest.raises(MissionError, match="Outside takes part in at most 4 worlds of one stack, not 5"):
+    with pytest.raises(MissionError, match=r"Outside .* at most 4 worlds .* not 5"):
         Simulation(game(), seeds=range(5))
 
 

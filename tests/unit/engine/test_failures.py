@@ -319,7 +319,7 @@ def test_a_motion_model_that_leaves_the_numbers_is_named():
 
     with pytest.raises(
         PluginError,
-        match=r"^Explosive, a 1, world 0, step \d+: the entity's state is not finite: pos = .*; all of its inputs are",
+        match=r"^Explosive, a 1, world 0, step \d+: .* not finite: pos = .*outputs of its autonomies and controllers are finite",
     ):
         Simulation(mission(block(autonomy=Idle(), motion=Explosive()))).run()
 
@@ -438,11 +438,11 @@ def test_names_that_are_not_there_are_told_with_those_that_are():
         (lambda me: me.sped, r"me has no 'sped' \(did you mean 'speed'\?\); there are: n, gain, speed"),
         (
             lambda me: setattr(me, "pos", 0),
-            r"me.pos is read-only: an autonomy decides, its motion model moves a 1 of world 0",
+            r"me.pos is read-only: an autonomy decides, and the motion model moves a 1 of world 0",
         ),
         (lambda me: setattr(me, "gain", 0), r"me.gain is read-only: it is a Param of Easy"),
         (lambda me: setattr(me, "other", 0), r"Easy.other is not declared"),
-        (lambda me: me.publish("notes"), r"Easy publishes no 'notes'; there are: claims"),
+        (lambda me: me.publish("notes"), r"Easy has no Publish column 'notes'; there are: claims"),
         (
             lambda me: me.publish("claims", targt=1),
             r"CaptureEntity has no field 'targt' \(did you mean 'target'\?\)",

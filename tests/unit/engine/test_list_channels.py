@@ -147,21 +147,21 @@ def test_lists_reach_controllers_and_the_last_writer_wins():
     [
         (
             Input(fields="x y", unit="m", ragged=True),
-            r"reads channel 'seen' as a list of 2 fields \(x y\), but it is a list of 3 fields \(x y z\) for the plugin",
+            r"reads channel 'seen' as a list of 2 fields \(x y\), but .* a list of 3 fields \(x y z\)",
         ),
         (
             Input(fields="z y x", unit="m", ragged=True),
-            r"as a list of 3 fields \(z y x\), but it is a list of 3 fields",
+            r"as a list of 3 fields \(z y x\), but .* a list of 3 fields",
         ),
-        (Input(unit="m", ragged=True), r"as a list of numbers, but it is a list of 3 fields"),
-        (Input(unit="m"), r"reads channel 'seen' as a number, but it is a list of 3 fields"),
+        (Input(unit="m", ragged=True), r"as a list of numbers, but .* a list of 3 fields"),
+        (Input(unit="m"), r"reads channel 'seen' as a number, but .* a list of 3 fields"),
         (
             Input(fields="x y z", unit="m m s", ragged=True),
-            r"channel 'seen', field 'z', in 's', but it is in 'm' for the plugin at its other end",
+            r"channel 'seen', field 'z', in 's', but .* in 'm'",
         ),
         (
             Input("seem", fields="x y z", unit="m", ragged=True),
-            r"nobody writes channel 'seem' for Other \(did you mean 'seen'\?\); written are: seen",
+            r"channel 'seem' for Other \(did you mean 'seen'\?\); written channels: seen",
         ),
     ],
 )
@@ -180,7 +180,7 @@ def test_two_writers_of_one_list_agree():
 
     with pytest.raises(
         WiringError,
-        match=r"Half.seen writes channel 'seen' as a list of 1 field \(x\), but it is a list of 3",
+        match=r"Half.seen writes channel 'seen' as a list of 1 field \(x\), but .* a list of 3",
     ):
         Simulation(mission(block(sensor=[Camera(), Half()])))
 

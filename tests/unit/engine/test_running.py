@@ -305,9 +305,9 @@ def test_reset_gives_seeds_and_params_in_the_order_of_the_worlds():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (([3],), r"reset: there are worlds 0 to 1, each once, not \[3\]"),
-        (([-1],), r"reset: there are worlds 0 to 1"),
-        (([0, 0],), r"reset: there are worlds 0 to 1, each once, not \[0, 0\]"),
+        (([3],), r"reset: worlds = \[3\] .*0 to 1, each once"),
+        (([-1],), r"reset: worlds = \[-1\] .*0 to 1"),
+        (([0, 0],), r"reset: worlds = \[0, 0\] .*0 to 1, each once"),
         (([0, 1], [5]), r"reset: 1 seeds for 2 worlds"),
         (([0], ["x"]), r"seed 'x' is not allowed; it takes a whole number"),
         (([0], None, {"a.Drift.two": 1}), r"Drift has no 'two' \(did you mean 'to'\?\)"),
@@ -393,9 +393,9 @@ def test_restore_takes_messages_back():
 
 def test_snapshots_of_something_else_are_refused():
     saved = Simulation(mission()).snapshot()
-    with pytest.raises(SnapshotError, match=r"a stack of 1 worlds"):
+    with pytest.raises(SnapshotError, match=r"has 1 worlds of mission .*, the simulation 2"):
         Simulation(mission(), seeds=[1, 2]).restore(saved)
-    with pytest.raises(SnapshotError, match="another mission"):
+    with pytest.raises(SnapshotError, match="missions must be equal"):
         Simulation(mission(block("b"))).restore(saved)
 
 
@@ -403,7 +403,7 @@ def test_snapshot_of_groups_that_are_not_there():
     game = mission(block(motion=Unicycle(), autonomy=Substeps()))
     split = Simulation(game, seeds=[1, 2], params={"a.Unicycle.enable_roll": [False, True]})
     saved = split.snapshot()
-    with pytest.raises(SnapshotError, match="never had"):
+    with pytest.raises(SnapshotError, match="a block that has had none"):
         Simulation(game, seeds=[1, 2]).restore(saved)
 
 

@@ -1,4 +1,4 @@
-"""Easy mode: plugins that are written for one entity or one world at a time, in plain Python, and can be stepped through in a debugger."""
+"""Easy mode: plugins written in plain Python for one entity or one world at a time. A debugger can step through them."""
 
 from tussle.api.easy.entities import Me, Other
 from tussle.api.easy.plugins import (

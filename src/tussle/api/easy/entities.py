@@ -1,11 +1,11 @@
-"""What an entity's plugin is given in easy mode: the entity itself, and the others that it sees."""
+"""Arguments of entity plugins in easy mode: the entity itself (`Me`) and other entities (`Other`)."""
 
 from __future__ import annotations
 
 import math
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from tussle.api.easy.looks import DrawIn, Look
+from tussle.api.easy.shared import Shared, WorldDraw
 from tussle.api.easy.values import (
     BODY,
     NUMBERS,
@@ -13,7 +13,7 @@ from tussle.api.easy.values import (
     Columns,
     ReceivedMessage,
     Write,
-    plain,
+    with_ids,
     write_number,
 )
 from tussle.columns import Publish
@@ -29,8 +29,8 @@ ROLES = {
     "controller": "a controller steers",
     "sensor": "a sensor measures",
 }
-MOST_KEPT = 64
-"""Others that an entity keeps as objects, so as not to make them anew in each step."""
+MAX_CACHED = 64
+"""Number of `Other` objects that an entity caches, so that they are not created again in each step."""
 
 
 def _read_only(of: Any, value: Any) -> None:
@@ -42,23 +42,23 @@ def _of_body(name: str, doc: str) -> property:
 
 
 class Entity:
-    """An entity's body, as plain values; abstract."""
+    """Body of an entity as plain values; abstract."""
 
-    __slots__ = ("_body", "_look", "_row")
+    __slots__ = ("_body", "_row", "_shared")
     _called: ClassVar[str] = "entity"
     _columns: ClassVar[tuple[str, ...]] = ()
     _body: Columns
     _row: int
-    _look: Any
+    _shared: Any
 
     def __getattr__(self, name: str) -> Any:
         if name in self._columns:
-            self._refuse(f"me.{name} is sent, not read: me.publish({name!r}, ...)")
-        allowed = list(dict.fromkeys((*self._columns, *BODY, *offered(type(self)))))
+            self._refuse(f"me.{name} cannot be read, only published: me.publish({name!r}, ...)")
+        allowed = list(dict.fromkeys((*self._columns, *BODY, *public_names(type(self)))))
         self._refuse(f"{self._called} has no {name!r}{nearest_name(name, allowed)}; {listed(allowed)}")
 
     def _refuse(self, text: str) -> Any:
-        raise AttributeError(f"{type(self._look.plugin).__name__}: {text}")
+        raise AttributeError(f"{type(self._shared.plugin).__name__}: {text}")
 
     def _body_row(self) -> int:
         return self._row
@@ -66,7 +66,7 @@ class Entity:
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Entity):
             return NotImplemented
-        return self._body_row() == other._body_row() and self._look.bodies is other._look.bodies
+        return self._body_row() == other._body_row() and self._shared.bodies is other._shared.bodies
 
     def __hash__(self) -> int:
         return hash(self._body_row())
@@ -76,51 +76,51 @@ for _name, _doc in {**VECTORS, **NUMBERS}.items():
     setattr(Entity, _name, _of_body(_name, _doc))
 
 
-def offered(cls: type) -> list[str]:
-    """What an author is offered beside columns and the body."""
+def public_names(cls: type) -> list[str]:
+    """Public attributes of a class, without columns and body columns."""
     return [n for n in dir(cls) if not n.startswith("_") and n not in BODY]
 
 
-def square_between(a: Entity, b: Entity) -> float:
-    """Squared distance [m^2], as the kernels compute it."""
+def squared_distance(a: Entity, b: Entity) -> float:
+    """Squared distance [m^2], bit-identical to the kernels' result."""
     try:
         ax, ay, az = a._body.xyz
         bx, by, bz = b._body.xyz
     except AttributeError:
-        raise ParameterError(f"a distance is between two entities, not {a!r} and {b!r}") from None
+        raise ParameterError(f"distance takes two entities, not {a!r} and {b!r}") from None
     i, j = a._row, b._row
     x, y, z = ax[i] - bx[j], ay[i] - by[j], az[i] - bz[j]
     return x * x + y * y + z * z  # type: ignore[no-any-return]
 
 
 class Other(Entity):
-    """Another entity, as it is: its body, and where it is from the one that sees it."""
+    """Another entity: its true state, and its position relative to the observing entity."""
 
     __slots__ = ("_by", "_id")
     _called = "another entity"
     _id: int
 
     def __init__(self, by: Any, entity: int, row: int) -> None:
-        self._look, self._body, self._row = by._look, by._look.truth, row
+        self._shared, self._body, self._row = by._shared, by._shared.truth, row
         self._by, self._id = by, entity
 
     @property
     def offset(self) -> np.ndarray:
-        """From the one that sees it [m], (3,), world frame."""
+        """Position relative to the observing entity [m], (3,), world frame."""
         by = self._by
         return self._body["pos"][self._row] - by._body["pos"][by._row]  # type: ignore[no-any-return]
 
     @property
     def distance(self) -> float:
-        """Distance from the one that sees it [m]."""
-        return math.sqrt(square_between(self, self._by))
+        """Distance from the observing entity [m]."""
+        return math.sqrt(squared_distance(self, self._by))
 
     def __repr__(self) -> str:
         return f"<entity {self._id} of team {self._body['team'][self._row]}>"
 
 
-class Seeing(Entity):
-    """An entity that can ask who is near it; abstract."""
+class Observer(Entity):
+    """An entity with neighbour queries; abstract."""
 
     __slots__ = ()
 
@@ -131,51 +131,52 @@ class Seeing(Entity):
     def nearest(
         self, team: str | int | None = None, radius: float | None = None, k: int | None = None
     ) -> Any:
-        """The nearest other entity, None when there is none; the smaller id at equal distance.
+        """The nearest other entity, or None. At equal distance, the one with the smaller id.
 
         Args:
             team: "own", "other", a team number, or None for all.
-            radius: Only who is nearer than that [m].
-            k: Give a list of the k nearest, nearest first; shorter where there are fewer.
+            radius: Only entities nearer than this [m].
+            k: Return a list of the k nearest, nearest first; shorter if there are fewer.
         """
         if k is not None and (type(k) is not int or k < 1):
             raise ParameterError(f"nearest: k = {k!r} is not allowed; it takes a whole number >= 1")
-        search = self._look.search
-        known = search.known.get((k or 1, team))
-        found = known[self._row] if known else search.nearest(self._row, k or 1, team)
+        search = self._shared.search
+        cached = search.cached.get((k or 1, team))
+        found = cached[self._row] if cached else search.nearest(self._row, k or 1, team)
         if k is None and radius is None:
             return self._other(*found[0]) if found else None
         others = [self._other(entity, row) for entity, row in found]
         if radius is not None:
-            others = [o for o in others if radius > 0.0 and square_between(o, self) < radius * radius]
+            others = [o for o in others if radius > 0.0 and squared_distance(o, self) < radius * radius]
         if k is not None:
             return others
         return others[0] if others else None
 
     def near(self, radius: float, team: str | int | None = None) -> list[Other]:
         """Other entities nearer than radius [m], nearest first; `team` as in `nearest`."""
-        search = self._look.search
-        known = search.known.get((radius, team, "near"))
-        found = known[self._row] if known else search.near(self._row, radius, team)
+        search = self._shared.search
+        cached = search.cached.get((radius, team, "near"))
+        found = cached[self._row] if cached else search.near(self._row, radius, team)
         return [self._other(entity, row) for entity, row in found]
 
 
-class Me(Seeing):
-    """One entity in easy mode: its plugin's columns by name, its body as it believes it to be, and its view of others.
+class Me(Observer):
+    """One entity in easy mode: the columns of its plugin by name, its body as the entity believes it to be, and neighbour queries.
 
-    Numbers are Python's, several are an array (k,), an `EntityRef` is an `Other` or None, a `Subscribe` a list of messages.
+    A column of one number is a Python number, of k numbers an array (k,), of `EntityRef` an `Other` or None, of `Subscribe` a list of
+    messages.
     """
 
     __slots__ = ("_cells", "_own", "_seen", "_world")
     _called = "me"
     _writers: ClassVar[dict[str, Write]] = {}
 
-    def __init__(self, look: Look, row: int, world: int) -> None:
+    def __init__(self, shared: Shared, row: int, world: int) -> None:
         set_ = object.__setattr__
-        set_(self, "_look", look)
-        set_(self, "_body", look.mine)
-        set_(self, "_own", look.own)
-        set_(self, "_cells", look.cells)
+        set_(self, "_shared", shared)
+        set_(self, "_body", shared.belief)
+        set_(self, "_own", shared.own)
+        set_(self, "_cells", shared.cells)
         set_(self, "_row", row)
         set_(self, "_world", world)
         set_(self, "_seen", {})
@@ -184,7 +185,7 @@ class Me(Seeing):
         write = self._writers.get(name)
         if write is write_number:
             try:
-                self._cells[name][self._row] = value  # as `write_number` does, without a call
+                self._cells[name][self._row] = value  # `write_number` inlined, for speed
                 return
             except (TypeError, ValueError):
                 pass
@@ -194,7 +195,7 @@ class Me(Seeing):
             write(self, name, value)
 
     def _cannot_write(self, name: str, value: Any) -> None:
-        plugin = self._look.plugin
+        plugin = self._shared.plugin
         column = plugin.columns.get(name)
         if column is not None:
             raise AttributeError(
@@ -202,100 +203,100 @@ class Me(Seeing):
             )
         if name in BODY:
             raise AttributeError(
-                f"me.{name} is read-only: {ROLES[plugin.kind]}, its motion model moves {self._look.g.who(self._row)}"
+                f"me.{name} is read-only: {ROLES[plugin.kind]}, and the motion model moves {self._shared.g.who(self._row)}"
             )
-        if name in offered(type(self)):
+        if name in public_names(type(self)):
             raise AttributeError(f"me.{name} is read-only")
-        setattr(plugin, name, value)  # refused there, with the sentence on columns
+        setattr(plugin, name, value)  # raises the error about columns
 
     # -- others -------------------------------------------------------------------------------------------------------------
 
     def _entity(self, entity: int) -> Other | None:
-        """The entity of an id; None for 0 and for who is gone."""
-        row = self._look.row_of(self._world, entity)
+        """The entity with an id; None for id 0 and for removed entities."""
+        row = self._shared.row_of(self._world, entity)
         return None if row < 0 else self._other(entity, row)
 
     def _other(self, entity: int, row: int) -> Other:
         found = self._seen.get(entity)
         if found is None:
-            if len(self._seen) >= MOST_KEPT:
+            if len(self._seen) >= MAX_CACHED:
                 self._seen.clear()
             found = self._seen[entity] = Other(self, entity, row)
         return found  # type: ignore[no-any-return]
 
     def distance(self, other: Entity) -> float:
         """Distance to another entity [m]."""
-        return math.sqrt(square_between(other, self))
+        return math.sqrt(squared_distance(other, self))
 
-    # -- time, chance, messages -----------------------------------------------------------------------------------------------
+    # -- time, random numbers, messages -----------------------------------------------------------------------------------------------
 
     @property
     def t(self) -> float:
-        """Time of the states that are seen [s]."""
+        """Time of the visible states [s]."""
         return self._body["t"][self._row]  # type: ignore[no-any-return]
 
     @property
     def dt(self) -> float:
         """Time since the plugin's last call [s]."""
-        return self._look.g.dt  # type: ignore[no-any-return]
+        return self._shared.g.dt  # type: ignore[no-any-return]
 
     @property
     def step_count(self) -> int:
-        """Number of the step."""
+        """Current step number."""
         return self._body["step_count"][self._row]  # type: ignore[no-any-return]
 
     @property
     def motion_state(self) -> np.ndarray:
-        """State of the entity's motion model, (m,): where a planner's rollout begins."""
+        """State of the entity's motion model, (m,): the initial state of a planner's rollout."""
         return self._body["motion_state"][self._row]  # type: ignore[no-any-return]
 
     @property
     def scene(self) -> Scene:
-        """Origin, ground, boundaries."""
-        return self._look.g.scene  # type: ignore[no-any-return]
+        """Origin, ground, boundaries and bases."""
+        return self._shared.g.scene  # type: ignore[no-any-return]
 
     @property
-    def draw(self) -> DrawIn:
-        """Draws shapes: `me.draw.line(pos=...)`, as `g.draw`, in this entity's world."""
-        return DrawIn(self._look.g.draw, self._world)
+    def draw(self) -> WorldDraw:
+        """Draw shapes in this entity's world: `me.draw.line(pos=...)`, as `g.draw`."""
+        return WorldDraw(self._shared.g.draw, self._world)
 
     def uniform(self, label: str = "") -> float:
-        """A draw in [0, 1), in each step the next one under its label: the same for this entity whatever else there is."""
-        return self._look.draws.next(self._row, "uniform", label)  # type: ignore[no-any-return]
+        """The next uniform draw in [0, 1) for this entity, step and label, independent of other entities and worlds."""
+        return self._shared.draws.next(self._row, "uniform", label)  # type: ignore[no-any-return]
 
     random = uniform
 
     def normal(self, label: str = "") -> float:
-        """A standard normal draw; as `uniform`."""
-        return self._look.draws.next(self._row, "normal", label)  # type: ignore[no-any-return]
+        """The next standard normal draw; otherwise as `uniform`."""
+        return self._shared.draws.next(self._row, "normal", label)  # type: ignore[no-any-return]
 
     def fail(self, why: str) -> None:
-        """End this entity's world with an error at the end of the step; the others go on."""
-        self._look.g.fail(self._row, why)
+        """End this entity's world with an error at the end of the step. Other worlds continue."""
+        self._shared.g.fail(self._row, why)
 
     def _messages(self, topic: str) -> list[ReceivedMessage]:
-        look = self._look
-        of_row = look.heard.get(topic)
+        shared = self._shared
+        of_row = shared.heard.get(topic)
         if of_row is None:
-            of_row = look.heard[topic] = look.own[topic].by_row()
+            of_row = shared.heard[topic] = shared.own[topic].by_row()
         return [ReceivedMessage(self, batch, i) for batch, i in of_row(self._row)]
 
     def publish(self, topic: str, **fields: Any) -> None:
-        """Send a message to a `Publish` column; fields that refer to entities take entities."""
-        plugin = self._look.plugin
+        """Publish a message on the topic of a `Publish` column. `EntityRef` fields take entities."""
+        plugin = self._shared.plugin
         if not isinstance(plugin.columns.get(topic), Publish):
             topics = [k for k, c in plugin.columns.items() if isinstance(c, Publish)]
             raise AttributeError(
-                f"{type(plugin).__name__} publishes no {topic!r}{nearest_name(topic, topics)}; {listed(topics)}"
+                f"{type(plugin).__name__} has no Publish column {topic!r}{nearest_name(topic, topics)}; {listed(topics)}"
             )
-        self._own[topic].publish([self._row], **plain(fields))
+        self._own[topic].publish([self._row], **with_ids(fields))
 
     def _body_row(self) -> int:
-        return self._row + self._look.g.first  # type: ignore[no-any-return]
+        return self._row + self._shared.g.first  # type: ignore[no-any-return]
 
     @property
     def _id(self) -> int:
         return self._body["id"][self._row]  # type: ignore[no-any-return]
 
     def __repr__(self) -> str:
-        return f"<{self._look.g.who(self._row)}>"
+        return f"<{self._shared.g.who(self._row)}>"

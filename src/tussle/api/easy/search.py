@@ -1,4 +1,4 @@
-"""Who is near whom, asked by one row after another and answered for all rows at once."""
+"""Neighbour queries of single rows, computed for all rows at once when many rows ask the same."""
 
 from __future__ import annotations
 
@@ -11,46 +11,47 @@ from tussle.errors import ParameterError
 from tussle.neighbors import queries
 
 Found = list[tuple[int, int]]
-"""Id and body row of each."""
+"""(id, body row) of each entity found."""
 
 
 class Search:
-    """The queries of the rows of a view.
+    """Neighbour queries of the rows of a view.
 
-    The first rows that ask are answered one by one. A question that many ask is answered for all rows, in one call of the kernel;
-    what it finds is the same.
+    The first rows that make a query are answered one by one. When more rows make the same query, it is computed for all rows in one
+    kernel call, with the same result.
 
     Attributes:
-        known: (k, team) of `nearest`, and (radius, team, "near") of `near` -> what each row finds, as far as all have been answered.
+        cached: Query -> result of each row, for queries computed for all rows. A query is (k, team) of `nearest` or
+            (radius, team, "near") of `near`.
     """
 
     def __init__(self, g: GroupView) -> None:
         self._g = g
         self._asked: dict[Any, int] = {}
-        self.known: dict[Any, list[Found]] = {}
+        self.cached: dict[Any, list[Found]] = {}
 
     def clear(self) -> None:
-        """Forget the answers: somebody has moved."""
+        """Discard the results: entities have moved."""
         self._asked.clear()
-        self.known.clear()
+        self.cached.clear()
 
     def nearest(self, row: int, k: int, team: Any) -> Found:
-        """(id, body row) of the k nearest others of a row, nearest first, the smaller id first at equal distance."""
-        return self._ask(("nearest", k, _checked(team)), (k, team), row)
+        """The k nearest other entities of a row, nearest first; at equal distance, smaller id first."""
+        return self._query(("nearest", k, _checked(team)), (k, team), row)
 
     def near(self, row: int, radius: float, team: Any) -> Found:
-        """(id, body row) of the others nearer than radius [m] to a row; ordered as by `nearest`."""
-        return self._ask(("near", float(radius), _checked(team)), (radius, team, "near"), row)
+        """The other entities nearer than radius [m] to a row, ordered as in `nearest`."""
+        return self._query(("near", float(radius), _checked(team)), (radius, team, "near"), row)
 
-    def _ask(self, question: tuple[str, Any, Any], key: Any, row: int) -> Found:
+    def _query(self, query: tuple[str, Any, Any], key: Any, row: int) -> Found:
         n = self._asked[key] = self._asked.get(key, 0) + 1
-        if n <= 1 + self._g.n // 256:  # few rows ask this, or it is another radius each time
-            return self._answers(*question, row, row + 1)[0]
-        known = self.known[key] = self._answers(*question, 0, self._g.n)
-        return known[row]
+        if n <= 1 + self._g.n // 256:  # few rows make this query, or the radius differs each time
+            return self._compute(*query, row, row + 1)[0]
+        found = self.cached[key] = self._compute(*query, 0, self._g.n)
+        return found[row]
 
-    def _answers(self, kind: str, limit: Any, team: Any, first: int, last: int) -> list[Found]:
-        """What the rows [first, last) find."""
+    def _compute(self, kind: str, limit: Any, team: Any, first: int, last: int) -> list[Found]:
+        """Results of the rows [first, last)."""
         g, bodies, index = self._g, self._g.bodies, self._g.any_index()
         x, y, z = np.ascontiguousarray(g.pos[:, first:last])
         first, last = g.first + first, g.first + last

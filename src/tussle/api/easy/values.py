@@ -1,4 +1,4 @@
-"""Columns as plain values: a number, an array of a few, an entity, a list of messages."""
+"""Columns as plain values: numbers, small arrays, entities and lists of messages."""
 
 from __future__ import annotations
 
@@ -28,19 +28,19 @@ VECTORS = {
     "vel": "Velocity [m/s], (3,), world frame.",
     "quat": "Attitude (w, x, y, z), (4,).",
     "omega": "Angular velocity [rad/s], (3,).",
-    "force": "Force of interactions [N], (3,), world frame.",
-    "torque": "Torque of interactions [N m], (3,).",
+    "force": "Force exerted by interactions [N], (3,), world frame.",
+    "torque": "Torque exerted by interactions [N m], (3,).",
     "forward": "Unit vector along the body x axis, (3,), world frame.",
 }
 NUMBERS = {
     "yaw": "Heading, counter-clockwise from East [rad].",
     "climb": "Elevation of the nose, up positive [rad].",
     "roll": "Bank, right wing down positive [rad].",
-    "health": "Who has none left is removed.",
-    "radius": "Size [m].",
-    "mass": "[kg].",
-    "id": "Number of the entity in its world.",
-    "team": "Number of its team.",
+    "health": "Health; the entity is removed when it reaches 0.",
+    "radius": "Body radius [m].",
+    "mass": "Mass [kg].",
+    "id": "Id of the entity, unique in its world.",
+    "team": "Team number.",
 }
 BODY = (*VECTORS, *NUMBERS)
 
@@ -49,7 +49,7 @@ Write = Callable[[Any, str, Any], None]
 
 
 def reader(name: str, column: Column) -> Read:
-    """What reads a column of an object that has `_own`, the plugin's columns, and `_row`, its place in them."""
+    """Getter of a column, for objects with `_own` (columns of the plugin) and `_row` (row in them)."""
     if isinstance(column, EntityRef):
         return lambda of: of._seen.get(number := of._cells[name][of._row]) or of._entity(number)
     if isinstance(column, Subscribe):
@@ -59,7 +59,7 @@ def reader(name: str, column: Column) -> Read:
     if isinstance(column, Handle):
         return lambda of: of._own[name][of._row]
     if isinstance(column, State) and column.per == "team":
-        return lambda of: PerTeam(of._own[name][:, of._row], of._look.teams, f"{of._called}.{name}")
+        return lambda of: PerTeam(of._own[name][:, of._row], of._shared.teams, f"{of._called}.{name}")
     assert isinstance(column, Numbers)
     if column.fields or is_list(column):
         return lambda of: of._own[name][..., of._row]
@@ -67,12 +67,12 @@ def reader(name: str, column: Column) -> Read:
 
 
 def is_list(column: Column) -> bool:
-    """Whether it is a list per row, of any length."""
+    """Whether the column holds a list of any length per row."""
     return isinstance(column, Numbers) and column.ragged
 
 
 def writer(name: str, column: Column) -> Write | None:
-    """What writes a column; None where it is not the plugin's to write."""
+    """Setter of a column; None if the plugin may not write it by attribute."""
     if isinstance(column, EntityRef):
         return _write_reference
     if not isinstance(column, (State, Output)) or (isinstance(column, State) and column.per == "team"):
@@ -81,47 +81,47 @@ def writer(name: str, column: Column) -> Write | None:
 
 
 def write_number(of: Any, name: str, value: Any) -> None:
-    """Write a column of one number."""
+    """Setter of a column of one number."""
     try:
         of._cells[name][of._row] = value
     except (TypeError, ValueError):
         try:
-            of._own[name][of._row] = value  # NumPy takes a float for a whole number
+            of._own[name][of._row] = value  # NumPy converts a float to an integer, a memory view does not
         except (TypeError, ValueError):
-            raise _misfit(of, name, value, "a number") from None
+            raise _wrong_value(of, name, value, "a number") from None
 
 
 def _write_several(of: Any, name: str, value: Any) -> None:
     try:
         of._own[name][..., of._row] = value
     except (TypeError, ValueError):
-        fields = type(of._look.plugin).columns[name].fields
-        raise _misfit(of, name, value, f"{len(fields)} numbers ({', '.join(fields)})") from None
+        fields = type(of._shared.plugin).columns[name].fields
+        raise _wrong_value(of, name, value, f"{len(fields)} numbers ({', '.join(fields)})") from None
 
 
-def _misfit(of: Any, name: str, value: Any, wanted: str) -> ParameterError:
+def _wrong_value(of: Any, name: str, value: Any, wanted: str) -> ParameterError:
     shape = np.shape(value) if isinstance(value, (np.ndarray, list, tuple)) else ()
     given = f"of shape {shape}" if shape else repr(value)
-    return ParameterError(f"{type(of._look.plugin).__name__}.{name} takes {wanted}, not {given}")
+    return ParameterError(f"{type(of._shared.plugin).__name__}.{name} takes {wanted}, not {given}")
 
 
 def _write_reference(of: Any, name: str, value: Any) -> None:
     number = 0 if value is None else getattr(value, "_id", value)
     if type(number) is not int:
-        raise _misfit(of, name, value, "an entity or None")
+        raise _wrong_value(of, name, value, "an entity or None")
     of._own[name][of._row] = number
 
 
 def make_type(base: type, columns: Mapping[str, Column], owner: str) -> type:
-    """The type of what an author is given: `base` with a plugin's columns as attributes.
+    """Subclass of `base` with the columns of a plugin as attributes.
 
     Raises:
-        DeclarationError: A column is called as something that `base` offers.
+        DeclarationError: A column has the name of an attribute of `base`.
     """
     for name in columns:
         if hasattr(base, name) and name not in BODY:
             raise DeclarationError(
-                f"{owner}.{name}: {base._called}.{name} is something else in easy mode; choose another name"  # type: ignore[attr-defined]
+                f"{owner}.{name}: {base._called}.{name} is an attribute of easy mode; choose another name"  # type: ignore[attr-defined]
             )
     own: dict[str, Any] = {
         name: property(reader(name, column), doc=column.doc)
@@ -134,7 +134,7 @@ def make_type(base: type, columns: Mapping[str, Column], owner: str) -> type:
 
 
 class Cells(dict[str, Any]):
-    """A plugin's columns of one number, as memory views: these give Python's numbers, in half of NumPy's time."""
+    """Columns of one number, as memory views: these return Python numbers, in half the time of NumPy arrays."""
 
     def __init__(self, own: dict[str, Any]) -> None:
         super().__init__()
@@ -146,10 +146,10 @@ class Cells(dict[str, Any]):
 
 
 class Columns(dict[str, Any]):
-    """Body columns of a view by row: memory views of numbers, arrays (n, k) of vectors; each is looked up when it is first read.
+    """Body columns of a view, by row: memory views for numbers, arrays (n, k) for vectors. Created when first read.
 
     Attributes:
-        xyz: Position east, north, up [m], a memory view (n,) each.
+        xyz: Position east, north and up [m], each a memory view (n,).
     """
 
     def __init__(self, view: Any) -> None:
@@ -165,7 +165,7 @@ class Columns(dict[str, Any]):
 
 
 class PerTeam(MutableMapping[int, Any]):
-    """A column per team in one world: team number -> number."""
+    """A per-team column in one world: team number -> value."""
 
     def __init__(self, values: np.ndarray, teams: dict[int, int], name: str) -> None:
         self._values, self._teams, self._name = values, teams, name
@@ -184,7 +184,7 @@ class PerTeam(MutableMapping[int, Any]):
         self._values[self._place(team)] = value
 
     def __delitem__(self, team: int) -> None:
-        raise TypeError(f"{self._name} has one number for each team")
+        raise TypeError(f"{self._name} has one value per team; values cannot be deleted")
 
     def __iter__(self) -> Iterator[int]:
         return iter(self._teams)
@@ -197,7 +197,7 @@ class PerTeam(MutableMapping[int, Any]):
 
 
 class ReceivedMessage:
-    """One message: its fields as attributes, and `sender`; both it and what fields refer to are entities, or None when gone."""
+    """One message: its fields as attributes, and `sender`. `sender` and `EntityRef` fields are entities, None for removed ones."""
 
     __slots__ = ("_batch", "_i", "_of")
 
@@ -222,6 +222,6 @@ class ReceivedMessage:
         return f"<{self._batch.type.__name__} from {self.sender!r}: {fields}>"
 
 
-def plain(fields: dict[str, Any]) -> dict[str, Any]:
-    """Fields of a message with ids in place of entities."""
+def with_ids(fields: dict[str, Any]) -> dict[str, Any]:
+    """Message fields with entities replaced by their ids."""
     return {name: getattr(value, "_id", value) for name, value in fields.items()}

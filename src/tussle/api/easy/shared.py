@@ -1,4 +1,4 @@
-"""What the entities of one plugin share: columns, searches, draws, messages."""
+"""Data shared by all entities of one easy-mode plugin: columns, neighbour queries, random numbers and messages."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from tussle.api.group import GroupView
 from tussle.errors import ParameterError
 
 
-class Draws:
-    """Random numbers of a view's rows, each drawn for all of them, by law and label.
+class RandomNumbers:
+    """Random numbers for the rows of a view, drawn for all rows at once.
 
     Args:
-        view: Whose rows they are.
+        view: View that draws the numbers.
         n: Number of rows.
     """
 
@@ -23,21 +23,21 @@ class Draws:
         self._of: dict[str, tuple[str, list[list[float]], list[int]]] = {}
 
     def clear(self, prefix: str = "") -> None:
-        """Forget what was drawn: another call begins, whose labels are told from others' by a prefix."""
+        """Start a new call. `prefix` separates the labels of hooks from each other."""
         self._of.clear()
         self._prefix = prefix
 
     def next(self, row: int, law: str, label: str) -> float:
-        """The next number of a row under a label: what `g.uniform(label, k)` and `g.normal(label, k)` give, one after the other.
+        """The next number of a row and label: the values of `g.uniform(label, k)` or `g.normal(label, k)` in order.
 
         Raises:
-            ParameterError: The label has served for numbers of another law in this step.
+            ParameterError: The label was used with another law in this step.
         """
         label = label or law
         drawn, lines, used = self._of.setdefault(label, (law, [], [0] * self._n))
         if drawn != law:
             raise ParameterError(
-                f"the label {label!r} has been drawn as {drawn} in this step, with the same random bits; use another label for {law}"
+                f"label {label!r} is in use for {drawn} numbers in this step, with the same random bits; use another label for {law}"
             )
         j = used[row]
         used[row] = j + 1
@@ -46,8 +46,8 @@ class Draws:
         return lines[j][row]
 
 
-class DrawIn:
-    """Draws shapes in one world; see `tussle.api.draw`."""
+class WorldDraw:
+    """Draw shapes in one world; see `tussle.api.draw`."""
 
     __slots__ = ("_draw", "_world")
 
@@ -59,40 +59,42 @@ class DrawIn:
         return lambda **attributes: shape(**{"world": self._world, **attributes})
 
 
-class Look:
-    """What the entities of one plugin share, until rows change.
+class Shared:
+    """Data shared by all entities of one plugin; valid until rows change.
 
     Attributes:
         plugin: The bound plugin.
-        author: What its author knows as `self`.
+        author: The object passed as `self` to the author's methods.
         g: The view.
-        own: The plugin's columns; `cells`, those of one number.
-        mine: Body columns of the rows, as they believe them to be.
-        truth: Body columns of everybody.
+        own: Columns of the plugin.
+        cells: Columns of one number, as memory views.
+        belief: Body columns of the rows, as the entities believe them to be.
+        truth: True body columns of all entities.
+        entities: The `Me` of each row.
     """
 
     def __init__(self, plugin: Any, g: GroupView) -> None:
-        self.plugin, self.author, self.g = plugin, plugin._for_one(), g
+        self.plugin, self.author, self.g = plugin, plugin._author_self(), g
         self.own: dict[str, Any] = plugin.__dict__
         self.cells = Cells(self.own)
         self.bodies = g.bodies
-        self.mine, self.truth = Columns(g), Columns(g.bodies)
-        self.search, self.draws = Search(g), Draws(g, g.n)
+        self.belief, self.truth = Columns(g), Columns(g.bodies)
+        self.search, self.draws = Search(g), RandomNumbers(g, g.n)
         self.heard: dict[str, Any] = {}
         _, _, id_row, id_start = g._bodies.layout()
         self.id_row: Any = memoryview(id_row)  # type: ignore[arg-type]
         self.id_start: list[int] = id_start.tolist()
-        self.everyone = [plugin.me_type(self, row, world) for row, world in enumerate(g.world.tolist())]
+        self.entities = [plugin.me_type(self, row, world) for row, world in enumerate(g.world.tolist())]
 
     def begin(self, hook: str = "") -> None:
-        """A call begins."""
-        self.mine.clear()
+        """Start a call: discard cached values."""
+        self.belief.clear()
         self.truth.clear()
         self.heard.clear()
         self.search.clear()
         self.draws.clear(hook)
 
     def row_of(self, world: int, entity: int) -> int:
-        """Body row of an id; -1 for 0 and for who is gone."""
+        """Body row of an id; -1 for id 0 and for removed entities."""
         place = self.id_start[world] + entity
         return self.id_row[place] if entity > 0 and place < self.id_start[world + 1] else -1
