@@ -195,11 +195,13 @@ class Rows:
 
 
 def step_rows(plugin: Any, g: GroupView) -> None:
-    """Run a bound plugin's laws once for every row of its view."""
+    """Run a bound plugin's laws once for every row of its view; no law runs whose results nobody reads."""
     own = plugin.__dict__
     if "_rows" not in own:
-        own["_rows"] = Rows(laws_of(plugin, plugin.wired))
-    own["_rows"].run(g, lambda name, place: np.atleast_2d(own[name])[place], g.dt, 1)
+        calls = laws_of(plugin, plugin.wired)
+        own["_rows"] = Rows(calls) if calls else None
+    if own["_rows"] is not None:
+        own["_rows"].run(g, lambda name, place: np.atleast_2d(own[name])[place], g.dt, 1)
 
 
 def advance_rows(model: Any) -> Callable[..., None]:

@@ -15,6 +15,7 @@ from tussle.stock import (
     NoisyState,
     SimpleAircraft,
     SimpleAircraftControllerPID,
+    Still,
     Unicycle,
     Unicycle3D,
     UnicyclePID,
@@ -324,3 +325,28 @@ def test_a_law_may_be_a_device():
     sim = flown(game(bad(), DRIFTING, motion_multiplier=1), 1)
     start = flown(game(bad(), DRIFTING, motion_multiplier=1), 0)
     np.testing.assert_array_equal(sim.read("a.Bad.turn_rate")[0], -start.read("a.yaw")[0])
+
+
+class Constant(Controller):
+    """Reads nothing at all."""
+
+    speed = Output(unit="m/s")
+    rates = Output("turn_rate pitch_rate", unit="rad/s")
+
+    @row_law("speed")
+    @staticmethod
+    def constant(dt):
+        return 3.0 + 0.0 * dt
+
+
+def test_a_controller_whose_results_nobody_reads_does_nothing():
+    sim = Simulation(Mission(blocks=[block(autonomy=Plan(), controller=UnicyclePID(), motion=Still())]))
+    sim.step(3)
+    assert sim.read("a.UnicyclePID.heading")[0].max() == 0.0
+
+
+@pytest.mark.parametrize("rate", [None, 10.0])
+def test_a_law_may_read_nothing(rate):
+    sim = Simulation(Mission(blocks=[block(controller=Constant(rate=rate), motion=Unicycle(vel_max=9.0))]))
+    sim.step()
+    assert sim.read("a.Constant.speed")[0].max() == 3.0
