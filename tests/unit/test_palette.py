@@ -6,9 +6,9 @@ import itertools
 
 import numpy as np
 import pytest
-from tussle.view.looks import Looks
 
 from tussle.palette import GRID, MUTED, NEUTRAL, PAPER, TEAM_COLOURS, colour_of, mixed, rgb_of
+from tussle.view.style import Style
 
 # Machado, Oliveira and Fernandes, IEEE TVCG 15 (2009), 1291-1298: linear RGB as seen by dichromats.
 VISION = {
@@ -39,8 +39,8 @@ def test_teams_differ_by_several_times_what_is_just_seen(vision):
 
 
 def test_the_viewer_and_the_plots_give_a_team_the_same_colour():
-    looks = Looks([], [])
-    assert [looks.colour(team) for team in range(1, 9)] == [rgb_of(colour_of(team)) for team in range(1, 9)]
+    style = Style([], [])
+    assert [style.colour(team) for team in range(1, 9)] == [rgb_of(colour_of(team)) for team in range(1, 9)]
     assert not {GRID, MUTED, PAPER, *NEUTRAL} & set(TEAM_COLOURS)
 
 

@@ -172,7 +172,7 @@ def _said(simulation: Simulation, world: int, who: int) -> list[ShownMessage]:
 
 
 def _under_way(topic: TopicBuffer) -> Iterator[Delivery]:
-    """Parcels that are queued or lie in an inbox, each once."""
+    """Deliveries that are queued or lie in an inbox, each once."""
     known: dict[int, Delivery] = {id(p): p for p in topic.queue}
     for inbox in topic.inboxes:
         known |= {id(p): p for p in inbox.deliveries}

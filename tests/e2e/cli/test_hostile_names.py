@@ -216,6 +216,6 @@ def test_whatever_is_printed_steers_nothing(text):
     with console.capture() as captured:
         console.print(text, Text.assemble((text, "bold"), text), table)
     assert not STEERING.search(captured.get())
-    with pytest.raises(typer.Exit) as caught, terminal.told(False):
+    with pytest.raises(typer.Exit) as caught, terminal.reported(False):
         raise TussleError(text)
     assert caught.value.exit_code == terminal.WRONG_INPUT

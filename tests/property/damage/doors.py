@@ -22,7 +22,6 @@ from unittest import mock
 sys.path.insert(0, str(Path(__file__).parent))
 
 from damages import damage, make_bombs
-from tussle.view.page.replaying import Replay
 from typer.testing import CliRunner
 
 from tussle import Simulation
@@ -37,6 +36,7 @@ from tussle.record import Recorder, load_run, read_table
 from tussle.view.export.html import write_html
 from tussle.view.export.mcap_file import write_mcap
 from tussle.view.export.tables import write_tables
+from tussle.view.page.recorded import RecordedData
 from tussle.view.recording import Recording
 
 SECONDS = 10
@@ -94,17 +94,15 @@ def run(path: Path, _: Path) -> None:
 
 
 def recording(path: Path, _: Path) -> None:
-    replay = Replay(Recording(path))
-    if not replay.recording.n_frames:
+    recorded = Recording(path, is_mapped=True)
+    if not recorded.n_frames:
         return
-    for t in (-1e9, *replay.span, sum(replay.span) / 2, 1e9):
-        replay.seek(t)
-        assert len(replay.frame().pos) >= 0
-        for who in replay.frame().id[:3].tolist():
-            replay.entity(who)
-    for look in ("looks", "scenery", "happenings", "notes", "teams", "name"):
-        getattr(replay, look)
-    replay.result()
+    served = RecordedData(recorded, is_file=False)
+    assert served.document()["nFrames"] == recorded.n_frames
+    for name in served.names:
+        served.blob(name)
+    for look in ("style", "scenery", "events", "notes", "teams", "name"):
+        getattr(recorded, look)
 
 
 def start(path: Path, _: Path) -> None:

@@ -279,9 +279,11 @@ def test_batches_of_messages():
             r"2 lists with items of shape \(2,\); expected 1 lists with items of shape \(2,\)",
         ),
     ):
-        with pytest.raises(ParameterError, match=f"Parcel.points: {text}"):
+        with pytest.raises(ParameterError, match=f"Delivery.points: {text}"):
             Messages.make(Delivery, one, one, {"points": points})
-    with pytest.raises(ParameterError, match=r"Parcel.thing: 3 objects; expected one object, or a list of 2"):
+    with pytest.raises(
+        ParameterError, match=r"Delivery.thing: 3 objects; expected one object, or a list of 2"
+    ):
         Messages.make(Delivery, np.zeros(2, int), np.zeros(2, int), {"thing": ["a", "b", "c"]})
     captured = Messages.make(EntityCaptured, np.zeros(2, int), np.zeros(2, int), {"source": [1, 2]})
     assert captured.source_team.tolist() == [0, 0]

@@ -268,7 +268,7 @@ def test_one_topic_carries_one_type():
         def step(self, g):
             pass
 
-    with pytest.raises(WiringError, match="topic 'Note' on GlobalNetwork carries Note, not Parcel"):
+    with pytest.raises(WiringError, match="topic 'Note' on GlobalNetwork carries Note, not Delivery"):
         Simulation(mission(still("a", Talker(), Shout())))
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from tussle.errors import ParameterError
-from tussle.view import offers, pacing
+from tussle.view import latest, pacing
 from tussle.view.latest import LINGER, LatestValue
 from tussle.view.pacing import Allowance, Pace, Speedometer, checked_warp, faster, slower
 
@@ -22,7 +22,7 @@ class Clock:
 def clock(monkeypatch):
     clock = Clock()
     monkeypatch.setattr(pacing, "time", clock)
-    monkeypatch.setattr(offers, "time", clock)
+    monkeypatch.setattr(latest, "time", clock)
     return clock
 
 
