@@ -22,7 +22,7 @@ import tussle
 
 FIRST_STEP = "import sys; sys.path.insert(0, {here!r}); import game; game.Simulation(game.mission()).step()"
 EDITED = "stock/autonomy/boids/kernels.py"
-BEFORE, AFTER = "        done = 0\n", "        done = b - b\n"
+BEFORE, AFTER = "2.0 * (w * z + x * y)", "(w * z + x * y) * 2.0"
 
 
 def run(code: str, package: Path, cache: Path) -> float:
@@ -34,7 +34,7 @@ def run(code: str, package: Path, cache: Path) -> float:
 
 
 def edit(path: Path) -> None:
-    """Change the code of the largest kernel without changing its results."""
+    """Change the code of a kernel without changing its results."""
     text = path.read_text(encoding="utf-8")
     assert text.count(BEFORE) >= 1
     path.write_text(text.replace(BEFORE, AFTER, 1), encoding="utf-8")
