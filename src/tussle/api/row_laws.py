@@ -1,4 +1,4 @@
-"""Row laws: what a controller or a motion model makes of one entity's numbers, as a function of these."""
+"""Row laws: controllers and motion models as functions of the numbers of one entity."""
 
 from __future__ import annotations
 
@@ -22,25 +22,25 @@ BODY_NUMBERS: dict[str, Value] = {
     **{part: Number(part) for part in BODY},
     **{k: tuple(map(Number, components(k, n))) for k, n in {**FLOATS, **DERIVED}.items() if n > 1},
 }
-"""What body columns and their components are in a kernel: vel_x a number, vel three of them."""
+"""Kernel values of body columns and their components: one number for vel_x, three for vel."""
 
 
 def row_law(*results: str) -> Callable[[Callable[..., Any]], RowLaw]:
     """Declare a function of one row as a law of a controller or a motion model.
 
-    Its arguments are matched by name: `dt` [s]; the plugin's columns, one with fields as a tuple; a single field as `gains_kp` (of a
-    motion model `kp`, as in `derivative`), a channel by its own name; structural parameters. A controller's law may also take body
-    columns of the entity, as it believes them: yaw, climb, roll, vel, pos_z ..., a motion model's force_x ... torque_z and mass,
-    and `substeps`: it then advances by dt in so many, and otherwise by one.
+    Arguments are matched by name: `dt` [s]; columns of the plugin, as tuples if they have fields; single fields such as `gains_kp`
+    (in a motion model `kp`, as in `derivative`); channels; structural parameters. The law of a controller may also take body
+    columns of the entity, as the entity believes them (yaw, climb, roll, vel, pos_z ...). The law of a motion model may take
+    force_x ... torque_z, mass, and `substeps`; with `substeps` it advances by dt in that many substeps, otherwise in one.
 
-    A law that takes an input that is switched off (see `active_inputs`) is not called, nor one whose outputs nobody reads.
+    A law is not called if it takes an inactive input (see `active_inputs`), or if no plugin reads any of its outputs.
 
     Args:
-        *results: What it returns, in order, columns with fields as tuples: own states and outputs, or an output's channel; of a
-            motion model its state, and what the body then is: pos_z, vel, yaw, climb, roll ...
+        *results: Names of the returned values, in order: states, outputs, or channels of outputs; columns with fields are tuples.
+            A motion model returns its state and body columns: pos_z, vel, yaw, climb, roll ...
 
     Raises:
-        DeclarationError: There are no results; when the plugin's class is made, an argument or a result is none of these names.
+        DeclarationError: No results are named; or, when the plugin class is created, an argument or result is unknown.
     """
 
     def declare(function: Callable[..., Any]) -> RowLaw:
@@ -65,10 +65,10 @@ class RowLaw:
             raise DeclarationError(f"{label(function)}: name the results, such as @row_law('turn_rate')")
 
     def check(self, cls: Any, name: str) -> None:
-        """Refuse a law whose arguments or results mean nothing to a plugin.
+        """Check that the plugin class has all arguments and results of the law.
 
         Raises:
-            DeclarationError: One of them means nothing.
+            DeclarationError: An argument or result is unknown.
         """
         kinds = (("argument", self.arguments, arguments_of(cls)), ("result", self.results, results_of(cls)))
         for kind, names, allowed in kinds:
@@ -81,7 +81,7 @@ class RowLaw:
                     )
 
     def call(self, plugin: Any) -> RowCall:
-        """The law as a call in a kernel, for a plugin as data or bound."""
+        """Return the law as a call in a kernel, for an unbound or bound plugin."""
         cls: Any = type(plugin)
         takes, gives = arguments_of(cls), results_of(cls)
         arguments = [takes[name] or Text(repr(plugin.values[name])) for name in self.arguments]
@@ -89,7 +89,7 @@ class RowLaw:
 
 
 def own_numbers(cls: Any) -> dict[str, tuple[Number, ...]]:
-    """The numbers of each column of a plugin."""
+    """Return the numbers of each column of a plugin class."""
     return {
         name: tuple(Number((name, place)) for place in range(len(declared.fields) or 1))
         for name, declared in cls.declared(Numbers).items()
@@ -99,7 +99,7 @@ def own_numbers(cls: Any) -> dict[str, tuple[Number, ...]]:
 
 @lru_cache(maxsize=256)
 def arguments_of(cls: Any) -> dict[str, Value | None]:
-    """What each argument that a class's laws may have is in a kernel; None is a structural parameter."""
+    """Return the kernel value of each possible argument; None for structural parameters."""
     is_motion = cls.kind == "motion"
     found: dict[str, Value | None] = {"dt": Text("dt")}
     if is_motion:
@@ -116,14 +116,14 @@ def arguments_of(cls: Any) -> dict[str, Value | None]:
         names = column.channels if is_channel else column.fields
         plain = is_motion or is_channel
         parts = {each if plain else f"{name}_{each}": n for each, n in zip(names, numbers, strict=False)}
-        # What passes a channel on has it twice: by its name goes what comes in.
+        # An input and an output may share a channel; as an argument its name means the input.
         single = {**parts, **single} if isinstance(column, Output) else {**single, **parts}
     return found | whole | single
 
 
 @lru_cache(maxsize=256)
 def results_of(cls: Any) -> dict[str, Value]:
-    """What each result that a class's laws may have is in a kernel."""
+    """Return the kernel value of each possible result."""
     found: dict[str, Value] = dict(BODY_NUMBERS) if cls.kind == "motion" else {}
     for name, numbers in own_numbers(cls).items():
         column = cls.columns[name]
@@ -135,7 +135,7 @@ def results_of(cls: Any) -> dict[str, Value]:
 
 
 def laws_of(plugin: Any, wired: Collection[str] | None = None) -> list[RowCall]:
-    """Calls of the laws that a plugin, as data or bound, runs; `wired` are its outputs that somebody reads, None for all."""
+    """Return the calls of the laws that a plugin runs; `wired` names the outputs that other plugins read, None means all."""
     cls = type(plugin)
     inputs = cls.inputs()
     active = plugin.active_inputs() if hasattr(plugin, "active_inputs") else inputs
@@ -152,14 +152,14 @@ def laws_of(plugin: Any, wired: Collection[str] | None = None) -> list[RowCall]:
 
 
 class Rows:
-    """Some laws' kernel over the rows of a view, and where its columns come from.
+    """A kernel that runs row laws over the rows of a view, and the columns that it loads and stores.
 
-    Own columns, whose keys are tuples, are loaded where a law reads them first, and stored where one writes them. Body columns are
-    loaded; what laws make of them passes from substep to substep only.
+    Columns of plugins, whose keys are tuples, are loaded if a law reads them before it writes them, and stored if a law writes them.
+    Body columns are loaded; the values that laws return for them are used in later substeps only.
 
     Args:
         calls: The laws, in order.
-        held: Body numbers that stay as they are seen, whatever a law says.
+        held: Body numbers that stay constant over all substeps.
     """
 
     def __init__(self, calls: Sequence[RowCall], held: Collection[Number] = ()) -> None:
@@ -182,7 +182,7 @@ class Rows:
         self.kernel = RowKernel(calls, {"own": self.given}, {"out": self.kept}, head)
 
     def run(self, g: GroupView, own: Callable[..., np.ndarray], dt: float, substeps: int) -> None:
-        """Run the laws for every row of a view, substeps times by dt [s] each; `own` gives the column of a key, (n,)."""
+        """Run the laws for all rows of a view, in substeps of dt [s] each; `own` returns the column of a key, (n,)."""
 
         def column(number: Number) -> np.ndarray:
             if isinstance(number.key, tuple):
@@ -195,7 +195,7 @@ class Rows:
 
 
 def step_rows(plugin: Any, g: GroupView) -> None:
-    """Run a bound plugin's laws once for every row of its view; no law runs whose results nobody reads."""
+    """Run the laws of a bound plugin once for all rows of its view."""
     own = plugin.__dict__
     if "_rows" not in own:
         calls = laws_of(plugin, plugin.wired)
@@ -205,7 +205,7 @@ def step_rows(plugin: Any, g: GroupView) -> None:
 
 
 def advance_rows(model: Any) -> Callable[..., None]:
-    """The compiled function (x, u, p, dt, substeps) of a motion model, as data or bound, that is written as row laws."""
+    """Return the compiled function (x, u, p, dt, substeps) of a motion model that is written as row laws."""
     cls: Any = type(model)
     arguments, own = arguments_of(cls), own_numbers(cls)
     state = next(k for k, c in model.states().items() if c.fields)

@@ -9,12 +9,7 @@ from collections.abc import Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Self
-
-from rich.console import Group
-from rich.live import Live
-from rich.progress import BarColumn, Progress
-from rich.text import Text
+from typing import Any
 
 from tussle.batch import store
 from tussle.batch.batch import Batch
@@ -29,15 +24,15 @@ from tussle.batch.variables import parse_variable
 from tussle.cli.batch_summary import compare_hash, show_batch
 from tussle.cli.interrupt import Interrupt
 from tussle.cli.play import FOR_VIEWER, Source, simulate
-from tussle.cli.progress import BAR_EVERY, LINE_EVERY, clock, compiling, text_column, times
+from tussle.cli.progress import ProgressMeter, compiling
 from tussle.cli.settings import ending_by_time
-from tussle.cli.terminal import err, say, say_note
+from tussle.cli.terminal import say, say_note
 from tussle.errors import BatchError, ParameterError, RecordError
 from tussle.record import Recorder, load_run
 
 
 @dataclass(frozen=True)
-class Asked:
+class BatchOptions:
     """What the command line says of a batch; None where it says nothing.
 
     Attributes:
@@ -126,7 +121,7 @@ class Asked:
         return nullcontext(batch.executor(self.processes, self.stack))
 
 
-def play_batch(asked: Asked, command: Sequence[str]) -> int:
+def play_batch(asked: BatchOptions, command: Sequence[str]) -> int:
     """Play a batch, or what is missing of it, and show what came of it.
 
     Returns:
@@ -147,7 +142,7 @@ def play_batch(asked: Asked, command: Sequence[str]) -> int:
         try:
             with BatchMeter(batch, interrupt, has_total=until is None) as meter:
                 results = batch.play(
-                    directory, executor, until=until, command=command, on_progress=meter.show
+                    directory, executor, until=until, command=command, on_progress=meter.show_batch
                 )
             if meter.n_before:
                 n = min(meter.n_before, results.n_runs)
@@ -231,81 +226,43 @@ class Interrupted(Exception):  # noqa: N818 - it is no error
     """The user wants the batch to stop."""
 
 
-class BatchMeter:
-    """Shows how far a batch is: a bar and the result so far on a terminal, a line now and then elsewhere.
+class BatchMeter(ProgressMeter):
+    """Shows the progress of a batch and the result so far.
 
     Args:
-        batch: What is played.
-        interrupt: Where Ctrl-C is heard.
-        has_total: It is known how many runs there will be.
+        batch: The batch.
+        interrupt: Says whether the user pressed Ctrl-C.
+        has_total: The number of runs is known.
 
     Attributes:
-        n_before: Runs that were there before.
-        n_new: Runs that were played since.
+        n_new: Runs that were played since the start.
     """
 
     def __init__(self, batch: Batch, interrupt: Interrupt, has_total: bool = True) -> None:
-        self.n_before = self.n_new = 0
-        self._has_total = has_total
-        self._names = batch.team_names
-        self._interrupt = interrupt
-        self._began = time.perf_counter()
-        self._is_bar = err().is_terminal
-        self._due = self._began + (0.0 if self._is_bar else LINE_EVERY)
-        self._bar = Progress(
-            text_column("{task.description}", style="bold"),
-            BarColumn(bar_width=None, complete_style="cyan", finished_style="cyan", pulse_style="cyan"),
-            text_column("{task.fields[at]}"),
-            text_column("{task.fields[rate]}", style="cyan"),
-            text_column("{task.fields[left]}", style="dim"),
-            auto_refresh=False, expand=True,
-        )  # fmt: skip
-        total = batch.plan.n_runs if has_total else None
-        self._task = self._bar.add_task(batch.name, total=total, at="", rate="", left="")
-        self._live = Live(self._bar, console=err(), auto_refresh=False, transient=True)
+        super().__init__(batch.name, "runs", speed_unit="runs/s")
+        self.n_new = 0
+        self._has_total, self._names, self._interrupt = has_total, batch.team_names, interrupt
 
-    def __enter__(self) -> Self:
-        if self._is_bar:
-            self._live.start()
-        return self
+    @property
+    def n_before(self) -> int:
+        """Runs that had been played before."""
+        return int(self.before)
 
-    def __exit__(self, *_: object) -> None:
-        if self._is_bar:
-            self._live.stop()
-
-    def show(self, progress: BatchProgress) -> None:
-        """The batch has come so far.
+    def show_batch(self, progress: BatchProgress) -> None:
+        """Show the progress of the batch.
 
         Raises:
-            Interrupted: The user has asked for an end.
+            Interrupted: The user pressed Ctrl-C.
         """
-        self.n_before, self.n_new = progress.n_before, progress.n_done - progress.n_before
+        self.before, self.n_new = progress.n_before, progress.n_done - progress.n_before
         if self._interrupt.code:
             raise Interrupted
-        now = time.perf_counter()
-        if now < self._due:
-            return
-        self._due = now + (BAR_EVERY if self._is_bar else LINE_EVERY)
-        played = progress.n_done - progress.n_before + progress.under_way
-        rate = played / max(now - self._began, 1e-9)
-        fields: dict[str, Any] = {
-            "at": f"{progress.n_done:,} runs",
-            "rate": f"{times(rate)} runs/s",
-            "left": "",
-        }
-        if self._has_total:
-            fields["at"] = f"{progress.n_done:,}/{progress.n_runs:,} runs"
-            left = progress.n_runs - progress.n_done - progress.under_way
-            fields["left"] = f"{clock(max(0.0, left / rate))} left" if rate > 0.0 else ""
-        result = self._result(progress)
-        if self._is_bar:
-            total = progress.n_runs if self._has_total else None
-            self._bar.update(
-                self._task, total=total, completed=progress.n_done + progress.under_way, **fields
-            )
-            self._live.update(Group(self._bar, Text(result, style="dim")), refresh=True)
-        else:
-            err().print(", ".join(text for text in [*fields.values(), result] if text), soft_wrap=True)
+        self.show(
+            progress.n_done + progress.under_way,
+            progress.n_runs if self._has_total else None,
+            n_finished=progress.n_done,
+            result=lambda: self._result(progress),
+        )
 
     def _result(self, progress: BatchProgress) -> str:
         wins = {

@@ -177,10 +177,10 @@ def batch(
     if scheduler is not None and slurm is not None:
         raise typer.BadParameter("--scheduler and --slurm are two places to play; give one of them")
     with reported(debug):
-        from tussle.cli.batch import Asked, play_batch
+        from tussle.cli.batch import BatchOptions, play_batch
 
         source = mission_source(mission, settings, more, seed, end, strict, plugin_files, allow_large)
-        asked = Asked(
+        asked = BatchOptions(
             source, runs, tuple(vary or ()), sweep, sample, samples, sample_seed, independent, until, directory,
             processes, stack, run_timeout, scheduler, slurm, log,
         )  # fmt: skip

@@ -41,7 +41,7 @@ def doctor(debug: Debug = False) -> None:
             )
             facts.add_row(f" extra {extra}", text)
         facts.add_row(" kernels", f"kept in {home_short(store.directory())}")
-        facts.add_row(" threads", f"{os.cpu_count()} processors")
+        facts.add_row(" processors", str(os.cpu_count()))
         show(facts)
         with compiling():
             state_hash, speed = play()

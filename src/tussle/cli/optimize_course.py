@@ -6,12 +6,7 @@ import time
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any, Self
-
-from rich.console import Group
-from rich.live import Live
-from rich.progress import BarColumn, Progress
-from rich.text import Text
+from typing import Any
 
 from tussle.batch.points import settings_of
 from tussle.batch.search.optimization import Optimization, SearchProgress
@@ -19,8 +14,8 @@ from tussle.cli.batch import Interrupted
 from tussle.cli.interrupt import Interrupt
 from tussle.cli.optimize_summary import interval, play_again, show_study
 from tussle.cli.play import FOR_VIEWER, Source
-from tussle.cli.progress import BAR_EVERY, LINE_EVERY, clock, compiling, text_column
-from tussle.cli.terminal import err, say, say_note
+from tussle.cli.progress import ProgressMeter, compiling
+from tussle.cli.terminal import say, say_note
 
 
 def search(
@@ -67,7 +62,12 @@ def search(
         meter = exits.enter_context(SearchMeter(optimization, interrupt))
         try:
             study = optimization.play(
-                directory, trials, processes=processes, stack=stack, command=command, on_progress=meter.show
+                directory,
+                trials,
+                processes=processes,
+                stack=stack,
+                command=command,
+                on_progress=meter.show_search,
             )
         except Interrupted:
             kept = f"{meter.n_done} trials are kept" if meter.n_done != 1 else "1 trial is kept"
@@ -81,66 +81,35 @@ def search(
     return show_study(study, optimization, directory, time.perf_counter() - began, n_new, again)
 
 
-class SearchMeter:
-    """Shows how far a search is: a bar and the best so far on a terminal, a line now and then elsewhere.
+class SearchMeter(ProgressMeter):
+    """Shows the progress of a search and the best trial so far.
 
     Args:
         optimization: The search.
-        interrupt: Where Ctrl-C is heard.
+        interrupt: Says whether the user pressed Ctrl-C.
 
     Attributes:
-        n_before: Trials that were there before.
+        n_before: Trials that had been evaluated before.
         n_done: Trials that are finished.
     """
 
     def __init__(self, optimization: Optimization, interrupt: Interrupt) -> None:
+        super().__init__(optimization.name, "trials")
         self.n_before = self.n_done = 0
         self._search, self._interrupt = optimization, interrupt
-        self._began = time.perf_counter()
-        self._is_bar = err().is_terminal
-        self._due = self._began + (0.0 if self._is_bar else LINE_EVERY)
-        self._bar = Progress(
-            text_column("{task.description}", style="bold"),
-            BarColumn(bar_width=None, complete_style="cyan", finished_style="cyan", pulse_style="cyan"),
-            text_column("{task.fields[at]}"),
-            text_column("{task.fields[left]}", style="dim"),
-            auto_refresh=False, expand=True,
-        )  # fmt: skip
-        self._task = self._bar.add_task(optimization.name, total=None, at="", left="")
-        self._live = Live(self._bar, console=err(), auto_refresh=False, transient=True)
 
-    def __enter__(self) -> Self:
-        if self._is_bar:
-            self._live.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._is_bar:
-            self._live.stop()
-
-    def show(self, progress: SearchProgress) -> None:
-        """Show how far the search is.
+    def show_search(self, progress: SearchProgress) -> None:
+        """Show the progress of the search.
 
         Raises:
             Interrupted: The user pressed Ctrl-C.
         """
-        self.n_before, self.n_done = progress.n_before, progress.n_done
+        self.before = self.n_before = progress.n_before
+        self.n_done = progress.n_done
         if self._interrupt.code:
             raise Interrupted
-        now = time.perf_counter()
-        if now < self._due:
-            return
-        self._due = now + (BAR_EVERY if self._is_bar else LINE_EVERY)
-        completed = progress.n_done + progress.n_round * progress.played
-        rate = (completed - progress.n_before) / max(now - self._began, 1e-9)
-        at = f"{progress.n_done:,}/{progress.n_trials:,} trials"
-        left = "" if rate <= 0.0 else f"{clock(max(0.0, progress.n_trials - completed) / rate)} left"
-        best = self._best(progress)
-        if self._is_bar:
-            self._bar.update(self._task, total=progress.n_trials, completed=completed, at=at, left=left)
-            self._live.update(Group(self._bar, Text(best, style="dim")), refresh=True)
-        else:
-            err().print(", ".join(text for text in (at, left, best) if text), soft_wrap=True)
+        done = progress.n_done + progress.n_round * progress.played
+        self.show(done, progress.n_trials, n_finished=progress.n_done, result=lambda: self._best(progress))
 
     def _best(self, progress: SearchProgress) -> str:
         parts = []

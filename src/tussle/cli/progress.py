@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Self
 
+from rich.console import Group
+from rich.live import Live
 from rich.progress import BarColumn, Progress, TextColumn
 from rich.status import Status
 from rich.text import Text
@@ -32,10 +34,14 @@ class ProgressMeter:
         unit: Unit of the amount done, such as "s" or "states".
         start: Amount done at the start.
         speed_unit: Unit of the amount done per second of wall time; if empty, the speed is not shown.
+
+    Attributes:
+        before: Amount that was done before the task began, and does not count for the speed.
     """
 
     def __init__(self, name: str, unit: str, start: float = 0.0, speed_unit: str = "") -> None:
         self._name, self._unit, self._start, self._speed_unit = name, unit, start, speed_unit
+        self.before = start
         self._began = time.perf_counter()
         self._is_bar = err().is_terminal
         self._due = self._began + (0.0 if self._is_bar else LINE_EVERY)
@@ -45,44 +51,56 @@ class ProgressMeter:
             text_column("{task.fields[at]}"),
             text_column("{task.fields[speed]}", style="cyan"),
             text_column("{task.fields[left]}", style="dim"),
-            console=err(), auto_refresh=False, transient=True, expand=True,
+            auto_refresh=False, expand=True,
         )  # fmt: skip
         self._task = self._bar.add_task(name, total=None, at="", speed="", left="")
+        self._live = Live(self._bar, console=err(), auto_refresh=False, transient=True)
 
     def __enter__(self) -> Self:
         if self._is_bar:
-            self._bar.start()
+            self._live.start()
         return self
 
     def __exit__(self, *_: object) -> None:
         if self._is_bar:
-            self._bar.stop()
+            self._live.stop()
 
-    def show(self, done: float, total: float | None = None) -> None:
-        """Show the amount done, of a total if it is known. Returns at once if an update is not due."""
+    def show(
+        self,
+        done: float,
+        total: float | None = None,
+        *,
+        n_finished: int | None = None,
+        result: Callable[[], str] | None = None,
+    ) -> None:
+        """Show the amount done, of a total if it is known. Returns at once if an update is not due.
+
+        Args:
+            done: Amount done.
+            total: Amount at the end.
+            n_finished: Number that is shown instead of the amount done, if this also counts parts of what is in progress.
+            result: Returns the result so far, which is shown below the bar.
+        """
         now = time.perf_counter()
         if now < self._due:
             return
         self._due = now + (BAR_EVERY if self._is_bar else LINE_EVERY)
-        rate = (done - self._start) / max(now - self._began, 1e-9)
-        at = f"{done:,.0f}" + ("" if total is None else f"/{total:,.10g}") + f" {self._unit}"
+        rate = (done - self.before) / max(now - self._began, 1e-9)
+        shown = done if n_finished is None else n_finished
+        at = f"{shown:,.0f}" + ("" if total is None else f"/{total:,.10g}") + f" {self._unit}"
         speed = f"{times(rate)} {self._speed_unit}" if self._speed_unit else ""
-        left = "" if total is None or rate <= 0.0 else f"{clock((total - done) / rate)} left"
+        left = "" if total is None or rate <= 0.0 else f"{clock(max(0.0, total - done) / rate)} left"
+        below = result() if result else ""
         if self._is_bar:
             span = None if total is None else total - self._start
             self._bar.update(
-                self._task,
-                completed=done - self._start,
-                total=span,
-                at=at,
-                speed=speed,
-                left=left,
-                refresh=True,
+                self._task, completed=done - self._start, total=span, at=at, speed=speed, left=left
             )
+            parts = [self._bar, Text(below, style="dim")] if below else [self._bar]
+            self._live.update(Group(*parts), refresh=True)
         else:
-            err().print(
-                f"{self._name}: " + ", ".join(text for text in (at, speed, left) if text), soft_wrap=True
-            )
+            texts = [text for text in (at, speed, left, below) if text]
+            err().print(f"{self._name}: " + ", ".join(texts), soft_wrap=True)
 
 
 def times(factor: float) -> str:

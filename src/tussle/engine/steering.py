@@ -1,4 +1,4 @@
-"""Controllers and motion model of a group in one kernel over all substeps, where all of them are written as row laws."""
+"""Runs the controllers and the motion model of a group in one kernel over all substeps, if all of them are row laws."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from tussle.numeric.row_kernel import Item, Number, RowCall, numbers_of
 
 
 class Steering:
-    """The substeps of a group between one step's autonomies and sensors.
+    """All substeps of a group in one step.
 
-    Rows are worked block by block, all substeps of a block before the next; what controllers read of the body between two substeps
-    comes from the motion model's law, and the body table is written once, behind the last.
+    The kernel processes the rows in blocks and completes all substeps of a block before the next block. Between substeps,
+    controllers read the body values that the law of the motion model returns. The body table is written after the last substep.
     """
 
     def __init__(self, group: Group, rows: Rows) -> None:
         self.group, self.rows = group, rows
 
     def run(self, dt: float, substeps: int) -> None:
-        """Control and move all rows over some substeps of dt [s]."""
+        """Run controllers and motion of all rows for a number of substeps of dt [s]."""
         group = self.group
         table = group.table
         self.rows.run(group.steering, lambda dtype, row: table.arrays[dtype][row], dt, substeps)
@@ -31,7 +31,11 @@ class Steering:
 
 
 def steering_of(group: Group) -> Steering | None:
-    """The one kernel of a group; None where a plugin is no row law, has a rate, or reads of the body what the model's law does not give."""
+    """Return the kernel of a group, or None if there is none.
+
+    There is none if a plugin has no row laws or has a rate, or if a controller reads body values that the law of the motion model
+    does not return.
+    """
     motion = group.motion
     if not all(_is_law(b) for b in group.controllers) or not _flies_by_law(motion):
         return None
@@ -59,7 +63,7 @@ def _flies_by_law(binding: Binding) -> bool:
 
 
 def placed(call: RowCall, group: Group, binding: Binding) -> RowCall:
-    """A call whose own columns are rows of the group's table: what one plugin writes is then what the next one reads."""
+    """Return the call with plugin columns replaced by rows of the group's table, so that plugins share connected channels."""
 
     def at(item: Item) -> Item:
         if not isinstance(item, Number) or not isinstance(item.key, tuple):

@@ -8,15 +8,15 @@ from tussle.numeric.kernel import device
 
 @device
 def pid(error, change, dt, kp, ki, kd, band, integral):
-    """Command and new integral of one PID step.
+    """Return the command and the new integral of one PID step.
 
-    u = kp e + ki I + kd de/dt; the integral is emptied while |e| > band, which keeps it from winding up far from the
+    u = kp e + ki I + kd de/dt; the integral is reset to 0 while |e| > band, which keeps it from winding up far from the
     goal.
 
     Args:
-        error: Wanted value minus measured value e; of an angle, wrapped to (-pi, pi].
+        error: Desired minus measured value e; of an angle, wrapped to (-pi, pi].
         change: Change of the error since the last call (of an angle, wrapped too); 0 at the first call, so that the
-            wanted value itself is not differentiated (no kick).
+            desired value itself is not differentiated (no kick).
         dt: Time since the last call [s], > 0.
         kp: Gain on the error.
         ki: Gain on the integral.
@@ -34,10 +34,10 @@ def pid(error, change, dt, kp, ki, kd, band, integral):
 
 @device
 def pid_loop(error, gains, memory, dt):
-    """Command and new memory of a loop's call.
+    """Return the command and the new memory of a PID loop.
 
     Args:
-        error: Wanted value minus measured value.
+        error: Desired minus measured value.
         gains: kp, ki, kd, band.
         memory: Integral, last error, and 1.0 once there is a last error.
         dt: Time since the last call [s].
@@ -50,7 +50,7 @@ def pid_loop(error, gains, memory, dt):
 
 @device
 def pid_angle_loop(error, gains, memory, dt):
-    """As `pid_loop`, of an angle [rad]: neither the error nor its change jumps where it passes from +pi to -pi."""
+    """Like `pid_loop`, for an angle [rad]: error and change are wrapped to (-pi, pi]."""
     kp, ki, kd, band = gains
     integral, last, has_error = memory
     error = wrap(error)

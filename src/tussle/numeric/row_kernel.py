@@ -1,4 +1,4 @@
-"""Functions of one row as a kernel over all rows: block of rows by block of rows, all calls of a block before the next."""
+"""Compiles functions of one row into a kernel over all rows, which processes the rows in blocks."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from tussle.numeric.kernel import Device, device, kernel
 from tussle.numeric.rk4 import label
 
 BLOCK = 128
-"""Rows that are worked on together: what a step's calls read and write of them stays in the first-level cache."""
+"""Rows per block: the values of a block fit into the first-level cache."""
 
 
 @dataclass(frozen=True)
 class Number:
-    """A number of the row; equal ones are the same number."""
+    """A number of the row, identified by its key."""
 
     key: Hashable
 
 
 @dataclass(frozen=True)
 class Text:
-    """What is the same for all rows, as it stands in the kernel: "dt", "substeps", a constant; or "_", a result that nobody needs."""
+    """Source text of a value that is the same for all rows ("dt", "substeps", a constant), or "_" for an unused result."""
 
     text: str
 
@@ -37,14 +37,14 @@ Value = Item | tuple[Item, ...]
 
 @dataclass(frozen=True)
 class RowCall:
-    """A call of a function of one row, which takes and returns numbers and tuples of numbers."""
+    """A call of a function of one row. It takes and returns numbers and tuples of numbers."""
 
     function: Callable[..., Any]
     arguments: tuple[Value, ...]
     results: tuple[Value, ...]
 
     def replaced(self, argument: Callable[[Item], Item], result: Callable[[Item], Item]) -> RowCall:
-        """The call with other numbers or texts."""
+        """Return the call with replaced arguments and results."""
 
         def each(change: Callable[[Item], Item], values: Iterable[Value]) -> tuple[Value, ...]:
             return tuple(tuple(map(change, v)) if isinstance(v, tuple) else change(v) for v in values)
@@ -53,7 +53,7 @@ class RowCall:
 
 
 def numbers_of(values: Iterable[Value]) -> Iterator[Number]:
-    """The numbers of the row in arguments or results."""
+    """Yield the numbers of the row in arguments or results."""
     for value in values:
         if isinstance(value, tuple):
             yield from numbers_of(value)
@@ -62,19 +62,19 @@ def numbers_of(values: Iterable[Value]) -> Iterator[Number]:
 
 
 class RowKernel:
-    """A kernel that makes some calls in turn for every row, again for every substep.
+    """A kernel that makes a sequence of calls for each row, once per substep.
 
-    The numbers of a block of rows lie in one scratch array, a line for each: at fixed distances in one array LLVM sees that lines do
-    not overlap, and takes rows as SIMD lanes.
+    All numbers of a block of rows are lines of one scratch array. LLVM can then prove that the lines do not overlap, and vectorizes
+    over the rows.
 
     Args:
         calls: The calls.
-        given: What is loaded: name of an argument, 2-D array or tuple of columns (n,), -> the numbers in it.
-        kept: What is stored, likewise; numbers that stand one after the other in what is given, or follow it.
-        head: Signature, arguments, and as texts which rows are meant and how often the calls are made.
+        given: Values to load: name of an argument, a 2-D array or a tuple of columns (n,), -> its numbers.
+        kept: Values to store, likewise. Numbers of one argument must be consecutive lines of the scratch array.
+        head: Signature, arguments, and the source texts of the row range and of the number of substeps.
 
     Raises:
-        DeclarationError: When first called: a function cannot be compiled, or does not return what is expected.
+        DeclarationError: On the first call: a function cannot be compiled, or does not return the declared results.
     """
 
     def __init__(
@@ -96,13 +96,13 @@ class RowKernel:
         text = [f"def row_kernel({arguments}):", *self._lines(given, kept, rows, times)]
         exec("\n".join(text) + "\n", scope)  # noqa: S102 - written here; what authors wrote is in functions of its own
         made = scope["row_kernel"]
-        # An author's function makes the kernel the author's, which may be run as Python.
+        # A kernel with a function of a plugin author belongs to the author's module, and so may run as Python.
         made.__module__ = next((f for f in functions if package(f) != "tussle"), functions[0]).__module__
         made.__qualname__ = "+".join(dict.fromkeys(f.__qualname__ for f in functions))
         self.kernel = kernel(signature)(made)
 
     def _text(self, value: Value) -> str:
-        """An argument or result as it stands in the kernel."""
+        """Return the source text of an argument or result."""
         if isinstance(value, tuple):
             return f"({''.join(f'{self._text(each)}, ' for each in value)})"
         return value.text if isinstance(value, Text) else f"work[{self._line[value]}, l]"
@@ -160,14 +160,14 @@ class RowKernel:
 
 
 def shape_of(value: Any) -> str:
-    """In words how many numbers a function returns."""
+    """Describe the structure of a returned value for messages."""
     if not isinstance(value, tuple):
         return "a number"
     return f"({', '.join(shape_of(each) for each in value)})"
 
 
 def read_first(calls: Iterable[RowCall]) -> list[Number]:
-    """The numbers that are read before a call has written them."""
+    """Return the numbers that a call reads before any call has written them."""
     found: dict[Number, None] = {}
     written: set[Number] = set()
     for call in calls:

@@ -171,6 +171,15 @@ def load_run(path: str | Path, frames: str = "", *, is_mapped: bool = False) -> 
         raise ParameterError(
             f"frames = {frames!r} is not allowed{nearest_name(frames, FRAMES)}; {listed(FRAMES)}"
         )
+    return Run(run_directory(path), frames, is_mapped=is_mapped)
+
+
+def run_directory(path: str | Path) -> Path:
+    """The path of a run directory.
+
+    Raises:
+        RecordError: It is not a run directory.
+    """
     place = Path(path)
     if not any((place / name).exists() for name in FILES):
         reason = (
@@ -181,4 +190,4 @@ def load_run(path: str | Path, frames: str = "", *, is_mapped: bool = False) -> 
             else f"it has none of {', '.join(FILES)}"
         )
         raise RecordError(f"{place}: it is not a run directory; {reason}")
-    return Run(place, frames, is_mapped=is_mapped)
+    return place

@@ -1,4 +1,4 @@
-"""Carries out what those who watch a game order, between its steps, and plays on in between."""
+"""Plays a game and executes the orders of its viewers between steps."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ BURST = 0.004
 
 @dataclass(frozen=True, eq=False)
 class Order:
-    """Something to be done between two steps.
+    """An order to be executed between two steps.
 
     Attributes:
         do: Does it.
@@ -38,7 +38,7 @@ class Order:
 
 
 class PlaybackController:
-    """Plays a game and carries out orders, in one thread or in whoever gives them.
+    """Plays a game and executes orders, in a thread of its own or in the caller's.
 
     Args:
         player: The game.
@@ -80,7 +80,7 @@ class PlaybackController:
     # -- from any thread --------------------------------------------------------------------------------------------------------
 
     def give(self, order: Order) -> None:
-        """Have something done between two steps."""
+        """Queue an order."""
         if order.is_seek:
             for other in list(self._orders):
                 if other.is_seek:
@@ -93,23 +93,23 @@ class PlaybackController:
             self._orders.remove(order)
 
     def ring(self) -> None:
-        """Wake it where it sleeps: there is something to be looked after."""
+        """Wake the playing thread."""
         self._bell.set()
 
     def end(self) -> None:
-        """Return from `run` after the step in hand."""
+        """Make `run` return after the current step."""
         self._is_stopping = True
         self._bell.set()
 
     @property
     def is_seeking(self) -> bool:
-        """It is on its way to another time through steps that have been seen before."""
+        """Whether steps are being replayed on the way to another time."""
         return self._is_going and self.player.step < self.player.last_step
 
     # -- the loop -----------------------------------------------------------------------------------------------------------------
 
     def run(self) -> None:
-        """Carry out orders and play, until `end`."""
+        """Execute orders and play, until `end`."""
         while not self._is_stopping:
             self._bell.clear()
             has_worked = self.work(may_play=True)
@@ -123,12 +123,12 @@ class PlaybackController:
         self.player.rest(time.perf_counter() - began)
 
     def drain(self) -> None:
-        """Carry out all orders, and return."""
+        """Execute all queued orders."""
         while self.work(may_play=False):
             pass
 
     def work(self, may_play: bool) -> bool:
-        """Do the next thing; False where there is nothing to be done now."""
+        """Execute the next order or step; return False if there is none."""
         self._wait = None
         if self._orders and (self._goal is None or self._orders[0].may_cut_in):
             self._carry_out(self._orders.popleft())
@@ -198,14 +198,14 @@ class PlaybackController:
     # -- orders -------------------------------------------------------------------------------------------------------------------
 
     def move(self, n: int) -> None:
-        """Make n steps, or go back -n."""
+        """Advance n steps, or go back -n."""
         if n < 0:
             self.go(self.player.step + n)
         else:
             self._goal = self.player.step + n
 
     def go(self, step: int) -> None:
-        """Go to a step, back or forth."""
+        """Go to an earlier or later step."""
         was_broken = self.player.is_broken
         self._is_going = True
         self._goal = self.player.wind(step)
@@ -215,7 +215,7 @@ class PlaybackController:
             self.error = None
 
     def begin_anew(self, seed: int | None) -> None:
-        """Begin anew, with another seed where one is given."""
+        """Restart, with another seed if one is given."""
         self._goal, self._is_going, self.error = None, False, None
         self.epoch += 1
         self.sketchbook.clear()
@@ -224,5 +224,5 @@ class PlaybackController:
         self.speed.restart()
 
     def say(self, type_: type[Message], network: str, topic: str, fields: dict[str, Any]) -> None:
-        """Say something to the plugins."""
+        """Publish a message to the plugins."""
         self.player.publish(type_, network, topic, fields)

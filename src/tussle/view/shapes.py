@@ -27,10 +27,6 @@ class Mesh:
             array.flags.writeable = False
             object.__setattr__(self, name, array)
 
-    def faceted(self) -> Mesh:
-        """The same with corners of its own for each triangle, so that edges are drawn sharp."""
-        return Mesh(self.vertices[self.faces.ravel()], np.arange(3 * len(self.faces)).reshape(-1, 3))
-
     def placed(self, scale: float | Sequence[float] = 1.0, at: Sequence[float] = (0.0, 0.0, 0.0)) -> Mesh:
         """The same larger by a factor > 0, one or one per axis, and moved [m]."""
         return Mesh(self.vertices * np.asarray(scale, float) + np.asarray(at, float), self.faces)

@@ -146,7 +146,7 @@ def end(process, seconds=600.0):
     finally:
         if members(process.pid):
             os.killpg(process.pid, signal.SIGKILL)
-    passing = re.compile(r"[\d,/]+ runs, |compil(ing|ed) ")
+    passing = re.compile(r"(?!note|error)[^:]*: [\d,/]+ runs, |compil(ing|ed) ")
     told = [line for line in err.splitlines(keepends=True) if not passing.match(line)]
     return process.returncode, out, "".join(told)
 

@@ -123,7 +123,7 @@ def test_what_cannot_be_done_is_told_in_one_line(tussle, played, folder):
     (folder / "empty").mkdir()
     for arguments, message in (
         (("nowhere", "--mp4"), "nowhere: it is not a run directory"),
-        (("empty", "--csv"), "empty: no run has been recorded there"),
+        (("empty", "--csv"), "empty: it is not a run directory"),
         (("game.xml", "--png"), "game.xml: it is not a run directory"),
         (("played", "--mp4", "nowhere/a.mp4"), "nowhere/a.mp4: cannot be written: No such file or directory"),
         (("played", "--csv", "nowhere/a.csv"), "nowhere/a.csv: cannot be written: No such file or directory"),

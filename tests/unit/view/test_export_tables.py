@@ -112,7 +112,7 @@ def test_a_large_run_does_not_fill_the_memory(tmp_path):
 def test_what_cannot_be_is_refused_and_leaves_nothing(played, tmp_path, kind):
     with pytest.raises(ParameterError, match=r"kind = 'cvs' is not allowed \(did you mean 'csv'\?\)"):
         write_tables(played, tmp_path / "a.cvs", "cvs")
-    with pytest.raises(RecordError, match="no run has been recorded there"):
+    with pytest.raises(RecordError, match="it is not a run directory"):
         write_tables(tmp_path, tmp_path / "a", kind)
     with pytest.raises(RecordError, match="there is no world 2; there are worlds 0 to 1"):
         write_tables(played, tmp_path / "a", kind, world=2)

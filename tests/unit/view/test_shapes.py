@@ -86,16 +86,13 @@ def test_a_ball_is_round():
     assert volume(ball(3)) == pytest.approx(np.pi / 6.0, rel=0.01)
 
 
-def test_placing_joining_and_faceting():
+def test_placing_and_joining():
     one = box((0, 0, 0), (1, 2, 3))
     assert volume(one) == pytest.approx(6.0)
     moved = one.placed(2.0, (10.0, 0.0, 0.0))
     assert volume(moved) == pytest.approx(48.0)
     assert moved.vertices.min(axis=0).tolist() == [10.0, 0.0, 0.0]
     assert volume(joined([one, moved])) == pytest.approx(54.0)
-    sharp = one.faceted()
-    assert len(sharp.vertices) == 36
-    assert volume(sharp) == pytest.approx(6.0)
     with pytest.raises(ValueError, match="read-only"):
         one.vertices[0, 0] = 1.0
 

@@ -1,4 +1,4 @@
-"""The look of all plots, and how they become SVG and PNG: one palette, thin lines, the same bytes for the same batch."""
+"""Style of all plots, and their conversion to SVG and PNG. The same batch gives the same bytes."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ UNDATED: dict[str, dict[str, Any]] = {
 
 @dataclass(frozen=True)
 class Picture:
-    """A plot in the forms in which it is kept.
+    """A plot as SVG and PNG.
 
     Args:
         svg: A file of its own.
@@ -92,7 +92,7 @@ class Picture:
 
 @contextmanager
 def house_style(whose: str = "the report", extra: str = "batch") -> Iterator[None]:
-    """Plots are made and saved inside; settings of the user's own matplotlibrc do not reach them.
+    """Make and save plots inside this context; the user's matplotlibrc has no effect in it.
 
     Args:
         whose: Who draws, for the message.
@@ -122,7 +122,7 @@ def blank(height: float, n_rows: int = 1, n_columns: int = 1, **options: Any) ->
 
 
 def marker_of(team: int) -> str:
-    """A team's marker, for those who do not see its colour."""
+    """Return the marker of a team, which does not depend on colour vision."""
     return MARKERS[(team - 1) % len(MARKERS)]
 
 
@@ -176,7 +176,7 @@ def _width(text: str) -> int:
 
 
 def pictured(figure: Figure, name: str, title: str) -> Picture:
-    """A finished figure in all its forms.
+    """Return a finished figure as SVG and PNG.
 
     Args:
         figure: The figure.

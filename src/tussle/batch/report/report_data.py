@@ -220,7 +220,7 @@ def _half_width(values: np.ndarray, clusters: np.ndarray) -> tuple[float, float]
 
 
 class ReportData:
-    """What is worth showing of a batch.
+    """The data of a report.
 
     Args:
         results: Its results.
@@ -390,7 +390,7 @@ class ReportData:
 
 
 def varies(values: np.ndarray) -> bool:
-    """Not all of them are the same."""
+    """Return whether the values differ."""
     return bool(len(values)) and bool(np.ptp(values) > 0.0)
 
 

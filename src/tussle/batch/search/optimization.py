@@ -1,4 +1,4 @@
-"""A search for the values of a mission with which a quantity is greatest, or smallest."""
+"""Searches for mission values that maximize or minimize a quantity."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class SearchProgress:
 
 
 class Optimization:
-    """A search for the values of a mission with which the mean of a quantity is greatest, or smallest.
+    """A search for mission values that maximize or minimize the mean of a quantity.
 
     Args:
         mission: A mission file, the name of one that ships, a `Mission`, or a function of the varied values that makes one.
@@ -174,7 +174,7 @@ class Optimization:
         command: Sequence[str] | None = None,
         on_progress: Callable[[SearchProgress], None] | None = None,
     ) -> Study:
-        """Search until there are so many trials.
+        """Search until the given number of trials is reached.
 
         Args:
             directory: Where trials are kept, and from where the search goes on; None keeps them in memory.
@@ -225,7 +225,7 @@ class Optimization:
         player: RoundPlayer,
         tell: Callable[[SearchProgress], None],
     ) -> list[Trial]:
-        """Play some values of the running round."""
+        """Play some values of the current round."""
         self.evaluator.check_same()
         progress.n_round = len(points)
 
@@ -254,7 +254,7 @@ def optimize(
     on_progress: Callable[[SearchProgress], None] | None = None,
     **search: Any,
 ) -> Study:
-    """Search for the values of a mission with which the mean of a quantity is greatest, or smallest.
+    """Search for mission values that maximize or minimize the mean of a quantity.
 
     Args:
         mission: As for `Optimization`, like all that is not said here.

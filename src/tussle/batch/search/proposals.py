@@ -1,4 +1,4 @@
-"""Which values are tried next: what Optuna's samplers propose.
+"""Proposes the next values to try, with Optuna's samplers.
 
 A round is a function of the seed and of the rounds before, so a search that was killed goes on as it would have.
 """
@@ -56,14 +56,14 @@ class Proposer:
         import optuna
 
         self._variables, self._seed, self._per_round = tuple(variables), seed, per_round
-        self._kind, self._is_minimized = sampler, is_minimized
+        self._kind = sampler
         self._space = {v.name: distribution(v) for v in variables}
         self._storage = optuna.storages.InMemoryStorage()
         with quiet():
             self._study = new_study(is_minimized, self._storage)
 
     def learn(self, trials: Sequence[Trial]) -> None:
-        """Take finished trials into account."""
+        """Add finished trials."""
         import optuna
 
         with quiet():
@@ -78,7 +78,7 @@ class Proposer:
                 self._study.tell(asked, trial.objective if trial.is_complete else None, state=failed)
 
     def propose(self) -> list[Point]:
-        """The values of the next round, all of it; the same each time until `learn` is called."""
+        """Return the values of the next round. The result is the same until `learn` is called."""
         import optuna
 
         with quiet():
@@ -135,7 +135,7 @@ def importances(
 
 
 def new_study(is_minimized: bool, storage: Any = None) -> optuna.Study:
-    """A study of Optuna without trials."""
+    """Return an empty Optuna study."""
     import optuna
 
     return optuna.create_study(
@@ -162,7 +162,7 @@ def require_optuna(*, with_cmaes: bool = False) -> None:
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Optuna logs and warns nothing inside; its settings are as before afterwards."""
+    """Silence Optuna's log and warnings inside."""
     import optuna
 
     before = optuna.logging.get_verbosity()

@@ -1,4 +1,4 @@
-"""The directory of a search: what is searched, and the journal of its trials, which Optuna keeps."""
+"""The directory of a search: `study.json`, and Optuna's journal of the trials."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ MOST_JOURNAL = 1 << 28
 
 
 class StudyStore:
-    """A directory into which one search writes.
+    """The directory of a search, opened for writing.
 
     Each trial is one line of the journal, written when its round is finished.
 
@@ -108,7 +108,7 @@ class StudyStore:
             raise
 
     def _agreed(self, info: dict[str, Any]) -> dict[str, Any]:
-        """The info of the directory; written if there is none."""
+        """Return the info of the directory; write it if there is none."""
         if not (self.path / STUDY_FILE).exists():
             with told(self.path):
                 put_whole(self.path / STUDY_FILE, json.dumps(info, indent=1, allow_nan=False) + "\n")
@@ -164,7 +164,7 @@ def _journal(path: Path) -> JournalStorage:
 
 
 def _difference(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
-    """The first difference of two searches."""
+    """Return the first difference between two searches."""
     for name in COMPARED:
         if before.get(name) != now[name]:
             if isinstance(now[name], (str, int)):
@@ -223,7 +223,7 @@ def read_trials(path: Path, info: Mapping[str, Any]) -> list[Trial]:
 
 
 def _against(i: int, trial: Any, info: Mapping[str, Any]) -> str:
-    """What is wrong with a trial of the journal; "" for nothing."""
+    """Return what is wrong with a trial of the journal; "" if it is valid."""
     facts = {"value": trial.value, **trial.user_attrs}
     if i >= MOST_TRIALS or (said := problem(facts, TRIAL, f"trial {i}")):
         return said if i < MOST_TRIALS else f"has more than {MOST_TRIALS:,} trials"
@@ -241,7 +241,7 @@ def _against(i: int, trial: Any, info: Mapping[str, Any]) -> str:
 
 
 def load_study(path: str | Path) -> Study:
-    """A search as far as it has come; also while it goes on.
+    """Load a search, finished or still running.
 
     Raises:
         BatchError: There is none, or it cannot be read.

@@ -13,11 +13,11 @@ import pyarrow.parquet
 
 from tussle.errors import ParameterError, RecordError, listed, nearest_name
 from tussle.record.arrow_file import read_batches
+from tussle.record.run import run_directory
 from tussle.record.schema import (
     EVENTS,
     EVENTS_FILE,
     EVENTS_RULES,
-    FILES,
     RUN,
     RUN_FILE,
     TRAJECTORY,
@@ -73,7 +73,7 @@ def write_tables(
     """
     if kind not in KINDS:
         raise ParameterError(f"kind = {kind!r} is not allowed{nearest_name(kind, KINDS)}; {listed(KINDS)}")
-    place, target = Path(run), Path(path)
+    place, target = run_directory(run), Path(path)
     report = TablesReport()
     _check(place, world, report)
     beside = target.with_name(f"{target.stem}.events{target.suffix or '.' + kind}")
@@ -94,13 +94,11 @@ def _check(place: Path, world: int | None, report: TablesReport) -> None:
     Raises:
         RecordError: There is not.
     """
-    if not any((place / name).exists() for name in FILES):
-        raise RecordError(f"{place}: no run has been recorded there; {listed(FILES)}")
     if (place / RUN_FILE).exists():
         worlds = RUN.read(place / RUN_FILE)["worlds"]
     else:
         report.notes.append(
-            f"{RUN_FILE} is not there: the run goes on, or was cut short; what had been written is exported"
+            f"{RUN_FILE} is missing: the run is still going on or was killed; what was written is exported"
         )
         return
     if world is not None and not 0 <= world < len(worlds):

@@ -1,1 +1,1 @@
-"""The page in the browser on which a game is watched and steered."""
+"""The browser page that shows and controls a game."""

@@ -1,4 +1,4 @@
-"""Who may open a page: whoever has its whole address, at a name that is served, and not from another page."""
+"""Access control of the page: token in the address, allowed host names, no foreign origins."""
 
 from __future__ import annotations
 
@@ -17,6 +17,8 @@ MOST_BROWSERS = 32
 """That are connected at once."""
 MOST_BYTES = 16 * 1024
 """Of one message from a browser; the longest that a control sends has some hundred."""
+MOST_UNSENT = 64 * 1024
+"""Bytes that a browser has not taken yet when sending to it pauses."""
 PORT = 8123
 """Where it is served when no port is asked for and this one is free; else at one of the next."""
 MOST_PORTS = 100
@@ -30,7 +32,7 @@ HEADERS = {
 
 
 class Access:
-    """The rule by which requests for a page, and for its socket, are answered.
+    """Decides which requests for the page and its socket are answered.
 
     Args:
         host: Address that the page is served at.
@@ -49,7 +51,7 @@ class Access:
         self.url = f"http://{name}:{port}/{self.token}"
 
     def refusal(self, path: str, hosts: Sequence[str], origins: Sequence[str]) -> str:
-        """Why a request is refused; "" for one that is answered.
+        """Return why a request is refused; "" if it is accepted.
 
         Args:
             path: The path that is asked for.
@@ -73,7 +75,7 @@ class Access:
 
 
 def _is_own(name: str) -> bool:
-    """Whether it is an address, which no name server can redirect, or this machine's own name."""
+    """Return whether a host is an IP address, which no name server can redirect, or the name of this machine."""
     try:
         ipaddress.ip_address(name.removeprefix("[").removesuffix("]"))
     except ValueError:
@@ -82,7 +84,7 @@ def _is_own(name: str) -> bool:
 
 
 def bound_socket(host: str, wanted: int | None) -> socket.socket:
-    """A socket at a port that can be served at: the one that is wanted, or the first free one.
+    """Return a socket bound to the requested port, or to the first free one.
 
     Raises:
         ViewError: There is none, the one that is wanted is taken, or the host is not this machine's.

@@ -1,4 +1,4 @@
-"""Puts the page together: one HTML text with style, script and document in it, which asks nobody for anything but its own server."""
+"""Assembles the page: one HTML text with style, script and document, which makes no requests except to its own server."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ NO_MARKUP = str.maketrans({c: f"\\u{ord(c):04x}" for c in "<>&"})
 
 
 def page_html(document: Mapping[str, Any], blobs: Mapping[str, bytes] | None = None) -> str:
-    """The whole page.
+    """Return the HTML text of the page.
 
     Args:
         document: What it is told at once.
@@ -76,7 +76,7 @@ def page_html(document: Mapping[str, Any], blobs: Mapping[str, bytes] | None = N
 
 
 def _joined(module: str) -> str:
-    """A module as a part of one script, in which all names are known: without its imports and exports."""
+    """Return a module without its imports and exports, as a part of one script."""
     return re.sub(
         r"^export (?=\w)", "", re.sub(r"^import [^;]*;\n", "", module, flags=re.MULTILINE), flags=re.MULTILINE
     )

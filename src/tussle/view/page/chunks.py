@@ -1,4 +1,4 @@
-"""The binary format of frames, for the offline file, for replays and for live games alike.
+"""The binary frame format of offline files, replays and live games.
 
 A chunk holds frames that follow one another, as tracks, and needs no other chunk to be read. A track is one entity over frames that
 follow each other. Where an entity is missing for a while, changes its team, or jumps, as at the edge of a world that is closed upon
@@ -45,7 +45,7 @@ sqrt(3) e; an angle is twice what the quaternion errs."""
 
 @dataclass(frozen=True)
 class Grain:
-    """How positions and health are rounded.
+    """Rounding of positions and health.
 
     Attributes:
         low: What is added to positions [m], (3,).
@@ -93,7 +93,7 @@ def _round_down(value: float) -> float:
 
 
 class Tracks:
-    """Who was there from when to when.
+    """The intervals of frames in which entities exist.
 
     Args:
         leap: Distance above which an entity has jumped [m]; its speed must be far from explaining it, too.
@@ -110,7 +110,7 @@ class Tracks:
         self._before: tuple[Frame, np.ndarray] | None = None
 
     def follow(self, i: int, frame: Frame) -> np.ndarray:
-        """The track of each entity in the frame that comes next, (n,)."""
+        """Return the track of each entity of the next frame, (n,)."""
         tracks = np.full(len(frame), -1, np.int64)
         if self._before is not None:
             was, its = self._before
@@ -129,7 +129,7 @@ class Tracks:
         return tracks
 
     def _jumped(self, was: Frame, olds: np.ndarray, now: Frame, rows: np.ndarray) -> np.ndarray:
-        """Whether they cannot have moved from there to here."""
+        """Return which entities moved further than is possible without a jump."""
         moved = np.linalg.norm(now.pos[rows] - was.pos[olds], axis=1)
         speeds = [np.linalg.norm(f.vel[r], axis=1) for f, r in ((was, olds), (now, rows))]
         return np.asarray(moved > np.maximum(self.leap, 10.0 * (now.t - was.t) * np.maximum(*speeds)))
@@ -152,7 +152,7 @@ def _matches(frame: Frame, was: Frame) -> tuple[np.ndarray, np.ndarray]:
 
 
 def pack(first: int, frames: Sequence[Frame], step: float, leap: float = math.inf) -> bytes:
-    """Frames that follow one another, at least one, as a chunk. Entities that are nowhere (not finite) are left out.
+    """Pack one or more consecutive frames into a chunk. Entities without a finite position are omitted.
 
     Args:
         first: Number of the first frame.
@@ -180,7 +180,7 @@ def pack(first: int, frames: Sequence[Frame], step: float, leap: float = math.in
 
 
 def _somewhere(frame: Frame) -> Frame:
-    """The frame without those whose place is not finite."""
+    """Return the frame without entities whose position is not finite."""
     is_there = np.isfinite(frame.pos).all(axis=1)
     if is_there.all():
         return frame

@@ -1,4 +1,4 @@
-"""What a page takes from a browser: commands by name, with these fields and values and no others."""
+"""The commands that a browser may send, with their fields and allowed values."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ SHOWN = 40
 
 @dataclass(frozen=True)
 class Check:
-    """What a field takes.
+    """Checks the value of a field.
 
     Attributes:
         holds: Whether a value is one of them.
@@ -36,7 +36,7 @@ class Check:
 
 
 def number(low: float = -FARTHEST, high: float = FARTHEST) -> Check:
-    """A number in a range; nan is in none."""
+    """Return a check for a number in a range; NaN is never allowed."""
     return Check(
         lambda value: type(value) in (int, float) and low <= value <= high,
         f"a number from {low:g} to {high:g}",
@@ -44,7 +44,7 @@ def number(low: float = -FARTHEST, high: float = FARTHEST) -> Check:
 
 
 def whole(low: int, high: int) -> Check:
-    """A whole number in a range."""
+    """Return a check for an integer in a range."""
     return Check(
         lambda value: type(value) is int and low <= value <= high, f"a whole number from {low} to {high}"
     )
@@ -62,7 +62,7 @@ WARP = Check(
 
 @dataclass(frozen=True)
 class Command:
-    """Something that a browser may ask for.
+    """A command of the page.
 
     Attributes:
         do: Does it, called with the fields by name.
@@ -76,7 +76,7 @@ class Command:
 
 
 def game_commands(live: Live) -> dict[str, Command]:
-    """Commands by name that steer a live game."""
+    """Return the commands of a live game by name."""
 
     def seek(t: float) -> None:
         first, last = live.span
@@ -105,7 +105,7 @@ def game_commands(live: Live) -> dict[str, Command]:
 
 
 def read_command(text: Any, commands: Mapping[str, Command]) -> tuple[str, dict[str, Any]] | None:
-    """Name and fields of a command; None for anything else.
+    """Return name and fields of a valid command; None for anything else.
 
     Args:
         text: What a browser has sent.

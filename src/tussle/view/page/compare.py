@@ -1,4 +1,4 @@
-"""Two recorded runs seen together, from the first moment at which they differ."""
+"""Compares two recorded runs and shows them together."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ MOST_NAMED = 4
 
 @dataclass(frozen=True)
 class Difference:
-    """Where two runs part.
+    """The first difference between two runs.
 
     Attributes:
         t: Time of the first moment at which they differ [s].
@@ -42,7 +42,7 @@ class Difference:
 
 
 def first_difference(a: Recording, b: Recording) -> Difference | None:
-    """The first moment that both runs have and that is not the same in both; None where all of these are the same.
+    """Return the first common time at which two runs differ; None if they do not differ.
 
     A run that is shorter than the other differs from it only in its end, which is no moment of both.
     """
@@ -56,7 +56,7 @@ def first_difference(a: Recording, b: Recording) -> Difference | None:
 
 
 def what_differs(a: Frame, b: Frame) -> str:
-    """In what two moments differ, in words; "" where they are the same."""
+    """Describe the difference between two frames; "" if they are equal."""
     if not np.array_equal(a.id, b.id):
         only_a, only_b = np.setdiff1d(a.id, b.id), np.setdiff1d(b.id, a.id)
         parts = [f"{_named(ids)} only in {name}" for ids, name in ((only_a, "A"), (only_b, "B")) if len(ids)]
@@ -82,7 +82,7 @@ def what_differs(a: Frame, b: Frame) -> str:
 
 
 def _named(ids: np.ndarray) -> str:
-    """A few ids in words."""
+    """List a few ids as text."""
     some = ", ".join(str(i) for i in ids[:MOST_NAMED])
     more = f" and {len(ids) - MOST_NAMED:,} more" if len(ids) > MOST_NAMED else ""
     return f"{'entity' if len(ids) == 1 else 'entities'} {some}{more}"
@@ -167,7 +167,7 @@ class Comparison:
 
     @property
     def lead(self) -> str:
-        """Where they part, in a line."""
+        """The first difference, in one line."""
         if self.difference is None:
             both = min(self.a.t[-1], self.b.t[-1])
             return f"they do not differ up to t = {both:g} s, where the shorter one ends"
@@ -182,7 +182,7 @@ class Comparison:
 
     @cached_property
     def _pairs(self) -> tuple[np.ndarray, np.ndarray]:
-        """Number of the frame of each run that belongs to each time, (T,) each."""
+        """Return the frame number of each run at each time, (T,) each."""
         a, b = ([run.index_at(float(t)) for t in self.t] for run in (self.a, self.b))
         return np.array(a), np.array(b)
 
@@ -194,7 +194,7 @@ class Comparison:
         return counts
 
     def frame(self, i: int) -> Frame:
-        """Both runs at a time, by its number."""
+        """Return the frame of both runs at a time index."""
         a, b = (run.frame(int(pair[i])) for run, pair in zip((self.a, self.b), self._pairs, strict=True))
         return Frame(
             float(self.t[i]), max(a.step, b.step), np.concatenate([a.id, b.id + np.int32(self.id_shift)]),
@@ -221,7 +221,7 @@ class Comparison:
 
 
 class _Both:
-    """The looks of two runs: the second's blocks come after the first's, in paler colours."""
+    """Style of two runs: the blocks of the second run follow those of the first, in paler colours."""
 
     def __init__(self, a: Style, b: Style, n_first: int) -> None:
         self._a, self._b, self._n = a, b, n_first

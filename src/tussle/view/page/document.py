@@ -1,4 +1,4 @@
-"""What the page is told once about a game: names, colours, models, what stands still, how it is seen at first."""
+"""The static description of a game for the page: names, colours, models, scenery, first view."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ ANGLES = ("fov_az", "fov", "field_of_view", "fov_el")
 
 
 class Game(Protocol):
-    """What live games, recordings and comparisons of two recordings have in common."""
+    """The common interface of live games, recordings and comparisons."""
 
     @property
     def name(self) -> str: ...
@@ -51,7 +51,7 @@ def game_document(
     viewer: Mapping[str, Any] | None = None,
     title: str | None = None,
 ) -> dict[str, Any]:
-    """The part of the document that live and recorded games share.
+    """Return the part of the document that live and recorded games share.
 
     Args:
         game: The game.
@@ -85,7 +85,7 @@ def game_document(
 
 
 def opening_data(said: Mapping[str, Any] | None, notes: list[str]) -> dict[str, Any] | None:
-    """How the mission's `<camera>` wants the game to be seen at first; None without one. What it says wrongly goes to `notes`.
+    """Return the first view from the mission's `<camera>`; None without one. Invalid values are added to `notes`.
 
     Args:
         said: The attributes of the tag.
@@ -118,7 +118,7 @@ def opening_data(said: Mapping[str, Any] | None, notes: list[str]) -> dict[str, 
 
 
 def reach_of(mission: Mission | None) -> tuple[float, float]:
-    """How far entities hear or see [m], and the full angle in which they see [rad]; 0 where no plugin says.
+    """Return range of communication or sight [m] and field of view [rad] of the entities; 0 if no plugin declares it.
 
     The first parameter that names a range counts, networks before others: a range of what is heard is what links are about.
     """
@@ -136,7 +136,7 @@ def reach_of(mission: Mission | None) -> tuple[float, float]:
 
 
 def rounded(values: np.ndarray, digits: int) -> list[Any]:
-    """Numbers in as few characters as they need, in the array's shape."""
+    """Return rounded numbers as nested lists of the array's shape."""
     flat: list[Any] = np.round(np.asarray(values, np.float64), digits).tolist()
     return flat
 

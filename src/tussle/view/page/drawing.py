@@ -1,4 +1,4 @@
-"""Reads what plugins have drawn: attributes as they were given become arrays with one item per thing."""
+"""Converts the shapes drawn by plugins to arrays for the page."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ SCALE = np.array([(68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 98), (25
 
 @dataclass
 class Drawing:
-    """All shapes of a moment, alike ones together; n counts things.
+    """All shapes of one step, grouped by kind; n is the number of shapes of a group.
 
     Attributes:
         points: Position [m], (n, 3), colour, (n, 3), and size of each [m], (n,); those of clouds too.
@@ -59,7 +59,7 @@ class Drawing:
 
 
 def read_drawing(shapes: tuple[Shape, ...], size: float) -> Drawing:
-    """What a moment's shapes come to. A shape that cannot be drawn leaves a note, and the others are drawn.
+    """Convert the shapes of one step. A shape that cannot be drawn is reported in a note.
 
     Args:
         shapes: The shapes.
@@ -77,7 +77,7 @@ def read_drawing(shapes: tuple[Shape, ...], size: float) -> Drawing:
 
 
 def drawing_message(shapes: tuple[Shape, ...]) -> tuple[dict[str, Any], bytes, list[str]]:
-    """Shapes as the page reads them: a header, numbers in 32 bits, and what could not be drawn.
+    """Encode shapes for the page: header, 32-bit numbers, notes.
 
     The header has `parts`, each with its kind, the number of things n and the place of its numbers in the data; `width` of lines
     [pixels]; `texts` with their places. Numbers of one thing: of points place, size [m] (0 where nothing is said), colour (7); of lines
@@ -179,7 +179,7 @@ _SOLIDS = {"sphere": _sphere, "box": _box, "cone": _cone}
 
 
 def _turning_x_to(direction: np.ndarray) -> np.ndarray:
-    """Quaternions that turn the x axis into directions (n, 3): half the way between both is the axis of a half turn."""
+    """Return quaternions that rotate the x axis to directions (n, 3): half turns about the bisectors."""
     length = np.linalg.norm(direction, axis=1, keepdims=True)
     unit = np.where(length > 0.0, direction / np.where(length > 0.0, length, 1.0), [1.0, 0.0, 0.0])
     middle = unit + np.array([1.0, 0.0, 0.0])

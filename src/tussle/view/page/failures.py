@@ -1,4 +1,4 @@
-"""Errors of a page itself: told to who watches, while page and game go on."""
+"""Errors of the page itself. They are shown on the page; page and game continue."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ LONGEST = 300
 
 
 class Failures:
-    """A list of errors, each once.
+    """A list of distinct errors.
 
     Attributes:
         texts: What went wrong, one line each.
@@ -28,7 +28,7 @@ class Failures:
         self.last: BaseException | None = None
 
     def tell(self, error: BaseException) -> str:
-        """Put an error on the list; its line."""
+        """Add an error to the list and return its line."""
         self.last = error
         text = _in_words(error)
         if text not in self.texts and len(self.texts) <= MOST_FAILURES:
@@ -38,7 +38,7 @@ class Failures:
 
     @contextlib.contextmanager
     def caught(self) -> Iterator[None]:
-        """What is done inside may fail: that is told, and what comes after is done."""
+        """Catch and report an error inside; execution continues after the block."""
         try:
             yield
         except Exception as error:  # noqa: BLE001 - whatever it is, whoever watches reads it

@@ -1,4 +1,4 @@
-"""Values of a game as text, for the page's panels."""
+"""Formats values of a game for the panels of the page."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Row = tuple[str, str]
 
 
 def number(value: Any) -> str:
-    """A value with the digits that count."""
+    """Format a number with its significant digits."""
     if isinstance(value, (bool, np.bool_)):
         return "yes" if value else "no"
     if isinstance(value, (int, np.integer)):
@@ -34,7 +34,7 @@ def number(value: Any) -> str:
 
 
 def result_rows(result: WorldResult) -> list[Row]:
-    """Names and values of a game's metrics so far, scores apart."""
+    """Return names and values of the current metrics, without scores."""
     return [
         (name.replace("_", " "), _by_team(value) if isinstance(value, dict) else number(value))
         for named in result.metrics.values()
@@ -48,7 +48,7 @@ def _by_team(values: Mapping[Any, Any]) -> str:
 
 
 def entity_sections(state: EntityState) -> list[tuple[str, list[Row]]]:
-    """Title and rows of all that is known of an entity: body, plugins' columns, messages."""
+    """Return titles and rows of an entity: body, columns of plugins, messages."""
     body = [(key, reading(r)) for key, r in state.body.items() if key not in ("force", "torque")]
     plugins = [
         (name, [(key, reading(r)) for key, r in columns.items()]) for name, columns in state.plugins.items()
@@ -61,7 +61,7 @@ def entity_sections(state: EntityState) -> list[tuple[str, list[Row]]]:
 
 
 def reading(value: Reading) -> str:
-    """A value with its unit, which is said once where all fields have the same."""
+    """Format a value with its unit; a unit that all fields share is written once."""
     units = set(value.unit.split())
     unit = value.unit if len(units) > 1 else next(iter(units), "")
     return f"{number(value.value)} {unit}".rstrip()

@@ -1,4 +1,4 @@
-"""Numbers as few bytes: differences and planes of bytes, which deflate makes smaller still."""
+"""Packs numbers into few bytes: differences and byte planes, which deflate compresses further."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ MOST = 2**28
 
 
 def ints(values: np.ndarray) -> bytes:
-    """Whole numbers, small ones in few bytes.
+    """Pack integers; small ones take few bytes.
 
     One byte p from 0 to 4, then p planes of one byte per number, the lowest first, of the numbers in zigzag (0, -1, 1, -2 are 0, 1,
     2, 3). Deflate finds more in planes than in numbers that lie one after another.
@@ -25,7 +25,7 @@ def ints(values: np.ndarray) -> bytes:
 
 
 def column(values: np.ndarray, is_head: np.ndarray) -> bytes:
-    """Series of whole numbers, each as its first one and differences.
+    """Pack series of integers as first values and differences.
 
     One byte: 1 where the differences stand themselves, 2 where the differences of these do, whichever is smaller; then `ints` of the
     first number of each series, and `ints` of all that follow, series by series. The first difference of a series counts as one to 0.
@@ -45,7 +45,7 @@ def column(values: np.ndarray, is_head: np.ndarray) -> bytes:
 
 
 def reals(values: np.ndarray) -> bytes:
-    """Real numbers as they are: eight planes of one byte per number, the lowest first.
+    """Pack floats without loss: eight byte planes, lowest byte first.
 
     Args:
         values: (n,).

@@ -1,4 +1,4 @@
-"""Sends a live game to the browsers that watch it, and takes what they order."""
+"""Sends a live game to the connected browsers and executes their commands."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ MOST_LOOKS = 4
 
 
 class Reader:
-    """A browser that watches.
+    """A connected browser.
 
     Attributes:
         socket: Its websocket.
@@ -66,12 +66,12 @@ class Reader:
         self.free_at = 0.0
 
     def choose(self, id: int) -> None:  # noqa: A002 - as the page calls it
-        """Read of this entity; 0 is nobody."""
+        """Select the entity whose state is sent; 0 selects none."""
         self.chosen = id
 
 
 class Publisher:
-    """Makes each frame once, whoever watches. To each browser goes the newest when it has taken the one before.
+    """Encodes each frame once for all browsers. A browser gets the newest frame after it has read the previous one.
 
     While nobody watches, the game is asked for nothing. All methods but `n_readers` are called in the server's loop.
 
@@ -100,7 +100,7 @@ class Publisher:
         self._commands = game_commands(live)
 
     def document(self) -> dict[str, Any]:
-        """What a page is told of a live game at once, beside what it shares with recorded ones."""
+        """Return the document of a live game."""
         return {
             "source": "socket", "facts": [], "idShift": 0, "isComplete": True, "attitudeUnit": UNIT,
             "healthSteps": FULL_HEALTH, "seed": min(self._live.seed, LARGEST_ID),
@@ -205,7 +205,7 @@ class Publisher:
         }  # fmt: skip
 
     def _new_events(self, reader: Reader) -> dict[str, Any]:
-        """Events that a browser has not been sent, and how many of those before still hold."""
+        """Return the events that a browser does not have yet, and how many of the earlier ones are still valid."""
         events, sent = self._live.events, reader.events_sent
         n = len(sent)
         if n > len(events) or (n and events[n - 1] is not sent[-1]):
@@ -224,7 +224,7 @@ class Publisher:
         return not self._one_steers or self.readers[0] is reader
 
     def _take(self, reader: Reader, text: Any) -> None:
-        """Do what a browser orders; what is no command is ignored."""
+        """Execute the command of a browser; ignore invalid ones."""
         commands = self._commands | {
             "choose": Command(reader.choose, {"id": whole(0, LARGEST_ID)}, steers=False),
             "history": Command(
@@ -246,13 +246,13 @@ class Publisher:
                 each.status_due = 0.0
 
     def _refuse(self, reader: Reader, reason: str) -> None:
-        """Say that a value was not taken; of many in a row, the first."""
+        """Report a rejected value; of consecutive ones, only the first."""
         now = time.monotonic()
         if now - reader.refused_at >= REFUSAL_PERIOD:
             reader.refused_at, reader.refusal = now, reason
 
     def _look_back(self, reader: Reader, seconds: float) -> None:
-        """Send what was seen over the last seconds, in as many frames as are needed for trails."""
+        """Send frames of the last seconds, as many as the trails need."""
         live = self._live
         now = live.frame()
         n = max(2, min(PAST_FRAMES, PAST_STATES // max(len(now), 1)))
@@ -265,7 +265,7 @@ class Publisher:
 
 
 def message(header: dict[str, Any], data: bytes) -> bytes:
-    """A binary message: length of the header, header as JSON padded to four bytes, data."""
+    """Return a binary message: length of the header, JSON header padded to four bytes, data."""
     text = json.dumps(header, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)
     return struct.pack("<I", len(text)) + text + data

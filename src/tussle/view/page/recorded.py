@@ -1,4 +1,4 @@
-"""A recorded game as the page reads it: a document, and blobs by name, each made when it is asked for."""
+"""A recorded game for the page: a document, and named blobs that are made on request."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ LEAP_OF_EXTENT = 0.25
 
 
 class RecordedData:
-    """What a page is told of a recorded run, or of two.
+    """The data of one or two recorded runs for the page.
 
     Args:
         game: The run; of one that was cut short, what there is.
@@ -79,12 +79,12 @@ class RecordedData:
 
     @property
     def n_entities(self) -> int:
-        """Ids that were ever there: at the beginning, or born since."""
+        """Number of entities over the whole run."""
         first = set(self._game.frame(0).id.tolist())
         return len(first | {event.id for event in self._game.events if event.kind == "birth"})
 
     def document(self, **more: Any) -> dict[str, Any]:
-        """What the page is told at once.
+        """Return the document.
 
         Args:
             **more: Further entries, such as the time at which it begins.
@@ -130,12 +130,12 @@ class RecordedData:
 
     @property
     def names(self) -> list[str]:
-        """Names of the blobs."""
+        """Names of all blobs."""
         terrain = [] if self._terrain is None else ["terrain"]
         return ["times", "events", *terrain, *(f"chunk-{i}" for i in range(len(self.chunks)))]
 
     def blob(self, name: str) -> bytes | None:
-        """A blob by its name; None where there is none of that name."""
+        """Return a blob by its name, or None."""
         if name == "times":
             return reals(self._game.t[self.kept])
         if name == "events":
@@ -154,7 +154,7 @@ class RecordedData:
 
 
 def kept_frames(t: np.ndarray, period: float | None) -> np.ndarray:
-    """Numbers of the frames that are kept: the first of each period, and the last.
+    """Return the numbers of the frames to show: the first of each period, and the last.
 
     Args:
         t: Times of all frames [s], (T,), ascending.
@@ -169,7 +169,7 @@ def kept_frames(t: np.ndarray, period: float | None) -> np.ndarray:
 
 
 def chunk_bounds(counts: np.ndarray, n_states: int, least_frames: int) -> list[tuple[int, int]]:
-    """First and last frame of chunks with about so many states, each of which begins with the last frame of the one before.
+    """Return first and last frame of chunks of about n_states states. Each chunk starts with the last frame of the previous one.
 
     Args:
         counts: States of each frame, (F,), F > 0.
@@ -188,7 +188,7 @@ def chunk_bounds(counts: np.ndarray, n_states: int, least_frames: int) -> list[t
 
 
 def game_facts(game: Recording | Comparison) -> list[tuple[str, str]]:
-    """Names and values for the page's reader."""
+    """Return names and values of the facts panel."""
     if isinstance(game, Comparison):
         both = (("A", game.a), ("B", game.b))
         return [(f"{name}: {key}", value) for name, run in both for key, value in game_facts(run)]
@@ -212,12 +212,12 @@ def game_facts(game: Recording | Comparison) -> list[tuple[str, str]]:
 
 
 def grouped(count: int) -> str:
-    """A count with narrow spaces between thousands, as the page's script writes it."""
+    """Format a count with narrow spaces between thousands, as the page's script does."""
     return f"{count:,}".replace(",", "\u202f")
 
 
 def compact_json(data: object) -> str:
-    """JSON without blanks.
+    """Encode as JSON without whitespace.
 
     Raises:
         ValueError: A number is not finite.

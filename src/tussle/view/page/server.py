@@ -1,4 +1,4 @@
-"""Serves the page of a game: live, recorded, or two recorded ones."""
+"""Serves the page of a live game or of one or two recorded runs."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Self
 from tussle.errors import MissingExtraError, ViewError
 from tussle.mission import Mission
 from tussle.view.live import Live
-from tussle.view.page.access import HEADERS, MOST_BROWSERS, MOST_BYTES, Access, bound_socket
+from tussle.view.page.access import HEADERS, MOST_BROWSERS, MOST_BYTES, MOST_UNSENT, Access, bound_socket
 from tussle.view.page.assemble import page_html
 from tussle.view.page.compare import Comparison
 from tussle.view.page.document import game_document, terrain_bytes
@@ -30,7 +30,7 @@ MOST_PERIOD = 60.0
 
 
 class Page:
-    """A game on a page in the browser, from when this is made until `stop`.
+    """Serves a game in the browser from construction until `stop`.
 
     Nothing on the page reads files or runs code, and it asks no other server for anything. Only who has the whole address opens it,
     and what a browser sends is checked before anything is done (`tussle.view.page.access`, `tussle.view.page.commands`). Closing all
@@ -108,7 +108,7 @@ class Page:
     # -- the server -----------------------------------------------------------------------------------------------------------------
 
     def _run(self, is_up: threading.Event) -> None:
-        """The server's thread: whoever waits for it is told when it is up, and when it fails before."""
+        """Body of the server thread; reports when the server is ready or has failed."""
         with self._failures.caught():
             asyncio.run(self._serve(is_up))
         is_up.set()
@@ -155,7 +155,9 @@ class Page:
         if not name and "Upgrade" in request.headers and self.publisher is not None:
             if len(self.publisher.readers) >= MOST_BROWSERS:
                 return web.Response(status=403, text=f"{MOST_BROWSERS} browsers watch already.\n")
-            socket = web.WebSocketResponse(max_msg_size=MOST_BYTES, compress=False, timeout=1.0)
+            socket = web.WebSocketResponse(
+                max_msg_size=MOST_BYTES, compress=False, timeout=1.0, writer_limit=MOST_UNSENT
+            )
             await socket.prepare(request)
             await self.publisher.serve(socket)
             return socket
@@ -177,26 +179,26 @@ class Page:
 
     @property
     def n_readers(self) -> int:
-        """Browsers that watch a live game now."""
+        """Number of browsers connected to a live game."""
         return len(self.publisher.readers) if self.publisher else 0
 
     @property
     def game_error(self) -> Exception | None:
-        """What stopped a live game; None while nothing has."""
+        """The error that stopped a live game, or None."""
         return self.game.error if isinstance(self.game, Live) else None
 
     @property
     def error(self) -> BaseException | None:
-        """The last thing that failed on the page itself, which goes on; None while nothing has."""
+        """The last error of the page itself, or None."""
         return self._failures.last
 
     @property
     def errors(self) -> list[str]:
-        """What has failed on the page itself, one line each; they are on the page too."""
+        """Errors of the page itself, one line each; the page shows them."""
         return self._failures.texts
 
     def stop(self) -> None:
-        """Serve no more. A second call does nothing."""
+        """Stop serving. A second call does nothing."""
         if self._thread.is_alive():
             self._loop.call_soon_threadsafe(self._stopping.set)
             self._thread.join(10.0)
@@ -224,7 +226,7 @@ def _check_extra() -> None:
 
 
 def _period(viewer: Mapping[str, Any], notes: list[str]) -> float:
-    """Time between frames as the mission has it, in ms there [s]; 0 where it says nothing of use, which goes to `notes`."""
+    """Return the time between frames that the mission sets [s]; 0 if it sets none. Invalid values are added to `notes`."""
     text = viewer.get("gui_update_period")
     try:
         period = 0.0 if text is None else 1e-3 * float(text)

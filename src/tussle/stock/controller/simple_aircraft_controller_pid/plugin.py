@@ -66,26 +66,26 @@ class SimpleAircraftControllerPID(Controller):
     @row_law("roll_rate", "lateral")
     @staticmethod
     def turn(desired_heading: float, yaw: float, heading_pid: Any, lateral: Any, dt: float) -> Any:
-        """The heading's loop."""
+        """Heading loop."""
         return pid_angle_loop(desired_heading - yaw, heading_pid, lateral, dt)
 
     @row_law("roll_rate", "lateral")
     @staticmethod
     def bank(desired_roll: float, roll: float, heading_pid: Any, lateral: Any, dt: float) -> Any:
-        """The bank's loop; a bank to the right needs a negative roll rate of the model."""
+        """Bank loop; a bank to the right needs a negative roll rate of the model."""
         command, lateral = pid_angle_loop(desired_roll - roll, heading_pid, lateral, dt)
         return -command, lateral
 
     @row_law("pitch_rate", "vertical")
     @staticmethod
     def rise(desired_altitude: float, pos_z: float, alt_pid: Any, vertical: Any, dt: float) -> Any:
-        """The altitude's loop."""
+        """Altitude loop."""
         return pid_loop(desired_altitude - pos_z, alt_pid, vertical, dt)
 
     @row_law("pitch_rate", "vertical")
     @staticmethod
     def glide(desired_glide_slope: float, vel: Any, alt_pid: Any, vertical: Any, dt: float) -> Any:
-        """The slope's loop; a steeper descent needs a lower nose."""
+        """Slope loop; a steeper descent needs a lower nose."""
         vx, vy, vz = vel
         slope = atan2(-vz, math.sqrt(vx * vx + vy * vy))
         command, vertical = pid_loop(desired_glide_slope - slope, alt_pid, vertical, dt)
@@ -94,6 +94,6 @@ class SimpleAircraftControllerPID(Controller):
     @row_law("throttle", "forward")
     @staticmethod
     def push(desired_speed: float, vel: Any, vel_pid: Any, forward: Any, dt: float) -> Any:
-        """The speed's loop."""
+        """Speed loop."""
         vx, vy, vz = vel
         return pid_loop(desired_speed - math.sqrt(vx * vx + vy * vy + vz * vz), vel_pid, forward, dt)

@@ -24,7 +24,7 @@ class UnicyclePID(Controller):
     Other than in the existing system, elevation is nose up and a positive pitch_rate raises the nose; each loop's
     time step is that of the call (there, the full step even when called once per substep); the first call has no
     derivative kick; the derivative of an angle's error does not jump where the error passes from +pi to -pi; and a loop
-    whose output nobody reads does not run.
+    does not run if no plugin reads its output.
     """
 
     grade = "portable"
@@ -64,13 +64,13 @@ class UnicyclePID(Controller):
     @row_law("speed")
     @staticmethod
     def pass_speed(desired_speed: float) -> float:
-        """The wanted speed."""
+        """Pass the desired speed through."""
         return desired_speed
 
     @row_law("turn_rate", "heading")
     @staticmethod
     def turn(desired_heading: float, yaw: float, heading_pid: Any, heading: Any, dt: float) -> Any:
-        """The heading's loop."""
+        """Heading loop."""
         return pid_angle_loop(desired_heading - yaw, heading_pid, heading, dt)
 
     @row_law("pitch_rate", "elevation")
@@ -84,19 +84,19 @@ class UnicyclePID(Controller):
         elevation: Any,
         dt: float,
     ) -> Any:
-        """The elevation's loop."""
+        """Elevation loop."""
         aim = atan2((desired_altitude - pos_z) * desired_speed, desired_speed * desired_speed)
         return pid_loop(aim - climb, pitch_pid, elevation, dt)
 
     @row_law("roll_rate", "bank")
     @staticmethod
     def level(roll: float, roll_pid: Any, bank: Any, dt: float) -> Any:
-        """The bank's loop, to level wings."""
+        """Bank loop; keeps the wings level."""
         return pid_angle_loop(-roll, roll_pid, bank, dt)
 
     @row_law("acceleration_x", "forward")
     @staticmethod
     def push(desired_speed: float, vel: Any, speed_pid: Any, forward: Any, dt: float) -> Any:
-        """The speed's loop."""
+        """Speed loop."""
         vx, vy, vz = vel
         return pid_loop(desired_speed - math.sqrt(vx * vx + vy * vy + vz * vz), speed_pid, forward, dt)
