@@ -80,9 +80,7 @@ class GroupView:
         self.first, self.last = first, last
         self.n = last - first
         self._reaches: dict[int, tuple[np.ndarray, float | np.ndarray]] = {}
-        self.walks: dict[
-            tuple[int, int], Any
-        ] = {}  # what neighbour laws keep while rows move one after the other
+        self.walks: dict[tuple[int, int], Any] = {}  # see `tussle.api.laws.Plan.gather`
 
     def renew(self) -> None:
         """Forget what follows from seeds and parameters: some rows have begun anew in their places."""

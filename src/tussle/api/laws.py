@@ -219,35 +219,27 @@ class Plan:
         run: The walk's kernel.
         run_single: The same for views whose rows are each in a world of their own.
         names: Names of the contributions.
-        columns: Gives, of a view and a plugin's attributes, how far to look [m] and the columns by row.
+        reach: Function of a view and a plugin's attributes: how far to look [m].
+        own: Likewise, the columns by row.
         other: Its columns by place: of the body table, and which components.
         lists: It gives one value for each pair, instead of one for each row.
         moving: Columns by place that follow who moves.
-        keeps: The columns by row are arrays that the view and the plugin keep.
+        keeps: The columns by row are arrays that the view and the plugin keep until rows change.
     """
 
     run: Callable[..., Any]
     run_single: Callable[..., Any]
     names: tuple[str, ...]
-    columns: Callable[[GroupView, dict[str, Any]], tuple[Any, tuple[np.ndarray, ...]]]
+    reach: Callable[[GroupView, dict[str, Any]], Any]
+    own: Callable[[GroupView, dict[str, Any]], tuple[np.ndarray, ...]]
     other: tuple[tuple[str, tuple[int, ...]], ...]
     lists: bool
     moving: tuple[str, ...]
     keeps: bool
 
     def walk(self, plugin: Any, g: GroupView) -> Contributions:
-        """What the neighbours of each row contribute."""
-        key = id(self), id(plugin)
-        kept = g.walks.get(key)
-        if kept is None:
-            kept = self.gather(plugin, g)
-            if g.one_per_world and self.keeps and not self.lists:
-                g.walks[key] = kept
-        else:
-            index = g.index(np.inf)
-            for name in self.moving:
-                g.by_place(index, name)
-        blocks, arrays = kept
+        """Return what the neighbours of each row contribute."""
+        blocks, arrays = self.gather(plugin, g)
         if self.lists:
             return self.listed(g, blocks.n_blocks, lambda *last: self.run(*arrays, *last, blocks.most))
         out = np.empty((len(self.names), g.n))
@@ -259,16 +251,32 @@ class Plan:
         return Contributions(self.names, out)
 
     def gather(self, plugin: Any, g: GroupView) -> tuple[Blocks, tuple[Any, ...]]:
-        """The blocks of the rows, and the arrays that the kernels take."""
-        reach, own = self.columns(g, plugin.__dict__)
-        index = g.index(reach)
+        """Return the blocks of the rows and the arguments of the kernels, with everybody at the positions of now."""
+        key = id(self), id(plugin)
+        index = g.index(self.reach(g, plugin.__dict__))
+        kept = g.walks.get(key)
+        if kept is not None and kept[0] is index:
+            _, blocks, arrays = kept
+            if (
+                g.one_per_world and not self.lists
+            ):  # each sees all of its world: blocks and whole numbers stay
+                for name in self.moving:
+                    g.by_place(index, name)
+                return blocks, arrays
+            if index.blocks(g.first, g.last).spans is arrays[0][1]:
+                for name, _ in self.other:
+                    g.by_place(index, name)
+                return blocks, arrays
         blocks = index.blocks(g.first, g.last)
-        longs, points = (blocks.cuts, blocks.spans, index.order), (blocks.points, index.points)
         others: tuple[np.ndarray, ...] = ()
         for name, places in self.other:
             columns = g.by_place(index, name)
             others += columns if len(columns) == len(places) else tuple([columns[place] for place in places])
-        return blocks, (longs, points, others, own)
+        own = self.own(g, plugin.__dict__)
+        arrays = (blocks.cuts, blocks.spans, index.order), (blocks.points, index.points), others, own
+        if self.keeps:
+            g.walks[key] = index, blocks, arrays
+        return blocks, arrays
 
     def listed(self, g: GroupView, n_blocks: int, run: Callable[..., int]) -> Listed:
         """What each pair contributes."""
@@ -319,7 +327,8 @@ def make_plan(g: GroupView, plugin: Any, declared: NeighborLaw) -> Plan:
         made.run,
         made.run_single,
         declared.names,
-        evaluated(f"({farthest}, ({by_row}))"),
+        evaluated(farthest),
+        evaluated(f"({by_row})"),
         tuple(other.items()),
         laws[0].lists,
         tuple(name for name in other if name not in INTS),

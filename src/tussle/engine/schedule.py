@@ -152,6 +152,7 @@ def _entity_call(state: SimulationState, kind: str, group: Group, binding: Bindi
     ]
     is_linked = any(b.links for b in binding.walk())
     await_ready = _waits_for(group, binding)
+    view, plugin = binding.view, binding.plugin
 
     def call(some: Group, own: Binding, dt: float) -> None:
         view = own.view
@@ -184,9 +185,13 @@ def _entity_call(state: SimulationState, kind: str, group: Group, binding: Bindi
 
     def lean() -> None:
         if group.n:
-            call(group, binding, grid_dt)
+            view._caller, view.substep, view.phase, view.dt = plugin, substep, phase, grid_dt
+            try:
+                plugin.step(view)
+            except Exception as error:
+                raise failure.in_call(error, plugin, view, group) from error
 
-    is_plain = cadence is None and not (inboxes or await_ready)
+    is_plain = cadence is None and not (inboxes or await_ready or is_linked)
     return Call(_label(state, kind, group, binding, substep), lean if is_plain else run)
 
 
@@ -222,7 +227,7 @@ def _world_call(state: SimulationState, kind: str, world_binding: WorldBinding) 
 
     label = f"{kind:<12} {world_binding.spec.instance_name}{_rate_text(world_binding.spec)}"
     if cadence is None:
-        return Call(label, lambda: call(world_binding, world_binding.view, dt))
+        return Call(label, partial(call, world_binding, world_binding.view, dt))
 
     def call_part(dt: float) -> Callable[[WorldBinding, Any], None]:
         return lambda some, w: call(some, w, dt)

@@ -58,6 +58,8 @@ class WorldBinding:
             if isinstance(column, Param) and column.ragged:
                 own = [np.transpose(spec.values[name])] * n_worlds
                 world_binding.plugin.__dict__[name] = RaggedColumn.from_rows(own, column).read_only()
+            elif isinstance(column, Param) and column.structural:
+                world_binding.plugin.__dict__[name] = spec.values[name]
             elif isinstance(column, Param) and column.is_row_data:
                 world_binding._add("world", name, column.dtype, len(column.fields), column.default)
             elif isinstance(column, State):

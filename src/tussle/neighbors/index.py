@@ -28,62 +28,36 @@ SPARSE_WORLD = 400
 class Blocks:
     """Query rows in groups of up to LANES that stand close together, each with the runs of places where its neighbours are.
 
-    Block b holds queries[block_first[b] : block_first[b + 1]]; its candidates are the places span_start[s] to span_end[s] - 1
-    for s
+    Block b holds queries[block_first[b] : block_first[b + 1]]; its candidates are the places span_start[s] to span_end[s] - 1 for s
     from span_first[b] to span_first[b + 1] - 1. Walking them in this order is the order of (cell row, cell, id), in any stack.
+
+    Attributes:
+        cuts: queries, block_first, span_first, block_strip, (4, n + 1); queries are the n sorted places of the query rows.
+        spans: span_start and span_end, (2, number of spans or more).
+        points: Positions of the queries in their order [m], (3, n + LANES); what is behind the end may be read.
+        n_blocks: Number of blocks.
+        most: Largest number of candidates that one block has.
+        built: Build of the index that they were cut for.
     """
 
     cuts: Longs
-    """queries, block_first, span_first, block_strip, (4, n + 1): for the n sorted places of the query rows, n and one more."""
     spans: Longs
-    """span_start and span_end, (2, number of spans or more)."""
     points: Floats
-    """Positions of the queries in their order [m], (3, n + LANES); what is behind the end may be read."""
-    n_blocks: int
-    most: int
-    """Largest number of candidates that one block has."""
+    n_blocks: int = 0
+    most: int = 0
+    built: int = -1
 
-    @property
-    def queries(self) -> Any:
-        """Sorted places of the query rows, (n,)."""
-        return self.cuts[0, :-1]
-
-    @property
-    def block_first(self) -> Any:
-        return self.cuts[1, :]
-
-    @property
-    def span_first(self) -> Any:
-        return self.cuts[2, :]
-
-    @property
-    def span_start(self) -> Any:
-        return self.spans[0, :]
-
-    @property
-    def span_end(self) -> Any:
-        return self.spans[1, :]
+    @classmethod
+    def of(cls, n: int) -> Blocks:
+        """Return blocks for n rows, not yet cut; the spans may turn out to need more elements."""
+        return cls(
+            np.empty((4, n + 1), np.int64), np.empty((2, 2 * n + 64), np.int64), np.zeros((3, n + LANES))
+        )
 
 
 def padded(n: int) -> Floats:
     """N zeros that may be read in groups of LANES up to the last."""
     return np.zeros(n + LANES)[:n]
-
-
-@dataclass(slots=True)
-class Room:
-    """Arrays for the blocks of one range of rows, used again from step to step; see `Blocks`."""
-
-    cuts: Longs
-    spans: Longs
-    points: Floats
-
-    @classmethod
-    def of(cls, n: int) -> Room:
-        """For n rows; the spans may turn out to need more."""
-        return cls(
-            np.empty((4, n + 1), np.int64), np.empty((2, 2 * n + 64), np.int64), np.zeros((3, n + LANES))
-        )
 
 
 class Index:
@@ -100,7 +74,7 @@ class Index:
         self.world_start: Longs = np.zeros(1, np.int64)
         self.row_world = self.row_id = np.zeros(1, np.int64)
         self.built = 0
-        self._cache: dict[tuple[int, int], tuple[bool, int, Blocks]] = {}
+        self._blocks: dict[tuple[int, int], Blocks] = {}
         self.layout(np.zeros(0, np.int64), np.zeros(0, np.int64), 0)
 
     def layout(self, world: Longs, ids: Longs, n_worlds: int) -> None:
@@ -134,8 +108,7 @@ class Index:
         self._fixed = False
         self._given: Floats | None = None
         self.built = 0
-        self._cache.clear()
-        self._rooms: dict[tuple[int, int], Room] = {}
+        self._blocks.clear()
 
     @property
     def n_worlds(self) -> int:
@@ -157,7 +130,7 @@ class Index:
         if reach is not self._given and (not np.array_equal(reach, self.reach) or not self.built):
             self._given, self.reach = reach, np.array(reach, np.float64)
             self.inverse_cell = self._rings / np.where(self.reach > 0.0, self.reach, 1.0)
-            self._cache.clear()
+            self._blocks.clear()
             self._fixed = bool(np.isinf(self.reach).all())
         self.built += 1
         pos, worlds, work = (x, y, z), (self.world_start, self.members), (self._keys, self._scratch)
@@ -181,34 +154,26 @@ class Index:
         kernels.gather(column, self.order, out)
         return out
 
-    def blocks(self, first: int, last: int, pos: tuple[Floats, Floats, Floats] | None = None) -> Blocks:
-        """Blocks of rows [first, last) of the table, good until the next call for these.
-
-        `pos`: where the rows stand [m], three (n,), if not where the table says.
-        """
-        if pos is None:
-            fixed, built, blocks = self._cache.get((first, last), (False, -1, None))
-            if blocks is not None and fixed:
-                kernels.query_positions(blocks.queries, self.order, self.points, first, False, blocks.points)
-                return blocks
-            if blocks is not None and built == self.built:
-                return blocks
-        room = self._rooms.get((first, last))
-        if room is None or pos is not None:
-            room = Room.of(last - first)
-            if pos is None:
-                self._rooms[first, last] = room
-        points = self.points if pos is None else np.stack(pos)
+    def blocks(self, first: int, last: int) -> Blocks:
+        """Blocks of rows [first, last) of the table, good until the next build; one object for each range."""
+        blocks = self._blocks.get((first, last))
+        if blocks is None:
+            blocks = self._blocks[first, last] = Blocks.of(last - first)
+        elif self._fixed:
+            kernels.query_positions(blocks.cuts[0, :-1], self.points, blocks.points)
+            return blocks
+        elif blocks.built == self.built:
+            return blocks
         index = self.order, self._strips, self._world_strip, self.world_start, self._keys
-        cells, rows, own = (self.inverse_cell, self.reach), (first, last), pos is not None
+        cells = self.inverse_cell, self.reach
         while True:
-            work = room.cuts, room.spans, self._cursor
-            needed = kernels.cut_blocks(index, rows, points, own, cells, work, room.points, self._size)
-            if needed <= room.spans.shape[1]:
+            arrays = blocks.cuts, blocks.spans, self._cursor
+            needed = kernels.cut_blocks(
+                index, (first, last), self.points, cells, arrays, blocks.points, self._size
+            )
+            if needed <= blocks.spans.shape[1]:
                 break
-            room.spans = np.empty((2, 2 * needed), np.int64)
-        most, n_blocks = self._size.tolist()
-        blocks = Blocks(room.cuts, room.spans, room.points, n_blocks, most)
-        if pos is None:
-            self._cache[first, last] = (self._fixed, self.built, blocks)
+            blocks.spans = np.empty((2, 2 * needed), np.int64)
+        blocks.most, blocks.n_blocks = self._size.tolist()
+        blocks.built = self.built
         return blocks

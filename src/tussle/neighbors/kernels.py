@@ -203,15 +203,14 @@ def gather(column, order, out):
         out[p] = column[order[p]]
 
 
-@kernel("I I F2 i8 b1 F2w")
-def query_positions(queries, order, pos, first, own, out):
-    """Positions [m] by query, (3, n), from pos: those of rows first ... (own), or by place."""
+@kernel("I F2 F2w")
+def query_positions(queries, points, out):
+    """Positions [m] by query, (3, n), from those by place."""
     for k in range(queries.shape[0]):
         p = queries[k]
-        i = order[p] - first if own else p
-        out[0, k] = pos[0, i]
-        out[1, k] = pos[1, i]
-        out[2, k] = pos[2, i]
+        out[0, k] = points[0, p]
+        out[1, k] = points[1, p]
+        out[2, k] = points[2, p]
 
 
 @kernel("I I I i8 i8 Iw Iw Iw -> i8")
@@ -350,11 +349,11 @@ def find_spans(cells, index, x, y, room, size, n_blocks):
     return n_spans
 
 
-@kernel("(I I2 I I I) (i8 i8) F2 b1 (F F) (I2w I2w Iw) F2w Iw -> i8")
-def cut_blocks(index, rows, pos, own, cells, room, out, size):
+@kernel("(I I2 I I I) (i8 i8) F2 (F F) (I2w I2w Iw) F2w Iw -> i8")
+def cut_blocks(index, rows, points, cells, room, out, size):
     """The queries of rows [first, last) in blocks, where they stand, and the candidate runs of every block.
 
-    index: order, strips, world_strip, world_start, keys. rows: first, last. pos, own: see `query_positions`. cells: inverse_cell
+    index: order, strips, world_strip, world_start, keys. rows: first, last. points: positions by place [m], (3, n). cells: inverse_cell
     [1/m], reach [m], (n_worlds,). Written: room, that is cuts (queries, block_first, span_first, block_strip; 4, n + 1), spans
     (span_start, span_end) and work space (3 n_strips,); out (positions by query), size (most candidates of a block, number of
     blocks). Returns the number of spans, which may exceed the room for them.
@@ -364,6 +363,6 @@ def cut_blocks(index, rows, pos, own, cells, room, out, size):
     first, last = rows
     queries = cuts[0, : last - first]
     n_blocks = group_queries(order, strips[0], world_strip, first, last, queries, cuts[1], cuts[3])
-    query_positions(queries, order, pos, first, own, out)
+    query_positions(queries, points, out)
     size[1] = n_blocks
     return find_spans(cells, index, out[0], out[1], room, size, n_blocks)

@@ -56,9 +56,9 @@ def stack(worlds, groups=1, reverse_groups=False):
 
 def block_candidates(blocks):
     """Per query place, the candidate places of its block."""
+    queries, block_first, span_first, _ = blocks.cuts
     for b in range(blocks.n_blocks):
-        spans = range(blocks.span_first[b], blocks.span_first[b + 1])
-        runs = [np.arange(blocks.span_start[s], blocks.span_end[s]) for s in spans]
+        runs = [np.arange(*blocks.spans[:, s]) for s in range(span_first[b], span_first[b + 1])]
         candidates = np.concatenate(runs) if runs else np.zeros(0, np.int64)
-        for q in range(blocks.block_first[b], blocks.block_first[b + 1]):
-            yield blocks.queries[q], candidates
+        for q in range(block_first[b], block_first[b + 1]):
+            yield queries[q], candidates

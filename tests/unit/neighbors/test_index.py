@@ -104,17 +104,6 @@ def test_moved_rows_keep_their_places_with_one_cell_per_world():
     assert sorted(again.points[0, :2]) == [7.0, 8.0]
 
 
-def test_queries_may_stand_elsewhere_than_the_table_says():
-    s = stack([RNG.normal(size=(3, 700)) * 300.0])
-    index = s.index(80.0)
-    own = tuple(np.ascontiguousarray(axis + 1000.0 * np.sign(axis)) for axis in s.pos)
-    for place, candidates in block_candidates(index.blocks(0, 700, own)):
-        row = index.order[place]
-        d = s.pos - np.array([axis[row] for axis in own])[:, None]
-        near = np.flatnonzero((d**2).sum(0) < 80.0**2)
-        assert np.isin(index.place[near], candidates).all()
-
-
 def test_unknown_team_filter_is_refused():
     s = stack([np.zeros((3, 2))])
     index = s.index(1.0)
