@@ -28,7 +28,7 @@ ENGINE_INDICES = {
         "fresh",
         "source",
     ),
-    *("id_start", "block_first", "span_first", "span_start", "span_end"),
+    *("id_start", "block_first", "span_first", "span_last", "span_start", "span_end"),
 }
 """Arrays that the engine fills with rows, places and offsets of its own tables."""
 

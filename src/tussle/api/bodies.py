@@ -218,8 +218,11 @@ class Bodies:
         for place in [place for place in self._by_place if place[0] == id(index)]:
             del self._by_place[place]
 
-    def by_place(self, index: Index, name: str) -> tuple[np.ndarray, ...]:
-        """Components of a column in the order of an index's places, as floats, each (n,) and padded for lanes; for kernels."""
+    def by_place(self, index: Index, name: str, split: Split | None = None) -> tuple[np.ndarray, ...]:
+        """Components of a column in the order of an index's places, as floats, each (n,) and padded for lanes; for kernels.
+
+        `split` calls a function over parts of the rows in several threads.
+        """
         key = (id(index), name)
         kept = self._by_place.get(key)
         if kept is None:
@@ -227,17 +230,32 @@ class Bodies:
             kept = self._by_place[key] = Kept(-1, tuple(padded(self.n) for _ in range(k)))
         if kept.built == index.built and (kept.version == self.version or name in INTS):
             return kept.columns  # type: ignore[no-any-return]
-        for part in self._since(kept.version) if kept.built == index.built else [(0, self.n)]:
-            if name == "level_forward":
-                kernels.level_forward_by_place(self.quat, *part, index.place, *kept.columns)
-            elif name in INTS:
-                kernels.ints_by_place(getattr(self, name), *part, index.place, kept.columns[0])
-            else:
-                source = np.atleast_2d(self.derived(name) if name in DERIVED else getattr(self, name))
-                for column, values in zip(kept.columns, source, strict=True):
-                    kernels.floats_by_place(values, *part, index.place, column)
+        values = (
+            None
+            if name == "level_forward"
+            else self.derived(name)
+            if name in DERIVED
+            else getattr(self, name)
+        )
+        if split is not None and kept.built != index.built:
+            split(self.n, lambda *part: self._put_by_place(name, values, index.place, kept.columns, *part))
+        else:
+            for part in self._since(kept.version) if kept.built == index.built else [(0, self.n)]:
+                self._put_by_place(name, values, index.place, kept.columns, *part)
         kept.version, kept.built = self.version, index.built
         return kept.columns  # type: ignore[no-any-return]
+
+    def _put_by_place(
+        self, name: str, values: Any, place: np.ndarray, columns: Any, first: int, last: int
+    ) -> None:
+        """Put the values of rows [first, last) to their places; of level_forward, from the quaternions."""
+        if name == "level_forward":
+            kernels.level_forward_by_place(self.quat, first, last, place, *columns)
+        elif name in INTS:
+            kernels.ints_by_place(values, first, last, place, columns[0])
+        else:
+            for column, source in zip(columns, np.atleast_2d(values), strict=True):
+                kernels.floats_by_place(source, first, last, place, column)
 
     def any_index(self) -> Index:
         """An index for searches without a radius, whose result does not depend on it: one that is up to date, if there is one."""

@@ -17,6 +17,8 @@ from tussle.errors import PluginError, TussleError, listed, nearest_name
 from tussle.rng import stream_key
 from tussle.scene import Scene
 
+PARTS_PER_THREAD = 4
+
 
 @dataclass
 class Context:
@@ -57,13 +59,17 @@ class Context:
         return np.asarray(self.seeds[world] ^ self.block_keys[block])
 
     def split(self, n: int, run: Callable[[int, int], Any], least: int = 64) -> None:
-        """Call run(first, last) on consecutive parts of [0, n): in parallel if `threads` > 1 and n >= 2 * least, else in one call."""
+        """Call run(first, last) on consecutive parts of [0, n): in parallel if `threads` > 1 and n >= 2 * least, else in one call.
+
+        There are several parts for each thread, so that a thread that is held up does not hold up the others.
+        """
         if self.threads == 1 or n < 2 * least:
             run(0, n)
             return
         if self._pool is None:
             self._pool = ThreadPoolExecutor(self.threads)
-        edges = [n * i // self.threads for i in range(self.threads + 1)]
+        n_parts = min(PARTS_PER_THREAD * self.threads, n // least)
+        edges = [n * i // n_parts for i in range(n_parts + 1)]
         for done in [self._pool.submit(run, a, b) for a, b in pairwise(edges) if b > a]:
             done.result()
 

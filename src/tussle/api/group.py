@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -186,7 +185,7 @@ class GroupView:
         if self.context.threads == 1:
             run(0, self.n)
         else:
-            self.context.split(self.n, run, ROWS_PER_THREAD)
+            self._split_rows(self.n, run)
 
     def begin(
         self, plugin: Any = None, phase: float = 0.0, dt: float | None = None, substep: int = 0
@@ -250,7 +249,10 @@ class GroupView:
             return self._bodies.index(EVERYWHERE)
         if self.context.threads == 1:
             return self._bodies.index(self.reach(radius))
-        return self._bodies.index(self.reach(radius), partial(self.context.split, least=ROWS_PER_THREAD))
+        return self._bodies.index(self.reach(radius), self._split_rows)
+
+    def _split_rows(self, n: int, run: Callable[[int, int], Any]) -> None:
+        self.context.split(n, run, ROWS_PER_THREAD)
 
     def any_index(self) -> Index:
         """Neighbour index for searches without a radius; for kernels."""
@@ -263,7 +265,9 @@ class GroupView:
 
     def by_place(self, index: Index, name: str) -> tuple[np.ndarray, ...]:
         """Components of a body column of everybody in the order of an index's places; for kernels."""
-        return self._bodies.by_place(index, name)
+        if self.context.threads == 1:
+            return self._bodies.by_place(index, name)
+        return self._bodies.by_place(index, name, self._split_rows)
 
     def near(self, radius: float | np.ndarray, teams: str | int | None = None) -> Pairs:
         """Pairs of a row and another entity of its world at a distance < radius.

@@ -254,6 +254,7 @@ class Plan:
         """Return the blocks of the rows and the arguments of the kernels, with everybody at the positions of now."""
         key = id(self), id(plugin)
         index = g.index(self.reach(g, plugin.__dict__))
+        split = None if g.context.threads == 1 else g.context.split
         kept = g.walks.get(key)
         if kept is not None and kept[0] is index:
             _, blocks, arrays = kept
@@ -263,11 +264,11 @@ class Plan:
                 for name in self.moving:
                     g.by_place(index, name)
                 return blocks, arrays
-            if index.blocks(g.first, g.last).spans is arrays[0][1]:
+            if index.blocks(g.first, g.last, split).spans is arrays[0][1]:
                 for name, _ in self.other:
                     g.by_place(index, name)
                 return blocks, arrays
-        blocks = index.blocks(g.first, g.last)
+        blocks = index.blocks(g.first, g.last, split)
         others: tuple[np.ndarray, ...] = ()
         for name, places in self.other:
             columns = g.by_place(index, name)

@@ -29,10 +29,10 @@ class Blocks:
     """Query rows in groups of up to LANES that stand close together, each with the runs of places where its neighbours are.
 
     Block b holds queries[block_first[b] : block_first[b + 1]]; its candidates are the places span_start[s] to span_end[s] - 1 for s
-    from span_first[b] to span_first[b + 1] - 1. Walking them in this order is the order of (cell row, cell, id), in any stack.
+    from span_first[b] to span_last[b] - 1. Walking them in this order is the order of (cell row, cell, id), in any stack.
 
     Attributes:
-        cuts: queries, block_first, span_first, block_strip, (4, n + 1); queries are the n sorted places of the query rows.
+        cuts: queries, block_first, block_strip, span_first, span_last, (5, n + 1); queries are the n sorted places of the query rows.
         spans: span_start and span_end, (2, number of spans or more).
         points: Positions of the queries in their order [m], (3, n + LANES); what is behind the end may be read.
         n_blocks: Number of blocks.
@@ -51,7 +51,7 @@ class Blocks:
     def of(cls, n: int) -> Blocks:
         """Return blocks for n rows, not yet cut; the spans may turn out to need more elements."""
         return cls(
-            np.empty((4, n + 1), np.int64), np.empty((2, 2 * n + 64), np.int64), np.zeros((3, n + LANES))
+            np.empty((5, n + 1), np.int64), np.empty((2, 2 * n + 64), np.int64), np.zeros((3, n + LANES))
         )
 
 
@@ -103,8 +103,6 @@ class Index:
         self.inverse_cell = np.zeros(n_worlds)
         self.reach = np.zeros(n_worlds)
         self._rings = np.where(self.world_start[1:] - self.world_start[:-1] < SPARSE_WORLD, 1.0, RINGS)
-        self._cursor = np.zeros(3 * n, np.int64)
-        self._size = np.zeros(2, np.int64)
         self._fixed = False
         self._given: Floats | None = None
         self.built = 0
@@ -140,7 +138,7 @@ class Index:
         if split is None:
             kernels.build(*arrays, (kernels.KEYS + kernels.SORT + kernels.PLACES, 0, n))
         else:  # rows lie anywhere in memory: what takes time is to fetch them
-            split(n, lambda *part: kernels.build(*arrays, (kernels.KEYS, *part)))
+            split(n, lambda *part: kernels.build(*arrays, (kernels.KEYS + kernels.PART, *part)))
             kernels.build(*arrays, (kernels.SORT, 0, n))
             split(n, lambda *part: kernels.build(*arrays, (kernels.PLACES, *part)))
 
@@ -154,8 +152,11 @@ class Index:
         kernels.gather(column, self.order, out)
         return out
 
-    def blocks(self, first: int, last: int) -> Blocks:
-        """Blocks of rows [first, last) of the table, good until the next build; one object for each range."""
+    def blocks(self, first: int, last: int, split: Split | None = None) -> Blocks:
+        """Blocks of rows [first, last) of the table, good until the next build; one object for each range.
+
+        `split` calls a function over parts of the blocks in several threads.
+        """
         blocks = self._blocks.get((first, last))
         if blocks is None:
             blocks = self._blocks[first, last] = Blocks.of(last - first)
@@ -165,15 +166,28 @@ class Index:
         elif blocks.built == self.built:
             return blocks
         index = self.order, self._strips, self._world_strip, self.world_start, self._keys
-        cells = self.inverse_cell, self.reach
-        while True:
-            arrays = blocks.cuts, blocks.spans, self._cursor
-            needed = kernels.cut_blocks(
-                index, (first, last), self.points, cells, arrays, blocks.points, self._size
-            )
-            if needed <= blocks.spans.shape[1]:
-                break
-            blocks.spans = np.empty((2, 2 * needed), np.int64)
-        blocks.most, blocks.n_blocks = self._size.tolist()
+        table = index, (first, last), self.points, (self.inverse_cell, self.reach)
+        while not self._cut(blocks, table, split):
+            blocks.spans = np.empty((2, 2 * blocks.spans.shape[1]), np.int64)
         blocks.built = self.built
         return blocks
+
+    def _cut(self, blocks: Blocks, table: tuple[Any, ...], split: Split | None) -> bool:
+        """Cut blocks and find their spans. Return whether the spans fit."""
+        room = blocks.spans.shape[1]
+        arrays = blocks.cuts, blocks.spans
+        if split is None:
+            part = kernels.GROUP + kernels.SPANS, 0, -1, 0, room
+            blocks.n_blocks, used, blocks.most = kernels.cut_blocks(*table, arrays, blocks.points, part)
+            return bool(used <= room)
+        n, _, _ = kernels.cut_blocks(*table, arrays, blocks.points, (kernels.GROUP, 0, 0, 0, 0))
+        made: list[tuple[bool, int]] = []
+
+        def find(begin: int, end: int) -> None:
+            part = kernels.SPANS, begin, end, room * begin // n, room * end // n
+            _, used, most = kernels.cut_blocks(*table, arrays, blocks.points, part)
+            made.append((used <= part[-1], most))
+
+        split(n, find)
+        blocks.n_blocks, blocks.most = n, max((most for _, most in made), default=0)
+        return all(fits for fits, _ in made)

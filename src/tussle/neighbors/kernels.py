@@ -10,8 +10,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
+
 from tussle.neighbors.lane_count import LANES
-from tussle.neighbors.sort import sort_keys
+from tussle.neighbors.sort import MOVES_PER_KEY, insertion_sort, sort_keys
 from tussle.numeric.kernel import device, kernel
 
 KEY_BITS = 62
@@ -164,7 +166,7 @@ def put_places(pos, worlds, keys, placed, points, begin, end):
             sz[p] = z[row]
 
 
-KEYS, SORT, PLACES = 1, 2, 4
+KEYS, PART, SORT, PLACES = 1, 2, 4, 8
 
 
 @kernel("(F F F) F (I I) (Iw Iw) I2w F2w (I2w Iw) (i8 i8 i8)")
@@ -174,12 +176,17 @@ def build(pos, inverse_cell, worlds, work, placed, points, strips, part):
     pos: x, y, z (N,) [m]; inverse_cell (n_worlds,) [1/m], 0 for one cell per world; worlds: world_start, members. work: keys (N,)
     hold ranks in their low bits on entry, in any order, the last one for speed; scratch (N,). Written: placed, order and place,
     (2, N); points, positions by place, (3, N + LANES); strips: first place and world of each strip, (2, N + 1), and the first
-    strip of each world, (n_worlds + 1,). part: a sum of KEYS, SORT and PLACES, in this order to be done, and the places
-    [begin, end) to do it for; SORT is for all.
+    strip of each world, (n_worlds + 1,). part: a sum of KEYS, PART, SORT and PLACES, in this order to be done, and the places
+    [begin, end) to do it for; PART sorts these among themselves, which leaves little for SORT, which is for all.
     """
     phases, begin, end = part
     if phases & KEYS:
         make_keys(pos, inverse_cell, worlds, work[0], begin, end)
+    if phases & PART:
+        for w in range(inverse_cell.shape[0]):
+            start, stop = max(worlds[0][w], begin), min(worlds[0][w + 1], end)
+            if inverse_cell[w] != 0.0 and stop - start > 1:
+                insertion_sort(work[0], start, stop, MOVES_PER_KEY * (stop - start))
     if phases & SORT:
         sort_worlds(inverse_cell, worlds[0], work, strips[0], strips[1])
     if phases & PLACES:
@@ -270,25 +277,25 @@ def rectangle(x, y, start, end):
 
 
 @device
-def find_spans(cells, index, x, y, room, size, n_blocks):
-    """Candidate runs of every block: all entities of its world within `reach` of a query, and more.
+def find_spans(cells, index, points, arrays, part):
+    """Candidate runs of the blocks [b0, b1): all entities of their world within `reach` of a query, and more.
 
-    x, y (n,) positions [m] of the queries in query order; for the rest see `cut_blocks`. Returns the number of spans, which may
-    exceed the room in span_start (then call again with more). size[0] becomes the largest number of candidates of one block.
+    points: positions of the queries in query order [m], (3, n); part: b0, b1 and the range of spans to fill; for the rest see
+    `cut_blocks`. Returns the number of spans, which may exceed that range (then call again with more), and the largest number of
+    candidates of one block.
     """
     inverse_cell, reach = cells
     _, strips, world_strip, world_start, keys = index
-    cuts, spans, cursor = room
+    cuts, spans = arrays
     strip_start, strip_world = strips[0], strips[1]
-    block_first, span_first, block_strip = cuts[1], cuts[2], cuts[3]
+    block_first, block_strip, span_first, span_last = cuts[1], cuts[2], cuts[3], cuts[4]
     span_start, span_end = spans[0], spans[1]
-    room = span_start.shape[0]
+    b0, b1, n_spans, room = part
     n_strips = world_strip[world_strip.shape[0] - 1]
-    n_spans = 0
-    size[0] = 0
-    for k in range(2 * n_strips, 3 * n_strips):
-        cursor[k] = -1
-    for b in range(n_blocks):
+    cursor, cursor_end, cursor_of = np.empty((3, n_strips), np.int64)
+    cursor_of[:] = -1
+    most = 0
+    for b in range(b0, b1):
         span_first[b] = n_spans
         own = block_strip[b]
         w = strip_world[own]
@@ -301,12 +308,13 @@ def find_spans(cells, index, x, y, room, size, n_blocks):
                 span_start[n_spans] = start
                 span_end[n_spans] = end
             n_spans += 1
-            size[0] = max(size[0], end - start)
+            span_last[b] = n_spans
+            most = max(most, end - start)
             continue
         bits = rank_bits(end - start)
         cell_bits = (KEY_BITS - bits) >> 1
         limit = float((1 << (cell_bits - 1)) - 1)
-        west, east, south, north = rectangle(x, y, block_first[b], block_first[b + 1])
+        west, east, south, north = rectangle(points[0], points[1], block_first[b], block_first[b + 1])
         low_row = cell_of(south - reach[w], inverse, limit)
         high_row = cell_of(north + reach[w], inverse, limit)
         low = cell_of(west - reach[w], inverse, limit)
@@ -324,15 +332,15 @@ def find_spans(cells, index, x, y, room, size, n_blocks):
                 stop = strip_start[strip + 1]
                 from_key = ((row << cell_bits) + low) << bits
                 to_key = ((row << cell_bits) + high) << bits
-                if cursor[2 * n_strips + strip] == own:
+                if cursor_of[strip] == own:
                     i = step_to(keys, begin, stop, from_key, cursor[strip])
-                    j = step_to(keys, begin, stop, to_key, cursor[n_strips + strip])
+                    j = step_to(keys, begin, stop, to_key, cursor_end[strip])
                 else:
                     i = lower_bound(keys, begin, stop, from_key)
                     j = lower_bound(keys, i, stop, to_key)
-                    cursor[2 * n_strips + strip] = own
+                    cursor_of[strip] = own
                 cursor[strip] = i
-                cursor[n_strips + strip] = j
+                cursor_end[strip] = j
                 if i < j:
                     total += j - i
                     if i == before:
@@ -344,25 +352,33 @@ def find_spans(cells, index, x, y, room, size, n_blocks):
                     before = j
                     n_spans += 1
             strip += 1
-        size[0] = max(size[0], total)
-    span_first[n_blocks] = n_spans
-    return n_spans
+        span_last[b] = n_spans
+        most = max(most, total)
+    return n_spans, most
 
 
-@kernel("(I I2 I I I) (i8 i8) F2 (F F) (I2w I2w Iw) F2w Iw -> i8")
-def cut_blocks(index, rows, points, cells, room, out, size):
+GROUP, SPANS = 1, 2
+
+
+@kernel("(I I2 I I I) (i8 i8) F2 (F F) (I2w I2w) F2w (i8 i8 i8 i8 i8) -> i8 i8 i8")
+def cut_blocks(index, rows, points, cells, arrays, out, part):
     """The queries of rows [first, last) in blocks, where they stand, and the candidate runs of every block.
 
     index: order, strips, world_strip, world_start, keys. rows: first, last. points: positions by place [m], (3, n). cells: inverse_cell
-    [1/m], reach [m], (n_worlds,). Written: room, that is cuts (queries, block_first, span_first, block_strip; 4, n + 1), spans
-    (span_start, span_end) and work space (3 n_strips,); out (positions by query), size (most candidates of a block, number of
-    blocks). Returns the number of spans, which may exceed the room for them.
+    [1/m], reach [m], (n_worlds,). Written: arrays, that is cuts (queries, block_first, block_strip, span_first, span_last; 5, n + 1)
+    and spans (span_start, span_end); out (positions by query). part: a sum of GROUP (for all blocks) and SPANS, the blocks [b0, b1) to
+    find spans for, b1 -1 for all, and the range of spans for them. Returns the number of blocks, the end of the spans, which may
+    exceed that range, and the largest number of candidates of one block.
     """
     order, strips, world_strip, _, _ = index
-    cuts = room[0]
-    first, last = rows
-    queries = cuts[0, : last - first]
-    n_blocks = group_queries(order, strips[0], world_strip, first, last, queries, cuts[1], cuts[3])
-    query_positions(queries, points, out)
-    size[1] = n_blocks
-    return find_spans(cells, index, out[0], out[1], room, size, n_blocks)
+    cuts = arrays[0]
+    phases, b0, b1, s0, s1 = part
+    if phases & GROUP:
+        first, last = rows
+        queries = cuts[0, : last - first]
+        b1 = group_queries(order, strips[0], world_strip, first, last, queries, cuts[1], cuts[2])
+        query_positions(queries, points, out)
+    used, most = s0, 0
+    if phases & SPANS:
+        used, most = find_spans(cells, index, out, arrays, (b0, b1, s0, s1))
+    return b1, used, most

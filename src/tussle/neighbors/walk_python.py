@@ -31,7 +31,7 @@ def walk_in_python(
                 i = order[me] - first
                 mine = {name: np.float64(column[i]) for name, column in zip(own_names, own, strict=True)}
                 totals = [Totals(law, mine) for law in laws]
-                places = (p for s in range(*cuts[2, b : b + 2]) for p in range(*spans[:, s]) if p != me)
+                places = (p for s in range(*cuts[3:5, b]) for p in range(*spans[:, s]) if p != me)
                 for p in places:
                     theirs = {name: column[p] for name, column in zip(other_names, other, strict=True)}
                     pair = {**mine, **theirs, **between(points[1][:, p] - points[1][:, me])}

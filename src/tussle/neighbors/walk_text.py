@@ -191,7 +191,7 @@ class WalkText:
         """The kernel's arguments."""
         yield "def walk(longs, points, other, own, out, first, part, most):"
         yield "    cuts, spans, order = longs"
-        yield "    queries, block_first, span_first = cuts[0], cuts[1], cuts[2]"
+        yield "    queries, block_first, span_first, span_last = cuts[0], cuts[1], cuts[3], cuts[4]"
         yield "    span_start, span_end = spans[0], spans[1]"
         for number, name in enumerate("qs"):
             yield f"    {name}x, {name}y, {name}z = points[{number}][0], points[{number}][1], points[{number}][2]"
@@ -248,7 +248,7 @@ class WalkText:
             yield f"            limit2_{at} = {square(radii)}"
         for part in self.parts:
             yield from indented(3, part.single_begin())
-        yield "            for s in range(span_first[b], span_first[b + 1]):"
+        yield "            for s in range(span_first[b], span_last[b]):"
         yield "                for p in range(span_start[s], span_end[s], LANES):"
         yield from indented(5, self.single_neighbors(names))
         for part in self.parts:
@@ -315,7 +315,7 @@ class WalkText:
 
     def find_places(self) -> Iterator[str]:
         """Places near the lanes, of all, of their team, of other teams."""
-        spans = "span_first[b], span_first[b + 1], span_start, span_end, (sx, sy, sz)"
+        spans = "span_first[b], span_last[b], span_start, span_end, (sx, sy, sz)"
         box = "(west, east, south, north, low, high), reach2"
         if None in self.lists:
             yield f"n_all = find_near({spans}, {box}, places_all)"

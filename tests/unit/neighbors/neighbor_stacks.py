@@ -56,9 +56,9 @@ def stack(worlds, groups=1, reverse_groups=False):
 
 def block_candidates(blocks):
     """Per query place, the candidate places of its block."""
-    queries, block_first, span_first, _ = blocks.cuts
+    queries, block_first, _, span_first, span_last = blocks.cuts
     for b in range(blocks.n_blocks):
-        runs = [np.arange(*blocks.spans[:, s]) for s in range(span_first[b], span_first[b + 1])]
+        runs = [np.arange(*blocks.spans[:, s]) for s in range(span_first[b], span_last[b])]
         candidates = np.concatenate(runs) if runs else np.zeros(0, np.int64)
         for q in range(block_first[b], block_first[b + 1]):
             yield queries[q], candidates
