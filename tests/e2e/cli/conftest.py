@@ -1,4 +1,4 @@
-"""The command, run as a user runs it: in a process and an empty folder of its own."""
+"""The command, run in an empty folder: in this process, or in one of its own."""
 
 from __future__ import annotations
 
@@ -8,6 +8,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
+
+from tussle.cli import terminal
+from tussle.cli.app import app
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -45,17 +49,34 @@ def folder(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def tussle(folder: Path) -> Tussle:
-    """Runs the command in the folder; `code` is the exit code that it must end with."""
+def process(folder: Path) -> Tussle:
+    """Runs the command in the folder, in a process of its own; `code` is the exit code that it must end with."""
 
-    def run(
-        *arguments: str | Path, code: int = 0, timeout: float = 600.0
-    ) -> subprocess.CompletedProcess[str]:
+    def run(*arguments: str | Path, code: int = 0) -> subprocess.CompletedProcess[str]:
         done = subprocess.run(
             [*COMMAND, *map(str, arguments)],
-            check=False, capture_output=True, text=True, timeout=timeout, cwd=folder, env=environment(),
+            check=False, capture_output=True, text=True, cwd=folder, env=environment(),
         )  # fmt: skip
         assert done.returncode == code, (done.returncode, done.stdout, done.stderr)
         return done
+
+    return run
+
+
+@pytest.fixture
+def tussle(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Tussle:
+    """The same in this process, which has imported everything already."""
+    monkeypatch.chdir(folder)
+    monkeypatch.setenv("TERM", "xterm")
+    for name in ("FORCE_COLOR", "COLUMNS", "NO_COLOR"):
+        monkeypatch.delenv(name, raising=False)
+
+    def run(*arguments: str | Path, code: int = 0) -> subprocess.CompletedProcess[str]:
+        terminal.out.cache_clear()
+        terminal.err.cache_clear()
+        done = CliRunner().invoke(app, [str(a) for a in arguments], prog_name="tussle")
+        assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
+        assert done.exit_code == code, (done.exit_code, done.stdout, done.stderr)
+        return subprocess.CompletedProcess(arguments, code, done.stdout, done.stderr)
 
     return run

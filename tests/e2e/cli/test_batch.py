@@ -56,9 +56,9 @@ def told(messages):
 # -- as a user types it ---------------------------------------------------------------------------------------------------------
 
 
-def test_a_batch_is_played_counted_and_gone_on_with(tussle, folder):
+def test_a_batch_is_played_counted_and_gone_on_with(process, folder):
     command = ("batch", "chance.xml", "--vary", "odds=0.1,0.3", *PLUGINS)
-    done = tussle(*command, "--runs", 9, "--processes", 2)
+    done = process(*command, "--runs", 9, "--processes", 2)
     (path,) = (folder / "batches").iterdir()
     assert re.fullmatch(r"chance-[0-9a-f]{8}", path.name)
     assert told(done.stderr) == ""
@@ -69,10 +69,10 @@ def test_a_batch_is_played_counted_and_gone_on_with(tussle, folder):
     assert heads[-5:] == ["played", "batch", "next", "tussle", "tussle"]
     assert f" batch   batches/{path.name}" in lines
     assert re.search(r"\n played  18 runs in \d+:\d\d \(\S+ runs/s\), \S+ CPU s in all\n", done.stdout)
-    again = tussle(*command, "--runs", 9)
+    again = process(*command, "--runs", 9)
     assert told(again.stderr) == f"note: 18 of 18 runs were there already, in batches/{path.name}\n"
     assert "played" not in again.stdout
-    more = tussle(*command, "--runs", 12, "--processes", 1)
+    more = process(*command, "--runs", 12, "--processes", 1)
     assert told(more.stderr) == f"note: 18 of 24 runs were there already, in batches/{path.name}\n"
     assert " 24 runs · 2 points · seeds 1 to 12\n" in more.stdout
     assert re.search(r"\n played  6 runs in", more.stdout)
@@ -347,11 +347,11 @@ def test_a_game_that_takes_longer_than_it_may_is_given_up(here):
     assert code == 2
 
 
-def test_a_plugin_that_kills_the_command_kills_it_only_once(tussle, folder):
+def test_a_plugin_that_kills_the_command_kills_it_only_once(process, folder):
     command = ("batch", "chance.xml", "how=crash", "--runs", 4, "--stack", 1, "--out", "out", *PLUGINS)
-    tussle(*command, code=-signal.SIGSEGV)  # so few are played in the process itself
+    process(*command, code=-signal.SIGSEGV)  # so few are played in the process itself
     assert load_batch(folder / "out").runs["seed"].to_pylist() == [1, 2]
-    done = tussle(*command, code=5)
+    done = process(*command, code=5)
     assert told(done.stderr).splitlines() == [
         "note: 2 of 4 runs were there already, in out",
         "note: 1 of 4 runs failed and are left out above; tussle analyze tells which",

@@ -10,8 +10,8 @@ import typer
 from tussle.cli import doctor, terminal
 
 
-def test_it_shows_what_is_installed_and_plays_the_self_test(tussle):
-    text = " ".join(tussle("doctor").stdout.split())
+def test_it_shows_what_is_installed_and_plays_the_self_test(process):
+    text = " ".join(process("doctor").stdout.split())
     assert f"numba {importlib.metadata.version('numba')}" in text
     for extra in ("batch", "cluster", "frames", "view"):
         assert f"extra {extra} installed" in text

@@ -15,6 +15,9 @@ from cli_process import COMMAND, environment
 from mcap.reader import make_reader
 from test_terminal import ESCAPE, seen
 
+from tussle import Recorder, Simulation
+from tussle.mission import read_mission
+
 SMALL = ("--size", "96x64", "--fps", "5", "--speed", "1")
 
 
@@ -25,10 +28,10 @@ def played(tussle, folder):
     return folder / "played"
 
 
-def test_all_outputs_at_once_lie_in_the_run(tussle, played):
+def test_all_outputs_at_once_lie_in_the_run(process, played):
     before = {p.name for p in played.iterdir()}
     asked = ("--mp4", "--gif", "--png", "--mcap", "--csv", "--parquet", "--html")
-    said = tussle("export", "played", *asked, *SMALL)
+    said = process("export", "played", *asked, *SMALL)
     made = {
         "film.mp4", "film.gif", "picture.png", "run.mcap", "replay.html", "states.csv", "states.events.csv",
         "states.parquet", "states.events.parquet",
@@ -72,12 +75,9 @@ def test_a_part_of_the_game_as_others_see_it(tussle, played):
 
 
 def test_of_several_worlds_one_is_shown_and_tables_hold_all(tussle, folder):
-    script = (
-        "from tussle import Recorder, Simulation\nfrom tussle.mission import read_mission\n"
-        "simulation = Simulation(read_mission('game.xml').mission, seeds=[1, 2])\n"
-        "with Recorder(simulation, 'two'):\n    simulation.run()\n"
-    )
-    subprocess.run([COMMAND[0], "-c", script], check=True, cwd=folder, env=environment())
+    simulation = Simulation(read_mission(folder / "game.xml").mission, seeds=[1, 2])
+    with Recorder(simulation, folder / "two"):
+        simulation.run()
     said = tussle("export", "two", "--png", "--csv", "--size", "96x64")
     assert "note: the run has 2 worlds; world 0 is shown" in said.stderr
     both = (folder / "two" / "states.csv").read_text().splitlines()

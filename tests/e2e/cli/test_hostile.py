@@ -6,8 +6,6 @@ import os
 
 import pytest
 
-SECONDS = 300.0  # that nothing takes which ends at all; alone it is one
-
 RUN = '<run start="0" end="5" dt="0.1"/>'
 ENTITY = (
     "<entity><team_id>1</team_id><autonomy>Boids</autonomy><motion_model>Unicycle</motion_model></entity>"
@@ -61,7 +59,7 @@ CASES = {
 def test_it_ends_soon_in_one_message_and_writes_nothing(tussle, folder, name):
     text, expected = CASES[name]
     (folder / "bad.xml").write_text(text)
-    done = tussle("run", "bad.xml", code=1, timeout=SECONDS)
+    done = tussle("run", "bad.xml", code=1)
     errors = [line for line in done.stderr.splitlines() if line.startswith("error: ")]
     assert len(errors) == 1
     assert expected in errors[0]
@@ -96,7 +94,7 @@ PLUGIN_FILES = {
 def test_a_plugin_file_that_cannot_be_imported_is_told_with_its_line(tussle, folder, name):
     text, expected = PLUGIN_FILES[name]
     (folder / "own.py").write_text(text)
-    done = tussle("run", "game.xml", "--plugin-path", "own.py", code=1, timeout=SECONDS)
+    done = tussle("run", "game.xml", "--plugin-path", "own.py", code=1)
     (line,) = done.stderr.splitlines()
     assert expected in line
 
@@ -104,7 +102,7 @@ def test_a_plugin_file_that_cannot_be_imported_is_told_with_its_line(tussle, fol
 def test_what_is_no_file_is_not_waited_for(tussle, folder):
     os.mkfifo(folder / "pipe.xml")
     for name in ("pipe.xml", "/dev/zero", "."):
-        assert tussle("run", name, code=1, timeout=SECONDS).stderr.startswith("error: ")
+        assert tussle("run", name, code=1).stderr.startswith("error: ")
 
 
 def test_a_title_that_is_a_path_does_not_lead_out_of_the_folder(tussle, folder):

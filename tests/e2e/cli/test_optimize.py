@@ -55,8 +55,8 @@ def command_of(done):
     return lines[next(i for i, line in enumerate(lines) if line.startswith(" next ")) + 1]
 
 
-def test_faster_hunters_catch_more_and_the_best_can_be_played_again(tussle, folder):
-    done = tussle(*SEARCH)
+def test_faster_hunters_catch_more_and_the_best_can_be_played_again(process, tussle, folder):
+    done = process(*SEARCH)
     (path,) = (folder / "optimizations").iterdir()
     assert re.fullmatch(r"game-[0-9a-f]{8}", path.name)
     table = pq.read_table(path / "trials.parquet").to_pylist()

@@ -47,11 +47,11 @@ def test_a_bar_with_the_speed_is_shown_while_it_plays_and_gone_after(folder):
     assert "\x1b[?25h" in text  # and the cursor is back
 
 
-def test_colours_are_for_terminals_only(folder, tussle):
+def test_colours_are_for_terminals_only(folder, process):
     text, _ = seen(folder, "run", "nothing.xml")
     assert "\x1b[1;31merror: " in text
-    assert "\x1b" not in tussle("run", "nothing.xml", code=1).stderr
-    assert "\x1b" not in tussle("plugins").stdout
+    assert "\x1b" not in process("run", "nothing.xml", code=1).stderr
+    assert "\x1b" not in process("plugins").stdout
 
 
 def test_the_first_run_ever_says_that_it_compiles_and_the_next_does_not(folder, monkeypatch):

@@ -101,16 +101,16 @@ def test_a_game_is_served_steered_and_ended_with_its_summary(watching, folder):
     assert (folder / "kept" / "run.json").exists()
 
 
-def test_what_is_watched_has_the_hash_that_it_has_alone(tussle):
-    alone = re.search(r"hash\s+(\w{32})", tussle("run", "game.xml", "--no-log").stdout)[1]
-    seen = tussle("view", "game.xml", "--no-browser", "--exit-when-over", "--pace", "max").stdout
+def test_what_is_watched_has_the_hash_that_it_has_alone(process):
+    alone = re.search(r"hash\s+(\w{32})", process("run", "game.xml", "--no-log").stdout)[1]
+    seen = process("view", "game.xml", "--no-browser", "--exit-when-over", "--pace", "max").stdout
     assert f"hash   {alone}" in seen
     assert "end time reached" in seen
 
 
-def test_a_failing_plugin_is_the_exit_code(tussle, folder):
+def test_a_failing_plugin_is_the_exit_code(process, folder):
     (folder / "broken.py").write_text(BROKEN)
-    done = tussle(
+    done = process(
         "view", "game.xml", "mind=Broken", "--plugin-path", "broken.py", "--no-browser", "--exit-when-over", code=3
     )  # fmt: skip
     assert "Broken" in done.stderr
