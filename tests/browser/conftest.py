@@ -4,17 +4,10 @@ from __future__ import annotations
 
 import os
 import shutil
-import sys
 from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, ConsoleMessage, Page, Request, sync_playwright
-
-here = Path(__file__).parent
-for folder in (here, here.parent / "unit" / "record", here.parent / "unit" / "view"):
-    if str(folder) not in sys.path:
-        sys.path.insert(0, str(folder))
 
 PROGRAMS = ("chromium", "chromium-browser", "google-chrome")
 # Drawing without a graphics card; and nothing that the browser would ask of the network by itself.

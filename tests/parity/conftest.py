@@ -1,13 +1,10 @@
-"""Lets the tests of this folder import its modules, and skips them where there are no recordings."""
+"""Skips the tests of this folder where there are no recordings."""
 
-import sys
 from pathlib import Path
 
 import pytest
 
 HERE = Path(__file__).parent
-if str(HERE) not in sys.path:
-    sys.path.insert(0, str(HERE))
 
 
 def pytest_collection_modifyitems(items):

@@ -37,8 +37,8 @@ class Flight:
         return max(self.error.values())
 
 
-def fly(mission: Mission, recording: Recording) -> Flight:
-    """Play a mission from the recorded first states to its end, and compare."""
+def fly(mission: Mission, recording: Recording, enough: float | None = None) -> Flight:
+    """Play a mission from the recorded first states, and compare, to its end or until an error is larger than `enough` [m]."""
     flight = Flight()
     wanted = set(recording.frames.tolist())
 
@@ -51,6 +51,9 @@ def fly(mission: Mission, recording: Recording) -> Flight:
 
     with Simulation(mission, start_from=recording.first_states) as sim:
         sim.observers.append(look)
+        if enough is not None:
+            sim.run_until(lambda _: next(reversed(flight.error.values()), 0.0) > enough)
+            return flight
         flight.result = sim.run()[0]
         frame, bodies = int(sim.steps[0]), sim.state.parked[0].bodies
     flight.last_frame.update(dict.fromkeys(bodies.id.tolist(), frame))

@@ -65,4 +65,4 @@ def test_without_the_variant_the_recording_is_missed(law: str, name: str, least:
     """Each variant is there because the product's law flies otherwise, by more than this."""
     others = {cls: variant for cls, variant in VARIANTS.items() if cls.__name__ != law}
     assert len(others) == len(VARIANTS) - 1
-    assert fly(historic(mission(name), others), load(name)).max_error > least
+    assert fly(historic(mission(name), others), load(name), enough=least).max_error > least

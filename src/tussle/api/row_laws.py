@@ -138,7 +138,7 @@ def laws_of(plugin: Any, wired: Collection[str] | None = None) -> list[RowCall]:
     """Return the calls of the laws that a plugin runs; `wired` names the outputs that other plugins read, None means all."""
     cls = type(plugin)
     inputs = cls.inputs()
-    active = plugin.active_inputs() if hasattr(plugin, "active_inputs") else inputs
+    active = plugin.active_inputs() if hasattr(type(plugin), "active_inputs") else inputs
     off = {each for k, c in inputs.items() if k not in active for each in (k, *c.channels)}
     calls = []
     for law in cls.row_laws.values():

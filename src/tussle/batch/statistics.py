@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
@@ -115,6 +116,7 @@ class Comparison:
 # -- shares ---------------------------------------------------------------------------------------------------------------
 
 
+@cache
 def wilson(k: float, n: float) -> tuple[float, float]:
     """Wilson's interval of a share, k of n, which are rounded to whole numbers; NaN for n = 0."""
     if n <= 0:

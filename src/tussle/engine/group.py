@@ -105,7 +105,7 @@ def check_hooks(spec: Any, where: str) -> None:
     needed = {"motion": ("from_body", "to_body"), "network": ("route",)}.get(spec.kind, ("step",))
     if isinstance(spec, EasyEntityPlugin):
         needed = ("step_one",)
-    if getattr(spec, "passthrough", False) or (spec.kind == "controller" and type(spec).row_laws):
+    if getattr(type(spec), "passthrough", False) or (spec.kind == "controller" and type(spec).row_laws):
         return
     abstract = [c for c in type(spec).__mro__ if c.__module__.startswith("tussle.api.")]
     for hook in needed:

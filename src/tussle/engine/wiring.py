@@ -44,7 +44,7 @@ class Bus:
 def read_channels(plugin: Any) -> list[tuple[str, Channel]]:
     """Input columns used by a plugin, in order of declaration."""
     inputs = type(plugin).inputs()
-    names = plugin.active_inputs() if hasattr(plugin, "active_inputs") else list(inputs)
+    names = plugin.active_inputs() if hasattr(type(plugin), "active_inputs") else list(inputs)
     return [(k, inputs[k]) for k in names]
 
 
@@ -141,7 +141,7 @@ class Wiring:
                 self.links[id(plugin), name] = self._link(column, bus)
         for plugin in consumers:
             self._read(plugin, bus, fallback, required=True)
-            if getattr(plugin, "reads_all", False):
+            if getattr(type(plugin), "reads_all", False):
                 bus.read.update(bus.writers)
         for channel, names in bus.writers.items():
             if len(names) > 1:

@@ -39,6 +39,7 @@ class Problems:
         self._notes: dict[str, list[Place]] = {}
         self._n_omitted = 0
         self._absent: dict[tuple[str, str], str] = {}
+        self._unknown: dict[tuple[str, str], tuple[str, str]] = {}
 
     def error(self, place: Place, text: str) -> None:
         """Add an error: the mission cannot be run.
@@ -74,10 +75,13 @@ class Problems:
         if not self.strict and len(self._notes) >= MOST_LINES:
             self._n_omitted += 1  # skips the search for the nearest name, which is slow
             return
-        known = sorted(allowed)
-        text = f"{what} {shown(name)} is unknown{nearest_name(name[:LONGEST_SHOWN], known)}"
+        if (what, name) not in self._unknown:
+            known = sorted(allowed)
+            text = f"{what} {shown(name)} is unknown{nearest_name(name[:LONGEST_SHOWN], known)}"
+            self._unknown[what, name] = text, listed(known)
+        text, allowed_names = self._unknown[what, name]
         if self.strict or not place.line:
-            self.error(place, f"{text}; {listed(known)}" if lists else text)
+            self.error(place, f"{text}; {allowed_names}" if lists else text)
         else:
             self.note(place, f"{text}; it is ignored")
 

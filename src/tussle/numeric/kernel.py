@@ -299,11 +299,10 @@ class Kernel(Device):
         return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
 
     def assembly(self) -> str:
-        """Assembly text, from a separate compilation."""
+        """Assembly text of the machine code that runs, from its optimized intermediate code."""
         with _lock:
-            dispatcher = self._new_dispatcher(self.key())
-            dispatcher.compile(self.types)
-        return "\n".join(dispatcher.inspect_asm().values())
+            library = self.compiled.library
+            return str(library.codegen._tm.emit_assembly(library._get_module_for_linking()))
 
     def _new_dispatcher(self, key: str) -> Any:
         return jitted(renamed(self.py_func, key), nogil=True, no_cfunc_wrapper=True, **self.options)

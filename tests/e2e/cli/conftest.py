@@ -3,19 +3,11 @@
 from __future__ import annotations
 
 import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
-
-from tussle.cli import terminal
-from tussle.cli.app import app
-
-sys.path.insert(0, str(Path(__file__).parent))
-
-from cli_process import COMMAND, environment
+from cli_process import COMMAND, call, environment
 
 Tussle = Callable[..., "subprocess.CompletedProcess[str]"]
 
@@ -72,11 +64,8 @@ def tussle(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Tussle:
         monkeypatch.delenv(name, raising=False)
 
     def run(*arguments: str | Path, code: int = 0) -> subprocess.CompletedProcess[str]:
-        terminal.out.cache_clear()
-        terminal.err.cache_clear()
-        done = CliRunner().invoke(app, [str(a) for a in arguments], prog_name="tussle")
-        assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
-        assert done.exit_code == code, (done.exit_code, done.stdout, done.stderr)
-        return subprocess.CompletedProcess(arguments, code, done.stdout, done.stderr)
+        done = call(*arguments)
+        assert done.returncode == code, (done.returncode, done.stdout, done.stderr)
+        return done
 
     return run

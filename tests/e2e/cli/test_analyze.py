@@ -3,14 +3,9 @@
 from __future__ import annotations
 
 import json
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "unit" / "batch"))
-
 from made_batches import made_batch, write_batch
 
 from tussle.batch.sampling import sample

@@ -12,16 +12,11 @@ import sys
 import termios
 from pathlib import Path
 
+import gambles
 import pytest
-from cli_process import COMMAND, environment
-from typer.testing import CliRunner
+from cli_process import COMMAND, call, environment
 
 from tussle.batch import InProcess, load_batch
-from tussle.cli.app import app
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "unit" / "batch"))
-
-import gambles
 
 PLUGINS = ("--plugin-path", "plugins.py")
 
@@ -39,12 +34,11 @@ def here(folder, monkeypatch):
     """Calls the command in this process: exit code, output and messages."""
     monkeypatch.chdir(folder)
 
-    def call(*arguments):
-        done = CliRunner().invoke(app, [str(a) for a in arguments])
-        assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
-        return done.exit_code, done.stdout, told(done.stderr)
+    def run(*arguments):
+        done = call(*arguments)
+        return done.returncode, done.stdout, told(done.stderr)
 
-    return call
+    return run
 
 
 def told(messages):

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import pytest
-from typer.testing import CliRunner
+from cli_process import call
 
-from tussle.cli.app import app
 from tussle.cli.terminal import OWN_FAULT
 
 EXTREMES = ("5e-324", "1e-300", "1e300", "-1e300", "9223372036854775808", "nan", "inf", "²")
@@ -89,12 +88,11 @@ def ends(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "game.xml").write_text(MISSION)
 
-    def call(*arguments):
-        done = CliRunner().invoke(app, list(arguments))
-        is_own = done.exit_code == OWN_FAULT or not isinstance(done.exception, (SystemExit, type(None)))
-        return f"{' '.join(arguments)}: {done.output} {done.exception!r}" if is_own else ""
+    def run(*arguments):
+        done = call(*arguments)
+        return f"{' '.join(arguments)}: {done.stderr}" if done.returncode == OWN_FAULT else ""
 
-    return call
+    return run
 
 
 @pytest.mark.parametrize("place", PLACES)

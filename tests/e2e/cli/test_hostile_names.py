@@ -8,15 +8,14 @@ import warnings
 
 import pytest
 import typer
+from cli_process import call
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from rich.table import Table
 from rich.text import Text
 from test_terminal import seen
-from typer.testing import CliRunner
 
 from tussle.cli import terminal
-from tussle.cli.app import app
 from tussle.errors import TussleError, visible
 
 NAMES = {
@@ -81,15 +80,15 @@ def here(folder, monkeypatch):
     """Calls the command in this process: exit code and all that is printed."""
     monkeypatch.chdir(folder)
 
-    def call(*arguments):
-        done = CliRunner().invoke(app, [str(a) for a in arguments])
-        assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
-        assert not STEERING.search(done.output), ascii(done.output)
-        assert "Traceback" not in done.output
-        assert "internal error" not in done.output
-        return done.exit_code, done.output
+    def run(*arguments):
+        done = call(*arguments)
+        output = done.stdout + done.stderr
+        assert not STEERING.search(output), ascii(output)
+        assert "Traceback" not in output
+        assert "internal error" not in output
+        return done.returncode, output
 
-    return call
+    return run
 
 
 def plain(name):
@@ -182,10 +181,10 @@ def test_errors_show_what_a_file_says_as_it_is(here, folder):
     assert "bad\\x1b[2J[b].xml:1" in output
     (folder / "odd.py").write_text("raise ValueError('\\x1b[2J[/red] \\x9b')")
     for more in ((), ("--debug",)):
-        done = CliRunner().invoke(app, ["run", "game.xml", "--plugin-path", "odd.py", *more])
-        assert done.exit_code == 1
-        assert "odd.py:1: it cannot be imported: ValueError: \\x1b[2J[/red] \\x9b" in done.output
-        assert not STEERING.search(done.output)
+        done = call("run", "game.xml", "--plugin-path", "odd.py", *more)
+        assert done.returncode == 1
+        assert "odd.py:1: it cannot be imported: ValueError: \\x1b[2J[/red] \\x9b" in done.stderr
+        assert not STEERING.search(done.stderr)
 
 
 def test_on_a_terminal_nothing_but_the_program_steers(folder, hostile):

@@ -11,16 +11,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+import gambles
 import pytest
 from cli_process import COMMAND, environment
 from typer.testing import CliRunner
 
 from tussle.batch import Batch, InProcess, trust
 from tussle.cli.app import app
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "unit" / "batch"))
-
-import gambles
 
 PLUGINS = ("--plugin-path", "plugins.py")
 BATCH = ("batch", "chance.xml", "--runs", 3, "--out", "out", "--processes", 1, *PLUGINS)

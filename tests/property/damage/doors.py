@@ -19,16 +19,13 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
-sys.path.insert(0, str(Path(__file__).parent))
-
+from cli_process import call
 from damages import damage, make_bombs
-from typer.testing import CliRunner
 
 from tussle import Simulation
 from tussle.batch import Batch, InProcess, load_batch
 from tussle.batch.reload import planned_run
 from tussle.batch.search.study_store import load_study
-from tussle.cli import app as commands
 from tussle.cli import terminal
 from tussle.errors import MissingExtraError, TussleError
 from tussle.mission import read_mission
@@ -71,15 +68,13 @@ def cli(*words: str | Path) -> None:
     """
     told: list[BaseException] = []
     with mock.patch.object(terminal, "_report", told.append):
-        result = CliRunner().invoke(commands.app, [str(word) for word in words])
+        result = call(*words)
     if told:
         raise told[0]
-    if result.exception is not None and not isinstance(result.exception, SystemExit):
-        raise result.exception
-    if result.exit_code == terminal.NOT_WRITTEN:  # told by the command itself
+    if result.returncode == terminal.NOT_WRITTEN:  # told by the command itself
         raise TussleError(result.stderr)
-    if result.exit_code in (terminal.OWN_FAULT, terminal.USAGE):
-        raise Fault(f"exit code {result.exit_code}: {result.output} {result.stderr}")
+    if result.returncode in (terminal.OWN_FAULT, terminal.USAGE):
+        raise Fault(f"exit code {result.returncode}: {result.stdout} {result.stderr}")
 
 
 # -- doors: each opens a directory and looks at all that is behind ----------------------------------------------------------------

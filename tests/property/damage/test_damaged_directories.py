@@ -12,6 +12,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from cli_process import environment
 
 N = int(os.environ.get("TUSSLE_DAMAGES", "2000"))
 DOORS = Path(__file__).with_name("doors.py")
@@ -32,7 +33,7 @@ def test_damaged_directories_end_in_one_message_or_are_read(tmp_path):
         str(first),
         str(first + N),
     ]
-    worker = subprocess.run(words, capture_output=True, text=True, check=False)
+    worker = subprocess.run(words, env=environment(), capture_output=True, text=True, check=False)
     assert worker.returncode == 0, f"{worker.stdout[-2000:]}\n{worker.stderr[-4000:]}"
     told = [json.loads(line) for line in worker.stdout.splitlines()]
     faults = [

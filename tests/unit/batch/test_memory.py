@@ -34,9 +34,8 @@ def grown(executor, directory, n_runs):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("executor", [InProcess(), Processes(2)], ids=["in process", "processes"])
-def test_ten_thousand_runs(tmp_path, executor):
-    ours, theirs = grown(executor, tmp_path / "out", 10_000)
+def test_ten_thousand_runs(tmp_path):
+    ours, theirs = grown(Processes(2), tmp_path / "out", 10_000)
     assert ours < MOST_GROWTH
     assert theirs < MOST_GROWTH
 

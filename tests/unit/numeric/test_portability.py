@@ -16,6 +16,7 @@ from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
 
 import tussle
 from tussle.neighbors.walk import make_walk
+from tussle.numeric import store
 from tussle.numeric.kernel import Kernel, kernel
 from tussle.numeric.rk4 import driver
 from tussle.stock import Boids
@@ -38,17 +39,11 @@ HASH = "6253fd21ad5e16a14a2ea4ee17c8ac88"
 """What PROGRAM prints; another one is a change of numbers, which the changelog tells."""
 
 
-@pytest.fixture(scope="module")
-def compiled_alike(tmp_path_factory):
-    """A cache for the settings under which the same code is compiled."""
-    return tmp_path_factory.mktemp("compiled")
-
-
 @pytest.mark.skipif(os.uname().machine != "x86_64", reason="the settings name x86-64 processors")
 @pytest.mark.parametrize("name", SETTINGS)
-def test_all_instruction_sets_give_the_same_bits(name, compiled_alike, tmp_path):
+def test_all_instruction_sets_give_the_same_bits(name):
     settings = SETTINGS[name]
-    folder = tmp_path if settings.keys() & COMPILING else compiled_alike
+    folder = store.directory() / name if settings.keys() & COMPILING else store.directory()
     env = dict(os.environ, PYTHONPATH=str(PACKAGE.parent), TUSSLE_CACHE_DIR=str(folder), **settings)
     done = subprocess.run(
         [sys.executable, "-W", "error", PROGRAM], env=env, capture_output=True, text=True, check=False

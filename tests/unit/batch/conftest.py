@@ -1,6 +1,0 @@
-"""Tests of batches share the made batches beside them."""
-
-import sys
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).parent))
