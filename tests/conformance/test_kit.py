@@ -801,14 +801,7 @@ class IgnoresBody(SoundMotion):
 
 
 BROKEN = {
-    "declarations": [
-        NoDoc,
-        ListOnClass,
-        NotAHook,
-        OwnInit,
-        NothingToDo,
-        DeclaresPos,
-    ],
+    "declarations": [NoDoc, ListOnClass, NotAHook, OwnInit, NothingToDo, DeclaresPos],
     "stack invariance": [
         CountsRows,
         KnowsItsRow,

@@ -41,11 +41,7 @@ def test_it_shows_what_came_of_the_game_and_where_it_is_recorded(process, folder
         (line,) = (line.split() for line in lines if line.startswith(f"  {team} {name}"))
         assert line[2:4] == [start, str(info["worlds"][0]["alive"][team])]
         assert line[6] == f"{scores[team]:g}"
-    for label in (
-        " ended  end time reached, at t = 3 s",
-        " grade  portable",
-        f" run    runs/{run.name}",
-    ):
+    for label in (" ended  end time reached, at t = 3 s", " grade  portable", f" run    runs/{run.name}"):
         assert label in lines
     assert re.search(
         r"^ speed  \S+ × real time \(\S+ s, \S+ CPU s\), ready after \S+ s$", done.stdout, re.MULTILINE

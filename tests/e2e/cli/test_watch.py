@@ -137,11 +137,7 @@ def test_a_run_is_replayed_and_two_are_compared(tussle, watching):
 @pytest.mark.parametrize(
     ("arguments", "code", "told"),
     [
-        (
-            ("view", "game.xml", "--pace", "fast"),
-            2,
-            "--pace fast is not allowed; it takes a number > 0, or max",
-        ),
+        (("view", "game.xml", "--pace", "fast"), 2, "--pace fast is not allowed"),
         (("view", "game.xml", "--pace", "0"), 2, "--pace 0 is not allowed"),
         (("view", "nosuch.xml"), 1, "nosuch.xml"),
         (("view", "game.xml", "--host", "192.0.2.1"), 1, "cannot be served at 192.0.2.1"),
@@ -166,10 +162,7 @@ def page_of(command):
 
 
 def test_sigterm_closes_the_recording(watching, folder):
-    with (
-        watching("view", "game.xml", "--record", "kept") as command,
-        PageClient(command.url) as client,
-    ):
+    with watching("view", "game.xml", "--record", "kept") as command, PageClient(command.url) as client:
         client.wait(lambda: client.t > 0.55)
         code, out, _ = command.end(signal.SIGTERM)
     assert code == 143

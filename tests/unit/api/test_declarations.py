@@ -99,11 +99,7 @@ def test_values_are_taken_in_si(name, given, value):
         ("path", 5, r"Sample.path = 5 is not allowed; it takes a list"),
         ("path", [5], r"Sample.path = 5 is not allowed; it takes 2 values \(x, y\)"),
         ("weights", 5, r"Sample.weights = 5 is not allowed; it takes a list"),
-        (
-            "sped",
-            5,
-            r"Sample has no parameter 'sped' \(did you mean 'speed'\?\); there are: speed, count, is_on",
-        ),
+        ("sped", 5, r"Sample has no parameter 'sped' \(did you mean 'speed'\?\)"),
         ("rate", 0, r"Sample: rate = 0 is not allowed; it takes a finite number in 1/s > 0"),
         ("rate", math.nan, r"Sample: rate = nan"),
         ("rate", math.inf, r"Sample: rate = inf"),
@@ -153,10 +149,7 @@ def test_the_signature_shows_names_and_defaults():
 
 def test_a_plugin_is_a_value_and_has_no_arrays():
     one = Sample()
-    with pytest.raises(
-        ParameterError,
-        match=r"Sample.speed cannot be changed: a plugin is a value; make another with .replace\(speed=...\)",
-    ):
+    with pytest.raises(ParameterError, match=r"Sample.speed cannot be changed: a plugin is a value"):
         one.speed = 3.0
     with pytest.raises(AttributeError, match=r"Sample.wings is not declared"):
         one.wings = 3.0
@@ -181,14 +174,8 @@ def test_shipped_plugins_are_data(kind):
         (lambda: Param((1.0, 2.0), fields="a a"), r"Param: duplicate name in 'a a'"),
         (lambda: State(dtype=complex), r"State: dtype <class 'complex'> is not one of float, int, bool"),
         (lambda: State(per="block"), r"State: per='block' is not one of entity, world, team"),
-        (
-            lambda: type("A", (Autonomy,), {"grade": "perfect"}),
-            r"A.grade is 'perfect'; it is one of portable, machine, external",
-        ),
-        (
-            lambda: type("A", (Autonomy,), {"name": State()}),
-            r"A.name: the name is reserved; choose another for this State",
-        ),
+        (lambda: type("A", (Autonomy,), {"grade": "perfect"}), r"A.grade is 'perfect'"),
+        (lambda: type("A", (Autonomy,), {"name": State()}), r"A.name: the name is reserved"),
         (lambda: type("A", (Autonomy,), {"_x": Param(1.0)}), r"A._x: the name is reserved"),
         (
             lambda: type("M", (Message,), {"x": State()}),
@@ -247,9 +234,7 @@ def test_ragged_columns():
     assert taken.start.tolist() == [0, 1, 1, 3]
     assert taken.data.tolist() == [[5.0, 1.0, 3.0], [6.0, 2.0, 4.0]]
     assert RaggedColumn.empty(0, Field(ragged=True)).take(np.array([-1, -1])).start.tolist() == [0, 0, 0]
-    with pytest.raises(
-        ValueError, match=r"shape \(2,\) and data \(2, 3\); expected \(4,\) and \(2,\) \+ \(total,\)"
-    ):
+    with pytest.raises(ValueError, match=r"shape \(2,\) and data \(2, 3\)"):
         column.set([0, 3], np.zeros((2, 3)))
     with pytest.raises(ValueError, match="start must rise from 0 to the number of items, 3"):
         column.set([0, 2, 1, 3], np.zeros((2, 3)))
@@ -264,8 +249,7 @@ def test_batches_of_messages():
     assert both.value.tolist() == [30, 20, 10]
     assert len(Messages.empty(Note)) == 0
     with pytest.raises(
-        AttributeError,
-        match=r"messages of this type have no field 'valu' \(did you mean 'value'\?\); there are: value",
+        AttributeError, match=r"messages of this type have no field 'valu' \(did you mean 'value'\?\)"
     ):
         _ = both.valu
     with pytest.raises(ParameterError, match=r"Note.value: shape \(3,\) does not fit \(2,\)"):
@@ -281,9 +265,7 @@ def test_batches_of_messages():
     ):
         with pytest.raises(ParameterError, match=f"Delivery.points: {text}"):
             Messages.make(Delivery, one, one, {"points": points})
-    with pytest.raises(
-        ParameterError, match=r"Delivery.thing: 3 objects; expected one object, or a list of 2"
-    ):
+    with pytest.raises(ParameterError, match=r"Delivery.thing: 3 objects"):
         Messages.make(Delivery, np.zeros(2, int), np.zeros(2, int), {"thing": ["a", "b", "c"]})
     captured = Messages.make(EntityCaptured, np.zeros(2, int), np.zeros(2, int), {"source": [1, 2]})
     assert captured.source_team.tolist() == [0, 0]

@@ -246,10 +246,7 @@ def test_who_has_seen_many_goes_on_seeing():
 @pytest.mark.parametrize(
     ("call", "text"),
     [
-        (
-            lambda me: me.nearest(team="mine"),
-            "team = 'mine' is not allowed; it is 'own', 'other', a team number or None",
-        ),
+        (lambda me: me.nearest(team="mine"), "team = 'mine' is not allowed"),
         (lambda me: me.near(5.0, team=True), "team = True is not allowed"),
         (lambda me: me.nearest(k=0), "nearest: k = 0 is not allowed; it takes a whole number >= 1"),
     ],
@@ -382,27 +379,15 @@ COLUMNS = {
 @pytest.mark.parametrize(
     ("step", "text"),
     [
-        (
-            lambda self, me: me.taget,
-            "Easy: me has no 'taget' (did you mean 'target'?); there are: max_speed, n, goal, target",
-        ),
+        (lambda self, me: me.taget, "Easy: me has no 'taget' (did you mean 'target'?)"),
         (lambda self, me: me.nearst(), "me has no 'nearst' (did you mean 'nearest'?)"),
-        (
-            lambda self, me: self.max_sped,
-            "Easy has no 'max_sped' (did you mean 'max_speed'?); there are: max_speed, n, goal",
-        ),
-        (
-            lambda self, me: me.nearest().poss,
-            "another entity has no 'poss' (did you mean 'pos'?); there are: pos, vel",
-        ),
+        (lambda self, me: self.max_sped, "Easy has no 'max_sped' (did you mean 'max_speed'?)"),
+        (lambda self, me: me.nearest().poss, "another entity has no 'poss' (did you mean 'pos'?)"),
         (
             lambda self, me: self.max_speed,
             "Easy.max_speed differs between entities: read me.max_speed, not self.max_speed",
         ),
-        (
-            lambda self, me: self.goal,
-            "Easy.goal differs between entities: read me.goal, not self.goal",
-        ),
+        (lambda self, me: self.goal, "Easy.goal differs between entities: read me.goal, not self.goal"),
         (lambda self, me: setattr(self, "n", 1), "Easy.n is a column: write into it with me.n = value"),
         (
             lambda self, me: setattr(me, "clas", 1),
@@ -459,9 +444,7 @@ def test_a_number_that_is_none_is_told_as_with_arrays():
 
 
 def test_columns_that_hide_what_me_offers_are_refused():
-    with pytest.raises(
-        DeclarationError, match=r"Easy.near: me.near is an attribute of easy mode; choose another name"
-    ):
+    with pytest.raises(DeclarationError, match=r"Easy.near: me.near is an attribute of easy mode"):
         does(lambda self, me: None, near=Param(1.0))
     assert does(lambda self, me: None, radius=Param(1.0)).params()["radius"].default == 1.0
 

@@ -264,18 +264,9 @@ COLUMNS = {
 @pytest.mark.parametrize(
     ("step", "text"),
     [
-        (
-            lambda self, w: w.entitis,
-            "Judge: w has no 'entitis' (did you mean 'entities'?); there are: reach, n, lost",
-        ),
-        (
-            lambda self, w: w.entities[0].agee,
-            "an entity has no 'agee' (did you mean 'age'?); there are: age, pos",
-        ),
-        (
-            lambda self, w: self.reach,
-            "Judge.reach differs between worlds: read w.reach, not self.reach",
-        ),
+        (lambda self, w: w.entitis, "Judge: w has no 'entitis' (did you mean 'entities'?)"),
+        (lambda self, w: w.entities[0].agee, "an entity has no 'agee' (did you mean 'age'?)"),
+        (lambda self, w: self.reach, "Judge.reach differs between worlds: read w.reach, not self.reach"),
         (lambda self, w: setattr(w, "clas", 1), "clas = State(...) on the class, then w.clas = value"),
         (lambda self, w: setattr(w, "reach", 1.0), "Judge: w.reach is read-only"),
         (lambda self, w: setattr(w, "t", 1.0), "Judge: w.t is read-only"),
@@ -295,19 +286,13 @@ COLUMNS = {
         ),
         (lambda self, w: w.lost.pop(1), "w.lost has one value per team"),
         (lambda self, w: w.kill(1, "x"), "w.kill takes an entity from w.entities or from a message, not 1"),
-        (
-            lambda self, w: setattr(w.entities[0], "pos", (0, 0, 0)),
-            "pos of an entity is read-only; w.move(",
-        ),
+        (lambda self, w: setattr(w.entities[0], "pos", (0, 0, 0)), "pos of an entity is read-only"),
         (
             lambda self, w: setattr(w.entities[0], "aeg", 1),
-            "an entity's 'aeg' cannot be written (did you mean 'age'?); there are: age",
+            "an entity's 'aeg' cannot be written (did you mean 'age'?)",
         ),
         (lambda self, w: w.spawn("c"), "w.spawn: there is no block 'c'"),
-        (
-            lambda self, w: w.move(w.entities[0], pos=(1.0, 2.0)),
-            "w.move: pos has shape (2, 1); it takes (3, 1)",
-        ),
+        (lambda self, w: w.move(w.entities[0], pos=(1.0, 2.0)), "w.move: pos has shape (2, 1)"),
         (lambda self, w: w.publish(Note, valeu=1), "Note has no field 'valeu' (did you mean 'value'?)"),
     ],
 )
@@ -330,16 +315,10 @@ def test_the_world_and_the_line_that_failed_are_named():
 @pytest.mark.parametrize(
     ("result", "text"),
     [
-        (
-            {"score": 3.0},
-            "Judge.result_one: 'score' = 3.0 is not allowed; it takes {team: number}, with a number for each team",
-        ),
+        ({"score": 3.0}, "Judge.result_one: 'score' = 3.0 is not allowed"),
         ({"score": {1: 2.0}}, "Judge.result_one: 'score' has no value for team 2"),
         ({"lost": {1: 2.0, 2: 1.0, 3: 4.0}}, "Judge.result_one: 'lost': there is no team 3; there are: 1, 2"),
-        (
-            {"name": "red"},
-            "Judge.result_one: 'name' = 'red' is not allowed; it takes a number, or {team: number}",
-        ),
+        ({"name": "red"}, "Judge.result_one: 'name' = 'red' is not allowed"),
     ],
 )
 def test_results_that_mean_nothing(result, text):

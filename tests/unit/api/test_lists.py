@@ -36,18 +36,9 @@ POINTS = Field("x y", ragged=True)
             lambda: Output("range bearing", unit="m rad", ragged=True),
             r"Output: .*one channel, not 2.*fields='range bearing'",
         ),
-        (
-            lambda: Input(fields="x y"),
-            r"Input: fields='x y' needs ragged=True",
-        ),
-        (
-            lambda: Input(ragged=True, default=1.0),
-            r"Input: a ragged column .* takes no default",
-        ),
-        (
-            lambda: State(ragged=True, per="world"),
-            r"State: a ragged column is per entity",
-        ),
+        (lambda: Input(fields="x y"), r"Input: fields='x y' needs ragged=True"),
+        (lambda: Input(ragged=True, default=1.0), r"Input: a ragged column .* takes no default"),
+        (lambda: State(ragged=True, per="world"), r"State: a ragged column is per entity"),
         (lambda: State(ragged=True, default=2.0), r"it takes neither per nor default"),
         (
             lambda: type("M", (MotionModel,), {"path": Input(fields="x y", ragged=True)}),
@@ -163,13 +154,7 @@ def looking(look, *blocks, seeds=1, cls=Probe, **values):
 
 def others(n, name="o", **values):
     return Block(
-        name=name,
-        team=2,
-        count=n,
-        variance=(100.0, 100.0, 0.0),
-        autonomy=Probe(),
-        motion=Still(),
-        **values,
+        name=name, team=2, count=n, variance=(100.0, 100.0, 0.0), autonomy=Probe(), motion=Still(), **values
     )
 
 

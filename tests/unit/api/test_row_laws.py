@@ -201,11 +201,7 @@ class Stepping(Steer):
 
 @pytest.mark.parametrize(
     ("controller", "motion"),
-    [
-        (Steer(rate=20.0), None),
-        (Stepping(), None),
-        (UnicyclePID(), Unicycle3D(speed_max=30.0)),
-    ],
+    [(Steer(rate=20.0), None), (Stepping(), None), (UnicyclePID(), Unicycle3D(speed_max=30.0))],
     ids=["rate", "step", "model"],
 )
 def test_what_cannot_be_one_kernel_goes_substep_by_substep(controller, motion):

@@ -20,16 +20,7 @@ from small_worlds import (
 )
 
 from tussle import Simulation
-from tussle.api import (
-    Autonomy,
-    Interaction,
-    Network,
-    Param,
-    Publish,
-    State,
-    Subscribe,
-    service,
-)
+from tussle.api import Autonomy, Interaction, Network, Param, Publish, State, Subscribe, service
 from tussle.errors import MissionError, ParameterError, PluginError, TussleError, WiringError
 from tussle.stock import GlobalNetwork, LocalNetwork, SphereNetwork
 
@@ -255,8 +246,7 @@ def test_topic_and_network_can_be_parameters():
 
 def test_a_network_that_is_not_there_is_refused():
     with pytest.raises(
-        WiringError,
-        match=r"block 'a'.*network 'LocalNetwrk' \(did you mean 'LocalNetwork'\?\); there are: GlobalNetwork, LocalNetwork",
+        WiringError, match=r"block 'a'.*network 'LocalNetwrk' \(did you mean 'LocalNetwork'\?\)"
     ):
         Simulation(mission(still("a", Talker(network="LocalNetwrk")), networks=[LocalNetwork()]))
 
@@ -465,9 +455,7 @@ def test_capture_of_names_that_are_not_there():
         def step(self, g):
             self.notes.publish([0], valu=3)
 
-    with pytest.raises(
-        PluginError, match=r"Note has no field 'valu' \(did you mean 'value'\?\); there are: value"
-    ):
+    with pytest.raises(PluginError, match=r"Note has no field 'valu' \(did you mean 'value'\?\)"):
         Simulation(mission(still("a", Misspelt()))).step()
 
 
@@ -486,8 +474,5 @@ def test_two_networks_of_one_name_are_refused():
 
 
 def test_prob_transmit_is_a_probability():
-    with pytest.raises(
-        ParameterError,
-        match=r"SphereNetwork.prob_transmit = 1.5 is not allowed; it takes a finite number >= 0 and <= 1",
-    ):
+    with pytest.raises(ParameterError, match=r"SphereNetwork.prob_transmit = 1.5 is not allowed"):
         SphereNetwork(prob_transmit=1.5)

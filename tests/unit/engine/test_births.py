@@ -295,18 +295,9 @@ def test_w_spawn_takes_one_place_for_all_or_one_each():
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (
-            lambda w: w.spawn("chld", [0]),
-            r"there is no block 'chld' \(did you mean 'child'\?\); there are: a, child, b",
-        ),
-        (
-            lambda w: w.spawn("child", [0], speed=3),
-            r"w.spawn: unknown argument 'speed'; there are: pos, vel, quat, team",
-        ),
-        (
-            lambda w: w.spawn("child", [0], team=7),
-            r"w.spawn: team = 7 is not allowed; the mission has teams 1, 2",
-        ),
+        (lambda w: w.spawn("chld", [0]), r"there is no block 'chld' \(did you mean 'child'\?\)"),
+        (lambda w: w.spawn("child", [0], speed=3), r"w.spawn: unknown argument 'speed'"),
+        (lambda w: w.spawn("child", [0], team=7), r"w.spawn: team = 7 is not allowed"),
         (lambda w: w.spawn("child", [0], pos=(1, 2)), r"w.spawn: pos has shape \(2,\); it takes \(3, 1\)"),
         (lambda w: w.move([0], pos=(1, 2)), r"w.move: pos has shape \(2, 1\); it takes \(3, 1\)"),
     ],
@@ -419,9 +410,7 @@ def test_a_referee_due_in_some_worlds_asks_only_there():
 
 
 def test_negative_count_is_refused():
-    with pytest.raises(
-        MissionError, match=r"block 'a': count = -1 is not allowed; it takes a whole number >= 0"
-    ):
+    with pytest.raises(MissionError, match=r"block 'a': count = -1 is not allowed"):
         block(count=-1)
     with pytest.raises(ParameterError, match=r"seed '1' is not allowed"):
         Simulation(mission(), seeds=["1"])

@@ -24,14 +24,7 @@ from tussle.api import (
     Subscribe,
 )
 from tussle.errors import MissionError, ParameterError
-from tussle.stock import (
-    AvoidEntityMS,
-    MotorSchemas,
-    SingleIntegrator,
-    SphereNetwork,
-    Unicycle,
-    UnicyclePID,
-)
+from tussle.stock import AvoidEntityMS, MotorSchemas, SingleIntegrator, SphereNetwork, Unicycle, UnicyclePID
 
 
 class Counter(Autonomy):
@@ -244,12 +237,9 @@ def test_easy_mode_has_the_dt_of_its_period():
         ),
         (
             lambda: mission(block(controller=Watch(rate=41.0)), motion_multiplier=4),
-            r"Watch: rate = 41.0 Hz is too high; .* 40 Hz, one call per substep",
+            r"Watch: rate = 41.0 Hz is too high",
         ),
-        (
-            lambda: mission(metrics=[Tally(rate=50)]),
-            r"mission: Tally: rate = 50.0 Hz is too high.*10 Hz",
-        ),
+        (lambda: mission(metrics=[Tally(rate=50)]), r"mission: Tally: rate = 50.0 Hz is too high.*10 Hz"),
         (
             lambda: mission(metrics=[Tally(rate=1e308)], dt=10, end=20),
             r"rate = 1e\+308 Hz is too high.*0.1 Hz",
@@ -257,15 +247,15 @@ def test_easy_mode_has_the_dt_of_its_period():
         (lambda: mission(metrics=[Tally(rate=1e-6)]), r"is too low; .* 1e-05 Hz"),
         (
             lambda: mission(block(motion=SingleIntegrator(rate=5.0))),
-            r"block 'a': SingleIntegrator has rate = 5.0, but it is integrated over every step; leave the rate out",
+            r"block 'a': SingleIntegrator has rate = 5.0, but it is integrated over every step",
         ),
         (
             lambda: mission(networks=[SphereNetwork(rate=5.0)]),
-            r"mission: SphereNetwork has rate = 5.0, but it carries messages in every step; leave the rate out",
+            r"mission: SphereNetwork has rate = 5.0, but it carries messages in every step",
         ),
         (
             lambda: MotorSchemas(behaviors=[AvoidEntityMS(rate=5.0)]),
-            r"MotorSchemas.behaviors: AvoidEntityMS\(rate=5.0\) takes no rate; give it to MotorSchemas",
+            r"MotorSchemas.behaviors: AvoidEntityMS\(rate=5.0\) takes no rate",
         ),
     ],
 )

@@ -537,7 +537,5 @@ def test_names_that_the_api_does_not_have():
         AttributeError, match=r"module 'tussle.stock' has no attribute 'Boid' \(did you mean 'Boids'\?\)"
     ):
         _ = tussle.stock.Boid
-    with pytest.raises(
-        ParameterError, match=r"there is no plugin 'Boid' \(did you mean 'Boids'\?\); there are: "
-    ):
+    with pytest.raises(ParameterError, match=r"there is no plugin 'Boid' \(did you mean 'Boids'\?\)"):
         tussle.stock.load("Boid")

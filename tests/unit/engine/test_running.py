@@ -491,26 +491,14 @@ def test_world_columns_are_read_and_written_by_world():
         ("c.pos", 0.0, r"'c.pos': the mission has no 'c'; there are: run, a, GlobalNetwork"),
         ("a", 0.0, r"'a' is not a value; in a there are: pos, vel"),
         ("a.Drft.to", 0.0, r"'a.Drft.to': a has no 'Drft' \(did you mean 'Drift'\?\)"),
-        (
-            "a.Drift.too",
-            0.0,
-            r"'a.Drift.too': Drift has no 'too' \(did you mean 'to'\?\); there are: to, velocity",
-        ),
+        ("a.Drift.too", 0.0, r"'a.Drift.too': Drift has no 'too' \(did you mean 'to'\?\)"),
         ("a.yaw", 0.0, r"'a.yaw' cannot be written; there are: pos, vel, quat"),
         ("a.id", 0.0, r"'a.id' cannot be written"),
         ("a.pos", [1.0, 2.0], r"'a.pos': values have shape \(2,\); needed is \(1, 1, 3\)"),
         ("a.pos", np.nan, r"'a.pos': values hold NaN|'a.pos': values must be finite"),
         ("a.pos", np.inf, r"'a.pos': values must be finite"),
-        (
-            "a.Unicycle.vel_max",
-            -1.0,
-            r"a.Unicycle.vel_max: Unicycle.vel_max = .*-1.0.* is not allowed; it takes .* in m/s >= 0",
-        ),
-        (
-            "GlobalNetwork.comm_dely",
-            0.0,
-            r"GlobalNetwork has no 'comm_dely' \(did you mean 'comm_delay'\?\)",
-        ),
+        ("a.Unicycle.vel_max", -1.0, r"a.Unicycle.vel_max: Unicycle.vel_max = .*-1.0.* is not allowed"),
+        ("GlobalNetwork.comm_dely", 0.0, r"GlobalNetwork has no 'comm_dely' \(did you mean 'comm_delay'\?\)"),
     ],
 )
 def test_paths_and_values_that_are_refused(path, value, message):
@@ -592,10 +580,7 @@ def test_structural_params_split_groups_and_each_world_is_as_alone():
     [
         ({"b.Drift.to": 1}, r"'b.Drift.to': the mission has no 'b'; there are: run, a"),
         ({"a.Drif.to": 1}, r"'a.Drif.to': a has no 'Drif' \(did you mean 'Drift'\?\)"),
-        (
-            {"a.Drift.two": 1},
-            r"'a.Drift.two': Drift has no 'two' \(did you mean 'to'\?\); there are: to",
-        ),
+        ({"a.Drift.two": 1}, r"'a.Drift.two': Drift has no 'two' \(did you mean 'to'\?\)"),
         ({"a.sped": 1}, r"'a.sped': a has no 'sped' .did you mean 'speed'"),
         ({"a": 1}, r"'a' is not a value; in a there are: name, team"),
         ({"a.speed": "3 kg"}, r"a.speed = '3 kg'"),
@@ -604,10 +589,7 @@ def test_structural_params_split_groups_and_each_world_is_as_alone():
         ({"a.mass": [1.0, -1.0]}, r"a.mass = -1.0 is not allowed"),
         ({"a.Drift.to": (1, 2)}, r"Drift.to = \(1, 2\) is not allowed; it takes 3 values \(x, y, z\)"),
         ({"a.Drift.to": float("nan")}, r"Drift.to = nan is not allowed"),
-        (
-            {"GlobalNetwork.comm_delay": [0.0, -1.0]},
-            r"comm_delay = -1.0 is not allowed; it takes a finite number in s >= 0",
-        ),
+        ({"GlobalNetwork.comm_delay": [0.0, -1.0]}, r"comm_delay = -1.0 is not allowed"),
     ],
 )
 def test_bad_params_are_refused_with_their_path(params, message):
@@ -618,8 +600,7 @@ def test_bad_params_are_refused_with_their_path(params, message):
 def test_a_structural_param_of_a_world_plugin_belongs_to_the_mission():
     game = mission(interactions=[SimpleCollision()])
     with pytest.raises(
-        (MissionError, ParameterError),
-        match=r"startup_collisions_only' is one for all worlds of a stack; set it in the mission",
+        (MissionError, ParameterError), match=r"startup_collisions_only' is one for all worlds of a stack"
     ):
         Simulation(game, seeds=[1, 2], params={"SimpleCollision.startup_collisions_only": [True, False]})
 
@@ -640,7 +621,5 @@ def test_a_ragged_param_belongs_to_the_mission():
     sim = alone(game, 1)
     assert sim.read("a.Path.n")[0].tolist() == [[3, 3]]
     assert sim.read("b.Path.n")[0].tolist() == [[1]]
-    with pytest.raises(
-        ParameterError, match=r"a.Path.points' is one for all worlds of a stack; set it in the mission"
-    ):
+    with pytest.raises(ParameterError, match=r"a.Path.points' is one for all worlds of a stack"):
         Simulation(game, params={"a.Path.points": [(1.0, 2.0)]})

@@ -255,11 +255,7 @@ def test_a_text_is_written_to_any_column(path, text, value):
     ("path", "value", "said"),
     [
         ("prey.radius", "3 kg", r"'prey.radius': '3 kg' is in kg, not convertible to m"),
-        (
-            "prey.pos",
-            [["1", "2", "3"]],
-            r"'prey.pos': values are <U1; needed are numbers, or one text for all",
-        ),
+        ("prey.pos", [["1", "2", "3"]], r"'prey.pos': values are <U1"),
         (
             "GlobalNetwork.comm_delay",
             -1.0,

@@ -39,10 +39,7 @@ def test_placeholders_are_set(files):
 
 
 def test_an_unknown_setting_is_refused_with_the_nearest_name(files):
-    with pytest.raises(
-        MissionError,
-        match=r"the mission has no setting 'edn' \(did you mean 'end'\?\); there are: end, n, title, v",
-    ):
+    with pytest.raises(MissionError, match=r"the mission has no setting 'edn' \(did you mean 'end'\?\)"):
         files.read(PLAIN, {"edn": "9"})
     with pytest.raises(MissionError, match="has no setting 'hidden'"):
         files.read(PLAIN, {"hidden": "9"})

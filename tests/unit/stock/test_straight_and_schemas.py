@@ -251,10 +251,7 @@ def test_others_are_avoided_if_asked_and_the_one_at_the_same_place_never():
 
 
 def going(steps=1, **values):
-    mover = block(
-        autonomy=MotorSchemas(behaviors=[MoveToGoalMS(**values)], max_speed=1e6),
-        heading="90 deg",
-    )
+    mover = block(autonomy=MotorSchemas(behaviors=[MoveToGoalMS(**values)], max_speed=1e6), heading="90 deg")
     sim = Simulation(mission(mover, end=5.0))
     sim.step(steps)
     return sim, sim.read("a.MotorSchemas.MoveToGoalMS.desired_velocity")[0][0, 0].tolist()
@@ -318,12 +315,7 @@ def test_a_waypoint_of_the_world_is_heard_by_all():
 
 def test_who_is_born_later_has_no_kick_of_the_derivative_either():
     mover = MoveToGoalMS(goal=(100.0, 0.0, 0.0), distance_pid=(0.0, 0.0, 1.0, 0.0))
-    late = block(
-        autonomy=MotorSchemas(behaviors=[mover], max_speed=1e6),
-        count=1,
-        rate=1.0,
-        first_birth=0.5,
-    )
+    late = block(autonomy=MotorSchemas(behaviors=[mover], max_speed=1e6), count=1, rate=1.0, first_birth=0.5)
     sim = Simulation(mission(late))
     sim.step(6)
     desired_velocity, alive = sim.read("a.MotorSchemas.MoveToGoalMS.desired_velocity")

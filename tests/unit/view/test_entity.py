@@ -117,10 +117,7 @@ def test_messages_that_were_heard_and_said():
                                 if (
                                     sim.state.population.bodies.world[at],
                                     sim.state.population.bodies.id[at],
-                                ) == (
-                                    1,
-                                    who,
-                                ):
+                                ) == (1, who):
                                     expected.append((int(batch.sender[i]), tuple(batch.pos[:, i])))
             assert sorted((m.sender, tuple(m.fields["pos"])) for m in state.heard) == sorted(expected)
             heard += len(expected)

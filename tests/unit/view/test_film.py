@@ -319,8 +319,7 @@ def test_the_eye_flies_behind_whom_it_follows_and_stays_where_that_is_lost(hunte
 
 def test_following_somebody_who_is_not_there_is_refused(flown, tmp_path):
     with pytest.raises(
-        ViewError,
-        match=r"entity 99 cannot be followed: it is not there between t = 0 s and 4 s; there are 1 to 2",
+        ViewError, match=r"entity 99 cannot be followed: it is not there between t = 0 s and 4 s"
     ):
         write_film(flown, mp4=tmp_path / "x.mp4", options=FilmOptions(camera="follow", follow=99))
     assert not list(tmp_path.iterdir())
@@ -525,10 +524,7 @@ def test_an_interruption_leaves_nothing(flown, tmp_path):
         ({"trails": -1.0}, "trails = -1.0 is not allowed"),
         ({"start": math.nan}, "start = nan is not allowed"),
         ({"start": 3.0, "stop": 2.0}, "stop = 2 s is not allowed; it takes a time after start = 3 s"),
-        (
-            {"size": (641, 480)},
-            "size = 641x480 is not allowed; it takes even numbers of pixels from 16 to 7680",
-        ),
+        ({"size": (641, 480)}, "size = 641x480 is not allowed"),
         ({"size": (8, 8)}, "size = 8x8 is not allowed"),
     ],
 )

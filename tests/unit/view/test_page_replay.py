@@ -30,11 +30,7 @@ def recorded(folder, seed=3, steps=40, **changes):
 def runs(tmp_path_factory):
     """A run, the same again and longer, and one with another seed."""
     base = tmp_path_factory.mktemp("runs")
-    return (
-        recorded(base / "one"),
-        recorded(base / "longer", steps=50),
-        recorded(base / "other", seed=4),
-    )
+    return (recorded(base / "one"), recorded(base / "longer", steps=50), recorded(base / "other", seed=4))
 
 
 # -- one run ----------------------------------------------------------------------------------------------------------------------

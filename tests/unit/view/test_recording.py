@@ -247,7 +247,5 @@ def test_a_run_file_that_says_something_else_than_the_table_is_refused(tmp_path,
         Recording(tmp_path / "run", 1)
     info["worlds"][0]["steps"] = "many"
     file.write_text(json.dumps(info))
-    with pytest.raises(
-        RecordError, match=r"run.json: worlds\[0\].steps = 'many' is not allowed; it takes a whole number"
-    ):
+    with pytest.raises(RecordError, match=r"run.json: worlds\[0\].steps = 'many' is not allowed"):
         Recording(tmp_path / "run")
