@@ -10,7 +10,6 @@ import numpy as np
 from tussle.errors import ParameterError, listed, nearest_name
 from tussle.geodesy import Origin
 from tussle.shapes import (
-    Boundary,
     Convex,
     Cuboid,
     FlatGround,
@@ -18,13 +17,13 @@ from tussle.shapes import (
     Polyhedron,
     Sphere,
     Vector,
+    Volume,
     checked_number,
     checked_vector,
 )
 
 __all__ = [
     "Base",
-    "Boundary",
     "Convex",
     "Cuboid",
     "FlatGround",
@@ -33,6 +32,7 @@ __all__ = [
     "Polyhedron",
     "Scene",
     "Sphere",
+    "Volume",
 ]
 
 
@@ -79,8 +79,8 @@ class Scene:
 
     origin: Origin = field(default_factory=Origin)
     ground: FlatGround | None = None
-    walls: tuple[Boundary, ...] = ()
-    boundaries: Mapping[int | str, Boundary] = field(default_factory=dict)
+    walls: tuple[Volume, ...] = ()
+    boundaries: Mapping[int | str, Volume] = field(default_factory=dict)
     bases: tuple[Base, ...] = ()
 
     def __post_init__(self) -> None:
@@ -88,7 +88,7 @@ class Scene:
         object.__setattr__(self, "boundaries", dict(self.boundaries))
         object.__setattr__(self, "bases", tuple(self.bases))
 
-    def boundary(self, name: int | str) -> Boundary:
+    def boundary(self, name: int | str) -> Volume:
         """The region with this id or name.
 
         Raises:

@@ -26,7 +26,7 @@ MOST_POINTS = 32
 """Maximum number of points of a polyhedron: faces are searched among all triples of points, 4,960 for 32."""
 
 
-class Boundary(ABC):
+class Volume(ABC):
     """A region of space; abstract. Its surface counts as outside."""
 
     @abstractmethod
@@ -50,7 +50,7 @@ class Boundary(ABC):
         """
 
 
-class Convex(Boundary):
+class Convex(Volume):
     """An intersection of half-spaces; abstract."""
 
     @abstractmethod
@@ -233,7 +233,7 @@ class Polyhedron(Convex):
 
 
 @dataclass(frozen=True)
-class Sphere(Boundary):
+class Sphere(Volume):
     """A sphere.
 
     Args:

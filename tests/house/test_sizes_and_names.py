@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from collections import defaultdict
 
 from tree import SOURCE_TREES, parsed, python_files, relative
 
@@ -46,6 +47,21 @@ def test_modules_have_names_that_say_something():
         for path, names in parts.items()
         if NAMES_THAT_SAY_NOTHING & {name.strip("_").lower() for name in names}
     ]
+
+
+STILL_SHARED = "Base Choice Comparison Game Messages Publisher Run Source Stored Table Tracks Whole"
+"""Names that a class of `view`, `batch` or `cli` shares with another one."""
+
+
+def test_public_classes_have_names_of_their_own():
+    places = defaultdict(list)
+    for path in python_files("src"):
+        if "templates" not in path.parts:  # of the plugins that `tussle new` writes
+            for node in parsed(path).body:
+                if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                    places[node.name].append(f"{relative(path)}:{node.lineno}")
+    shared = {name: at for name, at in places.items() if len(at) > 1}
+    assert not {name: shared[name] for name in shared.keys() - STILL_SHARED.split()}
 
 
 def test_modules_change_no_globals_and_leave_nothing_unimplemented():

@@ -12,10 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tussle.errors import ParameterError
-from tussle.scene import Base, Boundary, Cuboid, FlatGround, Origin, Plane, Polyhedron, Scene, Sphere
+from tussle.scene import Base, Cuboid, FlatGround, Origin, Plane, Polyhedron, Scene, Sphere, Volume
 
 CUBE = tuple((x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0))
-SHAPES: tuple[Boundary, ...] = (
+SHAPES: tuple[Volume, ...] = (
     FlatGround(3.0),
     Plane((1.0, 2.0, 3.0), (1.0, -2.0, 0.5)),
     Cuboid((5.0, -3.0, 1.0), (4.0, 2.0, 6.0), (0.3, -0.7, 2.0)),
@@ -195,7 +195,7 @@ def test_surface_is_outside() -> None:
         (Sphere((1.0, 2.0, 3.0)), (-8.0, -7.0, -6.0)),
     ],
 )
-def test_a_way_leads_inside(shape: Boundary, way: tuple[float, float, float]) -> None:
+def test_a_way_leads_inside(shape: Volume, way: tuple[float, float, float]) -> None:
     assert shape.inward(columns((9.0, 9.0, 9.0)))[:, 0] == pytest.approx(way)
 
 
@@ -232,7 +232,7 @@ def test_sphere_is_met_from_outside_and_inside() -> None:
 
 
 @pytest.mark.parametrize("shape", SHAPES, ids=lambda s: type(s).__name__)
-def test_ray_ends_where_containment_changes(shape: Boundary) -> None:
+def test_ray_ends_where_containment_changes(shape: Volume) -> None:
     rng = np.random.default_rng(3)
     start = rng.uniform(-8.0, 8.0, (3, 400))
     direction = rng.uniform(-3.0, 8.0, (3, 400)) - start
@@ -249,7 +249,7 @@ def test_ray_ends_where_containment_changes(shape: Boundary) -> None:
 
 
 @pytest.mark.parametrize("shape", SHAPES, ids=lambda s: type(s).__name__)
-def test_shapes_do_not_care_where_a_row_stands(shape: Boundary) -> None:
+def test_shapes_do_not_care_where_a_row_stands(shape: Volume) -> None:
     rng = np.random.default_rng(4)
     start, direction = rng.uniform(-8.0, 8.0, (3, 33)), rng.normal(0.0, 1.0, (3, 33))
     together = shape.ray(start, direction)
@@ -258,7 +258,7 @@ def test_shapes_do_not_care_where_a_row_stands(shape: Boundary) -> None:
 
 
 @pytest.mark.parametrize("shape", SHAPES, ids=lambda s: type(s).__name__)
-def test_nan_is_nowhere(shape: Boundary) -> None:
+def test_nan_is_nowhere(shape: Volume) -> None:
     lost = np.full((3, 1), np.nan)
     assert shape.contains(lost).tolist() == [False]
     assert shape.ray(lost, columns((1.0, 2.0, 3.0))).tolist() == [math.inf]
@@ -266,7 +266,7 @@ def test_nan_is_nowhere(shape: Boundary) -> None:
 
 
 @pytest.mark.parametrize("shape", SHAPES, ids=lambda s: type(s).__name__)
-def test_shapes_are_values(shape: Boundary) -> None:
+def test_shapes_are_values(shape: Volume) -> None:
     shape.contains(np.zeros((3, 1)))
     again = pickle.loads(pickle.dumps(shape))
     assert again == shape

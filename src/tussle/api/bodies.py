@@ -49,7 +49,7 @@ BODY_UNITS = {
 
 
 @dataclass(slots=True)
-class Kept:
+class CachedArrays:
     """Arrays that follow from the table, and the version of the table that they follow from."""
 
     version: int
@@ -110,11 +110,11 @@ class Bodies:
             self.__dict__.pop(name, None)
         self.version = self._oldest = 0
         self._touched: list[tuple[int, int]] = []
-        self._derived: dict[str, Kept] = {}
+        self._derived: dict[str, CachedArrays] = {}
         self._indexes: dict[Any, Index] = getattr(self, "_indexes", {})
-        self._laid_out: dict[Any, Kept] = {}
-        self._newest: Kept | None = None
-        self._by_place: dict[tuple[int, str], Kept] = {}
+        self._laid_out: dict[Any, CachedArrays] = {}
+        self._newest: CachedArrays | None = None
+        self._by_place: dict[tuple[int, str], CachedArrays] = {}
         self._layout: tuple[np.ndarray, ...] | None = None
         self._read_only: BodyView | None = None
 
@@ -154,7 +154,7 @@ class Bodies:
         kept = self._derived.get(name)
         if kept is None:
             k = DERIVED[name]
-            kept = self._derived[name] = Kept(-1, np.empty((k, self.n) if k > 1 else self.n))
+            kept = self._derived[name] = CachedArrays(-1, np.empty((k, self.n) if k > 1 else self.n))
         if kept.version != self.version:
             for first, last in self._since(kept.version):
                 derive(name, self.quat, first, last, 0, kept.columns)
@@ -198,7 +198,7 @@ class Bodies:
                 self._forget(next(iter(self._indexes)))
             index.layout(self.world, self.id, self.n_worlds)
             reaches = np.full(self.n_worlds, reach) if isinstance(reach, float) else reach
-            kept = self._laid_out[key] = Kept(-1, (index, reaches, *self.pos))
+            kept = self._laid_out[key] = CachedArrays(-1, (index, reaches, *self.pos))
         index, reaches, x, y, z = kept.columns
         if kept.version != self.version:
             ranges = self._since(kept.version)
@@ -227,7 +227,7 @@ class Bodies:
         kept = self._by_place.get(key)
         if kept is None:
             k = DERIVED.get(name) or FLOATS.get(name, 1)
-            kept = self._by_place[key] = Kept(-1, tuple(padded(self.n) for _ in range(k)))
+            kept = self._by_place[key] = CachedArrays(-1, tuple(padded(self.n) for _ in range(k)))
         if kept.built == index.built and (kept.version == self.version or name in INTS):
             return kept.columns  # type: ignore[no-any-return]
         values = (

@@ -16,7 +16,7 @@ from tussle.api.bodies import (
     INTS,
     Bodies,
     BodyView,
-    Kept,
+    CachedArrays,
     derive,
     derived_from,
     read_only,
@@ -74,7 +74,7 @@ class GroupView:
             own.pop(name, None)
         self._seen.clear()
         self._bodies = bodies
-        self._derived: dict[str, Kept] = {}
+        self._derived: dict[str, CachedArrays] = {}
         self._components: dict[str, tuple[np.ndarray, ...]] = {}
         self.first, self.last = first, last
         self.n = last - first
@@ -110,7 +110,7 @@ class GroupView:
         if kept is None:
             k = DERIVED[name]
             out = np.empty((k, self.n) if k > 1 else self.n)
-            kept = self._derived[name] = Kept(-1, (out, read_only(out)))
+            kept = self._derived[name] = CachedArrays(-1, (out, read_only(out)))
         bodies = self._bodies
         if "quat" in self.belief:
             derive(name, self.belief["quat"], 0, self.n, 0, kept.columns[0])

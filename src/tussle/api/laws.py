@@ -111,7 +111,7 @@ class NeighborLaw:
     def __init__(self, laws: tuple[Law, ...], where: Law | None, names: tuple[str, ...]) -> None:
         self.laws, self.where, self.names = laws, where, names
         self.__doc__ = laws[0].function.__doc__
-        self._plans: dict[type, Plan] = {}
+        self._plans: dict[type, WalkPlan] = {}
 
     def __get__(self, plugin: Any, owner: type) -> Any:
         if plugin is None:
@@ -212,7 +212,7 @@ def own_columns(cls: Any) -> dict[str, str]:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Plan:
+class WalkPlan:
     """What one walk over the neighbours takes of a plugin.
 
     Attributes:
@@ -301,7 +301,7 @@ class Plan:
         return Listed(self.names, np.take(values, order, axis=1), row, other)
 
 
-def make_plan(g: GroupView, plugin: Any, declared: NeighborLaw) -> Plan:
+def make_plan(g: GroupView, plugin: Any, declared: NeighborLaw) -> WalkPlan:
     """The plan for what a plugin declares; g and plugin show of which types the columns are."""
     cls: Any = type(plugin)
     laws = declared.laws
@@ -324,7 +324,7 @@ def make_plan(g: GroupView, plugin: Any, declared: NeighborLaw) -> Plan:
         name, place = BODY[part.removeprefix(OTHER)]
         other[name] = (*other.get(name, ()), place)
     by_row = "".join(f"{columns[name]}, " for name in made.own)
-    return Plan(
+    return WalkPlan(
         made.run,
         made.run_single,
         declared.names,

@@ -30,7 +30,7 @@ class Pairs(Segments):
 
     items = "pairs"
 
-    def __init__(self, found: queries.Pairs, bodies: BodyView) -> None:
+    def __init__(self, found: queries.PairArrays, bodies: BodyView) -> None:
         self.row, self.other = found.row, found.other
         self.offset, self.distance = found.offset, found.distance
         self.count, self.start = found.count, found.start
@@ -57,7 +57,7 @@ class Pairs(Segments):
             np.diff(start),
             start,
         )
-        return Pairs(queries.Pairs(*kept), self._bodies)
+        return Pairs(queries.PairArrays(*kept), self._bodies)
 
     def nearest(self) -> np.ndarray:
         """Index of the pair with the smallest distance in each row, (n,); -1 for rows without pairs."""

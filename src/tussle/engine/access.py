@@ -52,7 +52,7 @@ def _columns(owner: Any) -> dict[str, Numbers]:
 
 def _follow(state: SimulationState, path: str) -> tuple[Any, tuple[str, ...], str, Numbers]:
     """(block or world plugin, plugin path in the block, column, its declaration)."""
-    owners, name = paths.follow(path, paths.Whole(state.mission), paths.inside, _columns)
+    owners, name = paths.follow(path, paths.MissionRoot(state.mission), paths.inside, _columns)
     return owners[0], tuple(p.instance_name for p in owners[1:]), name, _columns(owners[-1])[name]
 
 

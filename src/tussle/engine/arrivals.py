@@ -11,7 +11,7 @@ from tussle.api.bodies import Bodies
 from tussle.api.kinds import Interaction, WorldPlugin
 from tussle.api.world import WorldView
 from tussle.engine import failure
-from tussle.engine.births import Room, in_order, joined
+from tussle.engine.births import Occupancy, in_order, joined
 from tussle.engine.rows import repack, take_over_moves
 from tussle.engine.state import SimulationState
 from tussle.engine.step_end import take_out_dead
@@ -102,12 +102,12 @@ def _create(state: SimulationState, due: Mapping[int, np.ndarray], at_start: boo
             raise error
         state.record_failure(world, state.error(world, str(error)))
 
-    room = Room(rejects, standing, fail) if rejecting else None
+    occupancy = Occupancy(rejects, standing, fail) if rejecting else None
     state.world_view.begin()
     new, first = Bodies.empty(sum(map(len, due.values())), state.n_worlds), 0
     for block, worlds in due.items():
         mine = slice(first, first := first + len(worlds))
-        state.births.create(new, mine, block, worlds, room=room)
+        state.births.create(new, mine, block, worlds, occupancy=occupancy)
         if rejecting:
             for world in np.unique(worlds):
                 placed.setdefault(int(world), []).append(new.pos[:, mine][:, worlds == world])

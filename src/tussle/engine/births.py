@@ -23,7 +23,7 @@ MOST_TRIES = 10_000
 
 
 @dataclass
-class Room:
+class Occupancy:
     """Who stands where, for those that are born at one moment.
 
     Attributes:
@@ -157,7 +157,7 @@ class Births:
         block: int,
         worlds: np.ndarray,
         where: dict[str, np.ndarray] | None = None,
-        room: Room | None = None,
+        occupancy: Occupancy | None = None,
     ) -> None:
         """Make some rows of an empty table entities of one block, one per item of `worlds` (sorted).
 
@@ -167,7 +167,7 @@ class Births:
             block: Number of the block.
             worlds: World of each, (m,).
             where: pos, vel, quat, team that were asked for.
-            room: Where they may stand; None is everywhere.
+            occupancy: Where they may stand; None is everywhere.
         """
         where = where or {}
         spec = self.overrides.mission.blocks[block]
@@ -176,40 +176,48 @@ class Births:
         out = new.id, new.block_index, new.pos, new.vel, new.quat, new.health, new.radius, new.mass
         keys, counts = (self.keys[block], POSITION, HEADING), (self.next_id, self.n_born[block])
         kernels.bear((self.seeds, worlds), keys, *self._placing[block], values, counts, out, mine.start)
-        if "pos" not in where and room is not None:
-            self._separate(block, worlds, new.block_index[mine], new.pos[:, mine], room)
+        if "pos" not in where and occupancy is not None:
+            self._separate(block, worlds, new.block_index[mine], new.pos[:, mine], occupancy)
         if spec.velocity is not None:
             new.vel[:, mine] = np.array(spec.velocity)[:, None]
         for name, asked in where.items():
             getattr(new, name)[..., mine] = asked
 
     def _separate(
-        self, block: int, worlds: np.ndarray, places: np.ndarray, pos: np.ndarray, room: Room
+        self, block: int, worlds: np.ndarray, places: np.ndarray, pos: np.ndarray, occupancy: Occupancy
     ) -> None:
         """Draw again where a referee finds a place not free; one entity after the other, as each takes up room."""
         for world in map(int, np.unique(worlds)):
-            if world not in room.full:
+            if world not in occupancy.full:
                 try:
-                    self._separate_world(block, world, np.flatnonzero(worlds == world), places, pos, room)
+                    self._separate_world(
+                        block, world, np.flatnonzero(worlds == world), places, pos, occupancy
+                    )
                 except MissionError as error:
-                    room.full.add(world)
-                    room.fail(world, error)
+                    occupancy.full.add(world)
+                    occupancy.fail(world, error)
 
     def _separate_world(
-        self, block: int, world: int, mine: np.ndarray, places: np.ndarray, pos: np.ndarray, room: Room
+        self,
+        block: int,
+        world: int,
+        mine: np.ndarray,
+        places: np.ndarray,
+        pos: np.ndarray,
+        occupancy: Occupancy,
     ) -> None:
         spec, most = self.overrides.mission.blocks[block], self.overrides.mission.limits.tries
-        before = room.standing(world)
+        before = occupancy.standing(world)
         n = before.shape[1]
         taken = np.empty((3, n + len(mine)))
         taken[:, :n] = before
         for i in mine:
             attempt = 0
-            while room.rejects(world, pos[:, i], taken[:, :n]):
+            while occupancy.rejects(world, pos[:, i], taken[:, :n]):
                 attempt += 1
-                room.tries[world] += 1
-                if attempt > MOST_TRIES or room.tries[world] > most:
-                    others = f", and {most:,} in all" if room.tries[world] > most else ""
+                occupancy.tries[world] += 1
+                if attempt > MOST_TRIES or occupancy.tries[world] > most:
+                    others = f", and {most:,} in all" if occupancy.tries[world] > most else ""
                     raise MissionError(
                         f"block {spec.name!r}: no free place for entity {int(places[i]) + 1} of {spec.count} "
                         f"after {attempt - 1} tries{others}; give the block more room (placement {spec.placement!r}) or fewer entities"

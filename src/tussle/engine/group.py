@@ -25,7 +25,7 @@ from tussle.columns import (
     Subscribe,
 )
 from tussle.comms import Inbox, Publisher
-from tussle.engine.table import Place, Table
+from tussle.engine.table import ColumnPlace, Table
 from tussle.engine.wiring import BELIEF, Link, Wiring, read_channels
 from tussle.errors import DeclarationError, WiringError, listed, nearest_name
 
@@ -52,7 +52,7 @@ class Binding:
     spec: Any
     view: GroupView
     path: tuple[str, ...]
-    places: dict[str, Place] = field(default_factory=dict)
+    places: dict[str, ColumnPlace] = field(default_factory=dict)
     params: tuple[str, ...] = ()
     writable: set[str] = field(default_factory=set)
     links: dict[str, Link] = field(default_factory=dict)
@@ -279,7 +279,7 @@ class Group:
 
     def _believe(self) -> None:
         """Find the sensor outputs that are the entity's belief."""
-        self.belief: dict[str, Place] = {}
+        self.belief: dict[str, ColumnPlace] = {}
         for sensor in self.sensors:
             for name, (body, k, _) in BELIEF.items():
                 place = sensor.places.get(name)

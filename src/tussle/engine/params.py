@@ -71,7 +71,7 @@ class Overrides:
         )
 
     def _find(self, path: str) -> tuple[tuple[str, tuple[str, ...], str], Param]:
-        owners, name = paths.follow(path, paths.Whole(self.mission), paths.inside, paths.settable)
+        owners, name = paths.follow(path, paths.MissionRoot(self.mission), paths.inside, paths.settable)
         column, names = paths.declared(owners[-1], name), path.split(".")
         if isinstance(owners[0], Block):
             plugins, is_own = tuple(names[1:-1]), len(owners) > 1 or name in WORLD_VALUES

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tussle.api.bodies import Bodies
-from tussle.engine.births import Births, Room
+from tussle.engine.births import Births, Occupancy
 from tussle.engine.params import Overrides
 from tussle.errors import MissionError, listed, nearest_name
 from tussle.mission import Block
@@ -70,10 +70,10 @@ class RecordedBirths(Births):
         block: int,
         worlds: np.ndarray,
         where: dict[str, np.ndarray] | None = None,
-        room: Room | None = None,
+        occupancy: Occupancy | None = None,
     ) -> None:
         if where is not None:
-            super().create(new, mine, block, worlds, where, room)
+            super().create(new, mine, block, worlds, where, occupancy)
             return
         rows, table = self.rows[block], self.table
         # Those who are due have been taken off n_left before: the last of them is the last that has entered.

@@ -24,7 +24,7 @@ def span(rows: np.ndarray) -> Any:
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class ColumnPlace:
     """Where a column lies: `k` rows from `first` in the array of a dtype; k = 0 is one row seen as (n,)."""
 
     dtype: type
@@ -54,13 +54,13 @@ class Table:
     n: int = 0
     defaults: dict[type, list[float]] = field(default_factory=lambda: {float: [], int: [], bool: []})
     arrays: dict[type, np.ndarray] = field(default_factory=dict)
-    places: dict[Any, Place] = field(default_factory=dict)
+    places: dict[Any, ColumnPlace] = field(default_factory=dict)
     lists: list[RaggedColumn] = field(default_factory=list)
 
-    def add(self, key: Any, dtype: type, k: int, default: Any = 0.0) -> Place:
+    def add(self, key: Any, dtype: type, k: int, default: Any = 0.0) -> ColumnPlace:
         """Declare a column of k components (0: one number a row); default is a number or k numbers."""
         values = self.defaults[dtype]
-        place = Place(dtype, len(values), k)
+        place = ColumnPlace(dtype, len(values), k)
         values.extend(default if isinstance(default, tuple) else [default] * max(1, k))
         self.places[key] = place
         return place
@@ -77,7 +77,7 @@ class Table:
             self.arrays[dtype] = np.repeat(np.array(values, DTYPES[dtype])[:, None], n, axis=1)
         self.lists = [column.take(np.full(n, -1)) for column in self.lists]
 
-    def array(self, place: Place) -> np.ndarray:
+    def array(self, place: ColumnPlace) -> np.ndarray:
         """The array of a place, (n,) or (k, n), C-contiguous."""
         data = self.arrays[place.dtype]
         return data[place.first : place.first + place.k] if place.k else data[place.first]

@@ -8,7 +8,7 @@ from typing import Any
 
 from tussle import units
 from tussle.columns import Channel, Output
-from tussle.engine.table import Place, Table
+from tussle.engine.table import ColumnPlace, Table
 from tussle.errors import WiringError, nearest_name
 
 BELIEF = {"belief_pos": ("pos", 3, "m"), "belief_vel": ("vel", 3, "m/s"), "belief_quat": ("quat", 4, "")}
@@ -18,7 +18,7 @@ BELIEF = {"belief_pos": ("pos", 3, "m"), "belief_vel": ("vel", 3, "m/s"), "belie
 class Link:
     """Location of a channel column. With `rows`, a separate array of the plugin: inputs are copied from these rows, outputs to them."""
 
-    place: Place
+    place: ColumnPlace
     rows: tuple[int, ...] | None = None
 
 
@@ -188,7 +188,7 @@ class Wiring:
         if column.ragged:
             return rows[0]
         if not column.fields or rows == tuple(range(rows[0], rows[0] + len(rows))):
-            return Link(Place(float, rows[0], len(column.fields)))
+            return Link(ColumnPlace(float, rows[0], len(column.fields)))
         return Link(self.table.add(("own", len(self.table.places)), float, len(column.fields)), rows)
 
     def _check_form(self, plugin: Any, column: Channel, bus: Bus) -> None:

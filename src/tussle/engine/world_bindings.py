@@ -12,7 +12,7 @@ from tussle.api.world import WorldView
 from tussle.columns import Handle, Input, Output, Param, Publish, State, Subscribe
 from tussle.comms import Publisher
 from tussle.engine.params import Overrides
-from tussle.engine.table import Place, Stored, Table
+from tussle.engine.table import ColumnPlace, Stored, Table
 from tussle.errors import DeclarationError, WiringError
 from tussle.lists import RaggedColumn
 
@@ -36,8 +36,8 @@ class WorldBinding:
     tables: dict[str, Table] = field(
         default_factory=lambda: {"world": Table(), "team": Table(), "entity": Table()}
     )
-    places: dict[str, tuple[str, Place]] = field(default_factory=dict)
-    memory: list[tuple[Place, Any]] = field(default_factory=list)
+    places: dict[str, tuple[str, ColumnPlace]] = field(default_factory=dict)
+    memory: list[tuple[ColumnPlace, Any]] = field(default_factory=list)
 
     @classmethod
     def bind(cls, spec: Any, view: WorldView, overrides: Overrides) -> WorldBinding:

@@ -37,7 +37,7 @@ def as_texts(settings: Mapping[str, Any]) -> dict[str, str]:
     return found
 
 
-class Overrides:
+class TreeEditor:
     """Sets values in a mission's tree.
 
     Args:

@@ -61,7 +61,7 @@ def _absent(path: str, owner: str, name: str, known: Collection[str]) -> Paramet
 # -- in a mission -----------------------------------------------------------------------------------------------------------
 
 
-class Whole(NamedTuple):
+class MissionRoot(NamedTuple):
     """Owner that paths into a mission start from; the name "run" in it is the mission itself."""
 
     mission: Mission
@@ -69,7 +69,7 @@ class Whole(NamedTuple):
 
 def inside(owner: Any) -> dict[str, Any]:
     """Members of an owner: run, blocks and world plugins of the root; plugins of a block; plugins inside a plugin."""
-    if isinstance(owner, Whole):
+    if isinstance(owner, MissionRoot):
         mission = owner.mission
         return {
             RUN: mission,
@@ -88,7 +88,7 @@ def settable(owner: Any) -> tuple[str, ...]:
     """Names that can be set in an owner: attributes of `Mission` and `Block`, parameters of plugins."""
     if isinstance(owner, Plugin):
         return (*owner.params(), *owner.children(), *RESERVED)
-    return () if isinstance(owner, Whole) else tuple(f.name for f in fields(owner))
+    return () if isinstance(owner, MissionRoot) else tuple(f.name for f in fields(owner))
 
 
 def declared(owner: Any, name: str) -> Param | None:
@@ -105,7 +105,7 @@ def with_value(mission: Mission, path: str, value: Any) -> Mission:
         ParameterError: The path does not exist, or the value is not allowed.
         MissionError: The mission is invalid with this value.
     """
-    owners, name = follow(path, Whole(mission), inside, settable)
+    owners, name = follow(path, MissionRoot(mission), inside, settable)
     try:
         new = owners[-1].replace(**{name: value})
     except TussleError as error:

@@ -103,7 +103,7 @@ def read_text(path: Path, budget: Budget) -> str:
 
 
 @dataclass
-class Source:
+class MissionSource:
     """A mission's tree and its sources.
 
     Attributes:
@@ -121,7 +121,7 @@ class Source:
     files: list[Path] = field(default_factory=list)
 
 
-class Reader:
+class SourceReader:
     """Reads one mission's files.
 
     Args:
@@ -145,7 +145,7 @@ class Reader:
         self.placeholders: dict[str, str] = {}
         self.files: list[Path] = []
 
-    def read(self, path: Path, text: str | None = None) -> Source:
+    def read(self, path: Path, text: str | None = None) -> MissionSource:
         """Read a mission with its includes.
 
         Raises:
@@ -159,7 +159,7 @@ class Reader:
         self._include_all(root, [path.resolve()], roots)
         if len(self.files) > n_before:
             resolved = root.to_text()
-        return Source(path, root, resolved, self.placeholders, self.files)
+        return MissionSource(path, root, resolved, self.placeholders, self.files)
 
     def _file(self, path: Path, text: str | None = None) -> tuple[Node, str]:
         text = read_text(path, self.budget) if text is None else text

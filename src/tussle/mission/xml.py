@@ -16,11 +16,11 @@ from tussle.mission.catalogue import KINDS, Catalogue
 from tussle.mission.entities import EntityReader, Fields, block_names, expand_entity_common
 from tussle.mission.limits import Limits
 from tussle.mission.node import Budget, Node
-from tussle.mission.overrides import Overrides, as_texts
+from tussle.mission.overrides import TreeEditor, as_texts
 from tussle.mission.plugin_files import PluginFile
 from tussle.mission.plugin_tags import PluginReader
 from tussle.mission.problems import Place, Problems
-from tussle.mission.source import Reader, Source, find_mission
+from tussle.mission.source import MissionSource, SourceReader, find_mission
 from tussle.mission.spec import MISSION_VALUES, Mission, end_conditions
 from tussle.mission.tags import RUN, SEED_ATTRIBUTES, WORLD, TagSpec
 from tussle.scene import Scene
@@ -93,13 +93,13 @@ def read_mission(
     catalogue = Catalogue(plugin_files)
     problems = Problems(strict=strict)
     path = find_mission(source, search)
-    read = Reader(settings, problems, budget, search).read(path)
+    read = SourceReader(settings, problems, budget, search).read(path)
     if read.root.tag != "runscript":
         raise MissionError(
             f"{read.root.place}: the root tag is <{read.root.tag[:80]}>; it must be <runscript>"
         )
     expand_entity_common(read.root, problems, budget)
-    tree = Overrides(read.root, catalogue, read.placeholders)
+    tree = TreeEditor(read.root, catalogue, read.placeholders)
     paths = {name: tree.set(name, value) for name, value in given.items() if name not in read.placeholders}
     if paths:
         read.text = read.root.to_text()
@@ -109,7 +109,9 @@ def read_mission(
 class _WorldReader:
     """Reads the tags of <runscript>."""
 
-    def __init__(self, source: Source, catalogue: Catalogue, problems: Problems, budget: Budget) -> None:
+    def __init__(
+        self, source: MissionSource, catalogue: Catalogue, problems: Problems, budget: Budget
+    ) -> None:
         self.source = source
         self.catalogue = catalogue
         self.problems = problems

@@ -2,6 +2,6 @@
 
 from tussle.neighbors.index import Blocks, Index
 from tussle.neighbors.lane_count import LANES
-from tussle.neighbors.queries import Pairs, nearest, pairs
+from tussle.neighbors.queries import PairArrays, nearest, pairs
 
-__all__ = ["LANES", "Blocks", "Index", "Pairs", "nearest", "pairs"]
+__all__ = ["LANES", "Blocks", "Index", "PairArrays", "nearest", "pairs"]

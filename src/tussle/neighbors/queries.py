@@ -14,7 +14,7 @@ Teams = str | int | None
 
 
 @dataclass(frozen=True, slots=True)
-class Pairs:
+class PairArrays:
     """All pairs of a row and an entity in range, ordered by row, then as in the index. Row i has pairs start[i] to start[i + 1] - 1."""
 
     row: Longs
@@ -59,7 +59,7 @@ def pairs(
     radius: Floats,
     team: Longs | None = None,
     teams: Teams = None,
-) -> Pairs:
+) -> PairArrays:
     """Find all entities nearer than a radius to rows of the table. A row is never its own neighbour.
 
     Args:
@@ -91,7 +91,7 @@ def pairs(
         search.pair_columns(
             (x, y, z), start, found, index.points, index.order, (row, other), offset, distance
         )
-    return Pairs(row, other, offset, distance, count, start)
+    return PairArrays(row, other, offset, distance, count, start)
 
 
 def nearest(

@@ -14,7 +14,7 @@ import pyarrow as pa
 from tussle.errors import ParameterError, RecordError
 from tussle.record import run_file
 from tussle.record.events import BIRTH, END, Events
-from tussle.record.row_buffer import RowBuffer, Rows
+from tussle.record.row_buffer import RowBuffer, RowSelection
 from tussle.record.schema import EVENTS, EVENTS_FILE, FILES, MISSION_FILE, TRAJECTORY, TRAJECTORY_FILE
 from tussle.record.stream import Stream
 
@@ -79,7 +79,7 @@ class Recorder:
         self._buffer = RowBuffer([b.name for b in mission.blocks], clock.start, clock.dt)
         self._events: list[Events] = []
         self._rows_source: np.ndarray | None = None
-        self._rows: Rows
+        self._rows: RowSelection
         self._common_step = -1
         self._steps = np.full(sim.n_worlds, -1, np.int64)
         self._open(mission_text)
@@ -108,7 +108,7 @@ class Recorder:
         sim = self.sim
         bodies, clock = sim.state.population.bodies, sim.state.context.clock
         names = sim.state.context.block_names
-        rows = Rows(bodies.ints, sim.state.running)
+        rows = RowSelection(bodies.ints, sim.state.running)
         world, ids, _, block = rows.columns
         nobody = np.zeros(rows.n, np.int64)
         self._events.append(Events(BIRTH, world, clock.step[world], ids, nobody, [names[b] for b in block]))
@@ -138,7 +138,7 @@ class Recorder:
             ):
                 bodies = sim.state.population.bodies
                 if bodies.ints is not self._rows_source:
-                    self._rows_source, self._rows = bodies.ints, Rows(bodies.ints)
+                    self._rows_source, self._rows = bodies.ints, RowSelection(bodies.ints)
                 self._add(bodies.floats, self._rows, step)
         if time.monotonic() >= self._flush_at:
             self.flush()
@@ -155,7 +155,7 @@ class Recorder:
             p, q = self._per_step.numerator, self._per_step.denominator
             due &= (step * p) // q != ((step - 1) * p) // q
         bodies = sim.state.population.bodies
-        rows = Rows(bodies.ints, due)
+        rows = RowSelection(bodies.ints, due)
         self._add(bodies.floats, rows, step[rows.world])
 
     def _refuse_past(self) -> None:
@@ -165,7 +165,7 @@ class Recorder:
             "close the recorder before `reset` or `restore`, and make another"
         )
 
-    def _add(self, floats: np.ndarray, rows: Rows, step: Any) -> None:
+    def _add(self, floats: np.ndarray, rows: RowSelection, step: Any) -> None:
         if not self._buffer.has_room(rows.n):
             self._write(self._trajectory, self._buffer.take())
         self._buffer.add(floats, rows, step)
@@ -176,7 +176,7 @@ class Recorder:
         if events.kind == END:
             for world, step in zip(events.world, events.step, strict=True):
                 bodies = self.sim.state.parked[int(world)].bodies
-                self._add(bodies.floats, Rows(bodies.ints), int(step))
+                self._add(bodies.floats, RowSelection(bodies.ints), int(step))
 
     def _write(self, stream: Stream, batch: pa.RecordBatch) -> None:
         try:
@@ -231,7 +231,7 @@ class Recorder:
         last = np.maximum(self._steps, self._common_step)
         unrecorded = sim.state.running & (step > last)
         if unrecorded.any():
-            rows = Rows(sim.state.population.bodies.ints, unrecorded)
+            rows = RowSelection(sim.state.population.bodies.ints, unrecorded)
             self._add(sim.state.population.bodies.floats, rows, step[rows.world])
         self.flush()
         for stream in (self._trajectory, self._event_stream):

@@ -18,7 +18,7 @@ _N_STATE = FLOATS["pos"] + FLOATS["vel"] + FLOATS["quat"]
 assert (_FIRST["vel"], _FIRST["quat"]) == (3, 6), "pos, vel and quat are copied as one block"
 
 
-class Rows:
+class RowSelection:
     """Selected rows of a body table in the order of the file; valid until entities are added or removed.
 
     Args:
@@ -68,7 +68,7 @@ class RowBuffer:
     def has_room(self, n: int) -> bool:
         return self.n + n <= self.capacity
 
-    def add(self, floats: np.ndarray, rows: Rows, step: int | np.ndarray) -> None:
+    def add(self, floats: np.ndarray, rows: RowSelection, step: int | np.ndarray) -> None:
         """Copy rows of a body table. The buffer must be empty or have room.
 
         Args:

@@ -41,7 +41,7 @@ STEPS = 20
 
 
 @dataclass(frozen=True)
-class Game:
+class ConformanceGame:
     """A mission around a plugin.
 
     Attributes:
@@ -83,7 +83,7 @@ def scaled(plugin: Any, name: str, factor: float) -> Any:
 # -- the mission ------------------------------------------------------------------------------------------------------------------
 
 
-def build(plugin: Any, companions: Sequence[Any] = ()) -> Game:
+def build(plugin: Any, companions: Sequence[Any] = ()) -> ConformanceGame:
     """Build a game around a plugin, with partners that write its inputs, read its outputs and exchange messages with it.
 
     Args:
@@ -159,7 +159,9 @@ def _types_published(mission: Mission) -> list[type[Message]]:
     return list(found)
 
 
-def _missions(plugin: Any, companions: Sequence[Any], sent: Iterable[Any], received: Iterable[Any]) -> Game:
+def _missions(
+    plugin: Any, companions: Sequence[Any], sent: Iterable[Any], received: Iterable[Any]
+) -> ConformanceGame:
     publishes = sorted((t for t in sent if can_fill(t[0])), key=_topic_order)
     subscribes = sorted(received, key=_topic_order)
     all_: list[Any] = [plugin, *companions]
@@ -188,7 +190,7 @@ def _missions(plugin: Any, companions: Sequence[Any], sent: Iterable[Any], recei
         name=f"conformance of {plugin.instance_name}",
     )
     quiet = mission.replace(blocks=blocks[:2], interactions=mission.interactions[:-1])
-    return Game(plugin, mission, quiet, paths if len(paths) == 1 else paths[:2])
+    return ConformanceGame(plugin, mission, quiet, paths if len(paths) == 1 else paths[:2])
 
 
 def _topic_order(topic: Any) -> tuple[str, str, str]:

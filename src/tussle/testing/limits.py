@@ -13,7 +13,7 @@ import numpy as np
 from tussle.columns import Handle, Param
 from tussle.engine.simulation import Simulation
 from tussle.errors import ConformanceError, MissionError, PluginError
-from tussle.testing.game import Game
+from tussle.testing.game import ConformanceGame
 from tussle.testing.lines import lines_of
 
 RULE = "finite"
@@ -31,7 +31,7 @@ class Case:
     words: str
 
 
-def check_limits(game: Game) -> None:
+def check_limits(game: ConformanceGame) -> None:
     """With each parameter at its finite bounds, and at 0.1 and 10 times its default, all columns and bodies stay finite.
 
     Raises:
@@ -50,7 +50,7 @@ def check_limits(game: Game) -> None:
                     _play(game, [case])
 
 
-def _cases(game: Game) -> Iterator[Case]:
+def _cases(game: ConformanceGame) -> Iterator[Case]:
     for name, column in game.plugin.params().items():
         if column.is_row_data:
             default = game.plugin.values[name]
@@ -81,7 +81,7 @@ def _values(column: Param, default: Any) -> Iterator[Any]:
             yield value
 
 
-def _play(game: Game, cases: list[Case]) -> None:
+def _play(game: ConformanceGame, cases: list[Case]) -> None:
     plugin = game.plugin
     params: dict[str, list[Any]] = {}
     for name, column in plugin.params().items():

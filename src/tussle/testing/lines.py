@@ -10,7 +10,7 @@ import numpy as np
 from tussle.api.bodies import FLOATS, STORED_INTS
 from tussle.columns import Column, Output, State
 from tussle.engine.simulation import Simulation
-from tussle.engine.table import Place, Table
+from tussle.engine.table import ColumnPlace, Table
 
 BODY_ROWS = [name for name, k in FLOATS.items() for _ in range(k)]
 
@@ -35,7 +35,7 @@ class Line:
     is_made: bool
 
 
-def keys_of(table: Table, place: Place) -> list[Key]:
+def keys_of(table: Table, place: ColumnPlace) -> list[Key]:
     """The lines of a column."""
     return [(id(table), place.dtype, place.first + i) for i in range(max(1, place.k))]
 
@@ -50,7 +50,7 @@ def lines_of(sim: Simulation) -> dict[Key, Line]:
     found["clock",] = Line("the clock", sim.state.context.clock.step, worlds, False)
     found["seeds",] = Line("the seeds", sim.state.context.seeds, worlds, False)
 
-    def add(table: Table, place: Place, column: Column, name: str, world: np.ndarray) -> None:
+    def add(table: Table, place: ColumnPlace, column: Column, name: str, world: np.ndarray) -> None:
         is_made = isinstance(column, (State, Output)) and bool(np.isfinite(column.default).all())
         for key in keys_of(table, place):
             if key not in found or isinstance(column, Output):

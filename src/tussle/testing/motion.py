@@ -12,7 +12,7 @@ from tussle.api import MotionModel
 from tussle.engine.group import Group
 from tussle.engine.simulation import Simulation
 from tussle.errors import ConformanceError
-from tussle.testing.game import Game
+from tussle.testing.game import ConformanceGame
 
 EPS = float(np.finfo(float).eps)
 STEPS = 10
@@ -43,7 +43,7 @@ class Flight:
         substeps: Substeps per step.
     """
 
-    def __init__(self, game: Game) -> None:
+    def __init__(self, game: ConformanceGame) -> None:
         self.sim = sim = Simulation(game.quiet, [11, 12], on_error="raise")
         sim.state.by_substep = True
         sim.state.population.on_new_group()  # the schedule is made anew
@@ -65,7 +65,7 @@ class Flight:
         self.x, self.u, self.p = np.array(states), np.array(inputs), np.array(self.group.p)
 
 
-def check_motion(game: Game, is_default: bool) -> None:
+def check_motion(game: ConformanceGame, is_default: bool) -> None:
     """All rules for motion models.
 
     Args:

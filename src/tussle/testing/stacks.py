@@ -6,7 +6,7 @@ from typing import Any
 
 from tussle.columns import Handle
 from tussle.engine.simulation import Simulation
-from tussle.testing.game import SEEDS, STEPS, Game
+from tussle.testing.game import SEEDS, STEPS, ConformanceGame
 from tussle.testing.traces import Traces
 
 STACKS: tuple[tuple[int, int], ...] = ((1, 2), (2, 1), (7, 1), (64, 2))
@@ -26,7 +26,7 @@ def order_of(n: int) -> list[int]:
     return seeds
 
 
-def check_stacks(game: Game, traces: Traces) -> None:
+def check_stacks(game: ConformanceGame, traces: Traces) -> None:
     """World k of a stack is bit-identical to world k alone.
 
     Raises:
@@ -42,7 +42,7 @@ def check_stacks(game: Game, traces: Traces) -> None:
             _follow(sim, traces, seeds, range(STEPS + 1), "stack invariance", where)
 
 
-def check_reset(game: Game, traces: Traces) -> None:
+def check_reset(game: ConformanceGame, traces: Traces) -> None:
     """Reset worlds equal new ones, and the other worlds do not change.
 
     Raises:
@@ -72,7 +72,7 @@ def check_reset(game: Game, traces: Traces) -> None:
         _follow(sim, traces, [SEEDS[0]], range(8), "reset", "new world versus a reset of all worlds")
 
 
-def check_snapshot(game: Game, traces: Traces) -> None:
+def check_snapshot(game: ConformanceGame, traces: Traces) -> None:
     """The same future follows after a restore, in the same simulation and in another.
 
     Raises:

@@ -9,7 +9,7 @@ import numpy as np
 from tussle.engine.simulation import Simulation
 from tussle.engine.snapshot import hashed
 from tussle.errors import ConformanceError
-from tussle.testing.game import SEEDS, STEPS, Game
+from tussle.testing.game import SEEDS, STEPS, ConformanceGame
 
 Columns = list[tuple[str, Any]]
 
@@ -50,7 +50,7 @@ def _shape(values: Any) -> str:
 class Traces:
     """The states of each compared world alone, after every step: the reference for all stacks."""
 
-    def __init__(self, game: Game) -> None:
+    def __init__(self, game: ConformanceGame) -> None:
         self.game = game
         self.steps: dict[int, list[Columns]] = {}
         for seed in SEEDS:

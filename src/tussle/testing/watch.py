@@ -16,7 +16,7 @@ from tussle.engine.simulation import Simulation
 from tussle.engine.world_bindings import WorldBinding
 from tussle.errors import ConformanceError
 from tussle.testing.declarations import MACHINERY, own_classes
-from tussle.testing.game import SEEDS, STEPS, Game
+from tussle.testing.game import SEEDS, STEPS, ConformanceGame
 from tussle.testing.lines import BODY_ROWS, Key, keys_of, lines_of
 
 MEMORY = "memory in columns"
@@ -28,7 +28,7 @@ Own = dict[Key, Any]
 """Lines that a hook may write -> their rows that it may write."""
 
 
-def check_calls(game: Game) -> None:
+def check_calls(game: ConformanceGame) -> None:
     """Play a short game; compare all data before and after each call of the plugin, and record its draws.
 
     Raises:

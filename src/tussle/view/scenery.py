@@ -13,8 +13,8 @@ import numpy as np
 from tussle.errors import ViewError
 from tussle.geodesy import Origin
 from tussle.mission import Block, Mission
-from tussle.scene import Boundary, Cuboid, Plane, Polyhedron, Sphere
-from tussle.stock import Boundary as BoundaryPlugin
+from tussle.scene import Cuboid, Plane, Polyhedron, Sphere, Volume
+from tussle.stock import Boundary
 from tussle.view.shapes import Mesh
 from tussle.view.solids import mesh_of, outline_of
 from tussle.view.terrain import Terrain, find_terrain
@@ -57,7 +57,7 @@ class Region:
 
     name: str
     team: int | None
-    shape: Boundary
+    shape: Volume
     is_wall: bool
     mesh: Mesh
     outline: np.ndarray
@@ -152,21 +152,19 @@ def _start(block: Block) -> list[np.ndarray]:
     return [np.array(block.position) - spread, np.array(block.position) + spread]
 
 
-def _shapes(mission: Mission) -> list[tuple[str, int | None, Boundary, bool]]:
+def _shapes(mission: Mission) -> list[tuple[str, int | None, Volume, bool]]:
     """Name, team, shape and whether it is a wall, of all regions of a mission."""
-    found: list[tuple[str, int | None, Boundary, bool]] = []
+    found: list[tuple[str, int | None, Volume, bool]] = []
     scene = mission.scene
     found += [(str(name), None, shape, False) for name, shape in scene.boundaries.items()]
     found += [(f"wall {i + 1}", None, shape, True) for i, shape in enumerate(scene.walls)]
     found += [
-        (p.instance_name, p.team, p.region(), False)
-        for p in mission.interactions
-        if isinstance(p, BoundaryPlugin)
+        (p.instance_name, p.team, p.region(), False) for p in mission.interactions if isinstance(p, Boundary)
     ]
     return found
 
 
-def _corners(shape: Boundary) -> list[np.ndarray]:
+def _corners(shape: Volume) -> list[np.ndarray]:
     """Of a box around a shape; none of one without end."""
     if isinstance(shape, Sphere):
         return [np.array(shape.center) - shape.radius, np.array(shape.center) + shape.radius]

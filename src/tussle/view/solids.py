@@ -6,14 +6,14 @@ from itertools import combinations
 
 import numpy as np
 
-from tussle.scene import Boundary, Convex, FlatGround, Plane, Sphere
+from tussle.scene import Convex, FlatGround, Plane, Sphere, Volume
 from tussle.view.shapes import Mesh, ball
 
 N_CIRCLE = 48
 """Lines of each circle that outlines a sphere."""
 
 
-def mesh_of(shape: Boundary, low: np.ndarray, high: np.ndarray) -> Mesh:
+def mesh_of(shape: Volume, low: np.ndarray, high: np.ndarray) -> Mesh:
     """The surface of a shape.
 
     Args:
@@ -26,7 +26,7 @@ def mesh_of(shape: Boundary, low: np.ndarray, high: np.ndarray) -> Mesh:
     return _polygons(_rings(shape, low, high))
 
 
-def outline_of(shape: Boundary, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+def outline_of(shape: Volume, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     """Edges of a shape, or three circles of a sphere: ends of each line [m], (k, 2, 3), float32."""
     if isinstance(shape, Sphere):
         angle = 2.0 * np.pi * np.arange(N_CIRCLE + 1) / N_CIRCLE
@@ -47,7 +47,7 @@ def _lines(points: np.ndarray) -> np.ndarray:
     return np.stack([points[:-1], points[1:]], axis=1)
 
 
-def _rings(shape: Boundary, low: np.ndarray, high: np.ndarray) -> list[np.ndarray]:
+def _rings(shape: Volume, low: np.ndarray, high: np.ndarray) -> list[np.ndarray]:
     """Corners of each flat face, counter-clockwise seen from outside, each (k, 3)."""
     if isinstance(shape, FlatGround):
         shape = Plane((0.0, 0.0, shape.height), (0.0, 0.0, 1.0))
