@@ -1,4 +1,4 @@
-"""Neighbour laws: what an entity makes of each neighbour, as one function of a pair."""
+"""Neighbour laws: the contribution of each neighbour, written as a function of a pair."""
 
 from __future__ import annotations
 
@@ -41,27 +41,29 @@ def neighbors(
 ) -> Callable[[Callable[..., Any]], NeighborLaw]:
     """Declare a function of a pair as a neighbour law.
 
-    Its arguments are matched by name: of the pair offset_x, offset_y, offset_z [m], distance [m], distance_squared, inverse_distance;
-    columns of the entity (vel_x, team, quat_w, yaw ..., and the plugin's own, goal_x of a column goal with a field x); body columns
-    of the other with "other_" before their name. It returns the contributions in the order of `reductions`, or None where the pair
-    does not count. In the plugin `self.law(g)` gives them reduced, by name, (n,) each.
+    Arguments are matched by name: offset_x, offset_y, offset_z [m], distance [m], distance_squared [m^2] and inverse_distance [1/m]
+    of the pair; body columns of the entity (vel_x, team, quat_w, yaw ...) and columns of the plugin (goal_x is field x of column
+    goal); body columns of the neighbour with the prefix "other_". The function returns the contributions in the order of
+    `reductions`, or None to skip the pair. In the plugin, `self.law(g)` returns the reduced contributions by name, (n,) each.
 
     Args:
-        radius: Name of a parameter or state, or a number [m]; neighbours are nearer. Of several, nearer than each.
+        radius: Name of a parameter or state, or a number [m]. Only neighbours at a smaller distance count; with several radii, smaller
+            than all of them.
         teams: "own", "other", or None for all.
-        **reductions: Name of each contribution and how it is reduced: "sum"; "mean", 0 without neighbours; "min" and "max", inf and
-            -inf without; "count" of those that are true; "nearest", that of the nearest neighbour (the smaller id of equals), NaN
-            without. Or "each" for all contributions: `self.law(g)` then lists the pairs that count, see `Listed`.
+        **reductions: Name of each contribution and its reduction: "sum"; "mean", 0 without neighbours; "min" and "max", inf and -inf
+            without neighbours; "count" of true values; "nearest", the value of the nearest neighbour (at equal distances that with
+            the smaller id), NaN without neighbours. Or "each" for all contributions: `self.law(g)` then returns one value per pair,
+            see `Listed`.
 
     Raises:
-        DeclarationError: A reduction is unknown, or there is none, or no radius, or some are "each" and others not.
+        DeclarationError: A reduction is unknown, no reduction or no radius is given, or "each" is mixed with other reductions.
     """
 
     def declare(function: Callable[..., Any]) -> NeighborLaw:
         law = law_of(function, radius, teams, reductions)
         if not radius or not reductions:
             raise DeclarationError(
-                f"{label(law.function)}: name the radius and the contributions, such as @neighbors('sight', n='count')"
+                f"{label(law.function)}: give a radius and the contributions, such as @neighbors('sight', n='count')"
             )
         return NeighborLaw((law,), None, tuple(reductions))
 
@@ -69,18 +71,20 @@ def neighbors(
 
 
 def together(*laws: NeighborLaw, where: Callable[..., Any] | None = None) -> NeighborLaw:
-    """Several neighbour laws of a plugin in one walk over the neighbours; contribution n of a law `mates` is then `mates_n`.
+    """Evaluate several neighbour laws of a plugin in one pair loop; contribution n of a law `mates` is called `mates_n`.
 
     Args:
         laws: The laws.
-        where: A function of a pair like a law's, with one result: whether the pair counts for any of them.
+        where: A function of a pair that returns whether the pair counts for any of the laws.
 
     Raises:
-        DeclarationError: A law lists its pairs; these are not reduced to rows in a walk.
+        DeclarationError: A law has the reduction "each".
     """
     for law in (law for each in laws for law in each.laws):
         if law.lists:
-            raise DeclarationError(f"{label(law.function)}: a law that lists its pairs stands alone")
+            raise DeclarationError(
+                f"{label(law.function)}: a law with the reduction 'each' cannot be combined with others"
+            )
     condition = law_of(where, (), None, {"counts": "count"}) if where is not None else None
     every = tuple(law for each in laws for law in each.laws)
     return NeighborLaw(
@@ -94,18 +98,18 @@ def law_of(
     teams: str | None,
     reductions: dict[str, str],
 ) -> Law:
-    """The law that a function of a pair states; the function may be declared static."""
+    """Return the law of a function of a pair; the function may be a static method."""
     function = getattr(function, "__func__", function)
     return Law(function, tuple(inspect.signature(function).parameters), radii, teams, reductions)
 
 
 class NeighborLaw:
-    """Neighbour laws as an attribute of a plugin: called on a bound one with its view, they give what the neighbours contribute.
+    """Neighbour laws as an attribute of a plugin; a bound plugin calls it with its view and gets the contributions.
 
     Attributes:
-        laws: The laws that share a walk.
-        where: A condition of all of them.
-        names: Names of their contributions.
+        laws: Laws that share a pair loop.
+        where: Condition for all laws, if any.
+        names: Names of all contributions.
     """
 
     def __init__(self, laws: tuple[Law, ...], where: Law | None, names: tuple[str, ...]) -> None:
@@ -120,15 +124,15 @@ class NeighborLaw:
         return partial(plan.walk if plan else self.first_walk, plugin)
 
     def first_walk(self, plugin: Any, g: GroupView) -> Contributions:
-        """What the neighbours of each row contribute; from then on the plan is known."""
+        """Make the plan for the plugin's class, and evaluate the laws."""
         plan = self._plans[type(plugin)] = make_plan(g, plugin, self)
         return plan.walk(plugin, g)
 
     def check(self, cls: type, name: str) -> None:
-        """Refuse a law whose arguments mean nothing to a plugin.
+        """Check that all arguments and radii of the laws exist in a plugin class.
 
         Raises:
-            DeclarationError: An argument or radius is no name of a pair or a column.
+            DeclarationError: An argument or radius is neither a name of the pair nor a column.
         """
         own = [*PAIR, *own_columns(cls)]
         allowed = [*own, *(OTHER + part for part in BODY)]
@@ -136,8 +140,8 @@ class NeighborLaw:
             for column in law.columns:
                 if column not in allowed:
                     raise DeclarationError(
-                        f"{label(law.function)}: {cls.__name__}.{name}: {column!r} is no name of a pair or a column"
-                        f"{nearest_name(column, allowed)}; {listed(own)}; and body columns of the other with {OTHER!r} before the name"
+                        f"{label(law.function)}: {cls.__name__}.{name}: {column!r} is neither a name of the pair nor a column"
+                        f"{nearest_name(column, allowed)}; {listed(own)}; and body columns of the neighbour with the prefix {OTHER!r}"
                     )
 
 
@@ -145,7 +149,7 @@ class Contributions:
     """Contributions of the neighbours, by name, (n,) each.
 
     Attributes:
-        values: All of them in the order of the declaration, (k, n).
+        values: All contributions in the order of the declaration, (k, n).
     """
 
     __slots__ = ("_names", "values")
@@ -167,12 +171,12 @@ class Contributions:
 
 
 class Listed(Contributions):
-    """Contributions pair by pair, by name, (m,) each; ordered by row, each row's pairs in a fixed order.
+    """Contributions of each pair, by name, (m,) each; ordered by row, the order within a row is deterministic.
 
     Attributes:
-        values: All of them in the order of the declaration, (k, m).
+        values: All contributions in the order of the declaration, (k, m).
         row: Row of the view, (m,).
-        other: Row of the other in the body table, (m,).
+        other: Row of the neighbour in the body table, (m,).
     """
 
     __slots__ = ("other", "row")
@@ -189,12 +193,15 @@ class Listed(Contributions):
 
 @lru_cache(maxsize=256)
 def own_columns(cls: Any) -> dict[str, str]:
-    """Expression, over a view `g` and a plugin's attributes `own`, of each column of the entity that its laws may name."""
+    """Return the Python expression of each column that laws of a plugin class may take, by name.
+
+    Expressions use a view `g` and the plugin's attributes `own`.
+    """
     found = {}
     for part, (name, place) in BODY.items():
         column = f"g.column({name!r})" if name in DERIVED else f"g.{name}"
         found[part] = column if part == name else f"{column}[{place}]"
-    is_world = hasattr(cls, "start")  # a world plugin; its class is above this module
+    is_world = hasattr(cls, "start")  # world plugins; their class is in a higher layer
     for name, declared in cls.declared(Numbers).items():
         per = getattr(declared, "per", "world" if is_world else "entity")
         if declared.ragged or per == "team" or (isinstance(declared, Param) and not declared.is_row_data):
@@ -213,18 +220,18 @@ def own_columns(cls: Any) -> dict[str, str]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WalkPlan:
-    """What one walk over the neighbours takes of a plugin.
+    """Kernel of a pair loop and the columns of a plugin that it takes.
 
     Attributes:
-        run: The walk's kernel.
-        run_single: The same for views whose rows are each in a world of their own.
+        run: Kernel of the pair loop.
+        run_single: Kernel for views with at most one row per world.
         names: Names of the contributions.
-        reach: Function of a view and a plugin's attributes: how far to look [m].
-        own: Likewise, the columns by row.
-        other: Its columns by place: of the body table, and which components.
-        lists: It gives one value for each pair, instead of one for each row.
-        moving: Columns by place that follow who moves.
-        keeps: The columns by row are arrays that the view and the plugin keep until rows change.
+        reach: Function of a view and a plugin's attributes that returns the search radius [m].
+        own: Function of the same arguments that returns the columns by row.
+        other: Columns of the neighbours, by place: body column and components.
+        lists: The kernel returns one value per pair instead of one per row.
+        moving: Columns of the neighbours that change when an entity moves.
+        keeps: The columns by row are arrays that stay the same until the rows change.
     """
 
     run: Callable[..., Any]
@@ -238,7 +245,7 @@ class WalkPlan:
     keeps: bool
 
     def walk(self, plugin: Any, g: GroupView) -> Contributions:
-        """Return what the neighbours of each row contribute."""
+        """Return the contributions of the neighbours of each row."""
         blocks, arrays = self.gather(plugin, g)
         if self.lists:
             return self.listed(g, blocks.n_blocks, lambda *last: self.run(*arrays, *last, blocks.most))
@@ -251,16 +258,14 @@ class WalkPlan:
         return Contributions(self.names, out)
 
     def gather(self, plugin: Any, g: GroupView) -> tuple[Blocks, tuple[Any, ...]]:
-        """Return the blocks of the rows and the arguments of the kernels, with everybody at the positions of now."""
+        """Return the blocks of the rows and the arguments of the kernels, for the current positions."""
         key = id(self), id(plugin)
         index = g.index(self.reach(g, plugin.__dict__))
         split = None if g.context.threads == 1 else g.context.split
         kept = g.walks.get(key)
         if kept is not None and kept[0] is index:
             _, blocks, arrays = kept
-            if (
-                g.one_per_world and not self.lists
-            ):  # each sees all of its world: blocks and whole numbers stay
+            if g.one_per_world and not self.lists:  # each row has its whole world as candidates
                 for name in self.moving:
                     g.by_place(index, name)
                 return blocks, arrays
@@ -280,14 +285,14 @@ class WalkPlan:
         return blocks, arrays
 
     def listed(self, g: GroupView, n_blocks: int, run: Callable[..., int]) -> Listed:
-        """What each pair contributes."""
+        """Return the contributions of each pair."""
         made: list[tuple[np.ndarray, np.ndarray]] = []
 
         def fill(begin: int, end: int) -> None:
-            room, n = -1, 8 * (end - begin)
-            while n > room:  # again, where there are more pairs than there was room for
-                room = n
-                pairs, values = np.empty((2, room), np.int64), np.empty((len(self.names), room))
+            size, n = -1, 8 * (end - begin)
+            while n > size:  # repeat with larger arrays if there were more pairs
+                size = n
+                pairs, values = np.empty((2, size), np.int64), np.empty((len(self.names), size))
                 n = run((pairs, values), g.first, (begin, end))
             made.append((pairs[:, :n], values[:, :n]))
 
@@ -302,13 +307,13 @@ class WalkPlan:
 
 
 def make_plan(g: GroupView, plugin: Any, declared: NeighborLaw) -> WalkPlan:
-    """The plan for what a plugin declares; g and plugin show of which types the columns are."""
+    """Return the plan for neighbour laws of a plugin; the types of the columns are taken from `g` and `plugin`."""
     cls: Any = type(plugin)
     laws = declared.laws
     columns, scope = own_columns(cls), {"np": np}
 
     def evaluated(text: str) -> Any:
-        return eval(f"lambda g, own: {text}", scope)  # noqa: S307 - made of declared names
+        return eval(f"lambda g, own: {text}", scope)  # noqa: S307 - consists of declared names
 
     made = make_walk(
         laws, declared.where, lambda name: CODES[evaluated(columns[name])(g, plugin.__dict__).dtype.kind]

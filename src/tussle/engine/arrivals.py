@@ -12,9 +12,9 @@ from tussle.api.kinds import Interaction, WorldPlugin
 from tussle.api.world import WorldView
 from tussle.engine import failure
 from tussle.engine.births import Occupancy, in_order, joined
-from tussle.engine.rows import repack, take_over_moves
+from tussle.engine.rows import apply_moves, repack
 from tussle.engine.state import SimulationState
-from tussle.engine.step_end import take_out_dead
+from tussle.engine.step_end import remove_dead
 from tussle.engine.subset import call_world_plugin
 from tussle.engine.world_bindings import WorldBinding
 from tussle.errors import MissionError
@@ -55,7 +55,7 @@ def reset(
     steps = clock.step[state.running]
     clock.common = int(steps[0]) if len(steps) and (steps == steps[0]).all() else -1
     _start_referees(state, mask)
-    take_out_dead(state)
+    remove_dead(state)
 
 
 def _start_referees(state: SimulationState, mask: np.ndarray) -> None:
@@ -66,7 +66,7 @@ def _start_referees(state: SimulationState, mask: np.ndarray) -> None:
             _start(world_binding, world_binding.view)
         else:
             call_world_plugin(state.population, world_binding, mask, _start)
-    take_over_moves(state, 0.0)
+    apply_moves(state, 0.0)
 
 
 def _start(world_binding: WorldBinding, view: WorldView) -> None:
@@ -137,7 +137,7 @@ def give_birth(state: SimulationState) -> None:
     parts += [born] if born is not None else []
     if parts:
         repack(state, None, joined(parts))
-        take_out_dead(state)  # what an entity holds outside the arrays could not be opened
+        remove_dead(state)  # what an entity holds outside the arrays could not be opened
 
 
 def _check_space(state: SimulationState, worlds: np.ndarray) -> None:

@@ -1,4 +1,4 @@
-"""A group: all rows with the same list of plugins, their columns, and the plugins bound to them."""
+"""Groups: all rows with the same list of plugins, their columns, and the plugins bound to them."""
 
 from __future__ import annotations
 
@@ -37,15 +37,15 @@ class Binding:
     Attributes:
         plugin: The bound copy.
         spec: The plugin as data.
-        view: What its step is given.
-        path: Names from the entity down, such as ("MotorSchemas", "AvoidEntityMS").
-        places: Attribute -> where its column lies.
-        params: Those of them that are parameters.
+        view: View that is passed to its `step`.
+        path: Plugin names, outermost first, such as ("MotorSchemas", "AvoidEntityMS").
+        places: Attribute -> place of its column in the table.
+        params: Attributes that are parameters.
         writable: Attributes that the plugin may write.
-        links: Channel attributes that are copied from and to the bus around each call.
-        ragged: Attribute -> number of its lists in the table.
-        handles: Attribute -> object per row.
-        children: Bindings of the plugins inside this one.
+        links: Channel attributes that are copied from and to the bus before and after each call.
+        ragged: Attribute -> index of its list column in the table.
+        handles: Attribute -> one object per row.
+        children: Bindings of the plugins inside this plugin.
     """
 
     plugin: Any
@@ -61,13 +61,13 @@ class Binding:
     children: list[Binding] = field(default_factory=list)
 
     def walk(self) -> Iterator[Binding]:
-        """This binding and all inside it."""
+        """Yield this binding and all bindings inside it."""
         yield self
         for child in self.children:
             yield from child.walk()
 
     def attach(self, table: Table) -> None:
-        """Give the plugin its arrays anew."""
+        """Set the plugin's attributes to the current arrays."""
         own = self.plugin.__dict__
         for name, place in self.places.items():
             array = table.array(place)
@@ -80,7 +80,7 @@ class Binding:
             child.attach(table)
 
     def pull(self, table: Table) -> None:
-        """Copy the channels that do not lie side by side into the plugin's own arrays."""
+        """Copy channels that are not contiguous on the bus into the plugin's own arrays."""
         data = table.arrays[float]
         for name, link in self.links.items():
             assert link.rows is not None
@@ -97,10 +97,10 @@ class Binding:
 
 
 def check_hooks(spec: Any, where: str) -> None:
-    """Refuse a plugin without the method that it is there for.
+    """Check that a plugin has the methods that its kind requires.
 
     Raises:
-        DeclarationError: It has none, or one by another name.
+        DeclarationError: A method is missing, or has another name.
     """
     needed = {"motion": ("from_body", "to_body"), "network": ("route",)}.get(spec.kind, ("step",))
     if isinstance(spec, EasyEntityPlugin):
@@ -122,15 +122,15 @@ def check_hooks(spec: Any, where: str) -> None:
 
 
 class Group:
-    """Rows [first, first + n) of the body table with one list of plugins.
+    """Rows [first, first + n) of the body table, which share one list of plugins.
 
     Args:
-        name: Name of the first block in it, for messages.
-        block: The block whose plugins it has.
+        name: Name of its first block, for messages.
+        block: The block that gives the plugins.
         context: Shared by all views.
         bodies: The body table.
         dt: Step length [s].
-        substeps: Substeps of controllers and motion.
+        substeps: Number of substeps of controllers and motion per step.
         advise: See `Wiring`.
     """
 
@@ -174,7 +174,7 @@ class Group:
 
     @property
     def bindings(self) -> list[Binding]:
-        """All plugins in the order of a step."""
+        """All plugins in the order in which a step calls them."""
         return [*self.autonomies, *self.controllers, self.motion, *self.sensors]
 
     def walk(self) -> Iterator[Binding]:
@@ -183,7 +183,7 @@ class Group:
 
     @property
     def name(self) -> str:
-        """Names of the blocks whose entities are in it."""
+        """Names of the blocks whose entities belong to the group."""
         return ", ".join(self.names)
 
     def block_of(self, row: int) -> str:
@@ -207,7 +207,10 @@ class Group:
         wired = set(self.wiring.wired.get(id(spec), ()))
         params = {k: c for k, c in type(spec).params().items() if c.is_row_data}
         binding.params = tuple(params)
-        for name, param in params.items():  # one after the other, so that a motion model's are one matrix
+        for (
+            name,
+            param,
+        ) in params.items():  # declared in order, so that those of a motion model form one matrix
             dtype = float if is_motion else param.dtype
             value = spec.values[name]
             default = tuple(value) if param.fields else value
@@ -248,13 +251,13 @@ class Group:
 
     def _bind_channel(self, binding: Binding, name: str, column: Channel, is_child: bool) -> None:
         link = self.wiring.links.get((id(binding.spec), name))
-        if link is None:  # inside another plugin, or switched off by a structural parameter
+        if link is None:  # the plugin is inside another one, or a structural parameter disables the channel
             is_read = any(k == name for k, _ in read_channels(binding.spec))
             if is_child and is_read and not column.optional:  # type: ignore[attr-defined]
                 sensed, channel = self.wiring.sensed, column.channels[0]
                 raise WiringError(
-                    f"{self.wiring.where}: {'.'.join(binding.path)}.{name} is an input, and a plugin inside another has none but, in "
-                    f"an autonomy, what sensors write; {channel!r} is not of that{nearest_name(channel, sensed)}; {listed(sensed)}"
+                    f"{self.wiring.where}: {'.'.join(binding.path)}.{name}: a plugin inside another one can only read channels that "
+                    f"sensors write, and only in an autonomy; no sensor writes {channel!r}{nearest_name(channel, sensed)}; {listed(sensed)}"
                 )
             link = self.wiring.alone(column, (binding.path, name))
         if isinstance(link, int):
@@ -278,26 +281,29 @@ class Group:
         )
 
     def _believe(self) -> None:
-        """Find the sensor outputs that are the entity's belief."""
+        """Find the sensor outputs that hold the entity's belief."""
         self.belief: dict[str, ColumnPlace] = {}
         for sensor in self.sensors:
             for name, (body, k, _) in BELIEF.items():
                 place = sensor.places.get(name)
                 if name in sensor.ragged:
                     raise WiringError(
-                        f"{self.wiring.where}: {sensor.spec.instance_name}.{name} is a list; it needs {k} channels"
+                        f"{self.wiring.where}: {sensor.spec.instance_name}.{name} is a list; it must have {k} channels"
                     )
                 if place is not None and isinstance(type(sensor.spec).columns[name], Output):
                     if place.k != k:
                         raise WiringError(
-                            f"{self.wiring.where}: {sensor.spec.instance_name}.{name} has {place.k} channels, it needs {k}"
+                            f"{self.wiring.where}: {sensor.spec.instance_name}.{name} has {place.k} channels; it must have {k}"
                         )
                     self.belief[body] = place
 
     # -- rows ---------------------------------------------------------------------------------------------------------------
 
     def rearrange(self, source: np.ndarray) -> None:
-        """New row i is row source[i] of the old body table; one below 0 is a new one at the defaults. `attach` follows."""
+        """Reorder rows: new row i is row source[i] of the old body table; negative values are new rows at the defaults.
+
+        Call `attach` afterwards.
+        """
         self.table.rearrange(source, self.first)
         index = np.where(source >= 0, source - self.first, -1) if self.holds_handles else source
         for binding in self.walk() if self.holds_handles else ():
@@ -305,7 +311,7 @@ class Group:
                 binding.handles[name] = [objects[i] if i >= 0 else None for i in index]
 
     def attach(self, bodies: Bodies, first: int) -> None:
-        """Take the place [first, first + n) in the body table, and give all plugins and views their arrays."""
+        """Set the rows [first, first + n) in the body table, and set the arrays of all plugins and views."""
         belief = {name: self.table.array(place) for name, place in self.belief.items()}
         self.thinking.belief = self.steering.belief = belief
         self.shift(bodies, first)
@@ -314,19 +320,19 @@ class Group:
         self._attach_motion()
 
     def shift(self, bodies: Bodies, first: int) -> None:
-        """Take another place in the body table with the rows unchanged."""
+        """Move to other rows of the body table; the group's own rows are unchanged."""
         self.bodies, self.first, self.n = bodies, first, self.table.n
         for view in self.views:
             view.reset(bodies, first, self.last)
 
     def renew(self, rows: np.ndarray) -> None:
-        """Some rows begin anew: they go back to the defaults, in the arrays and places that they have."""
+        """Reset some rows, (m,), to the defaults, in place."""
         self.table.renew(rows)
         for view in self.views:
             view.renew()
 
     def _place_motion(self) -> None:
-        """Where the motion model's state, inputs and parameters lie in the table."""
+        """Find the rows of the motion model's state, inputs and parameters in the table."""
         motion, plugin = self.motion, self.motion.plugin
         self.x_place = motion.places[next(k for k, c in type(plugin).states().items() if c.fields)]
         params = [motion.places[k] for k in type(plugin).row_params()]
@@ -346,7 +352,7 @@ class Group:
             view.motion_state = read_only(self.x)
 
     def rows_of(self, binding: Binding, name: str) -> tuple[int, ...]:
-        """Rows of a column in the table, of a channel where its number passes from writer to reader."""
+        """Table rows of a column; for a channel, the rows that its writer and readers share."""
         link = binding.links.get(name)
         if link is not None and link.rows is not None:
             return link.rows
@@ -354,7 +360,7 @@ class Group:
         return tuple(range(place.first, place.first + max(1, place.k)))
 
     def from_body(self, rows: np.ndarray) -> None:
-        """Have the motion model take over the states of some of its rows, in order, from the body table."""
+        """Let the motion model set the states of some rows, (m,) ascending, from the body table."""
         view = self.moving
         view.span = (int(rows[0]), int(rows[-1]) + 1)
         try:
@@ -363,7 +369,7 @@ class Group:
             view.span = (0, self.n)
 
     def advance(self, dt: float, substeps: int) -> None:
-        """Integrate all rows over dt [s], and publish the new states."""
+        """Integrate all rows over dt [s], and write the new states to the body table."""
         u = self.u
         if self.stacks_inputs:
             u = self._stacked_inputs()
@@ -379,7 +385,7 @@ class Group:
         self.bodies.touch(self.first, self.last)
 
     def _integrate_part(self, rows: slice, u: np.ndarray, dt: float, substeps: int) -> None:
-        """Integrate some rows, on a copy: kernels take arrays without gaps."""
+        """Integrate some rows on a copy, as kernels need contiguous arrays."""
         x = np.ascontiguousarray(self.x[:, rows])
         self.integrate(
             x, np.ascontiguousarray(u[:, rows]), np.ascontiguousarray(self.p[:, rows]), dt, substeps

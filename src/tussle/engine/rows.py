@@ -1,4 +1,4 @@
-"""Rows of the body table that come, go or are moved: all that keeps to them follows."""
+"""Changes of the body table's rows: births, removals and moves, passed on to all views and plugins."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ def repack(state: SimulationState, gone: np.ndarray | None, new: Bodies | None) 
 
 
 def rows_changed(state: SimulationState) -> None:
-    """The table has been repacked or restored: views and checks look at it."""
+    """Update views and checks after the table has been repacked or restored."""
     b = state.population.bodies
     state.world_view.reset(b, 0, b.n)
     state.checked = b.pos, b.quat, b.health, np.empty(b.n, bool)
     state.has_changed = True
 
 
-def take_over_moves(state: SimulationState, phase: float = 1.0) -> None:
-    """Motion models take over the rows that world plugins have moved; beliefs follow with the next reading of their sensor."""
+def apply_moves(state: SimulationState, phase: float = 1.0) -> None:
+    """Let motion models set their states where world plugins have moved entities. Sensors update beliefs when next called."""
     view = state.world_view
     if not view.moved:
         return

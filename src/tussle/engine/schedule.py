@@ -1,4 +1,4 @@
-"""The step as a list of calls, composed once."""
+"""The schedule: the calls of a step, in order, composed once."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tussle.columns import Subscribe
 from tussle.engine import failure
 from tussle.engine.delivery import deliver
 from tussle.engine.group import Binding, Group
-from tussle.engine.rows import take_over_moves
+from tussle.engine.rows import apply_moves
 from tussle.engine.state import SimulationState
 from tussle.engine.steering import Steering, steering_of
 from tussle.engine.step_end import end_step
@@ -27,20 +27,20 @@ from tussle.mission.cadence import Cadence
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """One line of the schedule: what is done, in words, and the function that does it."""
+    """One entry of the schedule: its description, and the function to call."""
 
     label: str
     run: Callable[[], None]
 
 
 def compose(state: SimulationState) -> list[Call]:
-    """All calls of a step, in order.
+    """Return all calls of a step, in order.
 
-    A plugin's call is made once for all rows of its group, or once for all worlds. Where worlds' clocks differ, a plugin with a rate is
-    called for the worlds in which it is due. An exception ends the stack with a `PluginError`.
+    An entity plugin is called once for all rows of its group, a world plugin once for all worlds. If the clocks of the worlds differ,
+    a plugin with a rate is called for the worlds in which it is due. An exception ends the stack with a `PluginError`.
 
     Raises:
-        MissionError: A plugin has a rate that cannot be honoured.
+        MissionError: The rate of a plugin does not fit the step.
     """
     calls: list[Call] = []
     groups = state.population.groups
@@ -55,15 +55,15 @@ def compose(state: SimulationState) -> list[Call]:
     for group in groups:
         calls += [_entity_call(state, "sensor", group, b) for b in group.sensors]
     if state.interactions:
-        calls.append(Call("forces back to zero: they have acted", partial(_clear_forces, state)))
+        calls.append(Call("reset forces", partial(_clear_forces, state)))
     calls += [_world_call(state, "interaction", r) for r in state.interactions if steps(r)]
     if state.interactions:
-        calls.append(Call("take over what was moved", partial(take_over_moves, state)))
+        calls.append(Call("apply moves", partial(apply_moves, state)))
     calls += [_world_call(state, "metric", r) for r in state.metrics if steps(r)]
     if state.events:
-        tell = partial(state.events.messages, state.world_view)
-        calls.append(Call("tell of captures and collisions", tell))
-    # Always: the world may speak first on topics of its own.
+        report = partial(state.events.messages, state.world_view)
+        calls.append(Call("report captures and collisions", report))
+    # Always, since the world may publish on topics of its own.
     calls.append(Call("deliver messages", partial(deliver, state)))
     calls.append(Call("check, remove, end", partial(end_step, state)))
     return calls
@@ -78,7 +78,7 @@ def _motion(state: SimulationState, groups: list[Group]) -> list[Call]:
     calls = [_advance_call(state, g, dt, m, 0.0) for g in groups if not g.controllers]
     steered = [g for g in groups if g.controllers]
     steerings = [None if state.by_substep else steering_of(g) for g in steered]
-    if None not in steerings:  # else a controller might look at others, and see them move substep by substep
+    if None not in steerings:  # otherwise a controller may read other entities, which move in each substep
         return calls + [_steering_call(state, steering, dt / m, m) for steering in steerings if steering]
     for s in range(m if steered else 0):
         for group in steered:
@@ -90,7 +90,7 @@ def _motion(state: SimulationState, groups: list[Group]) -> list[Call]:
 def _due(
     state: SimulationState, cadence: Cadence, substep: int = 0
 ) -> Iterator[tuple[int, np.ndarray | None]]:
-    """Grid points since the last call, and the worlds, (n_worlds,), in which a plugin is due; None for all that run."""
+    """Yield the number of grid points since the last call and the worlds, (n_worlds,), in which a plugin is due; None for all."""
     clock, running = state.context.clock, state.running
     if clock.common >= 0:
         if since := cadence.since(clock.common, substep):
@@ -110,7 +110,7 @@ def _advance_call(state: SimulationState, group: Group, dt: float, substeps: int
         if group.n:
             if await_ready:
                 await_ready()
-            # As `view.begin` does, here and below: the calls of it are 1 % of a small step.
+            # Inlined `view.begin`, here and below: calling it takes 1 % of a small step.
             view._caller, view.phase = plugin, phase
             try:
                 group.advance(dt, substeps)
@@ -179,7 +179,7 @@ def _entity_call(state: SimulationState, kind: str, group: Group, binding: Bindi
                     call(group, binding, since * grid_dt)
                 else:
                     call_group(state.population, group, worlds, call_part(since * grid_dt))
-            # Of a group without rows too: who comes later has not heard what was said before
+            # Also if the group has no rows: entities born later do not receive older messages.
             for inbox in inboxes:
                 inbox.clear(worlds)
 
@@ -196,7 +196,7 @@ def _entity_call(state: SimulationState, kind: str, group: Group, binding: Bindi
 
 
 def _waits_for(group: Group, binding: Binding) -> Callable[[], None] | None:
-    """What waits until all that a plugin's handles stand for is ready; None where it never waits."""
+    """Return a function that waits until all handles of a plugin are ready; None if the plugin never waits."""
     waiting = [b for b in binding.walk() if b.handles and hasattr(type(b.spec), "ready")]
 
     def wait() -> None:
@@ -250,7 +250,7 @@ def _label(state: SimulationState, kind: str, group: Group, binding: Binding, su
 
 
 def steps(world_binding: WorldBinding) -> bool:
-    """Whether a world plugin has anything to do in a step."""
+    """Whether a world plugin has a `step` of its own."""
     return type(world_binding.plugin).step is not WorldPlugin.step
 
 

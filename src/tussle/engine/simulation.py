@@ -17,7 +17,7 @@ from tussle.engine.result import WorldResult
 from tussle.engine.schedule import Call, compose
 from tussle.engine.snapshot import Snapshot, restore, snapshot, state_hash
 from tussle.engine.state import SimulationState
-from tussle.engine.step_end import take_out_dead, world_result
+from tussle.engine.step_end import remove_dead, world_result
 from tussle.errors import MissionError, ParameterError, PluginError
 from tussle.messages import Message, Messages
 from tussle.mission import Mission
@@ -157,7 +157,7 @@ class Simulation:
             for world in np.flatnonzero(state.running):
                 state.record_failure(int(world), error)
             state.world_view.moved = []
-            take_out_dead(state)
+            remove_dead(state)
             return
         # Without the engine's traceback, so that only the plugin's lines are printed.
         raise error.with_traceback(None) from error.cause

@@ -1,4 +1,4 @@
-"""The end of a step: states checked, the dead removed, clocks advanced, worlds ended."""
+"""The end of a step: check states, remove dead entities, advance clocks, end worlds."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from tussle.engine.state import Parked, SimulationState
 
 
 def end_step(state: SimulationState) -> None:
-    """Check all states, remove who is gone, advance the clocks, end worlds."""
+    """Check all states, advance the clocks, remove dead entities, end worlds."""
     if kernels.check(*state.checked):
-        _take_note_of_faults(state)
+        _record_faults(state)
     clock = state.context.clock
     if state.n_running == state.n_worlds:
         clock.step += 1
     else:
         clock.step += state.running
     if state.world_view.deaths or state.has_failures:
-        take_out_dead(state)
+        remove_dead(state)
     if clock.common >= 0:
         clock.common += 1
     if state.has_changed or clock.common < 0 or clock.common >= state.n_steps:
         _end_worlds(state)
 
 
-def _take_note_of_faults(state: SimulationState) -> None:
-    """States that are not finite are failures of their worlds; who has no health left is dead."""
+def _record_faults(state: SimulationState) -> None:
+    """Fail the worlds that have non-finite states, and kill entities without health."""
     bodies, faulty = state.population.bodies, state.checked[-1]
     for row in map(int, np.flatnonzero(faulty)):
         world = int(bodies.world[row])
@@ -45,8 +45,8 @@ def _take_note_of_faults(state: SimulationState) -> None:
     state.world_view.kill(~faulty & ~(bodies.health > 0.0), "health")
 
 
-def take_out_dead(state: SimulationState) -> None:
-    """Remove who is dead, and all of the worlds in which a plugin has failed."""
+def remove_dead(state: SimulationState) -> None:
+    """Remove dead entities, and all entities of worlds that have failed."""
     view, bodies = state.world_view, state.population.bodies
     if not view.deaths and not state.has_failures:
         return
@@ -69,7 +69,7 @@ def _end_worlds(state: SimulationState) -> None:
     if "time" in state.mission.end_conditions:
         for world in np.flatnonzero(state.running & (state.context.clock.step >= state.n_steps)):
             over[int(world)] = "time"
-    # Who is there has changed since the last look: births count too, since the last one may decide
+    # Entities were born or removed since the last check. Births count: the last one due may leave a single team.
     if state.has_changed:
         state.has_changed = False
         for number, reason in _lost_teams(state):
@@ -122,7 +122,7 @@ def _end(state: SimulationState, world: int, reason: str) -> None:
 
 
 def _park(state: SimulationState, world: int) -> Parked:
-    """Keep a world's rows before they leave the table."""
+    """Copy the rows of a world that ends, before they are removed from the table."""
     bodies = state.population.bodies
     rows = np.flatnonzero(bodies.world == world)
     tables = {}
@@ -134,7 +134,7 @@ def _park(state: SimulationState, world: int) -> Parked:
 
 
 def world_result(state: SimulationState, world: int, reason: str, is_hashed: bool = True) -> WorldResult:
-    """What a world's game has come to by now; without the state hash where that is not wanted, which takes longer than the rest."""
+    """Return the result of a world at its current step. The state hash is optional, since it takes longer than the rest."""
     bodies = state.population.bodies
     here = bodies.team[bodies.world == world]
     alive = {int(team): int((here == team).sum()) for team in state.context.teams}
@@ -147,7 +147,7 @@ def world_result(state: SimulationState, world: int, reason: str, is_hashed: boo
         try:
             found = world_binding.plugin.result_of(world_binding.view, world)
         except Exception as error:
-            if reason == "error":  # something has failed already, and this may come of it
+            if reason == "error":  # may be a consequence of the earlier failure
                 continue
             raise failure.raised(
                 error, world_binding.plugin, where="result", step=steps, world=world

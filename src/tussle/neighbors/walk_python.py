@@ -1,4 +1,4 @@
-"""The pair loop in Python: laws are called for one pair after the other, to be debugged. The bits are the kernels'."""
+"""The pair loop in Python, for a debugger: laws are called for one pair at a time. Results equal the kernels' bit for bit."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Values = Mapping[str, Any]
 def walk_in_python(
     laws: Sequence[Law], where: Law | None, own_names: Sequence[str], other_names: Sequence[str]
 ) -> Callable[..., int]:
-    """A function that takes what the kernel of these laws takes; see `make_walk`."""
+    """Return a function with the arguments of the kernel of these laws; see `make_walk`."""
 
     def walk(
         longs: Any, points: Any, other: Any, own: Any, out: Any, first: int, part: Any, most: int
@@ -49,7 +49,7 @@ def walk_in_python(
 
 
 def between(offset: np.ndarray) -> dict[str, Any]:
-    """What belongs to a pair, of the offset [m], (3,)."""
+    """Values of a pair by name, from its offset [m], (3,)."""
     x, y, z = offset
     square = x * x + y * y + z * z
     return {
@@ -59,13 +59,13 @@ def between(offset: np.ndarray) -> dict[str, Any]:
 
 
 def call(law: Law, pair: Values) -> Any:
-    """What a law makes of a pair."""
+    """Call a law for a pair."""
     with np.errstate(all="ignore"):  # as in compiled code
         return law.function(*[pair[name] for name in law.arguments])
 
 
 class Totals:
-    """Contributions of one entity's neighbours to a law.
+    """Reduced contributions of one entity's neighbours to a law.
 
     Args:
         law: The law.
@@ -79,7 +79,7 @@ class Totals:
         self.limit = min(radius * radius if radius > 0.0 else -1.0 for radius in radii)
 
     def add(self, pair: Values) -> tuple[Any, ...] | None:
-        """Take a pair in; returns what the law makes of it, None where it does not count."""
+        """Add a pair. Returns the law's values, or None if the pair does not count."""
         law = self.law
         if not pair["distance_squared"] < self.limit:
             return None
@@ -105,6 +105,6 @@ class Totals:
         return values
 
     def results(self) -> Iterator[float]:
-        """The contributions in order."""
+        """Yield the reduced contributions in order."""
         for total, reduction in zip(self.sums, self.law.reductions.values(), strict=True):
             yield total / max(self.n, 1) if reduction == "mean" else total

@@ -1,4 +1,4 @@
-"""The text of a walk's kernel: the pair loop, written for the laws that it runs."""
+"""Source text of the pair-loop kernel, generated for the laws that it evaluates."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from dataclasses import dataclass
 from tussle.neighbors.law import OTHER, Law
 
 START = {"min": math.inf, "max": -math.inf, "nearest": math.nan}
-"""What a reduction of nobody is, other than 0."""
+"""Initial values of reductions that do not start at 0."""
 
 
 @dataclass(frozen=True)
 class Part:
-    """One law of a walk, ready to be written: contribution k of all is v_k for one pair and a_k over them.
+    """One law of a pair loop. In the text, v_k is contribution k of a pair, and a_k is its reduction over the pairs.
 
     Attributes:
         law: The law.
-        at: Number of its first contribution, and of its function.
+        at: Number of its first contribution, also used in the name of its function.
         masks: Which of its contributions are masks.
-        can_skip: It returns None for some.
+        can_skip: The law returns None for some pairs.
     """
 
     law: Law
@@ -39,7 +39,7 @@ class Part:
         return f"inside & counts_{self.at}" if self.can_skip else "inside"
 
     def begin(self) -> Iterator[str]:
-        """What stands before the loop over the candidates."""
+        """Code before the loop over the candidates."""
         if self.law.lists:
             return
         for k, reduction in self.reductions:
@@ -60,7 +60,7 @@ class Part:
                 yield f"v_{k} = number(v_{k})"
 
     def step(self) -> Iterator[str]:
-        """One candidate."""
+        """Code for one candidate."""
         at = self.at
         yield from self.contributions()
         yield f"ok = {self.counted}"
@@ -85,7 +85,7 @@ class Part:
             yield f"a_{k} = choose({mask}, {value}, a_{k})"
 
     def append(self) -> Iterator[str]:
-        """The pairs that count to the lists, as far as there is room."""
+        """Code that appends the counted pairs to the lists, up to their size."""
         yield "hits = bits(ok)"
         yield "if hits != 0:"
         for k, _ in self.reductions:
@@ -100,7 +100,7 @@ class Part:
         yield "    n_listed += 1"
 
     def single_begin(self) -> Iterator[str]:
-        """What stands before the loop over one agent's neighbours."""
+        """Code before the loop over the neighbours of one agent."""
         for k, reduction in self.reductions:
             yield f"a_{k} = {START.get(reduction, 0.0)}"
         if "mean" in self.law.reductions.values():
@@ -109,7 +109,7 @@ class Part:
             yield f"best_{self.at}, best_id_{self.at} = np.inf, np.inf"
 
     def single_step(self, limit: int) -> Iterator[str]:
-        """Eight neighbours of one agent."""
+        """Code for LANES neighbours of one agent."""
         at, values = self.at, [(k, r) for k, r in self.reductions if r != "count"]
         yield f"hits = near_{limit} & {self.law.teams or 'all'}_"
         yield "if hits != 0:"
@@ -146,27 +146,27 @@ class Part:
             yield f"            a_{k} = {value}"
 
     def single_end(self) -> Iterator[str]:
-        """One agent's contributions to its row."""
+        """Code that writes the contributions of one agent to its row."""
         for k, reduction in self.reductions:
             if reduction == "mean":
                 yield f"a_{k} = a_{k} / n_{self.at} if n_{self.at} > 0 else 0.0"
             yield f"out[{k}, i] = a_{k}"
 
     def end(self) -> Iterator[str]:
-        """What stands behind the loop."""
+        """Code after the loop."""
         for k, reduction in self.reductions:
             if reduction == "mean":
                 yield f"a_{k} = choose(n_{self.at} > 0.0, a_{k} / n_{self.at}, 0.0)"
 
 
 class WalkText:
-    """The text of a walk's kernel.
+    """Source text of a pair-loop kernel.
 
-    Scratch `lane` holds groups of LANES numbers: the place of each lane, its own columns, its squared radii, then the results.
+    The scratch array `lane` holds groups of LANES numbers: place of each lane, its own columns, squared radii, then results.
 
     Args:
         parts: The laws.
-        where: A condition of all of them.
+        where: Condition for all laws, if any.
         n_out: Number of contributions.
     """
 
@@ -179,7 +179,7 @@ class WalkText:
         self.own = tuple(name for name in names if not name.startswith(OTHER)) or ("team",)
         self.other = tuple(
             sorted(name for name in names if name.startswith(OTHER))
-        )  # components stand together
+        )  # sorted, so that components of a column are adjacent
         self.taken = [name for name in self.own if any(name in part.law.arguments for part in every)]
         self.limits = list(dict.fromkeys(part.law.radii for part in parts))
         self.lists = list(dict.fromkeys(part.law.teams for part in parts))
@@ -188,7 +188,7 @@ class WalkText:
         self.lists_pairs = parts[0].law.lists
 
     def head(self) -> Iterator[str]:
-        """The kernel's arguments."""
+        """The kernel's signature and the names of its arrays."""
         yield "def walk(longs, points, other, own, out, first, part, most):"
         yield "    cuts, spans, order = longs"
         yield "    queries, block_first, span_first, span_last = cuts[0], cuts[1], cuts[3], cuts[4]"
@@ -202,7 +202,7 @@ class WalkText:
         yield "    begin, stop = part"
 
     def lines(self) -> Iterator[str]:
-        """The kernel that has agents in the lanes."""
+        """Text of the kernel that has agents in the lanes."""
         yield from self.head()
         yield f"    lane = np.empty({self.results_at + self.n_out} * LANES)"
         kept = [*(["all"] if None in self.lists else []), *(["own", "other"] if self.by_team else [])]
@@ -210,10 +210,10 @@ class WalkText:
             *(f"places_{each}" for each in kept),
             *(f"near_{number}" for number in range(len(self.limits))),
         ]
-        yield "    room = most + LANES"
-        yield f"    found = np.empty({len(lists)} * room, np.int64)"
+        yield "    size = most + LANES"
+        yield f"    found = np.empty({len(lists)} * size, np.int64)"
         for number, name in enumerate(lists):
-            yield f"    {name} = found[{number} * room : {number + 1} * room]"
+            yield f"    {name} = found[{number} * size : {number + 1} * size]"
         yield f"    results_at, n_listed = {self.results_at}, 0"
         yield "    for b in range(begin, stop):"
         yield "        q0 = block_first[b]"
@@ -232,7 +232,7 @@ class WalkText:
             yield "    return n_listed"
 
     def single_lines(self) -> Iterator[str]:
-        """The kernel that has neighbours in the lanes; they are added one by one, in the order of the other kernel."""
+        """Text of the kernel that has neighbours in the lanes; contributions are added in the order of the other kernel."""
         every = [*self.parts, *([self.where] if self.where else [])]
         names = sorted({name for part in every for name in part.law.names})
         yield from self.head()
@@ -243,7 +243,7 @@ class WalkText:
         yield "            me = queries[q]"
         yield "            i = order[me] - first"
         for name in self.taken:
-            yield f"            {name}_ = splat(1.0 * by_row_{name}[i])"  # of a flag too
+            yield f"            {name}_ = splat(1.0 * by_row_{name}[i])"  # converts flags to numbers
         for at, radii in enumerate(self.limits):
             yield f"            limit2_{at} = {square(radii)}"
         for part in self.parts:
@@ -257,7 +257,7 @@ class WalkText:
             yield from indented(3, part.single_end())
 
     def single_neighbors(self, names: Sequence[str]) -> Iterator[str]:
-        """Eight neighbours of one agent, and which of them there are, are of its team, and near enough."""
+        """Code that loads LANES neighbours of one agent, and their masks by existence, team and distance."""
         for axis in "xyz":
             yield f"offset_{axis}_ = load(s{axis}, p) - s{axis}[me]"
         yield "distance_squared_ = offset_x_ * offset_x_ + offset_y_ * offset_y_ + offset_z_ * offset_z_"
@@ -284,9 +284,9 @@ class WalkText:
             yield "other_ = all_ & ~own_"
 
     def take_lanes(self) -> Iterator[str]:
-        """Columns of the lanes into `lane`; lanes that are not taken get a reach that nothing is within."""
+        """Code that loads the lanes' columns into `lane`; unused lanes get a negative squared radius."""
         active = "k < width"
-        if self.by_team:  # a block of several teams is walked once for each
+        if self.by_team:  # a block with several teams is processed once per team
             yield "k = 0"
             yield "while (done >> k) & 1:"
             yield "    k += 1"
@@ -314,7 +314,7 @@ class WalkText:
         yield "        low, high = min(low, qz[q]), max(high, qz[q])"
 
     def find_places(self) -> Iterator[str]:
-        """Places near the lanes, of all, of their team, of other teams."""
+        """Code that finds the places near the lanes: of all entities, of the lanes' team, of other teams."""
         spans = "span_first[b], span_last[b], span_start, span_end, (sx, sy, sz)"
         box = "(west, east, south, north, low, high), reach2"
         if None in self.lists:
@@ -324,7 +324,7 @@ class WalkText:
             yield f"n_own, n_other = find_teams({spans}, {team}, {box}, places_own, places_other)"
 
     def load_lanes(self) -> Iterator[str]:
-        """What stays the same over the candidates."""
+        """Code that loads values that are the same for all candidates."""
         yield "me = load(lane, 0)"
         for at, name in enumerate(self.taken, 1):
             yield f"{name}_ = load(lane, {at} * LANES)"
@@ -332,7 +332,7 @@ class WalkText:
             yield f"limit2_{at} = load(lane, {self.limits_at + at} * LANES)"
 
     def over(self, teams: str | None) -> Iterator[str]:
-        """Loops over the candidates of some teams, one for each radius; the first notes which are near enough for the others."""
+        """Loops over the candidates of some teams, one per radius; the first loop selects the candidates of the others."""
         parts = [part for part in self.parts if part.law.teams == teams]
         limits = [n for n, radii in enumerate(self.limits) if any(part.law.radii == radii for part in parts)]
         for number in limits:
@@ -355,7 +355,7 @@ class WalkText:
     def pair(
         self, places: str, number: int, teams: str | None, parts: list[Part], rest: list[int]
     ) -> Iterator[str]:
-        """One candidate against eight agents."""
+        """Code for one candidate and LANES agents."""
         yield f"p = {places}[c]"
         for axis in "xyz":
             yield f"offset_{axis}_ = s{axis}[p] - {axis}"
@@ -380,7 +380,7 @@ class WalkText:
             yield from part.step()
 
     def put(self) -> Iterator[str]:
-        """Contributions of the lanes taken to their rows."""
+        """Code that writes the contributions of the used lanes to their rows."""
         for at in range(self.n_out):
             yield f"store(lane, {self.results_at + at} * LANES, a_{at})"
         yield "for k in range(LANES):"
@@ -391,7 +391,7 @@ class WalkText:
 
 
 def square(radii: tuple[str | float, ...]) -> str:
-    """Squared smallest of the radii of the row i."""
+    """Expression of the square of the smallest radius of row i."""
     text = ""
     for radius in radii:
         value = f"by_row_{radius}[i]" if isinstance(radius, str) else repr(float(radius))
@@ -400,5 +400,5 @@ def square(radii: tuple[str | float, ...]) -> str:
 
 
 def indented(depth: int, lines: Iterable[str]) -> Iterator[str]:
-    """The lines further in."""
+    """Indent lines."""
     return ("    " * depth + line for line in lines)

@@ -347,7 +347,7 @@ def test_a_belief_of_another_size_is_refused():
         def step(self, g):
             pass
 
-    with pytest.raises(WiringError, match=r"Flat.belief_pos has 2 channels, it needs 3"):
+    with pytest.raises(WiringError, match=r"Flat\.belief_pos has 2 channels.* 3"):
         Simulation(mission(block(sensor=Flat())))
 
 
@@ -409,9 +409,7 @@ def test_a_child_with_an_input_is_refused():
         def step(self, g):
             pass
 
-    with pytest.raises(
-        WiringError, match=r"Sum.Needy.level is an input, and a plugin inside another has none"
-    ):
+    with pytest.raises(WiringError, match=r"Sum\.Needy\.level: .*'level'"):
         Simulation(mission(block(autonomy=Sum(parts=[Needy()]))))
 
 
