@@ -1,11 +1,18 @@
-"""Folders of the user (XDG base directory specification), and checks that no other user can write to them."""
+"""Folders of the user (XDG base directory specification), safe access to files in them, and locks between processes."""
 
 from __future__ import annotations
 
+import errno
 import os
 import stat
 from contextlib import suppress
 from pathlib import Path
+from typing import IO, Any
+
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None  # type: ignore[assignment]
 
 
 def user_folder(variable: str, usual: str) -> Path | None:
@@ -26,6 +33,8 @@ def user_folder(variable: str, usual: str) -> Path | None:
 
 def is_own(found: os.stat_result) -> bool:
     """Whether a file belongs to the user and no other user can write it."""
+    if not hasattr(os, "geteuid"):  # Windows: the access lists of the user's folders keep other users out
+        return True
     return found.st_uid == os.geteuid() and not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
 
 
@@ -38,13 +47,35 @@ def is_private(folder: Path) -> bool:
     return stat.S_ISDIR(found.st_mode) and is_own(found)
 
 
+def open_safely(path: Path, flags: int, mode: int = 0o600) -> int:
+    """Open a file without following a link and without waiting for a pipe; returns its descriptor.
+
+    Raises:
+        OSError: The file cannot be opened, or is a link.
+    """
+    names = ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY")  # not all of them exist on all systems
+    return os.open(path, flags | sum(getattr(os, name, 0) for name in names), mode)
+
+
+def lock(file: IO[Any], *, wait: bool) -> None:
+    """Lock a file for this process until the file is closed.
+
+    Raises:
+        BlockingIOError: Another process holds the lock, and `wait` is false.
+        OSError: The system or the file system has no locks.
+    """
+    if fcntl is None:
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+    fcntl.flock(file, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
 def read_own(path: Path) -> tuple[bytes, float]:
     """Content and modification time [s] of a file that only the user can write.
 
     Raises:
         OSError: The file cannot be read, is a link, or can be written by another user.
     """
-    handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
+    handle = open_safely(path, os.O_RDONLY)
     with os.fdopen(handle, "rb") as file:
         found = os.fstat(handle)
         if not (stat.S_ISREG(found.st_mode) and is_own(found)):

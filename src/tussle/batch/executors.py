@@ -114,7 +114,7 @@ class Processes:
     """
 
     def __init__(self, n: int | None = None, stack: int | None = None) -> None:
-        self.n: int = _whole("processes", n) or len(os.sched_getaffinity(0))
+        self.n: int = _whole("processes", n) or n_cores()
         self.stack = _whole("stack", stack)
 
     def play(self, package: Package, runs: Sequence[Run]) -> Generator[Finished | Beat, None, None]:
@@ -152,6 +152,11 @@ class Processes:
         finally:
             for player in players:
                 player.stop()
+
+
+def n_cores() -> int:
+    """Number of cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @dataclass(frozen=True)
@@ -305,6 +310,9 @@ def _deaf_to_interrupts() -> Iterator[None]:
     """While open, processes that are started do not hear Ctrl-C, which reaches all of a terminal; their parent ends them."""
     from multiprocessing import resource_tracker
 
+    if not hasattr(signal, "pthread_sigmask"):  # Windows: `_work` ignores it
+        yield
+        return
     resource_tracker.ensure_running()  # as it starts it makes this thread hear again
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
@@ -330,6 +338,7 @@ def _without_script(package: Package) -> Iterator[None]:
 
 def _work(pipe: Connection, package: Package, stack: int | None, n_processes: int) -> None:
     """The life of a process that plays."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
     def ask(group: int | None, n: int) -> tuple[list[Run], int]:

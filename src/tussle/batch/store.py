@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import json
 import math
 import os
@@ -23,6 +22,7 @@ from tussle.batch.consistency import check_design, check_metrics, check_results
 from tussle.batch.schemas import BATCH, RULES
 from tussle.batch.tasks import Finished
 from tussle.errors import BatchError, RecordError
+from tussle.folders import lock, open_safely
 from tussle.record.arrow_file import read_batches
 from tussle.record.parquet_file import read_parquet
 from tussle.record.run_file import plain, put_whole
@@ -304,20 +304,19 @@ def locked(path: Path, doing: str) -> IO[str]:
         RecordError: It cannot be made, or is a link or something else than a file.
     """
     with told(path):
-        handle = os.open(path / LOCK, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK, 0o666)
-        lock = os.fdopen(handle, "r+")
+        file = os.fdopen(open_safely(path / LOCK, os.O_RDWR | os.O_CREAT, 0o666), "r+")
     try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        lock(file, wait=False)
     except BlockingIOError:
-        lock.close()
+        file.close()
         raise BatchError(f"{path}: another process is {doing}") from None
     except OSError as error:
         warnings.warn(
-            f"{path}: this file system has no locks ({error.strerror}); see that nobody else is {doing} meanwhile",
+            f"{path}: this system has no locks ({error.strerror}); see that nobody else is {doing} meanwhile",
             RuntimeWarning,
             stacklevel=3,
         )
-    return lock
+    return file
 
 
 @contextlib.contextmanager

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import atexit
-import fcntl
 import hashlib
 import os
 import pickle
@@ -18,7 +17,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from tussle.folders import is_private, read_own, user_folder
+from tussle.folders import is_private, lock, open_safely, read_own, user_folder
 
 KEEP = 8  # files per kernel: a few variants of the code and of the processor settings that tests use
 TOUCH_AFTER = (
@@ -39,7 +38,7 @@ def directory() -> Path:
         f"compiled kernels are not stored in {chosen or 'your home folder'}: the folder must belong to you and be writable only by "
         "you; a temporary folder is used instead; set TUSSLE_CACHE_DIR to choose another"
     )
-    shared = Path(tempfile.gettempdir()) / f"tussle-{os.geteuid()}"  # used by all workers of a batch
+    shared = Path(tempfile.gettempdir()) / f"tussle-{os.geteuid() if hasattr(os, 'geteuid') else 'cache'}"  # used by all workers of a batch
     with suppress(OSError):
         shared.mkdir(mode=0o700)
     return shared if is_private(shared) and not shared.is_symlink() else _only_now()
@@ -117,16 +116,18 @@ def compile_lock(name: str, key: str) -> Iterator[None]:
     path = directory() / f".{file_stem(name)}-{key}.lock"
     try:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-        handle = os.open(path, os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o600)
+        handle = open_safely(path, os.O_CREAT | os.O_RDWR)
     except OSError:  # nothing can be stored; `save` warns
         yield
         return
     try:
-        fcntl.flock(handle, fcntl.LOCK_EX)  # released by the system when the process ends
-        yield
+        with os.fdopen(handle, "r+b") as file:
+            with suppress(OSError):  # without locks, each process compiles the kernel
+                lock(file, wait=True)
+            yield
     finally:
-        path.unlink(missing_ok=True)  # waiting processes have it open
-        os.close(handle)
+        with suppress(OSError):  # removed by another process, or, on Windows, still open there
+            path.unlink()
 
 
 def remove_old(folder: Path, stem: str) -> None:

@@ -362,7 +362,7 @@ def test_where_there_are_no_locks_it_is_said(tmp_path, monkeypatch):
         raise OSError(95, os.strerror(95))
 
     monkeypatch.setattr(fcntl, "flock", no_locks)
-    with pytest.warns(RuntimeWarning, match="this file system has no locks"):
+    with pytest.warns(RuntimeWarning, match="this system has no locks"):
         Store(tmp_path / "out").close()
 
 
