@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tussle.batch.statistics import scipy_package
 from tussle.batch.variables import Choice, Point, Range, Value, Variable
 from tussle.errors import ParameterError, listed, nearest_name
 
@@ -113,11 +114,9 @@ Rows = Iterable[Sequence[Value]]
 
 
 def _lhs(variables: Sequence[Variable], n: int, seed: int) -> Rows:
-    from scipy.stats import qmc
-
     # One variable alone has nothing to exchange, and its discrepancies would differ by rounding errors only.
     is_improved = len(variables) > 1 and 2 < n <= MOST_IMPROVED
-    sampler = qmc.LatinHypercube(
+    sampler = scipy_package().stats.qmc.LatinHypercube(
         d=len(variables),
         optimization="random-cd" if is_improved else None,
         rng=np.random.default_rng(seed),
@@ -147,9 +146,7 @@ def _sobol(variables: Sequence[Variable], n: int, seed: int) -> Rows:
 
 def _sobol_points(d: int, n: int, seed: int) -> Floats:
     """The first n points of a scrambled Sobol sequence, shares of [0, 1), (n, d)."""
-    from scipy.stats import qmc
-
-    sampler = qmc.Sobol(d=d, scramble=True, rng=np.random.default_rng(seed))
+    sampler = scipy_package().stats.qmc.Sobol(d=d, scramble=True, rng=np.random.default_rng(seed))
     # As many as a power of two, then cut: scipy warns of any other number, and who asks for n has decided.
     return np.asarray(sampler.random_base2((n - 1).bit_length())[:n])
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from tussle.batch.statistics import BLOCKS_FROM, LEVEL, SEED
+from tussle.batch.statistics import BLOCKS_FROM, LEVEL, SEED, scipy_package
 from tussle.batch.variables import Range, Variable
 from tussle.errors import MissingExtraError
 
@@ -136,9 +136,7 @@ def spearman(x: np.ndarray, y: np.ndarray) -> tuple[float, float, float]:
     """
     if len(x) < 2 or np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
         return math.nan, math.nan, math.nan
-    from scipy.stats import spearmanr
-
-    r = float(spearmanr(x, y).statistic)
+    r = float(scipy_package().stats.spearmanr(x, y).statistic)
     if len(x) < 5:
         return r, math.nan, math.nan
     if abs(r) > 1.0 - 1e-12:

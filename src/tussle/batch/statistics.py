@@ -9,8 +9,11 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from typing import Any
 
 import numpy as np
+
+from tussle.errors import MissingExtraError
 
 LEVEL = 0.95
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
@@ -113,6 +116,21 @@ class Comparison:
     p: float
 
 
+def scipy_package() -> Any:
+    """Return the package `scipy`, which loads its submodules on first access.
+
+    Raises:
+        MissingExtraError: It cannot be imported.
+    """
+    try:
+        import scipy
+    except ImportError as error:
+        raise MissingExtraError(
+            f"statistics of batches need scipy, which cannot be imported ({error}); pip install 'tussle[batch]' installs it"
+        ) from None
+    return scipy
+
+
 # -- shares ---------------------------------------------------------------------------------------------------------------
 
 
@@ -121,9 +139,7 @@ def wilson(k: float, n: float) -> tuple[float, float]:
     """Wilson's interval of a share, k of n, which are rounded to whole numbers; NaN for n = 0."""
     if n <= 0:
         return math.nan, math.nan
-    from scipy.stats import binomtest
-
-    found = binomtest(round(k), round(n)).proportion_ci(LEVEL, method="wilson")
+    found = scipy_package().stats.binomtest(round(k), round(n)).proportion_ci(LEVEL, method="wilson")
     return float(found.low), float(found.high)
 
 
@@ -246,11 +262,13 @@ def mean_intervals(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _by_t(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Student's interval; with many values the normal one."""
-    from scipy.special import stdtrit
-
     n = rows.shape[1]
     mean = rows.mean(axis=1)
-    half = float(stdtrit(n - 1, 0.5 + LEVEL / 2.0)) * rows.std(axis=1, ddof=1) / math.sqrt(n)
+    half = (
+        float(scipy_package().special.stdtrit(n - 1, 0.5 + LEVEL / 2.0))
+        * rows.std(axis=1, ddof=1)
+        / math.sqrt(n)
+    )
     half[np.ptp(rows, axis=1) == 0.0] = (
         0.0  # where the mean of equal values is not their value to the last bit
     )
@@ -259,15 +277,13 @@ def _by_t(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _by_bootstrap(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """BCa interval (Efron, JASA 82 (1987), 171-185); all rows are drawn from with the same numbers."""
-    from scipy.stats import bootstrap
-
     k, n = rows.shape
     n_at_once = max(1, NUMBERS_AT_ONCE // n)  # rows are taken a few at a time, and resamples a few at a time
     low, high = np.empty(k), np.empty(k)
     step = max(1, n_at_once // N_RESAMPLES)
     for i in range(0, k, step):
         some = rows[i : i + step]
-        found = bootstrap(
+        found = scipy_package().stats.bootstrap(
             (some,), np.mean, n_resamples=N_RESAMPLES, batch=max(1, n_at_once // len(some)), vectorized=True,
             axis=-1, confidence_level=LEVEL, method="BCa", rng=np.random.default_rng(SEED),
         )  # fmt: skip
@@ -301,9 +317,7 @@ def sign_test(n_greater: int, n_less: int) -> float:
     """Two-sided p of the exact sign test; 1 without any sign."""
     if n_greater + n_less == 0:
         return 1.0
-    from scipy.stats import binomtest
-
-    return float(binomtest(n_greater, n_greater + n_less, 0.5).pvalue)
+    return float(scipy_package().stats.binomtest(n_greater, n_greater + n_less, 0.5).pvalue)
 
 
 def paired_difference(

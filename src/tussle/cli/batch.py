@@ -16,7 +16,7 @@ from tussle.batch.batch import Batch
 from tussle.batch.executors import Executor
 from tussle.batch.progress import Progress as BatchProgress
 from tussle.batch.reload import planned_run
-from tussle.batch.statistics import running_result
+from tussle.batch.statistics import running_result, scipy_package
 from tussle.batch.sweep_file import Sweep, read_sweep
 from tussle.batch.trust import digest
 from tussle.batch.until import Until
@@ -127,6 +127,7 @@ def play_batch(asked: BatchOptions, command: Sequence[str]) -> int:
     Returns:
         The exit code.
     """
+    scipy_package()  # if it is missing, the user learns it before the games are played
     began = time.perf_counter()
     until = None if asked.until is None else Until.parse(asked.until)
     batch = asked.batch()

@@ -38,7 +38,9 @@ def directory() -> Path:
         f"compiled kernels are not stored in {chosen or 'your home folder'}: the folder must belong to you and be writable only by "
         "you; a temporary folder is used instead; set TUSSLE_CACHE_DIR to choose another"
     )
-    shared = Path(tempfile.gettempdir()) / f"tussle-{os.geteuid() if hasattr(os, 'geteuid') else 'cache'}"  # used by all workers of a batch
+    shared = (
+        Path(tempfile.gettempdir()) / f"tussle-{os.geteuid() if hasattr(os, 'geteuid') else 'cache'}"
+    )  # used by all workers of a batch
     with suppress(OSError):
         shared.mkdir(mode=0o700)
     return shared if is_private(shared) and not shared.is_symlink() else _only_now()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 
 import numpy as np
 import pytest
@@ -23,6 +24,17 @@ from tussle.batch.statistics import (
     sign_test,
     wilson,
 )
+from tussle.cli.batch import play_batch
+from tussle.errors import MissingExtraError
+
+
+def test_without_scipy_the_extra_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "scipy", None)
+    with pytest.raises(MissingExtraError, match=r"scipy.*tussle\[batch\]"):
+        wilson(3, 10)
+    with pytest.raises(MissingExtraError):  # before anything is looked at
+        play_batch(None, ())
+
 
 # -- shares ---------------------------------------------------------------------------------------------------------------
 

@@ -23,6 +23,7 @@ from tussle.view.export.film.film import usual_speed
 from tussle.view.export.film.ground import Tints
 from tussle.view.export.film.moments import Moments, between
 from tussle.view.export.film.stage import Stage
+from tussle.view.export.film.survey import crowd_of
 from tussle.view.export.film.tracks import Tracks
 from tussle.view.export.film.view import View
 from tussle.view.export.film.window import find_window
@@ -557,6 +558,12 @@ def test_without_a_package_the_message_names_the_extra(flown, tmp_path, monkeypa
     ):
         write_film(flown, mp4=tmp_path / "a.mp4", options=FilmOptions(size=SMALL))
     assert not list(tmp_path.iterdir())
+
+
+def test_without_scipy_the_message_names_the_extra(hunted, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "scipy", None)
+    with pytest.raises(MissingExtraError, match=r"scipy.*tussle\[view\]"):
+        crowd_of(hunted.frame(0))
 
 
 def test_without_an_encoder_for_this_machine_it_is_said(flown, tmp_path, monkeypatch):

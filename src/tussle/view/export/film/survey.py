@@ -6,8 +6,8 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from scipy.spatial import cKDTree
 
+from tussle.errors import MissingExtraError
 from tussle.view.export.film.moments import Moments
 from tussle.view.frame import Frame
 
@@ -60,6 +60,12 @@ def crowd_of(frame: Frame) -> np.ndarray:
     """Median of the distances to the nearest other [m], nan where nobody has one, and how many there are, (2,)."""
     if len(frame) < 2:
         return np.array([np.nan, len(frame)])
+    try:
+        from scipy.spatial import cKDTree
+    except ImportError:
+        raise MissingExtraError(
+            "films and MCAP files need scipy, which is not installed: pip install 'tussle[view]'"
+        ) from None
     distance, _ = cKDTree(frame.pos).query(frame.pos, k=2)
     return np.array([np.median(distance[:, 1]), len(frame)])
 
