@@ -1,4 +1,4 @@
-"""A simulation from outside: columns by path."""
+"""Reading and writing columns of a simulation by path."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ BODY_COLUMNS: dict[str, Numbers] = {
     **{name: State(FIELDS[k], BODY_UNITS[name].replace(" ", "*")) for name, k in (FLOATS | DERIVED).items()},
     **{name: State(dtype=int) for name in INTS},
 }
-"""Columns of a block's bodies, as a plugin would declare them."""
+"""Body columns as declarations."""
 
 
 def _sources(
     state: SimulationState,
 ) -> Iterator[tuple[Bodies, list[tuple[Group, np.ndarray, Stored | Table]]]]:
-    """Body tables with the rows of each group: the live one, then the worlds that have ended."""
+    """Yield body tables with the rows of each group: that of the running worlds, then those of ended worlds."""
     groups = state.population.groups
     by_key = {g.key: g for g in groups}
     yield state.population.bodies, [(g, np.arange(g.first, g.last), g.table) for g in groups]
@@ -41,7 +41,7 @@ def _binding(group: Group, path: tuple[str, ...]) -> Binding | None:
 
 
 def _columns(owner: Any) -> dict[str, Numbers]:
-    """Columns that an owner has in a simulation: those of bodies for a block, else those that its plugin declares."""
+    """Columns of an owner of a path: body columns for a block, declared columns for a plugin."""
     if isinstance(owner, Block):
         return BODY_COLUMNS
     if not isinstance(owner, Plugin):
@@ -51,7 +51,7 @@ def _columns(owner: Any) -> dict[str, Numbers]:
 
 
 def _follow(state: SimulationState, path: str) -> tuple[Any, tuple[str, ...], str, Numbers]:
-    """(block or world plugin, plugin path in the block, column, its declaration)."""
+    """Return block or world plugin, plugin path in the block, column name and its declaration."""
     owners, name = paths.follow(path, paths.MissionRoot(state.mission), paths.inside, _columns)
     return owners[0], tuple(p.instance_name for p in owners[1:]), name, _columns(owners[-1])[name]
 
@@ -63,11 +63,11 @@ def _body_column(bodies: Bodies, name: str, rows: np.ndarray) -> np.ndarray:
 
 
 MISSING: dict[str, Any] = {"f": np.nan, "i": -1, "b": False}
-"""What `read` gives for who is dead or unborn, by kind of number."""
+"""Values that `read` returns for entities that are dead or unborn, by kind of number."""
 
 
 def capacity(state: SimulationState, number: int) -> int:
-    """Entities that a block has room for in what `read` gives: those of the mission, and more only where plugins ask for births."""
+    """Number of entities of a block in the arrays of `read`: its count, or more if plugins have spawned entities."""
     return max(state.mission.blocks[number].count, int(state.births.n_born[number].max(initial=0)))
 
 
@@ -109,11 +109,11 @@ def _world_column(state: SimulationState, path: str, name: str) -> np.ndarray:
     head = path.partition(".")[0]
     world_binding = next(r for r in state.world_bindings if r.spec.instance_name == head)
     if name not in world_binding.places:
-        raise ParameterError(f"{path!r} is the same in all worlds, and no column of the simulation")
+        raise ParameterError(f"{path!r} is the same in all worlds; it is not a column")
     per, place = world_binding.places[name]
     if per == "entity":
         raise ParameterError(
-            f"{path!r}: a column per entity of a world plugin has no fixed shape and cannot be read"
+            f"{path!r}: columns per entity of a world plugin have no fixed shape and cannot be read"
         )
     return world_binding.tables[per].array(place)
 
@@ -135,7 +135,7 @@ def write(state: SimulationState, path: str, values: Any) -> None:
     if not key and name not in FLOATS:
         raise ParameterError(f"{path!r} cannot be written; {listed(FLOATS)}")
     if column.ragged:
-        raise ParameterError(f"{path!r} is a list per entity, which a plugin makes; it cannot be written")
+        raise ParameterError(f"{path!r} is a list per entity; lists cannot be written")
     number, bodies = state.context.block_names.index(head.name), state.population.bodies
     given = _shaped(path, values, (state.n_worlds, capacity(state, number), *column.shape))
     for group in state.population.groups:
@@ -148,7 +148,7 @@ def write(state: SimulationState, path: str, values: Any) -> None:
         part = np.moveaxis(given[bodies.world[rows[mine]], bodies.block_index[rows[mine]]], 0, -1)
         _check_written(path, part, column, is_body=binding is None)
         if binding is None:
-            # Rows that are written as they were keep their motion state: taking it over from the attitude would round it.
+            # Unchanged rows keep their motion state: setting it from the attitude would round it.
             differs = np.atleast_2d(target[..., rows[mine]] != part).any(axis=0)
             target[..., rows[mine]] = part
             bodies.touch(group.first, group.last)
@@ -157,18 +157,20 @@ def write(state: SimulationState, path: str, values: Any) -> None:
                 group.motion.plugin.from_body(group.moving, mine[differs])
         else:
             target[..., mine] = part
-            for view in group.views:  # reaches of parameters are kept until the next repack
+            for view in group.views:  # views cache the reaches of parameters until the next repack
                 view.reset(bodies, group.first, group.last)
 
 
 def _shaped(path: str, values: Any, shape: tuple[int, ...]) -> np.ndarray:
     given = np.asarray(values)
     if given.dtype.kind not in "biuf":
-        raise ParameterError(f"{path!r}: values are {given.dtype}; needed are numbers, or one text for all")
+        raise ParameterError(f"{path!r}: values are {given.dtype}; they must be numbers, or one text for all")
     try:
         return np.broadcast_to(given, shape)
     except ValueError:
-        raise ParameterError(f"{path!r}: values have shape {given.shape}; needed is {shape}") from None
+        raise ParameterError(
+            f"{path!r}: values have shape {given.shape}; the shape must be {shape}"
+        ) from None
 
 
 def _check_written(path: str, values: np.ndarray, column: Numbers, is_body: bool = False) -> None:

@@ -1,4 +1,4 @@
-"""Who comes: all entities of worlds that begin anew, those that are due later, and those that plugins ask for."""
+"""Entity births: initial entities of worlds that are reset, scheduled births, and entities that plugins spawn."""
 
 from __future__ import annotations
 
@@ -50,15 +50,15 @@ def reset(
         if state.overrides.columns:
             world_binding.fill_params(state.overrides, chosen)
     due = state.births.begin(chosen)
-    gone = mask | ~state.running  # worlds that ended last keep their rows as long as nobody runs
+    gone = mask | ~state.running  # the worlds that ended last keep their rows while no world runs
     repack(state, gone[state.population.bodies.world], _create(state, due, at_start=True))
     steps = clock.step[state.running]
     clock.common = int(steps[0]) if len(steps) and (steps == steps[0]).all() else -1
-    _start_referees(state, mask)
+    _start_world_plugins(state, mask)
     remove_dead(state)
 
 
-def _start_referees(state: SimulationState, mask: np.ndarray) -> None:
+def _start_world_plugins(state: SimulationState, mask: np.ndarray) -> None:
     for world_binding in state.world_bindings:
         if type(world_binding.plugin).start is WorldPlugin.start:
             continue
@@ -78,19 +78,19 @@ def _start(world_binding: WorldBinding, view: WorldView) -> None:
 
 
 def _create(state: SimulationState, due: Mapping[int, np.ndarray], at_start: bool = False) -> Bodies | None:
-    """Entities where interactions do not reject them; None where nobody is due.
+    """Create the entities that are due, at positions that no interaction rejects; None if none are due.
 
     Args:
-        state: The state; its table stays as it is.
+        state: The simulation; its body table is not changed.
         due: Block number -> world of each entity, (m,).
-        at_start: Their worlds begin.
+        at_start: The worlds are being reset.
     """
     rejecting = [r for r in state.interactions if type(r.plugin).rejects is not Interaction.rejects]
     placed: dict[int, list[np.ndarray]] = {}
 
     def standing(world: int) -> np.ndarray:
         bodies = state.population.bodies
-        # At a reset, the rows of the last game are still there.
+        # At a reset, the table still holds the rows of the last game.
         here = [] if at_start else [bodies.pos[:, bodies.world == world]]
         return np.concatenate([np.zeros((3, 0)), *here, *placed.get(world, [])], axis=1)
 
@@ -114,21 +114,21 @@ def _create(state: SimulationState, due: Mapping[int, np.ndarray], at_start: boo
     return in_order(new) if due else None
 
 
-def give_birth(state: SimulationState) -> None:
-    """Add the entities that are due or were asked for at the beginning of a step."""
+def spawn_due(state: SimulationState) -> None:
+    """Add the entities that are due, and those that plugins have spawned, at the beginning of a step."""
     parts, births = [], state.births
     asked, state.world_view.births = state.world_view.births, []
     if asked:
-        _check_space(state, np.concatenate([wish["world"] for wish in asked]))
+        _check_space(state, np.concatenate([request["world"] for request in asked]))
     is_open = state.running & ~state.failed
-    for wish in asked:
-        where = {k: v for k, v in wish.items() if k not in ("block", "world")}
-        worlds = wish["world"]
+    for request in asked:
+        where = {k: v for k, v in request.items() if k not in ("block", "world")}
+        worlds = request["world"]
         order = np.argsort(worlds, kind="stable")
         kept = order[is_open[worlds[order]]]
         if len(kept):
             where = {k: v[..., kept] for k, v in where.items()}
-            block = state.context.block_names.index(wish["block"])
+            block = state.context.block_names.index(request["block"])
             new = Bodies.empty(len(kept), state.n_worlds)
             births.create(new, slice(0, new.n), block, worlds[kept], where)
             parts.append(new)
@@ -137,17 +137,17 @@ def give_birth(state: SimulationState) -> None:
     parts += [born] if born is not None else []
     if parts:
         repack(state, None, joined(parts))
-        remove_dead(state)  # what an entity holds outside the arrays could not be opened
+        remove_dead(state)  # handles that could not be opened fail their worlds
 
 
 def _check_space(state: SimulationState, worlds: np.ndarray) -> None:
-    """End the worlds that the births asked for in `worlds`, (m,), would make larger than they may be."""
+    """Fail the worlds that would exceed their size limit with the spawned entities of `worlds`, (m,)."""
     n_asked = np.bincount(worlds, minlength=state.n_worlds)
     space = state.births.space(np.bincount(state.population.bodies.world, minlength=state.n_worlds))
     limits, update = state.mission.limits, state.mission.update
     for world in map(int, np.flatnonzero(state.running & (n_asked > space))):
         text = (
-            f"plugins ask for {n_asked[world]:,} more entities, and there is room for {max(0, space[world]):,}: with "
-            f"update={update!r} a world holds {limits.most_rows(update):,}; for a mission you trust there is allow_large"
+            f"plugins spawn {n_asked[world]:,} more entities, but only {max(0, space[world]):,} are allowed: with update={update!r} the "
+            f"limit of a world is {limits.most_rows(update):,}; allow_large raises it, for missions that you trust"
         )
         state.record_failure(world, state.error(world, text))

@@ -1,4 +1,4 @@
-"""Who is born when and where."""
+"""Births of the mission's blocks: times, ids, positions and headings."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from tussle.rng import stream_key
 POSITION, HEADING = (np.uint64(stream_key("birth", label)) for label in ("position", "heading"))
 VALUES = ("heading", "climb", "roll", "speed", "heading_variance", "health", "radius", "mass")
 MOST_TRIES = 10_000
-"""Attempts to find a free place for one entity before the mission is called too crowded."""
+"""Maximum number of attempts to find a free position for one entity."""
 
 
 @dataclass
 class Occupancy:
-    """Who stands where, for those that are born at one moment.
+    """Occupied positions while the entities of one moment are placed.
 
     Attributes:
-        rejects: (world, pos, taken) -> whether a place is not free.
-        standing: World -> positions of those that are there [m], (3, j).
-        fail: Called with a world that has no place for one of them.
-        tries: World -> places drawn anew so far.
-        full: Worlds that have no place for one of them.
+        rejects: (world, pos, taken) -> whether a position is not free.
+        standing: World -> positions of its entities [m], (3, j).
+        fail: Called with a world that has no free position, and the error.
+        tries: World -> number of positions drawn again so far.
+        full: Worlds without a free position.
     """
 
     rejects: Callable[[int, np.ndarray, np.ndarray], bool]
@@ -42,14 +42,14 @@ class Occupancy:
 
 
 def joined(parts: list[Bodies]) -> Bodies:
-    """All in one table, ordered by (world, id)."""
+    """Concatenate tables into one, ordered by (world, id)."""
     floats = np.concatenate([p.floats for p in parts], axis=1)
     ints = np.concatenate([p.ints for p in parts], axis=1)
     return in_order(Bodies(floats, ints, parts[0].n_worlds))
 
 
 def in_order(bodies: Bodies) -> Bodies:
-    """The same rows ordered by (world, id)."""
+    """Order rows by (world, id)."""
     if (np.diff(bodies.world << 32 | bodies.id) > 0).all():
         return bodies
     order = np.lexsort((bodies.id, bodies.world))
@@ -57,19 +57,19 @@ def in_order(bodies: Bodies) -> Bodies:
 
 
 def _placing(block: Block) -> tuple[np.ndarray, np.ndarray]:
-    """How a block's entities are scattered: flags and shape of `kernels.scatter`."""
+    """Placement of a block's entities, as flags and shape of `kernels.scatter`."""
     is_uniform = block.placement == "uniform"
     width = block.half_width if is_uniform else np.sqrt(block.variance)
     return np.array([is_uniform, block.scatter_first]), np.array([block.position, width], float)
 
 
 class Births:
-    """Draws places and headings, counts ids, and keeps the times of the births to come.
+    """Draws positions and headings, assigns ids, and keeps the times of future births.
 
     Attributes:
         next_id: Next id of each world, (n_worlds,).
         n_born: Entities born so far, (n_blocks, n_worlds).
-        n_left: Births to come of blocks with a rate, (n_blocks, n_worlds).
+        n_left: Number of future births of blocks with a rate, (n_blocks, n_worlds).
         next_time: Time of the next birth of each slot [s], per block (n_worlds, slots).
     """
 
@@ -89,7 +89,7 @@ class Births:
         self._placing = [_placing(b) for b in overrides.mission.blocks]
 
     def begin(self, worlds: np.ndarray) -> dict[int, np.ndarray]:
-        """Set worlds to their beginning; block number -> world of each entity that is there from the start."""
+        """Reset worlds. Returns block number -> world of each initial entity."""
         self.next_id[worlds] = 1
         self.n_born[:, worlds] = 0
         due: dict[int, np.ndarray] = {}
@@ -102,14 +102,14 @@ class Births:
         return due
 
     def due(self, t: np.ndarray, running: np.ndarray) -> dict[int, np.ndarray]:
-        """Block number -> worlds of the births that are due at the worlds' times t [s], (n_worlds,)."""
+        """Return block number -> worlds of the births that are due at the worlds' times t [s], (n_worlds,)."""
         found: dict[int, np.ndarray] = {}
         for i, block in enumerate(self.overrides.mission.blocks):
             if not block.rate or not self.n_left[i].any():
                 continue
             parts = []
             for slot in range(block.slots):
-                again = 0  # a rate above that of the steps: several births of a slot in one step
+                again = 0  # more than one birth of a slot per step, if the rate is above the step rate
                 while True:
                     is_due = running & (self.next_time[i][:, slot] <= t + 1e-9) & (self.n_left[i] > 0)
                     worlds = np.flatnonzero(is_due)
@@ -124,7 +124,7 @@ class Births:
                     jitter = rng.normal(
                         seeds, stream_key("birth", "birth"), np.full(len(worlds), slot), number
                     )[0]
-                    # From the time it was due at, not that of the step, else a rate that does not divide the steps' would lag.
+                    # Counted from the due time, not from the step, so that any rate is kept on average.
                     due_at = self.next_time[i][worlds, slot]
                     later = due_at + wait + block.interval_sd * jitter
                     self.next_time[i][worlds, slot] = np.where(later > due_at, later, due_at + wait)
@@ -133,21 +133,21 @@ class Births:
         return found
 
     def space(self, n_alive: np.ndarray) -> np.ndarray:
-        """Entities that may be born beside those of the blocks, (n_worlds,).
+        """Number of entities that plugins may spawn, besides those of the blocks, (n_worlds,).
 
         Args:
-            n_alive: Entities of each world, (n_worlds,).
+            n_alive: Number of entities of each world, (n_worlds,).
         """
         mission = self.overrides.mission
         n_own = sum(b.count for b in mission.blocks)
         n_to_come = self.n_left.sum(axis=0)
         space = max(mission.limits.rows, n_own) - n_alive - n_to_come
-        if mission.update == "sequential":  # whose groups and calls outlive the entities
+        if mission.update == "sequential":  # groups and calls are kept after their entities are gone
             space = np.minimum(space, max(mission.limits.sequential, n_own) - self.next_id + 1 - n_to_come)
         return np.asarray(space)
 
     def is_over(self, world: int) -> bool:
-        """No birth is to come in this world."""
+        """Whether the blocks have no future births in a world."""
         return not (self.n_left[:, world] > 0).any()
 
     def create(
@@ -159,15 +159,15 @@ class Births:
         where: dict[str, np.ndarray] | None = None,
         occupancy: Occupancy | None = None,
     ) -> None:
-        """Make some rows of an empty table entities of one block, one per item of `worlds` (sorted).
+        """Fill rows of a new table with entities of one block, one per item of `worlds` (sorted).
 
         Args:
             new: The table.
-            mine: The rows.
+            mine: Rows to fill.
             block: Number of the block.
-            worlds: World of each, (m,).
-            where: pos, vel, quat, team that were asked for.
-            occupancy: Where they may stand; None is everywhere.
+            worlds: World of each entity, (m,).
+            where: pos, vel, quat and team, if given by a plugin or a recorded table.
+            occupancy: Occupied positions; None allows all positions.
         """
         where = where or {}
         spec = self.overrides.mission.blocks[block]
@@ -175,7 +175,9 @@ class Births:
         values = self.overrides.block_values(spec, VALUES, worlds)
         out = new.id, new.block_index, new.pos, new.vel, new.quat, new.health, new.radius, new.mass
         keys, counts = (self.keys[block], POSITION, HEADING), (self.next_id, self.n_born[block])
-        kernels.bear((self.seeds, worlds), keys, *self._placing[block], values, counts, out, mine.start)
+        kernels.place_newborn(
+            (self.seeds, worlds), keys, *self._placing[block], values, counts, out, mine.start
+        )
         if "pos" not in where and occupancy is not None:
             self._separate(block, worlds, new.block_index[mine], new.pos[:, mine], occupancy)
         if spec.velocity is not None:
@@ -186,7 +188,7 @@ class Births:
     def _separate(
         self, block: int, worlds: np.ndarray, places: np.ndarray, pos: np.ndarray, occupancy: Occupancy
     ) -> None:
-        """Draw again where a referee finds a place not free; one entity after the other, as each takes up room."""
+        """Draw positions again that an interaction rejects, one entity after another, since each occupies space."""
         for world in map(int, np.unique(worlds)):
             if world not in occupancy.full:
                 try:
@@ -219,8 +221,8 @@ class Births:
                 if attempt > MOST_TRIES or occupancy.tries[world] > most:
                     others = f", and {most:,} in all" if occupancy.tries[world] > most else ""
                     raise MissionError(
-                        f"block {spec.name!r}: no free place for entity {int(places[i]) + 1} of {spec.count} "
-                        f"after {attempt - 1} tries{others}; give the block more room (placement {spec.placement!r}) or fewer entities"
+                        f"block {spec.name!r}: no free position for entity {int(places[i]) + 1} of {spec.count} "
+                        f"after {attempt - 1} tries{others}; give the block more space (placement {spec.placement!r}) or fewer entities"
                     )
                 again = np.empty(3)
                 seed = self.seeds[world] ^ self.keys[block]

@@ -1,4 +1,4 @@
-"""Kernels of who comes and goes: rows moved to other places, first states of the newborn."""
+"""Kernels of births and removals: initial states of newborn entities, and moving of rows."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tussle.rng import normal2, uniform2
 
 @device
 def drawn_place(seed, stream, index, attempt, flags, shape):
-    """Position [m] of the entity `index` of a block; flags and shape as in `scatter`."""
+    """Position [m] of entity number `index` of a block; flags and shape as in `scatter`."""
     if attempt == 0 and index == 0 and not flags[1]:
         x, y, z = 0.0, 0.0, 0.0
     elif flags[0]:
@@ -27,23 +27,23 @@ def drawn_place(seed, stream, index, attempt, flags, shape):
 
 @kernel("u8 u8 i8 i8 B F2 Fw")
 def scatter(seed, stream, place, attempt, flags, shape, pos):
-    """Position [m], (3,), of an entity around the position of its block.
+    """Draw the position [m], (3,), of an entity of a block.
 
-    place: its place within the block. flags: whether places are uniform in a box, else normal; and whether the first entity is
-    scattered too. shape: centre and half width, or standard deviation, (2, 3) [m].
+    place: number of the entity in its block. flags: whether positions are uniform in a box, otherwise normal; whether the first
+    entity is scattered too. shape: centre and half width or standard deviation [m], (2, 3).
     """
     pos[0], pos[1], pos[2] = drawn_place(seed, stream, place, attempt, flags, shape)
 
 
 @kernel("(U I) (u8 u8 u8) B F2 F2 (Iw Iw) (Iw Iw F2w F2w F2w Fw Fw Fw) i8")
-def bear(worlds, keys, flags, shape, values, counts, out, first):
-    """Number, place and turn the newborn, (m,), of a block.
+def place_newborn(worlds, keys, flags, shape, values, counts, out, first):
+    """Set ids, positions, attitudes and velocities of the newborn entities, (m,), of a block.
 
     worlds: seeds of all worlds, and the world of each newborn. keys: of the block, and of the streams of positions and headings.
     flags, shape: as in `scatter`. values: heading, climb, roll [rad], speed [m/s], variance of the heading [rad^2], health, radius
-    [m], mass [kg], (8, m) or (8, 1). counts: next id of each world, and how many of the block it has had; both count on. out: columns
-    whose rows from `first` on are written: id, place in the block, position [m], velocity [m/s], (3, n), quaternion, (4, n), health,
-    radius, mass.
+    [m], mass [kg], (8, m) or (8, 1). counts: next id of each world, and number of entities of the block born so far; both are
+    advanced. out: columns whose rows from `first` on are written: id, block index, position [m], velocity [m/s], (3, n), quaternion,
+    (4, n), health, radius, mass.
     """
     seeds, world = worlds
     key, position, turning = keys
@@ -68,8 +68,8 @@ def bear(worlds, keys, flags, shape, values, counts, out, first):
 
 
 @kernel("I I I B2w")
-def note_teams(world, team, teams, there):
-    """there[w, k] becomes true where world w has a row of team teams[k]."""
+def mark_teams(world, team, teams, there):
+    """Set there[w, k] if world w has a row of team teams[k]."""
     for i in range(world.shape[0]):
         if i > 0 and world[i] == world[i - 1] and team[i] == team[i - 1]:
             continue
@@ -80,11 +80,11 @@ def note_teams(world, team, teams, there):
 
 @kernel("B i8 i8 (I I) (I I) I (Iw Iw) -> i8 b1")
 def merge(gone, first, last, old, new, fresh, out):
-    """Where the rows of a group come from: those of [first, last) that stay, and newborn j of `fresh` as -1 - j.
+    """Merge the remaining rows [first, last) of a group with its newborn, ordered by (world, id).
 
-    old, new: world and id of all rows, and of the newborn; both are in the order of (world, id) within a group, and so are the rows
-    that come of it. out: where each of these comes from, and the place of each newborn among them. Returns how many there are, and
-    whether all that stay do so in their places.
+    gone: rows to remove. old, new: world and id of all rows, and of all newborn; both ordered by (world, id) within a group. fresh:
+    the group's newborn. out: source of each merged row (a row, or -1 - j for newborn j), and the merged position of each newborn.
+    Returns the number of merged rows, and whether all remaining rows keep their positions.
     """
     old_world, old_id = old
     new_world, new_id = new
@@ -117,9 +117,9 @@ def merge(gone, first, last, old, new, fresh, out):
 
 @device
 def gather(table, first, fresh, source, out):
-    """Columns source - first of table (k, n) into out (k, m), where source < 0 column -1 - source of fresh, or its only one.
+    """Copy columns source - first of table (k, n) to out (k, m); where source < 0, column -1 - source of fresh, or its only column.
 
-    Rows that stay neighbours are copied as one piece.
+    Adjacent source columns are copied together.
     """
     k, m = table.shape[0], source.shape[0]
     last = fresh.shape[1] - 1

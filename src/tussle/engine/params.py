@@ -1,4 +1,4 @@
-"""Values that differ from world to world: parameters by path, and the blocks that structural ones make."""
+"""Parameters that differ between worlds, by path, and the variants of blocks that structural parameters lead to."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ class Overrides:
     """Parameters set per world, by paths such as "prey.Boids.gain", "prey.speed" or "SimpleCapture.capture_range".
 
     Attributes:
-        columns: (owner, plugin path, parameter) -> one value per world, (n_worlds,) or (n_worlds, k); NaN-free; `given` says where.
+        columns: (owner, plugin path, parameter) -> values, (n_worlds,) or (n_worlds, k), valid where `given` is true.
+        given: The same keys -> worlds in which the parameter is set, (n_worlds,).
     """
 
     def __init__(self, mission: Mission, n_worlds: int) -> None:
@@ -31,10 +32,10 @@ class Overrides:
         self._variants: dict[tuple[Any, ...], tuple[Block, ...]] = {}
 
     def set(self, values: Mapping[str, Any], worlds: np.ndarray) -> None:
-        """Set parameters of `worlds`; each value is one for all of them, or one per world along its first axis.
+        """Set parameters of `worlds`; each value is one for all worlds, or one per world along its first axis.
 
         Raises:
-            ParameterError: The path leads nowhere, or a value is not allowed.
+            ParameterError: A path does not exist, or a value is not allowed.
         """
         checked = []  # all of them before any is set
         for path, value in values.items():
@@ -42,7 +43,7 @@ class Overrides:
             is_many = isinstance(value, (list, np.ndarray)) and np.ndim(value) > len(column.shape)
             if is_many and len(value) != len(worlds):
                 raise ParameterError(
-                    f"{path!r} has {len(value)} values for {len(worlds)} worlds; it takes one value, or one per world"
+                    f"{path!r} has {len(value)} values for {len(worlds)} worlds; give one value, or one per world"
                 )
             items = [column.convert(v, path) for v in (value if is_many else [value] * len(worlds))]
             checked.append((key, column, items))
@@ -59,13 +60,13 @@ class Overrides:
             self.given[key][worlds] = True
 
     def save(self) -> list[dict[Any, Any]]:
-        """What has been set, for snapshots."""
+        """Copy all values, for snapshots."""
         return [
             {k: copy.copy(v) for k, v in part.items()} for part in (self.columns, self.given, self.structural)
         ]
 
     def restore(self, saved: list[dict[Any, Any]]) -> None:
-        """Go back to what `save` gave."""
+        """Restore the values that `save` returned."""
         self.columns, self.given, self.structural = (
             {k: copy.copy(v) for k, v in part.items()} for part in saved
         )
@@ -79,11 +80,11 @@ class Overrides:
             plugins, is_own = (names[0],), isinstance(owners[0], Plugin) and len(owners) == 1
             is_own = is_own and column is not None and not column.structural
         if column is None or column.ragged or not is_own:
-            raise ParameterError(f"{path!r} is one for all worlds of a stack; set it in the mission")
+            raise ParameterError(f"{path!r} is the same in all worlds of a stack; set it in the mission")
         return (names[0], plugins, name), column
 
     def block_values(self, block: Block, names: Sequence[str], world: np.ndarray) -> np.ndarray:
-        """Numbers of a block for entities of the worlds `world`, (k, m), or (k, 1) where all have the same."""
+        """Values of a block for entities of the worlds `world`, (k, m), or (k, 1) if all are equal."""
         values = np.array([[getattr(block, name)] for name in names], float)
         keys = [(block.name, (), name) for name in names] if self.columns else []
         if any(key in self.columns for key in keys):
@@ -94,7 +95,7 @@ class Overrides:
         return values
 
     def fill(self, owner: str, path: tuple[str, ...], name: str, base: Any, world: np.ndarray) -> np.ndarray:
-        """A parameter for rows of the worlds `world`, (m,) or (k, m)."""
+        """Values of a parameter for rows of the worlds `world`, (m,) or (k, m)."""
         out = np.asarray(base, float)[..., None] + np.zeros(len(world))
         key = (owner, path, name)
         if key in self.columns:
@@ -103,7 +104,7 @@ class Overrides:
         return out
 
     def variant(self, world: int) -> tuple[Block, ...]:
-        """The blocks of a world: those of the mission, but for structural parameters set for it."""
+        """Blocks of a world: the mission's, with the structural parameters that are set for this world."""
         key = tuple((path, row[world]) for path, row in self.structural.items() if row[world] is not None)
         if key not in self._variants:
             mission = self.mission

@@ -1,4 +1,4 @@
-"""All entities of all worlds: the body table, the groups, and the one operation that changes who is in them."""
+"""All entities of all worlds: the body table, the groups, and the operation that adds and removes rows."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ from tussle.lists import RaggedColumn
 from tussle.mission import Block
 
 Params = list[tuple[int, Binding, str, Any]]
-"""Number of a block, plugin, parameter, and its value there."""
+"""Block number, plugin, parameter name, and its value."""
 Newborn = list[tuple[Group, np.ndarray, np.ndarray]]
-"""Groups with newborn rows: these, and their numbers among the newborn, (m,) each."""
+"""For each group with newborn rows: these rows, and their numbers among all newborn, (m,) each."""
 NOBODY = Bodies.empty(0, 1)
 
 
 @dataclass(frozen=True)
 class HandleRow:
-    """What `open_one` is told of a row: world, id, team, seed of the world, position [m] (3,), step length [s], and the plugin."""
+    """Argument of `open_one`: world, id, team, seed of the world, position [m], (3,), step length [s], and the plugin as data."""
 
     world: int
     id: int
@@ -53,8 +53,8 @@ class Population:
     Attributes:
         bodies: The body table.
         groups: Groups in the order of their rows.
-        is_sequential: One group per place in the order of ids.
-        on_new_group: Called when a group has come, or a block to one.
+        is_sequential: Each entity has a group of its own, in the order of ids.
+        on_new_group: Called when a group is added, or a block joins a group.
     """
 
     def __init__(self, context: Context, overrides: Overrides, advise: Callable[..., list[str]]) -> None:
@@ -74,7 +74,7 @@ class Population:
     # -- groups -------------------------------------------------------------------------------------------------------------
 
     def group_of(self, blocks: tuple[Block, ...], number: int, place: int) -> Group:
-        """The group of an entity: made when it is the first of its kind."""
+        """Return the group of an entity; it is created for the first entity of its kind."""
         asked = (id(blocks), number, place if self.is_sequential else 0)
         if asked not in self._asked:
             self._asked[asked] = self._group_of(blocks[number], place)
@@ -114,7 +114,7 @@ class Population:
         return group
 
     def prepare(self) -> None:
-        """Make the groups of all blocks, so that wiring errors show before anything runs."""
+        """Create the groups of all blocks, so that wiring errors are raised before the first step."""
         if not self.is_sequential:
             for number in range(len(self.overrides.mission.blocks)):
                 self.group_of(self.overrides.variant(0), number, 0)
@@ -126,7 +126,7 @@ class Population:
             blocks = self.overrides.variant(0)
             by_block = [number[id(self.group_of(blocks, k, 0))] for k in range(len(blocks))]
             return np.take(by_block, new.block)
-        alike = new.block  # who has the same number here has the same group
+        alike = new.block  # entities with equal numbers belong to the same group
         if self.is_sequential:
             alike = alike << 32 | new.id
         if self.overrides.structural:
@@ -144,9 +144,9 @@ class Population:
     # -- repack -------------------------------------------------------------------------------------------------------------
 
     def repack(self, gone: np.ndarray | None, new: Bodies | None) -> tuple[np.ndarray, Newborn]:
-        """Remove rows (gone, (n,), true) and add newborn ones; returns for each new row its old one, and the newborn.
+        """Remove rows (where gone, (n,), is true) and add newborn rows. Returns the old row of each new row, and the newborn.
 
-        Rows stay ordered by (group, world, id).
+        Rows are ordered by (group, world, id).
         """
         old = self.bodies
         new = NOBODY if new is None else new
@@ -182,7 +182,7 @@ class Population:
         return source, newborn
 
     def _fill_bodies(self, newborn: Newborn, new: Bodies) -> bool:
-        """Write the newborn over the rows whose places they take; whether these had the same whole numbers."""
+        """Write newborn rows over the rows that they replace. Returns whether the integer columns are unchanged."""
         bodies = self.bodies
         ints = bodies.ints
         for group, places, fresh in newborn:
@@ -190,7 +190,7 @@ class Population:
             bodies.floats[:, rows] = new.floats[:, mine]
             if (ints[:, rows] != new.ints[:, mine]).any():
                 if ints is bodies.ints:
-                    ints = ints.copy()  # a recorder knows by the new array that other entities have come
+                    ints = ints.copy()  # a new array tells a recorder that the entities have changed
                 ints[:, rows] = new.ints[:, mine]
         if ints is bodies.ints:
             bodies.touch(0, bodies.n)
@@ -206,7 +206,7 @@ class Population:
         old.replace(floats, ints)
 
     def begin_rows(self, newborn: Newborn) -> None:
-        """Parameters, beliefs, motion states, handles and `spawn` hooks of newborn rows."""
+        """Set parameters, beliefs, motion states and handles of newborn rows, and call their `spawn` hooks."""
         for group, rows, _ in newborn:
             self._fill_params(group, rows)
             for binding in group.walk():
@@ -223,12 +223,12 @@ class Population:
     def _call(
         self, group: Group, binding: Binding, rows: np.ndarray, hook: Callable[..., Any], *args: Any
     ) -> None:
-        """Call a plugin's hook for newborn rows; an error of it becomes one that names the plugin."""
+        """Call a plugin's hook for newborn rows; errors are raised as `PluginError` with the plugin's name."""
         binding.view.begin(binding.plugin)
         try:
             hook(*args)
         except Exception as error:
-            if isinstance(error, PluginError):  # of `fail`
+            if isinstance(error, PluginError):  # raised by `fail`
                 raise
             worlds = np.unique(self.bodies.world[group.first + rows])
             step = int(self.context.clock.step[worlds[0]])
@@ -236,7 +236,7 @@ class Population:
             raise failure.raised(error, binding.plugin, where=group.name, step=step, world=world) from error
 
     def _fill_params(self, group: Group, rows: np.ndarray) -> None:
-        """Set the parameters that are not the default of the group's table, which its first block gives."""
+        """Set the parameters that differ from the defaults of the group's table, which are those of its first block."""
         columns, names = self.overrides.columns, self.context.block_names
         own, common = self._params_of(group)
         given = [p for p in common if (names[p[0]], p[1].path, p[2]) in columns] if columns else []
@@ -247,7 +247,7 @@ class Population:
             group.table.array(binding.places[name])[..., some] = filled
 
     def _params_of(self, group: Group) -> tuple[Params, Params]:
-        """Parameters of a group's blocks: those that differ from the group's first block, and the others."""
+        """Parameters of a group's blocks: those that differ from the first block, and the others."""
         if group not in self._params:
             own, common = self._params[group] = [], []
             for number in map(self.context.block_names.index, group.names):
@@ -267,7 +267,7 @@ class Population:
                 group.table.lists[number].put(rows, RaggedColumn.from_rows(lists, column))
 
     def _spec(self, number: int, path: tuple[str, ...]) -> Any:
-        """The plugin of a block, or inside another one of it, as data."""
+        """Return a plugin of a block by its path, as data."""
         if (number, path) not in self._specs:
             plugins, plugin = self.overrides.mission.blocks[number].plugins, None
             for name in path:
@@ -285,7 +285,7 @@ class Population:
         return HandleRow(world, int(b.id[i]), int(b.team[i]), seed, pos, binding.view.dt, binding.spec)
 
     def _open_handles(self, group: Group, binding: Binding, rows: np.ndarray) -> np.ndarray:
-        """Open what newborn rows hold outside the arrays; returns the rows with which that went well."""
+        """Open the handles of newborn rows. Returns the rows without errors."""
         binding.view.begin(binding.plugin)
         failed = []
         for name in type(binding.spec).handles() if hasattr(type(binding.spec), "open_one") else ():
@@ -314,11 +314,13 @@ class Population:
     def _close_one(self, group: Group, binding: Binding, held: Any) -> None:
         try:
             binding.plugin.close_one(held)
-        except Exception as error:  # the others are to be closed all the same, and no result depends on it
-            said = failure.raised(error, binding.plugin, where=group.name, step=0, world=None)
-            text = f"{binding.spec.instance_name}, {group.name}: could not be closed: {said.message}"
+        except Exception as error:  # the others must be closed too, and no result depends on this one
+            raised = failure.raised(error, binding.plugin, where=group.name, step=0, world=None)
+            text = (
+                f"{binding.spec.instance_name}, {group.name}: a handle could not be closed: {raised.message}"
+            )
             warnings.warn(text, RuntimeWarning, stacklevel=2)
 
     def close_handles(self) -> None:
-        """Release all objects outside the arrays."""
+        """Close all handles."""
         self._close_handles(np.ones(self.bodies.n, bool))

@@ -12,7 +12,7 @@ import numpy as np
 from tussle.api.plugin import GRADES
 from tussle.columns import Handle
 from tussle.engine import access
-from tussle.engine.arrivals import give_birth, reset
+from tussle.engine.arrivals import reset, spawn_due
 from tussle.engine.result import WorldResult
 from tussle.engine.schedule import Call, compose
 from tussle.engine.snapshot import Snapshot, restore, snapshot, state_hash
@@ -141,7 +141,7 @@ class Simulation:
         state = self.state
         try:
             if state.births.has_rates or state.world_view.births:
-                give_birth(state)
+                spawn_due(state)
             if self.observers and not self.events.is_replaying:
                 for observer in self.observers:
                     observer(self)

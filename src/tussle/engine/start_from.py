@@ -1,4 +1,4 @@
-"""Births by a recorded table instead of by the blocks' placement."""
+"""Births from a recorded table instead of the blocks' placement."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ if TYPE_CHECKING:
 
 
 class RecordedBirths(Births):
-    """Ids, times of birth and first states come from a table; what plugins ask for is born as ever.
+    """Takes ids, birth times and initial states from a table. Entities that plugins spawn are created as in `Births`.
 
     Args:
         overrides: As for `Births`.
         seeds: As for `Births`.
         start: Time of step 0 [s].
-        table: Who enters when and where.
+        table: Birth times and initial states.
 
     Raises:
         MissionError: The table does not fit the mission's blocks.
@@ -36,8 +36,8 @@ class RecordedBirths(Births):
         mission = overrides.mission
         block = blocks_of(table, mission.blocks)
         self.rows = [np.flatnonzero(block == i) for i in range(len(mission.blocks))]
-        """Rows of the table by block, in the order of birth."""
-        # Half a step of slack: a recorded time need not be the step's to the last bit.
+        """Rows of the table for each block, in the order of birth."""
+        # Rounded: a recorded time may differ from the time of its step in the last bits.
         self.step = np.maximum(0, np.floor((table.t - start) / mission.dt + 0.5)).astype(np.int64)
         self.dt = mission.dt
         self.has_rates = bool((self.step > 0).any())
@@ -76,7 +76,7 @@ class RecordedBirths(Births):
             super().create(new, mine, block, worlds, where, occupancy)
             return
         rows, table = self.rows[block], self.table
-        # Those who are due have been taken off n_left before: the last of them is the last that has entered.
+        # n_left has been reduced by the entities that are due; the last of them is the last entered.
         n_entered = len(rows) - self.n_left[block, worlds]
         _, first, counts = np.unique(worlds, return_index=True, return_counts=True)
         place = np.arange(len(worlds)) - np.repeat(first, counts)
@@ -91,36 +91,34 @@ class RecordedBirths(Births):
 
 
 def blocks_of(table: FirstStates, blocks: Sequence[Block]) -> np.ndarray:
-    """Number of the block of each entity, (m,): by name, else the first of its team, in order of ids, that is not full.
+    """Block number of each entity, (m,): by name, otherwise the first block of its team that is not full, in order of ids.
 
     Raises:
-        MissionError: An entity has no block, or a team that the mission does not have.
+        MissionError: An entity fits no block, or its team does not exist in the mission.
     """
     names, teams = [b.name for b in blocks], {b.team for b in blocks}
     block = np.full(len(table), -1)
-    room = np.array([b.count for b in blocks])
+    n_free = np.array([b.count for b in blocks])
     for row in np.argsort(table.id, kind="stable"):
         entity = f"{table.source}: entity {table.id[row]}"
         team = None if table.team is None else int(table.team[row])
         if team is not None and team not in teams:
             raise MissionError(
-                f"{entity} is of team {team}, which no block has; {listed(map(str, sorted(teams)))}"
+                f"{entity} is of team {team}, but no block has this team; {listed(map(str, sorted(teams)))}"
             )
         if table.block is not None:
             name = table.block[row]
             if name not in names:
                 raise MissionError(
-                    f"{entity} is of block {name!r}, which there is not{nearest_name(name, names)}; {listed(names)}"
+                    f"{entity} is of block {name!r}, which does not exist{nearest_name(name, names)}; {listed(names)}"
                 )
             block[row] = names.index(name)
             continue
-        fitting = [i for i, b in enumerate(blocks) if room[i] > 0 and team in (None, b.team)]
+        fitting = [i for i, b in enumerate(blocks) if n_free[i] > 0 and team in (None, b.team)]
         if not fitting:
             whose = "" if team is None else f" of team {team}"
             count = sum(b.count for b in blocks if team in (None, b.team))
-            raise MissionError(
-                f"{entity} is one more than the {count} entities{whose} that the mission's blocks have"
-            )
+            raise MissionError(f"{entity} exceeds the {count} entities{whose} of the mission's blocks")
         block[row] = fitting[0]
-        room[fitting[0]] -= 1
+        n_free[fitting[0]] -= 1
     return block

@@ -1,4 +1,4 @@
-"""The data of a simulation as one object; what a step, a reset or a snapshot does with it are functions in this package."""
+"""The data of a simulation as one object. Steps, resets and snapshots are functions of it, in other modules of this package."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ if TYPE_CHECKING:
 
 @dataclass
 class Parked:
-    """The last rows of a world that has ended: its part of the body table and of each group's table.
+    """The last rows of a world that has ended: its parts of the body table and of each group's table.
 
     Attributes:
-        bodies: Its rows.
-        tables: Key of the group -> (rows in `bodies`, what its table held of them).
+        bodies: Rows of the body table.
+        tables: Key of a group -> (rows in `bodies`, the rows of the group's table).
     """
 
     bodies: Bodies
@@ -43,29 +43,29 @@ class Parked:
 
 
 class SimulationState:
-    """All data of a stack of worlds; at first they have no entities. Arguments and errors are those of `Simulation`.
+    """All data of a stack of worlds, initially without entities. Arguments and errors are those of `Simulation`.
 
     Attributes:
-        mission: What is played.
-        overrides: Parameters that differ from world to world.
-        context: Clocks, random keys (the worlds' seeds), and what else all views share.
-        births: Ids, and the births to come.
-        mail: Topics: what was said, and what is on its way.
+        mission: The mission.
+        overrides: Parameters that differ between worlds.
+        context: Clocks, seeds, and other data that all views share.
+        births: Ids and future births.
+        message_bus: Topics with their published and pending messages.
         population: The body table, and the groups with their columns.
-        world_view: What world plugins are given; holds the deaths, moves and births that they ask for.
-        events: Who is told of what happens.
-        on_error: What an error of one world does: "raise" or "record".
-        raises_when_all_fail: An error is raised all the same when no world is left.
-        interactions: World plugins; likewise metrics, and networks by instance name.
+        world_view: View of the world plugins; holds the deaths, moves and births that they request.
+        events: Listeners of events.
+        on_error: Whether an error of one world is raised ("raise") or ends only this world ("record").
+        raises_when_all_fail: An error is raised if no world is left.
+        interactions: Bindings of interactions; likewise metrics, and networks by instance name.
         running: Which worlds have not ended, (n_worlds,).
         failed: Worlds in which a plugin has failed, (n_worlds,).
         results: Result of each world that has ended or failed.
         parked: World -> its last rows, for those that have ended.
-        has_failures: A plugin has failed since the last look.
-        has_changed: Who is there has changed since the last look at the end conditions.
-        checked: Columns that are checked at the end of a step, and which rows are faulty, (n,).
+        has_failures: A world has failed since dead entities were last removed.
+        has_changed: Entities were added or removed since the end conditions were last checked.
+        checked: Columns that are checked at the end of a step, and the mask of faulty rows, (n,).
         n_steps: Number of steps until the mission's end time.
-        by_substep: The schedule takes each substep by itself, also where one kernel could do all: to look between them.
+        by_substep: The schedule has separate calls for each substep, even if one kernel could run all of them.
     """
 
     def __init__(
@@ -116,14 +116,14 @@ class SimulationState:
         return [*self.interactions, *self.metrics, *self.networks.values()]
 
     def error(self, world: int, text: str, where: str = "") -> PluginError:
-        """What ends a world although no plugin has raised."""
+        """Return the error of a world in which no plugin has raised an exception."""
         return PluginError(text, where=where, step=int(self.context.clock.step[world]), world=world)
 
     def record_failure(self, world: int, error: PluginError) -> None:
-        """End a world with an error when this step ends.
+        """End a world with an error at the end of this step.
 
         Raises:
-            PluginError: The same, where errors are raised.
+            PluginError: The error itself, depending on `on_error` and `raises_when_all_fail`.
         """
         if self.on_error == "raise":
             raise error

@@ -9,7 +9,7 @@ import numpy as np
 from tussle.api import kernels
 from tussle.api.bodies import Bodies
 from tussle.engine import failure
-from tussle.engine.kernels import note_teams
+from tussle.engine.kernels import mark_teams
 from tussle.engine.result import WorldResult
 from tussle.engine.rows import repack
 from tussle.engine.snapshot import state_hash
@@ -84,7 +84,7 @@ def _lost_teams(state: SimulationState) -> Iterable[tuple[int, str]]:
         return
     bodies, teams = state.population.bodies, state.context.teams
     there = np.zeros((state.n_worlds, len(teams)), bool)
-    note_teams(bodies.world, bodies.team, teams, there)
+    mark_teams(bodies.world, bodies.team, teams, there)
     left = there.sum(axis=1)
     for world in np.flatnonzero(state.running & (left <= 1)):
         if not state.births.is_over(int(world)):

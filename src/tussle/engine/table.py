@@ -1,4 +1,4 @@
-"""The storage of one group: all columns of its plugins as rows of one array per dtype, and its lists."""
+"""Storage of one group: the columns of its plugins as rows of one array per dtype, and its lists."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ _GATHER = {float: kernels.gather_floats, int: kernels.gather_ints, bool: kernels
 
 
 def span(rows: np.ndarray) -> Any:
-    """Ascending rows as a slice where they lie side by side, which is faster to write to; else the rows."""
+    """Return ascending rows as a slice if they are contiguous, which is faster to write to; otherwise unchanged."""
     first, last = rows[0], rows[-1] + 1
     return slice(first, last) if last - first == len(rows) else rows
 
 
 @dataclass(frozen=True, slots=True)
 class ColumnPlace:
-    """Where a column lies: `k` rows from `first` in the array of a dtype; k = 0 is one row seen as (n,)."""
+    """Location of a column: `k` rows from `first` in the array of a dtype; k = 0 is one row with shape (n,)."""
 
     dtype: type
     first: int
@@ -34,7 +34,7 @@ class ColumnPlace:
 
 @dataclass(frozen=True, slots=True)
 class Stored:
-    """What a table holds of some rows: dtype -> (columns, n), and its lists."""
+    """Copy of rows of a table: dtype -> (columns, n), and lists."""
 
     arrays: dict[type, np.ndarray]
     lists: list[RaggedColumn]
@@ -42,13 +42,13 @@ class Stored:
 
 @dataclass
 class Table:
-    """Columns of n rows. Declare all with `add` and `add_list`, then `array` gives each its array; `rearrange` moves rows.
+    """Columns of n rows. Declare columns with `add` and `add_list`, then call `allocate`.
 
     Attributes:
         n: Number of rows.
         arrays: dtype -> (columns, n).
-        places: Column key -> its place.
-        lists: Lists of the rows, in the order in which they were declared.
+        places: Column key -> location.
+        lists: List columns, in order of declaration.
     """
 
     n: int = 0
@@ -58,7 +58,7 @@ class Table:
     lists: list[RaggedColumn] = field(default_factory=list)
 
     def add(self, key: Any, dtype: type, k: int, default: Any = 0.0) -> ColumnPlace:
-        """Declare a column of k components (0: one number a row); default is a number or k numbers."""
+        """Declare a column of k components (0: one number per row); the default is a number or k numbers."""
         values = self.defaults[dtype]
         place = ColumnPlace(dtype, len(values), k)
         values.extend(default if isinstance(default, tuple) else [default] * max(1, k))
@@ -66,24 +66,24 @@ class Table:
         return place
 
     def add_list(self, declaration: Numbers) -> int:
-        """Declare a list per row, empty at first; gives its number in `lists`."""
+        """Declare a list per row, initially empty. Returns its index in `lists`."""
         self.lists.append(RaggedColumn.empty(0, declaration))
         return len(self.lists) - 1
 
     def allocate(self, n: int) -> None:
-        """Make room for n rows at their defaults."""
+        """Allocate n rows with default values."""
         self.n = n
         for dtype, values in self.defaults.items():
             self.arrays[dtype] = np.repeat(np.array(values, DTYPES[dtype])[:, None], n, axis=1)
         self.lists = [column.take(np.full(n, -1)) for column in self.lists]
 
     def array(self, place: ColumnPlace) -> np.ndarray:
-        """The array of a place, (n,) or (k, n), C-contiguous."""
+        """Return the array of a column, (n,) or (k, n), C-contiguous."""
         data = self.arrays[place.dtype]
         return data[place.first : place.first + place.k] if place.k else data[place.first]
 
     def renew(self, rows: np.ndarray) -> None:
-        """Put rows back to the defaults."""
+        """Reset rows, (m,), to the defaults."""
         for dtype, values in self.defaults.items():
             if values:
                 self.arrays[dtype][:, span(rows)] = np.array(values, DTYPES[dtype])[:, None]
@@ -91,7 +91,7 @@ class Table:
             column.put(rows, column.take(np.full(len(rows), -1)))
 
     def rearrange(self, index: np.ndarray, first: int = 0) -> None:
-        """New row i is old row index[i] - first; one below 0 is a new row at the defaults. The arrays are other ones then."""
+        """Reorder rows into new arrays: new row i is old row index[i] - first; negative indices are new rows with default values."""
         for dtype, old in self.arrays.items():
             new = np.empty((len(old), len(index)), old.dtype)
             if len(old):
@@ -106,12 +106,12 @@ class Table:
         return Stored({d: a.copy() for d, a in self.arrays.items()}, [c.copy() for c in self.lists])
 
     def take(self, rows: np.ndarray) -> Stored:
-        """A copy of some rows."""
+        """Copy some rows."""
         arrays = {d: np.ascontiguousarray(a[:, rows]) for d, a in self.arrays.items()}
         return Stored(arrays, [column.take(rows) for column in self.lists])
 
     def put(self, rows: np.ndarray, part: Table) -> None:
-        """Take over some rows from a table of these."""
+        """Write rows from a table that holds only these rows."""
         for dtype, array in part.arrays.items():
             self.arrays[dtype][:, rows] = array
         for column, lists in zip(self.lists, part.lists, strict=True):

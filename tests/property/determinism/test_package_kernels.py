@@ -150,5 +150,5 @@ def test_callee_of_one_motion_model_reaches_no_other_module(edited, plain):
 def test_round_of_the_random_numbers_reaches_the_draws_only(new_keys):
     is_new = new_keys("rng.py", "mix(a, b, np.uint64(42))", "mix(a, b, np.uint64(43))")
     drawing = {name for name in is_new[True] if not name.startswith("tussle.rng.")}
-    assert drawing == {"tussle.engine.kernels.bear", "tussle.engine.kernels.scatter"}
+    assert drawing == {"tussle.engine.kernels.place_newborn", "tussle.engine.kernels.scatter"}
     assert is_new[False]

@@ -203,7 +203,7 @@ def test_births_during_the_run_keep_room_to_those_that_are_there():
 def test_a_mission_too_crowded_says_so():
     with pytest.raises(
         MissionError,
-        match=r"block 'a': no free place for entity 2 of 2 after 10000 tries.*placement 'normal'",
+        match=r"block 'a': no free position for entity 2 of 2 after 10000 tries.*placement 'normal'",
     ):
         Simulation(mission(block(count=2), interactions=[SimpleCollision()]))
 

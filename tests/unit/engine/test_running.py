@@ -600,7 +600,8 @@ def test_bad_params_are_refused_with_their_path(params, message):
 def test_a_structural_param_of_a_world_plugin_belongs_to_the_mission():
     game = mission(interactions=[SimpleCollision()])
     with pytest.raises(
-        (MissionError, ParameterError), match=r"startup_collisions_only' is one for all worlds of a stack"
+        (MissionError, ParameterError),
+        match="startup_collisions_only",
     ):
         Simulation(game, seeds=[1, 2], params={"SimpleCollision.startup_collisions_only": [True, False]})
 
@@ -621,5 +622,5 @@ def test_a_ragged_param_belongs_to_the_mission():
     sim = alone(game, 1)
     assert sim.read("a.Path.n")[0].tolist() == [[3, 3]]
     assert sim.read("b.Path.n")[0].tolist() == [[1]]
-    with pytest.raises(ParameterError, match=r"a.Path.points' is one for all worlds of a stack"):
+    with pytest.raises(ParameterError, match=r"a\.Path\.points"):
         Simulation(game, params={"a.Path.points": [(1.0, 2.0)]})

@@ -137,9 +137,9 @@ def test_states_that_cannot_be_are_refused(changes, words):
 @pytest.mark.parametrize(
     ("mission", "changes", "words"),
     [
-        (flock((2, 5)), {}, "entity 1 is of team 1, which no block has; there are: 2"),
-        (flock((1, 1)), {}, "entity 2 is one more than the 1 entities of team 1"),
-        (flock((1, 1)), {"team": None}, "entity 2 is one more than the 1 entities that"),
+        (flock((2, 5)), {}, "entity 1 is of team 1.* there are: 2"),
+        (flock((1, 1)), {}, "entity 2 exceeds the 1 entities of team 1"),
+        (flock((1, 1)), {"team": None}, "entity 2 exceeds the 1 entities of the"),
         (flock((1, 2)), {"block": ("block0", "blok0")}, "block 'blok0'.*did you mean 'block0'"),
     ],
 )

@@ -110,7 +110,7 @@ def test_nobody_is_placed_in_the_ground():
     sim = ground([crowd], ground_collision_z=0.5)
     assert sim.read("a.pos")[0][0, :, 2].min() > 0.5
     assert sim.read("a.pos")[1].all()
-    with pytest.raises(MissionError, match="no free place"):
+    with pytest.raises(MissionError, match="no free position"):
         ground([block(position=(0.0, 0.0, -5.0), count=1)])
     sim = ground([block(position=(0.0, 0.0, -5.0))], enable_startup_collisions=False)
     assert not sim.read("a.pos")[1].any()
