@@ -1,4 +1,4 @@
-"""The body table: the physical state of all entities of all worlds, and what is derived from it."""
+"""The body table: physical state of all entities of all worlds, and quantities derived from it."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ DERIVED = {"yaw": 1, "climb": 1, "roll": 1, "forward": 3, "level_forward": 2}
 N_FLOATS = sum(FLOATS.values())
 EVERYWHERE = np.inf
 MOST_RANGES = 1000
-"""Ranges of touched rows that are remembered one by one."""
+"""Maximum number of changed row ranges that are stored."""
 MOST_INDEXES = 32
-"""Reaches whose neighbour indexes are kept."""
+"""Maximum number of neighbour indexes that are kept, one per reach."""
 BRUTE = 600
-"""Rows per world up to which a search for the nearest needs no cells."""
+"""Rows per world up to which a nearest-neighbour search is fast without cells."""
 
 _DERIVING = {name: getattr(kernels, name) for name in DERIVED}
 OFFSETS = {name: sum(list(FLOATS.values())[:i]) for i, name in enumerate(FLOATS)}
@@ -50,7 +50,7 @@ BODY_UNITS = {
 
 @dataclass(slots=True)
 class CachedArrays:
-    """Arrays that follow from the table, and the version of the table that they follow from."""
+    """Arrays computed from the body table, and the table version that they were computed from."""
 
     version: int
     columns: Any
@@ -62,13 +62,14 @@ class Bodies:
 
     Attributes:
         floats: Storage of the real columns, (22, n).
-        ints: Storage of the whole-number columns, (6, n).
-        n_worlds: Number of worlds; world numbers in the table are below it.
+        ints: Storage of the integer columns, (6, n).
+        n_worlds: Number of worlds.
         n: Number of rows.
         pos: Position [m], (3, n), world frame; likewise vel [m/s], quat (w, x, y, z), omega [rad/s], force [N], torque [N m],
             health, radius [m], mass [kg], and id, team, world, block, block_index.
         loads: Forces and torques, (6, n).
-        born: Step of its world in which each entity was born, (n,); 0 for those that are there from the start.
+        born: Step of its world in which each entity was born, (n,); 0 for initial entities.
+        scans: Entities move one after another, so that indexes are updated row by row.
     """
 
     pos: np.ndarray
@@ -95,7 +96,7 @@ class Bodies:
 
     @classmethod
     def empty(cls, n: int, n_worlds: int) -> Bodies:
-        """N rows at the origin, unit mass and health, level."""
+        """Return n rows at the origin, level, with unit mass, radius and health."""
         floats = np.zeros((N_FLOATS, n))
         for name in ("health", "radius", "mass"):
             floats[OFFSETS[name]] = 1.0
@@ -103,7 +104,7 @@ class Bodies:
         return cls(floats, np.zeros((len(STORED_INTS), n), np.int64), n_worlds)
 
     def replace(self, floats: np.ndarray, ints: np.ndarray) -> None:
-        """Take other rows; everything that was derived from the old ones is dropped."""
+        """Replace all rows, and discard all derived quantities."""
         self.floats, self.ints = floats, ints
         self.n = floats.shape[1]
         for name in _COLUMNS:
@@ -119,7 +120,7 @@ class Bodies:
         self._read_only: BodyView | None = None
 
     def __getattr__(self, name: str) -> np.ndarray:
-        """A column: a view of the storage, made when it is first asked for."""
+        """A column: a view of the storage, created on first access."""
         if name not in _COLUMNS:
             raise AttributeError(f"Bodies has no {name!r}")
         first, k = _COLUMNS[name]
@@ -129,28 +130,28 @@ class Bodies:
 
     @property
     def view(self) -> BodyView:
-        """The table as plugins see it."""
+        """Read-only view of the table, for plugins."""
         if self._read_only is None:
             self._read_only = BodyView(self)
         return self._read_only
 
     def touch(self, first: int, last: int) -> None:
-        """Rows [first, last) have moved or turned."""
+        """Mark rows [first, last) as changed."""
         self.version += 1
-        if self.scans:  # only then do the ranges matter: entities move one after the other
+        if self.scans:  # ranges are needed only if entities move one after another
             self._touched.append((first, last))
             if len(self._touched) > MOST_RANGES:
                 self._oldest = self.version
                 self._touched.clear()
 
     def _since(self, version: int) -> list[tuple[int, int]]:
-        """Ranges of rows that have changed since a version of the table."""
+        """Row ranges that have changed since a version of the table."""
         if not self.scans or version < self._oldest:
             return [(0, self.n)]
         return self._touched[version - self._oldest :]
 
     def derived(self, name: str) -> np.ndarray:
-        """yaw, climb, roll [rad], (n,), or forward, (3, n), or level_forward, (2, n), up to date."""
+        """Return yaw, climb, roll [rad], (n,), forward, (3, n), or level_forward, (2, n), of the current attitudes."""
         kept = self._derived.get(name)
         if kept is None:
             k = DERIVED[name]
@@ -161,10 +162,10 @@ class Bodies:
             kept.version = self.version
         return kept.columns  # type: ignore[no-any-return]
 
-    # -- who is where -----------------------------------------------------------------------------------------------------
+    # -- rows by id and by position -----------------------------------------------------------------------------------------------------
 
     def layout(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """(members, world_start, id_row, id_start): rows by (world, id), and the row of each id that ever lived, -1 when gone."""
+        """Return members, world_start, id_row, id_start: rows by (world, id), and the row of each id so far, -1 if removed."""
         if self._layout is None:
             id_start = np.zeros(self.n_worlds + 1, np.int64)
             kernels.count_ids(self.world, self.id, id_start)
@@ -176,16 +177,16 @@ class Bodies:
         return self._layout  # type: ignore[return-value]
 
     def rows_of(self, world: np.ndarray, ids: np.ndarray) -> np.ndarray:
-        """Row of each (world, id), (m,); -1 for id 0 and for those that are gone."""
+        """Row of each (world, id), (m,); -1 for id 0 and for removed entities."""
         _, _, id_row, id_start = self.layout()
         rows = np.empty(len(ids), np.int64)
         kernels.find_rows(world, np.ascontiguousarray(ids, np.int64), id_row, id_start, rows)
         return rows
 
     def index(self, reach: float | np.ndarray, split: Split | None = None) -> Index:
-        """Neighbour index good for queries up to `reach` [m], one number or one per world, at the positions of now.
+        """Neighbour index of the current positions for queries up to `reach` [m], one number or one per world.
 
-        `split` calls a function over parts of the rows in several threads.
+        `split` calls a function for parts of the rows in several threads.
         """
         if self.scans:
             reach = EVERYWHERE
@@ -193,7 +194,7 @@ class Bodies:
         kept = self._laid_out.get(key)
         if kept is None:
             index = self._indexes.pop(key, None) or Index()
-            self._indexes[key] = index  # behind those that were asked for earlier
+            self._indexes[key] = index  # the most recently used is last
             if len(self._indexes) > MOST_INDEXES:
                 self._forget(next(iter(self._indexes)))
             index.layout(self.world, self.id, self.n_worlds)
@@ -212,14 +213,14 @@ class Bodies:
         return index  # type: ignore[no-any-return]
 
     def _forget(self, key: Any) -> None:
-        """Drop the index of a reach, and what is kept in its order."""
+        """Discard the index of a reach and the columns in its order."""
         index = self._indexes.pop(key)
         self._laid_out.pop(key, None)
         for place in [place for place in self._by_place if place[0] == id(index)]:
             del self._by_place[place]
 
     def by_place(self, index: Index, name: str, split: Split | None = None) -> tuple[np.ndarray, ...]:
-        """Components of a column in the order of an index's places, as floats, each (n,) and padded for lanes; for kernels.
+        """Components of a column by place of an index, as floats, each (n,), padded for lanes; for kernels.
 
         `split` calls a function over parts of the rows in several threads.
         """
@@ -258,14 +259,14 @@ class Bodies:
                 kernels.floats_by_place(source, first, last, place, column)
 
     def any_index(self) -> Index:
-        """An index for searches without a radius, whose result does not depend on it: one that is up to date, if there is one."""
+        """Index for searches without a radius, preferably an existing one; results do not depend on the choice."""
         newest = self._newest
         if newest is None or newest.version != self.version:
             return self.index(self.usual_reach())
         return newest.columns[0]  # type: ignore[no-any-return]
 
     def usual_reach(self) -> float:
-        """A reach for searches that need none: of an index that is up to date, else all, else one that suits the density [m]."""
+        """Reach for searches without a radius [m]: of an existing index, infinite for few rows, otherwise chosen by density."""
         known = [
             k for k, kept in self._laid_out.items() if isinstance(k, float) and kept.version == self.version
         ]
@@ -279,12 +280,12 @@ class Bodies:
 
 
 def derive(name: str, quat: np.ndarray, first: int, last: int, base: int, out: np.ndarray) -> None:
-    """Put yaw, climb, roll, forward or level_forward of the quaternions [first, last) into out, (n,) or (k, n), from first - base on."""
+    """Write yaw, climb, roll, forward or level_forward of quaternions [first, last) to out, (n,) or (k, n), from first - base on."""
     _DERIVING[name](quat, first, last, base, out)
 
 
 def derived_from(name: str, quat: np.ndarray) -> np.ndarray:
-    """yaw, climb, roll [rad], (n,), forward, (3, n), or level_forward, (2, n), of quaternions (4, n)."""
+    """Return yaw, climb, roll [rad], (n,), forward, (3, n), or level_forward, (2, n), of quaternions (4, n)."""
     k, n = DERIVED[name], quat.shape[1]
     out = np.empty((k, n) if k > 1 else n)
     derive(name, np.ascontiguousarray(quat), 0, n, 0, out)
@@ -292,14 +293,14 @@ def derived_from(name: str, quat: np.ndarray) -> np.ndarray:
 
 
 def read_only(array: np.ndarray) -> np.ndarray:
-    """A view that cannot be written."""
+    """Return a read-only view of an array."""
     view = array[...]
     view.flags.writeable = False
     return view
 
 
 class BodyView:
-    """The body table, read-only; the columns of `Bodies` and the derived yaw, climb, roll and forward."""
+    """Read-only body table: the columns of `Bodies`, and yaw, climb, roll, forward and level_forward."""
 
     def __init__(self, bodies: Bodies) -> None:
         self._bodies = bodies

@@ -1,4 +1,4 @@
-"""What an entity's plugin sees: the rows of its group."""
+"""The view of entity plugins: the rows of one group."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from tussle.neighbors.index import Index
 from tussle.scene import Scene
 
 ROWS_PER_THREAD = 4096
-"""Fewer rows are not worth a thread: a kernel needs some 20 ns for each, and a thread 50 us."""
+"""Minimum number of rows per thread: a kernel takes about 20 ns per row, starting a thread 50 us."""
 GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 LAWS: dict[str, Callable[..., np.ndarray]] = {"uniform": rng.uniform, "normal": rng.normal}
 
@@ -37,16 +37,16 @@ LAWS: dict[str, Callable[..., np.ndarray]] = {"uniform": rng.uniform, "normal": 
 class GroupView:
     """Rows [first, last) of the body table: all entities, of all worlds, with the same plugins.
 
-    Row numbers hold within one call; ids hold for ever.
+    Row numbers are valid within one call; ids do not change.
 
     Attributes:
         n: Number of rows.
         first: Row of this view's row 0 in the body table.
-        dt: Time since this plugin's last call in these worlds [s]; before the first, the period of its calls.
+        dt: Time since this plugin's last call in these worlds [s]; in the first call, the period of its calls.
         pos: Position [m], (3, n), world frame. Likewise vel [m/s], quat (w, x, y, z), omega [rad/s], force, torque, health, radius,
-            mass, and the whole numbers id, team, world, block, block_index. For autonomies and controllers pos, vel and quat are the
-            entity's belief where a sensor writes one.
-        motion_state: State of the entity's motion model, (m, n), fields in order of declaration: where a planner's rollout begins.
+            mass, and the integers id, team, world, block, block_index. For autonomies and controllers, pos, vel and quat are the
+            entity's belief if a sensor writes one.
+        motion_state: State of the entity's motion model, (m, n), fields in order of declaration, e.g. to start a rollout from.
     """
 
     is_subset = False
@@ -64,11 +64,11 @@ class GroupView:
         self.reset(bodies, first, last)
 
     def own_cache(self) -> None:
-        """After a copy: forget names without the original's forgetting them too."""
+        """Call after copying the view, so that both views cache attributes separately."""
         self._seen = set(self._seen)
 
     def reset(self, bodies: Bodies, first: int, last: int) -> None:
-        """Look at other rows, after the table has been repacked."""
+        """Set the rows [first, last), after the table has been repacked."""
         own = self.__dict__
         for name in self._seen:
             own.pop(name, None)
@@ -79,10 +79,10 @@ class GroupView:
         self.first, self.last = first, last
         self.n = last - first
         self._reaches: dict[int, tuple[np.ndarray, float | np.ndarray]] = {}
-        self.walks: dict[tuple[int, int], Any] = {}  # see `tussle.api.laws.Plan.gather`
+        self.walks: dict[tuple[int, int], Any] = {}  # see `tussle.api.laws.WalkPlan.gather`
 
     def renew(self) -> None:
-        """Forget what follows from seeds and parameters: some rows have begun anew in their places."""
+        """Discard values that depend on seeds and parameters, after rows have been replaced in place."""
         self.__dict__.pop("_seeds", None)
         self._reaches.clear()
         self.walks.clear()
@@ -96,7 +96,7 @@ class GroupView:
             self.__dict__[name] = array
             self._seen.add(name)
             return array
-        if name.startswith("__"):  # what `copy` asks for
+        if name.startswith("__"):  # queried by `copy`
             raise AttributeError(name)
         if name == "_seeds":
             self._seeds = self.context.row_seeds(self.world, self.block)
@@ -120,9 +120,9 @@ class GroupView:
         return kept.columns[1]  # type: ignore[no-any-return]
 
     def column(self, name: str, rows: np.ndarray | None = None) -> np.ndarray:
-        """A body column or what is derived from it, by name: what the entity believes, where it believes something.
+        """A body column or derived column by name; the entity's belief if there is one.
 
-        With rows, (m,), those of them only: in `spawn`, a few newborn of very many.
+        With `rows`, (m,), only of these rows, e.g. of newborn entities in `spawn`.
         """
         if rows is None:
             return self._derive(name) if name in DERIVED else getattr(self, name)
@@ -155,16 +155,16 @@ class GroupView:
         """Unit vector along the body x axis, (3, n), world frame."""
         return self._derive("forward")
 
-    # -- time and place ---------------------------------------------------------------------------------------------------
+    # -- time and surroundings ---------------------------------------------------------------------------------------------------
 
     @property
     def t(self) -> np.ndarray:
-        """Time of the states that are seen [s], (n,): after motion, that of the step's end."""
+        """Time of the visible states [s], (n,); after motion, the end of the step."""
         return np.asarray(self.context.clock.at(self.phase)[self.world])
 
     @property
     def step_count(self) -> np.ndarray:
-        """Number of the step of each row's world, (n,)."""
+        """Step number of each row's world, (n,)."""
         return np.asarray(self.context.clock.step[self.world])
 
     @property
@@ -177,11 +177,11 @@ class GroupView:
 
     @property
     def bodies(self) -> BodyView:
-        """All rows of all groups: what is true of everybody."""
+        """True states of all entities of all groups."""
         return self._bodies.view
 
     def split(self, run: Callable[[int, int], Any]) -> None:
-        """Call run(first, last) over the rows, in as many threads as the simulation has where there are enough rows; for kernels."""
+        """Call run(first, last) for parts of the rows, in several threads if there are enough rows; for kernels."""
         if self.context.threads == 1:
             run(0, self.n)
         else:
@@ -190,18 +190,18 @@ class GroupView:
     def begin(
         self, plugin: Any = None, phase: float = 0.0, dt: float | None = None, substep: int = 0
     ) -> None:
-        """A call of a plugin begins; without more than that, as at the beginning of a step: what hooks of newborn rows see."""
+        """Prepare the view for a call of a plugin; by default at the beginning of a step, as for hooks of newborn rows."""
         self._caller, self.phase, self.substep = plugin, phase, substep
         self.dt = self._period if dt is None else dt
 
     def step(self, plugin: Any) -> None:
-        """Step a plugin inside the one that is called; its draws are its own."""
+        """Step a plugin inside the calling one, with its own random draws."""
         caller, self._caller = self._caller, plugin
         plugin.step(self)
         self._caller = caller
 
     def fail(self, row: int, why: str) -> None:
-        """End the world of a row with an error at the end of this step; the others go on. For what handles stand for."""
+        """End the world of a row with an error at the end of this step; other worlds continue. For plugins with handles."""
         world = int(self.world[row])
         step, plugin = int(self.context.clock.step[world]), self._caller.instance_name
         name = self.context.block_names[int(self.block[row])]
@@ -215,7 +215,7 @@ class GroupView:
         name = self.context.block_names[int(self.block[row])]
         return f"{name} {int(self.id[row])} of world {int(self.world[row])}"
 
-    # -- others -----------------------------------------------------------------------------------------------------------
+    # -- other entities -----------------------------------------------------------------------------------------------------------
 
     @property
     def born(self) -> np.ndarray:
@@ -226,11 +226,11 @@ class GroupView:
         return self._bodies.rows_of(world, ids)
 
     def rows_of(self, ids: np.ndarray) -> np.ndarray:
-        """Rows in `bodies` of the entities that this view's rows refer to, (n,); -1 for none and for those that are gone."""
+        """Rows in `bodies` of the entities with these ids, (n,), in the worlds of the rows; -1 for id 0 and removed entities."""
         return self._bodies.rows_of(self.world, ids)
 
     def reach(self, radius: float | np.ndarray) -> float | np.ndarray:
-        """Longest radius of each world [m]: a float when the radius is one, else (n_worlds,)."""
+        """Longest radius of each world [m]: a float if equal in all worlds, otherwise (n_worlds,)."""
         if not isinstance(radius, np.ndarray):
             return float(radius)
         known = self._reaches.get(id(radius))
@@ -239,7 +239,7 @@ class GroupView:
         longest = np.zeros(self._bodies.n_worlds)
         common = kernels.longest_reach(radius, self.world, longest)
         reach = longest if common < 0.0 else float(common)
-        if not radius.flags.writeable:  # a parameter: it stays as it is until the next repack
+        if not radius.flags.writeable:  # parameters do not change until the next repack
             self._reaches[id(radius)] = (radius, reach)
         return reach
 
@@ -260,11 +260,11 @@ class GroupView:
 
     @property
     def one_per_world(self) -> bool:
-        """Each row is in a world of its own, since entities move one after the other."""
+        """Whether each row is in a different world, since entities move one after another."""
         return self._bodies.scans
 
     def by_place(self, index: Index, name: str) -> tuple[np.ndarray, ...]:
-        """Components of a body column of everybody in the order of an index's places; for kernels."""
+        """Components of a body column of all entities, by place of an index; for kernels."""
         if self.context.threads == 1:
             return self._bodies.by_place(index, name)
         return self._bodies.by_place(index, name, self._split_rows)
@@ -283,13 +283,13 @@ class GroupView:
         """The k nearest other entities of each row, at any distance; `teams` as in `near`, or one team per row."""
         return find_nearest(self._bodies, (self.first, self.last), self.pos, k, teams)
 
-    # -- chance and services ------------------------------------------------------------------------------------------------
+    # -- random numbers and services ------------------------------------------------------------------------------------------------
 
     def _stream(self, label: str) -> int:
         return stream(self._caller.instance_name if self._caller is not None else "", label)
 
     def uniform(self, label: str, k: int | None = None) -> np.ndarray:
-        """Uniform draws in [0, 1), (n,) or (k, n): the same for an entity whatever else there is in the world."""
+        """Uniform draws in [0, 1), (n,) or (k, n); an entity's draws do not depend on other entities."""
         out = self.draw_lines("uniform", label, k or 1)
         return out if k is not None else out[0]
 
@@ -303,7 +303,7 @@ class GroupView:
         return LAWS[law](self._seeds, self._stream(label), self.block_index, self.step_count, self.substep, k)
 
     def uniform_pairs(self, label: str, near: Any, k: int | None = None) -> np.ndarray:
-        """Uniform draws in [0, 1), one per pair of `near`, (m,) or (k, m): the same for a pair whatever other entities there are.
+        """Uniform draws in [0, 1), one per pair of `near`, (m,) or (k, m); a pair's draws do not depend on other entities.
 
         A draw is keyed by the entity of the row, the id of the other and the step.
         """
@@ -321,6 +321,6 @@ class GroupView:
         return out if k is not None else out[0]
 
     def call(self, service: str, *args: Any, **kwargs: Any) -> Any:
-        """Call a service of the entity's plugins (its first argument is this view), or of the world's."""
+        """Call a service of the entity's plugins, with this view as first argument, or of the world plugins."""
         function = self.context.find_service(service, self.services)
         return function(self, *args, **kwargs) if service in self.services else function(*args, **kwargs)

@@ -1,4 +1,4 @@
-"""Kernels behind the views: attitude, who is where, checks."""
+"""Kernels of the views: attitudes, rows by id, checks."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tussle.numeric.kernel import device, kernel
 def yaw(quat, first, last, base, out):
     """Heading of the body x axis, counter-clockwise from East [rad], of the columns [first, last) of quaternions (4, n).
 
-    Here and below column i goes to out[i - base]; the quaternions need not have unit length.
+    Here and below, the result of column i is written to out[i - base]; the quaternions need not have unit length.
     """
     for i in range(first, last):
         w, x, y, z = quat[0, i], quat[1, i], quat[2, i], quat[3, i]
@@ -51,7 +51,7 @@ def forward(quat, first, last, base, out):
 
 @device
 def level(w, x, y, z):
-    """Horizontal unit vector (east, north) of the heading; zero for a nose that points straight up or down."""
+    """Horizontal unit vector (east, north) of the heading; zero if the nose points straight up or down."""
     dx = w * w + x * x - y * y - z * z
     dy = 2.0 * (w * z + x * y)
     length = math.sqrt(dx * dx + dy * dy)
@@ -68,7 +68,7 @@ def level_forward(quat, first, last, base, out):
 
 @kernel("F2 i8 i8 I Fw Fw")
 def level_forward_by_place(quat, first, last, place, east, north):
-    """Horizontal unit vectors of the headings of the rows [first, last) to their places, (n,) each."""
+    """Write the horizontal unit vectors of the headings of rows [first, last) by place, (n,) each."""
     for i in range(first, last):
         p = place[i]
         east[p], north[p] = level(quat[0, i], quat[1, i], quat[2, i], quat[3, i])
@@ -76,21 +76,21 @@ def level_forward_by_place(quat, first, last, place, east, north):
 
 @kernel("F i8 i8 I Fw")
 def floats_by_place(values, first, last, place, out):
-    """out[place[i]] = values[i] of the rows [first, last)."""
+    """Set out[place[i]] = values[i] for the rows [first, last)."""
     for i in range(first, last):
         out[place[i]] = values[i]
 
 
 @kernel("I i8 i8 I Fw")
 def ints_by_place(values, first, last, place, out):
-    """out[place[i]] = values[i] of the rows [first, last), as a float."""
+    """Set out[place[i]] = values[i] for the rows [first, last), as floats."""
     for i in range(first, last):
         out[place[i]] = values[i]
 
 
 @kernel("I I Iw")
 def count_ids(world, ids, id_start):
-    """id_start[w] becomes the place of world w's id 0 in a table of all ids; the last item its length."""
+    """Set id_start[w] to the index of world w's id 0 in a table of all ids, and the last item to the table's length."""
     for i in range(world.shape[0]):
         w = world[i] + 1
         id_start[w] = max(id_start[w], ids[i] + 1)
@@ -100,7 +100,7 @@ def count_ids(world, ids, id_start):
 
 @kernel("I I I Iw Iw Iw")
 def lay_out(world, ids, id_start, id_row, members, world_start):
-    """Fill the row of each id (id_row comes in as -1) and the rows by (world, id)."""
+    """Set the row of each id (id_row is -1 on entry) and the rows by (world, id)."""
     for i in range(world.shape[0]):
         id_row[id_start[world[i]] + ids[i]] = i
     n = 0
@@ -115,14 +115,14 @@ def lay_out(world, ids, id_start, id_row, members, world_start):
 
 @kernel("I I I I Iw")
 def find_rows(world, ids, id_row, id_start, rows):
-    """rows[i] is the row of (world[i], ids[i]); -1 for id 0 and for those that are gone."""
+    """Set rows[i] to the row of (world[i], ids[i]); -1 for id 0 and for removed entities."""
     for i in range(world.shape[0]):
         rows[i] = row_of(world[i], ids[i], id_row, id_start)
 
 
 @kernel("F I Fw -> f8")
 def longest_reach(radius, world, reach):
-    """reach[w] = largest radius of its rows [m]; comes in as 0. Returns what all worlds that have rows share, or -1."""
+    """Set reach[w], 0 on entry, to the largest radius of its rows [m]. Returns the value common to all worlds with rows, or -1."""
     for i in range(radius.shape[0]):
         w = world[i]
         reach[w] = max(reach[w], radius[i])
@@ -137,11 +137,9 @@ def longest_reach(radius, world, reach):
 
 @kernel("F2 F2 F Bw -> i8")
 def check(pos, quat, health, faulty):
-    """Number of rows that are not sound, those without health among them.
+    """Count rows that are faulty or have no health, and mark faulty rows: position or attitude not finite, or health NaN.
 
-    faulty marks rows whose position or attitude is not finite, or whose health is NaN.
-
-    A sum of the seven numbers minus itself is 0 only where all are finite, so one test a row does, and it vectorises.
+    The sum of the seven numbers minus itself is 0 only if all are finite: one test per row, which vectorises.
     """
     count = 0
     for i in range(health.shape[0]):

@@ -1,4 +1,4 @@
-"""The kinds of plugin that an author derives from."""
+"""Base classes of plugins."""
 
 from __future__ import annotations
 
@@ -18,75 +18,75 @@ class EntityPlugin(Plugin):
 
     kind: ClassVar[str] = "entity plugin"
     wired: frozenset[str]
-    """In a simulation: names of its outputs that somebody reads. The others may be left as they are."""
+    """In a simulation: names of the outputs that other plugins read. Other outputs need not be written."""
 
     def spawn(self, g: GroupView, rows: np.ndarray) -> None:
-        """Set the columns of new rows where their declared defaults do not do; `rows` are row numbers in `g`."""
+        """Initialise columns of newborn entities beyond the declared defaults; `rows` are row numbers in `g`, (m,)."""
 
     def step(self, g: GroupView) -> None:
-        """One step of all rows."""
+        """Perform one step of all rows."""
         raise TypeError(f"{type(self).__name__} has no step")
 
 
 class Autonomy(EntityPlugin):
-    """Decides: reads the entity's belief and its neighbours, writes wanted values; abstract."""
+    """Decision making: reads the entity's belief and neighbours, writes desired values; abstract."""
 
     kind = "autonomy"
 
 
 class Behavior(Autonomy):
-    """A motor schema: an autonomy inside another one, whose output is one wanted velocity; abstract."""
+    """A motor schema: an autonomy inside another one, whose output is a desired velocity; abstract."""
 
     kind = "behavior"
     gain = Param(1.0, ge=0.0, doc="Weight among the behaviours of one entity.")
     desired_velocity = Output(
         "desired_velocity_x desired_velocity_y desired_velocity_z",
         unit="m/s",
-        doc="Wanted velocity, world frame.",
+        doc="Desired velocity, world frame.",
     )
 
 
 class Controller(EntityPlugin):
-    """Turns wanted values into what the next controller or the motion model takes; abstract.
+    """Converts desired values to inputs of the next controller or the motion model; abstract.
 
-    It is written as row laws (see `row_law`), or as a `step` of all rows.
+    It consists of row laws (see `row_law`), or has a `step` for all rows.
     """
 
     kind = "controller"
     passthrough: ClassVar[bool] = False
-    """Its outputs are its inputs: it is wiring, and no call."""
+    """Outputs equal inputs: the controller only connects channels and is not called."""
 
     def step(self, g: GroupView) -> None:
-        """One step of all rows: the row laws, in order of declaration."""
+        """Perform one step of all rows: the row laws, in order of declaration."""
         step_rows(self, g)
 
 
 class Sensor(EntityPlugin):
     """Measures after motion, and writes channels for autonomies; abstract.
 
-    Its outputs `belief_pos`, `belief_vel` and `belief_quat` are the state that the entity believes itself in.
+    The outputs `belief_pos`, `belief_vel` and `belief_quat` are the entity's estimate of its own state.
     """
 
     kind = "sensor"
 
 
 class WorldPlugin(Plugin):
-    """A plugin of the world; abstract. Its parameters are one value per world."""
+    """A plugin of the world; abstract. Parameters have one value per world."""
 
     kind: ClassVar[str] = "world plugin"
 
     def start(self, w: WorldView) -> None:
-        """Called once for worlds that begin, after their first entities are placed."""
+        """Called at the start of worlds, after their initial entities are placed."""
 
     def step(self, w: WorldView) -> None:
-        """One step of all worlds."""
+        """Perform one step of all worlds."""
 
     def result(self, w: WorldView) -> dict[str, np.ndarray]:
-        """Values to report: name -> (n_worlds,) or (n_teams, n_worlds)."""
+        """Results: name -> (n_worlds,) or (n_teams, n_worlds)."""
         return {}
 
     def result_of(self, w: WorldView, world: int) -> dict[str, Any]:
-        """Values to report of one world: name -> number, or team -> number."""
+        """Results of one world: name -> number, or name -> {team: number}."""
         out: dict[str, Any] = {}
         for name, array in self.result(w).items():
             item = np.asarray(array)[..., world]
@@ -95,17 +95,17 @@ class WorldPlugin(Plugin):
 
 
 class Interaction(WorldPlugin):
-    """Acts between entities after motion and sensors: captures, collisions, fields; abstract."""
+    """Interactions of entities after motion and sensors, such as captures, collisions and fields; abstract."""
 
     kind = "interaction"
 
     def rejects(self, w: WorldView, world: int, pos: np.ndarray, taken: np.ndarray) -> bool:
-        """Whether an entity must not be placed at `pos` [m], (3,), in world number `world`, where others stand at `taken`, (3, m)."""
+        """Whether an entity must not be placed at `pos` [m], (3,), in world number `world`, with others at `taken` [m], (3, m)."""
         return False
 
 
 class Metric(WorldPlugin):
-    """Counts and scores; abstract. A result named "score" with one row per team decides who wins."""
+    """Counts and scores; abstract. The result "score", with one row per team, determines the winner."""
 
     kind = "metric"
 
@@ -118,5 +118,5 @@ class Network(WorldPlugin):
     comm_delay = Param(0.0, unit="s", ge=0.0, doc="Time from sending to the earliest delivery.")
 
     def route(self, w: WorldView, messages: Any) -> Any:
-        """Who hears each message: `EVERYONE`, `SAME_ENTITY`, or (message numbers, body rows of the receivers)."""
+        """Receivers of each message: `EVERYONE`, `SAME_ENTITY`, or (message numbers, body rows of the receivers), each (m,)."""
         raise TypeError(f"{type(self).__name__} has no route")

@@ -1,4 +1,4 @@
-"""Motion models: a state equation, the driver that integrates it, and the way in and out of the body table."""
+"""Motion models: state equation, integration, and conversion from and to the body table."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ WRITABLE = ("pos", "quat", "vel", "omega")
 
 
 class MotionBody(GroupView):
-    """A motion model's rows in the body table; pos, vel, quat and omega are writable.
+    """View of a motion model on the body table; pos, vel, quat and omega are writable.
 
     Attributes:
-        span: Rows of the view [first, last) whose attitude `from_body` may ask for; of the others yaw, climb, roll and forward are 0.
+        span: Rows [first, last) of the view for which yaw, climb, roll and forward are computed; they are 0 elsewhere.
         forward_speed: Speed along the body x axis [m/s], (n,).
-        table: Body table, pos, vel, quat and omega of all entities one below the other, (>= 13, N), whose columns first ... first + n - 1
-            are this model's; for kernels.
+        table: Storage of the body table, starting with the rows of pos, vel, quat and omega, (>= 13, N); columns first to first + n - 1
+            belong to this view; for kernels.
     """
 
     def reset(self, bodies: Bodies, first: int, last: int) -> None:
@@ -51,7 +51,7 @@ class MotionBody(GroupView):
         return self._bodies.floats
 
     def _derive(self, name: str) -> np.ndarray:
-        # Straight from the quaternions: while a model writes them, what the table keeps is out of date.
+        # Computed without the table's cache, which is outdated while a model writes quaternions.
         k, (first, last) = DERIVED[name], self.span
         out = np.zeros((k, self.n) if k > 1 else self.n)
         derive(name, self._bodies.quat, self.first + first, self.first + last, self.first, out)
@@ -67,38 +67,38 @@ class MotionModel(EntityPlugin):
     """The dynamics of an entity: x' = f(x, u); abstract.
 
     A model declares one `State` with named fields, its inputs and parameters, and `derivative`: a static function whose arguments
-    are matched by name to fields, inputs, parameters, force_x ... torque_z (world frame) and mass, and which returns the fields'
-    derivatives in order. One shared Runge-Kutta driver of fourth order integrates it. A model may instead be written as `row_law`s,
-    which also say what the body then is, so that controllers written so run between its substeps in one kernel; or bring a kernel:
-    `advance = kernel` over (x, u, p, dt, substeps), x (m, n), u (k, n) inputs and p (q, n) parameters in order of declaration; or
-    a property `advance` that returns the kernel of the structural variant.
+    are matched by name to fields, inputs, parameters, force_x ... torque_z (world frame) and mass, and which returns the derivatives
+    of the fields in order. It is integrated by the shared fourth-order Runge-Kutta method. Alternatively, a model consists of
+    `row_law`s, which also return body columns, so that one kernel can run controllers with row laws and the model in all substeps;
+    or it has a kernel: `advance = kernel` with arguments (x, u, p, dt, substeps), x (m, n), u (k, n) inputs and p (q, n) parameters
+    in order of declaration; or a property `advance` that returns the kernel of the structural variant.
 
     Raises:
-        DeclarationError: No state, several, a list, or an argument of `derivative` that means nothing.
+        DeclarationError: There is not exactly one state, it is a list, or an argument of `derivative` is unknown.
     """
 
     kind = "motion"
     derivative: ClassVar[Any] = None
     abstract: ClassVar[bool] = True
     reads_all: ClassVar[bool] = False
-    """All channels that reach it are made, since they are read from outside."""
+    """All channels of the entity are computed, since they are read from outside."""
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
         for name, column in cls.columns.items():
             if isinstance(column, (State, Channel)) and column.ragged:
                 raise DeclarationError(
-                    f"{cls.__name__}.{name}: a motion model has no lists but parameters; what it flies by are numbers"
+                    f"{cls.__name__}.{name}: in a motion model, only parameters can be lists"
                 )
         own = vars(cls).get("advance")
         if own is not None and not isinstance(own, (property, staticmethod)):
-            cls.advance = staticmethod(own)  # type: ignore[method-assign]  # a function would be taken for a method
+            cls.advance = staticmethod(own)  # type: ignore[method-assign]  # a plain function would become a method
         if cls.derivative is None and cls.advance is MotionModel.advance and not cls.row_laws:
             return
         states = [c for c in cls.states().values() if c.fields]
         if len(states) != 1:
             raise DeclarationError(
-                f"{cls.__name__} declares {len(states)} states with fields; a motion model has one, such as x = State('east north')"
+                f"{cls.__name__} declares {len(states)} states with fields; a motion model must have one, such as x = State('east north')"
             )
         if cls.derivative is not None:
             allowed = [*states[0].fields, *cls._input_names(), *cls._param_names(), *BODY_INPUTS]
@@ -106,7 +106,7 @@ class MotionModel(EntityPlugin):
                 if name not in allowed:
                     raise DeclarationError(
                         f"{cls.__name__}.derivative has an argument {name!r}{nearest_name(name, allowed)} that is no state, input, "
-                        f"parameter or force; {listed(allowed)}"
+                        f"parameter, force, torque or mass; {listed(allowed)}"
                     )
 
     @classmethod
@@ -120,7 +120,7 @@ class MotionModel(EntityPlugin):
 
     @classmethod
     def row_params(cls) -> dict[str, Param]:
-        """The parameters that are columns, in order: the rows of `p`."""
+        """Parameters that are columns, in order: the rows of `p`."""
         return {k: c for k, c in cls.params().items() if c.is_row_data}
 
     @classmethod
@@ -128,7 +128,7 @@ class MotionModel(EntityPlugin):
         return [name for k, c in cls.row_params().items() for name in (c.fields or (k,))]
 
     def active_inputs(self) -> list[str]:
-        """Names of the inputs that this instance uses, in order of declaration; structural parameters may switch some off."""
+        """Names of the inputs that this instance uses, in order of declaration; structural parameters may disable some."""
         return list(type(self).inputs())
 
     def input_channels(self) -> list[str]:
@@ -136,7 +136,7 @@ class MotionModel(EntityPlugin):
         return [channel for k in self.active_inputs() for channel in type(self).inputs()[k].channels]
 
     def body_inputs(self) -> list[str]:
-        """Which of force, torque and mass the derivative takes."""
+        """Components of force and torque, and mass, that the model takes."""
         if type(self).advance is not MotionModel.advance:
             return []
         names = {name for law in self.row_laws.values() for name in law.arguments}
@@ -146,11 +146,11 @@ class MotionModel(EntityPlugin):
 
     @property
     def advance(self) -> Any:
-        """The compiled function (x, u, p, dt, substeps) that flies this model, and that `rollout` calls."""
+        """The compiled function (x, u, p, dt, substeps) that simulations and `rollout` call."""
         return advance_rows(self) if self.row_laws else self.solver()
 
     def solver(self) -> Any:
-        """The shared driver on the model's own derivative, as a function (x, u, p, dt, substeps)."""
+        """Runge-Kutta integration of `derivative`, as a function (x, u, p, dt, substeps)."""
         f = compile_derivative(
             type(self).derivative,
             list(self.state().fields),
@@ -162,7 +162,7 @@ class MotionModel(EntityPlugin):
     # -- hooks --------------------------------------------------------------------------------------------------------------
 
     def from_body(self, body: MotionBody, rows: np.ndarray) -> None:
-        """Set the state of `rows` from the body table: at spawn, and where someone else has moved them."""
+        """Set the state of `rows`, (m,), from the body table: at birth, and after world plugins have moved entities."""
         raise TypeError(f"{type(self).__name__} has no from_body")
 
     def to_body(self, body: MotionBody) -> None:
@@ -174,16 +174,16 @@ class MotionModel(EntityPlugin):
     def rollout(
         self, x0: Any, inputs: Any, dt: float, substeps: int = 1, params: Mapping[str, Any] | None = None
     ) -> np.ndarray:
-        """States along a path, by the very function that flies the model: bit for bit what the engine computes.
+        """Predict states for given inputs, with the function that simulations use: results are equal bit for bit.
 
-        Call it on a plugin as data (`Unicycle(vel_max=20).rollout(...)`); nothing in any simulation changes.
+        Call it on an unbound plugin (`Unicycle(vel_max=20).rollout(...)`); simulations are not affected.
 
         Args:
             x0: Initial states, (m,) or (m, n).
             inputs: One row per step, (T, k) or (T, k, n), in order of declaration.
             dt: Length of a step [s].
-            substeps: Runge-Kutta steps per step; the mission's motion_multiplier for the flown path.
-            params: Parameters that differ between the n, name -> (n,) or (k, n).
+            substeps: Runge-Kutta steps per step; as in the simulation with the mission's motion_multiplier.
+            params: Parameters that differ between the n columns, name -> (n,) or (k, n).
 
         Returns:
             (T + 1, m) or (T + 1, m, n), x0 first.
@@ -205,7 +205,7 @@ class MotionModel(EntityPlugin):
             or u.shape[2] not in (1, n)
         ):
             raise ParameterError(
-                f"{type(self).__name__}.rollout: x0 is {np.shape(x0)} and inputs {np.shape(inputs)}; needed are "
+                f"{type(self).__name__}.rollout: x0 is {np.shape(x0)} and inputs {np.shape(inputs)}; expected are "
                 f"({len(self.state().fields)}, n) for {', '.join(self.state().fields)} and (T, {len(names)}) for {', '.join(names)}"
             )
         for key in params or {}:

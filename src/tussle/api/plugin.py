@@ -1,4 +1,4 @@
-"""The plugin as data and as part of a simulation: one class, the same attribute names."""
+"""The base class of all plugins: as data, and bound to a simulation."""
 
 from __future__ import annotations
 
@@ -36,14 +36,14 @@ RESERVED = ("name", "rate")
 
 @dataclass(frozen=True)
 class HistoricAttributes:
-    """How a plugin's attributes in the existing system's mission files differ from its parameters.
+    """Differences between a plugin's attributes in SCRIMMAGE mission files and its parameters.
 
     Attributes:
         renamed: Attribute -> parameter.
         joined: Parameter -> the attributes that are its fields.
-        unread: Attributes that mean nothing here.
-        least_zero: Parameters that are 0 here where a negative number means "none" there.
-        differs: Parameter -> what is said where a file leaves it out, since its default is another one there.
+        unread: Attributes that are ignored.
+        least_zero: Parameters for which a negative number, "none" in SCRIMMAGE, is read as 0.
+        differs: Parameter -> note for files that omit it, since SCRIMMAGE has another default.
     """
 
     renamed: Mapping[str, str] = field(default_factory=dict)
@@ -54,7 +54,7 @@ class HistoricAttributes:
 
 
 def service(method: F) -> F:
-    """Mark a method that other plugins call by name with `g.call` or `w.call`."""
+    """Mark a method as a service, which other plugins call by name with `g.call` or `w.call`."""
     method.__dict__["is_service"] = True
     return method
 
@@ -62,11 +62,11 @@ def service(method: F) -> F:
 class Plugin:
     """A part of an entity or of the world; abstract.
 
-    Unbound, a plugin is data: it compares by value, pickles, and its repr says what differs from the defaults. A simulation binds
-    a copy of it, whose declared names are arrays.
+    An unbound plugin is data: it compares by value, can be pickled, and its repr shows parameters that differ from the defaults. A
+    simulation binds a copy, whose declared names are arrays.
 
     Args:
-        name: Name of this instance; the class's name unless given. It tells two plugins of one class in one entity apart.
+        name: Name of this instance, by default the class name. Plugins of one class in one entity need different names.
         rate: Calls per second [Hz]; None calls it in every step.
         **values: Parameters, by their declared names.
 
@@ -75,10 +75,10 @@ class Plugin:
     """
 
     grade: ClassVar[str] = "machine"
-    """What is promised of its bits: "portable", "machine" or "external"."""
+    """Reproducibility: "portable" (same bits on every machine), "machine" (same bits on one machine) or "external" (no promise)."""
 
     historic_attributes: ClassVar[HistoricAttributes] = HistoricAttributes()
-    """How it is written in the existing system's mission files, where that is not by the names of its parameters."""
+    """Attributes of SCRIMMAGE mission files that differ from the parameters."""
 
     columns: ClassVar[dict[str, Column]] = {}
     services: ClassVar[tuple[str, ...]] = ()
@@ -93,11 +93,11 @@ class Plugin:
             sorted(k for k in dir(cls) if getattr(getattr(cls, k, None), "is_service", False))
         )
         if cls.grade not in GRADES:
-            raise DeclarationError(f"{cls.__name__}.grade is {cls.grade!r}; it is one of {', '.join(GRADES)}")
+            raise DeclarationError(f"{cls.__name__}.grade is {cls.grade!r}; allowed are {', '.join(GRADES)}")
         for name, column in cls.columns.items():
             if name in RESERVED or name.startswith("_"):
                 raise DeclarationError(
-                    f"{cls.__name__}.{name}: the name is reserved; choose another for this {type(column).__name__}"
+                    f"{cls.__name__}.{name}: the name is reserved; choose another name for this {type(column).__name__}"
                 )
         for name, law in vars(cls).items():
             if isinstance(law, (NeighborLaw, RowLaw)):
@@ -125,7 +125,7 @@ class Plugin:
         cls = type(self)
         if unnamed:
             raise ParameterError(
-                f"{cls.__name__}({', '.join(map(repr, unnamed))}): parameters are given by name; {listed(cls.params())}"
+                f"{cls.__name__}({', '.join(map(repr, unnamed))}): give parameters by name; {listed(cls.params())}"
             )
         rate = None if rate is None else RATE.convert(rate, f"{cls.__name__}: rate")
         params, children = cls.params(), cls.children()
@@ -143,13 +143,13 @@ class Plugin:
                     raise ParameterError(f"{cls.__name__}.{key}: {plugin!r} is no {child.kind.__name__}")
                 if plugin.__dict__["rate"] is not None:
                     raise ParameterError(
-                        f"{cls.__name__}.{key}: {plugin!r} takes no rate; give it to {cls.__name__}"
+                        f"{cls.__name__}.{key}: {plugin!r} cannot have a rate; set the rate of {cls.__name__}"
                     )
             names = [plugin.instance_name for plugin in resolved[key]]
             for twice in names:
                 if names.count(twice) > 1:
                     raise ParameterError(
-                        f"{cls.__name__}.{key}: two plugins are called {twice!r}; give one of them another name with name=..."
+                        f"{cls.__name__}.{key}: two plugins are called {twice!r}; rename one with name=..."
                     )
         self.__dict__.update(_values=resolved, instance_name=name or cls.__name__, rate=rate)
 
@@ -157,7 +157,7 @@ class Plugin:
 
     @classmethod
     def declared(cls, kind: type[C]) -> dict[str, C]:
-        """Declarations of one kind, by name, in order of declaration, those of base classes first."""
+        """Declarations of one kind, by name, in order of declaration, starting with base classes."""
         return {k: c for k, c in cls.columns.items() if isinstance(c, kind)}
 
     @classmethod
@@ -200,11 +200,11 @@ class Plugin:
 
     @property
     def values(self) -> dict[str, Any]:
-        """Parameters and children by name, SI."""
+        """Parameters and children by name, in SI units."""
         return dict(self.__dict__["_values"])
 
     def replace(self, **values: Any) -> Self:
-        """A copy with other parameters."""
+        """Copy the plugin with other parameters."""
         merged = {
             **self.values,
             "name": self.__dict__["instance_name"],
@@ -214,7 +214,7 @@ class Plugin:
         return type(self)(**merged)
 
     def structure(self) -> tuple[Any, ...]:
-        """What entities must share to live in one group: class, name, rate, structural parameters, children's structure."""
+        """Key that is equal for plugins that can share a group: class, name, rate, structural parameters and children."""
         own = self.__dict__["_values"]
         fixed = tuple((k, own[k]) for k, c in self.params().items() if c.structural)
         inner = tuple((k, tuple(c.structure() for c in own[k])) for k in self.children())
@@ -247,7 +247,7 @@ class Plugin:
     # -- bound ----------------------------------------------------------------------------------------------------------
 
     def bound(self) -> Self:
-        """A copy whose arrays the engine fills in; the original stays data."""
+        """Copy the plugin for a simulation, which sets the arrays; the original stays data."""
         copy = object.__new__(type(self))
         copy.__dict__.update(self.__dict__, is_bound=True)
         return copy
@@ -257,7 +257,7 @@ class Plugin:
         if name in cls.columns:
             if not self.__dict__.get("is_bound"):
                 raise ParameterError(
-                    f"{cls.__name__}.{name} cannot be changed: a plugin is a value; make another with .replace({name}=...)"
+                    f"{cls.__name__}.{name} cannot be changed: plugins are immutable; make a copy with .replace({name}=...)"
                 )
             array = self.__dict__.get(name)
             if (
@@ -265,13 +265,13 @@ class Plugin:
                 and isinstance(value, np.ndarray)
                 and np.shares_memory(array, value)
             ):
-                return  # `self.x += 1` has already written into the column when Python assigns the result.
+                return  # `self.x += 1` has already written to the column
             raise AttributeError(
-                f"{cls.__name__}.{name} is a column: write into it with {self._write_of(name)}"
+                f"{cls.__name__}.{name} is a column: write to it with {self._write_of(name)}"
             )
         raise AttributeError(
-            f"{cls.__name__}.{name} is not declared{nearest_name(name, cls.columns)}: one plugin object serves all entities, so memory "
-            f"goes into a column: {name} = State(...) on the class, then {self._write_of(name)}"
+            f"{cls.__name__}.{name} is not declared{nearest_name(name, cls.columns)}: one plugin object serves all entities, so values "
+            f"are stored in columns: declare {name} = State(...) in the class, then write {self._write_of(name)}"
         )
 
     def _write_of(self, name: str) -> str:
@@ -279,7 +279,7 @@ class Plugin:
 
     def __getattr__(self, name: str) -> Any:
         cls = type(self)
-        if name in cls.columns:  # Column.__get__ has refused: it is no array here
+        if name in cls.columns:  # Column.__get__ raises the error: the plugin is not bound
             return cls.columns[name].__get__(self, cls)
         allowed = [n for n in (*cls.columns, *dir(cls)) if not n.startswith("_")]
         raise AttributeError(

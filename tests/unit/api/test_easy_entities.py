@@ -387,11 +387,14 @@ COLUMNS = {
             lambda self, me: self.max_speed,
             "Easy.max_speed differs between entities: read me.max_speed, not self.max_speed",
         ),
-        (lambda self, me: self.goal, "Easy.goal differs between entities: read me.goal, not self.goal"),
-        (lambda self, me: setattr(self, "n", 1), "Easy.n is a column: write into it with me.n = value"),
+        (
+            lambda self, me: self.goal,
+            "Easy.goal differs between entities: read me.goal, not self.goal",
+        ),
+        (lambda self, me: setattr(self, "n", 1), "Easy.n is a column: write to it with me.n = value"),
         (
             lambda self, me: setattr(me, "clas", 1),
-            "memory goes into a column: clas = State(...) on the class, then me.clas = value",
+            "clas = State(...) in the class, then write me.clas = value",
         ),
         (
             lambda self, me: setattr(me, "goal", (1.0, 2.0)),
@@ -598,5 +601,5 @@ def test_plugins_are_values_in_easy_mode_too():
     assert Steer() == Steer(most=2.0)
     with pytest.raises(AttributeError, match=r"Steer.calls is an array only inside a simulation"):
         _ = Steer().calls
-    with pytest.raises(ParameterError, match="a plugin is a value"):
+    with pytest.raises(ParameterError, match="immutable"):
         Steer().most = 3.0

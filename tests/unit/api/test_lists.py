@@ -42,7 +42,7 @@ POINTS = Field("x y", ragged=True)
         (lambda: State(ragged=True, default=2.0), r"it takes neither per nor default"),
         (
             lambda: type("M", (MotionModel,), {"path": Input(fields="x y", ragged=True)}),
-            r"M.path: a motion model has no lists but parameters",
+            r"M\.path: in a motion model",
         ),
     ],
 )

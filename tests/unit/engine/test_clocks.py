@@ -255,7 +255,7 @@ def test_easy_mode_has_the_dt_of_its_period():
         ),
         (
             lambda: MotorSchemas(behaviors=[AvoidEntityMS(rate=5.0)]),
-            r"MotorSchemas.behaviors: AvoidEntityMS\(rate=5.0\) takes no rate",
+            r"MotorSchemas.behaviors: AvoidEntityMS\(rate=5.0\) .* rate of MotorSchemas",
         ),
     ],
 )

@@ -377,15 +377,12 @@ def write(path):
 def test_undeclared_attributes_are_refused():
     text = failing(put("count", 3))
     assert "Wrong.count is not declared" in text
-    assert (
-        "one plugin object serves all entities, so memory goes into a column: count = State(...) on the class"
-        in text
-    )
+    assert "count = State(...)" in text
     assert "(did you mean 'gain'?)" in failing(put("gian", 3))
 
 
 def test_columns_are_written_into_not_replaced():
-    assert "Wrong.n is a column: write into it with self.n[:] = value" in failing(put("n", 3))
+    assert "Wrong.n is a column: write to it with self.n[:] = value" in failing(put("n", 3))
     assert "Wrong.n is a column" in failing(put("n", np.zeros(1)))
 
 

@@ -93,7 +93,7 @@ def test_the_entities_of_the_blocks_always_have_room():
 def test_the_dead_make_room_but_not_where_their_calls_stay():
     game = crowd(interactions=[Reaper(team=0, at=0.0), Breeder(litter=7)], limits=Limits(rows=20))
     assert Simulation(game).run()[0].end == "time"
-    with pytest.raises(PluginError, match="update='sequential' a world holds 20"):
+    with pytest.raises(PluginError, match=r"update='sequential'.* 20;"):
         Simulation(game.replace(update="sequential", limits=Limits(sequential=20))).run()
 
 

@@ -114,7 +114,7 @@ def test_easy_mode_draws_what_vector_mode_draws() -> None:
 
 
 def test_parameters_are_given_by_name() -> None:
-    with pytest.raises(ParameterError, match=r"Unicycle\(5\): parameters are given by name"):
+    with pytest.raises(ParameterError, match=r"Unicycle\(5\): .* by name; there are: vel_max"):
         Unicycle(5)
 
 

@@ -398,7 +398,10 @@ def test_children_have_columns_and_channels_of_their_own():
 def test_children_of_the_wrong_kind_or_of_one_name_are_refused():
     with pytest.raises(ParameterError, match=r"Sum.parts: Drift\(\) is no Behavior"):
         Sum(parts=[Drift()])
-    with pytest.raises(ParameterError, match=r"Sum.parts: two plugins are called 'Push'"):
+    with pytest.raises(
+        ParameterError,
+        match=r"Sum.parts: two plugins are called 'Push'",
+    ):
         Sum(parts=[Push(), Push()])
 
 
