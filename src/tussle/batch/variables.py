@@ -286,7 +286,7 @@ def key_of(value: Value) -> tuple[bool, str | float]:
 def _mixed(low: float, high: float, share: float, *, is_log: bool) -> float:
     """What lies at a share of the way. Not low + share * (high - low), whose difference may be too large for a number."""
     if is_log:
-        return exp(log(low) * (1.0 - share) + log(high) * share)
+        return float(exp(log(low) * (1.0 - share) + log(high) * share))
     return low * (1.0 - share) + high * share
 
 

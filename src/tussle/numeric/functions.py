@@ -2,148 +2,74 @@
 
 from __future__ import annotations
 
-from typing import Any, overload
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from tussle.numeric import elementary
-from tussle.numeric.kernel import Device, kernel
-
-Floats = NDArray[np.float64]
+from tussle.numeric.kernel import Device, Kernel, kernel
 
 
-def rows_of(value: ArrayLike) -> Floats:
-    """Convert to a contiguous float64 array, without a copy if it already is one."""
-    return np.ascontiguousarray(value, dtype=np.float64)
+def kernel_over_columns(scalar: Device, sizes: Sequence[int], n_out: int) -> Kernel:
+    """Kernel that calls a device function for each column of 2-D arrays: one input per item of `sizes`, then the output.
+
+    Args:
+        scalar: The device function; takes the components of all inputs.
+        sizes: Number of rows of each input.
+        n_out: Number of rows of the output.
+    """
+    names = [f"input_{k}" for k in range(len(sizes))]
+    values = [f"{name}[{row}, i]" for name, size in zip(names, sizes, strict=True) for row in range(size)]
+    results = [f"out[{row}, i]" for row in range(n_out)]
+    scope: dict[str, Any] = {"scalar": scalar}
+    exec(  # noqa: S102 - the text consists of the names above
+        f"def columns({', '.join(names)}, out):\n    for i in range(out.shape[1]):\n"
+        f"        {', '.join(results)} = scalar({', '.join(values)})\n",
+        scope,
+    )
+    columns = scope["columns"]
+    columns.__module__, columns.__qualname__ = scalar.__module__, f"{scalar.__qualname__}_columns"
+    return kernel(" ".join([*["F2"] * len(sizes), "F2w"]))(columns)
 
 
-class Unary(Device):
-    """A function of one number.
+class Elementwise(Device):
+    """A function of numbers; in Python also of arrays, which broadcast.
 
     Args:
         scalar: The device function that computes it.
+        n_in: Number of arguments.
+        n_out: Number of results.
     """
 
-    def __init__(self, scalar: Device) -> None:
+    def __init__(self, scalar: Device, n_in: int = 1, n_out: int = 1) -> None:
         super().__init__(scalar.py_func)
+        self._one = kernel(f"{'f8 ' * n_in}->{' f8' * n_out}")(scalar.py_func)
+        self._columns = kernel_over_columns(scalar, (1,) * n_in, n_out)
+        self._n_out = n_out
 
-        @kernel("f8 -> f8")
-        def one(x):  # type: ignore[no-untyped-def]
-            return scalar(x)
-
-        @kernel("F Fw")
-        def each(x, out):  # type: ignore[no-untyped-def]
-            for i in range(x.shape[0]):
-                out[i] = scalar(x[i])
-
-        name_kernels(scalar, one, each)
-        self._one = one
-        self._each = each
-
-    @overload
-    def __call__(self, x: float) -> float: ...
-    @overload
-    def __call__(self, x: ArrayLike) -> Any: ...
-    def __call__(self, x: Any) -> Any:
-        if isinstance(x, (float, int)):
-            return self._one(float(x))
-        values = np.asarray(x, dtype=np.float64)
-        if values.ndim == 0:
-            return self._one(float(values))
-        flat = rows_of(values).reshape(-1)
-        out = np.empty_like(flat)
-        self._each(flat, out)
-        return out.reshape(values.shape)
+    def __call__(self, *values: Any) -> Any:
+        if isinstance(values[0], (float, int)) and isinstance(values[-1], (float, int)):
+            return self._one(*values)
+        arrays = [np.asarray(value, dtype=np.float64) for value in values]
+        if arrays[0].shape != arrays[-1].shape:
+            arrays = list(np.broadcast_arrays(*arrays))
+        shape = arrays[0].shape
+        if not shape:
+            return self._one(*map(float, arrays))
+        out = np.empty((self._n_out, arrays[0].size))
+        self._columns(*[np.ascontiguousarray(array).reshape(1, -1) for array in arrays], out)
+        results = out.reshape(self._n_out, *shape)
+        return results[0] if self._n_out == 1 else tuple(results)
 
 
-class Pair(Device):
-    """A function of one number that returns two."""
-
-    def __init__(self, scalar: Device) -> None:
-        super().__init__(scalar.py_func)
-
-        @kernel("f8 -> f8 f8")
-        def one(x):  # type: ignore[no-untyped-def]
-            return scalar(x)
-
-        @kernel("F Fw Fw")
-        def each(x, first, second):  # type: ignore[no-untyped-def]
-            for i in range(x.shape[0]):
-                first[i], second[i] = scalar(x[i])
-
-        name_kernels(scalar, one, each)
-        self._one = one
-        self._each = each
-
-    @overload
-    def __call__(self, x: float) -> tuple[float, float]: ...
-    @overload
-    def __call__(self, x: ArrayLike) -> tuple[Any, Any]: ...
-    def __call__(self, x: Any) -> Any:
-        if isinstance(x, (float, int)):
-            return self._one(float(x))
-        values = np.asarray(x, dtype=np.float64)
-        if values.ndim == 0:
-            return self._one(float(values))
-        flat = rows_of(values).reshape(-1)
-        first, second = np.empty_like(flat), np.empty_like(flat)
-        self._each(flat, first, second)
-        return first.reshape(values.shape), second.reshape(values.shape)
-
-
-class Binary(Device):
-    """A function of two numbers; arrays broadcast."""
-
-    def __init__(self, scalar: Device) -> None:
-        super().__init__(scalar.py_func)
-
-        @kernel("f8 f8 -> f8")
-        def one(y, x):  # type: ignore[no-untyped-def]
-            return scalar(y, x)
-
-        @kernel("F F Fw")
-        def each(y, x, out):  # type: ignore[no-untyped-def]
-            for i in range(y.shape[0]):
-                out[i] = scalar(y[i], x[i])
-
-        name_kernels(scalar, one, each)
-        self._one = one
-        self._each = each
-
-    @overload
-    def __call__(self, y: float, x: float) -> float: ...
-    @overload
-    def __call__(self, y: ArrayLike, x: ArrayLike) -> Any: ...
-    def __call__(self, y: Any, x: Any) -> Any:
-        if isinstance(y, (float, int)) and isinstance(x, (float, int)):
-            return self._one(float(y), float(x))
-        ys, xs = np.asarray(y, dtype=np.float64), np.asarray(x, dtype=np.float64)
-        if ys.shape != xs.shape:
-            shape = np.broadcast_shapes(ys.shape, xs.shape)
-            ys, xs = np.broadcast_to(ys, shape), np.broadcast_to(xs, shape)
-        if ys.ndim == 0:
-            return self._one(float(ys), float(xs))
-        out = np.empty(ys.size)
-        self._each(rows_of(ys).reshape(-1), rows_of(xs).reshape(-1), out)
-        return out.reshape(ys.shape)
-
-
-def name_kernels(scalar: Device, *kernels: Any) -> None:
-    """Name generated kernels after their function, for cache file names and error messages."""
-    for each in kernels:
-        each.__name__ = f"{scalar.py_func.__name__}_{each.py_func.__name__}"
-        each.__qualname__ = each.__name__
-        each.__module__ = scalar.py_func.__module__
-
-
-sin = Unary(elementary.sin)
-cos = Unary(elementary.cos)
-sincos = Pair(elementary.sincos)
-tan = Unary(elementary.tan)
-asin = Unary(elementary.asin)
-acos = Unary(elementary.acos)
-exp = Unary(elementary.exp)
-log = Unary(elementary.log)
-wrap = Unary(elementary.wrap)
-atan2 = Binary(elementary.atan2)
+sin = Elementwise(elementary.sin)
+cos = Elementwise(elementary.cos)
+sincos = Elementwise(elementary.sincos, n_out=2)
+tan = Elementwise(elementary.tan)
+asin = Elementwise(elementary.asin)
+acos = Elementwise(elementary.acos)
+exp = Elementwise(elementary.exp)
+log = Elementwise(elementary.log)
+wrap = Elementwise(elementary.wrap)
+atan2 = Elementwise(elementary.atan2, n_in=2)

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tussle.numeric.elementary import atan2, sincos
-from tussle.numeric.kernel import Device, Kernel, device, kernel
+from tussle.numeric.functions import kernel_over_columns
+from tussle.numeric.kernel import Device, device
 
 Floats = NDArray[np.float64]
 
@@ -24,14 +25,13 @@ class Columnar(Device):
 
     Args:
         scalar: The device function.
-        rows: Kernel over the columns of 2-D arrays: inputs, then the output.
         n_in: Number of components of each input; 0 for a scalar.
         n_out: Number of components of the result; 0 for a scalar.
     """
 
-    def __init__(self, scalar: Device, rows: Kernel, n_in: tuple[int, ...], n_out: int) -> None:
+    def __init__(self, scalar: Device, n_in: tuple[int, ...], n_out: int) -> None:
         super().__init__(scalar.py_func)
-        self._rows = rows
+        self._columns = kernel_over_columns(scalar, [max(1, size) for size in n_in], max(1, n_out))
         self._n_in = n_in
         self._n_out = n_out
 
@@ -50,7 +50,7 @@ class Columnar(Device):
         tail = np.broadcast_shapes(*tails)
         columns = [column_major(array, size, tail) for array, size in zip(arrays, self._n_in, strict=True)]
         out = np.empty((max(self._n_out, 1), columns[0].shape[1]))
-        self._rows(*columns, out)
+        self._columns(*columns, out)
         shaped = out.reshape((self._n_out, *tail) if self._n_out else tail)
         return shaped if shaped.ndim else float(shaped)
 
@@ -146,81 +146,12 @@ def _to_roll(w, x, y, z):
     return atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
 
 
-@kernel("F2 F2 F2 F2w")
-def from_euler_rows(roll, pitch, yaw, out):
-    """Convert roll, pitch, yaw (1, n) [rad] to quaternions (4, n)."""
-    for i in range(out.shape[1]):
-        out[0, i], out[1, i], out[2, i], out[3, i] = _from_euler(roll[0, i], pitch[0, i], yaw[0, i])
-
-
-@kernel("F2 F2 F2w")
-def multiply_rows(a, b, out):
-    """Products of quaternions (4, n)."""
-    for i in range(out.shape[1]):
-        out[0, i], out[1, i], out[2, i], out[3, i] = _multiply(
-            a[0, i], a[1, i], a[2, i], a[3, i], b[0, i], b[1, i], b[2, i], b[3, i]
-        )
-
-
-@kernel("F2 F2w")
-def conjugate_rows(q, out):
-    """Inverses of unit quaternions (4, n)."""
-    for i in range(out.shape[1]):
-        out[0, i], out[1, i], out[2, i], out[3, i] = _conjugate(q[0, i], q[1, i], q[2, i], q[3, i])
-
-
-@kernel("F2 F2w")
-def normalize_rows(q, out):
-    """Scale quaternions (4, n) to length 1."""
-    for i in range(out.shape[1]):
-        out[0, i], out[1, i], out[2, i], out[3, i] = _normalize(q[0, i], q[1, i], q[2, i], q[3, i])
-
-
-@kernel("F2 F2 F2w")
-def rotate_rows(q, v, out):
-    """Rotate body vectors (3, n) to the world frame."""
-    for i in range(out.shape[1]):
-        out[0, i], out[1, i], out[2, i] = _rotate(
-            q[0, i], q[1, i], q[2, i], q[3, i], v[0, i], v[1, i], v[2, i]
-        )
-
-
-@kernel("F2 F2 F2w")
-def rotate_inverse_rows(q, v, out):
-    """Rotate world vectors (3, n) to the body frame."""
-    for i in range(out.shape[1]):
-        out[0, i], out[1, i], out[2, i] = _rotate_inverse(
-            q[0, i], q[1, i], q[2, i], q[3, i], v[0, i], v[1, i], v[2, i]
-        )
-
-
-@kernel("F2 F2w")
-def to_yaw_rows(q, out):
-    """Headings (1, n) [rad] of quaternions (4, n)."""
-    for i in range(out.shape[1]):
-        out[0, i] = _to_yaw(q[0, i], q[1, i], q[2, i], q[3, i])
-
-
-@kernel("F2 F2w")
-def to_pitch_rows(q, out):
-    """Pitch angles (1, n) [rad] of quaternions (4, n), positive nose down."""
-    for i in range(out.shape[1]):
-        out[0, i] = _to_pitch(q[0, i], q[1, i], q[2, i], q[3, i])
-
-
-@kernel("F2 F2w")
-def to_roll_rows(q, out):
-    """Roll angles (1, n) [rad] of quaternions (4, n)."""
-    for i in range(out.shape[1]):
-        out[0, i] = _to_roll(q[0, i], q[1, i], q[2, i], q[3, i])
-
-
-quat_from_euler = Columnar(_from_euler, from_euler_rows, (0, 0, 0), 4)
-quat_multiply = Columnar(_multiply, multiply_rows, (4, 4), 4)
-quat_conjugate = Columnar(_conjugate, conjugate_rows, (4,), 4)
-quat_normalize = Columnar(_normalize, normalize_rows, (4,), 4)
-quat_rotate = Columnar(_rotate, rotate_rows, (4, 3), 3)
-quat_rotate_inverse = Columnar(_rotate_inverse, rotate_inverse_rows, (4, 3), 3)
-quat_to_yaw = Columnar(_to_yaw, to_yaw_rows, (4,), 0)
-quat_to_pitch = Columnar(_to_pitch, to_pitch_rows, (4,), 0)
-quat_to_roll = Columnar(_to_roll, to_roll_rows, (4,), 0)
+quat_from_euler = Columnar(_from_euler, (0, 0, 0), 4)
+quat_multiply = Columnar(_multiply, (4, 4), 4)
+quat_conjugate = Columnar(_conjugate, (4,), 4)
+quat_normalize = Columnar(_normalize, (4,), 4)
+quat_rotate = Columnar(_rotate, (4, 3), 3)
+quat_rotate_inverse = Columnar(_rotate_inverse, (4, 3), 3)
+quat_to_yaw = Columnar(_to_yaw, (4,), 0)
+quat_to_pitch = Columnar(_to_pitch, (4,), 0)
+quat_to_roll = Columnar(_to_roll, (4,), 0)

@@ -324,5 +324,5 @@ def test_a_belief_is_no_list():
         def step(self, g):
             pass
 
-    with pytest.raises(WiringError, match=r"Dreamer.belief_pos is a list; it needs 3 channels"):
+    with pytest.raises(WiringError, match=r"Dreamer.belief_pos is a list.* 3 channels"):
         Simulation(Mission(blocks=[others(1, sensor=Dreamer())]))
