@@ -1,4 +1,4 @@
-"""Who is near whom: the positions of one instant, sorted into cells per world."""
+"""Spatial index: the positions of one instant, sorted into cells, separately for each world."""
 
 from __future__ import annotations
 
@@ -17,16 +17,15 @@ Longs = NDArray[np.int64]
 Split = Callable[[int, Callable[[int, int], Any]], Any]
 
 RINGS = 2
-"""Cells per reach of a world: with 2 a block's box is about as high as it is long where time is spent (best of 1 to 3 at
-2000)."""
+"""Cells per reach of a world; 2 is the fastest of 1 to 3 for 2000 entities."""
 
 SPARSE_WORLD = 400
-"""Below this many entities one cell per reach is faster: fuller blocks (1.0 against 1.3 us per entity at 110, even at 500)."""
+"""Below this number of entities, one cell per reach is faster (1.0 instead of 1.3 us per entity with 110, equal with 500)."""
 
 
 @dataclass(slots=True)
 class Blocks:
-    """Query rows in groups of up to LANES that stand close together, each with the runs of places where its neighbours are.
+    """Groups of up to LANES nearby query rows, each with the spans of places that contain its neighbours.
 
     Block b holds queries[block_first[b] : block_first[b + 1]]; its candidates are the places span_start[s] to span_end[s] - 1 for s
     from span_first[b] to span_last[b] - 1. Walking them in this order is the order of (cell row, cell, id), in any stack.
@@ -34,10 +33,10 @@ class Blocks:
     Attributes:
         cuts: queries, block_first, block_strip, span_first, span_last, (5, n + 1); queries are the n sorted places of the query rows.
         spans: span_start and span_end, (2, number of spans or more).
-        points: Positions of the queries in their order [m], (3, n + LANES); what is behind the end may be read.
+        points: Positions of the queries [m], (3, n + LANES); the padding may be read.
         n_blocks: Number of blocks.
-        most: Largest number of candidates that one block has.
-        built: Build of the index that they were cut for.
+        most: Largest number of candidates of a block.
+        built: Number of the index build that the blocks belong to.
     """
 
     cuts: Longs
@@ -49,19 +48,19 @@ class Blocks:
 
     @classmethod
     def of(cls, n: int) -> Blocks:
-        """Return blocks for n rows, not yet cut; the spans may turn out to need more elements."""
+        """Allocate blocks for n rows; `spans` may need to grow later."""
         return cls(
             np.empty((5, n + 1), np.int64), np.empty((2, 2 * n + 64), np.int64), np.zeros((3, n + LANES))
         )
 
 
 def padded(n: int) -> Floats:
-    """N zeros that may be read in groups of LANES up to the last."""
+    """Return n zeros that are padded, so that they can be read in groups of LANES."""
     return np.zeros(n + LANES)[:n]
 
 
 class Index:
-    """Positions of all rows of all worlds at one instant; what a world's rows see is independent of the other worlds.
+    """Spatial index of all rows of all worlds at one instant; results in a world do not depend on other worlds.
 
     After `layout` and `build`: `order` (N,) row of each place; `place` (N,) its inverse; `points` (3, N + LANES) positions by
     place [m]. `built` counts the builds. `inverse_cell` (n_worlds,) [1/m] is 0 where a world is one cell. World w holds places
@@ -78,7 +77,7 @@ class Index:
         self.layout(np.zeros(0, np.int64), np.zeros(0, np.int64), 0)
 
     def layout(self, world: Longs, ids: Longs, n_worlds: int) -> None:
-        """Take over a new table: `world` (N,) and `ids` (N,) of its rows, unique within a world. Positions come with `build`."""
+        """Set the rows: `world` (N,) and `ids` (N,), unique within a world. Call `build` afterwards."""
         n = len(world)
         same_worlds = n_worlds == len(self.world_start) - 1
         if same_worlds and np.array_equal(world, self.row_world) and np.array_equal(ids, self.row_id):
@@ -114,16 +113,14 @@ class Index:
 
     @property
     def table(self) -> tuple[Longs, Longs, Longs, Longs, Floats, Floats]:
-        """world_start, keys, strips, world_strip, inverse_cell, points: what the kernels of `search` take."""
+        """Arrays for the kernels of `search`: world_start, keys, strips, world_strip, inverse_cell, points."""
         return self.world_start, self._keys, self._strips, self._world_strip, self.inverse_cell, self.points
 
     def build(self, x: Floats, y: Floats, z: Floats, reach: Floats, split: Split | None = None) -> None:
-        """Sort positions x, y, z (N,) [m] into cells. `reach` (n_worlds,) [m]: distance up to which blocks find everyone.
+        """Sort positions x, y, z (N,) [m] into cells; blocks find all neighbours up to `reach` (n_worlds,) [m].
 
-        `split` calls a function over parts of the places in several threads.
-
-        An infinite reach puts a world into one cell, in order of id; with every reach infinite the order depends on the layout
-        alone.
+        `split` calls a function for parts of the places in several threads. With an infinite reach, a world has one cell, in order
+        of id; if all reaches are infinite, the order depends only on the layout.
         """
         if reach is not self._given and (not np.array_equal(reach, self.reach) or not self.built):
             self._given, self.reach = reach, np.array(reach, np.float64)
@@ -143,11 +140,11 @@ class Index:
             split(n, lambda *part: kernels.build(*arrays, (kernels.PLACES, *part)))
 
     def update(self, first: int, last: int, x: Floats, y: Floats, z: Floats) -> None:
-        """Rows [first, last) moved, and keep their places; x, y, z (N,) [m] as for `build`. Only where all reaches are infinite."""
+        """Update the positions x, y, z (N,) [m] of rows [first, last). Only if all reaches are infinite."""
         kernels.update(first, last, x, y, z, self.place, self.points)
 
     def gather(self, column: Floats) -> Floats:
-        """A float column of the table by place, (N,), with LANES spare elements behind the end."""
+        """Return a float column of the table by place, (N,), padded by LANES elements."""
         out = padded(len(column))
         kernels.gather(column, self.order, out)
         return out

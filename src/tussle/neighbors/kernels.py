@@ -1,8 +1,8 @@
-"""Kernels of the index: sorting the entities of every world into cells, and blocks of queries with their candidates.
+"""Kernels of the index: sorting entities into cells, and blocks of queries with their candidates.
 
-A key packs (cell row, cell, rank) of an entity into 63 bits; the rank is its place in its world's list by id, so keys of a
-world are distinct and their order is unique, whatever the order before. Cells are floor(pos / cell) in absolute coordinates.
-Cells too far out for the bits left are clamped to the outermost one: still correct, only less selective.
+A key packs (cell row, cell, rank) of an entity into 63 bits; the rank is its index in its world's list by id. Keys of a world
+are distinct, so their sorted order does not depend on the order before. Cells are floor(pos / cell) in absolute coordinates.
+Cells outside the range of the bits are clamped to the outermost cell, which is correct but less selective.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ KEY_BITS = 62
 
 @device
 def rank_bits(n: int) -> int:
-    """Bits that hold the ranks of a world of n entities."""
+    """Number of bits for the ranks of a world of n entities."""
     bits = 1
     while (1 << bits) < n:
         bits += 1
@@ -30,14 +30,14 @@ def rank_bits(n: int) -> int:
 
 @device
 def row_of(world, entity, id_row, id_start):
-    """Row of the table of an entity by its id; -1 for every number that is not the id of a living entity of its world."""
+    """Table row of an entity by its id; -1 if no entity of its world has this id."""
     first = id_start[world]
     return id_row[first + entity] if 0 < entity < id_start[world + 1] - first else -1
 
 
 @device
 def cell_of(position, inverse_cell, limit):
-    """Cell number in [0, 2 limit]; NaN goes to cell 0. Never decreasing in position."""
+    """Cell number in [0, 2 limit], monotonic in position; 0 for NaN."""
     cell = math.floor(position * inverse_cell)
     cell = cell if cell > -limit else -limit
     cell = cell if cell < limit else limit
@@ -46,11 +46,11 @@ def cell_of(position, inverse_cell, limit):
 
 @kernel("(I I) (I I Iw) (Iw Iw Iw Iw) (Iw Iw) i8")
 def arrange(rows, old, new, work, n_worlds):
-    """New lists of the rows of each world by id, and the last sorted order carried over to them.
+    """List the rows of each world by id, and keep the last sorted order.
 
     rows: world and id of each row of the new table, (N,). old: old_start (n_worlds + 1,), old_ids (old N,) by rank, keys (old N,)
     sorted. new, written: world_start (n_worlds + 1,), members (N,) rows by rank, ids (N,) by rank, fresh (N,) keys that hold only
-    the rank, in the old order, newcomers last. work: scratch (N,), sequence (max(N, old N),).
+    the rank, in the old order, followed by new rows. work: scratch (N,), sequence (max(N, old N),).
     """
     row_world, row_id = rows
     old_start, old_ids, keys = old
@@ -101,7 +101,7 @@ def arrange(rows, old, new, work, n_worlds):
 
 @device
 def make_keys(pos, inverse_cell, worlds, keys, begin, end):
-    """Keys of the places [begin, end), whose ranks are in the low bits on entry."""
+    """Set the keys of the places [begin, end); on entry, their low bits hold the ranks."""
     x, y = pos[0], pos[1]
     world_start, members = worlds
     for w in range(world_start.shape[0] - 1):
@@ -123,7 +123,7 @@ def make_keys(pos, inverse_cell, worlds, keys, begin, end):
 
 @device
 def sort_worlds(inverse_cell, world_start, work, strips, world_strip):
-    """Sort the keys of every world and note where each strip begins."""
+    """Sort the keys of every world, and find the first place of each strip."""
     keys, scratch = work
     strip_start, strip_world = strips[0], strips[1]
     n_worlds = world_start.shape[0] - 1
@@ -149,7 +149,7 @@ def sort_worlds(inverse_cell, world_start, work, strips, world_strip):
 
 @device
 def put_places(pos, worlds, keys, placed, points, begin, end):
-    """Which row stands at the places [begin, end), and where."""
+    """Set row and position of the places [begin, end)."""
     x, y, z = pos
     world_start, members = worlds
     order, place = placed[0], placed[1]
@@ -171,10 +171,10 @@ KEYS, PART, SORT, PLACES = 1, 2, 4, 8
 
 @kernel("(F F F) F (I I) (Iw Iw) I2w F2w (I2w Iw) (i8 i8 i8)")
 def build(pos, inverse_cell, worlds, work, placed, points, strips, part):
-    """Sort the rows of every world by (cell row, cell, id) and note where each cell row (strip) begins.
+    """Sort the rows of every world by (cell row, cell, id), and find the first place of each cell row (strip).
 
     pos: x, y, z (N,) [m]; inverse_cell (n_worlds,) [1/m], 0 for one cell per world; worlds: world_start, members. work: keys (N,)
-    hold ranks in their low bits on entry, in any order, the last one for speed; scratch (N,). Written: placed, order and place,
+    hold ranks in their low bits on entry, in any order (fastest in the last sorted order); scratch (N,). Written: placed, order and place,
     (2, N); points, positions by place, (3, N + LANES); strips: first place and world of each strip, (2, N + 1), and the first
     strip of each world, (n_worlds + 1,). part: a sum of KEYS, PART, SORT and PLACES, in this order to be done, and the places
     [begin, end) to do it for; PART sorts these among themselves, which leaves little for SORT, which is for all.
@@ -195,7 +195,7 @@ def build(pos, inverse_cell, worlds, work, placed, points, strips, part):
 
 @kernel("i8 i8 F F F I F2w")
 def update(first, last, x, y, z, place, points):
-    """Rows [first, last) that moved and keep their places; x, y, z (N,) positions [m]."""
+    """Update the positions of rows [first, last), which keep their places; x, y, z (N,) [m]."""
     for i in range(first, last):
         p = place[i]
         points[0, p] = x[i]
@@ -205,7 +205,7 @@ def update(first, last, x, y, z, place, points):
 
 @kernel("F I Fw")
 def gather(column, order, out):
-    """out[p] = column[order[p]]."""
+    """Set out[p] = column[order[p]]."""
     for p in range(order.shape[0]):
         out[p] = column[order[p]]
 
@@ -222,7 +222,7 @@ def query_positions(queries, points, out):
 
 @kernel("I I I i8 i8 Iw Iw Iw -> i8")
 def group_queries(order, strip_start, world_strip, first, last, queries, block_first, block_strip):
-    """Places of rows [first, last) in sorted order, cut into blocks of up to LANES of one strip. Returns the number of blocks."""
+    """Split the places of rows [first, last) into blocks of up to LANES places of one strip. Returns the number of blocks."""
     n_strips = world_strip[world_strip.shape[0] - 1]
     n_blocks = 0
     done = 0
@@ -244,7 +244,7 @@ def group_queries(order, strip_start, world_strip, first, last, queries, block_f
 
 @device
 def lower_bound(keys: Any, start: int, end: int, bound: int) -> int:
-    """First place in [start, end) whose key is not below `bound`."""
+    """First place in [start, end) with a key >= bound."""
     while start < end:
         middle = (start + end) >> 1
         if keys[middle] < bound:
@@ -256,7 +256,7 @@ def lower_bound(keys: Any, start: int, end: int, bound: int) -> int:
 
 @device
 def step_to(keys: Any, start: int, end: int, bound: int, guess: int) -> int:
-    """As lower_bound, walking from a guess that is usually near."""
+    """Like `lower_bound`, by linear search from a guess."""
     while guess > start and keys[guess - 1] >= bound:
         guess -= 1
     while guess < end and keys[guess] < bound:
@@ -266,7 +266,7 @@ def step_to(keys: Any, start: int, end: int, bound: int, guess: int) -> int:
 
 @device
 def rectangle(x, y, start, end):
-    """Least and largest x and y of the points [start, end)."""
+    """Bounding rectangle of the points [start, end): west, east, south, north."""
     west, east, south, north = x[start], x[start], y[start], y[start]
     for q in range(start + 1, end):
         west = min(west, x[q])
