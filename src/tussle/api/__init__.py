@@ -1,4 +1,4 @@
-"""What a plugin author imports."""
+"""Interface for plugin authors."""
 
 from tussle.api.easy import (
     EasyAutonomy,

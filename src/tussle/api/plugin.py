@@ -13,10 +13,8 @@ import numpy as np
 from tussle.api.laws import NeighborLaw
 from tussle.api.row_laws import RowLaw
 from tussle.columns import (
-    Channel,
     Children,
     Column,
-    EntityRef,
     Handle,
     Input,
     Output,
@@ -173,20 +171,12 @@ class Plugin:
         return cls.declared(State)
 
     @classmethod
-    def refs(cls) -> dict[str, EntityRef]:
-        return cls.declared(EntityRef)
-
-    @classmethod
     def inputs(cls) -> dict[str, Input]:
         return cls.declared(Input)
 
     @classmethod
     def outputs(cls) -> dict[str, Output]:
         return cls.declared(Output)
-
-    @classmethod
-    def channels(cls) -> dict[str, Channel]:
-        return cls.declared(Channel)
 
     @classmethod
     def topics(cls) -> dict[str, Topic]:

@@ -158,7 +158,7 @@ class WorldView(GroupView):
             )
         return values
 
-    def spoken_for(self) -> list[int]:
+    def active_worlds(self) -> list[int]:
         """Numbers of the running worlds that this call acts on."""
         running = self.context.running
         return [int(w) for w in np.flatnonzero(running if self.only is None else running & self.only)]

@@ -50,26 +50,16 @@ class Listeners:
             self._listeners.remove(listener)
             self.on_change()
 
-    def _report(
-        self,
-        kind: str,
-        world: np.ndarray,
-        step: np.ndarray,
-        ids: np.ndarray,
-        other: np.ndarray,
-        text: list[str],
-    ) -> None:
-        if self.is_replaying:
-            return
-        events = Events(kind, world, step, ids, other, text)
-        for listener in list(self._listeners):
+    def _report(self, events: Events) -> None:
+        for listener in () if self.is_replaying else list(self._listeners):
             listener(events)
 
     def births(self, new: Bodies) -> None:
         """Report the births of new entities."""
         names = self._context.block_names
         step = self._context.clock.step[new.world]
-        self._report(BIRTH, new.world, step, new.id, np.zeros_like(new.id), [names[b] for b in new.block])
+        text = [names[b] for b in new.block]
+        self._report(Events(BIRTH, new.world, step, new.id, np.zeros_like(new.id), text))
 
     def messages(self, view: WorldView) -> None:
         """Report captures and collisions of this step, from the messages in the outboxes."""
@@ -86,7 +76,8 @@ class Listeners:
         batch = view.inbox(type_)
         one = batch.data[first]
         two = batch.data[second] if second else np.zeros_like(one)
-        self._report(kind, batch.world, self._context.clock.step[batch.world], one, two, [text] * batch.n)
+        step = self._context.clock.step[batch.world]
+        self._report(Events(kind, batch.world, step, one, two, [text] * batch.n))
         if not second:
             return
         for world, a, b in zip(batch.world.tolist(), one.tolist(), two.tolist(), strict=True):
@@ -108,9 +99,9 @@ class Listeners:
         rows, why = rows[order], [deaths[i][1] for i in number[first[order]]]
         world, ids = bodies.world[rows], bodies.id[rows]
         by = [self._causes.get(key, 0) for key in zip(world.tolist(), ids.tolist(), strict=True)]
-        self._report(DEATH, world, step[world], ids, np.array(by, np.int64), why)
+        self._report(Events(DEATH, world, step[world], ids, np.array(by, np.int64), why))
 
     def end(self, world: int, reason: str) -> None:
         """Report the end of a world."""
         numbers, none = np.array([world]), np.zeros(1, np.int64)
-        self._report(END, numbers, self._context.clock.step[numbers], none, none, [reason])
+        self._report(Events(END, numbers, self._context.clock.step[numbers], none, none, [reason]))

@@ -38,17 +38,14 @@ def raised(error: BaseException, plugin: Any, *, where: str, step: int, world: i
     if isinstance(error, TussleError) and all(
         frame.filename.startswith(_OWN) for frame in traceback.extract_tb(error.__traceback__)
     ):  # raised by this package: its message names the place
-        return PluginError(
-            str(error), where=where, step=step, world=world, plugin=plugin.instance_name, cause=error
-        )
-    place = error.__traceback__
-    while (
-        place is not None and place.tb_frame.f_code.co_filename.startswith(_OWN) and place.tb_next is not None
-    ):
-        place = place.tb_next
-    if place is not None and not place.tb_frame.f_code.co_filename.startswith(_OWN):
-        error = error.with_traceback(place)
-    text = f"{_location(error, plugin)}: {type(error).__name__}: {error}"
+        text = str(error)
+    else:
+        place = error.__traceback__
+        while place is not None and place.tb_frame.f_code.co_filename.startswith(_OWN):
+            place = place.tb_next
+        if place is not None:
+            error = error.with_traceback(place)
+        text = f"{_location(error, plugin)}: {type(error).__name__}: {error}"
     return PluginError(text, where=where, step=step, world=world, plugin=plugin.instance_name, cause=error)
 
 
@@ -77,27 +74,17 @@ def not_finite(group: Group, bodies: Bodies, row: int, step: int) -> PluginError
     i, world = row - group.first, int(bodies.world[row])
     who = f"{group.block_of(i)} {int(bodies.id[row])}"
     for binding in [*group.autonomies, *group.controllers]:
-        found = _not_finite_output(binding, group, i)
-        if found:
-            return PluginError(
-                f"{found} is not a finite number",
-                where=who,
-                step=step,
-                world=world,
-                plugin=binding.spec.instance_name,
-            )
-    values = ", ".join(
-        f"{name} = {np.array2string(getattr(bodies, name)[..., row], precision=6)}"
-        for name in ("pos", "quat", "health")
-    )
-    motion = group.motion.spec.instance_name
-    return PluginError(
-        f"the entity's state is not finite: {values}; all outputs of its autonomies and controllers are finite",
-        where=who,
-        step=step,
-        world=world,
-        plugin=motion,
-    )
+        if found := _not_finite_output(binding, group, i):
+            text = f"{found} is not a finite number"
+            break
+    else:
+        binding = group.motion
+        values = ", ".join(
+            f"{name} = {np.array2string(getattr(bodies, name)[..., row], precision=6)}"
+            for name in ("pos", "quat", "health")
+        )
+        text = f"the entity's state is not finite: {values}; all outputs of its autonomies and controllers are finite"
+    return PluginError(text, where=who, step=step, world=world, plugin=binding.spec.instance_name)
 
 
 def _not_finite_output(binding: Binding, group: Group, row: int) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import pickle
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -45,15 +46,10 @@ def snapshot(state: SimulationState) -> Snapshot:
         "failed": state.failed.copy(),
         "results": list(state.results),
         "parked": dict(state.parked),
-        "births": [
-            births.next_id.copy(),
-            births.n_born.copy(),
-            births.n_left.copy(),
-            [a.copy() for a in births.next_time],
-        ],
-        "referees": [r.copy() for r in state.world_bindings],
-        "mail": state.message_bus.save(),
-        "wishes": list(state.world_view.births),
+        "births": copy.deepcopy((births.next_id, births.n_born, births.n_left, births.next_time)),
+        "world_plugins": [r.copy() for r in state.world_bindings],
+        "messages": state.message_bus.save(),
+        "requested_births": list(state.world_view.births),
         "params": state.overrides.save(),
     }
     return Snapshot(state.mission, state.context.seeds.copy(), groups, world)
@@ -95,20 +91,19 @@ def restore(state: SimulationState, saved: Snapshot) -> None:
             binding.handles = {k: [None] * len(objects) for k, objects in saved_handles.items()}
         group.attach(population.bodies, first)
         _load_handles(state, group, handles)
-    births.next_id, births.n_born, births.n_left = (a.copy() for a in world["births"][:3])
-    births.next_time = [a.copy() for a in world["births"][3]]
+    births.next_id, births.n_born, births.n_left, births.next_time = copy.deepcopy(world["births"])
     clock = state.context.clock
     clock.step[:], clock.common = world["step"], world["common"]
     state.running[:], state.failed[:] = world["running"], world["failed"]
     state.results, state.parked = list(world["results"]), dict(world["parked"])
-    state.world_view.births = list(world["wishes"])
+    state.world_view.births = list(world["requested_births"])
     state.world_view.deaths, state.world_view.moved = [], []  # requested in an interrupted step
     state.overrides.restore(world["params"])
     state.n_running = int(state.running.sum())
     rows_changed(state)
-    for world_binding, columns in zip(state.world_bindings, world["referees"], strict=True):
+    for world_binding, columns in zip(state.world_bindings, world["world_plugins"], strict=True):
         world_binding.restore(columns)
-    state.message_bus.restore(world["mail"])
+    state.message_bus.restore(world["messages"])
 
 
 def _no_rows(group: Group, first: int) -> tuple[Any, ...]:
@@ -146,13 +141,11 @@ def hashed(state: SimulationState, world: int) -> Iterator[tuple[str, Any]]:
     yield "births", np.concatenate(counts)
     for times in births.next_time:
         yield "births", times[world]
-    for wish in state.world_view.births:
-        mine = wish["world"] == world
+    for request in state.world_view.births:
+        mine = request["world"] == world
         if mine.any():
-            yield "wish", f"{wish['block']} {mine.sum()}".encode()
-            yield from (
-                (name, array[..., mine]) for name, array in wish.items() if name not in ("block", "world")
-            )
+            yield "wish", f"{request['block']} {mine.sum()}".encode()
+            yield from ((k, array[..., mine]) for k, array in request.items() if k not in ("block", "world"))
     for name in HASHED:
         yield name, getattr(bodies, name)[..., rows]
     parts = []

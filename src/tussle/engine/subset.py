@@ -30,20 +30,23 @@ def _sub_table(table: Table, rows: np.ndarray) -> Table:
     return sub
 
 
+def _sub_plugin(plugin: Any, view: Any) -> Any:
+    """Copy a bound plugin; its topics get another view."""
+    sub = object.__new__(type(plugin))
+    for name, value in plugin.__dict__.items():
+        sub.__dict__[name] = Publisher(value.topic, view) if isinstance(value, Publisher) else value
+        if isinstance(value, Inbox):
+            sub.__dict__[name] = inbox = Inbox(value.topic, view)
+            inbox.deliveries = list(value.deliveries)
+    return sub
+
+
 def _sub_binding(binding: Binding, view: Any, rows: np.ndarray) -> Binding:
-    plugin = object.__new__(type(binding.plugin))
-    plugin.__dict__.update(binding.plugin.__dict__)
+    plugin = _sub_plugin(binding.plugin, view)
     sub = copy.copy(binding)
     sub.plugin, sub.view = plugin, view
     sub.handles = {k: [objects[i] for i in rows] for k, objects in binding.handles.items()}
     sub.children = [_sub_binding(child, view, rows) for child in binding.children]
-    for name, value in list(plugin.__dict__.items()):
-        if isinstance(value, Publisher):
-            plugin.__dict__[name] = Publisher(value.topic, view)
-        elif isinstance(value, Inbox):
-            inbox = Inbox(value.topic, view)
-            inbox.deliveries = list(value.deliveries)
-            plugin.__dict__[name] = inbox
     children = iter(sub.children)
     for name in type(plugin).children():
         plugin.__dict__[name] = [next(children).plugin for _ in plugin.__dict__[name]]
@@ -102,7 +105,7 @@ def call_world_plugin(
     worlds: np.ndarray,
     action: Callable[[WorldBinding, WorldView], None],
 ) -> None:
-    """Call action(referee, view) on a copy of the rows of the worlds where `worlds`, (n_worlds,), is true, then copy the results back."""
+    """Call action(binding, view) on a copy of the rows of the worlds where `worlds`, (n_worlds,), is true, then copy the results back."""
     bodies, view = population.bodies, world_binding.view
     rows = np.flatnonzero(worlds[bodies.world])
     sub_bodies = _sub_bodies(bodies, rows)
@@ -112,16 +115,12 @@ def call_world_plugin(
     sub_view.only = worlds
     sub_view.reset(sub_bodies, 0, len(rows))
     sub = copy.copy(world_binding)
-    sub.plugin = object.__new__(type(world_binding.plugin))
-    sub.plugin.__dict__.update(world_binding.plugin.__dict__)
+    sub.plugin = _sub_plugin(world_binding.plugin, sub_view)
     sub.tables = {
         per: _sub_table(table, rows if per == "entity" else np.arange(table.n))
         for per, table in world_binding.tables.items()
         if table.places  # a table without columns does not follow the number of rows
     }
-    for name, value in list(sub.plugin.__dict__.items()):
-        if isinstance(value, Publisher):
-            sub.plugin.__dict__[name] = Publisher(value.topic, sub_view)
     sub.attach()
     action(sub, sub_view)
     for per, part in sub.tables.items():

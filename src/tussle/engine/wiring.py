@@ -194,10 +194,8 @@ class Wiring:
     def _check_form(self, plugin: Any, column: Channel, bus: Bus) -> None:
         kind = "writes" if isinstance(column, Output) else "reads"
         for channel, (fields, own) in _forms(column).items():
-            at, there = (
-                f"{self.where}: {plugin.instance_name}.{column.name} {kind} channel {channel!r}",
-                bus.fields[channel],
-            )
+            at = f"{self.where}: {plugin.instance_name}.{column.name} {kind} channel {channel!r}"
+            there = bus.fields[channel]
             if fields != there:
                 raise WiringError(
                     f"{at} as {_form_text(fields)}, but another plugin declares it as {_form_text(there)}"

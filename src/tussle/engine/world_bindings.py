@@ -1,4 +1,4 @@
-"""World plugins bound to a stack: their parameters per world, their memory per world, team or entity."""
+"""World plugins bound to a stack: parameters per world, and states per world, team or entity."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ class WorldBinding:
     Attributes:
         plugin: The bound copy.
         spec: The plugin as data.
-        view: What its step is given.
+        view: View that is passed to its `step`.
         tables: "world", "team" and "entity" -> its columns.
-        places: Attribute -> (which table, where in it).
-        memory: Place and default of each state that worlds begin anew with.
+        places: Attribute -> (table, location of its column).
+        memory: Location and default of each state that a reset restores.
     """
 
     plugin: Any
@@ -44,8 +44,8 @@ class WorldBinding:
         """Bind a plugin of the mission to all worlds.
 
         Raises:
-            DeclarationError: It declares a column that only entities' plugins have.
-            WiringError: A topic belongs to a network that is not there.
+            DeclarationError: It declares a column that only entity plugins can have.
+            WiringError: A topic belongs to a network that does not exist.
         """
         world_binding = cls(spec.bound(), spec, view)
         n_worlds, n_teams = view.n_worlds, len(view.teams)
@@ -95,18 +95,18 @@ class WorldBinding:
                 array[..., worlds] = overrides.fill(name, (name,), key, self.spec.values[key], worlds)
 
     def reset(self, worlds: np.ndarray) -> None:
-        """Memory of some worlds back to the declared defaults."""
+        """Reset the states of some worlds to the declared defaults."""
         for place, default in self.memory:
             self.tables["world"].array(place)[..., worlds] = default
 
     def rearrange(self, index: np.ndarray) -> None:
-        """The body table has been repacked."""
+        """Reorder the states per entity, after the body table has been repacked."""
         if self.tables["entity"].places:
             self.tables["entity"].rearrange(index)
             self.attach()
 
     def attach(self) -> None:
-        """Give the plugin its arrays anew."""
+        """Set the plugin's attributes to the current arrays."""
         declared = type(self.spec).columns
         for name, (per, place) in self.places.items():
             array = self.tables[per].array(place)

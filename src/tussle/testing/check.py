@@ -56,9 +56,8 @@ def check_plugin(cls: type[Plugin], *, companions: Sequence[Any] | None = None, 
             _play(variant, companions or (), is_first=number == 0)
         except ConformanceError as error:
             if number and repr(variant) not in error.evidence:
-                raise ConformanceError(
-                    error.plugin, error.rule, f"as {variant!r}, {error.evidence}"
-                ) from error
+                text = f"as {variant!r}, {error.evidence}"
+                raise ConformanceError(error.plugin, error.rule, text) from error
             raise
         except TussleError as error:
             if number and companions and isinstance(error, WiringError):
@@ -66,9 +65,8 @@ def check_plugin(cls: type[Plugin], *, companions: Sequence[Any] | None = None, 
             cause = error.__cause__
             if isinstance(cause, ConformanceError):  # raised inside a call and wrapped as its failure
                 raise cause from None
-            raise ConformanceError(
-                cls.__name__, "runs", f"as {variant!r} in the kit's game: {error}"
-            ) from error
+            text = f"as {variant!r} in the kit's game: {error}"
+            raise ConformanceError(cls.__name__, "runs", text) from error
         check_class_values(cls, before)
 
 

@@ -44,7 +44,7 @@ def check_limits(game: ConformanceGame) -> None:
         some = cases[first : first + most]
         try:
             _play(game, some)
-        except MissionError:  # such as no room to place an entity, which is a valid refusal
+        except MissionError:  # such as no free position for an entity, which is allowed
             for case in some:
                 with contextlib.suppress(MissionError):
                     _play(game, [case])
@@ -72,8 +72,8 @@ def _values(column: Param, default: Any) -> Iterator[Any]:
         tried = [b for b in (column.ge, column.le) if b is not None and math.isfinite(b)]
         for bound, sign in ((column.gt, 1.0), (column.lt, -1.0)):
             if bound is not None and math.isfinite(bound):
-                room = abs(default - bound) if math.isfinite(default) and default != bound else 1.0
-                tried.append(bound + sign * (NEAR * room if column.dtype is float else 1))
+                distance = abs(default - bound) if math.isfinite(default) and default != bound else 1.0
+                tried.append(bound + sign * (NEAR * distance if column.dtype is float else 1))
         if math.isfinite(default):
             tried += [0.1 * default, 10.0 * default]
     for value in dict.fromkeys(column.dtype(v) for v in tried):
@@ -97,11 +97,8 @@ def _play(game: ConformanceGame, cases: list[Case]) -> None:
                     sim.step()
                     world, text = _not_finite(sim)
                     if text:
-                        raise ConformanceError(
-                            type(plugin).__name__,
-                            RULE,
-                            f"{cases[world].words}, {text} after {step + 1} steps",
-                        )
+                        words = f"{cases[world].words}, {text} after {step + 1} steps"
+                        raise ConformanceError(type(plugin).__name__, RULE, words)
         except PluginError as error:
             if not error.plugin:  # not raised by a plugin: the mission is impossible
                 raise MissionError(error.message) from error
@@ -121,9 +118,7 @@ def _not_finite(sim: Simulation) -> tuple[int, str]:
                 items = binding.plugin.__dict__[name]
                 bad = np.flatnonzero(~np.isfinite(np.atleast_2d(items.data)).all(axis=0))
                 if len(bad) and name in binding.writable:
-                    row = group.first + int(items.row[bad[0]])
-                    where = f"an item of {'.'.join(binding.path)}.{name}"
-                    return int(
-                        sim.state.population.bodies.world[row]
-                    ), f"{where} is {items.data[..., bad[0]]}"
+                    world = sim.state.population.bodies.world[group.first + int(items.row[bad[0]])]
+                    text = f"an item of {'.'.join(binding.path)}.{name} is {items.data[..., bad[0]]}"
+                    return int(world), text
     return 0, ""

@@ -64,6 +64,10 @@ class Flight:
         self.group.integrate = integrate
         self.x, self.u, self.p = np.array(states), np.array(inputs), np.array(self.group.p)
 
+    def error(self, rule: str, text: str) -> ConformanceError:
+        """Return the error of a rule that the model breaks."""
+        return ConformanceError(type(self.group.motion.spec).__name__, rule, text)
+
 
 def check_motion(game: ConformanceGame, is_default: bool) -> None:
     """All rules for motion models.
@@ -80,7 +84,7 @@ def check_motion(game: ConformanceGame, is_default: bool) -> None:
     with flight.sim:
         _check_rollout(model, flight)
         _check_rows(model, flight)
-        _check_bodies(model, flight)
+        _check_bodies(flight)
         is_solved = type(model).advance is MotionModel.advance and not model.row_laws
         if model.derivative is not None and (is_default or is_solved):
             equation = model.solver()
@@ -102,7 +106,7 @@ def _check_rollout(model: Any, flight: Flight) -> None:
         step, field, row = (int(i[0]) for i in np.nonzero(path != flight.x))
         name, planned, flown = model.state().fields[field], path[step, field, row], flight.x[step, field, row]
         text = f"{name} after step {step} is {planned!r} in the rollout and {flown!r} in flight"
-        raise ConformanceError(type(model).__name__, "rollout", text)
+        raise flight.error("rollout", text)
 
 
 def _check_rows(model: Any, flight: Flight) -> None:
@@ -116,11 +120,7 @@ def _check_rows(model: Any, flight: Flight) -> None:
         u, p = np.ascontiguousarray(flight.u[0][:, a:b]), np.ascontiguousarray(flight.p[:, a:b])
         integrate(part, u, p, flight.dt, flight.substeps)
         if part.tobytes() != np.ascontiguousarray(whole[:, a:b]).tobytes():
-            raise ConformanceError(
-                type(model).__name__,
-                "rows",
-                f"rows {a} to {b} of {n} take another path alone than among all rows",
-            )
+            raise flight.error("rows", f"rows {a} to {b} of {n} take another path alone than among all rows")
 
 
 # -- the equation and its solvers -------------------------------------------------------------------------------------------------
@@ -150,7 +150,7 @@ def _check_order(model: Any, flight: Flight, equation: Integrator) -> None:
         # A clamp or a sign function in the equation lowers the order of single rows; a wrong equation that of all rows.
         if np.median(order) < ORDER - SLACK:
             text = f"halving the step divides the error of the derivative's path by 2^{np.median(order):.2f}, not 2^4; is it smooth in x?"
-            raise ConformanceError(type(model).__name__, "order of convergence", text)
+            raise flight.error("order of convergence", text)
 
 
 def _check_kernel(model: Any, flight: Flight, equation: Integrator) -> None:
@@ -173,7 +173,7 @@ def _check_kernel(model: Any, flight: Flight, equation: Integrator) -> None:
                 f"{model.state().fields[field]} after one step is {path[field, row]!r} by advance and {coarse[field, row]!r} by "
                 f"the derivative; they may differ by {np.broadcast_to(tolerance, gap.shape)[field, row]:.1e}"
             )
-            raise ConformanceError(type(model).__name__, "advance", text)
+            raise flight.error("advance", text)
 
 
 def _check_convergence(model: Any, flight: Flight) -> None:
@@ -185,7 +185,7 @@ def _check_convergence(model: Any, flight: Flight) -> None:
     if gaps[2] > 0.75 * gaps[0] + 4.0 * noise:
         changes = ", ".join(f"{gap:.1e}" for gap in gaps)
         text = f"halving the substeps three times changes the result of a step by {changes}; it does not converge"
-        raise ConformanceError(type(model).__name__, "convergence", text)
+        raise flight.error("convergence", text)
 
 
 # -- conversion to and from the body table ----------------------------------------------------------------------------------------
@@ -205,7 +205,7 @@ def _check_velocity(model: MotionModel, flight: Flight) -> None:
     step, axis, row = (int(i) for i in np.unravel_index(np.argmax(np.where(stays, near, 0.0)), near.shape))
     if stays.any(axis=1).mean() > FEW:
         text = f"the rate of pos differs from vel by {near[step, axis, row]:.3g} m/s along {'xyz'[axis]}"
-        raise ConformanceError(type(model).__name__, "velocity", text)
+        raise flight.error("velocity", text)
 
 
 def _velocity_gap(model: MotionModel, flight: Flight, h: float) -> np.ndarray:
@@ -224,16 +224,15 @@ def _velocity_gap(model: MotionModel, flight: Flight, h: float) -> np.ndarray:
             group.integrate(group.x, u, flight.p, h, 1)
         (before, first), (after, second) = at
         if not np.isfinite(first).all():
-            raise ConformanceError(type(model).__name__, "velocity", "to_body does not write vel of all rows")
+            raise flight.error("velocity", "to_body does not write vel of all rows")
         gaps.append(np.abs((after - before) / h - 0.5 * (first + second)))
     columns[:] = kept
     bound.to_body(body)
     return np.array(gaps)
 
 
-def _check_bodies(model: MotionModel, flight: Flight) -> None:
+def _check_bodies(flight: Flight) -> None:
     """A model reads back unchanged what it wrote to the body table, and continues from where it is placed."""
-    name = type(model).__name__
     group, body = flight.group, flight.group.moving
     bound: Any = group.motion.plugin
     rows = np.arange(group.n)
@@ -242,20 +241,14 @@ def _check_bodies(model: MotionModel, flight: Flight) -> None:
     bound.from_body(body, rows)
     bound.to_body(body)
     size = np.abs(before["pos"]).max()
-    if np.abs(body.pos - before["pos"]).max() > 4.0 * EPS * size:
-        raise ConformanceError(
-            name,
-            "body round trip",
-            f"from_body and to_body move entities by {np.abs(body.pos - before['pos']).max():.1e} m",
-        )
+    moved = np.abs(body.pos - before["pos"]).max()
+    if moved > 4.0 * EPS * size:
+        raise flight.error("body round trip", f"from_body and to_body move entities by {moved:.1e} m")
     steep = np.abs(np.cos(body.climb)) < 0.05  # gimbal lock: yaw and roll are not unique
     turned = np.minimum(np.abs(body.quat - before["quat"]), np.abs(body.quat + before["quat"])).max(axis=0)
     if (turned[~steep] > 20.0 * WORST_ANGLE).any():
-        raise ConformanceError(
-            name,
-            "body round trip",
-            f"from_body and to_body turn entities: quat changes by {turned[~steep].max():.1e}",
-        )
+        text = f"from_body and to_body turn entities: quat changes by {turned[~steep].max():.1e}"
+        raise flight.error("body round trip", text)
     group.x[:] = kept
     bound.to_body(body)
     body.pos[:, :3] += 7.0
@@ -263,9 +256,8 @@ def _check_bodies(model: MotionModel, flight: Flight) -> None:
     others = group.x[:, 3:].copy()
     bound.from_body(body, rows[:3])
     if group.x[:, 3:].tobytes() != others.tobytes():
-        raise ConformanceError(name, "from_body", "it changes the state of rows that are not in `rows`")
+        raise flight.error("from_body", "it changes the state of rows that are not in `rows`")
     bound.to_body(body)
     if not np.allclose(body.pos[:, :3], wanted[:, :3], rtol=4.0 * EPS, atol=4.0 * EPS * size):
-        raise ConformanceError(
-            name, "from_body", f"an entity placed at {wanted[:, 0]} continues from {body.pos[:, 0]}"
-        )
+        text = f"an entity placed at {wanted[:, 0]} continues from {body.pos[:, 0]}"
+        raise flight.error("from_body", text)

@@ -86,27 +86,15 @@ def check_snapshot(game: ConformanceGame, traces: Traces) -> None:
     with game.play(seeds) as sim:
         sim.step(7)
         saved: Any = sim.snapshot()
-        _follow(
-            sim,
-            traces,
-            seeds,
-            range(7, STEPS + 1),
-            "snapshot",
-            "world alone versus after taking a snapshot",
-        )
+        steps = range(7, STEPS + 1)
+        _follow(sim, traces, seeds, steps, "snapshot", "world alone versus after taking a snapshot")
         sim.restore(saved)
-        _follow(sim, traces, seeds, range(7, STEPS + 1), "snapshot", "before versus after restore")
+        _follow(sim, traces, seeds, steps, "snapshot", "before versus after restore")
     with game.play(seeds) as other:
         other.step(2)
         other.restore(saved)
-        _follow(
-            other,
-            traces,
-            seeds,
-            range(7, STEPS + 1),
-            "snapshot",
-            "before versus after restore into another simulation",
-        )
+        where = "before versus after restore into another simulation"
+        _follow(other, traces, seeds, steps, "snapshot", where)
 
 
 def _follow(sim: Simulation, traces: Traces, seeds: list[int], steps: range, rule: str, where: str) -> None:

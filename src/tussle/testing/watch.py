@@ -41,9 +41,8 @@ def check_calls(game: ConformanceGame) -> None:
         sim.step(STEPS)
         for watch in watches:
             own = watch.plugin.__dict__
-            own = (
-                {**own, **own["_look"].author.__dict__} if "_look" in own else own
-            )  # easy mode: the author's `self`
+            if "_look" in own:  # easy mode: the author's `self`
+                own = own | own["_look"].author.__dict__
             extra = sorted(set(own) - set(cls.columns) - BOUND - set(HOOKS))
             if extra:
                 text = f"{extra[0]} is stored on the plugin object, which all entities share; declare a State"
@@ -138,17 +137,15 @@ class Watch:
             label, step = given["label"], self.sim.state.context.clock.step.tobytes()
             keys = [v for k, v in given.items() if k not in {"self", "label", "law", "k"}]
             of = [v.other.tobytes() if isinstance(v, Pairs) else np.asarray(v).tobytes() for v in keys]
-            key, now = (
-                (label, getattr(view._caller, "instance_name", ""), step, view.substep, *of),
-                (hook, self.calls),
-            )
+            key = label, getattr(view._caller, "instance_name", ""), step, view.substep, *of
+            now = hook, self.calls
             first = self.drawn.setdefault(key, now)
             # A hook may be called several times in a step, for different rows.
             if first is not now and (first == now or first[0] != hook):
-                raise self._error(
-                    "draws",
-                    f"{hook} draws {label!r} again in a step, which gives the same numbers; use another label",
+                text = (
+                    f"{hook} draws {label!r} again in a step, which gives the same numbers; use another label"
                 )
+                raise self._error("draws", text)
             return law(view, *args, **kwargs)
 
         return draw

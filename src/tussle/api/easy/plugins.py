@@ -144,10 +144,10 @@ class EasyWorldPlugin(EasyPlugin, WorldPlugin):
 
     def start(self, w: WorldView) -> None:
         if type(self).start_one is not EasyWorldPlugin.start_one:
-            self._each(w, "start_one", w.spoken_for())
+            self._each(w, "start_one", w.active_worlds())
 
     def _step_each(self, w: WorldView) -> None:
-        self._each(w, "step_one", w.spoken_for())
+        self._each(w, "step_one", w.active_worlds())
 
     def result_of(self, w: WorldView, world: int) -> dict[str, Any]:
         shared = WorldShared(self, w, "result_one ")

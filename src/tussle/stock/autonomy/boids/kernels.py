@@ -91,7 +91,7 @@ def length(x, y, z):
 
 @kernel("F F -> b1")
 def sees_all(fov_az, fov_el):
-    """Whether the fields of view [rad], (n,) each, exclude nobody."""
+    """Whether the fields of view [rad], (n,) each, exclude no entity."""
     for i in range(fov_az.shape[0]):
         if fov_az[i] < 2.0 * math.pi or fov_el[i] <= math.pi:
             return False

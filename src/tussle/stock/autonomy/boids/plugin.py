@@ -38,7 +38,7 @@ class Boids(Autonomy):
         unit="rad",
         text_unit="deg",
         ge=0.0,
-        doc="Field of view in elevation; at 360 degrees nobody is excluded.",
+        doc="Field of view in elevation; at 360 degrees no entity is excluded.",
     )
     fov_az = Param(2.0 * math.pi, unit="rad", text_unit="deg", ge=0.0, doc="Field of view in azimuth.")
     goal_weight = Param(0.1, ge=0.0, doc="Weight of the direction to the goal.")
