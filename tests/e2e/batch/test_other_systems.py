@@ -1,4 +1,4 @@
-"""A game and a batch where the parts of Python and of the operating system that Windows or macOS lacks are hidden."""
+"""All modules, a game and a batch where the parts of Python and of the operating system that Windows or macOS lacks are hidden."""
 
 from __future__ import annotations
 
@@ -21,8 +21,9 @@ for module, names in {
 """
 
 PLAY = """
-import warnings
+import importlib, pkgutil, warnings
 
+import tussle
 from tussle import Block, Mission, Simulation
 from tussle.batch import Batch, Processes
 from tussle.stock import Still
@@ -38,6 +39,9 @@ if __name__ == "__main__":
     assert results.runs["state_hash"].to_pylist() == alone, (results.runs, alone)
     assert any("has no locks" in str(each.message) for each in caught), caught
     assert Processes().n >= 1
+    for module in pkgutil.walk_packages(tussle.__path__, "tussle."):
+        if ".templates." not in module.name and not module.name.endswith("__main__"):
+            importlib.import_module(module.name)
 """
 
 
