@@ -61,15 +61,11 @@ class Overrides:
 
     def save(self) -> list[dict[Any, Any]]:
         """Copy all values, for snapshots."""
-        return [
-            {k: copy.copy(v) for k, v in part.items()} for part in (self.columns, self.given, self.structural)
-        ]
+        return copy.deepcopy([self.columns, self.given, self.structural])
 
     def restore(self, saved: list[dict[Any, Any]]) -> None:
         """Restore the values that `save` returned."""
-        self.columns, self.given, self.structural = (
-            {k: copy.copy(v) for k, v in part.items()} for part in saved
-        )
+        self.columns, self.given, self.structural = copy.deepcopy(saved)
 
     def _find(self, path: str) -> tuple[tuple[str, tuple[str, ...], str], Param]:
         owners, name = paths.follow(path, paths.MissionRoot(self.mission), paths.inside, paths.settable)
