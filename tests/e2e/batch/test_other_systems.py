@@ -35,7 +35,7 @@ if __name__ == "__main__":
     alone = [result.state_hash for result in sim.run()]
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        results = Batch(mission, runs=2).play("out", Processes(2))
+        results = Batch(mission, runs=2).play("out", Processes(1))
     assert results.runs["state_hash"].to_pylist() == alone, (results.runs, alone)
     assert any("has no locks" in str(each.message) for each in caught), caught
     assert Processes().n >= 1
