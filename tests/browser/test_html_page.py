@@ -8,10 +8,10 @@ from dataclasses import replace
 import matplotlib.image
 import numpy as np
 import pytest
-from recorded_games import hunt
+from recorded_games import hunt, record
 from waiting import wait_until
 
-from tussle import Block, Mission, Recorder, Simulation
+from tussle import Block, Mission
 from tussle.mission import read_mission
 from tussle.stock import Still
 from tussle.view import Recording
@@ -19,13 +19,6 @@ from tussle.view.export.html import write_html
 from tussle.view.terrain import Terrain
 
 READY = "Boolean(window.player && player.isReady)"
-
-
-def record(mission, directory, **options):
-    sim = Simulation(mission)
-    with Recorder(sim, directory, **options):
-        sim.run()
-    return directory
 
 
 @pytest.fixture(scope="session")

@@ -50,7 +50,7 @@ def told(messages):
 # -- as a user types it ---------------------------------------------------------------------------------------------------------
 
 
-def test_a_batch_is_played_counted_and_gone_on_with(process, folder):
+def test_a_batch_is_played_counted_and_gone_on_with(process, tussle, folder):
     command = ("batch", "chance.xml", "--vary", "odds=0.1,0.3", *PLUGINS)
     done = process(*command, "--runs", 9, "--processes", 2)
     (path,) = (folder / "batches").iterdir()
@@ -63,10 +63,10 @@ def test_a_batch_is_played_counted_and_gone_on_with(process, folder):
     assert heads[-5:] == ["played", "batch", "next", "tussle", "tussle"]
     assert f" batch   batches/{path.name}" in lines
     assert re.search(r"\n played  18 runs in \d+:\d\d \(\S+ runs/s\), \S+ CPU s in all\n", done.stdout)
-    again = process(*command, "--runs", 9)
+    again = tussle(*command, "--runs", 9)
     assert told(again.stderr) == f"note: 18 of 18 runs were there already, in batches/{path.name}\n"
     assert "played" not in again.stdout
-    more = process(*command, "--runs", 12, "--processes", 1)
+    more = tussle(*command, "--runs", 12, "--processes", 1)
     assert told(more.stderr) == f"note: 18 of 24 runs were there already, in batches/{path.name}\n"
     assert " 24 runs · 2 points · seeds 1 to 12\n" in more.stdout
     assert re.search(r"\n played  6 runs in", more.stdout)

@@ -3,13 +3,12 @@
 import math
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from tussle.numeric.quaternion import quat_rotate
 from tussle.stock.motion.simple_aircraft import SimpleAircraft
 from tussle.stock.motion.simple_aircraft import kernels as aircraft
-from tussle.stock.motion.single_integrator import kernels as single
 from tussle.stock.motion.unicycle import Unicycle
 from tussle.stock.motion.unicycle import kernels as unicycle
 
@@ -22,25 +21,8 @@ UNLIMITED = np.array([[1e3], [1e3], [1e3], [1e3]])
 AIRFRAME = np.array([[13.0], [1.0], [80.0], [1.4], [1.4], [3.0], [3.0], [50.0], [0.0]])
 
 
-def turned(points, by):
-    c, s = math.cos(by), math.sin(by)
-    x, y, z = points
-    return np.array([c * x - s * y, s * x + c * y, z])
-
-
 def column(*values):
     return np.array(values, float)[:, None]
-
-
-@given(yaw=angle, pitch=angle, by=angle, v=speed, w=rate, q=rate, n=substeps)
-def test_unicycle_path_turns_with_its_start(yaw, pitch, by, v, w, q, n):
-    u = column(v, w, q)
-    straight, rotated = column(0, 0, 0, yaw, pitch), column(0, 0, 0, yaw + by, pitch)
-    for _ in range(10):
-        UNICYCLE(straight, u, UNLIMITED, 0.1, n)
-        UNICYCLE(rotated, u, UNLIMITED, 0.1, n)
-    assert np.abs(rotated[:3, 0] - turned(straight[:3, 0], by)).max() < 1e-11
-    assert abs(rotated[3, 0] - straight[3, 0] - by) < 1e-13
 
 
 @given(yaw=angle, pitch=angle, v=speed, w=rate, q=rate, n=substeps)
@@ -77,35 +59,6 @@ def test_unicycle_publishes_its_speed_along_its_nose(yaw, pitch, v, w, q):
     )
     assert abs(np.linalg.norm(out[3:6]) - abs(v)) < 1e-12
     assert np.abs(quat_rotate(out[6:10], column(v, 0, 0)) - out[3:6]).max() < 1e-6
-
-
-@given(command=st.tuples(speed, speed, speed), by=angle, n=substeps)
-@settings(max_examples=50)
-def test_single_integrator_path_turns_with_its_command(command, by, n):
-    straight, rotated = np.zeros((8, 1)), np.zeros((8, 1))
-    single.advance(straight, column(*command), column(-1.0), 0.3, n)
-    single.advance(rotated, column(*turned(command, by)), column(-1.0), 0.3, n)
-    assert np.abs(rotated[:3, 0] - turned(straight[:3, 0], by)).max() < 1e-12
-
-
-@given(
-    yaw=angle,
-    by=angle,
-    roll=st.floats(-1.0, 1.0),
-    pitch=st.floats(-1.0, 1.0),
-    v=st.floats(5.0, 50.0),
-    p=rate,
-    q=rate,
-    n=substeps,
-)
-def test_aircraft_path_turns_with_its_start(yaw, by, roll, pitch, v, p, q, n):
-    u = column(1.0, p, q)
-    straight, rotated = column(0, 0, 0, roll, pitch, yaw, v), column(0, 0, 0, roll, pitch, yaw + by, v)
-    for _ in range(5):
-        AIRCRAFT(straight, u, AIRFRAME, 0.1, n)
-        AIRCRAFT(rotated, u, AIRFRAME, 0.1, n)
-    assert np.abs(rotated[:3, 0] - turned(straight[:3, 0], by)).max() < 1e-10
-    assert np.array_equal(rotated[[2, 3, 4, 6]], straight[[2, 3, 4, 6]])
 
 
 @given(yaw=angle, roll=st.floats(-1.3, 1.3), pitch=st.floats(-1.3, 1.3), v=st.floats(1.0, 80.0))

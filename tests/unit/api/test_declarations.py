@@ -10,7 +10,6 @@ import pytest
 from design_plugins import Chaser
 from small_worlds import Delivery, Note
 
-from tussle import Block, Mission, Simulation
 from tussle.api import (
     Autonomy,
     Children,
@@ -28,7 +27,7 @@ from tussle.api import (
 )
 from tussle.errors import DeclarationError, ParameterError, UnitError
 from tussle.messages import EntityCaptured
-from tussle.stock import Boids, MotorSchemas, MoveToGoalMS, Predator, Unicycle
+from tussle.stock import MotorSchemas, MoveToGoalMS
 
 
 class Sample(Autonomy):
@@ -162,11 +161,6 @@ def test_a_plugin_is_a_value_and_has_no_arrays():
     assert isinstance(Sample.speed, Param)
 
 
-@pytest.mark.parametrize("kind", [Boids, Predator, Unicycle])
-def test_shipped_plugins_are_data(kind):
-    assert kind() == pickle.loads(pickle.dumps(kind()))
-
-
 # -- declarations -----------------------------------------------------------------------------------------------------------------
 
 
@@ -291,17 +285,3 @@ def test_messages_keep_the_order_of_saying():
 def test_a_unit_that_is_not_si_is_refused(unit):
     with pytest.raises(DeclarationError, match=r"is not an SI unit"):
         Param((0.0, 0.0) if " " in unit else 0.0, unit=unit, fields="a b" if " " in unit else "")
-
-
-def test_a_text_means_the_same_through_every_door():
-    """A number is SI, a text is read as a mission file reads it."""
-    right_angle = math.pi / 2
-    assert Boids(fov_az="90").values["fov_az"] == right_angle
-    assert Boids(fov_az=right_angle).values["fov_az"] == right_angle
-    block = Block(name="b", heading="90", autonomy=Boids(), motion=Unicycle())
-    assert block.heading == right_angle
-    game = Mission(blocks=[block])
-    for value in ("90", "90 deg", right_angle):
-        with Simulation(game, params={"b.Boids.fov_az": value, "b.heading": value}) as sim:
-            assert sim.read("b.Boids.fov_az")[0] == right_angle
-            assert sim.read("b.yaw")[0] == pytest.approx(right_angle)

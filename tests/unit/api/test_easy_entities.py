@@ -568,24 +568,6 @@ def errants():
     )
 
 
-def test_world_k_of_a_stack_is_world_k_alone():
-    stacked = hashes(errants(), [3, 4, 5])
-    assert stacked == [hashes(errants(), [seed])[0] for seed in (3, 4, 5)]
-    assert stacked == hashes(errants(), [3, 4, 5], threads=2)
-    assert len(set(stacked)) == 3
-
-
-def test_a_snapshot_has_the_same_future():
-    sim = Simulation(errants(), seeds=[3, 4])
-    sim.step(5)
-    saved = sim.snapshot()
-    sim.run()
-    first = [sim.state_hash(w) for w in (0, 1)]
-    sim.restore(saved)
-    sim.run()
-    assert [sim.state_hash(w) for w in (0, 1)] == first
-
-
 def test_entities_one_after_the_other_and_at_a_rate():
     sequential = errants().replace(update="sequential")
     assert hashes(sequential, [3, 4]) == [hashes(sequential, [seed])[0] for seed in (3, 4)]

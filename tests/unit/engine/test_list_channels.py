@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from small_worlds import Drift, Reaper, block, hashes, mission
+from small_worlds import Drift, Reaper, block, mission
 
 from tussle import Simulation
 from tussle.api import Autonomy, Behavior, Controller, EasyAutonomy, Input, Output, Param, Sensor, State
@@ -219,46 +219,6 @@ def test_lists_move_with_their_rows_when_others_die_and_are_born():
                 lengths.add((name, len(own)))
             assert all(lists[tuple(w)] is None for w in np.argwhere(~alive))
     assert {("late", 0), ("late", 1), ("late", 2), ("late", 3), ("reaped", 2)} <= lengths
-
-
-def crowded(**values):
-    make = lambda name, team, **more: block(  # noqa: E731
-        name, team=team, count=5, variance=(60.0, 60.0, 5.0), autonomy=Follow(), **more
-    )
-    return mission(
-        make("a", 1, sensor=Camera(rate=3.0)),
-        make("b", 2, sensor=Camera(reach=25.0), rate=4.0),
-        interactions=[Reaper(team=1, at=1.3)],
-        end=2.0,
-        **values,
-    )
-
-
-def test_a_world_is_the_same_in_any_stack():
-    stack = hashes(crowded(), [4, 2, 9])
-    assert stack == [hashes(crowded(), seed)[0] for seed in (4, 2, 9)]
-    assert len(set(stack)) == 3
-    assert hashes(crowded(update="sequential"), [4, 2]) == [
-        hashes(crowded(update="sequential"), seed)[0] for seed in (4, 2)
-    ]
-
-
-def test_reset_and_restore_bring_lists_back():
-    fresh = hashes(crowded(), [1, 2, 3])
-    sim = Simulation(crowded(), seeds=[1, 7, 3])
-    sim.step(6)
-    sim.reset([1], seeds=[2])
-    sim.step(5)
-    saved = sim.snapshot()
-    before = [sim.state_hash(k) for k in range(3)]
-    while not sim.is_over:
-        sim.step()
-    assert [r.state_hash for r in sim.result()] == fresh
-    sim.restore(saved)
-    assert [sim.state_hash(k) for k in range(3)] == before
-    while not sim.is_over:
-        sim.step()
-    assert [r.state_hash for r in sim.result()] == fresh
 
 
 def test_a_reset_empties_the_lists_of_its_worlds_alone():

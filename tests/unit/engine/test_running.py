@@ -255,18 +255,6 @@ def rich(**values):
     )
 
 
-@pytest.mark.parametrize("after", [1, 7, 20])
-def test_reset_of_some_worlds_is_a_fresh_start_and_leaves_the_others_alone(after):
-    fresh = hashes(rich(), [1, 2, 3])
-    sim = Simulation(rich(), seeds=[1, 9, 3])
-    sim.step(after)
-    sim.reset([1], seeds=[2])
-    while not sim.is_over:
-        sim.step()
-    assert [r.state_hash for r in sim.result()] == fresh
-    assert [r.seed for r in sim.result()] == [1, 2, 3]
-
-
 def test_a_slot_takes_the_next_seed_while_its_neighbours_go_on():
     game = rich(end_conditions="time")
     fresh = hashes(game, [1, 2, 3, 4])
@@ -323,28 +311,6 @@ def test_resets_that_cannot_be(arguments, message):
 
 
 # -- snapshots --------------------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("at", [0, 3, 11])
-def test_snapshot_and_restore_lead_to_the_same_future(at):
-    sim = Simulation(rich(), seeds=[1, 2, 3])
-    sim.step(at)
-    saved = sim.snapshot()
-    first = [r.state_hash for r in sim.run()]
-    assert first == hashes(rich(), [1, 2, 3])
-    sim.restore(saved)
-    assert sim.steps.tolist() == [at] * 3
-    assert [r.state_hash for r in sim.run()] == first
-
-
-def test_a_snapshot_fits_another_simulation_of_the_mission():
-    sim = Simulation(rich(), seeds=[1, 2])
-    sim.step(9)
-    saved = sim.snapshot()
-    other = Simulation(rich(), seeds=[7, 8])
-    other.restore(saved)
-    assert other.state.context.seeds.tolist() == [1, 2]
-    assert [r.state_hash for r in other.run()] == hashes(rich(), [1, 2])
 
 
 def test_a_snapshot_keeps_worlds_that_have_ended_and_clocks_that_differ():

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from small_worlds import VELOCITY, Drift, Wander, block, hashes, mission
+from small_worlds import VELOCITY, Drift, block, mission
 
 from tussle import Simulation
-from tussle.api import Autonomy, EasyAutonomy, Output, Param, State
-from tussle.stock import NoisyContacts, SimpleCollision
+from tussle.api import Autonomy, EasyAutonomy, Output, State
 
 
 class Follow(Autonomy):
@@ -71,55 +70,6 @@ def test_what_a_follower_sees(update, leader_first, seen, follow):
         found.append(float(sim.read(f"follower.{follow.__name__}.seen")[0][0, 0]))
         assert sim.read("follower.pos")[0][0, 0, 0] == pytest.approx(found[-1])
     assert found == pytest.approx(seen)
-
-
-class Shy(Autonomy):
-    """Flees the mean of those in sight."""
-
-    sight = Param(20.0, unit="m")
-    velocity = Output(VELOCITY, unit="m/s")
-
-    def step(self, g):
-        near = g.near(self.sight)
-        self.velocity[:] = -0.3 * near.mean(near.offset) + g.normal("jitter", 3) + 0.1 * near.mean(near.vel)
-
-
-def herd(update="sequential", **values):
-    return mission(
-        block("a", team=1, count=5, variance=(40, 40, 40), autonomy=Shy(), sensor=NoisyContacts()),
-        block("b", team=2, count=3, variance=(40, 40, 40), autonomy=[Wander(), Shy(rate=5.0)]),
-        block("late", team=2, count=3, rate=5.0, variance=(40, 40, 40), autonomy=Shy()),
-        update=update,
-        interactions=[SimpleCollision(collision_range=1.0)],
-        end=1.5,
-        **values,
-    )
-
-
-@pytest.mark.parametrize("update", ["sequential", "synchronous"])
-def test_a_world_is_the_same_in_any_stack(update):
-    game = herd(update)
-    lone = [hashes(game, [seed])[0] for seed in (3, 4, 5)]
-    assert hashes(game, [3, 4, 5]) == lone
-    assert hashes(game, [5, 9, 3, 4]) == [lone[2], hashes(game, [9])[0], lone[0], lone[1]]
-    assert len(set(lone)) == 3
-    assert lone != [
-        hashes(herd("synchronous" if update == "sequential" else "sequential"), [seed])[0]
-        for seed in (3, 4, 5)
-    ]
-
-
-def test_sequential_snapshot_and_reset():
-    sim = Simulation(herd(), seeds=[3, 4])
-    sim.step(4)
-    saved = sim.snapshot()
-    first = [r.state_hash for r in sim.run()]
-    assert first == hashes(herd(), [3, 4])
-    sim.restore(saved)
-    assert [r.state_hash for r in sim.run()] == first
-    sim.restore(saved)
-    sim.reset([0], seeds=[5])
-    assert [r.state_hash for r in sim.run()] == hashes(herd(), [5, 4])
 
 
 def test_sequential_with_structural_params_is_restored_into_the_right_groups():

@@ -1,9 +1,6 @@
 import numpy as np
-import pytest
 
 from tussle.numeric.quaternion import quat_from_euler, quat_multiply
-from tussle.stock.controller.direct import DirectController
-from tussle.stock.controller.single_integrator_controller_simple import SingleIntegratorControllerSimple
 from tussle.stock.sensor.noisy_contacts import kernels as contacts
 from tussle.stock.sensor.noisy_state import kernels as state
 
@@ -75,11 +72,3 @@ def test_contacts_are_the_others_with_the_noise_of_the_one_who_measures():
     assert np.array_equal(data[8:, :2], quat[:, [4, 5]])
     assert np.allclose(data[2:5, 2], pos[:, 0] + 1.0 + 2.0 * draws[0, :, 2])
     assert np.allclose(data[5:8, 2], vel[:, 0] + 1.0 + 2.0 * draws[1, :, 2])
-
-
-@pytest.mark.parametrize("controller", [DirectController, SingleIntegratorControllerSimple])
-def test_pass_through_controllers_are_wiring(controller):
-    assert controller.passthrough
-    assert [c.channels for c in controller.inputs().values()] == [
-        c.channels for c in controller.outputs().values()
-    ]

@@ -82,28 +82,3 @@ def test_flies_an_aircraft_to_heading_altitude_and_speed():
     assert x[5, 0] == pytest.approx(1.0, abs=0.02)
     assert x[2, 0] == pytest.approx(130.0, abs=1.0)
     assert x[6, 0] == pytest.approx(25.0, abs=0.1)
-
-
-def test_inputs_follow_the_structure():
-    assert SimpleAircraftControllerPID().active_inputs() == [
-        "desired_heading",
-        "desired_altitude",
-        "desired_speed",
-    ]
-    other = SimpleAircraftControllerPID(use_roll=True, use_glide_slope=True)
-    assert other.active_inputs() == ["desired_roll", "desired_glide_slope", "desired_speed"]
-
-
-@pytest.mark.parametrize("flag", [False, True])
-def test_bits_do_not_depend_on_place(flag):
-    rows = np.random.default_rng(6).normal(size=(8, 150)) * 3.0
-    whole = Steering(150, flag, flag)
-    for _ in range(2):
-        every = whole.step(*rows)
-    for width in range(1, 38):
-        for first in range(0, 150 - width, width):
-            some = slice(first, first + width)
-            part = Steering(width, flag, flag)
-            for _ in range(2):
-                out = part.step(*rows[:, some])
-            assert np.array_equal(out, every[:, some])

@@ -64,19 +64,3 @@ def test_attitude_is_yaw_then_elevation():
     x[6] = [0.0, 1.0, -2.0, 3.0, 100.0]
     x[7] = [0.0, 0.5, -0.5, 1.5, 0.1]
     assert np.abs(published(x)[1] - quat_from_euler(0.0 * x[6], -x[7], x[6])).max() < 1e-15
-
-
-def test_bits_do_not_depend_on_place():
-    draw = np.random.default_rng(2)
-    x, u, p = draw.normal(size=(8, 203)), draw.normal(size=(3, 203)), draw.normal(size=(1, 203))
-    u[:, ::7] = 0.0
-    whole = x.copy()
-    kernels.advance(whole, u, p, 0.1, 1)
-    shown = np.concatenate(published(whole))
-    for width in range(1, 38):
-        for first in range(0, 203 - width, width):
-            rows = slice(first, first + width)
-            part = np.ascontiguousarray(x[:, rows])
-            kernels.advance(part, np.ascontiguousarray(u[:, rows]), np.ascontiguousarray(p[:, rows]), 0.1, 1)
-            assert np.array_equal(part, whole[:, rows])
-            assert np.array_equal(np.concatenate(published(part)), shown[:, rows])

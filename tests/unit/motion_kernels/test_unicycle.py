@@ -66,43 +66,6 @@ def test_turns_of_many_revolutions_per_substep_equal_rk4(substeps):
     assert np.abs(ours - rk4(x, u, p, 0.1, substeps)).max() < 1e-10
 
 
-def test_fourth_order():
-    x, u, p = many(20, speed=5.0, rate=2.0)
-    exact = x.copy()
-    PITCHED(exact, u, p, 1.0, 4096)
-    errors = []
-    for substeps in (2, 4, 8, 16):
-        y = x.copy()
-        PITCHED(y, u, p, 1.0, substeps)
-        errors.append(np.abs(y - exact)[:3].max())
-    orders = np.log2(np.array(errors[:-1]) / errors[1:])
-    assert np.all(np.abs(orders - 4.0) < 0.15), orders
-
-
-@pytest.mark.parametrize("advance", [PITCHED, LEVEL])
-def test_bits_do_not_depend_on_place(advance):
-    x, u, p = many(203, rate=40.0)
-    whole = x.copy()
-    advance(whole, u, p, 0.1, 5)
-    for width in range(1, 38):
-        for first in range(0, 203 - width, width):
-            rows = slice(first, first + width)
-            part = np.ascontiguousarray(x[:, rows])
-            advance(part, np.ascontiguousarray(u[:, rows]), np.ascontiguousarray(p[:, rows]), 0.1, 5)
-            assert np.array_equal(part, whole[:, rows]), (width, first)
-
-
-@pytest.mark.parametrize("banks", [False, True])
-def test_published_bits_do_not_depend_on_place(banks):
-    x, u, p = many(150)
-    whole = np.concatenate(publish(x, u, p, 0.1, banks=banks))
-    for width in range(1, 38):
-        for first in range(0, 150 - width, width):
-            rows = slice(first, first + width)
-            part = publish(*(np.ascontiguousarray(a[:, rows]) for a in (x, u, p)), 0.1, banks=banks)
-            assert np.array_equal(np.concatenate(part), whole[:, rows]), (width, first)
-
-
 def test_commands_are_held_within_limits():
     x = np.zeros((5, 2))
     u = np.array([[9.0, -9.0], [9.0, -9.0], [9.0, -9.0]])
@@ -152,17 +115,6 @@ def test_circle_closes():
     assert np.ptp(radius_seen) < 1e-9
 
 
-@pytest.mark.parametrize("pitches", [True, False])
-def test_velocity_is_displacement_of_the_last_substep(pitches):
-    x, u, p = many(40)
-    advance = PITCHED if pitches else LEVEL
-    before = x.copy()
-    advance(x, u, p, 0.1, 1)
-    pos, _, vel, _ = publish(x, u, p, 0.1, pitches)
-    assert np.array_equal(pos, x[:3])
-    assert np.abs(vel - (x - before)[:3] / 0.1).max() < 1e-12 * 30 / 0.1
-
-
 def test_bank_is_that_of_a_coordinated_turn():
     x = np.array([[0.0], [0.0], [0.0], [0.3], [0.0]])
     u = np.array([[20.0], [0.4], [0.0]])
@@ -202,13 +154,3 @@ def test_rollout_takes_the_third_input_of_its_variant():
     assert level[-1, 4] == 0.0
     assert level[-1, 2] == pytest.approx(0.2)
     assert Unicycle(use_pitch=False).input_channels() == ["speed", "turn_rate", "velocity_z"]
-
-
-def test_state_equation_of_the_page_is_the_one_that_flies():
-    x, u, p = many(30)
-    y = x.copy()
-    h = 1e-7
-    PITCHED(y, u, p, h, 1)
-    for i in range(30):
-        rates = Unicycle.derivative(x[3, i], x[4, i], *u[:, i], *p[:3, i])
-        assert np.allclose((y[:, i] - x[:, i]) / h, rates, atol=1e-5)

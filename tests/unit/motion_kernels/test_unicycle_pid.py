@@ -178,25 +178,3 @@ def test_flies_a_unicycle_to_heading_and_altitude():
     assert x[3, 0] == pytest.approx(2.5, abs=1e-3)
     assert x[2, 0] == pytest.approx(50.0, abs=0.05)
     assert x[4, 0] == pytest.approx(0.0, abs=1e-3)
-
-
-def test_bits_do_not_depend_on_place():
-    draw = np.random.default_rng(5)
-    rows = draw.normal(size=(10, 150)) * 3.0
-    whole = Steering(150)
-    for _ in range(3):
-        every = whole.step(rows[:3], rows[3], rows[4:7], rows[7:])
-    for width in range(1, 38):
-        for first in range(0, 150 - width, width):
-            some = slice(first, first + width)
-            part = Steering(width)
-            for _ in range(3):
-                out = part.step(rows[:3, some], rows[3, some], rows[4:7, some], rows[7:, some])
-            assert np.array_equal(out, every[:, some])
-            assert np.array_equal(part.memory, whole.memory[:, some])
-
-
-def test_band_of_the_heading_is_in_degrees_in_mission_files():
-    declared = UnicyclePID.heading_pid
-    assert declared.text_units[3] == "deg"
-    assert declared.default[3] == pytest.approx(math.pi / 4)

@@ -85,23 +85,6 @@ def test_sums_equal_the_formulas(mixed):
         )
 
 
-def test_sums_of_a_part_of_the_table_and_in_two_parts_are_the_same_bits():
-    s, yaw, team = scene(groups=3, worlds=2)
-    whole = sums_of(s, yaw, team)
-    np.testing.assert_array_equal(sums_of(s, yaw, team, split=True), whole)
-    np.testing.assert_array_equal(sums_of(s, yaw, team, first=200, last=400), whole[:, 200:400])
-
-
-def test_sums_of_a_world_do_not_depend_on_the_stack():
-    s, yaw, team = scene(n=110, groups=2, worlds=5)
-    sums = sums_of(s, yaw, team)
-    for w in range(5):
-        rows = np.flatnonzero(s.world == w)
-        rows = rows[np.argsort(s.source[rows])]
-        alone = stack([s.pos[:, rows]])
-        np.testing.assert_array_equal(sums_of(alone, yaw[rows], team[rows]), sums[:, rows])
-
-
 def test_unlimited_view_is_no_limit():
     s, yaw, team = scene(n=200)
     quat = np.random.default_rng(2).normal(size=(4, 200))

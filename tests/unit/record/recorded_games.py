@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from tussle import Block, Mission
+from pathlib import Path
+
+from tussle import Block, Mission, Recorder, Simulation
 from tussle.stock import (
     Boids,
     Predator,
@@ -13,6 +15,14 @@ from tussle.stock import (
     Unicycle,
     UnicyclePID,
 )
+
+
+def record(mission: Mission, directory: Path, seeds: tuple[int, ...] = (1,), **options: object) -> Path:
+    """Play a mission to its end and record it; returns the directory."""
+    simulation = Simulation(mission, seeds=list(seeds))
+    with Recorder(simulation, directory, **options):
+        simulation.run()
+    return directory
 
 
 def hunt(n_prey: int = 12, end: float = 6.0, **changes: object) -> Mission:

@@ -8,9 +8,9 @@ import pandas as pd
 import polars as pl
 import pyarrow as pa
 import pytest
-from recorded_games import hunt
+from recorded_games import hunt, record
 
-from tussle import Recorder, Simulation, load_run
+from tussle import load_run
 from tussle.errors import MissingExtraError, ParameterError, RecordError
 from tussle.record import run as run_module
 from tussle.record.schema import EVENTS, TRAJECTORY
@@ -19,11 +19,7 @@ from tussle.record.schema import EVENTS, TRAJECTORY
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
     """A short game with a batch for every step."""
-    path = tmp_path_factory.mktemp("runs") / "run"
-    sim = Simulation(hunt(end=2.0))
-    with Recorder(sim, path, flush_every=1e-9):
-        sim.run()
-    return path
+    return record(hunt(end=2.0), tmp_path_factory.mktemp("runs") / "run", flush_every=1e-9)
 
 
 @pytest.fixture

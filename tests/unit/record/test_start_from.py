@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from recorded_games import hunt
+from recorded_games import hunt, record
 
 from tussle import Block, Mission, Recorder, Simulation, load_run, read_table
 from tussle.errors import MissionError, ParameterError, RecordError
@@ -15,11 +15,7 @@ COLUMNS = ["id", "team", "x", "y", "z", "qw", "qx", "qy", "qz", "vx", "vy", "vz"
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
-    path = tmp_path_factory.mktemp("runs") / "run"
-    sim = Simulation(hunt(), seeds=[1, 2])
-    with Recorder(sim, path):
-        sim.run()
-    return load_run(path)
+    return load_run(record(hunt(), tmp_path_factory.mktemp("runs") / "run", (1, 2)))
 
 
 def flock(*counts):

@@ -7,9 +7,8 @@ import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet
 import pytest
-from recorded_games import hunt
+from recorded_games import hunt, record
 
-from tussle import Recorder, Simulation
 from tussle.errors import ParameterError, RecordError, ViewError
 from tussle.record import load_run
 from tussle.record.schema import TRAJECTORY, TRAJECTORY_FILE
@@ -19,11 +18,7 @@ from tussle.view.export.tables import write_tables
 @pytest.fixture(scope="module")
 def played(tmp_path_factory):
     """Two worlds, in many batches."""
-    directory = tmp_path_factory.mktemp("runs") / "run"
-    simulation = Simulation(hunt(end=8.0), seeds=[1, 2])
-    with Recorder(simulation, directory, flush_every=1e-9):
-        simulation.run()
-    return directory
+    return record(hunt(end=8.0), tmp_path_factory.mktemp("runs") / "run", (1, 2), flush_every=1e-9)
 
 
 def read(path):

@@ -8,9 +8,9 @@ import subprocess
 import imageio_ffmpeg
 import numpy as np
 import pytest
-from recorded_games import hunt
+from recorded_games import hunt, record
 
-from tussle import Block, Mission, Recorder, Simulation
+from tussle import Block, Mission
 from tussle.errors import MissingExtraError, ParameterError, ViewError
 from tussle.geodesy import Origin
 from tussle.scene import Cuboid
@@ -34,13 +34,6 @@ from tussle.view.terrain import Terrain
 
 SMALL = (64, 48)
 BARE = {"size": SMALL, "captions": False, "trails": 0.0}
-
-
-def record(mission, directory, **options):
-    simulation = Simulation(mission, seeds=[1])
-    with Recorder(simulation, directory, **options):
-        simulation.run()
-    return directory
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from page_reader import Bytes, PageReader
-from recorded_games import head_on, hunt
+from recorded_games import head_on, hunt, record
 
 from tussle import Block, Mission, Recorder, Simulation
 from tussle.errors import ParameterError, ViewError
@@ -23,13 +23,6 @@ from tussle.view.page.recorded import kept_frames
 from tussle.view.terrain import Terrain
 
 HOSTILE = "</script><script>alert(1)</script><!-- {{script}} '\"&amp;\u2028"
-
-
-def record(mission, directory, seeds=(1,), **options):
-    sim = Simulation(mission, seeds=list(seeds))
-    with Recorder(sim, directory, **options):
-        sim.run()
-    return directory
 
 
 @pytest.fixture(scope="module")

@@ -8,9 +8,8 @@ from collections import defaultdict
 import numpy as np
 import pytest
 from mcap.reader import make_reader
-from recorded_games import hunt
+from recorded_games import hunt, record
 
-from tussle import Recorder, Simulation
 from tussle.errors import MissingExtraError, ParameterError, ViewError
 from tussle.geodesy import Origin
 from tussle.scene import Cuboid
@@ -25,17 +24,10 @@ from tussle.view.terrain import Terrain
 SECOND = 1_000_000_000
 
 
-def record(mission, directory):
-    simulation = Simulation(mission, seeds=[5])
-    with Recorder(simulation, directory):
-        simulation.run()
-    return directory
-
-
 @pytest.fixture(scope="module")
 def hunted(tmp_path_factory):
     """Births in the middle of it, captures, deaths."""
-    return Recording(record(hunt(n_prey=8, end=12.0), tmp_path_factory.mktemp("runs") / "run"))
+    return Recording(record(hunt(n_prey=8, end=12.0), tmp_path_factory.mktemp("runs") / "run", (5,)))
 
 
 class Opened:
@@ -222,7 +214,7 @@ def test_models_are_as_large_as_can_be_seen(hunted, tmp_path):
 
 
 def test_a_clock_before_zero_is_shifted_and_that_is_said(tmp_path):
-    recording = Recording(record(hunt(n_prey=2, end=-1.0, start=-2.5), tmp_path / "run"))
+    recording = Recording(record(hunt(n_prey=2, end=-1.0, start=-2.5), tmp_path / "run", (5,)))
     report = write_mcap(recording, tmp_path / "a.mcap")
     assert report.notes == [
         "t = 0 is 3 s after the beginning of the file's clock, which knows no earlier times"

@@ -9,9 +9,9 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
-from recorded_games import head_on, hunt
+from recorded_games import head_on, hunt, record
 
-from tussle import Block, Mission, Recorder, Simulation
+from tussle import Block, Mission
 from tussle.errors import MissingExtraError, ParameterError, ViewError
 from tussle.stock import Still
 from tussle.view import Recording
@@ -47,13 +47,6 @@ MISSION = """\
   </entity>
 </runscript>
 """
-
-
-def record(mission, directory, seeds=(1,), **options):
-    simulation = Simulation(mission, seeds=list(seeds))
-    with Recorder(simulation, directory, **options):
-        simulation.run()
-    return directory
 
 
 @pytest.fixture(scope="module")
