@@ -161,7 +161,7 @@ def page_of(command):
         return answer.read().decode()
 
 
-def test_sigterm_closes_the_recording(watching, folder):
+def test_a_signal_closes_the_recording(watching, folder):
     with watching("view", "game.xml", "--record", "kept") as command, PageClient(command.url) as client:
         client.wait(lambda: client.t > 0.55)
         code, out, _ = command.end(signal.SIGTERM)
