@@ -148,10 +148,7 @@ def test_the_signature_shows_names_and_defaults():
 
 def test_a_plugin_is_a_value_and_has_no_arrays():
     one = Sample()
-    with pytest.raises(
-        ParameterError,
-        match=r"Sample.speed cannot be changed: .* .replace\(speed=...\)",
-    ):
+    with pytest.raises(ParameterError, match=r"Sample.speed cannot be changed"):
         one.speed = 3.0
     with pytest.raises(AttributeError, match=r"Sample.wings is not declared"):
         one.wings = 3.0
@@ -171,19 +168,10 @@ def test_a_plugin_is_a_value_and_has_no_arrays():
         (lambda: Param((1.0, 2.0), fields="a a"), r"Param: duplicate name in 'a a'"),
         (lambda: State(dtype=complex), r"State: dtype <class 'complex'> is not one of float, int, bool"),
         (lambda: State(per="block"), r"State: per='block' is not one of entity, world, team"),
-        (
-            lambda: type("A", (Autonomy,), {"grade": "perfect"}),
-            r"A.grade is 'perfect'; .* portable, machine, external",
-        ),
-        (
-            lambda: type("A", (Autonomy,), {"name": State()}),
-            r"A.name: the name is reserved; .* this State",
-        ),
+        (lambda: type("A", (Autonomy,), {"grade": "perfect"}), r"A.grade is 'perfect'; .* portable"),
+        (lambda: type("A", (Autonomy,), {"name": State()}), r"A.name: the name is reserved"),
         (lambda: type("A", (Autonomy,), {"_x": Param(1.0)}), r"A._x: the name is reserved"),
-        (
-            lambda: type("M", (Message,), {"x": State()}),
-            r"M.x: a message field is a Field, EntityRef or Handle, not State",
-        ),
+        (lambda: type("M", (Message,), {"x": State()}), r"M.x: a message field is a Field"),
         (lambda: type("M", (Message,), {"sender": Field()}), r"M.sender: the name is reserved in messages"),
         (
             lambda: type("M", (Message,), {"a": Field(ragged=True), "b": Field(ragged=True)}),

@@ -383,23 +383,11 @@ COLUMNS = {
         (lambda self, me: me.nearst(), "me has no 'nearst' (did you mean 'nearest'?)"),
         (lambda self, me: self.max_sped, "Easy has no 'max_sped' (did you mean 'max_speed'?)"),
         (lambda self, me: me.nearest().poss, "another entity has no 'poss' (did you mean 'pos'?)"),
-        (
-            lambda self, me: self.max_speed,
-            "Easy.max_speed differs between entities: read me.max_speed, not self.max_speed",
-        ),
-        (
-            lambda self, me: self.goal,
-            "Easy.goal differs between entities: read me.goal, not self.goal",
-        ),
+        (lambda self, me: self.max_speed, "Easy.max_speed differs between entities: read me.max_speed"),
+        (lambda self, me: self.goal, "Easy.goal differs between entities: read me.goal"),
         (lambda self, me: setattr(self, "n", 1), "Easy.n is a column: write to it with me.n = value"),
-        (
-            lambda self, me: setattr(me, "clas", 1),
-            "clas = State(...) in the class, then write me.clas = value",
-        ),
-        (
-            lambda self, me: setattr(me, "goal", (1.0, 2.0)),
-            "Easy.goal takes 3 numbers (x, y, z), not of shape (2,)",
-        ),
+        (lambda self, me: setattr(me, "clas", 1), "clas = State(...) in the class"),
+        (lambda self, me: setattr(me, "goal", (1.0, 2.0)), "Easy.goal takes 3 numbers (x, y, z)"),
         (lambda self, me: setattr(me, "n", (1.0, 2.0)), "Easy.n takes a number, not of shape (2,)"),
         (lambda self, me: setattr(me, "n", None), "Easy.n takes a number, not None"),
         (lambda self, me: setattr(me, "n", math.nan), "Easy.n takes a number, not nan"),

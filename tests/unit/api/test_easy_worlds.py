@@ -270,20 +270,11 @@ COLUMNS = {
         (lambda self, w: setattr(w, "clas", 1), "clas = State(...) on the class, then w.clas = value"),
         (lambda self, w: setattr(w, "reach", 1.0), "Judge: w.reach is read-only"),
         (lambda self, w: setattr(w, "t", 1.0), "Judge: w.t is read-only"),
-        (
-            lambda self, w: setattr(w, "lost", 1),
-            "Judge: lost has one value per team: write w.lost[team] = value",
-        ),
-        (
-            lambda self, w: setattr(w, "age", 1),
-            "Judge: age has one value per entity: write entity.age = value",
-        ),
+        (lambda self, w: setattr(w, "lost", 1), "Judge: lost has one value per team"),
+        (lambda self, w: setattr(w, "age", 1), "Judge: age has one value per entity"),
         (lambda self, w: setattr(w, "n", "many"), "Judge.n takes a number, not 'many'"),
         (lambda self, w: w.lost[9], "w.lost: there is no team 9; there are: 1, 2"),
-        (
-            lambda self, w: w.distance(w.entities[0], None),
-            "distance takes two entities, not <entity 1 of team 1> and None",
-        ),
+        (lambda self, w: w.distance(w.entities[0], None), "distance takes two entities"),
         (lambda self, w: w.lost.pop(1), "w.lost has one value per team"),
         (lambda self, w: w.kill(1, "x"), "w.kill takes an entity from w.entities or from a message, not 1"),
         (lambda self, w: setattr(w.entities[0], "pos", (0, 0, 0)), "pos of an entity is read-only"),
@@ -306,9 +297,7 @@ def test_the_world_and_the_line_that_failed_are_named():
             raise ValueError("not this one")
 
     sim = Simulation(mission(block(), interactions=[referee(fail)()]), seeds=[7, 8, 9])
-    with pytest.raises(
-        PluginError, match=r"Judge, world 1, step 2: test_easy_worlds.py:\d+: ValueError: not this one"
-    ):
+    with pytest.raises(PluginError, match=r"Judge, world 1, step 2: test_easy_worlds.py:\d+: ValueError"):
         sim.step(5)
 
 

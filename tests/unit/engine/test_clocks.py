@@ -231,10 +231,7 @@ def test_easy_mode_has_the_dt_of_its_period():
             lambda: mission(block(autonomy=[Drift(), Counter(rate=10.5)])),
             r"block 'a': Counter: rate = 10.5 Hz.*10 Hz",
         ),
-        (
-            lambda: mission(block(sensor=Blank(rate=11.0))),
-            r"block 'a': Blank: rate = 11.0 Hz.*10 Hz, one call per step",
-        ),
+        (lambda: mission(block(sensor=Blank(rate=11.0))), r"block 'a': Blank: rate = 11.0 Hz.*10 Hz"),
         (
             lambda: mission(block(controller=Watch(rate=41.0)), motion_multiplier=4),
             r"Watch: rate = 41.0 Hz is too high",
@@ -249,10 +246,7 @@ def test_easy_mode_has_the_dt_of_its_period():
             lambda: mission(block(motion=SingleIntegrator(rate=5.0))),
             r"block 'a': SingleIntegrator has rate = 5.0, but it is integrated over every step",
         ),
-        (
-            lambda: mission(networks=[SphereNetwork(rate=5.0)]),
-            r"mission: SphereNetwork has rate = 5.0, but it carries messages in every step",
-        ),
+        (lambda: mission(networks=[SphereNetwork(rate=5.0)]), r"mission: SphereNetwork has rate = 5.0"),
         (
             lambda: MotorSchemas(behaviors=[AvoidEntityMS(rate=5.0)]),
             r"MotorSchemas.behaviors: AvoidEntityMS\(rate=5.0\) .* rate of MotorSchemas",

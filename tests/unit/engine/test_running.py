@@ -565,10 +565,7 @@ def test_bad_params_are_refused_with_their_path(params, message):
 
 def test_a_structural_param_of_a_world_plugin_belongs_to_the_mission():
     game = mission(interactions=[SimpleCollision()])
-    with pytest.raises(
-        (MissionError, ParameterError),
-        match="startup_collisions_only",
-    ):
+    with pytest.raises((MissionError, ParameterError), match="startup_collisions_only"):
         Simulation(game, seeds=[1, 2], params={"SimpleCollision.startup_collisions_only": [True, False]})
 
 

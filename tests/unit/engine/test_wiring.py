@@ -66,9 +66,7 @@ def test_units_are_checked_at_both_ends():
         def step(self, g):
             pass
 
-    with pytest.raises(
-        WiringError, match=r"block 'a': Feet.velocity writes channel 'velocity_x' in 'm', but .* in 'm/s'"
-    ):
+    with pytest.raises(WiringError, match=r"block 'a': Feet.velocity writes channel 'velocity_x' in 'm'"):
         Simulation(mission(block(autonomy=Feet())))
 
     class Reader(Autonomy):
@@ -398,10 +396,7 @@ def test_children_have_columns_and_channels_of_their_own():
 def test_children_of_the_wrong_kind_or_of_one_name_are_refused():
     with pytest.raises(ParameterError, match=r"Sum.parts: Drift\(\) is no Behavior"):
         Sum(parts=[Drift()])
-    with pytest.raises(
-        ParameterError,
-        match=r"Sum.parts: two plugins are called 'Push'",
-    ):
+    with pytest.raises(ParameterError, match=r"Sum.parts: two plugins are called 'Push'"):
         Sum(parts=[Push(), Push()])
 
 

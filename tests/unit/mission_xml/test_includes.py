@@ -74,10 +74,7 @@ def test_a_pointer_that_selects_nothing_is_said(files):
         ('<xi:include href="e.xml" accept="text/xml"/>', "include takes href and xpointer, not 'accept'"),
         ('<xi:include href="e.xml" xpointer="element(/1)"/>', "is not supported; it takes xpointer"),
         ('<xi:include href="m.xml"/>', r"m\.xml:2: a file includes itself: m\.xml -> m\.xml"),
-        (
-            '<xi:include href="loop1.xml"/>',
-            r"loop2\.xml:1: a file includes itself: loop1\.xml -> loop2\.xml -> loop1\.xml",
-        ),
+        ('<xi:include href="loop1.xml"/>', r"loop2\.xml:1: a file includes itself"),
         ('<xi:include href="bad.xml"/>', r"bad\.xml:1: this is not well-formed XML"),
         ('<xi:include href="doctype.xml"/>', r"doctype\.xml:1: a DOCTYPE is not allowed"),
         ("\n".join(['<xi:include href="e.xml"/>'] * 70), "more than 64 files are included"),

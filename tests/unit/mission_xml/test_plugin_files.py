@@ -45,10 +45,7 @@ def test_a_mission_flies_with_a_plugin_of_a_file(files):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        (
-            "import nothing_of_this_name",
-            r"p\.py:1: it cannot be imported: ModuleNotFoundError: No module named",
-        ),
+        ("import nothing_of_this_name", r"p\.py:1: it cannot be imported: ModuleNotFoundError"),
         ("\n\ndef f(:\n", r"p\.py:3: it cannot be imported: SyntaxError"),
         ("\n1 / 0\n", r"p\.py:2: it cannot be imported: ZeroDivisionError"),
         ("raise SystemExit(3)", r"p\.py:1: it cannot be imported: SystemExit"),

@@ -312,9 +312,7 @@ def test_the_eye_flies_behind_whom_it_follows_and_stays_where_that_is_lost(hunte
 
 
 def test_following_somebody_who_is_not_there_is_refused(flown, tmp_path):
-    with pytest.raises(
-        ViewError, match=r"entity 99 cannot be followed: it is not there between t = 0 s and 4 s"
-    ):
+    with pytest.raises(ViewError, match=r"entity 99 cannot be followed"):
         write_film(flown, mp4=tmp_path / "x.mp4", options=FilmOptions(camera="follow", follow=99))
     assert not list(tmp_path.iterdir())
 
