@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from tussle.errors import TussleError, listed, nearest_name
+from tussle.errors import ParameterError, TussleError, listed, nearest_name
 
 MOST_BYTES = 1 << 25
 """Maximum size of a document. Parsed JSON takes up to about twenty times as much memory."""
@@ -139,6 +139,16 @@ def problem(value: Any, rule: Rule, where: str = "") -> str:
     return _scalar_problem(value, rule, where)
 
 
+def check_argument(name: str, value: Any, rule: Rule) -> None:
+    """Check an argument of a function.
+
+    Raises:
+        ParameterError: It does not follow the rule.
+    """
+    if violation := problem(value, rule, name):
+        raise ParameterError(violation)
+
+
 def _object_problem(value: Any, rule: Mapping[str, Rule], where: str) -> str:
     if not isinstance(value, dict):
         return _refused(where, value, "an object")
@@ -165,7 +175,8 @@ def _scalar_problem(value: Any, rule: Rule, where: str) -> str:
         )
     if isinstance(rule, Whole):
         is_good = type(value) is int and rule.least <= value <= rule.most
-        return "" if is_good else _refused(where, value, f"a whole number from {rule.least} to {rule.most}")
+        bounds = f">= {rule.least}" if rule.most == Whole.most else f"from {rule.least} to {rule.most}"
+        return "" if is_good else _refused(where, value, f"a whole number {bounds}")
     is_named = rule.is_any and value in ("inf", "-inf", "nan")
     is_good = is_named or (type(value) in (int, float) and rule.least <= value <= rule.most)
     return "" if is_good else _refused(where, value, f"a number from {rule.least:g} to {rule.most:g}")

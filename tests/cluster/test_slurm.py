@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from tussle.batch import Batch, InProcess
-from tussle.batch.cluster_slurm import on_slurm
+from tussle.batch.slurm import on_slurm
 from tussle.batch.tasks import Finished
 from tussle.errors import BatchError
 

@@ -5,14 +5,14 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from tussle.batch.batch import Batch
-    from tussle.batch.cluster import OnDask
-    from tussle.batch.cluster_slurm import on_slurm
+    from tussle.batch.dask_runner import OnDask
     from tussle.batch.executors import InProcess, Processes
     from tussle.batch.reload import load_batch
     from tussle.batch.results import Results
     from tussle.batch.search.optimization import optimize
     from tussle.batch.search.study import Study
     from tussle.batch.search.study_store import load_study
+    from tussle.batch.slurm import on_slurm
     from tussle.batch.variables import Choice, Range
 
 __all__ = [
@@ -34,14 +34,14 @@ _LAZY = {
     "Batch": "batch",
     "Choice": "variables",
     "InProcess": "executors",
-    "OnDask": "cluster",
+    "OnDask": "dask_runner",
     "Processes": "executors",
     "Range": "variables",
     "Results": "results",
     "Study": "search.study",
     "load_batch": "reload",
     "load_study": "search.study_store",
-    "on_slurm": "cluster_slurm",
+    "on_slurm": "slurm",
     "optimize": "search.optimization",
 }
 

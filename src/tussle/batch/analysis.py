@@ -15,7 +15,7 @@ from tussle.batch.results import Results
 from tussle.batch.sensitivity import Effect
 from tussle.batch.statistics import Comparison, Mean, Share
 from tussle.batch.variables import Choice, Variable
-from tussle.batch.varied import about
+from tussle.batch.varied import variable_entry
 from tussle.errors import MissingExtraError, ParameterError
 
 MOST_PAIRED_POINTS = 20
@@ -114,7 +114,7 @@ class Analysis:
 
     def as_dict(self) -> dict[str, Any]:
         """The same for JSON: None where a number is not known."""
-        fields = dataclasses.asdict(self) | {"variables": [about(v) for v in self.variables]}
+        fields = dataclasses.asdict(self) | {"variables": [variable_entry(v) for v in self.variables]}
         plain: dict[str, Any] = _plain(fields)
         return plain
 

@@ -26,7 +26,7 @@ ALWAYS_ALLOWED = 1_000_000
 
 
 def check_design(design: pa.Table, info: Mapping[str, Any], file: Path) -> None:
-    """Check that the planned runs have the numbers, points and seeds of `Plan`.
+    """Check that the planned runs have the numbers, points and seeds of `BatchPlan`.
 
     Raises:
         BatchError: A run does not.

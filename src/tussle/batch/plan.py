@@ -1,4 +1,4 @@
-"""Which runs a batch has: points × seeds, numbered so that more seeds only append."""
+"""The runs of a batch: points × seeds, numbered so that more seeds only append."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from tussle.documents import Whole, check_argument
 from tussle.errors import ParameterError
 from tussle.mission.codecs import written
 
@@ -16,10 +17,10 @@ MOST_RUNS = 10_000_000
 
 
 @dataclass(frozen=True)
-class Plan:
+class BatchPlan:
     """The runs of a batch.
 
-    Run r plays point r modulo the number of points. All points meet the same seeds (common random numbers), unless `independent`.
+    Run r plays point r modulo the number of points. All points have the same seeds (common random numbers), unless `independent`.
 
     Attributes:
         points: Values by name, of each point.
@@ -34,19 +35,10 @@ class Plan:
     independent: bool = False
 
     def __post_init__(self) -> None:
-        for name, least in (("n_seeds", 1), ("first_seed", 0)):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int) or value < least:
-                label = "runs" if name == "n_seeds" else name
-                raise ParameterError(
-                    f"{label} = {value!r} is not allowed; it takes a whole number >= {least}"
-                )
+        check_argument("runs", self.n_seeds, Whole(1))
+        check_argument("first_seed", self.first_seed, Whole(0, 2**64 - 1))
         if not self.points:
             raise ParameterError("a batch needs at least one point")
-        if self.first_seed >= 2**64:
-            raise ParameterError(
-                f"first_seed = {self.first_seed} is not allowed; it takes a whole number from 0 to 2^64 - 1"
-            )
         if self.n_runs > MOST_RUNS:
             raise ParameterError(
                 f"{len(self.points):,} points with {self.n_seeds:,} seeds each are {self.n_runs:,} runs; allowed are {MOST_RUNS:,}"

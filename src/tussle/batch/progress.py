@@ -1,22 +1,22 @@
-"""How far a batch is."""
+"""The progress of a batch."""
 
 from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, field
 
-from tussle.batch.tasks import Beat, Finished
+from tussle.batch.tasks import Finished
 
 
 @dataclass
 class Progress:
-    """How far a batch is, and what has come of it so far.
+    """The progress of a batch.
 
     Attributes:
-        n_runs: Runs that are planned.
-        n_done: Runs that are finished, those of earlier calls included.
-        n_before: Runs that had been finished before this call.
-        n_failed: Of them, those that failed.
+        n_runs: Planned runs.
+        n_done: Finished runs, those of earlier calls included.
+        n_before: Runs that were finished before this call.
+        n_failed: Finished runs that failed.
         under_way: Runs under way, each counted by the part that it has played.
         wins: Runs won, by team; None for ties.
     """
@@ -29,13 +29,9 @@ class Progress:
     wins: Counter[int | None] = field(default_factory=Counter)
 
     def count(self, finished: Finished) -> None:
-        """A run is finished."""
+        """Count a finished run."""
         self.n_done += 1
         if finished.end == "error":
             self.n_failed += 1
         elif any(name == "score" for _, name, _ in finished.metrics):
             self.wins[finished.winner] += 1
-
-    def beat(self, beat: Beat) -> None:
-        """A sign of life."""
-        self.under_way = beat.under_way

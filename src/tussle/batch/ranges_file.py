@@ -13,11 +13,11 @@ SCALES = ("linear", "log")
 
 
 def read_ranges(text: str, file: str) -> tuple[list[Variable], list[str]]:
-    """What varies, and what is wrong, one line each with its place.
+    """The variables, and the problems, one line each with its place.
 
-    `count` is the number of levels, `vec` a list of the values to choose from, beside which low and high, which those scripts
-    demand, say nothing. `scale="log"`, which they leave unread, is obeyed. Whole numbers include the high bound, which
-    they never reach; a range whose bounds are equal is the one value.
+    `count` is the number of levels. `vec` is a list of values to choose from; low and high, which those scripts demand beside it, are
+    ignored. Unlike those scripts, `scale="log"` is followed, and whole numbers include the high bound. A range whose bounds are equal
+    is a choice of one value.
 
     Raises:
         ParameterError: It is no XML, or a mission.
@@ -34,11 +34,11 @@ def read_ranges(text: str, file: str) -> tuple[list[Variable], list[str]]:
     problems: list[str] = []
     seen: set[str] = set()
     for node in root.children:
-        # A name space, should there be one, is not part of the placeholder's name.
+        # A name space is no part of the placeholder's name.
         name = node.tag.rpartition("}")[2]
         try:
             if name in seen:
-                raise ParameterError(f"{name}: it stands there twice")
+                raise ParameterError(f"{name}: it is there twice")
             seen.add(name)
             variables.append(_variable(name, node))
         except ParameterError as error:
@@ -51,33 +51,33 @@ def read_ranges(text: str, file: str) -> tuple[list[Variable], list[str]]:
 
 
 def _variable(name: str, node: Node) -> Variable:
-    told = {key: value.strip() for key, value in node.attributes.items()}
-    for key in told:
+    found = {key: value.strip() for key, value in node.attributes.items()}
+    for key in found:
         if key not in ATTRIBUTES:
             raise ParameterError(
                 f"{name}: the attribute {key!r} is unknown{nearest_name(key, ATTRIBUTES)}; {listed(ATTRIBUTES)}"
             )
     for key, allowed in (("type", TYPES), ("scale", SCALES)):
-        if key in told and told[key] not in allowed:
+        if key in found and found[key] not in allowed:
             raise ParameterError(
-                f"{name}: {key}={told[key]!r} is not allowed{nearest_name(told[key], allowed)}; {listed(allowed)}"
+                f"{name}: {key}={found[key]!r} is not allowed{nearest_name(found[key], allowed)}; {listed(allowed)}"
             )
-    is_int = told.get("type") == "int"
-    if "vec" in told:
+    is_int = found.get("type") == "int"
+    if "vec" in found:
         return Choice(
-            name, tuple(_number(name, item, is_int=is_int) for item in told["vec"].split(",")), is_text=True
+            name, tuple(_number(name, item, is_int=is_int) for item in found["vec"].split(",")), is_text=True
         )
-    missing = [key for key in ("low", "high", "type") if key not in told]
+    missing = [key for key in ("low", "high", "type") if key not in found]
     if missing:
         raise ParameterError(f"{name}: it has no {' and no '.join(missing)}; a range has low, high and type")
-    low, high, unit = parse_bounds(name, told["low"], told["high"])
-    count = read_value(told["count"]) if "count" in told else None
+    low, high, unit = parse_bounds(name, found["low"], found["high"])
+    count = read_value(found["count"]) if "count" in found else None
     if isinstance(count, str | float):
-        raise ParameterError(f"{name}: count={told['count']!r} is not allowed; it takes a whole number")
+        raise ParameterError(f"{name}: count={found['count']!r} is not allowed; it takes a whole number")
     if low == high or count == 1:
         value = f"{shown(low)} {unit}" if unit else _number(name, shown(low), is_int=is_int)
         return Choice(name, (value,), is_text=True)
-    return Range(name, low, high, is_int, told.get("scale") == "log", count, unit, is_text=True)
+    return Range(name, low, high, is_int, found.get("scale") == "log", count, unit, is_text=True)
 
 
 def _number(name: str, text: str, *, is_int: bool) -> int | float:
@@ -87,5 +87,5 @@ def _number(name: str, text: str, *, is_int: bool) -> int | float:
             f"{name}: {value[:80]!r} is not a number; vec takes numbers, as in vec='1, 2, 5'"
         )
     if is_int and not float(value).is_integer():
-        raise ParameterError(f"{name}: {value!r} is not a whole number, and type='int' asks for such")
+        raise ParameterError(f"{name}: {value!r} is not a whole number, as type='int' demands")
     return int(value) if is_int else float(value)

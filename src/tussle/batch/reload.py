@@ -1,4 +1,4 @@
-"""A batch from its directory: its results, and any of its runs again."""
+"""Reads a batch directory: its results, and any of its runs to be played again."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tussle.mission import Loaded, Mission, PluginFile, read_mission
 
 
 def load_batch(path: str | Path) -> Results:
-    """The results of a batch directory, complete or not.
+    """Read the results of a batch directory, complete or not.
 
     Raises:
         BatchError: There is no batch, or it cannot be read.
@@ -31,10 +31,10 @@ class PlannedRun:
     """One run of a batch, to be played again.
 
     Attributes:
-        loaded: Its mission file, with the values of its point.
-        mission: What is played.
-        seed: Its seed.
-        state_hash: What it ended in; "" where it is not finished.
+        loaded: The mission file, read with the values of its point.
+        mission: The mission.
+        seed: The seed.
+        state_hash: State hash of the run in the batch; "" where it is not finished.
     """
 
     loaded: Loaded
@@ -51,18 +51,18 @@ def planned_run(
     allow_large: bool = False,
     search: Sequence[str | Path] = (),
 ) -> PlannedRun:
-    """A run of a batch that was made from a mission file. Plugins come from the batch directory and from nowhere else.
+    """A run of a batch of a mission file, to be played again. Plugins are read from the batch directory only.
 
     Args:
         path: The batch directory.
         number: The run.
-        may_run: Says whether the plugin files of the directory may be run; by default those of the user's own batches.
-        allow_large: As of `read_mission`: a directory cannot grant it to itself.
+        may_run: Decides whether the plugin files of the directory may be run; by default those of the user's own batches may.
+        allow_large: As for `read_mission`; a directory cannot set it.
         search: The same.
 
     Raises:
-        BatchError: There is no such batch or run, its mission was made in Python, its plugin files may not be run, or it asks for
-            what a directory cannot grant.
+        BatchError: There is no such batch or run, its mission was made in Python, its plugin files may not be run, or it sets
+            an option that a directory cannot set.
         MissionError: Its files can no longer be read.
     """
     path = Path(path)
@@ -99,10 +99,10 @@ def planned_run(
 
 
 def _inside(path: Path, name: str) -> Path:
-    """A file of the folder in which a batch keeps its mission.
+    """A file of the mission folder of a batch.
 
     Raises:
-        BatchError: It lies elsewhere, or a link leads elsewhere.
+        BatchError: It is elsewhere, or a link leads elsewhere.
     """
     file = path / store.MISSION / name.replace("\0", "")
     try:
@@ -110,18 +110,18 @@ def _inside(path: Path, name: str) -> Path:
     except (OSError, RuntimeError) as error:  # links in a circle
         raise BatchError(f"{path}: {name} cannot be read: {error}") from None
     if not is_inside:
-        raise BatchError(f"{path}: {name} lies outside of the batch directory, so it is not read")
+        raise BatchError(f"{path}: {name} is outside of the batch directory, so it is not read")
     return file
 
 
-def _is_strict(path: Path, said: Mapping[str, Any], granted: Mapping[str, bool]) -> bool:
-    """What `batch.json` may say of how the mission is read: that, and nothing that lifts a limit.
+def _is_strict(path: Path, options: Mapping[str, Any], granted: Mapping[str, bool]) -> bool:
+    """Whether the mission is read with `strict`, the only option that `batch.json` may set.
 
     Raises:
-        BatchError: It says more.
+        BatchError: It sets another option.
     """
-    for name, value in said.items():
+    for name, value in options.items():
         if name != "strict" and value and not granted.get(name):
             known = "as this batch was made with it, give it again" if name in granted else "it is unknown"
             raise BatchError(f"{path}: a batch directory cannot set the option {name!r}; {known}")
-    return bool(said.get("strict"))
+    return bool(options.get("strict"))

@@ -5,8 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from functools import cached_property
-from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,15 +29,15 @@ from tussle.batch.statistics import (
 from tussle.batch.survival import N_TIMES, Survival, survival_of
 from tussle.batch.variables import Choice, Range, Variable
 from tussle.batch.varied import variable_of
-from tussle.errors import MissingExtraError, ParameterError, listed, nearest_name
+from tussle.errors import ParameterError, listed
 from tussle.mission.codecs import written as text_of
+from tussle.record.run import check_frames, frame_of
 
 if TYPE_CHECKING:
-    from tussle.batch.store import Stored
+    from tussle.batch.store import StoredBatch
 
 FIRST = ("wins", "ties", "score", "alive", "lost", "start", "t", "steps")
 """Quantities that every game has, in the order in which they are listed; what plugins report comes behind."""
-FRAMES = ("pandas", "polars")
 
 
 class Results:
@@ -62,7 +60,7 @@ class Results:
         n_distinct: Distinct games among the runs that did not fail: runs of one point with one final state are copies.
     """
 
-    def __init__(self, stored: Stored) -> None:
+    def __init__(self, stored: StoredBatch) -> None:
         self.path: Path | None = stored.path
         self.info: dict[str, Any] = stored.info
         self.notes: list[str] = list(stored.notes)
@@ -111,7 +109,7 @@ class Results:
     @cached_property
     def variables(self) -> list[Variable]:
         """What was varied."""
-        return [variable_of(said) for said in self.info["variables"]]
+        return [variable_of(entry) for entry in self.info["variables"]]
 
     @cached_property
     def teams(self) -> dict[int, str]:
@@ -336,7 +334,7 @@ class Results:
         return effects(self.variables, self.points, self.by_seed(expression), self._step)
 
     def rank_correlations(self, expression: str) -> list[Effect]:
-        """As `sensitivity`, without parts of the variance: what can be said without a further package."""
+        """As `sensitivity`, without parts of the variance: for which no further package is needed."""
         return rank_effects(self.variables, self.points, self.by_seed(expression), self._step)
 
     @property
@@ -392,17 +390,8 @@ class Results:
             ParameterError: `package` names something else.
             MissingExtraError: It is not installed.
         """
-        if package not in ("", *FRAMES):
-            raise ParameterError(
-                f"package = {package!r} is not allowed{nearest_name(package, FRAMES)}; {listed(FRAMES)}"
-            )
-        name = package or next((f for f in FRAMES if find_spec(f)), "")
-        if not name or find_spec(name) is None:
-            raise MissingExtraError(
-                f"frames need {name or 'pandas or polars'}, which is not installed: pip install 'tussle[frames]' brings pandas; "
-                "`runs` is an Arrow table and needs neither"
-            )
-        return self.runs.to_pandas() if name == "pandas" else import_module(name).from_arrow(self.runs)
+        check_frames(package)
+        return frame_of(self.runs, package)
 
     # -- rows -------------------------------------------------------------------------------------------------------------
 

@@ -1,4 +1,4 @@
-"""One row per run, from one row per run, team and metric."""
+"""Makes a table with one row per run of one with a row per run, team and metric."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pyarrow.compute as pc
 from tussle.batch.quantities import column_name
 
 FACTS = ("end", "t", "steps", "winner", "error", "state_hash", "cpu_s", "host")
-"""Columns of the results that are the same in all rows of a run, in the order in which the runs show them."""
+"""Columns of the results that are the same in all rows of a run, in the order in which the table of runs has them."""
 KEYS = ("run", "point", "seed")
 
 
@@ -46,7 +46,7 @@ def metric_columns(table: pa.Table) -> dict[str, np.ndarray]:
 
 
 def floats(column: pa.ChunkedArray) -> np.ndarray:
-    """A column of numbers as float64, (n,); NaN where it says nothing."""
+    """A column of numbers as float64, (n,); NaN where it is empty."""
     array: np.ndarray = column.cast(pa.float64()).to_numpy()
     return array
 

@@ -181,8 +181,8 @@ def _list(variables: Sequence[Variable], _n: int, _seed: int) -> Rows:
         columns.append(variable.values)
     lengths = {variable.name: variable.n_values for variable in variables}
     if len(set(lengths.values())) > 1:
-        told = ", ".join(f"{name} has {length}" for name, length in lengths.items())
-        raise ParameterError(f"list: all need as many values as the others, but {told}; or sample by grid")
+        counts = ", ".join(f"{name} has {length}" for name, length in lengths.items())
+        raise ParameterError(f"list: all need as many values as the others, but {counts}; or sample by grid")
     return zip(*columns, strict=True)
 
 

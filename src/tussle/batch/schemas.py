@@ -1,4 +1,4 @@
-"""What `batch.json` and the tables beside it may say."""
+"""The schema of `batch.json`, and bounds of the values in the tables."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ CHOICE = {"values": [Either((bool, str, Real()), "a text, a number, or true or f
 
 
 def _against_mission(mission: dict[str, Any], where: str) -> str:
-    """What is wrong with where the mission came from, by whether it was a file."""
+    """The problem of the entry `mission`, "" for none."""
     if mission["made_in"] == "python":
         return ""
-    if said := problem(mission, FILE, where):
-        return said
+    if violation := problem(mission, FILE, where):
+        return violation
     for name in mission["options"]:
         if name not in OPTIONS:
             return (
@@ -47,8 +47,8 @@ def _against_mission(mission: dict[str, Any], where: str) -> str:
 
 
 def _against_variable(variable: dict[str, Any], where: str) -> str:
-    if said := problem(variable, RANGE if variable["kind"] == "range" else CHOICE, where):
-        return said
+    if violation := problem(variable, RANGE if variable["kind"] == "range" else CHOICE, where):
+        return violation
     try:
         variable_of(variable)
     except ParameterError as error:
@@ -57,7 +57,7 @@ def _against_variable(variable: dict[str, Any], where: str) -> str:
 
 
 def _against_counts(batch: dict[str, Any], _: str) -> str:
-    """What numbers say that should follow from one another."""
+    """The problem of counts that do not agree, "" for none."""
     n_runs = batch["n_points"] * batch["n_seeds"]
     if batch["n_runs"] != n_runs:
         return f"n_runs = {batch['n_runs']} is not allowed; n_points and n_seeds make {n_runs}"
@@ -101,11 +101,11 @@ BATCH = Document(
     ),
     BatchError,
 )
-"""What `batch.json` says."""
+"""Schema of `batch.json`."""
 
 RUN = Bounds(0, MOST_RUNS - 1)
 RULES: Rules = {
     "run": RUN, "point": RUN, "seed": Bounds(0, 2**64 - 1), "team": Bounds(-(2**31), INT32, may_miss=True), "metric": TEXT,
     "end": TEXT, "t": NUMBER, "steps": COUNT, "state_hash": TEXT, "cpu_s": Bounds(0.0), "host": TEXT, "alive": COUNT,
 }  # fmt: skip
-"""Of the tables of a batch."""
+"""Bounds of the columns of a batch's tables."""

@@ -23,15 +23,17 @@ def select_points(variables: Sequence[Variable], points: Points, text: str) -> l
     if is_number(text):
         return [known_point(points, int(text))]
     wanted = _values(variables, text)
-    found = [i for i, point in enumerate(points) if all(_agree(point[v.name], said, v) for v, said in wanted)]
+    found = [
+        i for i, point in enumerate(points) if all(_agree(point[v.name], shown, v) for v, shown in wanted)
+    ]
     if found:
         return found
-    for variable, said in wanted:
-        if not any(_agree(point[variable.name], said, variable) for point in points):
+    for variable, shown in wanted:
+        if not any(_agree(point[variable.name], shown, variable) for point in points):
             there = list(dict.fromkeys(written(point[variable.name]) for point in points))
             more = f" and {len(there) - MOST_LISTED} more" if len(there) > MOST_LISTED else ""
             raise ParameterError(
-                f"{text!r}: no point has {variable.name}={said}{nearest_name(said, there)}; "
+                f"{text!r}: no point has {variable.name}={shown}{nearest_name(shown, there)}; "
                 f"{listed(there[:MOST_LISTED])}{more}"
             )
     raise ParameterError(f"{text!r}: each of these values is there, but no point has all of them")
@@ -123,12 +125,12 @@ def _values(variables: Sequence[Variable], text: str) -> list[tuple[Variable, st
     return found
 
 
-def _agree(value: Any, said: str, variable: Variable) -> bool:
+def _agree(value: Any, shown: str, variable: Variable) -> bool:
     """Whether a text names a value; numbers are compared to six digits."""
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         try:
-            number = float(said)
+            number = float(shown)
         except ValueError:
             return False
         return math.isclose(value, number, rel_tol=5e-6)
-    return str(value) == said
+    return str(value) == shown

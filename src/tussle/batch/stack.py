@@ -1,4 +1,4 @@
-"""Runs played side by side in one simulation, where a finished world's slot takes the next run."""
+"""Plays runs side by side in one simulation, where the slot of a finished world takes the next run."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from tussle.api import Plugin
-from tussle.batch.tasks import Beat, Finished, Run
+from tussle.batch.tasks import BatchRun, Finished, Heartbeat
 from tussle.columns import Handle
 from tussle.engine.result import WorldResult
 from tussle.engine.simulation import Simulation
@@ -19,70 +19,70 @@ from tussle.errors import PluginError, TussleError
 from tussle.mission import Mission
 
 ROWS = 8192
-"""Entities that a stack holds, about: more rows cost no less each, and fall out of the cache."""
+"""Entities of a stack, about: with more rows a row costs no less, and the cache overflows."""
 MOST = 256
 BEAT_EVERY = 0.25  # [s]
 
-Take = Callable[[int], Sequence[Run]]
-"""Gives up to n further runs of the same group; none when there are no more."""
+Take = Callable[[int], Sequence[BatchRun]]
+"""Returns up to n further runs of the same group; none when there are no more."""
 
 
 def stack_size(mission: Mission) -> int:
-    """How many worlds of a mission are best played side by side."""
+    """Best number of worlds of a mission in a stack."""
     n = max(1, sum(block.count for block in mission.blocks))
     return max(1, min(MOST, ROWS // n, most_worlds(mission)))
 
 
 def most_worlds(mission: Mission) -> int:
-    """The largest stack that all plugins of a mission take part in."""
+    """The largest stack that all plugins of a mission allow."""
     plugins: list[Plugin] = [*mission.world_plugins, *(p for block in mission.blocks for p in block.plugins)]
     return min([MOST, *(Handle.most_worlds(p) or MOST for p in plugins)])
 
 
-def play(mission: Mission, take: Take, size: int) -> Iterator[Finished | Beat]:
-    """Play all runs that `take` gives.
+def play(mission: Mission, take: Take, size: int) -> Iterator[Finished | Heartbeat]:
+    """Play all runs that `take` returns.
 
-    Where a stack raises, each of its runs that is not finished is played again alone: the error is that of the run that raises alone.
+    Where a stack raises, each of its unfinished runs is played again alone, and one that raises alone gets the error.
 
     Args:
-        mission: What all of them play, but for their own params and seeds.
-        take: Where they come from.
-        size: How many are played side by side; fewer where a plugin takes part in fewer worlds.
+        mission: The mission of all runs, which have their own params and seeds.
+        take: Returns the runs.
+        size: Worlds side by side; fewer where a plugin allows fewer.
     """
     size = min(size, most_worlds(mission))
     while runs := list(take(size)):
         stack = _Stack(mission, take, runs)
-        lost, told = [], ""
+        lost, reported = [], ""
         try:
             yield from stack.play()
-        except (Exception, SystemExit) as error:  # noqa: BLE001 - whatever a plugin raises is the error of its run
-            lost, told = stack.under_way(), _told(error)
+        except (Exception, SystemExit) as error:  # noqa: BLE001 - all that a plugin raises is the error of its run
+            lost, reported = stack.under_way(), _reported(error)
         finally:
             stack.close()
         for run in lost:
             if stack.size == 1:
-                yield Finished.failed(run, told, mission.teams)
+                yield Finished.failed(run, reported, mission.teams)
             else:
                 yield from play(mission, _only(run), 1)
 
 
-def _only(run: Run) -> Take:
+def _only(run: BatchRun) -> Take:
     waiting = [run]
     return lambda n: [waiting.pop()] if waiting else []
 
 
-def _told(error: BaseException) -> str:
-    """What failed, without the number of the world, which depends on the stack."""
+def _reported(error: BaseException) -> str:
+    """The text of an error, without the number of the world, which depends on the stack."""
     if isinstance(error, PluginError):
         return str(PluginError(error.message, where=error.where, step=error.step, plugin=error.plugin))
     return str(error) if isinstance(error, TussleError) else f"{type(error).__name__}: {error}"
 
 
 class _CpuShare:
-    """CPU time of one world of the stack since the beginning, had it always been there.
+    """CPU time of one world of the stack.
 
     Attributes:
-        total: [s].
+        total: CPU time since the stack began, each part divided by the worlds of that time [s].
     """
 
     def __init__(self) -> None:
@@ -90,7 +90,7 @@ class _CpuShare:
         self._seen = time.process_time()
 
     def spent_by(self, n_worlds: int) -> None:
-        """What has passed since the last call was spent by so many worlds; by none: it was for something else."""
+        """Divide the time since the last call by so many worlds; with 0 worlds it is dropped."""
         now = time.process_time()
         if n_worlds:
             self.total += (now - self._seen) / n_worlds
@@ -101,14 +101,14 @@ class _Stack:
     """One simulation and the runs in its slots.
 
     Args:
-        mission: What is played.
-        take: Where further runs come from.
-        runs: The first ones, a slot each.
+        mission: The mission.
+        take: Returns further runs.
+        runs: The first runs, one per slot.
     """
 
-    def __init__(self, mission: Mission, take: Take, runs: Sequence[Run]) -> None:
+    def __init__(self, mission: Mission, take: Take, runs: Sequence[BatchRun]) -> None:
         self.mission, self.take = mission, take
-        self.slots: list[Run | None] = list(runs)
+        self.slots: list[BatchRun | None] = list(runs)
         self.sim: Simulation | None = None
         self._host = platform.node()
 
@@ -117,17 +117,17 @@ class _Stack:
         """Worlds side by side."""
         return len(self.slots)
 
-    def under_way(self) -> list[Run]:
-        """Runs that are not finished."""
+    def under_way(self) -> list[BatchRun]:
+        """Unfinished runs."""
         return [run for run in self.slots if run is not None]
 
     def close(self) -> None:
-        """Release what the simulation holds."""
+        """Close the simulation."""
         if self.sim is not None:
             self.sim.close()
 
-    def play(self) -> Iterator[Finished | Beat]:
-        """Play runs side by side, and all that follow them."""
+    def play(self) -> Iterator[Finished | Heartbeat]:
+        """Play the runs and all that follow them."""
         sim, teams = self._begin(self.under_way())
         rows, counts, n_before = sim.state.population.bodies.ints, self._count(), self.size
         n_steps, beat_at = max(1, self.mission.steps), time.monotonic() + BEAT_EVERY
@@ -154,10 +154,10 @@ class _Stack:
                 counts = left
             if time.monotonic() >= beat_at:
                 beat_at = time.monotonic() + BEAT_EVERY
-                yield Beat(float(sim.steps[sim.state.running].sum()) / n_steps if has_end else 0.0)
+                yield Heartbeat(float(sim.steps[sim.state.running].sum()) / n_steps if has_end else 0.0)
 
-    def _begin(self, runs: Sequence[Run]) -> tuple[Simulation, list[int]]:
-        """The simulation, before its first step, and its teams."""
+    def _begin(self, runs: Sequence[BatchRun]) -> tuple[Simulation, list[int]]:
+        """Make the simulation; returns it and its teams."""
         self._cpu = _CpuShare()
         self._cpu_begun = np.zeros(self.size)
         self._alive: list[list[tuple[int, float, int]]] = [[] for _ in runs]
@@ -185,8 +185,8 @@ class _Stack:
                 if before is None or counts[world, k] != before[world, k]:
                     self._alive[world].append((team, float(t[world]), int(counts[world, k])))
 
-    def _refill(self, teams: Sequence[int]) -> Iterator[Finished | Beat]:
-        """Hand on what is over, and begin further runs in the slots of these."""
+    def _refill(self, teams: Sequence[int]) -> Iterator[Finished | Heartbeat]:
+        """Yield the results of finished worlds, and start further runs in their slots."""
         assert self.sim is not None
         free = []
         for world, run in enumerate(self.slots):
@@ -210,7 +210,7 @@ class _Stack:
         self._start[chosen] = begun[chosen]
         self._note_alive(chosen, begun, teams)
 
-    def _finished(self, world: int, run: Run, teams: Sequence[int]) -> Finished:
+    def _finished(self, world: int, run: BatchRun, teams: Sequence[int]) -> Finished:
         assert self.sim is not None
         result = self.sim.state.results[world]
         assert result is not None
@@ -220,18 +220,18 @@ class _Stack:
         start = {team: int(n) for team, n in zip(teams, self._start[world], strict=True)}
         return Finished(
             run.number, result.end, result.t, result.steps,
-            None if result.error else result.winner, result.state_hash, "" if result.error is None else _told(result.error),
+            None if result.error else result.winner, result.state_hash, "" if result.error is None else _reported(result.error),
             self._cpu.total - float(self._cpu_begun[world]), self._host, _metrics(result, start), alive,
         )  # fmt: skip
 
 
-def _by_path(runs: Sequence[Run]) -> dict[str, list[Any]]:
-    """What differs among runs of a group: path -> value for each run."""
+def _by_path(runs: Sequence[BatchRun]) -> dict[str, list[Any]]:
+    """Params of runs of one group: path -> value for each run."""
     return {path: [run.params[path] for run in runs] for path in runs[0].params}
 
 
 def _metrics(result: WorldResult, start: Mapping[int, int]) -> list[tuple[int | None, str, float]]:
-    """All that is counted of a run: by team and of the world."""
+    """All metrics of a run, of teams and of the world."""
     out: list[tuple[int | None, str, float]] = []
     for name, counts in (("score", result.scores), ("alive", result.alive), ("start", start)):
         out += [(team, name, float(value)) for team, value in counts.items()]
@@ -246,4 +246,6 @@ def _metrics(result: WorldResult, start: Mapping[int, int]) -> list[tuple[int | 
                     RuntimeWarning,
                     stacklevel=2,
                 )
-    return out or [(None, "alive", 0.0)]  # a run without rows would not be there
+    return out or [
+        (None, "alive", 0.0)
+    ]  # the tables have one row per metric, so a run without any would be missing

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tussle.batch.plan import Plan
+from tussle.batch.plan import BatchPlan
 from tussle.batch.quantities import column_name
 from tussle.batch.tasks import Finished
 from tussle.batch.until import Until
@@ -27,7 +27,7 @@ class Stop:
         n_seeds: Seeds with which the rule is met; None until then.
     """
 
-    def __init__(self, rule: Until, plan: Plan, n_least: int = 0) -> None:
+    def __init__(self, rule: Until, plan: BatchPlan, n_least: int = 0) -> None:
         self.rule, self.plan, self.n_least = rule, plan, n_least
         self.n_seeds: int | None = None
         self._columns: dict[str, np.ndarray] = {}  # by seed and point, (room for seeds, n_points)

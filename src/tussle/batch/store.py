@@ -1,4 +1,4 @@
-"""A batch directory: what is planned, what has been played, and the tables that are made of it."""
+"""Reads and writes a batch directory: the plan, the results of finished runs, and the tables that are made of them."""
 
 from __future__ import annotations
 
@@ -29,14 +29,10 @@ from tussle.record.run_file import plain, put_whole
 from tussle.record.stream import Stream
 from tussle.record.table_values import check_values
 
-BATCH_FILE, DESIGN_FILE, RESULTS_FILE, ALIVE_FILE = (
-    "batch.json",
-    "design.parquet",
-    "results.parquet",
-    "alive.parquet",
-)
+BATCH_FILE, DESIGN_FILE = "batch.json", "design.parquet"
+RESULTS_FILE, ALIVE_FILE = "results.parquet", "alive.parquet"
 MOST_IN_PART = 2000
-"""Runs in one file of parts: each is a batch of its own, which in memory takes ten times what the run does in a table."""
+"""Runs in one file of parts: each is a record batch, which in memory takes ten times what the run takes in a table."""
 
 PARTS, RUNS, MISSION, PLUGINS, LOCK = "parts", "runs", "mission", "plugins", "lock"
 
@@ -61,7 +57,7 @@ PLAYED = pa.schema(
 """One row per finished run, as it is appended."""
 
 IS_OWN = (BATCH_FILE, f"{BATCH_FILE}.part", LOCK)
-"""What may lie in a directory in which no batch has been begun: one was killed as it began."""
+"""Files that a directory may have before its batch has begun: a batch may have been killed then."""
 
 OF_RUN = ("end", "t", "steps", "winner", "state_hash", "error", "cpu_s", "host")
 
@@ -76,26 +72,25 @@ RESULTS = pa.schema(
         *((name, PLAYED.field(name).type) for name in OF_RUN),
     ]
 )
-"""One row per run, team and metric, sorted by these; what is of the world comes before the teams."""
+"""One row per run, team and metric, sorted by these; metrics of the world come before those of teams."""
 
 ALIVE = pa.schema([("run", pa.int64()), ("team", pa.int32()), ("t", pa.float64()), ("alive", pa.int32())])
-"""One row whenever the number of a team's entities changes, from the start of the run to its end."""
-
+"""One row for each change of the number of a team's entities, from the start of the run to its end."""
 
 DESIGN = pa.schema([("run", pa.int64()), ("point", pa.int32()), ("seed", pa.uint64())])
-"""One row per planned run; the variables have columns behind these."""
+"""One row per planned run; a column for each variable follows."""
 
 
 @dataclass
-class Stored:
-    """A batch as it lies on disk, or in memory.
+class StoredBatch:
+    """The contents of a batch directory, or of a batch in memory.
 
     Attributes:
-        path: Its directory; None in memory.
-        info: What `batch.json` says.
+        path: The directory; None in memory.
+        info: Contents of `batch.json`.
         design: One row per planned run.
-        table: `RESULTS` of the runs that are finished.
-        alive: `ALIVE` of them.
+        table: `RESULTS` of the finished runs.
+        alive: `ALIVE` of the finished runs.
         notes: What is missing, one line each.
     """
 
@@ -110,35 +105,21 @@ class Stored:
 def row(finished: Finished) -> pa.RecordBatch:
     """A finished run as one row."""
     f = finished
-    metrics = [{"team": t, "metric": m, "value": None if math.isnan(v) else v} for t, m, v in f.metrics]
-    alive = [{"team": team, "t": t, "alive": n} for team, t, n in f.alive]
-    values = [
-        f.number,
-        f.end,
-        f.t,
-        f.steps,
-        f.winner,
-        f.state_hash,
-        f.error or None,
-        f.cpu_s,
-        f.host,
-        metrics,
-        alive,
-    ]
-    arrays = [pa.array([value], column.type) for value, column in zip(values, PLAYED, strict=True)]
-    return pa.RecordBatch.from_arrays(arrays, schema=PLAYED)
+    values = {name: getattr(f, name) for name in OF_RUN} | {
+        "run": f.number,
+        "error": f.error or None,
+        "metrics": [{"team": t, "metric": m, "value": None if math.isnan(v) else v} for t, m, v in f.metrics],
+        "alive": [{"team": team, "t": t, "alive": n} for team, t, n in f.alive],
+    }
+    return pa.RecordBatch.from_pylist([values], PLAYED)
 
 
 def tables(played: pa.Table, design: pa.Table) -> tuple[pa.Table, pa.Table]:
-    """`RESULTS` and `ALIVE` of finished runs; of a run that is there twice, the first row counts."""
+    """`RESULTS` and `ALIVE` of finished runs; where a run is there twice, the first row counts."""
     runs, first = np.unique(played["run"].to_numpy(), return_index=True)
-    known = design["run"].to_numpy()
-    place = np.searchsorted(known, runs)
-    is_planned = (
-        (place < len(known)) & (known[np.minimum(place, len(known) - 1)] == runs) if len(known) else runs < 0
-    )
+    is_planned = runs < design.num_rows  # a design has the runs 0, 1, 2 ...
     played = played.take(pa.array(first[is_planned])).combine_chunks()
-    of_run = design.take(pa.array(place[is_planned]))
+    of_run = design.take(pa.array(runs[is_planned]))
     if not played.num_rows:
         return RESULTS.empty_table(), ALIVE.empty_table()
     index, found = _exploded(played["metrics"])
@@ -160,7 +141,7 @@ def _exploded(column: pa.ChunkedArray) -> tuple[pa.Array, pa.StructArray]:
     return pc.list_parent_indices(lists), pc.list_flatten(lists)
 
 
-class Kept:
+class MemoryStore:
     """Finished runs in memory."""
 
     def __init__(self) -> None:
@@ -174,7 +155,7 @@ class Kept:
             self._compact()
 
     def played(self) -> pa.Table:
-        """All runs that are finished, in the order in which they were."""
+        """All finished runs, in the order in which they ended."""
         self._compact()
         return pa.concat_tables(self._parts)
 
@@ -184,26 +165,26 @@ class Kept:
 
 
 class Store:
-    """The directory of a batch that is being played; nobody else plays into it meanwhile.
+    """A batch directory that is open for writing, and locked for other processes.
 
-    What `add` has returned from is with the operating system. The tables appear whole or not at all, and `batch.json` says last that the
-    batch is complete.
+    When `add` returns, the operating system has the run. Tables are written whole or not at all; a `batch.json` that says that the batch
+    is complete is written last.
 
     Args:
-        path: The directory; made if need be.
+        path: The directory; made where it does not exist.
 
     Attributes:
-        was_killed: Who played before was killed, or ended otherwise without a word.
+        was_killed: The process that played before was killed.
 
     Raises:
-        BatchError: Another process plays into it, or it holds something else.
+        BatchError: Another process plays this batch, or the directory holds something else.
         RecordError: It cannot be written.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self._stream: Stream | None = None
-        with told(path):
+        with reported(path):
             path.mkdir(parents=True, exist_ok=True)
             if (path / BATCH_FILE).exists():
                 read_info(path)
@@ -212,27 +193,27 @@ class Store:
                     f"{path}: holds something that is no batch ({min(foreign)}); choose another directory"
                 )
         self._lock = locked(path, "playing this batch")
-        with told(path):
+        with reported(path):
             self.was_killed = (path / LOCK).stat().st_size > 0
             self._lock.write(f"{os.getpid()}\n")
             self._lock.flush()
 
     @property
     def info(self) -> dict[str, Any] | None:
-        """What `batch.json` says; None without one."""
+        """Contents of `batch.json`; None where there is none."""
         return read_info(self.path) if (self.path / BATCH_FILE).exists() else None
 
     def write_info(self, info: Mapping[str, Any]) -> None:
-        """Put `batch.json` in its place."""
-        with told(self.path):
+        """Write `batch.json`, as a whole."""
+        with reported(self.path):
             put_whole(self.path / BATCH_FILE, json.dumps(plain(info), indent=1, allow_nan=False) + "\n")
 
     def write_table(self, name: str, table: pa.Table) -> None:
-        """Put a table in its place."""
+        """Write a table, as a whole."""
         draft = self.path / f"{name}.part"
-        with told(self.path):
+        with reported(self.path):
             try:
-                draft.unlink(missing_ok=True)  # what a link leads to is not ours
+                draft.unlink(missing_ok=True)  # not what a link leads to
                 pq.write_table(table, draft, compression="zstd", write_page_checksum=True)
                 draft.replace(self.path / name)
             except OSError:
@@ -240,16 +221,16 @@ class Store:
                 raise
 
     def write_folder(self, name: str, files: Mapping[str, bytes]) -> None:
-        """Put a folder in its place, unless it is there or would be empty.
+        """Write a folder, as a whole, unless it exists or would be empty.
 
         Args:
             name: Of the folder.
-            files: Path in it -> content.
+            files: Path in the folder -> content.
         """
         target, draft = self.path / name, self.path / f"{name}.part"
         if target.exists() or not files:
             return
-        with told(self.path):
+        with reported(self.path):
             shutil.rmtree(draft, ignore_errors=True)
             draft.mkdir()
             for inner, content in files.items():
@@ -259,7 +240,7 @@ class Store:
             draft.replace(target)
 
     def played(self) -> pa.Table:
-        """All runs that are finished, in the order in which they were."""
+        """Finished runs that are not in the tables, in the order in which they ended."""
         return read_played(self.path)[0]
 
     def add(self, finished: Finished) -> None:
@@ -267,28 +248,28 @@ class Store:
         if self._stream is not None and self._stream.rows >= MOST_IN_PART:
             self.close_part()
         if self._stream is None:
-            with told(self.path):
+            with reported(self.path):
                 (self.path / PARTS).mkdir(exist_ok=True)
                 taken = [int(p.stem) for p in (self.path / PARTS).glob("*.arrow") if p.stem.isdigit()]
                 self._stream = Stream(self.path / PARTS / f"{max(taken, default=0) + 1:04d}.arrow", PLAYED)
         self._stream.write(row(finished))
 
     def close_part(self) -> None:
-        """End the stream of this process, so far as there is one."""
+        """Close the file of this process, if it has one."""
         if self._stream is not None:
             self._stream.close()
             self._stream = None
 
     def drop_parts(self) -> None:
-        """Remove what has been made into tables."""
-        with told(self.path):
+        """Remove the files of finished runs that the tables hold."""
+        with reported(self.path):
             for part in (self.path / PARTS).glob("*.arrow"):
                 part.unlink()
             with contextlib.suppress(FileNotFoundError):
                 (self.path / PARTS).rmdir()
 
     def close(self) -> None:
-        """Leave the directory to others."""
+        """Unlock the directory."""
         try:
             self.close_part()
         finally:
@@ -297,13 +278,13 @@ class Store:
 
 
 def locked(path: Path, doing: str) -> IO[str]:
-    """The lock of a directory, held until it is closed.
+    """Lock a directory until the returned file is closed.
 
     Raises:
         BatchError: Another process holds it.
-        RecordError: It cannot be made, or is a link or something else than a file.
+        RecordError: The file cannot be made, or is a link or no regular file.
     """
-    with told(path):
+    with reported(path):
         file = os.fdopen(open_safely(path / LOCK, os.O_RDWR | os.O_CREAT, 0o666), "r+")
     try:
         lock(file, wait=False)
@@ -312,7 +293,7 @@ def locked(path: Path, doing: str) -> IO[str]:
         raise BatchError(f"{path}: another process is {doing}") from None
     except OSError as error:
         warnings.warn(
-            f"{path}: this system has no locks ({error.strerror}); see that nobody else is {doing} meanwhile",
+            f"{path}: this system has no locks ({error.strerror}); make sure that no other process is {doing}",
             RuntimeWarning,
             stacklevel=3,
         )
@@ -320,8 +301,8 @@ def locked(path: Path, doing: str) -> IO[str]:
 
 
 @contextlib.contextmanager
-def told(path: Path) -> Iterator[None]:
-    """Errors of the operating system as those of records."""
+def reported(path: Path) -> Iterator[None]:
+    """Turn errors of the operating system into record errors."""
     try:
         yield
     except OSError as error:
@@ -332,10 +313,10 @@ def told(path: Path) -> Iterator[None]:
 
 
 def read_info(path: Path) -> dict[str, Any]:
-    """What `batch.json` of a directory says.
+    """Contents of `batch.json`.
 
     Raises:
-        BatchError: There is no batch, or one that cannot be read.
+        BatchError: There is no batch, or it cannot be read.
     """
     file = path / BATCH_FILE
     if not path.is_dir():
@@ -346,7 +327,7 @@ def read_info(path: Path) -> dict[str, Any]:
 
 
 def read_played(path: Path) -> tuple[pa.Table, list[str]]:
-    """Finished runs that are not in the tables yet, with what is missing; a file that was cut gives its whole batches.
+    """Finished runs that are not in the tables yet, and notes on what is missing; of a truncated file the whole rows are read.
 
     Raises:
         BatchError: A file holds something else.
@@ -364,7 +345,7 @@ def read_table(path: Path, name: str, columns: pa.Schema) -> pa.Table | None:
     Args:
         path: The directory.
         name: Of the file.
-        columns: What it has at least.
+        columns: Columns that it has at least.
 
     Raises:
         BatchError: It cannot be read, or is another table.
@@ -378,7 +359,7 @@ def read_table(path: Path, name: str, columns: pa.Schema) -> pa.Table | None:
 
 
 def finished_in(results: pa.Table) -> Iterator[Finished]:
-    """The runs of a table of results, without the numbers over time."""
+    """The runs of a table of results, without the numbers of entities over time."""
     runs = results["run"].to_numpy()
     starts = np.flatnonzero(np.diff(runs, prepend=-1))
     named = [results[name].to_pylist() for name in ("team", "metric", "value")]
@@ -393,8 +374,8 @@ def finished_in(results: pa.Table) -> Iterator[Finished]:
         yield Finished(number=number, error=error, metrics=metrics, alive=[], **first)
 
 
-def load(path: str | Path) -> Stored:
-    """A batch directory, complete or not.
+def load(path: str | Path) -> StoredBatch:
+    """Read a batch directory, complete or not.
 
     Raises:
         BatchError: There is no batch, or it cannot be read.
@@ -414,11 +395,11 @@ def load(path: str | Path) -> Stored:
     n = len(pc.unique(results["run"]))
     if not info["is_complete"]:
         notes = [f"the batch is not complete: {n} of {design.num_rows} runs are finished"]
-    return Stored(path, info, design, results, alive, notes)
+    return StoredBatch(path, info, design, results, alive, notes)
 
 
 def merged(path: Path, played: pa.Table, design: pa.Table) -> tuple[pa.Table, pa.Table]:
-    """The tables of a directory with runs that have been played since.
+    """The tables of a directory, with the runs that are not in them yet.
 
     Raises:
         BatchError: A table cannot be read, or is missing.
@@ -432,14 +413,14 @@ def merged(path: Path, played: pa.Table, design: pa.Table) -> tuple[pa.Table, pa
     results, alive = tables(played, design)
     for table in (results, alive):
         check_values(zip(table.column_names, table.columns, strict=True), RULES, path / PARTS, BatchError)
-    # Each by its own runs: a batch that is killed as it ends may have written one table and not the other.
+    # Each by its own runs: a batch that was killed at its end may have written one of the two.
     results = _with_new(old, results, ("run", "team", "metric"))
     check_metrics(results, path / RESULTS_FILE)
     return results, _with_new(old_alive, alive, ("run", "t", "team"))
 
 
 def _with_new(old: pa.Table | None, new: pa.Table, order: tuple[str, ...]) -> pa.Table:
-    """A table with the rows of runs that it does not have yet, in order."""
+    """A table with the rows of further runs, sorted."""
     if old is None:
         return new
     new = new.filter(pc.invert(pc.is_in(new["run"], pc.unique(old["run"]).cast(pa.int64()))))
@@ -449,6 +430,6 @@ def _with_new(old: pa.Table | None, new: pa.Table, order: tuple[str, ...]) -> pa
 
 
 def _ordered(table: pa.Table, names: tuple[str, ...]) -> pa.Table:
-    """A table in the order of some columns; what is of no team comes before the teams."""
+    """A table sorted by some columns; rows without a team come before those of teams."""
     keys = pa.table({n: table[n].fill_null(-(2**31)) if n == "team" else table[n] for n in names})
     return table.take(pc.sort_indices(keys, sort_keys=[(name, "ascending") for name in names]))

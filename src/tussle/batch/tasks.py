@@ -1,52 +1,50 @@
-"""What a batch hands to those who play it, and what they give back; all of it pickles."""
+"""The data that a batch sends to its workers and receives from them; all of it pickles."""
 
 from __future__ import annotations
 
 import math
-import pickle
 import platform
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from tussle.batch import by_value
 from tussle.mission import Mission, PluginFile
 
 
 @dataclass(frozen=True)
-class Run:
+class BatchRun:
     """One game of a batch.
 
     Attributes:
-        number: Its place in the design.
-        group: Which of the package's missions it plays.
-        seed: Its seed.
-        params: What differs from that mission, by path, SI.
-        is_alone: It is to be played in a process of its own beside no other, since one that played it has died.
+        number: Index in the design.
+        group: Index of the mission in the package.
+        seed: Seed.
+        params: Values that differ from that mission, by path, SI.
     """
 
     number: int
     group: int
     seed: int
     params: Mapping[str, Any] = field(default_factory=dict)
-    is_alone: bool = False
 
 
 @dataclass(frozen=True)
 class Finished:
-    """What came of a run.
+    """The result of a run.
 
     Attributes:
         number: The run.
-        end: Why it ended; "error" where something failed.
+        end: Why it ended; "error" where it failed.
         t: Time at the end [s].
-        steps: Steps made.
-        winner: Team with the highest score; None for a tie, without scores, and where it failed.
+        steps: Number of steps.
+        winner: Team with the highest score; None for a tie, without scores, and for a failed run.
         state_hash: Hash of the state at the end.
-        error: What failed, "" for nothing.
+        error: Error message, "" for none.
         cpu_s: CPU time of its share of the stack [s].
-        host: Machine that played it.
+        host: Name of the machine.
         metrics: (team or None, name, value).
-        alive: (team, t [s], entities): how many there are whenever that changes, from the start to the end.
+        alive: (team, t [s], entities) for each change of the number, from the start to the end.
     """
 
     number: int
@@ -62,23 +60,17 @@ class Finished:
     alive: list[tuple[int, float, int]]
 
     @staticmethod
-    def failed(run: Run, error: str, teams: Iterable[int]) -> Finished:
-        """A run of which nothing is known but that it failed.
-
-        Args:
-            run: The run.
-            error: What is known of why.
-            teams: Of its mission.
-        """
+    def failed(run: BatchRun, error: str, teams: Iterable[int]) -> Finished:
+        """The result of a run that failed without leaving a state."""
         named: list[int | None] = [int(team) for team in teams]
-        # A run without any row would not be there.
+        # The tables have one row per metric, so a run without any would be missing.
         metrics = [(team, "alive", math.nan) for team in named or [None]]
         return Finished(run.number, "error", 0.0, 0, None, "", error, 0.0, platform.node(), metrics, [])
 
 
 @dataclass(frozen=True)
-class Beat:
-    """Sign of life of a stack.
+class Heartbeat:
+    """Sign of life of whoever plays.
 
     Attributes:
         under_way: Sum over the runs under way of the part of the longest game that each has played, 0 to 1 each.
@@ -92,9 +84,9 @@ class Package:
     """The missions of a batch and the plugin files that they need.
 
     Attributes:
-        missions: One per group, pickled: classes of plugin files can be found only once these are loaded.
+        missions: One per group, pickled, since classes of plugin files exist only once the files are loaded.
         plugin_files: The files.
-        run_timeout: Wall time that a run may take [s]; None sets no limit.
+        run_timeout: Wall time that a run may take [s]; None for no limit.
     """
 
     missions: tuple[bytes, ...]
@@ -105,5 +97,5 @@ class Package:
         """The mission of a group."""
         for file in self.plugin_files:
             file.load()
-        mission: Mission = pickle.loads(self.missions[group])  # noqa: S301 - made by the process that asks for it to be played
+        mission: Mission = by_value.loads(self.missions[group])
         return mission

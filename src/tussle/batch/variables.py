@@ -1,4 +1,4 @@
-"""What varies in a batch: ranges and choices, as text such as "prey_speed=20:30 kt" and "tactic=keep,switch", and as values of a point."""
+"""The variables of a batch: ranges and choices, written as "prey_speed=20:30 kt" and "tactic=keep,switch"."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from tussle.errors import ParameterError, UnitError, nearest_name
+from tussle.errors import ParameterError, UnitError, listed, nearest_name
 from tussle.mission.codecs import written
 from tussle.numeric import exp, log
 from tussle.units import LONGEST_TEXT, QUANTITY, unit_of
@@ -22,36 +22,33 @@ Value = int | float | str | bool
 Point = dict[str, Value]
 
 COLUMNS = ("run", "point", "seed")
-"""Columns that every table of a batch has; a variable called so would be taken for one."""
+"""Columns that every table of a batch has, and that no variable can be named after."""
 
 MODIFIERS = ("int", "log")
 WHOLE = re.compile(r"[-+]?\d{1,9}", re.ASCII)
 WHOLE_VALUE = re.compile(r"[-+]?\d{1,18}", re.ASCII)
 LARGEST_WHOLE = 10**15
-"""Up to here, and not much further, a half more than a whole number is a float."""
+"""Up to here a whole number plus one half is a float."""
 
 MOST_LEVELS = 1_000_000
 
 SHOWN_DIGITS = 12
-"""Significant digits of a range's width in its values: enough to tell any two apart, few enough to be read and typed again.
-
-It is not what makes the values the same everywhere: sums, products and `tussle.numeric` do that.
-"""
+"""Significant digits of a range's width in its values: enough to tell any two apart, few enough to be typed."""
 
 
 @dataclass(frozen=True)
 class Range:
-    """Numbers between two bounds, which belong to it.
+    """Numbers between two bounds, both included.
 
     Attributes:
         name: A placeholder of the mission, or a path such as "prey.Boids.max_speed".
         low: Smallest value [unit].
         high: Largest value [unit].
         is_int: Whole numbers only.
-        is_log: Values lie evenly by their logarithm.
-        levels: It takes only so many values, evenly from low to high; None for all between.
+        is_log: Values are spread evenly by their logarithm.
+        levels: Number of values, spread evenly from low to high; None for all values between.
         unit: Unit that is written behind the number.
-        is_text: Its bounds come from a text such as "20:30", so a number without unit is read as in a mission file; else it is SI.
+        is_text: The bounds come from a text such as "20:30", so a number without unit is read as in a mission file; else it is SI.
 
     Raises:
         ParameterError: The bounds, the levels or the name are not allowed.
@@ -72,67 +69,49 @@ class Range:
         for word in ("low", "high"):
             bound = getattr(self, word)
             if isinstance(bound, bool) or not isinstance(bound, numbers.Real):
-                raise ParameterError(
-                    f"{self.name}: {word} is a number, not {bound!r}; a unit has a place of its own"
-                )
-            # Plain floats, whatever came: they are written into files.
-            object.__setattr__(self, word, float(bound))
-        self._check_bounds()
-        if self.is_int:
-            self._check_whole()
-        self._check_levels()
+                raise ParameterError(f"{self.name}: {word} is a number, not {bound!r}; `unit` takes a unit")
+            object.__setattr__(self, word, float(bound))  # as files take it, also if it was NumPy's
+        if wrong := self._wrong_bounds() or self._wrong_levels():
+            raise ParameterError(f"{self.name}: {wrong}")
         _unit(self.name, self.unit)
 
-    def _check_bounds(self) -> None:
+    def _wrong_bounds(self) -> str:
         low, high = shown(self.low), shown(self.high)
         if not (math.isfinite(self.low) and math.isfinite(self.high)):
-            raise ParameterError(
-                f"{self.name}: the bounds of a range are finite numbers, not {low} and {high}"
-            )
+            return f"the bounds of a range are finite numbers, not {low} and {high}"
         if self.low == self.high:
             value = f"{low} {self.unit}".strip()
-            raise ParameterError(
-                f"{self.name}: both bounds are {value}, so nothing varies; give it one value with --set '{self.name}={value}'"
+            return (
+                f"both bounds are {value}, so nothing varies; give one value with --set '{self.name}={value}'"
             )
         if self.low > self.high:
-            raise ParameterError(
-                f"{self.name}: the low bound {low} is above the high bound {high}; write the low one first"
-            )
+            return f"the low bound {low} is above the high bound {high}; write the low one first"
         if self.is_log and self.low <= 0.0:
-            raise ParameterError(f"{self.name}: a range by the logarithm needs a low bound > 0, not {low}")
-
-    def _check_whole(self) -> None:
-        for bound in (self.low, self.high):
+            return f"a range by the logarithm needs a low bound > 0, not {low}"
+        for bound in (self.low, self.high) if self.is_int else ():
             if not bound.is_integer():
-                raise ParameterError(
-                    f"{self.name}: the bounds of a range of whole numbers are whole, {shown(bound)} is not"
-                )
+                return f"the bounds of a range of whole numbers are whole, {shown(bound)} is not"
             if abs(bound) > LARGEST_WHOLE:
-                raise ParameterError(
-                    f"{self.name}: {shown(bound)} is too large; whole numbers are allowed up to 10^15"
-                )
+                return f"{shown(bound)} is too large; whole numbers are allowed up to 10^15"
+        return ""
 
-    def _check_levels(self) -> None:
+    def _wrong_levels(self) -> str:
         levels: Any = self.levels
         if levels is None:
-            return
+            return ""
         if isinstance(levels, bool) or not isinstance(levels, numbers.Integral):
-            raise ParameterError(f"{self.name}: levels are a whole number, not {levels!r}")
+            return f"levels are a whole number, not {levels!r}"
         n = int(levels)
         object.__setattr__(self, "levels", n)
         if not 2 <= n <= MOST_LEVELS:
-            raise ParameterError(
-                f"{self.name}: {n} levels are not allowed; a range takes 2 to {MOST_LEVELS:,}"
-            )
+            return f"{n} levels are not allowed; a range takes 2 to {MOST_LEVELS:,}"
         if self.is_int and len(set(self.spread(n))) < n:
-            raise ParameterError(
-                f"{self.name}: there are no {n} different whole numbers spread from {shown(self.low)} to "
-                f"{shown(self.high)}{' by the logarithm' if self.is_log else ''}; ask for fewer levels"
-            )
+            return f"there are no {n} different whole numbers spread over the range; ask for fewer levels"
+        return ""
 
     @property
     def n_values(self) -> int | None:
-        """How many values it takes; None where they are not countable."""
+        """Number of values; None where they are not countable."""
         if self.levels is not None:
             return self.levels
         return int(self.high) - int(self.low) + 1 if self.is_int else None
@@ -140,7 +119,7 @@ class Range:
     def value_at(self, share: float) -> int | float:
         """The value below which a share of the range lies; equal shares of [0, 1] belong to each level or whole number.
 
-        By the logarithm, whole numbers have the share of what is rounded to them.
+        By the logarithm, a whole number has the share of the numbers that are rounded to it.
         """
         if self.levels is not None:
             return self._level(min(int(share * self.levels), self.levels - 1), self.levels)
@@ -158,14 +137,14 @@ class Range:
         return tuple(self._level(i, n) for i in range(n))
 
     def text(self, value: Value) -> str:
-        """The value as it is put into a mission file; a text stays as it is."""
+        """The value as a mission file has it; a text stays as it is."""
         if isinstance(value, str):
             return value
         number = written(int(value) if self.is_int else float(value))
         return f"{number} {self.unit}" if self.unit else number
 
     def setting(self, value: Value, is_argument: bool = False) -> Value:
-        """The value as a mission takes it: a text where it is one, else a number in SI units. Arguments of functions stay numbers."""
+        """The value as `read_mission` takes it: a text where it was one, else a number in SI units. Arguments of functions stay numbers."""
         if isinstance(value, str) or self.unit or (self.is_text and not is_argument):
             return self.text(value)
         return int(value) if self.is_int else float(value)
@@ -183,7 +162,7 @@ class Range:
 
     @cached_property
     def _digits(self) -> int:
-        """Digits of a value: more of them where the range is narrow beside its values, as from 35.721025 to 35.721026."""
+        """Digits of a value: more of them where the range is narrow compared with its values, as from 35.721025 to 35.721026."""
         width = min(self.high - self.low, sys.float_info.max)
         leading = _exponent(max(abs(self.low), abs(self.high))) - _exponent(width)
         return min(SHOWN_DIGITS + max(leading, 0), 17)
@@ -191,7 +170,7 @@ class Range:
 
 @dataclass(frozen=True)
 class Choice:
-    """One of some values.
+    """One of several values.
 
     Attributes:
         name: A placeholder of the mission, or a path such as "prey.motion_model".
@@ -199,7 +178,7 @@ class Choice:
         is_text: They come from a text such as "20,30", so a number is read as in a mission file; else it is SI.
 
     Raises:
-        ParameterError: A value is of another type or stands twice, there is none, or the name is not allowed.
+        ParameterError: A value has another type or is there twice, there is none, or the name is not allowed.
     """
 
     name: str
@@ -211,7 +190,6 @@ class Choice:
         values: Any = self.values
         if isinstance(values, str) or not isinstance(values, Sequence | np.ndarray):
             raise ParameterError(f"{self.name}: choices are a list, not {values!r}")
-        # Plain Python values, whatever came: they are written into files.
         plain = tuple(v.item() if isinstance(v, np.generic) else v for v in values)
         object.__setattr__(self, "values", plain)
         if not plain:
@@ -219,14 +197,13 @@ class Choice:
         seen: set[tuple[bool, str | float]] = set()
         for value in plain:
             check_value(self.name, value)
-            key = key_of(value)
-            if key in seen:
-                raise ParameterError(f"{self.name}: the choice {value!r} stands there twice")
-            seen.add(key)
+            if key_of(value) in seen:
+                raise ParameterError(f"{self.name}: the choice {value!r} is there twice")
+            seen.add(key_of(value))
 
     @property
     def n_values(self) -> int:
-        """How many values there are."""
+        """Number of values."""
         return len(self.values)
 
     def value_at(self, share: float) -> Value:
@@ -234,11 +211,11 @@ class Choice:
         return self.values[min(int(share * len(self.values)), len(self.values) - 1)]  # type: ignore[no-any-return]
 
     def text(self, value: Value) -> str:
-        """The value as it is put into a mission file."""
+        """The value as a mission file has it."""
         return written(value)
 
     def setting(self, value: Value, is_argument: bool = False) -> Value:
-        """As of a range."""
+        """The value as `read_mission` takes it, see `Range.setting`."""
         return written(value) if self.is_text and not is_argument else value
 
 
@@ -246,7 +223,7 @@ Variable = Range | Choice
 
 
 def shown(number: float) -> str:
-    """A number for a message, without digits that say nothing."""
+    """A number for a message, to twelve digits."""
     return f"{number:.12g}"
 
 
@@ -256,42 +233,41 @@ def _check_name(name: Any) -> None:
             f"a variable has a name, not {name!r}: a placeholder of the mission, or a path such as prey.Boids.max_speed"
         )
     if name in COLUMNS:
-        raise ParameterError(
-            f"{name!r} cannot vary: the tables of a batch have a column of this name ({', '.join(COLUMNS)})"
-        )
+        raise ParameterError(f"{name!r} cannot vary: the tables of a batch have columns {listed(COLUMNS)}")
 
 
 def check_value(name: str, value: Any) -> None:
-    """Refuse what a point cannot hold.
+    """Check a value of a point.
 
     Raises:
         ParameterError: It is neither a text, a truth value nor a finite number.
     """
     if not isinstance(value, str | bool | int | float):
-        raise ParameterError(
-            f"{name}: {value!r} cannot be chosen; a choice is a text, a number, or true or false"
-        )
-    if isinstance(value, float) and not math.isfinite(value):
-        raise ParameterError(f"{name}: {value} cannot be chosen; a number is finite")
-    if isinstance(value, int) and abs(value) >= 2**63:
-        raise ParameterError(f"{name}: {value!r:.30} is too large; whole numbers are allowed up to 2^63 - 1")
+        wrong = "a choice is a text, a number, or true or false"
+    elif isinstance(value, float) and not math.isfinite(value):
+        wrong = "a number is finite"
+    elif isinstance(value, int) and abs(value) >= 2**63:
+        wrong = "whole numbers are allowed up to 2^63 - 1"
+    else:
+        return
+    raise ParameterError(f"{name}: {value!r:.80} cannot be chosen; {wrong}")
 
 
 def key_of(value: Value) -> tuple[bool, str | float]:
-    """What equal choices have in common: 1 and 1.0 are one number, true and "true" one text in a mission."""
+    """A key that equal values share: 1 and 1.0 are one number, true and "true" one text in a mission."""
     is_number = not isinstance(value, str | bool)
     return is_number, value if is_number else written(value)
 
 
 def _mixed(low: float, high: float, share: float, *, is_log: bool) -> float:
-    """What lies at a share of the way. Not low + share * (high - low), whose difference may be too large for a number."""
+    """The value at a share of the way. Not low + share * (high - low), whose difference may overflow."""
     if is_log:
         return float(exp(log(low) * (1.0 - share) + log(high) * share))
     return low * (1.0 - share) + high * share
 
 
 def _exponent(number: float) -> int:
-    """Power of ten of the first digit; by the text, since log10 of a power of ten is not the same on every machine."""
+    """Power of ten of the first digit; from the text, since log10 of a power of ten differs between machines."""
     return int(f"{number:e}".rpartition("e")[2])
 
 
@@ -299,24 +275,24 @@ def _exponent(number: float) -> int:
 
 
 def parse_variable(text: str) -> Variable:
-    """What `--vary` says: "prey_speed=20:30 kt", "prey.count=50:100:int", "gain=1e-3:10:log:5", "tactic=keep,switch".
+    """Parse a text of `--vary`: "prey_speed=20:30 kt", "prey.count=50:100:int", "gain=1e-3:10:log:5", "tactic=keep,switch".
 
     Raises:
-        ParameterError: It is written otherwise, or asks for what is not allowed.
+        ParameterError: The text is malformed, or a value is not allowed.
     """
     name, equals, values = (part.strip() for part in text.partition("="))
     if not equals:
         raise ParameterError(
-            f"{_cut(text)!r} does not say what varies; write a range such as prey_speed=20:30 or choices such as tactic=keep,switch"
+            f"{_cut(text)!r} is no variable; write a range such as prey_speed=20:30 or choices such as tactic=keep,switch"
         )
     return parse_values(name, values)
 
 
 def parse_values(name: str, text: str) -> Variable:
-    """The variable of a name whose values are written as on the command line: a text with ":" is a range, one with "," choices.
+    """Parse the values of a variable: a text with ":" is a range, one with "," choices.
 
     Raises:
-        ParameterError: It is written otherwise, or asks for what is not allowed.
+        ParameterError: The text is malformed, or a value is not allowed.
     """
     _check_name(name)
     if ":" in text and "," not in text:
@@ -324,19 +300,18 @@ def parse_values(name: str, text: str) -> Variable:
     items = [item.strip() for item in text.split(",")]
     if "" in items:
         raise ParameterError(
-            f"{name}: {'a value is missing' if len(items) > 1 else 'there is no value'} in {_cut(text)!r}; "
-            "write a range as 20:30 or choices as keep,switch"
+            f"{name}: a value is missing in {_cut(text)!r}; write a range as 20:30 or choices as keep,switch"
         )
     for item in items:
         if ":" in item and all(QUANTITY.fullmatch(part.strip()) for part in _cut(item).split(":")):
             raise ParameterError(
-                f"{name}: the range {_cut(item)!r} cannot stand among choices; write a range alone, as 20:30, or values, as 20,25,30"
+                f"{name}: the range {_cut(item)!r} cannot be among choices; write a range alone, as 20:30, or values, as 20,25,30"
             )
     return Choice(name, tuple(read_value(item) for item in items), is_text=True)
 
 
 def read_value(text: str) -> Value:
-    """A text from outside as a number where it is one, else as it is."""
+    """A text as a number where it is one."""
     if WHOLE_VALUE.fullmatch(text):
         return int(text)
     match = QUANTITY.fullmatch(text) if len(text) <= LONGEST_TEXT else None
@@ -345,16 +320,16 @@ def read_value(text: str) -> Value:
 
 
 def parse_bounds(name: str, low: str, high: str) -> tuple[float, float, str]:
-    """Two numbers and the unit behind both, or behind the second one for both.
+    """Two numbers, and the unit behind both, or behind the second one for both.
 
     Raises:
         ParameterError: One is not a number, or their units differ.
     """
     (low_number, low_unit), (high_number, high_unit) = _quantity(name, low), _quantity(name, high)
     if low_unit not in ("", high_unit):
-        unit = f"in {high_unit}" if high_unit else "without a unit"
         raise ParameterError(
-            f"{name}: one bound is in {low_unit} and the other {unit}; write both in one unit, as in 20:30 {low_unit}"
+            f"{name}: one bound is in {low_unit} and the other {f'in {high_unit}' if high_unit else 'without a unit'}; "
+            "write both in one unit, as in 20:30 kt"
         )
     return low_number, high_number, high_unit
 
@@ -364,7 +339,7 @@ def _quantity(name: str, text: str) -> tuple[float, str]:
     if match is not None:
         return float(match["number"]), _unit(name, match["unit"].strip())
     if text.lower() == "nan":
-        return math.nan, ""  # Range says what is wrong with it
+        return math.nan, ""  # which Range refuses
     raise ParameterError(
         f"{name}: {_cut(text)!r} is not a number; write a range as low:high, such as 20:30, 20:30 kt or 1e-3:10:log"
     )
@@ -380,20 +355,18 @@ def _unit(name: str, text: str) -> str:
 
 def _parse_range(name: str, parts: list[str]) -> Range:
     low, high, unit = parse_bounds(name, parts[0], parts[1])
-    said: dict[str, int] = {}
+    found: dict[str, int] = {}
     for part in parts[2:]:
         word = "levels" if WHOLE.fullmatch(part) else part
         if word not in (*MODIFIERS, "levels"):
             raise ParameterError(
-                f"{name}: {_cut(part)!r} behind a range means nothing{nearest_name(_cut(part), MODIFIERS)}; "
+                f"{name}: {_cut(part)!r} behind a range is not allowed{nearest_name(_cut(part), MODIFIERS)}; "
                 "allowed are int, log and a whole number of levels"
             )
-        if word in said:
-            raise ParameterError(
-                f"{name}: {'levels are' if word == 'levels' else f'{word} is'} said twice behind the range"
-            )
-        said[word] = int(part) if word == "levels" else 1
-    return Range(name, low, high, "int" in said, "log" in said, said.get("levels"), unit, is_text=True)
+        if word in found:
+            raise ParameterError(f"{name}: {word} is there twice behind the range")
+        found[word] = int(part) if word == "levels" else 1
+    return Range(name, low, high, "int" in found, "log" in found, found.get("levels"), unit, is_text=True)
 
 
 def _cut(text: str) -> str:

@@ -1,8 +1,9 @@
-"""What varies, in the forms in which Python callers say it, and as `batch.json` keeps it."""
+"""Variables in the forms in which Python callers give them, and as `batch.json` keeps them."""
 
 from __future__ import annotations
 
 import dataclasses
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -12,34 +13,26 @@ from tussle.mission.codecs import written
 
 
 def as_variables(vary: Mapping[str, Any] | Iterable[str | Variable]) -> list[Variable]:
-    """The variables that a caller means.
+    """The variables that a caller gives.
 
     Args:
         vary: Texts as on the command line and variables; or by name a text ("20:30:log"), (low, high), or a list of choices.
 
     Raises:
-        ParameterError: One of them is written otherwise, or a name stands twice.
+        ParameterError: One of them has another form, or a name is there twice.
     """
-    items = (
-        [_of(name, value) for name, value in vary.items()]
-        if isinstance(vary, Mapping)
-        else [_from(v) for v in vary]
-    )
-    names = [v.name for v in items]
-    for name in names:
-        if names.count(name) > 1:
-            raise ParameterError(f"{name} varies twice; say it once")
-    return items
-
-
-def _from(item: Any) -> Variable:
-    if isinstance(item, (Range, Choice)):
-        return item
-    if isinstance(item, str):
-        return parse_variable(item)
-    raise ParameterError(
-        f"{item!r} does not say what varies; write a text such as 'prey_speed=20:30', a Range or a Choice"
-    )
+    if isinstance(vary, Mapping):
+        return [_of(name, value) for name, value in vary.items()]
+    variables = [parse_variable(v) if isinstance(v, str) else v for v in vary]
+    for variable in variables:
+        if not isinstance(variable, Range | Choice):
+            raise ParameterError(
+                f"{variable!r} is no variable; write a text such as 'prey_speed=20:30', a Range or a Choice"
+            )
+    for name, n in Counter(v.name for v in variables).items():
+        if n > 1:
+            raise ParameterError(f"{name} varies twice; give it once")
+    return variables
 
 
 def _of(name: str, value: Any) -> Variable:
@@ -51,35 +44,33 @@ def _of(name: str, value: Any) -> Variable:
         return Range(name, value[0], value[1])
     if isinstance(value, Sequence):
         return Choice(name, tuple(value))
-    raise ParameterError(
-        f"{name}: {value!r} says nothing of what varies; give (low, high), a list of choices, or a text"
-    )
+    raise ParameterError(f"{name}: {value!r} is not allowed; give (low, high), a list of choices, or a text")
 
 
-def about(variable: Variable) -> dict[str, Any]:
-    """A variable as `batch.json` keeps it."""
+def variable_entry(variable: Variable) -> dict[str, Any]:
+    """The entry of a variable in `batch.json`."""
     kind = "range" if isinstance(variable, Range) else "choice"
     return {"kind": kind, **dataclasses.asdict(variable)}
 
 
-def variable_of(said: Mapping[str, Any]) -> Variable:
-    """A variable as `batch.json` keeps it, once the document's schema has been checked.
+def variable_of(entry: Mapping[str, Any]) -> Variable:
+    """The variable of an entry of `batch.json` that its schema allows.
 
     Raises:
         ParameterError: Its values are not allowed.
     """
-    if said["kind"] == "choice":
-        return Choice(said["name"], tuple(said["values"]), said["is_text"])
+    if entry["kind"] == "choice":
+        return Choice(entry["name"], tuple(entry["values"]), entry["is_text"])
     fields = ("name", "low", "high", "is_int", "is_log", "levels", "unit", "is_text")
-    return Range(**{name: said.get(name) for name in fields})  # type: ignore[arg-type]
+    return Range(**{name: entry.get(name) for name in fields})  # type: ignore[arg-type]
 
 
-def said(variables: Iterable[Mapping[str, Any]]) -> str:
-    """Variables as `batch.json` keeps them, in the words of the command line."""
-    return "; ".join(f"{v['name']}={_values_said(v)}" for v in variables) or "nothing"
+def entries_text(variables: Iterable[Mapping[str, Any]]) -> str:
+    """Entries of `batch.json` as the command line writes them."""
+    return "; ".join(f"{v['name']}={_values_text(v)}" for v in variables) or "nothing"
 
 
-def _values_said(variable: Mapping[str, Any]) -> str:
+def _values_text(variable: Mapping[str, Any]) -> str:
     if variable["kind"] == "choice":
         return ",".join(map(written, variable["values"]))
     parts = [

@@ -88,11 +88,11 @@ class BatchOptions:
 
         batch = Batch(
             self.source.mission,
-            runs=first(self.runs, sweep.n_seeds, None if self.until is not None else 100),
+            runs=first(self.runs, sweep.runs, None if self.until is not None else 100),
             vary=[*(v for v in sweep.variables if v.name not in names), *own] if sweep.points is None else (),
             points=sweep.points,
             sample=first(self.sample, sweep.sample, ""),
-            samples=first(self.samples, sweep.n_samples),
+            samples=first(self.samples, sweep.samples),
             sample_seed=first(self.sample_seed, sweep.sample_seed, 0),
             first_seed=first(self.source.seed, sweep.first_seed, 1),
             independent=self.independent,
@@ -113,7 +113,7 @@ class BatchOptions:
     def executor(self, batch: Batch) -> AbstractContextManager[Executor | None]:
         """Who plays."""
         if self.scheduler is not None or self.slurm is not None:
-            from tussle.batch.cluster_slurm import executor_for
+            from tussle.batch.slurm import executor_for
 
             return executor_for(self.scheduler, self.slurm, self.stack)
         if self.processes is None and self.stack is None:

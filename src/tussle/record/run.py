@@ -137,18 +137,8 @@ class Run:
         path = self.path / MISSION_FILE
         return read_text(path, RecordError, Limits.large().text) if path.exists() else None
 
-    def _package(self) -> Any:
-        name = self._frames or next((f for f in FRAMES if find_spec(f)), "")
-        if not name or find_spec(name) is None:
-            raise MissingExtraError(
-                f"frames need {name or 'pandas or polars'}, which is not installed: pip install 'tussle[frames]' installs pandas; "
-                "`trajectory_table` and `events_table` are Arrow tables and need neither"
-            )
-        return import_module(name)
-
     def _frame(self, table: pa.Table) -> Any:
-        package = self._package()
-        return table.to_pandas() if package.__name__ == "pandas" else package.from_arrow(table)
+        return frame_of(table, self._frames)
 
     def __repr__(self) -> str:
         state = "complete" if self.is_complete else f"incomplete: {'; '.join(self.notes)}"
@@ -167,11 +157,35 @@ def load_run(path: str | Path, frames: str = "", *, is_mapped: bool = False) -> 
         RecordError: It is not a run directory.
         ParameterError: `frames` is neither of these.
     """
-    if frames not in ("", *FRAMES):
-        raise ParameterError(
-            f"frames = {frames!r} is not allowed{nearest_name(frames, FRAMES)}; {listed(FRAMES)}"
-        )
+    check_frames(frames)
     return Run(run_directory(path), frames, is_mapped=is_mapped)
+
+
+def check_frames(package: str) -> None:
+    """Check the name of a package of frames; "" is the first of them that is installed.
+
+    Raises:
+        ParameterError: It is neither "pandas" nor "polars".
+    """
+    if package not in ("", *FRAMES):
+        raise ParameterError(
+            f"frames = {package!r} is not allowed{nearest_name(package, FRAMES)}; {listed(FRAMES)}"
+        )
+
+
+def frame_of(table: pa.Table, package: str) -> Any:
+    """A table as a frame of a package that `check_frames` allows.
+
+    Raises:
+        MissingExtraError: The package is not installed.
+    """
+    name = package or next((f for f in FRAMES if find_spec(f)), "")
+    if not name or find_spec(name) is None:
+        raise MissingExtraError(
+            f"frames need {name or 'pandas or polars'}, which is not installed: pip install 'tussle[frames]' installs pandas; "
+            "Arrow tables need neither"
+        )
+    return table.to_pandas() if name == "pandas" else import_module(name).from_arrow(table)
 
 
 def run_directory(path: str | Path) -> Path:

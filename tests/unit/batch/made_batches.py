@@ -12,11 +12,11 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from tussle.batch import store
-from tussle.batch.plan import Plan
-from tussle.batch.store import Stored
+from tussle.batch.plan import BatchPlan
+from tussle.batch.store import StoredBatch
 from tussle.batch.tasks import Finished
 from tussle.batch.variables import Variable
-from tussle.batch.varied import about
+from tussle.batch.varied import variable_entry
 from tussle.record.run_file import plain, put_whole
 
 TEAMS = {1: "prey", 2: "keepers", 3: "switchers"}
@@ -35,7 +35,7 @@ def made_batch(
     sample: str = "",
     independent: bool = False,
     hashes: Mapping[int, str] | None = None,
-) -> Stored:
+) -> StoredBatch:
     """A batch with given results.
 
     Args:
@@ -55,7 +55,7 @@ def made_batch(
     shapes = [np.shape(v) for v in scores.values()] + [
         np.shape(v) for of in metrics.values() for v in of.values()
     ]
-    plan = Plan(list(points), shapes[0][0], first_seed=1, independent=independent)
+    plan = BatchPlan(list(points), shapes[0][0], first_seed=1, independent=independent)
     rows = [
         store.row(_finished(run, by_run, metrics, alive, failed))
         for run in range(plan.n_runs)
@@ -71,12 +71,12 @@ def made_batch(
     results, counts = store.tables(played, plan.table())
     info = {
         "format": 1, "tussle": "0.1", "name": "A made game", "mission": {"made_in": "python"}, "sample": sample, "sample_seed": 0,
-        "variables": [about(v) for v in variables], "n_points": plan.n_points, "n_seeds": plan.n_seeds, "first_seed": 1,
+        "variables": [variable_entry(v) for v in variables], "n_points": plan.n_points, "n_seeds": plan.n_seeds, "first_seed": 1,
         "independent": independent, "until": None, "n_runs": plan.n_runs, "stopped_by": None, "command": [], "versions": {},
         "is_complete": not missing, "timings": {"wall_s": 1.0, "cpu_s": 1.0},
         "teams": {str(team): name for team, name in TEAMS.items()}, "dt": 0.1, "start": 0.0, "end": 100.0,
     }  # fmt: skip
-    return Stored(None, info, plan.table(), results, counts, [])
+    return StoredBatch(None, info, plan.table(), results, counts, [])
 
 
 def _finished(
@@ -117,7 +117,7 @@ def _unchanged() -> list[tuple[int, float, int]]:
     return [(team, t, START[team]) for team in (2, 3) for t in (0.0, 100.0)]
 
 
-def write_batch(stored: Stored, path: Path) -> Path:
+def write_batch(stored: StoredBatch, path: Path) -> Path:
     """Put a batch into a directory."""
     path.mkdir(parents=True)
     put_whole(path / store.BATCH_FILE, json.dumps(plain(stored.info)))

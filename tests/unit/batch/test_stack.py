@@ -11,8 +11,8 @@ from gambles import game
 
 from tussle import Block, Mission, Simulation
 from tussle.api import Autonomy, Handle, Metric
-from tussle.batch.stack import MOST, ROWS, play, stack_size
-from tussle.batch.tasks import Beat, Finished, Run
+from tussle.batch.stack import play, stack_size
+from tussle.batch.tasks import BatchRun, Finished, Heartbeat
 from tussle.stock import Still
 
 BAD = (2, 7)
@@ -21,7 +21,7 @@ BAD = (2, 7)
 
 def finished(mission, n=12, size=5, params=None):
     """What comes of n runs with seeds 1 to n, by number, but for what may differ."""
-    waiting = [Run(i, 0, i + 1, {} if params is None else params[i]) for i in range(n)]
+    waiting = [BatchRun(i, 0, i + 1, {} if params is None else params[i]) for i in range(n)]
 
     def take(k):
         taken = waiting[:k]
@@ -128,14 +128,8 @@ def lines():
     return enumerate(gambles.THIS.read_text().splitlines(), 1)
 
 
-def test_a_run_that_fails_has_a_row_for_each_team():
-    for run in (finished(game(how="start"))[2], finished(game(how="step"))[2]):
-        metrics = {(team, name) for team, name, _ in run[6]}
-        assert {(1, "alive"), (2, "alive")} <= metrics
-
-
 def test_a_run_that_fails_is_told_at_once_and_not_when_its_stack_is_over():
-    waiting = [Run(i, 0, i + 1) for i in range(12)]
+    waiting = [BatchRun(i, 0, i + 1) for i in range(12)]
     order = [
         f.number
         for f in play(game(how="step"), lambda k: [waiting.pop(0) for _ in range(min(k, len(waiting)))], 3)
@@ -177,10 +171,6 @@ def test_a_game_that_is_over_at_once_is_kept():
     assert finished(nobody, n=2)[1][0] == "all_dead"
 
 
-def test_a_mission_without_teams_has_a_row():
-    assert finished(Mission(blocks=[], end=0.2), n=1)[0][6] == [(0, "alive", 0.0)]
-
-
 def test_what_is_no_number_is_said_and_left_out():
     with pytest.warns(RuntimeWarning, match="Trouble reports 'word' as 'said', which is no number"):
         run = finished(game(how="word"), n=1)[0]
@@ -205,15 +195,9 @@ def test_a_stack_is_no_larger_than_its_plugins_allow():
     assert all(run[0] != "error" for run in finished(mission, n=5, size=64).values())
 
 
-def test_a_stack_holds_so_many_entities():
-    assert stack_size(game()) == MOST
-    assert stack_size(game(reds=ROWS // 2)) == 1
-    assert stack_size(game(reds=ROWS // 4)) == 3
-
-
 def test_signs_of_life_tell_how_much_of_the_games_is_played():
     slow = Mission(blocks=[Block(name="b", motion=Still())], dt=0.1, end=1.0, metrics=[Slow()])
-    beats = [m for m in play(slow, take_two(), 2) if isinstance(m, Beat)]
+    beats = [m for m in play(slow, take_two(), 2) if isinstance(m, Heartbeat)]
     assert beats
     parts = [b.under_way for b in beats]
     assert parts == sorted(parts)
@@ -221,7 +205,7 @@ def test_signs_of_life_tell_how_much_of_the_games_is_played():
 
 
 def take_two():
-    waiting = [Run(0, 0, 1), Run(1, 0, 2)]
+    waiting = [BatchRun(0, 0, 1), BatchRun(1, 0, 2)]
     return lambda n: [waiting.pop() for _ in range(min(n, len(waiting)))]
 
 
@@ -238,7 +222,7 @@ def test_the_cpu_time_of_a_stack_is_shared_among_its_runs():
                 pass
 
     mission = Mission(blocks=[Block(name="b", motion=Still())], dt=0.1, end=1.0, metrics=[Busy()])
-    waiting = [Run(i, 0, i) for i in range(8)]
+    waiting = [BatchRun(i, 0, i) for i in range(8)]
     before = time.process_time()
     found = list(play(mission, lambda n: [waiting.pop() for _ in range(min(n, len(waiting)))], 4))
     spent = time.process_time() - before

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tussle.batch.batch import Batch
+from tussle.batch.batch import Batch, check_quantity
 from tussle.batch.executors import Executor, InProcess
 from tussle.batch.points import settings_of
 from tussle.batch.quantities import Quantity
@@ -145,25 +145,14 @@ class Evaluator:
             except TussleError as error:
                 errors.append(error)
             else:
-                self._check_quantity(batch)
+                check_quantity(
+                    [batch.mission],
+                    self.first_seed,
+                    batch.patience,
+                    lambda results: self.quantity.names(results.quantities),
+                )
                 return
         raise errors[0]
-
-    def _check_quantity(self, batch: Batch) -> None:
-        """Look for the quantity after one step, and where it is not there yet after a whole game."""
-        mission = batch.mission
-        short = mission.replace(end=mission.start + mission.dt).ending_by_time()
-        for game in (short, mission):
-            one = Batch(game, runs=1, first_seed=self.first_seed, run_timeout=batch.patience)
-            results = one.play(executor=InProcess(1))
-            if results.n_failed:
-                return  # the trials tell the failure
-            try:
-                self.quantity.names(results.quantities)
-                return
-            except ParameterError:
-                if game is mission:
-                    raise
 
     def trials(
         self,

@@ -19,7 +19,8 @@ from tussle.batch.search.study import Study, best_of
 from tussle.batch.search.study_store import StudyStore, notes_on_versions, versions_of_samplers
 from tussle.batch.search.trials import MOST_TRIALS, Point, Trial
 from tussle.batch.variables import Variable
-from tussle.batch.varied import about, as_variables
+from tussle.batch.varied import as_variables, variable_entry
+from tussle.documents import Whole, check_argument
 from tussle.errors import ParameterError
 from tussle.mission import Mission
 from tussle.record.run_file import versions
@@ -94,13 +95,10 @@ class Optimization:
         run_timeout: float | None = None,
         **options: Any,
     ) -> None:
-        for name, value, *bounds in (
-            ("runs", runs, 1),
-            ("per_round", per_round, 1, MOST_TRIALS),
-            ("sample_seed", sample_seed, 0),
-            ("first_seed", first_seed, 0),
-        ):
-            _check_whole(name, value, *bounds)
+        check_argument("runs", runs, Whole(1))
+        check_argument("per_round", per_round, Whole(1, MOST_TRIALS))
+        check_argument("sample_seed", sample_seed, Whole())
+        check_argument("first_seed", first_seed, Whole(0, 2**64 - 1))
         settings = dict(settings or {})
         variables = tuple(as_variables(vary))
         if not variables:
@@ -126,22 +124,22 @@ class Optimization:
     @property
     def info(self) -> dict[str, Any]:
         """The content of `study.json`."""
-        said = {
+        contents = {
             "tussle": versions()["tussle"],
             "name": self.name,
             "mission": self.evaluator.corners.info()["mission"],
             "objective": str(self.quantity),
             "direction": "minimize" if self.is_minimized else "maximize",
-            "variables": [about(v) for v in self.variables],
+            "variables": [variable_entry(v) for v in self.variables],
             "runs": self.evaluator.runs,
             "first_seed": self.evaluator.first_seed,
             "sampler": self.sampler,
             "sample_seed": self.sample_seed,
             "per_round": self.per_round,
         }
-        text = json.dumps([said, self.evaluator.corners.fingerprint], default=str)
+        text = json.dumps([contents, self.evaluator.corners.fingerprint], default=str)
         fingerprint = hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
-        return {"format": 2, "fingerprint": fingerprint, **said, "versions": versions_of_samplers()}
+        return {"format": 2, "fingerprint": fingerprint, **contents, "versions": versions_of_samplers()}
 
     @property
     def fingerprint(self) -> str:
@@ -189,7 +187,7 @@ class Optimization:
             BatchError: The directory holds another search, another process searches there, or a file has changed meanwhile.
             RecordError: The directory cannot be written.
         """
-        _check_whole("trials", trials, 1, MOST_TRIALS)
+        check_argument("trials", trials, Whole(1, MOST_TRIALS))
         player, proposer = RoundPlayer(executor, processes, stack), self._proposer()
         info = {**self.info, "command": list(command or sys.argv)}
         path = None if directory is None else Path(directory)
@@ -257,7 +255,7 @@ def optimize(
     """Search for mission values that maximize or minimize the mean of a quantity.
 
     Args:
-        mission: As for `Optimization`, like all that is not said here.
+        mission: As for `Optimization`, like all that is not listed here.
         objective: The quantity.
         vary: What varies.
         trials: How many sets of values are tried.
@@ -280,15 +278,3 @@ def optimize(
     return optimization.play(
         directory, trials, executor=executor, processes=processes, stack=stack, on_progress=on_progress
     )
-
-
-def _check_whole(name: str, value: Any, least: int, most: int | None = None) -> None:
-    """Refuse what is not a whole number within bounds.
-
-    Raises:
-        ParameterError: The value is not allowed.
-    """
-    is_whole = isinstance(value, int) and not isinstance(value, bool)
-    if not is_whole or value < least or (most is not None and value > most):
-        bounds = f">= {least}" if most is None else f"from {least} to {most:,}"
-        raise ParameterError(f"{name} = {value!r} is not allowed; it takes a whole number {bounds}")

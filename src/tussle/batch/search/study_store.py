@@ -18,7 +18,7 @@ from tussle.batch.schemas import SEED, VARIABLE
 from tussle.batch.search.proposals import SAMPLERS, new_study, quiet, require_optuna
 from tussle.batch.search.study import Study
 from tussle.batch.search.trials import MOST_TRIALS, Trial, frozen, thawed, trials_table
-from tussle.batch.store import locked, told
+from tussle.batch.store import locked, reported
 from tussle.batch.variables import Variable
 from tussle.batch.varied import variable_of
 from tussle.documents import Document, Map, Maybe, Real, Whole, problem, read_text
@@ -90,7 +90,7 @@ class StudyStore:
 
     def __init__(self, path: Path, info: Mapping[str, Any]) -> None:
         self.path = path
-        with told(path):
+        with reported(path):
             path.mkdir(parents=True, exist_ok=True)
             foreign = [p.name for p in path.iterdir() if p.name.removesuffix(".part") not in OWN_FILES]
             if foreign and not (path / STUDY_FILE).exists():
@@ -100,7 +100,7 @@ class StudyStore:
         self._lock = locked(path, "at this search")
         try:
             self.info = self._agreed(dict(plain(info)))
-            self.variables = [variable_of(said) for said in self.info["variables"]]
+            self.variables = [variable_of(entry) for entry in self.info["variables"]]
             self._repair()
             self.trials = read_trials(path, self.info)
         except BaseException:
@@ -110,7 +110,7 @@ class StudyStore:
     def _agreed(self, info: dict[str, Any]) -> dict[str, Any]:
         """Return the info of the directory; write it if there is none."""
         if not (self.path / STUDY_FILE).exists():
-            with told(self.path):
+            with reported(self.path):
                 put_whole(self.path / STUDY_FILE, json.dumps(info, indent=1, allow_nan=False) + "\n")
             return info
         before = read_info(self.path)
@@ -123,7 +123,7 @@ class StudyStore:
     def _repair(self) -> None:
         """Remove what a killed process may leave: a cut line at the end of the journal, and Optuna's lock."""
         journal = self.path / JOURNAL_FILE
-        with told(self.path):
+        with reported(self.path):
             (self.path / f"{JOURNAL_FILE}.lock").unlink(missing_ok=True)
             if journal.exists():
                 whole = read_text(journal, BatchError, MOST_JOURNAL).rpartition("\n")
@@ -133,7 +133,7 @@ class StudyStore:
         """Append trials to the journal, and write the table of all."""
         import optuna
 
-        with told(self.path), quiet():
+        with reported(self.path), quiet():
             storage = _journal(self.path / JOURNAL_FILE)
             is_new = not storage.get_all_studies()
             is_minimized = self.info["direction"] == "minimize"
@@ -205,7 +205,7 @@ def read_trials(path: Path, info: Mapping[str, Any]) -> list[Trial]:
     import optuna
 
     read_text(file, BatchError, MOST_JOURNAL)
-    variables: list[Variable] = [variable_of(said) for said in info["variables"]]
+    variables: list[Variable] = [variable_of(entry) for entry in info["variables"]]
     try:
         with quiet():
             storage = _journal(file)
@@ -213,8 +213,8 @@ def read_trials(path: Path, info: Mapping[str, Any]) -> list[Trial]:
                 return []
             found = optuna.load_study(study_name="tussle", storage=storage).get_trials(deepcopy=False)
             for i, one in enumerate(found):
-                if said := _against(i, one, info):
-                    raise BatchError(f"{file}: {said}")
+                if violation := _against(i, one, info):
+                    raise BatchError(f"{file}: {violation}")
             return [thawed(i, info["per_round"], one, variables) for i, one in enumerate(found)]
     except BatchError:
         raise
@@ -225,8 +225,8 @@ def read_trials(path: Path, info: Mapping[str, Any]) -> list[Trial]:
 def _against(i: int, trial: Any, info: Mapping[str, Any]) -> str:
     """Return what is wrong with a trial of the journal; "" if it is valid."""
     facts = {"value": trial.value, **trial.user_attrs}
-    if i >= MOST_TRIALS or (said := problem(facts, TRIAL, f"trial {i}")):
-        return said if i < MOST_TRIALS else f"has more than {MOST_TRIALS:,} trials"
+    if i >= MOST_TRIALS or (violation := problem(facts, TRIAL, f"trial {i}")):
+        return violation if i < MOST_TRIALS else f"has more than {MOST_TRIALS:,} trials"
     low, high, n_games = facts["low"], facts["high"], len(facts["by_seed"])
     if (low is None) != (high is None) or (low is not None and low > high):
         return f"trial {i}: low = {low} is not allowed; high is {high}"
@@ -249,7 +249,7 @@ def load_study(path: str | Path) -> Study:
     """
     path = Path(path)
     info = read_info(path)
-    variables = tuple(variable_of(said) for said in info["variables"])
+    variables = tuple(variable_of(entry) for entry in info["variables"])
     return Study(path, info, variables, tuple(read_trials(path, info)))
 
 

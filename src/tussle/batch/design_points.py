@@ -1,4 +1,4 @@
-"""From points to missions, and from missions to groups whose worlds can share a stack."""
+"""Makes the mission of each point, and groups missions whose worlds can share a stack."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from tussle.batch import by_value
 from tussle.batch.tasks import Package
 from tussle.errors import MissionError, ParameterError, TussleError, nearest_name
 from tussle.mission import Block, Loaded, Mission, PluginFile, read_mission
@@ -25,8 +26,8 @@ Signature = tuple[Any, ...]
 
 
 @dataclass(frozen=True)
-class Treatment:
-    """How a point is played: in which group, with which values besides the group's mission."""
+class DesignPoint:
+    """A point as it is played: its group, and the values that differ from the mission of the group."""
 
     group: int
     params: dict[str, Any]
@@ -35,12 +36,12 @@ class Treatment:
 def read_points(
     source: str | Path, settings: Mapping[str, Any], points: Iterable[Point], **options: Any
 ) -> Iterator[Loaded]:
-    """The mission file once for each point.
+    """Read the mission file once for each point.
 
     Args:
         source: The file.
-        settings: What is set in all points.
-        points: What each point sets.
+        settings: Settings of all points.
+        points: Settings of each point.
         options: As for `read_mission`.
 
     Raises:
@@ -56,12 +57,12 @@ def build_points(
     settings: Mapping[str, Any],
     points: Iterable[Point],
 ) -> Iterator[Mission]:
-    """A mission made in Python once for each point.
+    """Make a mission of Python once for each point.
 
     Args:
         source: The mission, whose values are set by path, or a function of all values that makes it.
-        settings: What is set in all points.
-        points: What each point sets.
+        settings: Settings of all points.
+        points: Settings of each point.
 
     Raises:
         ParameterError: A path leads nowhere, or a value is not allowed.
@@ -81,18 +82,18 @@ def build_points(
 
 @contextmanager
 def _naming(number: int, values: Point) -> Iterator[None]:
-    """An error inside is one of this point, and says so."""
+    """Errors inside name the point."""
     try:
         yield
     except TussleError as error:
         if not values:
             raise
-        said = ", ".join(f"{k}={v}" for k, v in values.items())
-        raise type(error)(f"point {number} ({said}): {error}") from None
+        values_text = ", ".join(f"{k}={v}" for k, v in values.items())
+        raise type(error)(f"point {number} ({values_text}): {error}") from None
 
 
 def _made(function: Callable[..., Mission], values: Mapping[str, Any]) -> Mission:
-    """What a function makes of the values.
+    """The mission that a function makes of the values.
 
     Raises:
         ParameterError: It does not take one of them, or needs another.
@@ -110,7 +111,7 @@ def _made(function: Callable[..., Mission], values: Mapping[str, Any]) -> Missio
         ) from None
     mission = function(**values)
     if not isinstance(mission, Mission):
-        raise MissionError(f"{name} gave {mission!r}; it is to give a Mission")
+        raise MissionError(f"{name} gave {mission!r}; it must give a Mission")
     return mission
 
 
@@ -119,21 +120,21 @@ def _made(function: Callable[..., Mission], values: Mapping[str, Any]) -> Missio
 
 def group_points(
     missions: Sequence[Mission], plugin_files: Sequence[PluginFile] = ()
-) -> tuple[list[Treatment], Package]:
-    """Which points can share a stack, and what differs among those that do.
+) -> tuple[list[DesignPoint], Package]:
+    """Group points that can share a stack.
 
-    Values that are numbers of one world (parameters of plugins, speeds of blocks) may differ within a stack; what changes structure
-    (counts, the choice of plugins, times, text) may not.
+    Within a stack, values that each world has (parameters of plugins, speeds of blocks) may differ; structure (counts, the choice of
+    plugins, times, text) may not.
 
     Args:
         missions: The mission of each point.
-        plugin_files: What their plugins come from.
+        plugin_files: Files that their plugins come from.
 
     Returns:
-        The treatment of each point, and what those who play need.
+        Each point as it is played, and the package that workers need.
 
     Raises:
-        MissionError: A mission cannot be handed to other processes.
+        MissionError: A mission cannot be sent to other processes.
     """
     groups: dict[Signature, list[int]] = {}
     values = []
@@ -141,30 +142,28 @@ def group_points(
         signature, own = split(mission)
         groups.setdefault(signature, []).append(number)
         values.append(own)
-    treatments: list[Treatment | None] = [None] * len(missions)
+    design_points: list[DesignPoint | None] = [None] * len(missions)
     for group, numbers in enumerate(groups.values()):
         first = values[numbers[0]]
         differing = [path for path in first if any(values[n][path] != first[path] for n in numbers)]
         for n in numbers:
-            treatments[n] = Treatment(group, {path: values[n][path] for path in differing})
+            design_points[n] = DesignPoint(group, {path: values[n][path] for path in differing})
     bases = [missions[numbers[0]] for numbers in groups.values()]
-    return [t for t in treatments if t is not None], Package(
+    return [t for t in design_points if t is not None], Package(
         tuple(_pickled(m) for m in bases), tuple(plugin_files)
     )
 
 
 def _pickled(mission: Mission) -> bytes:
-    """A mission as it is handed to those who play.
+    """A mission, pickled.
 
     Raises:
-        MissionError: It cannot be.
+        MissionError: It cannot be pickled.
     """
     try:
-        return pickle.dumps(mission)
+        return by_value.dumps(mission)
     except (pickle.PicklingError, AttributeError, TypeError) as error:
-        raise MissionError(
-            f"the mission cannot be handed to those who play it: {error}; plugins are defined at the head of a module or in a plugin file"
-        ) from None
+        raise MissionError(f"the mission cannot be sent to other processes: {error}") from None
 
 
 def exactly(mission: Mission) -> str:
@@ -174,7 +173,7 @@ def exactly(mission: Mission) -> str:
 
 
 def split(mission: Mission) -> tuple[Signature, dict[str, Any]]:
-    """What all worlds of a stack share, hashable, and by path what may differ from world to world."""
+    """The part of a mission that all worlds of a stack share, hashable, and by path the values that may differ between them."""
     own: dict[str, Any] = {}
     blocks = tuple(_split_block(block, own) for block in mission.blocks)
     world = tuple(

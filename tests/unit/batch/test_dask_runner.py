@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import Future
 from contextlib import closing
 from importlib import import_module
 from importlib.util import find_spec
@@ -17,11 +18,10 @@ import pytest
 
 import tussle
 from tussle.batch import Batch, InProcess
-from tussle.batch.cluster import OnDask, connect
-from tussle.batch.cluster_course import Course, check_same
-from tussle.batch.cluster_slurm import executor_for
-from tussle.batch.cluster_worker import about
-from tussle.batch.tasks import Beat, Finished
+from tussle.batch.dask_runner import OnDask, _Playing, connect
+from tussle.batch.dask_worker import check_same_code, code_of
+from tussle.batch.slurm import executor_for
+from tussle.batch.tasks import Finished, Heartbeat
 from tussle.errors import BatchError, MissingExtraError, ParameterError
 from tussle.mission import read_mission
 
@@ -109,9 +109,9 @@ def test_each_worker_has_one_chunk_and_no_more_chunks_exist_than_workers(cluster
     n_there, sizes = [], []
     with closing(OnDask(client, stack=5).play(batch.package, [batch.run(i) for i in range(160)])) as messages:
         for message in messages:
-            if isinstance(message, Beat):
+            if isinstance(message, Heartbeat):
                 tasks = [
-                    t for t in list(cluster.scheduler.tasks.values()) if t.key.startswith("tussle-chunk")
+                    t for t in list(cluster.scheduler.tasks.values()) if str(t.key).startswith("play_chunk")
                 ]
                 n_there.append(sum(task.state == "processing" for task in tasks))
             else:
@@ -142,7 +142,7 @@ def test_what_a_killed_worker_played_is_played_again_and_nothing_twice(cluster, 
             busy = [
                 t.processing_on.address
                 for t in list(cluster.scheduler.tasks.values())
-                if t.key.startswith("tussle-chunk") and t.processing_on
+                if str(t.key).startswith("play_chunk") and t.processing_on
             ]
             if busy:
                 killed = busy[0]
@@ -153,18 +153,19 @@ def test_what_a_killed_worker_played_is_played_again_and_nothing_twice(cluster, 
     assert {f.number: f.state_hash for f in finished} == {n: f.state_hash for n, f in alone.items()}
 
 
-def test_results_that_are_lost_with_their_worker_before_they_are_fetched_are_played_again(
-    client, monkeypatch
-):
-    batch, over, killed = short_batch(2), Course._over, []
+def test_results_that_are_lost_with_their_worker_before_they_are_used_are_played_again(client, monkeypatch):
+    batch, collect, killed = short_batch(2), _Playing._collect, []
 
-    def kill_first(course, key, worker):
-        if not killed:
-            killed.append(worker)
-            kill(client, worker)
-        over(course, key, worker)
+    def kill_first(playing):
+        for worker, chunk in playing.under_way.items():
+            if not killed and chunk.future.done():
+                killed.append(worker)
+                kill(client, worker)
+                chunk.future = Future()  # as if it had not been fetched
+                del playing.workers[worker]
+        collect(playing)
 
-    monkeypatch.setattr(Course, "_over", kill_first)
+    monkeypatch.setattr(_Playing, "_collect", kill_first)
     assert rows(batch.play(None, OnDask(client))) == rows(batch.play(None, InProcess()))
     assert killed[0] not in client.nthreads()
 
@@ -255,7 +256,7 @@ def test_closing_it_ends_what_is_under_way(cluster, client, tmp_path):
     while any(client.run(executing).values()) and time.monotonic() - began < 300.0:
         time.sleep(0.05)
     assert not any(client.run(executing).values())
-    assert not [key for key in cluster.scheduler.tasks if str(key).startswith("tussle")]
+    assert not [key for key in cluster.scheduler.tasks if str(key).startswith("play_chunk")]
 
 
 # -- what travels -----------------------------------------------------------------------------------------------------------
@@ -281,7 +282,7 @@ SCRIPT = """
 import sys
 from tussle import Block, Mission
 from tussle.batch import Batch, InProcess
-from tussle.batch.cluster import OnDask, connect
+from tussle.batch.dask_runner import OnDask, connect
 from tussle.stock import Unicycle
 {walker}
 
@@ -305,24 +306,12 @@ def run_script(cluster, *command):
     )
 
 
-def test_plugins_of_the_script_itself_travel(cluster, tmp_path):
-    script = tmp_path / "sweep.py"
-    script.write_text(SCRIPT.format(walker=WALKER, main='if __name__ == "__main__":\n    main()'))
-    run = run_script(cluster, str(script))
+@pytest.mark.parametrize("is_file", [True, False], ids=["script", "prompt"])
+def test_plugins_of_a_script_or_prompt_travel(cluster, tmp_path, is_file):
+    script, text = tmp_path / "sweep.py", SCRIPT.format(walker=WALKER, main="main()")
+    script.write_text(text)
+    run = run_script(cluster, *([str(script)] if is_file else ["-c", text]))
     assert run.stdout == "8 rows\n", run.stderr
-
-
-def test_a_script_that_would_play_again_where_it_is_loaded_is_refused(cluster, tmp_path):
-    script = tmp_path / "sweep.py"
-    script.write_text(SCRIPT.format(walker=WALKER, main="main()"))
-    run = run_script(cluster, str(script))
-    assert "BatchError: Walker is defined in sweep.py" in run.stderr
-    assert "must stand under `if __name__" in run.stderr
-
-
-def test_plugins_of_a_prompt_are_refused(cluster):
-    run = run_script(cluster, "-c", SCRIPT.format(walker=WALKER, main="main()"))
-    assert "BatchError: Walker is defined at a prompt" in run.stderr
 
 
 def test_a_package_that_workers_lack_is_named(client, tmp_path, monkeypatch):
@@ -351,9 +340,7 @@ def test_a_worker_with_another_tussle_is_refused(tmp_path):
             own.scheduler_address, env=os.environ | {"PYTHONPATH": str(tmp_path)}, cwd=tmp_path
         )
         try:
-            with pytest.raises(
-                BatchError, match=r"worker tcp://.* has tussle .* with another source than here"
-            ):
+            with pytest.raises(BatchError, match=r"worker tcp://.* has source of tussle"):
                 short_batch(1).play(None, OnDask(client))
         finally:
             worker.kill()
@@ -361,14 +348,12 @@ def test_a_worker_with_another_tussle_is_refused(tmp_path):
 
 
 def test_versions_that_differ_are_named_on_both_sides():
-    here = about()
-    there = here | {"numba": "0.1", "numpy": "1.0"}
+    here = code_of(read_mission("predator_prey").mission)
+    check_same_code(here, "tcp://a:1")
     with pytest.raises(
-        BatchError,
-        match=rf"worker tcp://a:1 has numpy 1.0, numba 0.1; here is numpy {here['numpy']}, numba {here['numba']}",
+        BatchError, match=r"worker tcp://a:1 has numpy .*, numba .*; the batch has numpy 1.0, numba 0.1"
     ):
-        check_same(there, here, "tcp://a:1")
-    check_same(here, here, "tcp://a:1")
+        check_same_code(here | {"numpy": "1.0", "numba": "0.1"}, "tcp://a:1")
 
 
 def test_threads_that_are_of_no_use_are_told_once():
@@ -399,14 +384,6 @@ def test_a_scheduler_that_is_not_there_is_told_soon(address):
         pass
     assert "\n" not in str(error.value)
     assert time.monotonic() - began < 300.0
-
-
-def test_what_the_command_line_names_is_where_it_is_played(cluster):
-    batch = short_batch(2)
-    with executor_for(cluster.scheduler_address, None, 3) as executor:
-        assert isinstance(executor, OnDask)
-        assert executor.stack == 3
-        assert rows(batch.play(None, executor)) == rows(batch.play(None, InProcess()))
 
 
 @pytest.mark.parametrize(("scheduler", "slurm"), [(None, None), ("tcp://a:1", "2")])

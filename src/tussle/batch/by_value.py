@@ -1,0 +1,71 @@
+"""Pickles missions. Classes and functions of a script or prompt are pickled with their code, as other processes do not have the script."""
+
+from __future__ import annotations
+
+import io
+import linecache
+import pickle
+from types import FunctionType
+from typing import Any
+
+from tussle.api.laws import NeighborLaw
+from tussle.numeric.kernel import Device, Kernel
+
+MAIN = "__main__"
+
+
+def dumps(value: Any) -> bytes:
+    """Pickle a value.
+
+    Raises:
+        pickle.PicklingError, TypeError, AttributeError: A part of it cannot be pickled.
+    """
+    try:
+        plain = pickle.dumps(value)
+    except (pickle.PicklingError, AttributeError, TypeError):
+        plain = b""  # a class that a function defines, for example
+    if plain and MAIN.encode() not in plain:
+        return plain
+    stream = io.BytesIO()
+    sources = _dump(value, stream)
+    return pickle.dumps(_WithSource(stream.getvalue(), sources))
+
+
+def loads(data: bytes) -> Any:
+    """The value that was pickled."""
+    found = pickle.loads(data)  # noqa: S301 - made by `dumps` in the process that runs the batch
+    return found.loads() if isinstance(found, _WithSource) else found
+
+
+class _WithSource:
+    """A pickled value, and the source lines of the files that its functions come from: neighbour laws are read from source."""
+
+    def __init__(self, data: bytes, sources: dict[str, list[str]]) -> None:
+        self.data, self.sources = data, sources
+
+    def loads(self) -> Any:
+        for file, lines in self.sources.items():
+            linecache.cache.setdefault(file, (sum(map(len, lines)), None, lines, file))
+        return pickle.loads(self.data)  # noqa: S301 - as in `loads`
+
+
+def _dump(value: Any, stream: io.BytesIO) -> dict[str, list[str]]:
+    """Pickle by value; returns the source lines of each file."""
+    import cloudpickle
+
+    files: set[str] = set()
+
+    class Pickler(cloudpickle.Pickler):  # type: ignore[misc]  # defined here: most batches do not need cloudpickle
+        def reducer_override(self, obj: Any) -> Any:
+            if isinstance(obj, FunctionType) and obj.__module__ == MAIN:
+                files.add(obj.__code__.co_filename)
+            if isinstance(obj, NeighborLaw):  # without the plans that it has compiled here
+                return NeighborLaw, (obj.laws, obj.where, obj.names)
+            if isinstance(obj, Kernel) and obj.__module__ == MAIN:
+                return Kernel, (obj.py_func, obj.signature)
+            if isinstance(obj, Device) and obj.__module__ == MAIN:
+                return type(obj), (obj.py_func,)
+            return super().reducer_override(obj)
+
+    Pickler(stream).dump(value)
+    return {file: linecache.getlines(file) for file in files}

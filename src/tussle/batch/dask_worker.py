@@ -1,0 +1,119 @@
+"""What a Dask worker does for a batch. A worker outlives batches, and may have several threads: nothing here relies on a new process."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+import threading
+import time
+from collections.abc import Mapping, Sequence
+from contextlib import closing
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+
+from tussle.batch.stack import play
+from tussle.batch.tasks import BatchRun, Finished, Package
+from tussle.errors import BatchError
+from tussle.mission import Mission
+from tussle.mission.plugin_files import PREFIX
+from tussle.record.run_file import versions
+
+SOURCE = "source of "
+"""Begins the names of hashes in `code_of`."""
+REPORT_EVERY = 1.0  # [s]; hundreds of workers report to one scheduler
+
+_playing = threading.Lock()
+"""One chunk at a time in a process: plugins need not be safe between threads, and the CPU time of a run is that of its process."""
+
+
+def play_chunk(
+    package: Package, runs: Sequence[BatchRun], topic: str, code: Mapping[str, str]
+) -> list[Finished]:
+    """Play runs of one group side by side.
+
+    Args:
+        package: The package of their group only.
+        runs: The runs.
+        topic: Dask topic under which the worker reports its address and the number of runs that are played, with parts.
+        code: `code_of` their mission in the process that asks.
+
+    Returns:
+        The results, in the order in which the runs ended; only some where the task was cancelled.
+
+    Raises:
+        BatchError: The worker has other code.
+    """
+    from distributed import get_worker
+
+    worker = get_worker()
+    key, waiting, finished = worker.get_current_task(), list(runs), list[Finished]()
+    check_same_code(code, str(worker.address))
+
+    def take(n: int) -> list[BatchRun]:
+        taken, waiting[:] = waiting[:n], waiting[n:]
+        return taken
+
+    with _playing:
+        report_at = time.monotonic() + REPORT_EVERY
+        with closing(play(package.mission(0), take, len(runs))) as messages:  # type: ignore[type-var]
+            for message in messages:
+                task = worker.state.tasks.get(key)
+                if task is None or task.state == "cancelled":  # a thread cannot be ended from outside
+                    break
+                if isinstance(message, Finished):
+                    finished.append(message)
+                elif time.monotonic() >= report_at:
+                    report_at = time.monotonic() + REPORT_EVERY
+                    worker.log_event(topic, [worker.address, len(finished) + message.under_way])
+    return finished
+
+
+def code_of(mission: Mission) -> dict[str, str]:
+    """What results of a mission depend on in this process: versions, and hashes of the source of tussle and of packages with plugins.
+
+    Plugin files and scripts are left out: they are sent with the mission.
+    """
+    plugins = [*mission.world_plugins, *(p for block in mission.blocks for p in block.plugins)]
+    packages = {type(plugin).__module__.split(".")[0] for plugin in plugins} - {"__main__"}
+    return _code(tuple(sorted({"tussle", *(name for name in packages if not name.startswith(PREFIX))})))
+
+
+@cache
+def _code(packages: tuple[str, ...]) -> dict[str, str]:
+    found = {name: versions()[name] for name in ("tussle", "numpy", "numba")}
+    found["python"] = ".".join(platform.python_version_tuple()[:2])
+    return found | {f"{SOURCE}{name}": _source(name) for name in packages}
+
+
+def _source(name: str) -> str:
+    """Hash of the code of a package: its version changes only with a release."""
+    module = import_module(name)
+    folders = [Path(folder) for folder in getattr(module, "__path__", ())]
+    file = getattr(module, "__file__", None)
+    files = [(path, folder) for folder in folders for path in folder.rglob("*.py")]
+    files += [(Path(file), Path(file).parent)] if file and not folders else []
+    digest = hashlib.blake2b(digest_size=8)
+    for path, folder in sorted(files):
+        digest.update(str(path.relative_to(folder)).encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()
+
+
+def check_same_code(wanted: Mapping[str, str], worker: str) -> None:
+    """Compare the code of this process, which is a worker, with that of the process that runs the batch.
+
+    Args:
+        wanted: `code_of` there.
+        worker: Address of this worker.
+
+    Raises:
+        BatchError: They differ.
+        ImportError: A package is missing here.
+    """
+    own = _code(tuple(name.removeprefix(SOURCE) for name in wanted if name.startswith(SOURCE)))
+    differing = [name for name in wanted if own.get(name) != wanted[name]]
+    if differing:
+        there, here = (", ".join(f"{name} {v[name]}" for name in differing) for v in (own, wanted))
+        raise BatchError(
+            f"worker {worker} has {there}; the batch has {here}; equal results need the same code on both"
+        )
