@@ -49,7 +49,7 @@ def test_modules_have_names_that_say_something():
     ]
 
 
-STILL_SHARED = "Base Choice Comparison Game Messages Publisher Run Source Stored Table Tracks Whole"
+STILL_SHARED = "Base Choice Comparison Game Messages Publisher Source Table Tracks Whole"
 """Names that a class of `view`, `batch` or `cli` shares with another one."""
 
 
