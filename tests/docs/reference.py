@@ -141,8 +141,8 @@ def about(column: Column) -> str:
     names += f" `{' '.join(column.fields)}`" if column.fields else ""
     units = list(dict.fromkeys(column.units))
     unit = f" [{' '.join(units)}]" if any(units) else ""
-    takes = terminal._takes(column) if isinstance(column, Param) else ""
-    default = f" = {terminal._default(column)}" if isinstance(column, Param) else unit
+    takes = terminal.allowed_text(column) if isinstance(column, Param) else ""
+    default = f" = {terminal.default_text(column)}" if isinstance(column, Param) else unit
     return f"{kind}{names}{default}{f' ({takes})' if takes else ''}. {column.doc}".replace("\n", ", ").strip()
 
 

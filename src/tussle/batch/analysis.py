@@ -13,7 +13,7 @@ import numpy as np
 from tussle.batch.quantities import column_name
 from tussle.batch.results import Results
 from tussle.batch.sensitivity import Effect
-from tussle.batch.statistics import Comparison, Mean, Share
+from tussle.batch.statistics import Mean, PairedComparison, Share
 from tussle.batch.variables import Choice, Variable
 from tussle.batch.varied import variable_entry
 from tussle.errors import MissingExtraError, ParameterError
@@ -107,7 +107,7 @@ class Analysis:
     shares: list[Share]
     means: list[Mean]
     points: list[PointResult] = field(default_factory=list)
-    comparisons: list[Comparison] = field(default_factory=list)
+    comparisons: list[PairedComparison] = field(default_factory=list)
     sensitivity: dict[str, list[Effect]] = field(default_factory=dict)
     failures: list[Failure] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
@@ -197,7 +197,7 @@ def _points(results: Results, quantities: Sequence[str]) -> list[PointResult]:
 
 def _comparisons(
     results: Results, quantities: Sequence[str], asked: Sequence[tuple[int | str, int | str]]
-) -> list[Comparison]:
+) -> list[PairedComparison]:
     if asked:
         return [results.compare(name, a, b) for a, b in asked for name in quantities]
     choices = [v for v in results.variables if isinstance(v, Choice) and len(v.values) > 1]

@@ -18,8 +18,8 @@ from tussle.batch.selection import is_number, known_point, paired_points, select
 from tussle.batch.sensitivity import Effect, effects, rank_effects
 from tussle.batch.statistics import (
     BLOCKS_FROM,
-    Comparison,
     Mean,
+    PairedComparison,
     Share,
     mean_of,
     means_of,
@@ -266,7 +266,7 @@ class Results:
         names = [column_name(metric, team) for metric in ("score", "alive") for team in self.teams]
         return [name for name in [*names, "t"] if name in self._columns]
 
-    def compare(self, expression: str, a: int | str, b: int | str) -> Comparison:
+    def compare(self, expression: str, a: int | str, b: int | str) -> PairedComparison:
         """What b has more than a, in pairs of runs with the same seed; of a batch with independent seeds, in their order.
 
         Args:

@@ -82,7 +82,7 @@ class Mean:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class PairedComparison:
     """The second side minus the first, in pairs of runs with the same seed.
 
     Attributes:
@@ -328,7 +328,7 @@ def paired_difference(
     blocks: np.ndarray | None = None,
     *,
     are_copies: bool = False,
-) -> Comparison:
+) -> PairedComparison:
     """The second side of pairs minus the first.
 
     Args:
@@ -346,7 +346,7 @@ def paired_difference(
     mean = mean_of(quantity, more, own)
     signs = np.sign(more if own is None or not are_copies else more[np.unique(own, return_index=True)[1]])
     mean_a, mean_b = (float(v.mean()) if len(v) else math.nan for v in (a, b))
-    return Comparison(
+    return PairedComparison(
         quantity, *names, len(more), mean_a, mean_b, mean.value, mean.low, mean.high,
         n_greater, n_less, len(more) - n_greater - n_less,
         sign_test(int((signs > 0.0).sum()), int((signs < 0.0).sum())),

@@ -1,248 +1,212 @@
-"""`tussle batch`: many games, played, kept, and counted."""
+"""`tussle batch`: play many games, record some of them, and show who won how often."""
 
 from __future__ import annotations
 
 import re
+import shlex
 import shutil
+import sys
 import time
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+from rich.padding import Padding
+from rich.text import Text
 
 from tussle.batch import store
 from tussle.batch.batch import Batch
 from tussle.batch.executors import Executor
 from tussle.batch.progress import Progress as BatchProgress
 from tussle.batch.reload import planned_run
-from tussle.batch.statistics import running_result, scipy_package
+from tussle.batch.results import Results
+from tussle.batch.selection import written
+from tussle.batch.statistics import Share, running_result, scipy_package
 from tussle.batch.sweep_file import Sweep, read_sweep
 from tussle.batch.trust import digest
 from tussle.batch.until import Until
-from tussle.batch.variables import parse_variable
-from tussle.cli.batch_summary import compare_hash, show_batch
-from tussle.cli.interrupt import Interrupt
-from tussle.cli.play import FOR_VIEWER, Source, simulate
-from tussle.cli.progress import ProgressMeter, compiling
-from tussle.cli.settings import ending_by_time
-from tussle.cli.terminal import say, say_note
+from tussle.batch.variables import Variable, parse_variable
+from tussle.cli.batch_options import BatchOptions
+from tussle.cli.interrupt import Interrupt, Interrupted
+from tussle.cli.options import ending_by_time, show_notes
+from tussle.cli.play import check_hash, record, simulate
+from tussle.cli.progress import ProgressMeter, clock, compiling, times
+from tussle.cli.tables import estimate, fact_list, number_tables, title
+from tussle.cli.terminal import OK, PLUGIN_FAILED, RUNS_FAILED, put, say, say_error, say_note
 from tussle.errors import BatchError, ParameterError, RecordError
-from tussle.record import Recorder, load_run
+from tussle.record import load_run
+
+MOST_POINTS = 12
+"""Points that the end of a batch shows; `tussle analyze` shows all."""
 
 
-@dataclass(frozen=True)
-class BatchOptions:
-    """What the command line says of a batch; None where it says nothing.
-
-    Attributes:
-        source: The mission and what is set in it.
-        runs: Games of each point.
-        vary: Texts of `--vary`.
-        sweep: A sweep file.
-        sample: How points are chosen.
-        samples: How many points.
-        sample_seed: Seed of the sampling.
-        independent: Each game has a seed of its own.
-        until: When it is enough.
-        directory: Where it goes.
-        processes: How many.
-        stack: Worlds side by side.
-        run_timeout: Wall time that a run may take [s].
-        scheduler: Address of a Dask scheduler.
-        slurm: What to ask of Slurm.
-        log: Runs that are recorded in full.
-    """
-
-    source: Source
-    runs: int | None = None
-    vary: Sequence[str] = ()
-    sweep: Path | None = None
-    sample: str | None = None
-    samples: int | None = None
-    sample_seed: int | None = None
-    independent: bool = False
-    until: str | None = None
-    directory: Path | None = None
-    processes: int | None = None
-    stack: int | None = None
-    run_timeout: float | None = None
-    scheduler: str | None = None
-    slurm: str | None = None
-    log: str | None = None
-
-    def batch(self) -> Batch:
-        """The batch that is meant; what the command line says comes before what the sweep file says.
-
-        Raises:
-            TussleError: Something in it is not allowed.
-        """
-        sweep = read_sweep(self.sweep) if self.sweep is not None else Sweep(())
-        own = [parse_variable(text) for text in self.vary]
-        if sweep.points is not None and own:
-            raise ParameterError(f"{self.sweep} lists its points, so --vary means nothing beside it")
-        names = [v.name for v in own]
-
-        def first(*values: Any) -> Any:
-            return next((v for v in values if v is not None), None)
-
-        batch = Batch(
-            self.source.mission,
-            runs=first(self.runs, sweep.runs, None if self.until is not None else 100),
-            vary=[*(v for v in sweep.variables if v.name not in names), *own] if sweep.points is None else (),
-            points=sweep.points,
-            sample=first(self.sample, sweep.sample, ""),
-            samples=first(self.samples, sweep.samples),
-            sample_seed=first(self.sample_seed, sweep.sample_seed, 0),
-            first_seed=first(self.source.seed, sweep.first_seed, 1),
-            independent=self.independent,
-            settings=self.source.given,
-            plugin_files=tuple(self.source.plugin_files),
-            ends_by_time=self.source.end is not None,
-            run_timeout=self.run_timeout,
-            strict=self.source.strict,
-            allow_large=self.source.allow_large,
-        )
-        if self.source.end is not None:
-            ending_by_time(batch.mission)
-        for note in batch.loaded.notes if batch.loaded is not None else ():
-            if FOR_VIEWER not in note:
-                say_note(note)
-        return batch
-
-    def executor(self, batch: Batch) -> AbstractContextManager[Executor | None]:
-        """Who plays."""
-        if self.scheduler is not None or self.slurm is not None:
-            from tussle.batch.slurm import executor_for
-
-            return executor_for(self.scheduler, self.slurm, self.stack)
-        if self.processes is None and self.stack is None:
-            return nullcontext()
-        return nullcontext(batch.executor(self.processes, self.stack))
-
-
-def play_batch(asked: BatchOptions, command: Sequence[str]) -> int:
-    """Play a batch, or what is missing of it, and show what came of it.
+def batch(options: BatchOptions) -> int:
+    """Play a batch, or the runs of it that are missing, and show the result.
 
     Returns:
         The exit code.
     """
     scipy_package()  # if it is missing, the user learns it before the games are played
     began = time.perf_counter()
-    until = None if asked.until is None else Until.parse(asked.until)
-    batch = asked.batch()
-    logged = _numbers(asked.log, batch.plan.n_runs)
-    directory = asked.directory or batch.default_directory()
+    until = None if options.until is None else Until.parse(options.until)
+    planned = batch_of(options)
+    recorded = run_numbers(options.record_runs, planned.plan.n_runs)
+    directory = options.directory or planned.default_directory()
     with ExitStack() as stack:
         executor = None
-        if not batch.is_played_in(directory, until):
+        if not planned.is_played_in(directory, until):
             with compiling():
-                batch.check(until)
-            executor = stack.enter_context(asked.executor(batch))
+                planned.check(until)
+            executor = stack.enter_context(_executor(options, planned))
         interrupt = stack.enter_context(Interrupt())
         try:
-            with BatchMeter(batch, interrupt, has_total=until is None) as meter:
-                results = batch.play(
-                    directory, executor, until=until, command=command, on_progress=meter.show_batch
+            with BatchMeter(planned, interrupt, has_total=until is None) as meter:
+                results = planned.play(
+                    directory, executor, until=until, command=command_line(), on_progress=meter.show_batch
                 )
             if meter.n_before:
                 n = min(meter.n_before, results.n_runs)
                 say_note(f"{n:,} of {results.n_runs:,} runs were there already, in {directory}")
-            for number in logged:
-                record_run(batch, asked.source, directory, number, interrupt)
+            for number in recorded:
+                record_run(planned, options, directory, number, interrupt)
         except (Interrupted, BatchError):
             if not interrupt.code:
                 raise
-            # Whatever became of processes that heard the signal too.
+            # Worker processes that got the signal too may have failed.
             say(
                 "interrupted",
-                f"finished runs are kept in {directory}; the same command goes on",
+                f"finished runs are kept in {directory}; the same command continues",
                 "bold yellow",
             )
             return interrupt.code
     return show_batch(results, directory, time.perf_counter() - began, meter.n_new)
 
 
-def _numbers(text: str | None, n_runs: int) -> list[int]:
-    """Runs that `--log` names: "417,3,10:20", the last of a range included.
+def command_line() -> list[str]:
+    """Return the command that runs, as result directories record it."""
+    return [Path(sys.argv[0]).name, *sys.argv[1:]]
+
+
+def batch_of(options: BatchOptions) -> Batch:
+    """Return the batch that the options describe. They take precedence over the sweep file.
 
     Raises:
-        ParameterError: It is written otherwise, or the batch has no such run.
+        TussleError: An option is not allowed.
+    """
+    sweep = read_sweep(options.sweep) if options.sweep is not None else Sweep(())
+    own = [parse_variable(text) for text in options.vary]
+    if sweep.points is not None and own:
+        raise ParameterError(f"{options.sweep} lists its points, so --vary is not allowed with it")
+    names = [v.name for v in own]
+
+    def first(*values: Any) -> Any:
+        return next((v for v in values if v is not None), None)
+
+    made = Batch(
+        options.mission,
+        runs=first(options.runs, sweep.runs, None if options.until is not None else 100),
+        vary=[*(v for v in sweep.variables if v.name not in names), *own] if sweep.points is None else (),
+        points=sweep.points,
+        sample=first(options.sample, sweep.sample, ""),
+        samples=first(options.samples, sweep.samples),
+        sample_seed=first(options.sample_seed, sweep.sample_seed, 0),
+        first_seed=first(options.seed, sweep.first_seed, 1),
+        independent=options.independent,
+        settings=options.given,
+        plugin_files=tuple(options.plugin_files),
+        ends_by_time=options.end is not None,
+        run_timeout=options.run_timeout,
+        strict=options.strict,
+        allow_large=options.allow_large,
+    )
+    if options.end is not None:
+        ending_by_time(made.mission)
+    show_notes(made.loaded)
+    return made
+
+
+def _executor(options: BatchOptions, planned: Batch) -> AbstractContextManager[Executor | None]:
+    if options.scheduler is not None or options.slurm is not None:
+        from tussle.batch.slurm import executor_for
+
+        return executor_for(options.scheduler, options.slurm, options.stack)
+    if options.processes is None and options.stack is None:
+        return nullcontext()
+    return nullcontext(planned.executor(options.processes, options.stack))
+
+
+def run_numbers(text: str | None, n_runs: int) -> list[int]:
+    """Parse the numbers of `--record-runs`: "417,3,10:20", the last of a range included.
+
+    Raises:
+        ParameterError: The text has another form, or the batch has no such run.
     """
     found: list[int] = []
     for part in (text or "").split(",") if text is not None else ():
         low, colon, high = (item.strip() for item in part.partition(":"))
         if not re.fullmatch(r"[0-9]{1,18}", low) or (colon and not re.fullmatch(r"[0-9]{1,18}", high)):
             raise ParameterError(
-                f"--log {text!r} is not allowed; it takes numbers of runs, such as 417,3,10:20"
+                f"--record-runs {text!r} is not allowed; it takes numbers of runs, such as 417,3,10:20"
             )
         first, last = int(low), int(high or low)
         if not first <= last < n_runs:
             raise ParameterError(
-                f"--log {part.strip()!r} is not allowed; the batch has runs 0 to {n_runs - 1}"
+                f"--record-runs {part.strip()!r} is not allowed; the batch has runs 0 to {n_runs - 1}"
             )
         found += range(first, last + 1)
     return list(dict.fromkeys(found))
 
 
-def record_run(batch: Batch, source: Source, directory: Path, number: int, interrupt: Interrupt) -> None:
-    """Play a run again and record all of it, unless that has been done.
+def record_run(
+    planned: Batch, options: BatchOptions, directory: Path, number: int, interrupt: Interrupt
+) -> None:
+    """Play a run again and record it, unless it is recorded.
 
     Raises:
-        BatchError: It came out otherwise than in the batch.
-        Interrupted: The user has asked for an end.
+        BatchError: The run ended otherwise than in the batch.
+        Interrupted: The user asked to stop.
     """
     target = directory / store.RUNS / f"{number:06d}"
-    if _is_recorded(target):
-        return
-    shutil.rmtree(target, ignore_errors=True)  # cut short
+    try:
+        if load_run(target).is_complete:
+            return
+    except RecordError:  # there is no run, or a damaged one
+        pass
+    shutil.rmtree(target, ignore_errors=True)  # an incomplete record
     run = planned_run(
         directory,
         number,
-        may_run=lambda code: digest(code.files) == digest(batch.plugin_files),
-        allow_large=source.allow_large,
+        may_run=lambda code: digest(code.files) == digest(planned.plugin_files),
+        allow_large=options.allow_large,
     )
     with (
         simulate(run.loaded, run.mission, run.seed) as simulation,
-        Recorder(
-            simulation, target, mission_text=run.loaded.text, parameters=run.loaded.settings
-        ) as recorder,
+        record(simulation, target, run.loaded) as recorder,
     ):
         simulation.run_until(lambda _: bool(interrupt.code))
-        if interrupt.code:
-            raise Interrupted
+        interrupt.check()
         result = simulation.result()[0]
-        compare_hash(run, result.state_hash, number)
+        check_hash(run, result.state_hash, str(number))
         recorder.close("" if result.error is None else str(result.error))
-
-
-def _is_recorded(target: Path) -> bool:
-    try:
-        return load_run(target).is_complete
-    except RecordError:
-        return False
-
-
-class Interrupted(Exception):  # noqa: N818 - it is no error
-    """The user wants the batch to stop."""
 
 
 class BatchMeter(ProgressMeter):
     """Shows the progress of a batch and the result so far.
 
     Args:
-        batch: The batch.
-        interrupt: Says whether the user pressed Ctrl-C.
+        planned: The batch.
+        interrupt: Has the flag that Ctrl-C sets.
         has_total: The number of runs is known.
 
     Attributes:
         n_new: Runs that were played since the start.
     """
 
-    def __init__(self, batch: Batch, interrupt: Interrupt, has_total: bool = True) -> None:
-        super().__init__(batch.name, "runs", speed_unit="runs/s")
+    def __init__(self, planned: Batch, interrupt: Interrupt, has_total: bool = True) -> None:
+        super().__init__(planned.name, "runs", speed_unit="runs/s")
         self.n_new = 0
-        self._has_total, self._names, self._interrupt = has_total, batch.team_names, interrupt
+        self._has_total, self._names, self._interrupt = has_total, planned.team_names, interrupt
 
     @property
     def n_before(self) -> int:
@@ -253,11 +217,10 @@ class BatchMeter(ProgressMeter):
         """Show the progress of the batch.
 
         Raises:
-            Interrupted: The user pressed Ctrl-C.
+            Interrupted: The user asked to stop.
         """
         self.before, self.n_new = progress.n_before, progress.n_done - progress.n_before
-        if self._interrupt.code:
-            raise Interrupted
+        self._interrupt.check()
         self.show(
             progress.n_done + progress.under_way,
             progress.n_runs if self._has_total else None,
@@ -272,3 +235,119 @@ class BatchMeter(ProgressMeter):
         }
         text = running_result(wins, sum(progress.wins.values()))
         return f"{text}, {progress.n_failed} failed" if progress.n_failed else text
+
+
+# -- the result -------------------------------------------------------------------------------------------------------------
+
+
+def show_batch(results: Results, directory: Path, wall: float, n_new: int) -> int:
+    """Print the result of a batch.
+
+    Returns:
+        The exit code: that of a failed plugin if all runs failed, another one if only some failed.
+    """
+    info = results.info
+    has_points = info["n_points"] > 1
+    facts = f"{results.n_runs:,} runs" if results.n_runs != 1 else "1 run"
+    facts += f" · {info['n_points']:,} points" if has_points else ""
+    n_seeds = info["n_runs"] if info["independent"] else info["n_seeds"]
+    command = [
+        shlex.join(["tussle", *words])
+        for words in (
+            ("analyze", str(directory)),
+            ("report", str(directory)),
+            ("run", "--from", f"{directory}:0"),
+        )
+    ]
+    stopped, cpu = info.get("stopped_by"), info["timings"]["cpu_s"]
+    played = f"{n_new:,} runs in {clock(wall)} ({times(n_new / wall)} runs/s), {cpu:,.1f} CPU s in all"
+    put(
+        "",
+        title(info["name"], f"{facts} · {seeds_text(info['first_seed'], n_seeds)}"),
+        *(point_tables(results) if has_points else []),
+        *share_tables(results),
+        Text(" in parentheses: 95 % intervals", "dim italic"),
+        fact_list(
+            [
+                ("stopped", f"{stopped} is reached with {info['n_seeds']:,} seeds" if stopped else ""),
+                ("played", played if n_new else ""),
+                ("batch", str(directory)),
+                ("next", Text("\n".join(command))),
+            ]
+        ),
+        "",
+    )
+    for note in results.notes:
+        say_note(note)
+    if results.n_failed == results.n_runs:
+        say_error(f"all runs failed; the first: {results.failed()['error'][0].as_py()}")
+        return PLUGIN_FAILED
+    if results.n_failed:
+        say_note(
+            f"{results.n_failed:,} of {results.n_runs:,} runs failed and are not counted above; tussle analyze lists them"
+        )
+        return RUNS_FAILED
+    return OK
+
+
+def seeds_text(first: int, n: int) -> str:
+    """Format a range of seeds: "seed 3", "seeds 1 to 1,000"."""
+    return f"seed {first}" if n == 1 else f"seeds {first:,} to {first + n - 1:,}"
+
+
+def short_names(variables: Sequence[Variable]) -> list[str]:
+    """Return the last part of the name of each variable if these differ, else the names."""
+    last = [v.name.rpartition(".")[2] for v in variables]
+    return last if len(set(last)) == len(last) else [v.name for v in variables]
+
+
+def share_tables(results: Results) -> list[Padding]:
+    """Return one line per team: how often it won, its mean score, how many are left, each with its interval."""
+    shares = {share.team: share for share in results.shares()}
+    best = max((s.n for s in shares.values() if s.team is not None), default=0)
+    rows = []
+    for team, name in results.teams.items():
+        share, cells = shares.get(team), [f"{team} {name}"]
+        if shares:
+            cells += ["", ""] if share is None else [f"{share.n:,}", _share(share)]
+            cells.append(_mean(results, f"score[{team}]"))
+        style = "green" if share is not None and share.n == best > 0 else ""
+        rows.append((style, [*cells, _mean(results, f"alive[{team}]")]))
+    if None in shares:
+        rows.append(("dim", ["  ties", f"{shares[None].n:,}", _share(shares[None]), "", ""]))
+    return number_tables(
+        ["team", *(["won", "share of wins, %", "mean score"] if shares else []), "left"], rows
+    )
+
+
+def _share(share: Share) -> str:
+    return f"{100 * share.value:.1f} ({100 * share.low:.1f}–{100 * share.high:.1f})"
+
+
+def _mean(results: Results, name: str) -> str:
+    if name not in results.quantities:
+        return ""
+    mean = results.means([name])[0]
+    return estimate(mean.value, mean.low, mean.high) if mean.n else ""
+
+
+def point_tables(results: Results) -> list[Padding]:
+    """Return one line per point: its values, and who won how often there."""
+    winners = [share for share in results.shares() if share.n]
+    teams = [share.team for share in winners]
+    head = ["point", *short_names(results.variables), *(f"{share.name} won, %" for share in winners)]
+    rows = [
+        (
+            "",
+            [
+                str(point),
+                *map(written, values.values()),
+                *(_share(share) for share in results.shares(point) if share.team in teams),
+            ],
+        )
+        for point, values in list(enumerate(results.points))[:MOST_POINTS]
+    ]
+    if len(results.points) > MOST_POINTS:
+        more = f"and {len(results.points) - MOST_POINTS:,} more"
+        rows.append(("dim", [more, *[""] * (len(head) - 1)]))
+    return number_tables(head, rows)

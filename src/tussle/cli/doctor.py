@@ -8,14 +8,13 @@ import re
 import time
 from importlib import metadata
 
-import typer
-from rich.table import Table
-
 import tussle
-from tussle.cli.options import Debug
-from tussle.cli.pages import show
+from tussle.cli.options import MissionOptions
+from tussle.cli.play import simulate
+from tussle.cli.play_options import DoctorOptions
 from tussle.cli.progress import compiling, home_short, times
-from tussle.cli.terminal import WRONG_INPUT, put, reported, say_error
+from tussle.cli.tables import fact_list
+from tussle.cli.terminal import OK, WRONG_INPUT, put, say_error
 from tussle.numeric import store
 
 SELF_TEST = "predator_prey"
@@ -24,33 +23,33 @@ EXPECTED_HASH = "4092338cd3f84e5fc94d8c9e3a149b9c"
 """State hash of the self-test mission after STEPS steps, the same on every machine."""
 
 
-def doctor(debug: Debug = False) -> None:
-    """Show versions, extras, kernel cache and processors, and run a self-test."""
-    with reported(debug):
-        facts = Table.grid(padding=(0, 2))
-        facts.add_row(" tussle", tussle.__version__)
-        facts.add_row(" Python", f"{platform.python_version()} on {platform.platform()}")
-        needed, extras = requirements()
-        facts.add_row(" packages", ", ".join(f"{name} {version_of(name)}" for name in needed))
-        for extra, names in extras.items():
-            missing = [name for name in names if not version_of(name)]
-            text = (
-                f"not installed: {', '.join(missing)}; pip install 'tussle[{extra}]'"
-                if missing
-                else "installed"
-            )
-            facts.add_row(f" extra {extra}", text)
-        facts.add_row(" kernels", f"kept in {home_short(store.directory())}")
-        facts.add_row(" processors", str(os.cpu_count()))
-        show(facts)
-        with compiling():
-            state_hash, speed = play()
-        if state_hash != EXPECTED_HASH:
-            say_error(
-                f"self-test: {SELF_TEST} has the state hash {state_hash} after {STEPS} steps; expected {EXPECTED_HASH}"
-            )
-            raise typer.Exit(WRONG_INPUT)
-        put(f" self-test passed: {SELF_TEST} at {times(speed)} × real time, with the expected hash")
+def doctor(_: DoctorOptions) -> int:
+    """Show the installation, and run the self-test.
+
+    Returns:
+        The exit code.
+    """
+    needed, extras = requirements()
+    facts = [
+        ("tussle", tussle.__version__),
+        ("Python", f"{platform.python_version()} on {platform.platform()}"),
+        ("packages", ", ".join(f"{name} {version_of(name)}" for name in needed)),
+    ]
+    for extra, names in extras.items():
+        missing = ", ".join(name for name in names if not version_of(name))
+        advice = f"not installed: {missing}; pip install 'tussle[{extra}]'"
+        facts.append((f"extra {extra}", advice if missing else "installed"))
+    facts += [("kernels", f"kept in {home_short(store.directory())}"), ("processors", str(os.cpu_count()))]
+    put(fact_list(facts))
+    with compiling():
+        state_hash, speed = play()
+    if state_hash != EXPECTED_HASH:
+        say_error(
+            f"self-test: {SELF_TEST} has the state hash {state_hash} after {STEPS} steps; expected {EXPECTED_HASH}"
+        )
+        return WRONG_INPUT
+    put("", f" self-test passed: {SELF_TEST} at {times(speed)} × real time, with the expected hash")
+    return OK
 
 
 def requirements() -> tuple[list[str], dict[str, list[str]]]:
@@ -76,9 +75,7 @@ def version_of(package: str) -> str:
 
 def play() -> tuple[str, float]:
     """Run the self-test; return its state hash and speed [simulated seconds per second]."""
-    from tussle.cli.play import Source, simulate
-
-    loaded, mission, _ = Source(SELF_TEST, {}, SEED).read(tells_all=False)
+    loaded, mission, _ = MissionOptions(mission=SELF_TEST).read()
     with simulate(loaded, mission, SEED) as simulation:
         simulation.step()
         began = time.perf_counter()

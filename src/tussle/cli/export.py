@@ -1,202 +1,177 @@
-"""`tussle export RUN`: convert a recorded run to a web page, film, image or tables."""
+"""`tussle export` and `tussle plot`: convert and plot recorded runs."""
 
 from __future__ import annotations
 
+import math
+import re
+import time
 from collections.abc import Mapping
+from functools import cached_property
 from pathlib import Path
-from typing import Annotated
 
 import typer
-from typer.core import TyperCommand
 
-from tussle.cli.options import Debug, PluginFiles
-from tussle.cli.terminal import reported
+from tussle.cli.export_options import ExportOptions, PlotOptions
+from tussle.cli.options import read_time
+from tussle.cli.progress import ProgressMeter, home_short
+from tussle.cli.terminal import INTERRUPTED, NOT_WRITTEN, OK, out, say, say_error, say_note
+from tussle.errors import ParameterError, ViewError
+from tussle.view.export.film import FilmOptions
+from tussle.view.recording import Recording
 
-DEFAULT_NAMES = {
-    "html": "replay.html",
-    "mp4": "film.mp4",
-    "gif": "film.gif",
-    "png": "picture.png",
-    "mcap": "run.mcap",
-    "csv": "states.csv",
-    "parquet": "states.parquet",
-}
-"""Default file names of the outputs, in the run directory."""
-BESIDE = "@"
-"""Placeholder for the default file, inserted by `ExportCommand`."""
-FILMS = ("mp4", "gif", "png")
+TIMES = {"start": "--from", "stop": "--to", "at": "--at"}
 
 
-class ExportCommand(TyperCommand):
-    """A command whose output options may omit the file name: `tussle export RUN --mp4 --gif small.gif`."""
+def plot(options: PlotOptions) -> None:
+    """Write the plots of a run, and print their names."""
+    from tussle.view.plots import Choice, write_plots
 
-    def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:  # type: ignore[override]
-        """Insert the placeholder after output options without a file name."""
-        options = {f"--{name}" for name in DEFAULT_NAMES}
-        whole: list[str] = []
-        for word, following in zip(args, [*args[1:], "--"], strict=True):
-            whole.append(word)
-            if word in options and following.startswith("-"):
-                whole.append(BESIDE)
-        return super().parse_args(ctx, whole)
-
-
-def _output(name: str, what: str) -> object:
-    return typer.Option(
-        f"--{name}",
-        metavar="[FILE]",
-        help=f"{what} By default RUN/{DEFAULT_NAMES[name]}.",
-        show_default=False,
-    )
+    start = -math.inf if options.start is None else read_time("--from", options.start)
+    stop = math.inf if options.stop is None else read_time("--to", options.stop)
+    selection = Choice(tuple(options.teams), tuple(options.entities), start, stop)
+    recording = Recording(options.run, options.world, tuple(options.plugin_files))
+    directory = options.directory or options.run / "plots"
+    written = write_plots(recording, directory, options.kinds, selection, options.between, options.form)
+    for note in written.notes:
+        say_note(note)
+    for file in written.files:
+        out().print(home_short(file), soft_wrap=True)
 
 
-RunName = Annotated[
-    Path, typer.Argument(metavar="RUN", help="A run directory, complete or not.", show_default=False)
-]
-Html = Annotated[Path | None, _output("html", "A web page that replays the run offline.")]
-Mp4 = Annotated[Path | None, _output("mp4", "A film (H.264).")]
-Gif = Annotated[Path | None, _output("gif", "A small animation.")]
-Png = Annotated[Path | None, _output("png", "One image.")]
-Mcap = Annotated[Path | None, _output("mcap", "A log for Foxglove.")]
-Csv = Annotated[Path | None, _output("csv", "Tables of states and events.")]
-Parquet = Annotated[Path | None, _output("parquet", "The same tables, compressed.")]
-World = Annotated[
-    int | None,
-    typer.Option(
-        metavar="N", min=0, help="World of a stack; by default 0, for tables all.", show_default=False
-    ),
-]
-CameraName = Annotated[
-    str | None,
-    typer.Option(
-        "--camera",
-        metavar="overview|top|follow",
-        help="Camera of films and images: all entities from the south, from above, or behind one entity; by default overview.",
-        show_default=False,
-    ),
-]
-FollowId = Annotated[
-    int | None, typer.Option("--follow", metavar="ID", help="Follow this entity.", show_default=False)
-]
-Start = Annotated[
-    str | None,
-    typer.Option("--from", metavar="TIME", help="Start time of a film: 60, or '2 min'.", show_default=False),
-]
-Stop = Annotated[
-    str | None, typer.Option("--to", metavar="TIME", help="End time of a film.", show_default=False)
-]
-At = Annotated[
-    str | None,
-    typer.Option(
-        "--at", metavar="TIME", help="Time of the image; by default the middle.", show_default=False
-    ),
-]
-Speed = Annotated[
-    float | None,
-    typer.Option(
-        metavar="X",
-        help="Simulated seconds per second of film; by default chosen so that the film lasts at most 30 s.",
-        show_default=False,
-    ),
-]
-Fps = Annotated[
-    float | None, typer.Option(metavar="N", help="Frames per second; by default 25.", show_default=False)
-]
-Size = Annotated[
-    str | None,
-    typer.Option(
-        metavar="WIDTHxHEIGHT", help="Size of films and images; by default 1280x720.", show_default=False
-    ),
-]
-Trails = Annotated[
-    float | None,
-    typer.Option(metavar="S", help="Duration of the trails [s]; 0 for none.", show_default=False),
-]
-Labels = Annotated[bool, typer.Option("--labels", help="Show the ids of the entities.")]
-NoCaption = Annotated[bool, typer.Option("--no-caption", help="Show no caption on films and images.")]
-Zoom = Annotated[float | None, typer.Option(metavar="X", help="Zoom factor.", show_default=False)]
-Scale = Annotated[
-    float | None,
-    typer.Option(metavar="X", help="Factor on the size of the models.", show_default=False),
-]
-Period = Annotated[
-    float | None,
-    typer.Option(
-        metavar="S",
-        help="Time between the states in --html and --mcap [s]; by default all states.",
-        show_default=False,
-    ),
-]
+def export(options: ExportOptions) -> int:
+    """Write all files that are asked for, fast outputs first.
 
-
-def export(
-    run: RunName,
-    html: Html = None,
-    mp4: Mp4 = None,
-    gif: Gif = None,
-    png: Png = None,
-    mcap: Mcap = None,
-    csv: Csv = None,
-    parquet: Parquet = None,
-    world: World = None,
-    camera: CameraName = None,
-    follow: FollowId = None,
-    start: Start = None,
-    stop: Stop = None,
-    at: At = None,
-    speed: Speed = None,
-    fps: Fps = None,
-    size: Size = None,
-    trails: Trails = None,
-    labels: Labels = False,
-    no_caption: NoCaption = False,
-    zoom: Zoom = None,
-    scale: Scale = None,
-    period: Period = None,
-    plugin_files: PluginFiles = None,
-    debug: Debug = False,
-) -> None:
-    """Convert a recorded run to a web page, film, image or tables; several outputs at once are possible."""
-    asked = {"html": html, "mp4": mp4, "gif": gif, "png": png, "mcap": mcap, "csv": csv, "parquet": parquet}
-    files = {
-        name: run / DEFAULT_NAMES[name] if str(file) == BESIDE else file
-        for name, file in asked.items()
-        if file is not None
+    Returns:
+        The exit code.
+    """
+    exporter = _Exporter(options)
+    writers = {
+        ("csv", "parquet"): exporter.write_tables,
+        ("html",): exporter.write_html,
+        ("mcap",): exporter.write_mcap,
+        ("png", "mp4", "gif"): exporter.write_films,
     }
-    if not files:
-        names = ", ".join(f"--{name}" for name in asked)
-        raise typer.BadParameter(f"no output is given; possible outputs: {names}")
-    look = {
-        "--camera": camera, "--follow": follow, "--from": start, "--to": stop, "--speed": speed, "--fps": fps, "--size": size,
-        "--trails": trails, "--labels": labels or None, "--no-caption": no_caption or None, "--zoom": zoom,
-    }  # fmt: skip
-    _refuse_idle(look, FILMS, files)
-    _refuse_idle({"--speed": speed, "--fps": fps}, ("mp4", "gif"), files)
-    _refuse_idle({"--at": at}, ("png",), files)
-    _refuse_idle({"--scale": scale}, (*FILMS, "mcap"), files)
-    _refuse_idle({"--period": period}, ("html", "mcap"), files)
-    if period is not None and not 0.0 < period < float("inf"):
-        raise typer.BadParameter(f"--period {period:g} is not allowed; it takes a number > 0")
-    with reported(debug):
-        from tussle.cli.exporting import Source, film_options, write_outputs
-
-        options = film_options(
-            camera=camera or ("overview" if follow is None else "follow"), follow=follow, start=start, stop=stop, at=at,
-            speed=speed, fps=fps, size=size, trails=trails, labels=labels, captions=not no_caption, zoom=zoom, scale=scale,
-        )  # fmt: skip
-        code = write_outputs(Source(run, world, tuple(plugin_files or ())), files, options, period)
-    raise typer.Exit(code)
+    try:
+        for kinds, write in writers.items():
+            asked = {kind: options.files[kind] for kind in kinds if kind in options.files}
+            if asked:
+                write(asked)
+    except ViewError as error:
+        say_error(str(error))
+        return NOT_WRITTEN
+    except KeyboardInterrupt:
+        say("interrupted", "files listed above are complete, the others were not written", "bold yellow")
+        return INTERRUPTED
+    return OK
 
 
-def _refuse_idle(options: Mapping[str, object], useful: tuple[str, ...], files: Mapping[str, Path]) -> None:
-    """Refuse options that none of the outputs uses.
+def film_options(options: ExportOptions) -> FilmOptions:
+    """Return the options of films and images.
 
     Raises:
-        typer.BadParameter: An option is not used.
+        typer.BadParameter: A value is not allowed.
     """
-    if any(name in files for name in useful):
-        return
-    for option, value in options.items():
-        if value is not None:
-            names = " or ".join(f"--{name}" for name in useful)
-            raise typer.BadParameter(f"{option} is allowed with {names} only")
+    names = ("camera", "follow", "start", "stop", "at", "speed", "fps", "size", "trails", "zoom", "scale")
+    given = {name: value for name in names if (value := getattr(options, name)) is not None}
+    given.setdefault("camera", "overview" if options.follow is None else "follow")
+    try:
+        for name in TIMES.keys() & given.keys():
+            given[name] = read_time(TIMES[name], given[name])
+        if "size" in given:
+            given["size"] = read_size(given["size"])
+        return FilmOptions(**given, labels=options.labels, captions=not options.no_caption)
+    except ParameterError as error:
+        raise typer.BadParameter(str(error)) from None
+
+
+def read_size(text: str) -> tuple[int, int]:
+    """Parse width and height [pixels].
+
+    Raises:
+        ParameterError: The text has another form.
+    """
+    found = re.fullmatch(r"\s*(\d{1,6})\s*[x×]\s*(\d{1,6})\s*", text, re.IGNORECASE)
+    if found is None:
+        raise ParameterError(f"--size {text!r} does not have the form WIDTHxHEIGHT, such as 1280x720")
+    return int(found[1]), int(found[2])
+
+
+def size_of(path: Path) -> str:
+    """Format the size of a file: "812 B", "4.5 kB", "12 MB"."""
+    n = float(path.stat().st_size)
+    for unit in ("B", "kB", "MB"):
+        if n < 1000.0:
+            return f"{n:.3g} {unit}"
+        n /= 1000.0
+    return f"{n:.3g} GB"
+
+
+def _report(path: Path, text: str) -> None:
+    out().print(f"{home_short(path)}: {text}, {size_of(path)}", soft_wrap=True)
+
+
+class _Exporter:
+    """Writes the outputs of a run, and prints what it has written."""
+
+    def __init__(self, options: ExportOptions) -> None:
+        self._options, self._film = options, film_options(options)
+
+    @cached_property
+    def recording(self) -> Recording:
+        """The run in memory. Tables are written without it."""
+        world = self._options.world
+        recording = Recording(self._options.run, world or 0, tuple(self._options.plugin_files))
+        n_worlds = len(recording.run.info.get("worlds", ()))
+        if world is None and n_worlds > 1:
+            say_note(f"the run has {n_worlds} worlds; world 0 is shown, --world selects another")
+        # Style and scenery are read now, so that their notes are printed once, before the outputs.
+        for note in dict.fromkeys([*recording.style.notes, *recording.scenery.notes, *recording.notes]):
+            say_note(note)
+        return recording
+
+    def write_tables(self, files: Mapping[str, Path]) -> None:
+        from tussle.view.export.tables import write_tables
+
+        for kind, path in files.items():
+            with ProgressMeter(kind, "states") as meter:
+                report = write_tables(
+                    self._options.run, path, kind, world=self._options.world, show=meter.show
+                )
+            for note in report.notes:
+                say_note(note)
+            for file, rows, what in zip(report.paths, report.rows, ("states", "events"), strict=True):
+                _report(file, f"{rows:,} {what}")
+
+    def write_html(self, files: Mapping[str, Path]) -> None:
+        from tussle.view.export.html import write_html
+
+        report = write_html(self.recording, files["html"], period=self._options.period)
+        _report(report.path, f"{report.n_frames:,} states of {report.n_entities:,} entities")
+
+    def write_mcap(self, files: Mapping[str, Path]) -> None:
+        from tussle.view.export.mcap_file import write_mcap
+
+        recording = self.recording
+        with ProgressMeter("mcap", "states") as meter:
+            report = write_mcap(
+                recording, files["mcap"], period=self._options.period, scale=self._film.scale, show=meter.show
+            )
+        for note in report.notes:
+            say_note(note)
+        _report(report.path, f"{report.n_frames:,} states, {sum(report.n_messages.values()):,} messages")
+
+    def write_films(self, files: Mapping[str, Path]) -> None:
+        from tussle.view.export.film import write_film
+
+        recording = self.recording
+        began = time.perf_counter()
+        with ProgressMeter("film", "pictures") as meter:
+            report = write_film(recording, options=self._film, show=meter.show, **files)
+        wall = time.perf_counter() - began
+        for note in report.notes:
+            say_note(note)
+        width, height = self._film.size
+        for kind, path in files.items():
+            film = f"{report.n_pictures:,} pictures, {report.duration:.1f} s at {report.speed:g} × real time"
+            rate = f"{report.n_pictures / wall:.1f} pictures/s"
+            _report(path, f"{width}×{height}" if kind == "png" else f"{film}, {rate}")

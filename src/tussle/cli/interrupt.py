@@ -10,6 +10,10 @@ from typing import Any, Self
 from tussle.cli.terminal import INTERRUPTED, TERMINATED, err
 
 
+class Interrupted(Exception):  # noqa: N818 - not an error
+    """The user asked to stop."""
+
+
 class Interrupt:
     """A context in which SIGINT and SIGTERM set a flag; a second signal stops the program at once.
 
@@ -29,6 +33,15 @@ class Interrupt:
     def __exit__(self, *_: object) -> None:
         for number, handler in self._previous.items():
             signal.signal(number, handler)
+
+    def check(self) -> None:
+        """Stop if a signal has come.
+
+        Raises:
+            Interrupted: A signal has come.
+        """
+        if self.code:
+            raise Interrupted
 
     def _handle(self, number: int, _: FrameType | None) -> None:
         code = INTERRUPTED if number == signal.SIGINT else TERMINATED

@@ -1,88 +1,235 @@
-"""Options shared by several commands, and the epilog of all commands."""
+"""Commands whose options are the fields of a dataclass, and the options that all commands with a mission share."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import MISSING, Field, dataclass, field, fields
+from importlib import import_module
+from inspect import Parameter, Signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
+from typer.core import TyperCommand
 
-from tussle.cli.terminal import EXIT_CODES
+from tussle.cli.terminal import EXIT_CODES, OK, reported, say_note
+from tussle.errors import ParameterError
+from tussle.units import parse
 
 if TYPE_CHECKING:
-    from tussle.cli.play import Source
+    from tussle.mission import Loaded, Mission
 
 # \b keeps click from rewrapping the lines that follow.
 EPILOG = "\b\nExit codes:\n" + "\n".join(f"  {code:>3}  {meaning}" for code, meaning in EXIT_CODES.items())
-
-SET_HELP = (
-    "Set a variable ${name=default} of the mission, or any value by its path: prey.Boids.max_speed='50 kt', "
-    "prey.motion_model=SimpleAircraft, run.dt=0.05. Can be repeated."
-)
-
-MissionName = Annotated[
-    str,
-    typer.Argument(
-        metavar="MISSION",
-        help="A mission file, or the name of a built-in mission (tussle missions).",
-        show_default=False,
-    ),
-]
-Seed = Annotated[
-    int | None,
-    typer.Option(
-        metavar="N",
-        min=0,
-        max=2**64 - 1,
-        help="Seed of the game; by default that of the mission, or 1.",
-        show_default=False,
-    ),
-]
-Set = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="NAME=VALUE",
-        help=SET_HELP,
-        show_default=False,
-    ),
-]
-More = Annotated[
-    list[str] | None, typer.Argument(metavar="NAME=VALUE", help="Same as --set.", show_default=False)
-]
-End = Annotated[
-    str | None,
-    typer.Option(metavar="TIME", help="End the game at this time: 60, or '2 min'.", show_default=False),
-]
-Strict = Annotated[
-    bool, typer.Option("--strict", help="Treat unknown tags and attributes of the mission as errors.")
-]
-PluginFiles = Annotated[
-    list[Path] | None,
-    typer.Option(
-        "--plugin-path",
-        metavar="FILE",
-        help="A Python file with plugins. Can be repeated.",
-        show_default=False,
-    ),
-]
-Large = Annotated[bool, typer.Option("--allow-large", help="Lift the limits on the size of a mission.")]
-Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
+LARGEST_SEED = 2**64 - 1
+VIEWER_NOTE = ": kept for the viewer: "
+"""Part of the notes on settings that only the viewer uses."""
+RENAMED = {"--log": "--record-runs"}
+"""Former names of options."""
 
 
-def mission_source(
-    mission: str,
-    settings: list[str] | None,
-    more: list[str] | None,
-    seed: int | None,
-    end: str | None,
-    strict: bool,
-    plugin_files: list[Path] | None,
-    allow_large: bool,
-) -> Source:
-    """Return the mission selected by the options."""
-    from tussle.cli.play import Source
-    from tussle.cli.settings import read_settings
+def argument(metavar: str, text: str) -> Any:
+    """A positional argument."""
+    return typer.Argument(metavar=metavar, help=text, show_default=False)
 
-    given = read_settings([*(settings or ()), *(more or ())])
-    return Source(mission, given, seed, end, strict, tuple(plugin_files or ()), allow_large)
+
+def option(metavar: str | None, text: str, *names: str, shows_default: bool = False, **more: Any) -> Any:
+    """An option with a value; its name is that of the field where `names` is empty."""
+    return typer.Option(*names, metavar=metavar, help=text, show_default=shows_default, **more)
+
+
+def flag(name: str, text: str) -> Any:
+    """An option without a value."""
+    return typer.Option(name, help=text)
+
+
+class TussleCommand(TyperCommand):
+    """A command that names the new name of a renamed option."""
+
+    def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:  # type: ignore[override]
+        """Parse the command line.
+
+        Raises:
+            typer.BadParameter: The command line is wrong.
+        """
+        for name in (word.partition("=")[0] for word in args):
+            if name in RENAMED and any(RENAMED[name] in each.opts for each in self.params):
+                raise typer.BadParameter(f"no such option: {name}; it is now called {RENAMED[name]}")
+        return super().parse_args(ctx, args)
+
+
+def add_command(
+    app: typer.Typer, name: str, options: type[Any], target: str, cls: type[TyperCommand] = TussleCommand
+) -> None:
+    """Add a command with an option for each field of a dataclass, and `--debug`.
+
+    Args:
+        app: The command line.
+        name: Name of the command.
+        options: The dataclass; its docstring is the help text of the command.
+        target: "module:function". The module is imported when the command runs; the function takes the options and returns the
+            exit code, or None for success.
+        cls: Parses the command line.
+    """
+    hints = get_type_hints(options, include_extras=True)
+    # Own options come first, then those of the base classes.
+    declared = {
+        key: place
+        for place, base in reversed(list(enumerate(options.__mro__)))
+        for key in vars(base).get("__annotations__", ())
+    }
+    parameters = [
+        Parameter(f.name, Parameter.KEYWORD_ONLY, default=_default(f), annotation=hints[f.name])
+        for f in sorted(fields(options), key=lambda f: declared[f.name])
+    ]
+    debug = Annotated[bool, flag("--debug", "Show the traceback of an error.")]
+
+    def call(*, debug: bool, **given: Any) -> None:
+        with reported(debug):
+            module, _, function = target.partition(":")
+            asked = options(**{key: value for key, value in given.items() if value is not None})
+            code = getattr(import_module(module), function)(asked)
+        raise typer.Exit(code or OK)
+
+    call.__signature__ = Signature(  # type: ignore[attr-defined]
+        [*parameters, Parameter("debug", Parameter.KEYWORD_ONLY, default=False, annotation=debug)]
+    )
+    app.command(name, help=options.__doc__, epilog=EPILOG, cls=cls)(call)
+
+
+def _default(declared: Field[Any]) -> Any:
+    if declared.default_factory is not MISSING:
+        return None
+    return Parameter.empty if declared.default is MISSING else declared.default
+
+
+def check_positive(**values: float | None) -> None:
+    """Check options that take a positive number; None is allowed.
+
+    Raises:
+        typer.BadParameter: A number is not positive.
+    """
+    for name, value in values.items():
+        if value is not None and not 0.0 < value < float("inf"):
+            option_name = f"--{name.replace('_', '-')}"
+            raise typer.BadParameter(f"{option_name} {value:g} is not allowed; it takes a number > 0")
+
+
+def read_settings(texts: Sequence[str]) -> dict[str, str]:
+    """Parse texts "name=value" into a dict.
+
+    Raises:
+        typer.BadParameter: A text has another form, or a name is set twice.
+    """
+    settings: dict[str, str] = {}
+    for text in texts:
+        name, equals, value = (part.strip() for part in text.partition("="))
+        if not equals or not name:
+            raise typer.BadParameter(
+                f"{text!r} does not have the form NAME=VALUE, such as prey.Boids.max_speed='50 kt'"
+            )
+        if name in settings:
+            raise typer.BadParameter(f"{name} is set twice, to {settings[name]!r} and to {value!r}")
+        settings[name] = value
+    return settings
+
+
+def read_time(name: str, text: str) -> float:
+    """Parse the time of an option [s].
+
+    Raises:
+        ParameterError: The text is not a time.
+    """
+    try:
+        return parse(text, "s")
+    except ParameterError as error:
+        raise ParameterError(f"{name}: {error}") from None
+
+
+@dataclass(frozen=True, kw_only=True)
+class PluginOptions:
+    """List all plugins: those of tussle, of other packages, and of your files."""
+
+    plugin_files: Annotated[
+        list[Path], option("FILE", "A Python file with plugins. Can be repeated.", "--plugin-path")
+    ] = field(default_factory=list)
+
+
+@dataclass(frozen=True, kw_only=True)
+class MissionOptions(PluginOptions):
+    """Check a mission: read it, build its game, and report all errors."""
+
+    mission: Annotated[
+        str, argument("MISSION", "A mission file, or the name of a built-in mission (tussle missions).")
+    ]
+    more: Annotated[list[str], argument("NAME=VALUE", "Same as --set.")] = field(default_factory=list)
+    seed: Annotated[
+        int | None,
+        option("N", "Seed of the game; by default that of the mission, or 1.", min=0, max=LARGEST_SEED),
+    ] = None
+    settings: Annotated[
+        list[str],
+        option(
+            "NAME=VALUE",
+            "Set a variable ${name=default} of the mission, or any value by its path: prey.Boids.max_speed='50 kt', "
+            "prey.motion_model=SimpleAircraft, run.dt=0.05. Can be repeated.",
+            "--set",
+        ),
+    ] = field(default_factory=list)
+    end: Annotated[str | None, option("TIME", "End the game at this time: 60, or '2 min'.")] = None
+    strict: Annotated[
+        bool, flag("--strict", "Treat unknown tags and attributes of the mission as errors.")
+    ] = False
+    allow_large: Annotated[bool, flag("--allow-large", "Lift the limits on the size of a mission.")] = False
+
+    def __post_init__(self) -> None:
+        read_settings([*self.settings, *self.more])
+
+    @property
+    def given(self) -> dict[str, Any]:
+        """All settings by name, including the end time.
+
+        Raises:
+            ParameterError: The end time is not a time.
+        """
+        end = {} if self.end is None else {"run.end": read_time("--end", self.end)}
+        return read_settings([*self.settings, *self.more]) | end
+
+    def read(self, *, shows_viewer_notes: bool = False) -> tuple[Loaded, Mission, int]:
+        """Return the mission file as read, the mission, and the seed; print the notes.
+
+        Raises:
+            TussleError: The mission cannot be read.
+        """
+        from tussle.mission import read_mission
+
+        loaded = read_mission(
+            self.mission,
+            self.given,
+            strict=self.strict,
+            plugin_files=tuple(self.plugin_files),
+            allow_large=self.allow_large,
+        )
+        show_notes(loaded, shows_viewer_notes)
+        seed = self.seed if self.seed is not None else loaded.seed if loaded.seed is not None else 1
+        return loaded, loaded.mission if self.end is None else ending_by_time(loaded.mission), seed
+
+
+def show_notes(loaded: Loaded | None, shows_viewer_notes: bool = False) -> None:
+    """Print the notes on a mission file, by default without those on settings of the viewer."""
+    for note in loaded.notes if loaded is not None else ():
+        if shows_viewer_notes or VIEWER_NOTE not in note:
+            say_note(note)
+
+
+def ending_by_time(mission: Mission) -> Mission:
+    """Add the end condition "time" to a mission.
+
+    Raises:
+        ParameterError: The end is not after the start.
+    """
+    if not mission.end > mission.start:
+        raise ParameterError(
+            f"--end {mission.end:g} is not allowed; it takes a time in s > {mission.start:g}, the start"
+        )
+    return mission.ending_by_time()

@@ -1,78 +1,35 @@
-"""`tussle run`: play, show and record one game."""
+"""`tussle run` and `tussle check`: build, play, show and record one game."""
 
 from __future__ import annotations
 
 import datetime as dt
 import itertools
 import re
+import sys
 import time
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack
-from dataclasses import dataclass
+from collections.abc import Callable
+from contextlib import ExitStack, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
+
+import typer
 
 from tussle.cli.interrupt import Interrupt
+from tussle.cli.options import MissionOptions
+from tussle.cli.play_options import RunOptions
 from tussle.cli.progress import ProgressMeter, compiling
-from tussle.cli.settings import ending_by_time, read_time
 from tussle.cli.summary import Speed, show_summary
-from tussle.cli.terminal import say, say_note
+from tussle.cli.terminal import out, say, say_note
 from tussle.engine.simulation import Simulation
-from tussle.errors import MissionError, ParameterError, RecordError, WiringError
-from tussle.mission import Loaded, Mission, read_mission
+from tussle.errors import BatchError, MissionError, ParameterError, RecordError, WiringError
+from tussle.mission import Loaded, Mission
 
 if TYPE_CHECKING:
+    from tussle.batch.reload import PlannedRun
+    from tussle.batch.trust import DirectoryCode
     from tussle.record import Recorder
 
 NAP = 0.05  # [s] longest sleep of a paced run, so that Ctrl-C is handled in time
-
-FOR_VIEWER = ": kept for the viewer: "
-
-
-@dataclass(frozen=True)
-class Source:
-    """A mission and its settings; the options shared by run, check and describe.
-
-    Attributes:
-        mission: A file, or the name of a built-in mission.
-        settings: Values of variables ${name=default}, and of any path.
-        seed: Replaces the seed of the mission.
-        end: End time, in addition to the other end conditions.
-        strict: Treat unknown tags and attributes as errors.
-        plugin_files: Python files with plugins.
-        allow_large: Lift the limits on the size of the mission.
-    """
-
-    mission: str
-    settings: dict[str, str]
-    seed: int | None = None
-    end: str | None = None
-    strict: bool = False
-    plugin_files: Sequence[Path] = ()
-    allow_large: bool = False
-
-    def read(self, tells_all: bool = True) -> tuple[Loaded, Mission, int]:
-        """Return the file as read, the mission, and the seed. Without `tells_all`, notes on viewer settings are omitted."""
-        loaded = read_mission(
-            self.mission,
-            self.given,
-            strict=self.strict,
-            plugin_files=tuple(self.plugin_files),
-            allow_large=self.allow_large,
-        )
-        for note in loaded.notes:
-            if tells_all or FOR_VIEWER not in note:
-                say_note(note)
-        seed = self.seed if self.seed is not None else loaded.seed if loaded.seed is not None else 1
-        return loaded, loaded.mission if self.end is None else ending_by_time(loaded.mission), seed
-
-    @property
-    def given(self) -> dict[str, Any]:
-        """All settings, including the end time."""
-        return self.settings | ({} if self.end is None else {"run.end": read_time("--end", self.end)})
-
-    def ended(self, state_hash: str) -> None:
-        """Do nothing: any end is accepted."""
 
 
 def simulate(loaded: Loaded, mission: Mission, seed: int, **more: Any) -> Simulation:
@@ -89,26 +46,31 @@ def simulate(loaded: Loaded, mission: Mission, seed: int, **more: Any) -> Simula
         raise type(error)(f"{place or loaded.path}: {error}") from error
 
 
-@dataclass(frozen=True)
-class Record:
-    """Recording options: run directory, whether to record, and period [s]."""
+def record(simulation: Simulation, directory: Path, loaded: Loaded, period: float | None = None) -> Recorder:
+    """Return a recorder of a simulation.
 
-    directory: Path | None = None
-    is_on: bool = True
-    period: float | None = None
+    Raises:
+        RecordError: The directory cannot be written.
+    """
+    from tussle.record import Recorder
 
-
-class Game(Protocol):
-    """A game to play: a mission with settings, or a run of a batch."""
-
-    def read(self, tells_all: bool = True) -> tuple[Loaded, Mission, int]:
-        """Return the file as read, the mission, and the seed."""
-
-    def ended(self, state_hash: str) -> None:
-        """Called when the game has ended."""
+    return Recorder(
+        simulation, directory, period=period, mission_text=loaded.text, parameters=loaded.settings
+    )
 
 
-def play(source: Game, record: Record, pace: float | None, start_from: Path | None) -> int:
+def check(options: MissionOptions) -> None:
+    """Build the game of a mission and show its size."""
+    loaded, mission, seed = options.read(shows_viewer_notes=True)
+    with compiling(), simulate(loaded, mission, seed) as simulation:
+        n = sum(block.count for block in mission.blocks)
+        notes = f", {len(loaded.notes)} note(s)" if loaded.notes else ""
+        out().print(
+            f"{options.mission} can be played: {n} entities, grade {simulation.grade}{notes}", soft_wrap=True
+        )
+
+
+def run(options: RunOptions) -> int:
     """Play a game and show its result.
 
     Returns:
@@ -118,26 +80,37 @@ def play(source: Game, record: Record, pace: float | None, start_from: Path | No
         PluginError: A plugin failed. The game up to the failure is recorded and shown.
     """
     began = time.perf_counter()
-    loaded, mission, seed = source.read(tells_all=False)
+    planned = None if options.from_batch is None else planned_by(options)
+    if planned is None:
+        loaded, mission, seed = options.read()
+    else:
+        loaded, mission, seed = planned.loaded, planned.mission, planned.seed
     more: dict[str, Any] = {}
-    if start_from is not None:
+    if options.start_from is not None:
         from tussle.record import read_table
 
-        more["start_from"] = read_table(start_from)
+        more["start_from"] = read_table(options.start_from)
+    name, recorder = loaded.path.stem, None
     with ExitStack() as stack:
         with compiling():
             simulation = stack.enter_context(simulate(loaded, mission, seed, **more))
             interrupt = stack.enter_context(Interrupt())
-            recorder = _recorder(simulation, record, loaded, seed) if record.is_on else None
+            if not options.no_log:
+                directory = options.directory or _new_directory(name, seed)
+                recorder = record(simulation, directory, loaded, options.log_period)
             simulation.step()  # loads or compiles kernels, so it counts as preparation
         speed = Speed(began)
-        _run(simulation, loaded.path.stem, speed, pace, interrupt)
+        _play(simulation, name, speed, options.pace, interrupt)
         error = simulation.result()[0].error
         if recorder is not None:
             recorder.close(str(error) if error else "interrupted" if interrupt.code else "")
-        show_summary(simulation, loaded.path.stem, speed, recorder.directory if recorder else None)
-        if simulation.is_over and start_from is None:
-            source.ended(simulation.state_hash())
+        show_summary(simulation, name, speed, recorder.directory if recorder else None)
+        if planned is not None and simulation.is_over and options.start_from is None:
+            check_hash(planned, simulation.state_hash(), str(options.from_batch))
+            known = "the end is that of the batch: the same state hash"
+            say_note(
+                f"run {options.from_batch}: {known if planned.state_hash else 'the batch has not played it yet'}"
+            )
     if error is not None:
         raise error
     if interrupt.code:
@@ -146,7 +119,7 @@ def play(source: Game, record: Record, pace: float | None, start_from: Path | No
     return interrupt.code
 
 
-def _run(simulation: Simulation, name: str, speed: Speed, pace: float | None, interrupt: Interrupt) -> None:
+def _play(simulation: Simulation, name: str, speed: Speed, pace: float | None, interrupt: Interrupt) -> None:
     """Play to the end, or until an interrupt."""
     start = float(simulation.t[0])
     speed.begin(start)
@@ -172,15 +145,6 @@ def _wait(until: float, show: Callable[[], None], interrupt: Interrupt) -> None:
         show()
 
 
-def _recorder(simulation: Simulation, record: Record, loaded: Loaded, seed: int) -> Recorder:
-    from tussle.record import Recorder
-
-    directory = record.directory or _new_directory(loaded.path.stem, seed)
-    return Recorder(
-        simulation, directory, period=record.period, mission_text=loaded.text, parameters=loaded.settings
-    )
-
-
 def _new_directory(name: str, seed: int) -> Path:
     """Create a new directory runs/NAME-SEED-TIMESTAMP, with a number appended if it exists.
 
@@ -202,3 +166,54 @@ def _new_directory(name: str, seed: int) -> Path:
             raise RecordError(f"{path}: no run can be recorded there: {error.strerror or error}") from error
         return path
     raise AssertionError
+
+
+# -- runs of a batch --------------------------------------------------------------------------------------------------------
+
+
+def planned_by(options: RunOptions) -> PlannedRun:
+    """Return the run of a batch that `--from DIR:417` names.
+
+    Raises:
+        ParameterError: The text has another form.
+        BatchError: The batch cannot be read, or its plugin code may not run.
+    """
+    from tussle.batch.reload import planned_run
+
+    directory, colon, number = (options.from_batch or "").rpartition(":")
+    if not colon or not number.isdigit():
+        raise ParameterError(
+            f"--from {options.from_batch!r} is not allowed; it takes a batch directory and the number of a run, DIR:417"
+        )
+    return planned_run(
+        Path(directory),
+        int(number),
+        may_run=lambda code: _may_run(code, options.trust),
+        allow_large=options.allow_large,
+    )
+
+
+def _may_run(code: DirectoryCode, is_trusted: bool) -> bool:
+    """Whether plugin code of a batch directory may run: the user's own, and other code if the user says so."""
+    if code.is_own:
+        return True
+    is_asked = not is_trusted and sys.stdin.isatty() and sys.stderr.isatty()
+    if is_trusted or is_asked:
+        say_note(f"plugin code of {code.path}, which is not known to be yours, has all your rights: {code}")
+    if is_asked:
+        with suppress(typer.Abort):  # no answer
+            return typer.confirm("Run it?", err=True)
+    return is_trusted
+
+
+def check_hash(planned: PlannedRun, state_hash: str, name: str) -> None:
+    """Compare the end of a run with its end in the batch.
+
+    Raises:
+        BatchError: The state hashes differ.
+    """
+    if planned.state_hash and state_hash != planned.state_hash:
+        raise BatchError(
+            f"run {name} ended otherwise than in its batch: state hash {state_hash}, in the batch {planned.state_hash}; "
+            "the version of tussle or of a plugin differs, or a plugin is not deterministic"
+        )

@@ -3,27 +3,19 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from rich import box
-from rich.table import Table
-from rich.text import Text
+from rich.padding import Padding
 
 from tussle.cli.progress import times
+from tussle.cli.tables import fact_list, number_tables, title
 from tussle.cli.terminal import put
 from tussle.engine.result import WorldResult
 from tussle.engine.simulation import Simulation
+from tussle.event_texts import end_text
 from tussle.mission import Mission
-
-ENDS = {
-    "time": "end time reached",
-    "one_team": "one team is left",
-    "all_dead": "no entity is left",
-    "error": "a plugin failed",
-    "": "interrupted",
-}
 
 
 class Speed:
@@ -62,42 +54,49 @@ def show_summary(simulation: Simulation, name: str, speed: Speed, directory: Pat
     """Print the result of world 0 of a simulation."""
     result, mission = simulation.result()[0], simulation.mission
     n = sum(block.count for block in mission.blocks)
-    title = mission.name or name
     facts = f"seed {result.seed} · {n} entities · {result.steps} steps of {mission.dt:g} s"
+    of_world = (
+        (plugin, f"{key} {_number(value)}")
+        for plugin, named in result.metrics.items()
+        for key, value in named.items()
+        if not isinstance(value, dict)
+    )
     put(
         "",
-        Text.assemble(" ", (title, "bold"), (f"\n {facts}", "dim")),
-        teams_table(result, mission),
-        _facts(simulation, result, speed, directory),
+        title(mission.name or name, facts),
+        *team_tables(result, mission),
+        fact_list(
+            [
+                ("ended", f"{end_text(result.end)}, at t = {result.t:g} s"),
+                *of_world,
+                ("speed", str(speed)),
+                ("grade", simulation.grade),
+                ("hash", result.state_hash),
+                ("run", str(directory) if directory is not None else "not recorded (--no-log)"),
+            ]
+        ),
         "",
     )
 
 
-def teams_table(result: WorldResult, mission: Mission) -> Table:
-    """Build the table of teams: names, number of entities at start and end, metrics."""
-    columns = list(_team_columns(result))
-    table = Table(box=box.SIMPLE_HEAD, header_style="bold", pad_edge=False, padding=(0, 1))
-    table.add_column(" team", overflow="fold")
-    table.add_column("start", justify="right")
-    table.add_column("left", justify="right")
-    for _, short, _ in columns:
-        table.add_column(short, justify="right", overflow="fold")
-    if result.scores:
-        table.add_column("score", justify="right", style="bold")
-        table.add_column("")
+def team_tables(result: WorldResult, mission: Mission) -> list[Padding]:
+    """Return tables of the teams: names, number of entities at start and end, metrics, score."""
+    columns, has_scores = list(_team_columns(result)), bool(result.scores)
+    head = ["team", "start", "left", *(name for name, _ in columns), *(["score", ""] if has_scores else [])]
+    rows = []
     for team in sorted(result.alive):
         blocks = [b for b in mission.blocks if b.team == team]
         names = ", ".join(dict.fromkeys(b.name for b in blocks))
-        cells = [f" {team} {names}", str(sum(b.count for b in blocks)), str(result.alive[team])]
-        cells += [_number(values.get(team, "")) for _, _, values in columns]
-        if result.scores:
+        cells = [f"{team} {names}", str(sum(b.count for b in blocks)), str(result.alive[team])]
+        cells += [_number(values.get(team, "")) for _, values in columns]
+        if has_scores:
             cells += [_number(result.scores.get(team, 0.0)), "won" if team == result.winner else ""]
-        table.add_row(*cells, style="green" if team == result.winner else "")
-    return table
+        rows.append(("green" if team == result.winner else "", cells))
+    return number_tables(head, rows)
 
 
-def _team_columns(result: WorldResult) -> Iterable[tuple[str, str, dict[int, Any]]]:
-    """Yield plugin, column name and values of each metric per team, except for the scores, which have their own column."""
+def _team_columns(result: WorldResult) -> Iterator[tuple[str, dict[int, Any]]]:
+    """Yield column name and values of each metric per team, except for the scores, which have their own column."""
     found = [
         (plugin, name, values)
         for plugin, named in result.metrics.items()
@@ -106,24 +105,7 @@ def _team_columns(result: WorldResult) -> Iterable[tuple[str, str, dict[int, Any
     ]
     names = [name for _, name, _ in found]
     for plugin, name, values in found:
-        yield plugin, name if names.count(name) == 1 else f"{plugin}.{name}", values
-
-
-def _facts(simulation: Simulation, result: WorldResult, speed: Speed, directory: Path | None) -> Table:
-    grid = Table.grid(padding=(0, 2))
-    grid.add_column(style="dim", no_wrap=True)
-    grid.add_column(overflow="fold")
-    why = ENDS.get(result.end, result.end)
-    grid.add_row(" ended", f"{why}, at t = {result.t:g} s")
-    for plugin, named in result.metrics.items():
-        for name, value in named.items():
-            if not isinstance(value, dict):
-                grid.add_row(f" {plugin}", f"{name} {_number(value)}")
-    grid.add_row(" speed", str(speed))
-    grid.add_row(" grade", simulation.grade)
-    grid.add_row(" hash", result.state_hash)
-    grid.add_row(" run", str(directory) if directory is not None else "not recorded (--no-log)")
-    return grid
+        yield name if names.count(name) == 1 else f"{plugin}.{name}", values
 
 
 def _number(value: Any) -> str:

@@ -1,99 +1,31 @@
-"""`tussle view`: one game, played live on a page in the browser."""
+"""`tussle view` and `tussle replay`: games on a page in the browser."""
 
 from __future__ import annotations
 
+import os
+import sys
 import time
+import webbrowser
+from collections.abc import Callable
 from contextlib import ExitStack
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Any
 
-import typer
+from tussle.cli.interrupt import Interrupt
+from tussle.cli.play import record, simulate
+from tussle.cli.play_options import PageOptions, ReplayOptions, ViewOptions
+from tussle.cli.progress import compiling
+from tussle.cli.summary import Speed, show_summary
+from tussle.cli.terminal import OK, TERMINATED, err, out, say, say_error, say_note
+from tussle.view.live import Live
+from tussle.view.page.compare import Comparison
+from tussle.view.page.server import Page
+from tussle.view.recording import Recording
 
-from tussle.cli.options import (
-    Debug,
-    End,
-    Large,
-    MissionName,
-    More,
-    PluginFiles,
-    Seed,
-    Set,
-    Strict,
-    mission_source,
-)
-from tussle.cli.terminal import reported
-from tussle.cli.watching import Host, NoBrowser, Paused, Port, announce, read_pace, watch
-
-if TYPE_CHECKING:
-    from tussle.cli.play import Source
-
-LivePace = Annotated[
-    str | None,
-    typer.Option(
-        metavar="X|max",
-        help="Play X times as fast as real time, or as fast as possible; by default as the mission says, or 1.",
-        show_default=False,
-    ),
-]
-RecordDirectory = Annotated[
-    Path | None,
-    typer.Option(
-        metavar="DIR", help="Record the game into this directory, as tussle run does.", show_default=False
-    ),
-]
+NAP = 0.1  # [s] so that Ctrl-C is handled in time
 
 
-def view(
-    mission: MissionName,
-    more: More = None,
-    seed: Seed = None,
-    settings: Set = None,
-    end: End = None,
-    pace: LivePace = None,
-    paused: Paused = False,
-    record: RecordDirectory = None,
-    exit_when_over: Annotated[
-        bool, typer.Option("--exit-when-over", help="End when the game does, not only by Ctrl-C.")
-    ] = False,
-    host: Host = "127.0.0.1",
-    port: Port = None,
-    no_browser: NoBrowser = False,
-    strict: Strict = False,
-    plugin_files: PluginFiles = None,
-    allow_large: Large = False,
-    debug: Debug = False,
-) -> None:
-    """Play one game live on a page in the browser: pause it, step it, wind it back, follow who takes part."""
-    wanted = read_pace(pace, None) if pace is not None else 0.0
-    with reported(debug):
-        source = mission_source(mission, settings, more, seed, end, strict, plugin_files, allow_large)
-        code = play_live(
-            source, wanted, record, is_paused=paused, is_opened=not no_browser, ends=exit_when_over,
-            address={"host": host, "port": port},
-        )  # fmt: skip
-    raise typer.Exit(code)
-
-
-def play_live(
-    source: Source,
-    pace: float | None,
-    record: Path | None,
-    *,
-    is_paused: bool,
-    is_opened: bool,
-    ends: bool,
-    address: dict[str, Any],
-) -> int:
-    """Play a mission on a page, and show what came of it.
-
-    Args:
-        source: The mission and what is set in it.
-        pace: Simulated seconds per second; None is as fast as possible, 0 as the mission says.
-        record: Where it is recorded; None for nowhere.
-        is_paused: Wait before the first step.
-        is_opened: Open a browser.
-        ends: End when the game does.
-        address: Host and port of the page.
+def view(options: ViewOptions) -> int:
+    """Play a mission on a page, and show its result.
 
     Returns:
         The exit code.
@@ -101,51 +33,105 @@ def play_live(
     Raises:
         PluginError: A plugin failed.
     """
-    from tussle.cli.interrupt import Interrupt
-    from tussle.cli.play import simulate
-    from tussle.cli.progress import compiling
-    from tussle.cli.summary import Speed, show_summary
-    from tussle.view.live import Live
-    from tussle.view.page.server import Page
-
     began = time.perf_counter()
-    loaded, mission, seed = source.read(tells_all=False)
+    loaded, mission, seed = options.read()
     viewer = loaded.viewer
     with ExitStack() as stack:
         with compiling():
             simulation = stack.enter_context(simulate(loaded, mission, seed))
         interrupt = stack.enter_context(Interrupt())
         recorder = None
-        if record is not None:
-            from tussle.record import Recorder
-
-            # Closed last, and whatever ends the game.
-            recorder = stack.enter_context(
-                Recorder(simulation, record, mission_text=loaded.text, parameters=loaded.settings)
-            )
+        if options.record is not None:
+            # Closed last, however the game ends.
+            recorder = stack.enter_context(record(simulation, options.record, loaded))
         live = Live(
-            simulation, pace=_warp_of(viewer) if pace == 0.0 else pace, viewer=viewer,
-            is_paused=is_paused or bool(viewer.get("start_paused", False)),
-        )  # fmt: skip
+            simulation,
+            pace=_pace_of(viewer) if options.pace is None else options.speed,
+            viewer=viewer,
+            is_paused=options.paused or bool(viewer.get("start_paused", False)),
+        )
         stack.callback(live.stop)
-        page = stack.enter_context(Page(live, **address))
-        announce(page, is_opened)
+        page = stack.enter_context(Page(live, host=options.host, port=options.port))
+        announce(page, options)
         speed = Speed(began)
         speed.begin(float(simulation.t[0]))
-        code = watch(page, interrupt, lambda: ends and live.is_over)
+        code = watch(page, interrupt, lambda: options.exit_when_over and live.is_over)
         page.stop()
         live.stop()
         speed.end(float(simulation.t[0]))
         error = live.error
         if recorder is not None:
-            recorder.close(str(error) if error else "" if live.is_over else "ended by who watched")
+            recorder.close(str(error) if error else "" if live.is_over else "ended by the viewer")
         show_summary(simulation, loaded.path.stem, speed, recorder.directory if recorder else None)
     if error is not None:
         raise error
     return code
 
 
-def _warp_of(viewer: dict[str, Any]) -> float | None:
-    """The mission's `time_warp`: simulated seconds per second, None as fast as possible; real time where it says nothing."""
+def _pace_of(viewer: dict[str, Any]) -> float | None:
+    """Return the mission's `time_warp`: simulated seconds per second, None for as fast as possible; 1 if it is not given."""
     warp = viewer.get("time_warp")
     return 1.0 if warp is None else float(warp) if float(warp) > 0.0 else None
+
+
+def replay(options: ReplayOptions) -> int:
+    """Show one recorded run on a page, or compare two.
+
+    Returns:
+        The exit code.
+    """
+    runs = [
+        Recording(path, options.world, tuple(options.plugin_files), is_mapped=True)
+        for path in (options.run, options.other)
+        if path is not None
+    ]
+    game = Comparison(*runs, is_over_each_other=options.over) if len(runs) == 2 else runs[0]
+    with ExitStack() as stack:
+        interrupt = stack.enter_context(Interrupt())
+        page = stack.enter_context(
+            Page(game, host=options.host, port=options.port, warp=options.speed, is_paused=options.paused)
+        )
+        announce(page, options)
+        return watch(page, interrupt, lambda: False)
+
+
+def announce(page: Page, options: PageOptions) -> None:
+    """Print the address of the page, and open it in a browser unless that is unwanted or impossible."""
+    for note in page.notes:
+        say_note(note)
+    out().print(f"{page.game.name}: {page.url}  (Ctrl-C ends it)", soft_wrap=True)
+    if not page.is_local:
+        say(
+            "warning",
+            f"the page is served at {page.host}: whoever reaches this machine there and has the whole address can watch and"
+            " steer the game, and what they send is not encrypted",
+            "bold yellow",
+        )
+    if not options.no_browser and has_screen():
+        webbrowser.open(page.url)
+
+
+def has_screen() -> bool:
+    """Whether a browser can be opened: on Linux without a display, only the one that the user names in BROWSER."""
+    names = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")
+    return not sys.platform.startswith("linux") or any(os.environ.get(name) for name in names)
+
+
+def watch(page: Page, interrupt: Interrupt, is_done: Callable[[], bool]) -> int:
+    """Wait until Ctrl-C, or until the game is done. Errors of the page are printed and end nothing.
+
+    Returns:
+        The exit code. Ctrl-C is the usual end and therefore a success.
+    """
+    reported: BaseException | None = None
+    n_reported = 0
+    while not interrupt.code and not is_done():
+        for text in page.errors[n_reported:]:
+            n_reported += 1
+            say_error(text)
+        if page.game_error is not None and page.game_error is not reported:
+            reported = page.game_error
+            say_error(str(reported))
+            err().print("The page can rewind the game to the steps before the error. Ctrl-C ends it.")
+        time.sleep(NAP)
+    return TERMINATED if interrupt.code == TERMINATED else OK

@@ -223,7 +223,7 @@ def test_stopped_by_signals(folder):
         )  # as a terminal and a batch system do; the second ends the processes that play
         found, out, err = end(process)
         assert (found, out) == (code, "")
-        assert err == "interrupted: finished runs are kept in out; the same command goes on\n"
+        assert err == "interrupted: finished runs are kept in out; the same command continues\n"
         assert all_gone(process.pid)
         n, before = n_finished(folder), n
         assert n > before

@@ -64,7 +64,7 @@ OPTIONS = {
     "batch --seed": ("batch", "game.xml", *ONCE, "--seed"),
     "--until": ("batch", "game.xml", *ONCE, "--until"),
     "--stack": ("batch", "game.xml", *ONCE, "--stack"),
-    "--log": ("batch", "game.xml", *ONCE, "--log"),
+    "--record-runs": ("batch", "game.xml", *ONCE, "--record-runs"),
     "--run-timeout": ("batch", "game.xml", *ONCE, "--scheduler", "none", "--run-timeout"),
     "export --period": ("export", "played", "--html", "--period"),
     "--at": ("export", "played", *SMALL, "--png", "--at"),

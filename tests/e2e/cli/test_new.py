@@ -44,7 +44,7 @@ def test_every_plugin_that_ships_can_be_begun_with(tmp_path):
         cls = stock.load(name)
         if cls.kind not in KINDS:
             continue
-        written = list(write_plugin(cls.kind, f"My{name}", name, tmp_path).files)
+        written = list(write_plugin(cls.kind, f"My{name}", name, tmp_path)[0])
         copy = load_plugin_file(written[0])[f"My{name}"]
         assert list(copy.params()) == list(cls.params())
         assert copy.__doc__ == re.sub(rf"\b{name}\b", f"My{name}", cls.__doc__)

@@ -71,7 +71,7 @@ def test_faster_hunters_catch_more_and_the_best_can_be_played_again(process, tus
     first = done.stdout.splitlines()[6].split()
     assert first[:2] == [str(best["trial"]), str(best["hunters.Predator.max_speed"])]
     assert row(done, "study") == f"optimizations/{path.name}"
-    assert row(done, "course").endswith(f"(trial {best['trial']})")
+    assert row(done, "improved").endswith(f"(trial {best['trial']})")
     command = shlex.split(command_of(done))
     assert command[0] == "tussle"
     assert command[command.index("--seed") + 1] == "7"
@@ -117,7 +117,7 @@ def test_ctrl_c_keeps_whole_rounds(tussle, folder, number, code):
     assert process.returncode == code
     n = pq.read_table(folder / "out" / "trials.parquet").num_rows
     assert n % 2 == 0
-    assert f"interrupted: {n} trials are kept in out; the same command goes on" in err
+    assert f"interrupted: {n} trials are kept in out; the same command continues" in err
     assert out == ""
     done = tussle(*SMALL, "--trials", str(n + 2), "--out", "out")
     assert f"note: {n} of {n + 2} trials were there already" in done.stderr
@@ -139,8 +139,8 @@ def test_noise_is_told(tussle):
     done = tussle(
         "optimize", "game.xml", "--objective", "t", "--vary", "n=5:9:int", "-n", "2", "--trials", "6"
     )
-    assert row(done, "lead") == "0 over the next best, seed by seed: within noise"
-    assert "note: the best and the next best cannot be told apart by these games" in done.stderr
+    assert row(done, "lead") == "0 over the next best, paired by seed: within noise"
+    assert "note: these games do not show a difference of the best and the next best" in done.stderr
     assert "6 trials of" in done.stdout
 
 

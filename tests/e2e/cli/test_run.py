@@ -38,7 +38,7 @@ def test_it_shows_what_came_of_the_game_and_where_it_is_recorded(process, folder
     assert " seed 7 · 12 entities · 30 steps of 0.1 s" in lines
     scores = info["worlds"][0]["scores"]
     for team, name, start in (("1", "prey", "10"), ("2", "hunters", "2")):
-        (line,) = (line.split() for line in lines if line.startswith(f"  {team} {name}"))
+        (line,) = (line.split() for line in lines if line.startswith(f" {team} {name}"))
         assert line[2:4] == [start, str(info["worlds"][0]["alive"][team])]
         assert line[6] == f"{scores[team]:g}"
     for label in (" ended  end time reached, at t = 3 s", " grade  portable", f" run    runs/{run.name}"):

@@ -198,7 +198,7 @@ def test_what_a_directory_cannot_grant_is_granted_on_the_command_line(here):
         *PLUGINS,
         "--allow-large",
     )
-    assert here(*command, "--log", "1")[0] == 0
+    assert here(*command, "--record-runs", "1")[0] == 0
     assert here("run", "--from", "large:1", "--no-log")[0] == 4
     assert here("run", "--from", "large:1", "--no-log", "--allow-large")[0] == 0
 
@@ -230,7 +230,7 @@ def test_a_batch_that_is_gone_on_with_runs_the_users_files_and_not_those_of_the_
     """The directory holds a batch of the same fingerprint, but other code."""
     COPY.write_text(evil(ran))
     assert here(*BATCH)[0] == 0
-    code, err = here(*BATCH, "--log", "1")
+    code, err = here(*BATCH, "--record-runs", "1")
     assert code == 4
     assert "not known to be yours" in err
     assert here(*AGAIN)[0] == 4

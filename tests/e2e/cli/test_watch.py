@@ -142,7 +142,7 @@ def test_a_run_is_replayed_and_two_are_compared(tussle, watching):
         (("view", "nosuch.xml"), 1, "nosuch.xml"),
         (("view", "game.xml", "--host", "192.0.2.1"), 1, "cannot be served at 192.0.2.1"),
         (("replay", "nowhere"), 4, "nowhere"),
-        (("replay", "nowhere", "--over"), 2, "there is only one"),
+        (("replay", "nowhere", "--over"), 2, "a second run is required"),
     ],
 )
 def test_what_cannot_be_watched_is_told(tussle, arguments, code, told):

@@ -125,7 +125,7 @@ def plots(path: Path, out: Path) -> None:
 
 
 def replayed(path: Path, _: Path) -> None:
-    with mock.patch("tussle.cli.replay.watch", return_value=0):
+    with mock.patch("tussle.cli.view.watch", return_value=0):
         cli("replay", path, "--no-browser", "--paused")
 
 
@@ -181,7 +181,7 @@ def resumed(path: Path, _: Path) -> None:
 
 
 def logged(path: Path, _: Path) -> None:
-    cli(*BATCH, "--out", path, "--log", "0,3")
+    cli(*BATCH, "--out", path, "--record-runs", "0,3")
 
 
 def search(path: Path, _: Path) -> None:

@@ -9,7 +9,7 @@ import pytest
 from tussle import Block, Mission, Simulation
 from tussle.batch import Batch
 from tussle.batch.sweep_file import read_sweep
-from tussle.cli.settings import read_settings
+from tussle.cli.options import read_settings
 from tussle.errors import MissionError, ParameterError, TussleError
 from tussle.mission import read_mission
 from tussle.mission.paths import with_value

@@ -11,6 +11,7 @@ from mcap.reader import make_reader
 from recorded_games import hunt, record
 
 from tussle.errors import MissingExtraError, ParameterError, ViewError
+from tussle.event_texts import event_text
 from tussle.geodesy import Origin
 from tussle.scene import Cuboid
 from tussle.view import MODELS, Recording
@@ -177,10 +178,10 @@ def test_events_are_all_told_in_words(opened, hunted):
     assert levels == {"birth": 1, "death": 2, "capture": 3, "end": 2}
     words = [m["message"] for _, m in told]
     death = next(h for h in hunted.events if h.kind == "death")
-    prey = next(w for w in words if w.endswith("is born") and w.split("/")[1].startswith(f"{death.id} "))
-    assert f"{prey.split(' ')[0]} is gone: captured by hunters/{death.other}" in words
-    assert any(w.startswith(f"hunters/{death.other} captures {prey.split(' ')[0]}") for w in words)
-    assert words[-1] == f"end: {hunted.events[-1].text}"
+    prey = next(w for w in words if w.endswith("was born") and w.split("/")[1].startswith(f"{death.id} "))
+    assert f"{prey.split(' ')[0]} died: captured (hunters/{death.other})" in words
+    assert any(w.startswith(f"hunters/{death.other} captured {prey.split(' ')[0]}") for w in words)
+    assert words[-1] == event_text("end", text=hunted.events[-1].text)
 
 
 def test_teams_are_counted(opened, hunted):

@@ -108,7 +108,7 @@ def _page(data: ReportData, sections: Sequence[Section], pictures: dict[str, Pic
             f"the report needs jinja2, which cannot be imported ({error}); pip install 'tussle[batch]' brings it"
         ) from None
     from tussle.batch.report.drawing import printable
-    from tussle.batch.report.sections import answer, headline, notes
+    from tussle.batch.report.sections import answer, notes
 
     folder, results = files("tussle.batch.report"), data.results
     environment = jinja2.Environment(
@@ -121,7 +121,6 @@ def _page(data: ReportData, sections: Sequence[Section], pictures: dict[str, Pic
         style=folder.joinpath("page.css").read_text(encoding="utf-8"),
         answer=answer(data),
         notes=notes(data),
-        headline=headline(data),
         sections=sections,
         pictures=pictures,
     )

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import io
 import re
-import unicodedata
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING, Any
+
+from rich.cells import cell_len
 
 from tussle.errors import MissingExtraError, visible
 from tussle.palette import GRID, INK, MUTED, PAPER
@@ -144,7 +145,7 @@ def legend_above(figure: Figure, handles: Sequence[tuple[Any, str]]) -> None:
         return
     names = [shortened(name, 40) for _, name in handles]
     room = 56  # letters beside each other, of which each entry's sign takes 5
-    n_columns = max(1, min(len(names), room // (max(map(_width, names)) + 5)))
+    n_columns = max(1, min(len(names), room // (max(map(cell_len, names)) + 5)))
     n_rows = -(-len(names) // n_columns)
     figure.set_figheight(figure.get_figheight() + 0.17 * (n_rows - 1))
     figure.legend(
@@ -160,19 +161,14 @@ def printable(text: str) -> str:
 def shortened(text: str, most: int = 24) -> str:
     """A name that fits beside a plot, with the room of so many letters; of a longer one, its middle is left out."""
     text = printable(text)
-    if _width(text) <= most:
+    if cell_len(text) <= most:
         return text
     head, tail = "", ""
-    while _width(head) < (most - 1) * 2 // 3:
+    while cell_len(head) < (most - 1) * 2 // 3:
         head += text[len(head)]
-    while _width(tail) < most - 1 - _width(head):
+    while cell_len(tail) < most - 1 - cell_len(head):
         tail = text[-1 - len(tail)] + tail
     return f"{head}…{tail}"
-
-
-def _width(text: str) -> int:
-    """Room that a text takes, in letters of usual width."""
-    return sum(2 if unicodedata.east_asian_width(c) in "WF" else 1 for c in text)
 
 
 def pictured(figure: Figure, name: str, title: str) -> Picture:

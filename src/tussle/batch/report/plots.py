@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tussle.batch.report.drawing import blank, legend_above, rule_x, rule_y, shortened
-from tussle.batch.report.formatting import estimate, percent, signed
+from tussle.batch.report.formatting import estimate, percent
 from tussle.batch.report.report_data import Axis
+from tussle.event_texts import end_text
 from tussle.palette import INK, MUTED, NEUTRAL, PAPER, SEQUENTIAL, mixed
 
 if TYPE_CHECKING:
@@ -24,8 +25,7 @@ if TYPE_CHECKING:
 MOST_TICKS = 8
 """Values that are all written at an axis."""
 END_COLOURS = dict(zip(("time", "one_team", "all_dead"), NEUTRAL, strict=True))
-END_TEXTS = {"time": "end time reached", "one_team": "one team left", "all_dead": "nobody left"}
-"""Ways in which games end."""
+"""Colours of the reasons for which games end."""
 Limits = tuple[float, float] | None
 """Ends of an axis of values; None for those that fit the values."""
 
@@ -84,7 +84,10 @@ def share_bars(shares: Sequence[Share], colours: Sequence[str]) -> Figure:
 def distributions(
     values: Sequence[np.ndarray], names: Sequence[str], colours: Sequence[str], label: str
 ) -> Figure:
-    """Histograms one below the other on one axis, with the mean as a dot and the middle half of the games as a line."""
+    """Histograms one below the other on one axis, with the mean as a dot and the middle half of the games as a line.
+
+    Where values have both signs, as differences have, a line marks 0.
+    """
     figure, axes = blank(0.5 + 0.72 * len(values), len(values), sharex=True, gridspec_kw={"hspace": 0.05})
     edges = edges_for(np.concatenate(values))
     tallest = max(np.histogram(v, edges)[0].max() for v in values)
@@ -105,40 +108,11 @@ def distributions(
             transform=plot.transAxes,
             fontsize=8,
         )
+        if edges[0] < 0.0 < edges[-1]:
+            plot.axvline(0.0, color=MUTED, linewidth=0.8)
         rule_x(plot)
     axes[-1, 0].set_xlim(edges[0], edges[-1])
     axes[-1, 0].set_xlabel(label)
-    return figure
-
-
-def margins(values: np.ndarray, first: tuple[str, str], second: tuple[str, str], label: str) -> Figure:
-    """Histogram of a difference, its two sides in the colours of the team that is ahead.
-
-    Args:
-        values: Second minus first, (n,).
-        first: Name and colour of the team that leads where the difference is negative.
-        second: Name and colour of the other.
-        label: Of the axis.
-    """
-    figure, ((plot,),) = blank(2.5)
-    edges = edges_for(values)
-    width = edges[1] - edges[0]
-    if width % 2.0 == 0.0:
-        width += 1.0  # of whole numbers, the bin about 0 takes as many from both sides
-    steps = np.arange(math.floor(edges[0] / width), math.ceil(edges[-1] / width) + 2)
-    counts, edges = np.histogram(values, (steps - 0.5) * width)
-    colours = np.select([steps[:-1] < 0, steps[:-1] > 0], [first[1], second[1]], END_COLOURS["time"])
-    plot.bar(steps[:-1] * width, counts, width=width, color=list(colours), edgecolor=PAPER, linewidth=0.3)
-    plot.axvline(values.mean(), color=INK, linewidth=1.0)
-    plot.set_ylabel("games")
-    plot.set_xlabel(label)
-    for x, side, (name, colour), text in (
-        (0.0, "left", first, "◂ {} ahead"),
-        (1.0, "right", second, "{} ahead ▸"),
-    ):
-        where = {"ha": side, "va": "bottom", "transform": plot.transAxes}
-        plot.text(x, 1.03, text.format(shortened(name, 16)), color=colour, **where)
-    rule_y(plot)
     return figure
 
 
@@ -153,7 +127,7 @@ def lengths(ends: Mapping[str, np.ndarray]) -> Figure:
     colours = [END_COLOURS.get(end, MUTED) for end in ends]
     *_, patches = plot.hist(list(ends.values()), edges, stacked=True, histtype="stepfilled", color=colours)
     shown = patches if len(ends) > 1 else [patches]
-    names = (f"{END_TEXTS.get(end, end)} ({len(t):,})" for end, t in ends.items())
+    names = (f"{end_text(end)} ({len(t):,})" for end, t in ends.items())
     legend_above(figure, [(patch[0], name) for patch, name in zip(shown, names, strict=True)])
     plot.set_xlabel("length of the game [s]")
     plot.set_ylabel("games")
@@ -235,15 +209,13 @@ def along(
 
 def in_rows(
     names: Sequence[str], series: Sequence[Series], label: str, *,
-    is_share: bool = False, is_difference: bool = False, limits: Limits = None,
+    is_share: bool = False, limits: Limits = None,
 ) -> Figure:  # fmt: skip
-    """Means in rows that have names, with their intervals; differences with a line at 0."""
+    """Means in rows that have names, with their intervals."""
     figure, ((plot,),) = blank(0.75 + len(names) * (0.15 + 0.15 * len(series)))
-    if is_difference:
-        plot.axvline(0.0, color=MUTED, linewidth=0.8)
     _rows_of_marks(figure, plot, series, len(names))
     _name_rows(plot, names)
-    _value_axis(plot.xaxis, label, is_share=is_share, is_difference=is_difference)
+    _value_axis(plot.xaxis, label, is_share=is_share)
     if limits is not None:
         plot.set_xlim(*limits)
     return figure
@@ -316,8 +288,6 @@ def heat_map(
     plot.spines[:].set_visible(False)
     _map_ticks(plot, across, "x")
     _map_ticks(plot, up, "y")
-    if value.size <= 64 and across.texts and up.texts:
-        _write_cells(plot, value, mesh, is_share=is_share, is_difference=bool(ends))
     bar = figure.colorbar(mesh, ax=plot, aspect=28, pad=0.02, label=label)
     bar.outline.set_visible(False)
     if bar.solids is not None:
@@ -360,11 +330,9 @@ def _name_rows(plot: Axes, names: Sequence[str]) -> None:
     rule_x(plot)
 
 
-def _value_axis(axis: Any, label: str, *, is_share: bool, is_difference: bool = False) -> None:
+def _value_axis(axis: Any, label: str, *, is_share: bool) -> None:
     axis.set_label_text(label)
-    if is_share and is_difference:
-        axis.set_major_formatter(lambda v, _: signed(f"{round(100.0 * v, 6):g}".replace("-", "−")))
-    elif is_share:
+    if is_share:
         axis.set_major_formatter(lambda v, _: percent(v, 0))
 
 
@@ -390,17 +358,3 @@ def _make_log(plot: Axes, which: str) -> None:
     axis.set_major_locator(LogLocator(subs=(1.0,) if high > 30.0 * low else (1.0, 2.0, 5.0), numticks=8))
     axis.set_major_formatter(lambda v, _: f"{v:g}")
     axis.set_minor_formatter(NullFormatter())
-
-
-def _write_cells(plot: Axes, values: np.ndarray, mesh: Any, *, is_share: bool, is_difference: bool) -> None:
-    """The value in each cell, all with the decimals with which the largest shows three digits; shares in whole percent."""
-    largest = float(np.nanmax(np.abs(values)))
-    digits = 0 if is_share or largest == 0.0 else max(0, 2 - math.floor(math.log10(largest)))
-    for (row, column), value in np.ndenumerate(values):
-        if np.isfinite(value):
-            red, green, blue, _ = mesh.to_rgba(value)
-            is_dark = 0.299 * red + 0.587 * green + 0.114 * blue < 0.55
-            number = round(value * (100.0 if is_share else 1.0), digits) + 0.0
-            text = f"{number:{'+' if is_difference else ''},.{digits}f}".replace("-", "−")
-            colour = "#ffffff" if is_dark else "#111111"
-            plot.text(column, row, text, ha="center", va="center", fontsize=7.5, color=colour)

@@ -26,6 +26,7 @@ from tussle.batch.report.report_data import Measure, ReportData, axis_of, varies
 from tussle.batch.selection import written
 from tussle.batch.statistics import BLOCKS_FROM
 from tussle.batch.variables import Range
+from tussle.event_texts import END_TEXTS, end_text
 from tussle.palette import PAPER, colour_of, mixed
 
 if TYPE_CHECKING:
@@ -66,7 +67,7 @@ class Plot:
 
 
 @dataclass(frozen=True)
-class Table:
+class ReportTable:
     """A table with its text.
 
     Args:
@@ -99,7 +100,7 @@ class Section:
     title: str
     lead: Sequence[str] = ()
     plots: Sequence[Plot] = ()
-    tables: Sequence[Table] = ()
+    tables: Sequence[ReportTable] = ()
     facts: Sequence[tuple[str, str]] = ()
 
     @property
@@ -132,21 +133,11 @@ def won(data: ReportData) -> Section:
     )
     found = [Plot("wins", "Games won", caption, lambda: plots.share_bars(shares, colours))]
     if len(data.wins) >= 2:
-        found.append(_margin(data))
+        first, second = data.rivals[:2]
+        label = f"score of {data.name_of(first)} minus score of {data.name_of(second)}"
+        lead = Measure(f"score[{first}]-score[{second}]", "", None, label)
+        found.append(_distribution(data, [lead], "margin"))
     return Section("won", "Who won", plots=found)
-
-
-def _margin(data: ReportData) -> Plot:
-    """By how much the team with most wins was ahead of the next."""
-    ahead, behind = data.rivals[:2]
-    values = data.known(f"score[{ahead}]-score[{behind}]")
-    first, second = ((data.name_of(t), colour_of(t)) for t in (behind, ahead))
-    return Plot(
-        "margin",
-        f"Score of {second[0]} minus score of {first[0]}",
-        f"Height: number of games. Line: the mean, {estimate(values.mean())}. Grey: about equal, ties among them.{_outside(values)}",
-        lambda: plots.margins(values, first, second, "difference of the scores"),
-    )
 
 
 def _outside(values: np.ndarray) -> str:
@@ -171,12 +162,12 @@ def scores(data: ReportData) -> Section:
     return Section("scores", title, plots=found, tables=[means] if means.rows else [])
 
 
-def _distribution(data: ReportData, measures: Sequence[Measure]) -> Plot:
+def _distribution(data: ReportData, measures: Sequence[Measure], name: str = "") -> Plot:
     has_teams, label = measures[0].team is not None, measures[0].label
     values = [data.known(m.expression) for m in measures]
     names, colours = [m.name if has_teams else "" for m in measures], [m.colour for m in measures]
     return Plot(
-        "scores" if has_teams else f"distribution-{file_name(measures[0].expression)}",
+        name or ("scores" if has_teams else f"distribution-{file_name(measures[0].expression)}"),
         "Distribution of the scores" if has_teams and data.rivals else capital(label),
         "Height: number of games, on one scale. Dot: mean. Line: the middle half of the games."
         + _outside(np.concatenate(values)),
@@ -184,7 +175,7 @@ def _distribution(data: ReportData, measures: Sequence[Measure]) -> Plot:
     )
 
 
-def _means(data: ReportData) -> Table:
+def _means(data: ReportData) -> ReportTable:
     """Means of all quantities that vary."""
     results = data.results
 
@@ -213,7 +204,7 @@ def _means(data: ReportData) -> Table:
     caption = "The interval is that of the mean. 5 %, median and 95 % are quantiles of the games. Constant quantities are left out."
     if len(names) > MOST_MEANS:
         caption += f" {len(names) - MOST_MEANS} more quantities are in the tables of the batch."
-    return Table("All quantities", columns, rows, caption)
+    return ReportTable("All quantities", columns, rows, caption)
 
 
 # -- the games --------------------------------------------------------------------------------------------------------------
@@ -271,14 +262,12 @@ def ended(data: ReportData) -> Section:
     """When and why games ended."""
     runs, title = data.results.runs, "How the games ended"
     reason, t = np.array(runs["end"].to_pylist()), np.asarray(runs["t"].to_numpy())
-    known = [*plots.END_TEXTS, *sorted({*reason} - {*plots.END_TEXTS, "error"})]
+    known = [end for end in dict.fromkeys([*END_TEXTS, *sorted({*reason})]) if end != "error"]
     ends = {str(end): t[reason == end] for end in known if np.any(reason == end)}
     if not ends:
         return Section("ended", title)
     every = np.concatenate(list(ends.values()))
-    why = "; ".join(
-        f"{plots.END_TEXTS.get(end, end)}: {count(len(times), 'game')}" for end, times in ends.items()
-    )
+    why = "; ".join(f"{end_text(end)}: {count(len(times), 'game')}" for end, times in ends.items())
     if not varies(every):
         return Section("ended", title, lead=[f"Length of every game: {number(every[0])} s. {capital(why)}."])
     caption = f"Height: number of games. Mean {estimate(every.mean())} s, median {number(float(np.median(every)))} s. {capital(why)}."
@@ -299,7 +288,7 @@ def look_at(data: ReportData) -> Section:
         columns: Sequence[tuple[str, str]],
         cells: Any,
         caption: str,
-    ) -> Table:
+    ) -> ReportTable:
         values = [("values", "text")] if data.has_points else []
         replay = [("play it again", "code")] if folder is not None else []
         body = [
@@ -309,7 +298,7 @@ def look_at(data: ReportData) -> Section:
             )
             for row in rows
         ]  # fmt: skip
-        return Table(title, [*numbers("run", "seed"), *values, *columns, *replay], body, caption)
+        return ReportTable(title, [*numbers("run", "seed"), *values, *columns, *replay], body, caption)
 
     tables = []
     if n := results.n_failed:
@@ -346,7 +335,9 @@ def making(data: ReportData) -> Section:
     rows = [(v.name, _values_of(v)) for v in results.variables]
     caption = f"{count(len(data.points), 'point')}: {METHODS[data.method]}"
     caption += f", drawn with seed {info.get('sample_seed', 0)}." if data.is_drawn else "."
-    tables = [Table("What varied", [("name", "code"), ("values", "text")], rows, caption)] if rows else []
+    tables = (
+        [ReportTable("What varied", [("name", "code"), ("values", "text")], rows, caption)] if rows else []
+    )
     return Section("making", "How this was made", tables=tables, facts=facts)
 
 
@@ -363,7 +354,8 @@ def _facts(info: dict[str, Any]) -> Iterator[tuple[str, str]]:
     yield "seeds", seeds if int(info["n_points"]) == 1 else f"{seeds}, {sharing}"
     yield "played until", str(info.get("until") or "")
     yield "played", str(timings.get("began") or "").replace("T", " ").replace("+00:00", " UTC")
-    yield "took", seconds(float(timings["wall_s"])) if timings.get("wall_s") else ""
+    took = [seconds(float(timings[key])) for key in ("wall_s", "cpu_s") if timings.get(key)]
+    yield "took", " and ".join(took) + (" of CPU time" if len(took) == 2 else "")
     yield "versions", ", ".join(f"{name} {version}" for name, version in (info.get("versions") or {}).items())
     yield "fingerprint", str(info.get("fingerprint") or "")
 
@@ -459,12 +451,3 @@ def notes(data: ReportData) -> list[str]:
             f"The batch ended by its rule: {stopped}. An interval that made the batch stop is no test."
         )
     return found
-
-
-def headline(data: ReportData) -> list[tuple[str, str]]:
-    """The few numbers under the answer."""
-    found = [("games", count(data.results.n_runs))]
-    if data.has_points:
-        found += [("points", count(len(data.points))), ("variables", count(len(data.variables)))]
-    cpu = np.asarray(data.results.runs["cpu_s"].to_numpy(zero_copy_only=False), dtype=float)
-    return [*found, ("teams", count(len(data.results.teams))), ("CPU time", seconds(float(np.nansum(cpu))))]

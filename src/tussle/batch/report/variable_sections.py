@@ -23,10 +23,10 @@ from tussle.batch.report.formatting import (
     signed,
 )
 from tussle.batch.report.report_data import FEWEST_SEEDS, MOST_VARIABLES, Axis, Measure, ReportData, axis_of
-from tussle.batch.report.sections import Plot, Section, Table, numbers
+from tussle.batch.report.sections import Plot, ReportTable, Section, numbers
 from tussle.batch.selection import written
 from tussle.batch.sensitivity import Effect
-from tussle.batch.statistics import Comparison
+from tussle.batch.statistics import PairedComparison
 from tussle.batch.variables import Range
 from tussle.errors import ParameterError
 
@@ -218,18 +218,17 @@ def _strength(effect: Effect) -> float | None:
 
 def differences(data: ReportData) -> Section:
     """What another choice changes, seed by seed."""
-    found, rows, lead = list[Plot](), list[list[str]](), []
+    rows, lead = list[list[str]](), []
     for variable in data.variables:
         axis = axis_of(variable, data.points)
         if isinstance(variable, Range) or axis.n_places > (MOST_NUMBERS if axis.is_number else MOST_PLACES):
             continue
         try:
-            compared = [(stem, ms, [_compared(data, axis, m) for m in ms]) for stem, ms in data.groups]
+            compared = [(ms, [_compared(data, axis, m) for m in ms]) for _, ms in data.groups]
         except ParameterError as error:
             lead.append(f"The values of {variable.name} are not compared: {sentence(str(error))}")
             continue
-        for stem, measures, lines in compared:
-            found.append(_difference(axis, stem, measures, lines))
+        for measures, lines in compared:
             for pairs in zip(*lines, strict=True):
                 rows += [_difference_cells(data, m, c) for m, c in zip(measures, pairs, strict=True)]
     columns = numbers(
@@ -242,11 +241,11 @@ def differences(data: ReportData) -> Section:
         f"{paired} more / less / equal: number of pairs. p: exact sign test, each by itself; of twenty such numbers one is below 0.05 by"
         " chance."
     )
-    table = Table("In numbers", [("quantity", "text"), ("change", "text"), *columns], rows, caption)
-    return Section("differences", "Paired differences", lead, found, [table] if rows else [])
+    table = ReportTable("", [("quantity", "text"), ("change", "text"), *columns], rows, caption)
+    return Section("differences", "Paired differences", lead, tables=[table] if rows else [])
 
 
-def _compared(data: ReportData, axis: Axis, measure: Measure) -> list[Comparison]:
+def _compared(data: ReportData, axis: Axis, measure: Measure) -> list[PairedComparison]:
     """Each further value with the first one.
 
     Raises:
@@ -260,24 +259,7 @@ def _compared(data: ReportData, axis: Axis, measure: Measure) -> list[Comparison
     return [data.results.compare(measure.expression, sides[0], side) for side in sides[1:]]
 
 
-def _difference(
-    axis: Axis, stem: str, measures: Sequence[Measure], lines: Sequence[Sequence[Comparison]]
-) -> Plot:
-    is_share, label, first = measures[0].is_share, measures[0].label, axis.texts[0]
-    series = [
-        plots.series_of(m.name, m.colour, m.marker, [(c.difference, c.low, c.high) for c in line])
-        for m, line in zip(measures, lines, strict=True)
-    ]
-    unit = "percentage points of the games won" if is_share else f"change of {label}"
-    return Plot(
-        f"{stem}-change-by-{file_name(axis.variable.name)}",
-        f"{capital(label)}: change against {axis.variable.name}={first}",
-        f"Mean difference of the pairs, with its 95 % interval. Right of 0: more than with {first}.",
-        lambda: plots.in_rows(axis.texts[1:], series, unit, is_share=is_share, is_difference=True),
-    )
-
-
-def _difference_cells(data: ReportData, measure: Measure, c: Comparison) -> list[str]:
+def _difference_cells(data: ReportData, measure: Measure, c: PairedComparison) -> list[str]:
     scale, unit = (100.0, "\u00a0pp") if measure.is_share else (1.0, "")
     shown = percent if measure.is_share else estimate
     return [
@@ -315,4 +297,4 @@ def points(data: ReportData) -> Section:
         ("values", "text"),
         *numbers("games", *(data.title(m.expression) for m in data.measures)),
     ]
-    return Section("points", "Point by point", tables=[Table("", heads, rows, caption)])
+    return Section("points", "Point by point", tables=[ReportTable("", heads, rows, caption)])

@@ -14,7 +14,7 @@ import pyarrow as pa
 from tussle.batch.points import settings_of
 from tussle.batch.search.proposals import importances
 from tussle.batch.search.trials import Trial, trials_table
-from tussle.batch.statistics import Comparison, paired_difference
+from tussle.batch.statistics import PairedComparison, paired_difference
 from tussle.batch.variables import Value, Variable
 from tussle.mission.codecs import written
 
@@ -63,7 +63,7 @@ class Study:
         return best_of(self.trials, self.is_minimized)
 
     @cached_property
-    def lead(self) -> Comparison | None:
+    def lead(self) -> PairedComparison | None:
         """The best trial minus the next one, seed by seed; None for less than two trials of different values.
 
         Where its interval holds zero, the two cannot be told apart. Both were picked for their objectives on these very seeds, so

@@ -5,14 +5,19 @@ from __future__ import annotations
 import keyword
 import re
 import shlex
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from rich.text import Text
+
 from tussle import stock
 from tussle.api import Plugin
+from tussle.cli.play_options import NewOptions
+from tussle.cli.progress import compiling
 from tussle.cli.scaffold.copied import class_renamed, merged
 from tussle.cli.scaffold.played import mission_text
+from tussle.cli.tables import fact_list, indented
+from tussle.cli.terminal import put
 from tussle.errors import MissionError, ParameterError, listed, nearest_name
 
 TEMPLATES = Path(__file__).parent / "templates"
@@ -44,20 +49,19 @@ def test_mission_reaches_its_end_time():
 '''
 
 
-@dataclass(frozen=True)
-class Written:
-    """The written files.
-
-    Attributes:
-        files: Description of each file, by path.
-        next_steps: Commands to try next.
-    """
-
-    files: dict[Path, str]
-    next_steps: str
+def new(options: NewOptions) -> None:
+    """Write the files, and print their names and commands to try next."""
+    with compiling():
+        files, next_steps = write_plugin(
+            options.kind, options.name, options.origin, options.directory, options.easy
+        )
+    put(fact_list((str(path), what) for path, what in files.items()))
+    put(indented(Text(next_steps, "bold")), "")
 
 
-def write_plugin(kind: str, name: str, origin: str | None, directory: Path, is_easy: bool = False) -> Written:
+def write_plugin(
+    kind: str, name: str, origin: str | None, directory: Path, is_easy: bool = False
+) -> tuple[dict[Path, str], str]:
     """Write NAME.py, test_NAME.py and NAME.xml.
 
     Args:
@@ -66,6 +70,9 @@ def write_plugin(kind: str, name: str, origin: str | None, directory: Path, is_e
         origin: Stock plugin to copy, or None to use the template.
         directory: Directory for the files, created if necessary.
         is_easy: Use the easy mode: code for one entity or one world at a time.
+
+    Returns:
+        Description of each file by its path, and commands to try next.
 
     Raises:
         ParameterError: The kind or the plugin to copy is unknown, the name is no class name, or the kind has no easy mode.
@@ -91,7 +98,7 @@ def write_plugin(kind: str, name: str, origin: str | None, directory: Path, is_e
         ["pytest", str(directory / f"test_{module}.py")],
     )
     steps = "\n".join(shlex.join(command) for command in commands)
-    return Written({path: what for path, (_, what) in texts.items()}, steps)
+    return {path: what for path, (_, what) in texts.items()}, steps
 
 
 def _check_names(kind: str, name: str) -> None:

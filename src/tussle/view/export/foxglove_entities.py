@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from tussle.event_texts import event_text
 from tussle.view.export import foxglove_schemas as schemas
 from tussle.view.export.foxglove_scene import Json, entity, stamp, text, triangles
-from tussle.view.frame import Event, Frame
+from tussle.view.frame import Frame
 from tussle.view.recording import Recording
 from tussle.view.shapes import MODELS
 from tussle.view.style import Colour
@@ -110,7 +111,7 @@ class Log:
             line = {
                 "timestamp": stamp(self._ns(event.t)),
                 "level": LEVELS.get(event.kind, schemas.INFO),
-                "message": self._words(event),
+                "message": event_text(event.kind, self._name(event.id), self._name(event.other), event.text),
                 "name": event.kind,
                 "file": "",
                 "line": 0,
@@ -118,17 +119,6 @@ class Log:
             self._put("/events", event.t, line)
 
     def _name(self, who: int) -> str:
+        if not who:
+            return ""
         return f"{self._blocks[who]}/{who}" if who in self._blocks else self._entities.name(who)
-
-    def _words(self, event: Event) -> str:
-        one = self._name(event.id)
-        if event.kind == "birth":
-            return f"{one} is born"
-        if event.kind == "capture":
-            return f"{one} captures {self._name(event.other)}"
-        if event.kind == "collision":
-            return f"{one} meets {self._name(event.other) if event.other else event.text}"
-        if event.kind == "death":
-            by = f" by {self._name(event.other)}" if event.other else ""
-            return f"{one} is gone: {event.text}{by}"
-        return f"{event.kind}: {event.text}"

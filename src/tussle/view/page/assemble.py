@@ -15,6 +15,7 @@ from tussle.view.page.recorded import compact_json
 
 MODULES = (
     *(
+        "event_texts.js",
         "formatting.js",
         "geometry.js",
         "packing.js",

@@ -1,6 +1,6 @@
 // Events: marks on the time line, what they say, and the last ones in a corner.
 
-import { element, told } from './formatting.js';
+import { element, eventText } from './formatting.js';
 import { between } from './geometry.js';
 import { lastNotAfter } from './layer.js';
 
@@ -122,7 +122,7 @@ export class EventLine {
     const line = element(tag);
     const shape = element('i', `is-${happened.kind}`);
     shape.style.setProperty('--kind', KINDS[happened.kind] || KINDS.end);
-    line.append(shape, element('time', '', `${happened.t.toFixed(this.clock.decimals)} s`), element('span', '', told(happened, (id) => this.who(id))));
+    line.append(shape, element('time', '', `${happened.t.toFixed(this.clock.decimals)} s`), element('span', '', eventText(happened, (id) => this.who(id))));
     return line;
   }
 

@@ -1,5 +1,7 @@
 // How things are said: numbers, times, who somebody is, what happened.
 
+import { END_TEXTS, EVENT_TEXTS } from './event_texts.js';
+
 /** A number with so many decimals, with thin spaces between thousands. */
 export function number(value, digits = 0) {
   const [whole, rest] = Math.abs(value).toFixed(digits).split('.');
@@ -24,18 +26,14 @@ export function decimalsOf(step) {
   return Math.min(4, Math.max(1, Math.ceil(-Math.log10(step) - 1e-6)));
 }
 
-const ENDS = { time: 'its end time is reached', one_team: 'one team is left', all_dead: 'nobody is left', error: 'an error' };
-
-/** What happened, in words; `who` names an entity by its id. */
-export function told(event, who) {
+/** The sentence for an event; `who` names an entity by its id. */
+export function eventText(event, who) {
   const { kind, id, other, text } = event;
-  if (kind === 'capture') return `${who(id)} captured ${who(other)}`;
-  if (kind === 'collision') return other ? `${who(id)} and ${who(other)} collided` : `${who(id)} hit the ${text || 'ground'}`;
-  if (kind === 'birth') return `${who(id)} was born`;
-  if (kind === 'death') return `${who(id)} died${text ? ': ' + text : ''}${other ? ` (${who(other)})` : ''}`;
-  if (kind === 'difference') return 'the two runs differ from here on';
-  if (kind === 'end') return `The game ended: ${ENDS[text] || text}`;
-  return [kind, id ? who(id) : '', other ? who(other) : '', text].filter(Boolean).join(' ');
+  const parts = { id: id ? who(id) : '', other: other ? who(other) : '', text: kind === 'end' ? END_TEXTS[text] || text : text };
+  const isKnown = (template) => [...template.matchAll(/\{(\w+)\}/g)].every(([, name]) => parts[name]);
+  const template = (EVENT_TEXTS[kind] || []).find(isKnown);
+  if (!template) return [kind, ...Object.values(parts)].filter(Boolean).join(' ');
+  return template.replace(/\{(\w+)\}/g, (_, name) => parts[name]);
 }
 
 /** A new element with a class and a text. Whatever is said goes through here or `textContent`: a name is never read as HTML. */

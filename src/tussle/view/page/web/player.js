@@ -1,6 +1,6 @@
 // The player: puts the parts together and draws whenever something has changed.
 
-import { element, length, number, say, told } from './formatting.js';
+import { element, eventText, length, number, say } from './formatting.js';
 import { add, between, forward, halfTurn, minus, norm, scaled } from './geometry.js';
 import { SOURCES } from './sources.js';
 import { Recorded } from './layer.js';
@@ -414,7 +414,7 @@ class Player {
 
   jump(event) {
     this.clock.seek(event.t);
-    this.say(`${event.t.toFixed(this.clock.decimals)} s: ${told(event, (id) => this.layer.who(id))}`);
+    this.say(`${event.t.toFixed(this.clock.decimals)} s: ${eventText(event, (id) => this.layer.who(id))}`);
     this.look();
   }
 

@@ -1,0 +1,186 @@
+"""Options of the commands for batches and searches."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tussle.cli.options import LARGEST_SEED, MissionOptions, argument, flag, option
+
+
+@dataclass(frozen=True, kw_only=True)
+class ManyGamesOptions(MissionOptions):
+    """Options shared by batches and searches."""
+
+    vary: Annotated[
+        list[str],
+        option(
+            "NAME=VALUES",
+            "Vary a value: speed=20:30, prey.count=50:100:int, gain=1e-3:10:log, tactic=keep,switch. Can be repeated.",
+        ),
+    ] = field(default_factory=list)
+    seed: Annotated[
+        int | None, option("N", "First seed; by default 1. The others follow it.", min=0, max=LARGEST_SEED)
+    ] = None
+    processes: Annotated[int | None, option("N", "Number of processes; by default one per core.", min=1)] = (
+        None
+    )
+    stack: Annotated[
+        int | None,
+        option("N", "Games played side by side in each process; by default chosen by the mission.", min=1),
+    ] = None
+    run_timeout: Annotated[
+        float | None,
+        option(
+            "S", "Stop a game that takes longer than S seconds, and record it as failed; by default never."
+        ),
+    ] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class BatchOptions(ManyGamesOptions):
+    """Play a game many times, with other seeds and values, and show who wins how often."""
+
+    runs: Annotated[
+        int | None,
+        option(
+            "N",
+            "Games of each point, that is of each set of varied values; by default as the sweep file says, or 100.",
+            "--runs",
+            "-n",
+            min=1,
+        ),
+    ] = None
+    sweep: Annotated[
+        Path | None, option("FILE", "A sweep file (TOML) or ranges file (XML) with the varied values.")
+    ] = None
+    sample: Annotated[
+        str | None, option("METHOD", "Sampling method: lhs, sobol, saltelli, grid, list, product.")
+    ] = None
+    samples: Annotated[int | None, option("N", "Number of points to sample.", min=1)] = None
+    sample_seed: Annotated[int | None, option("N", "Seed of the sampling; by default 0.", min=0)] = None
+    independent: Annotated[
+        bool, flag("--independent", "Each game has its own seed, instead of the same seeds at all points.")
+    ] = False
+    until: Annotated[
+        str | None,
+        option(
+            "WIDTH",
+            "Stop when half of a 95 % interval is this narrow: 0.02 (share of wins of each team), 'score[2]:0.5'.",
+        ),
+    ] = None
+    directory: Annotated[
+        Path | None,
+        option(
+            "DIR",
+            "Batch directory; by default batches/NAME-HASH, the same for the same batch. Its finished runs are not repeated.",
+            "--out",
+        ),
+    ] = None
+    record_runs: Annotated[str | None, option("RUNS", "Record these runs in full: 417,3,10:20.")] = None
+    scheduler: Annotated[str | None, option("ADDRESS", "Play on a Dask cluster: tcp://HOST:8786.")] = None
+    slurm: Annotated[str | None, option("N[,OPTION=VALUE...]", "Play in N Slurm jobs.")] = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.scheduler is None and self.slurm is None:
+            return
+        if self.processes is not None:
+            raise typer.BadParameter(
+                "--processes counts those of this machine; it is not allowed with --scheduler and --slurm"
+            )
+        if self.run_timeout is not None:
+            raise typer.BadParameter(
+                "--run-timeout is for processes of this machine; with --scheduler and --slurm, limit the time of the jobs"
+            )
+        if self.scheduler is not None and self.slurm is not None:
+            raise typer.BadParameter("--scheduler and --slurm are two places to play; only one is allowed")
+
+
+@dataclass(frozen=True, kw_only=True)
+class OptimizeOptions(ManyGamesOptions):
+    """Search for the values with which a quantity of the game is greatest, or smallest."""
+
+    objective: Annotated[
+        str,
+        option(
+            "QUANTITY",
+            "Quantity whose mean over the games is maximized: 'score[3]-score[2]', 'wins[2]', 't'.",
+        ),
+    ] = ""
+    minimize: Annotated[bool, flag("--minimize", "Minimize the quantity instead.")] = False
+    trials: Annotated[int, option("N", "Sets of values to try.", min=1, shows_default=True)] = 100
+    runs: Annotated[
+        int,
+        option(
+            "N", "Games of each trial, all with the same seeds.", "--runs", "-n", min=1, shows_default=True
+        ),
+    ] = 32
+    per_round: Annotated[
+        int, option("N", "Trials that are proposed and played together.", min=1, shows_default=True)
+    ] = 8
+    sampler: Annotated[
+        str,
+        option("NAME", "Sampler of Optuna that proposes the trials: tpe, cmaes, random.", shows_default=True),
+    ] = "tpe"
+    sample_seed: Annotated[int, option("N", "Seed of the sampler.", min=0, shows_default=True)] = 0
+    directory: Annotated[
+        Path | None,
+        option(
+            "DIR",
+            "Directory of the search; by default optimizations/NAME-HASH. The same command continues the search.",
+            "--out",
+        ),
+    ] = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.objective:
+            raise typer.BadParameter("--objective is missing: a quantity such as 'score[3]-score[2]'")
+        if not self.vary:
+            raise typer.BadParameter("--vary is missing: speed=20:30, gain=1e-3:10:log, tactic=keep,switch")
+
+
+@dataclass(frozen=True, kw_only=True)
+class AnalyzeOptions:
+    """Show who won a batch and how sure that is, how points differ, and which variables matter."""
+
+    directory: Annotated[Path, argument("BATCH", "A batch directory, complete or not.")]
+    quantities: Annotated[
+        list[str],
+        option(
+            "EXPR",
+            "Analyze this quantity: score[2], lost[1]/start[1], wins[2]-wins[3], t. Can be repeated; "
+            "by default the scores, the entities left of each team, and the time at the end.",
+            "--quantity",
+        ),
+    ] = field(default_factory=list)
+    compare: Annotated[
+        tuple[str, str] | None,
+        option(
+            "A B", "Compare, paired by seed, points with these numbers or values: tactic=keep tactic=switch."
+        ),
+    ] = None
+    by_point: Annotated[bool, flag("--by-point", "Show all points, not only twenty.")] = False
+    as_json: Annotated[bool, flag("--json", "Print everything as JSON.")] = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReportOptions:
+    """Write a page with the results of a batch: who won, what the varied values do, with plots as SVG and PNG."""
+
+    batch: Annotated[Path, argument("BATCH", "A batch directory, complete or not.")]
+    directory: Annotated[
+        Path | None, option("DIR", "Directory for the page and its plots; by default BATCH/report.", "--out")
+    ] = None
+    quantities: Annotated[
+        list[str],
+        option(
+            "EXPR",
+            "A quantity that gets its own plots, such as 'score[2]-score[3]' or t. Can be repeated.",
+            "--quantity",
+        ),
+    ] = field(default_factory=list)

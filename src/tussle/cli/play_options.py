@@ -1,0 +1,186 @@
+"""Options of the commands that play, show and write games, and of those that list what there is."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tussle.cli.options import (
+    MissionOptions,
+    PluginOptions,
+    argument,
+    check_positive,
+    flag,
+    option,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunOptions(MissionOptions):
+    """Play one game, record it, and show its result."""
+
+    mission: Annotated[
+        str, argument("MISSION", "A mission file, or the name of a built-in mission (tussle missions).")
+    ] = ""
+    from_batch: Annotated[
+        str | None, option("BATCH:RUN", "Play a run of a batch again instead of a mission.", "--from")
+    ] = None
+    trust: Annotated[
+        bool, flag("--trust", "With --from: run the plugin code of a batch directory made by someone else.")
+    ] = False
+    directory: Annotated[
+        Path | None, option("DIR", "Run directory; by default runs/NAME-SEED-TIMESTAMP.", "--out")
+    ] = None
+    no_log: Annotated[bool, flag("--no-log", "Record nothing.")] = False
+    log_period: Annotated[
+        float | None, option("S", "Time between recorded states [s]; by default every step.")
+    ] = None
+    pace: Annotated[
+        float | None,
+        option("X", "Play at most X times as fast as real time. The result does not change."),
+    ] = None
+    start_from: Annotated[
+        Path | None,
+        option("TABLE", "Take ids, spawn times and initial states from a recorded trajectory."),
+    ] = None
+
+    def __post_init__(self) -> None:
+        if self.no_log and (self.directory is not None or self.log_period is not None):
+            raise typer.BadParameter(
+                "--no-log records nothing, so --out and --log-period are not allowed with it"
+            )
+        check_positive(pace=self.pace, log_period=self.log_period)
+        is_changed = self.mission or self.more or self.settings or self.plugin_files
+        if self.from_batch is not None and (is_changed or (self.seed, self.end) != (None, None)):
+            raise typer.BadParameter(
+                "--from BATCH:RUN determines the game, so a mission, settings, --seed, --end and --plugin-path"
+                " are not allowed with it"
+            )
+        if self.from_batch is None and self.trust:
+            raise typer.BadParameter("--trust is allowed with --from only")
+        if self.from_batch is None and not self.mission:
+            raise typer.BadParameter("a mission or --from BATCH:RUN is required")
+        super().__post_init__()
+
+
+@dataclass(frozen=True, kw_only=True)
+class DescribeOptions(MissionOptions):
+    """Show the parameters and channels of a plugin, or the entities and the step schedule of a mission."""
+
+    mission: Annotated[str, argument("MISSION|PLUGIN", "A mission file, a built-in mission, or a plugin.")]
+
+
+@dataclass(frozen=True, kw_only=True)
+class MissionsOptions:
+    """List the built-in missions."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DoctorOptions:
+    """Show versions, extras, kernel cache and processors, and run a self-test."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class NewOptions:
+    """Write a working plugin, its test, and a mission that uses it."""
+
+    kind: Annotated[
+        str, argument("KIND", "autonomy, motion, controller, sensor, interaction, metric or network.")
+    ]
+    name: Annotated[str, argument("NAME", "Class name, such as MyBoids.")]
+    origin: Annotated[str | None, option("STOCK", "Start from a copy of this stock plugin.", "--from")] = None
+    easy: Annotated[bool, flag("--easy", "Write code for one entity, or one world, at a time.")] = False
+    directory: Annotated[Path, option("DIR", "Directory for the files.", "--out", shows_default=True)] = (
+        Path()
+    )
+
+
+# -- pages in the browser ---------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, kw_only=True)
+class PageOptions(PluginOptions):
+    """Options of the viewer page."""
+
+    pace: Annotated[
+        str | None,
+        option("X|max", "Play X times as fast as real time, or as fast as possible; by default 1."),
+    ] = None
+    paused: Annotated[bool, flag("--paused", "Do not start until told to on the page.")] = False
+    host: Annotated[
+        str,
+        option(
+            "ADDRESS",
+            "Serve the page at this address of the machine. At any but 127.0.0.1, others who have the whole URL can watch and steer.",
+            shows_default=True,
+        ),
+    ] = "127.0.0.1"
+    port: Annotated[
+        int | None,
+        option(
+            "N", "Serve the page at this port; by default the first free one from 8123.", min=1, max=65535
+        ),
+    ] = None
+    no_browser: Annotated[bool, flag("--no-browser", "Open no browser, only print the address.")] = False
+
+    def __post_init__(self) -> None:
+        if self.pace is None or self.pace == "max":
+            return
+        try:
+            value = float(self.pace)
+        except ValueError:
+            value = math.nan
+        if not 0.0 < value < math.inf:
+            raise typer.BadParameter(f"--pace {self.pace} is not allowed; it takes a number > 0, or max")
+
+    @property
+    def speed(self) -> float | None:
+        """Simulated seconds per second that `pace` asks for; None for as fast as possible."""
+        return None if self.pace == "max" else float(self.pace or 1.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ViewOptions(MissionOptions, PageOptions):
+    """Play one game live on a page in the browser: pause it, step it, rewind it, follow entities."""
+
+    pace: Annotated[
+        str | None,
+        option(
+            "X|max",
+            "Play X times as fast as real time, or as fast as possible; by default as the mission says, or 1.",
+        ),
+    ] = None
+    record: Annotated[
+        Path | None, option("DIR", "Record the game into this directory, as tussle run does.")
+    ] = None
+    exit_when_over: Annotated[bool, flag("--exit-when-over", "End with the game, not only by Ctrl-C.")] = (
+        False
+    )
+
+    def __post_init__(self) -> None:
+        MissionOptions.__post_init__(self)
+        PageOptions.__post_init__(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReplayOptions(PageOptions):
+    """Play a recorded run on a page in the browser, or two runs from the moment at which they differ."""
+
+    run: Annotated[Path, argument("RUN", "A run directory, complete or not.")]
+    other: Annotated[
+        Path | None,
+        argument("RUN2", "Another run, shown beside the first from the moment at which they differ."),
+    ] = None
+    over: Annotated[
+        bool, typer.Option("--over/--side-by-side", help="Draw two runs in one place, or next to each other.")
+    ] = False
+    world: Annotated[int, option("N", "World of a stack.", min=0, shows_default=True)] = 0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.over and self.other is None:
+            raise typer.BadParameter("--over draws two runs in one place; a second run is required")

@@ -1,0 +1,114 @@
+"""Tables and lists of facts on the terminal, in one style."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+
+from rich import box
+from rich.cells import cell_len
+from rich.console import RenderableType
+from rich.padding import Padding
+from rich.table import Table
+from rich.text import Text
+
+from tussle.cli.terminal import out
+
+Cell = str | Text
+Row = tuple[str, Sequence[Cell]]
+"""Style and cells of a row."""
+GAP = 2
+"""Distance of columns, in characters."""
+WIDEST_TEXT = 30
+"""Texts up to this width have a column that wide; longer ones are folded."""
+
+
+def text_table(*columns: str) -> Table:
+    """Return a table of texts."""
+    made = _empty()
+    for name in columns:
+        made.add_column(name, overflow="fold")
+    return made
+
+
+def number_tables(head: Sequence[Cell], rows: Sequence[Row], n_texts: int = 1) -> list[Padding]:
+    """Return tables that fit the terminal, for a few columns of texts and any number of columns of numbers.
+
+    Texts are folded if necessary, numbers are not. Columns of numbers that do not fit beside the others make a further table
+    below, with the same columns of texts.
+
+    Args:
+        head: Names of the columns.
+        rows: The rows, each with a style and one cell for each column.
+        n_texts: Number of text columns, which come first.
+    """
+    widths = [max(map(_width, column)) for column in zip(head, *(cells for _, cells in rows), strict=True)]
+    room = out().width - 1
+    longest = max(8, (room - max(widths[n_texts:], default=0)) // max(n_texts, 1) - GAP)
+    texts = [min(width, max(WIDEST_TEXT, room // 3), longest) for width in widths[:n_texts]]
+    left = room - sum(texts) - GAP * n_texts
+    groups, used = [list[tuple[int, int]]()], 0
+    for i in range(n_texts, len(head)):
+        if groups[-1] and used + widths[i] > left:
+            groups.append([])
+            used = 0
+        groups[-1].append((i, min(widths[i], left)))
+        used += widths[i] + GAP
+    return [_number_table(head, rows, texts, group) for group in groups]
+
+
+def _number_table(
+    head: Sequence[Cell], rows: Sequence[Row], texts: Sequence[int], group: Sequence[tuple[int, int]]
+) -> Padding:
+    made, n_texts = _empty(), len(texts)
+    for i, width in enumerate(texts):
+        made.add_column(head[i], overflow="fold", max_width=width)
+    for i, width in group:
+        made.add_column(head[i], justify="right", overflow="fold", min_width=width, max_width=width)
+    for style, cells in rows:
+        made.add_row(*cells[:n_texts], *(cells[i] for i, _ in group), style=style)
+    return indented(made)
+
+
+def _empty() -> Table:
+    return Table(
+        box=box.SIMPLE_HEAD,
+        header_style="bold cyan",
+        pad_edge=False,
+        show_edge=False,
+        padding=(0, GAP - 1, 0, 0),
+    )
+
+
+def _width(cell: Cell) -> int:
+    return max(map(cell_len, str(cell).split("\n")))
+
+
+def indented(part: RenderableType) -> Padding:
+    """Return a table or text one space from the left, below an empty line."""
+    return Padding(part, (1, 0, 0, 1), expand=False)
+
+
+def fact_list(facts: Iterable[tuple[str, Cell]]) -> Padding:
+    """Return names and values, one pair per line; pairs without a value are left out."""
+    grid = Table.grid(padding=(0, 2))
+    grid.add_column(style="dim", no_wrap=True)
+    grid.add_column(overflow="fold")
+    for name, value in facts:
+        if value:
+            grid.add_row(name, value)
+    return indented(grid)
+
+
+def title(name: str, *facts: str) -> Text:
+    """Return a title with lines of facts under it."""
+    return Text.assemble(" ", (name, "bold"), ("".join(f"\n {fact}" for fact in facts), "dim"))
+
+
+def estimate(value: float, low: float, high: float) -> str:
+    """Format an estimate with its interval, to the digits that the interval allows: "12.3 (11.9–12.8)"."""
+    if not high > low:
+        return f"{value:.6g}"
+    digits = max(0, 1 - math.floor(math.log10(high - low)))
+    to = "–" if low >= 0.0 else " to "
+    return f"{value:.{digits}f} ({low:.{digits}f}{to}{high:.{digits}f})"
