@@ -19,7 +19,7 @@ from tussle.batch.varied import variable_entry
 from tussle.errors import MissingExtraError, ParameterError
 
 MOST_PAIRED_POINTS = 20
-"""Points that are all compared with the first, where choices cannot be compared by themselves."""
+"""Largest number of points that are all compared with the first, if choices cannot be compared."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What each variable does to a quantity: its rank correlation, and its part of the variance."""
+"""Sensitivity analysis: rank correlations, and the share of the variance of each variable."""
 
 from __future__ import annotations
 
@@ -15,35 +15,35 @@ from tussle.batch.variables import Range, Variable
 from tussle.errors import MissingExtraError
 
 FROM_POINTS = 64
-"""RBD-FAST looks at harmonics and needs many points for each; with 64 its error is 0.1, with 512 it is 0.03 (Ishigami function)."""
+"""Fewest points for RBD-FAST, which needs many points per harmonic: with 64 its error is 0.1, with 512 it is 0.03 (Ishigami function)."""
 N_HARMONICS = 4
-"""SALib's default of 10 adds noise at a few hundred points; responses of a game have no finer structure."""
+"""Harmonics of RBD-FAST. SALib's default of 10 adds noise at a few hundred points."""
 N_RESAMPLES = 200
 MOST_LEVELS = 30
-"""Of a factor of an analysis of variance."""
+"""Largest number of levels of a factor in an analysis of variance."""
 
 Points = Sequence[dict[str, Any]]
 Number = float | None
 Parts = tuple[Number, Number, Number, Number, Number, Number]
-"""First order with the ends of its interval, then total with the ends of its interval."""
+"""First-order index with the ends of its interval, then total index with the ends of its interval."""
 
 
 @dataclass(frozen=True)
 class Effect:
-    """What a variable does to a quantity.
+    """Effect of a variable on a quantity.
 
     Attributes:
-        variable: Its name; also "interaction" and "seed" for what no variable does alone.
-        rank_correlation: Spearman's, -1 to 1; NaN for a variable without order.
+        variable: Its name; also "interaction" and "seed".
+        rank_correlation: Spearman's rank correlation, -1 to 1; NaN for a variable without order.
         rank_low: Lower end of its interval.
         rank_high: Upper end.
-        first_order: Part of the variance that the variable makes by itself.
+        first_order: Share of the variance due to the variable alone.
         first_low: Lower end of its interval.
         first_high: Upper end.
-        total: The same with all interactions that the variable is in.
+        total: Share of the variance due to the variable and its interactions.
         total_low: Lower end of its interval.
         total_high: Upper end.
-        method: How the parts were found: "sobol", "rbd_fast", "levels", "anova", or "" where they were not.
+        method: Method for the shares: "sobol", "rbd_fast", "levels", "anova", or "" if there are none.
         note: The values and methods that were used, and their limits.
     """
 
@@ -61,7 +61,7 @@ class Effect:
     note: str = ""
 
     def having(self, parts: Parts, method: str, note: str) -> Effect:
-        """The same with parts of the variance."""
+        """Return a copy with shares of the variance."""
         names = ("first_order", "first_low", "first_high", "total", "total_low", "total_high")
         found: dict[str, Any] = dict(zip(names, parts, strict=True))
         return replace(
@@ -70,16 +70,16 @@ class Effect:
 
 
 def effects(variables: Sequence[Variable], points: Points, matrix: np.ndarray, step: int = 0) -> list[Effect]:
-    """What each variable does.
+    """Return the effect of each variable.
 
     Args:
         variables: What was varied.
         points: Its values at each point.
-        matrix: The quantity by seed and point, (n_seeds, n_points); NaN where it is not known.
-        step: Of a sample for Saltelli's indices, points from one base row to the next; 0 for other samples.
+        matrix: The quantity by seed and point, (n_seeds, n_points); NaN if unknown.
+        step: Points per base row of a Saltelli sample; 0 for other samples.
 
     Raises:
-        MissingExtraError: The points were sampled for Saltelli's indices, and SALib is not there.
+        MissingExtraError: The points are a Saltelli sample, and SALib is not installed.
     """
     if not variables:
         return []
@@ -102,7 +102,7 @@ def _without_parts(found: Sequence[Effect], reason: str) -> list[Effect]:
 def rank_effects(
     variables: Sequence[Variable], points: Points, matrix: np.ndarray, step: int = 0
 ) -> list[Effect]:
-    """Rank correlations only, which need no further package.
+    """Return rank correlations only, without SALib.
 
     Args:
         variables: What was varied.
@@ -146,7 +146,7 @@ def spearman(x: np.ndarray, y: np.ndarray) -> tuple[float, float, float]:
 
 
 def _means(matrix: np.ndarray) -> np.ndarray:
-    """Mean over the seeds that are known, by point, (n_points,)."""
+    """Return the mean over the known seeds, (n_points,); NaN if none is known."""
     is_known = np.isfinite(matrix)
     n = is_known.sum(axis=0)
     return np.where(n > 0, np.where(is_known, matrix, 0.0).sum(axis=0) / np.maximum(n, 1), np.nan)
@@ -156,7 +156,7 @@ def _means(matrix: np.ndarray) -> np.ndarray:
 
 
 def _by_saltelli(found: list[Effect], y: np.ndarray) -> list[Effect]:
-    """Indices of a sample that was made for them."""
+    """Return Saltelli's indices of a Saltelli sample."""
     k = len(found)
     rows = y.reshape(-1, k + 2)
     whole = rows[np.isfinite(rows).all(axis=1)]
@@ -180,7 +180,7 @@ def _by_saltelli(found: list[Effect], y: np.ndarray) -> list[Effect]:
 def _by_given_data(
     found: list[Effect], variables: Sequence[Variable], points: Points, y: np.ndarray
 ) -> list[Effect]:
-    """First-order indices of points that were not sampled for them."""
+    """Return first-order indices of points of any sample."""
     is_known = np.isfinite(y)
     y, n = y[is_known], int(is_known.sum())
     if n < FROM_POINTS or np.ptp(y) == 0.0:
@@ -207,7 +207,7 @@ def _by_given_data(
 
 
 def _rbd_fast(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
-    """First-order index of a variable from points of any sample, and half its interval.
+    """Return the first-order index of a variable from points of any sample, and half the width of its interval.
 
     Not SALib's `delta`: its binned estimate finds 0.10 of 0.44 at 128 points of the Ishigami function, and it prints.
     """
@@ -239,9 +239,9 @@ def _salib(name: str) -> Any:
 
 
 def correlation_ratio(labels: Sequence[Any], y: np.ndarray) -> tuple[float, float, float]:
-    """Part of the variance that lies between the values of a choice, without what chance puts there, and its interval.
+    """Return the share of the variance between the values of a choice, corrected for chance, and its interval.
 
-    Epsilon squared (Kelley, PNAS 21 (1935), 554-559); the interval by drawing the points again.
+    Epsilon squared (Kelley, PNAS 21 (1935), 554-559); the interval is a bootstrap over points.
     """
     numbers = {label: i for i, label in enumerate(dict.fromkeys(labels))}
     level = np.array([numbers[label] for label in labels])
@@ -282,7 +282,7 @@ def as_factorial(columns: Sequence[Sequence[Any]], matrix: np.ndarray) -> np.nda
 
 
 def _by_anova(found: list[Effect], values: np.ndarray, n_seeds: int) -> list[Effect]:
-    """Parts of the variance of a full factorial, the part of the seeds included."""
+    """Return shares of the variance of a full factorial, including the share of the seeds."""
     n, k = len(values), len(found)
     if not n or np.ptp(values) == 0.0:
         return _without_parts(

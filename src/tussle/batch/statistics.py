@@ -1,6 +1,6 @@
 """Shares, means and paired differences, with their 95 % intervals.
 
-Values that are not finite are left out; `n` counts the others.
+Only finite values are used; `n` counts them.
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ LEVEL = 0.95
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 BOOTSTRAP_FROM = 20
-"""Fewer values hold too little of their distribution to be drawn from again: the BCa interval of the mean of ten exponential numbers
-holds the true one in 87 % of cases, Student's in 90 %. Below, Student's."""
+"""Smallest number of values for a bootstrap: the BCa interval of the mean of ten exponential numbers contains the true mean in 87 % of
+cases, Student's in 90 %. Below, Student's interval is used."""
 BOOTSTRAP_UP_TO = 2000
 """More values make the mean normal enough (the skewness of its distribution falls with 1/sqrt(n)), and the jackknife in the BCa
 interval takes n^2 numbers. Above, the normal interval."""
 N_RESAMPLES = 2000
 """Efron and Tibshirani, An Introduction to the Bootstrap (1993), section 14: at least 1,000 for intervals of 95 %."""
 NUMBERS_AT_ONCE = 4_000_000
-"""Most numbers that the bootstrap holds at a time, 32 MB."""
+"""Largest count of numbers that the bootstrap holds at a time, 32 MB."""
 BLOCKS_FROM = BOOTSTRAP_FROM
-"""So many seeds must there be for the runs of a seed, over all points, to count as one block."""
+"""Smallest number of seeds for which the runs of a seed, over all points, count as one block."""
 ROUNDING = 1e-12
-"""Values that differ by less of their size are equal: differences of equal effects, say, that were rounded apart."""
+"""Relative tolerance below which values are equal, such as differences of equal effects after rounding."""
 SEED = 20180101
 
 

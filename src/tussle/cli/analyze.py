@@ -222,7 +222,7 @@ def _effects(effects: Sequence[Effect], variables: Sequence[Variable]) -> Iterab
     ]
     yield from number_tables(["", "rank correlation", "first order", "total"], rows)
     notes = dict.fromkeys(part for e in effects for part in e.note.split("; "))
-    yield Text("\n".join(f" {note}" for note in notes), "dim")
+    yield indented(Text("\n".join(notes), "dim"))
 
 
 def _estimate(value: float | None, low: float | None, high: float | None, sign: str = "") -> str:

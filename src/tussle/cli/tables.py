@@ -20,7 +20,7 @@ Row = tuple[str, Sequence[Cell]]
 GAP = 2
 """Distance of columns, in characters."""
 WIDEST_TEXT = 30
-"""Texts up to this width have a column that wide; longer ones are folded."""
+"""Texts up to this width are not folded; longer ones are, if all columns do not fit beside each other."""
 
 
 def text_table(*columns: str) -> Table:
@@ -31,42 +31,42 @@ def text_table(*columns: str) -> Table:
     return made
 
 
-def number_tables(head: Sequence[Cell], rows: Sequence[Row], n_texts: int = 1) -> list[Padding]:
-    """Return tables that fit the terminal, for a few columns of texts and any number of columns of numbers.
+def number_tables(head: Sequence[Cell], rows: Sequence[Row]) -> list[Padding]:
+    """Return tables that fit the terminal: a column of texts, and any number of columns of numbers.
 
     Texts are folded if necessary, numbers are not. Columns of numbers that do not fit beside the others make a further table
-    below, with the same columns of texts.
+    below, with the same column of texts.
 
     Args:
         head: Names of the columns.
         rows: The rows, each with a style and one cell for each column.
-        n_texts: Number of text columns, which come first.
     """
-    widths = [max(map(_width, column)) for column in zip(head, *(cells for _, cells in rows), strict=True)]
+    text, *numbers = (
+        max(map(_width, column)) for column in zip(head, *(cells for _, cells in rows), strict=True)
+    )
     room = out().width - 1
-    longest = max(8, (room - max(widths[n_texts:], default=0)) // max(n_texts, 1) - GAP)
-    texts = [min(width, max(WIDEST_TEXT, room // 3), longest) for width in widths[:n_texts]]
-    left = room - sum(texts) - GAP * n_texts
+    beside = room - sum(width + GAP for width in numbers)
+    text = min(text, max(beside, min(WIDEST_TEXT, room - max(numbers, default=0) - GAP), 8))
+    room -= text + GAP
     groups, used = [list[tuple[int, int]]()], 0
-    for i in range(n_texts, len(head)):
-        if groups[-1] and used + widths[i] > left:
+    for i, width in enumerate(numbers, 1):
+        if groups[-1] and used + width > room:
             groups.append([])
             used = 0
-        groups[-1].append((i, min(widths[i], left)))
-        used += widths[i] + GAP
-    return [_number_table(head, rows, texts, group) for group in groups]
+        groups[-1].append((i, min(width, room)))
+        used += width + GAP
+    return [_number_table(head, rows, text, group) for group in groups]
 
 
 def _number_table(
-    head: Sequence[Cell], rows: Sequence[Row], texts: Sequence[int], group: Sequence[tuple[int, int]]
+    head: Sequence[Cell], rows: Sequence[Row], text: int, numbers: Sequence[tuple[int, int]]
 ) -> Padding:
-    made, n_texts = _empty(), len(texts)
-    for i, width in enumerate(texts):
-        made.add_column(head[i], overflow="fold", max_width=width)
-    for i, width in group:
+    made = _empty()
+    made.add_column(head[0], overflow="fold", max_width=text)
+    for i, width in numbers:
         made.add_column(head[i], justify="right", overflow="fold", min_width=width, max_width=width)
     for style, cells in rows:
-        made.add_row(*cells[:n_texts], *(cells[i] for i, _ in group), style=style)
+        made.add_row(cells[0], *(cells[i] for i, _ in numbers), style=style)
     return indented(made)
 
 

@@ -60,7 +60,7 @@ def test_the_page_says_who_won_how_surely_and_what_differs(tussle, paired):
     ]
     (difference,) = lines_of(text, "compared")
     assert difference == ["tactic=switch", "+1", "1", "–", "1", "79", "0", "0", "<", "0.001"]
-    effects = lines_of(text, "what matters for score of keepers")
+    effects = lines_of(text, "what score of keepers depends on")
     assert [row[0] for row in effects] == ["tactic", "speed", "interaction", "seed"]
     assert lines_of(text, "failed") == [
         ["SimpleCapture:", "value", "[bold]nan", "(tactic=keep,", "1", "9", "3"],
@@ -92,7 +92,7 @@ def test_quantities_and_comparisons_can_be_asked_for(tussle, paired):
         "prey.Boids.speed=30 kt",
     )
     first, *_folded = lines_of(done.stdout, "compared")
-    assert first[1:5] == ["+3", "3", "–", "3"]
+    assert first[2:6] == ["+3", "3", "–", "3"]
     assert "score[2]-score[3]" in done.stdout
     assert "alive[1]" not in done.stdout
 

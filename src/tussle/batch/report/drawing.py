@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 WIDTH = 4.4
-"""Of a plot [inch]: its text stays legible where a telephone shows it 370 pixels wide."""
+"""Width of a plot [inch]; its text is legible at a width of 370 pixels, on a telephone."""
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 
@@ -71,7 +71,7 @@ UNDATED: dict[str, dict[str, Any]] = {
     "svg": {"Date": None, "Creator": None},
     "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
 }
-"""What files of each kind are not told, so that the same plot is the same bytes."""
+"""Metadata that is left out of files of each kind, so that the same plot gives the same bytes."""
 
 
 @dataclass(frozen=True)
@@ -79,10 +79,10 @@ class Picture:
     """A plot as SVG and PNG.
 
     Args:
-        svg: A file of its own.
-        inline: The same as part of a page: no address, no identifier that another picture has, the colours of the page.
-        png: The same as pixels.
-        missing: Letters that the font of the pixels lacks.
+        svg: Text of the SVG file.
+        inline: SVG element for the page: no addresses, unique identifiers, the colours of the page.
+        png: Bytes of the PNG file.
+        missing: Characters that the font of the PNG file lacks.
     """
 
     svg: str
@@ -96,8 +96,8 @@ def house_style(whose: str = "the report", extra: str = "batch") -> Iterator[Non
     """Make and save plots inside this context; the user's matplotlibrc has no effect in it.
 
     Args:
-        whose: Who draws, for the message.
-        extra: Which extra brings Matplotlib to it.
+        whose: What draws, for the message.
+        extra: The extra that installs Matplotlib.
 
     Raises:
         MissingExtraError: Matplotlib is not installed.
@@ -115,7 +115,7 @@ def house_style(whose: str = "the report", extra: str = "batch") -> Iterator[Non
 
 
 def blank(height: float, n_rows: int = 1, n_columns: int = 1, **options: Any) -> tuple[Figure, Any]:
-    """A figure of the house's width and some height [inch], and its axes as an array (n_rows, n_columns)."""
+    """Return a figure of the standard width and a given height [inch], and its axes as an array (n_rows, n_columns)."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(WIDTH, height))
@@ -128,19 +128,19 @@ def marker_of(team: int) -> str:
 
 
 def rule_x(axes: Axes) -> None:
-    """Helping lines for reading off x, for plots whose rows have names."""
+    """Draw vertical grid lines, for plots whose rows have names."""
     axes.grid(True, axis="x")
     axes.tick_params(axis="y", length=0)
     axes.spines["left"].set_visible(False)
 
 
 def rule_y(axes: Axes) -> None:
-    """Helping lines for reading off y."""
+    """Draw horizontal grid lines."""
     axes.grid(True, axis="y")
 
 
 def legend_above(figure: Figure, handles: Sequence[tuple[Any, str]]) -> None:
-    """A legend over the axes, in as many columns as the names leave room for; none for one name. The figure grows by its rows."""
+    """Add a legend above the axes with as many columns as fit, if there are several names. The figure grows by its rows."""
     if len(handles) < 2:
         return
     names = [shortened(name, 40) for _, name in handles]
@@ -154,12 +154,12 @@ def legend_above(figure: Figure, handles: Sequence[tuple[Any, str]]) -> None:
 
 
 def printable(text: str) -> str:
-    """A text in one line, without characters that no XML file may hold."""
+    """Return a text on one line, without characters that are not allowed in XML."""
     return visible(" ".join(text.split()))
 
 
 def shortened(text: str, most: int = 24) -> str:
-    """A name that fits beside a plot, with the room of so many letters; of a longer one, its middle is left out."""
+    """Return a name of at most `most` character widths; the middle of a longer one is left out."""
     text = printable(text)
     if cell_len(text) <= most:
         return text
@@ -176,8 +176,8 @@ def pictured(figure: Figure, name: str, title: str) -> Picture:
 
     Args:
         figure: The figure.
-        name: Begins all its identifiers.
-        title: What it shows, for those who have it read to them.
+        name: Prefix of all its identifiers.
+        title: Description for screen readers.
     """
     svg, png = io.StringIO(), io.BytesIO()
     with lettering(figure) as missing:
@@ -191,9 +191,9 @@ def pictured(figure: Figure, name: str, title: str) -> Picture:
 
 @contextmanager
 def lettering(figure: Figure) -> Iterator[set[str]]:
-    """Collects the letters that the font lacks while a figure is saved inside; other warnings are given on.
+    """Collect the characters that the font lacks while a figure is saved inside; other warnings are passed on.
 
-    What no picture may hold, or would turn the order of its letters, is written as an escape in all of its texts.
+    Control characters, and characters that change the direction of text, are written as escapes.
     """
     from matplotlib.text import Text
 
@@ -212,11 +212,11 @@ def lettering(figure: Figure) -> Iterator[set[str]]:
 
 
 def inlined(svg: str, name: str, title: str) -> str:
-    """An SVG file of Matplotlib as an element of a page, with the colours of the page and identifiers that no other picture has.
+    """Return an SVG file of Matplotlib as an element of a page, with the colours of the page and unique identifiers.
 
     Args:
         svg: The file.
-        name: Begins each identifier.
+        name: Prefix of each identifier.
         title: What the picture shows.
     """
     body = re.sub(
@@ -233,7 +233,7 @@ def inlined(svg: str, name: str, title: str) -> str:
 
 
 def _on_page(tag: str, name: str) -> str:
-    """A tag of Matplotlib's, whose attributes hold no text from outside."""
+    """Rewrite a tag of Matplotlib; its attributes contain no text from outside."""
     tag = re.sub(r'( id="|href="#|url\(#)', rf"\g<1>{name}-", tag).replace("xlink:href", "href")
     for colour, variable in _ON_PAGE.items():
         tag = tag.replace(colour, variable)

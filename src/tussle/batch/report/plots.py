@@ -23,26 +23,26 @@ if TYPE_CHECKING:
     from tussle.batch.statistics import Share
 
 MOST_TICKS = 8
-"""Values that are all written at an axis."""
+"""Largest number of values that are all written at an axis."""
 END_COLOURS = dict(zip(("time", "one_team", "all_dead"), NEUTRAL, strict=True))
 """Colours of the reasons for which games end."""
 Limits = tuple[float, float] | None
-"""Ends of an axis of values; None for those that fit the values."""
+"""Ends of an axis of values; None to fit the values."""
 
 
 @dataclass(frozen=True)
 class Series:
-    """Values with intervals, told apart from others by colour and marker.
+    """Values with intervals, with a colour and a marker.
 
     Args:
-        name: Of the series.
-        colour: Of its marks or its line.
-        marker: Shape of its marks, or dashes of its line, as Matplotlib says it.
-        mean: The values, (n,); NaN where there is none.
-        low: Lower ends of the intervals, (n,); NaN where there is none.
+        name: Name of the series.
+        colour: Colour of its marks or its line.
+        marker: Matplotlib's marker, or its line style.
+        mean: The values, (n,); NaN if unknown.
+        low: Lower ends of the intervals, (n,); NaN if unknown.
         high: Upper ends, (n,).
-        x: Where the values lie, (n,); None where all series share their places.
-        dots: Positions and values of single points, each (n_points,), which are shown faintly; None for none.
+        x: Positions of the values, (n,); None if all series share them.
+        dots: Positions and values of single points, each (n_points,), shown faintly; None for none.
     """
 
     name: str
@@ -56,7 +56,7 @@ class Series:
 
 
 def series_of(name: str, colour: str, marker: str, rows: Any) -> Series:
-    """A series from (value, low, high) for each place; None for what is not known."""
+    """Return a series from (value, low, high) for each place; None is unknown."""
     table = np.array(rows, dtype=float).reshape(-1, 3)
     return Series(name, colour, marker, *table.T)
 
@@ -89,7 +89,8 @@ def distributions(
     Where values have both signs, as differences have, a line marks 0.
     """
     figure, axes = blank(0.5 + 0.72 * len(values), len(values), sharex=True, gridspec_kw={"hspace": 0.05})
-    edges = edges_for(np.concatenate(values))
+    every = np.concatenate(values)
+    edges = edges_for(every)
     tallest = max(np.histogram(v, edges)[0].max() for v in values)
     for plot, some, name, colour in zip(axes.flat, values, names, colours, strict=True):
         plot.hist(some, edges, color=colour, alpha=0.75, histtype="stepfilled", linewidth=0)
@@ -108,7 +109,7 @@ def distributions(
             transform=plot.transAxes,
             fontsize=8,
         )
-        if edges[0] < 0.0 < edges[-1]:
+        if every.min() < 0.0 < every.max():
             plot.axvline(0.0, color=MUTED, linewidth=0.8)
         rule_x(plot)
     axes[-1, 0].set_xlim(edges[0], edges[-1])
@@ -153,7 +154,7 @@ def over_time(curves: Sequence[Series], label: str) -> Figure:
 
 
 def inside(values: np.ndarray) -> np.ndarray:
-    """Values without the few, one in a hundred at each end at the most, that would more than double the axis."""
+    """Return the values without outliers: at most 1 % at each end, if they would more than double the axis."""
     low, high = np.quantile(values, [0.01, 0.99])
     span = max(float(high - low), 1e-300)
     if values.max() - high <= span and low - values.min() <= span:
@@ -162,7 +163,7 @@ def inside(values: np.ndarray) -> np.ndarray:
 
 
 def edges_for(values: np.ndarray) -> np.ndarray:
-    """Ends of the bins of a histogram, by NumPy's rule and at most 50; of whole numbers, each bin holds equally many of them."""
+    """Return the ends of the bins of a histogram, by the rule of Freedman and Diaconis, at most 50; bins of whole numbers are whole."""
     values = inside(values)
     low, high = float(values.min()), float(values.max())
     if not 0.0 < (high - low) / 50.0 < math.inf:

@@ -30,17 +30,17 @@ _TITLES = {
 _OF_TEAM = re.compile(r"(wins|score|alive|lost)\[(-?\d+)\]")
 
 DRAWN_POINTS = ("lhs", "sobol", "saltelli", "product")
-"""Ways of sampling in which the points are drawn from ranges, so that other points could as well have been."""
+"""Sampling methods that draw points at random from ranges."""
 MOST_VARIABLES = 6
-"""Variables with plots of their own; of more, those with the strongest effects."""
+"""Largest number of variables with plots; if there are more, those with the strongest effects are shown."""
 MOST_LEVELS = 12
-"""A range with no more values than this is shown value by value."""
+"""A range with at most this many values is shown value by value."""
 MOST_BINS = 12
 POINTS_PER_BIN = 8
 WIDE_RATIO = 50.0
-"""Chosen numbers whose ratio is at least this are shown on a logarithmic axis."""
+"""Numbers whose largest ratio is at least this are shown on a logarithmic axis."""
 FEWEST_SEEDS = 10
-"""Below this many seeds, how much differs from seed to seed cannot be told; the interval then holds for these seeds only."""
+"""With fewer seeds, the variance between seeds is not estimated, and the interval holds for these seeds only."""
 
 
 @dataclass(frozen=True)
@@ -49,10 +49,10 @@ class Measure:
 
     Args:
         expression: As `Results.quantity` takes it.
-        name: Of the team, or of the quantity where it has none.
-        team: Its team; None for a quantity of no one team.
-        label: Of the axis that it is plotted on.
-        is_share: It is 0 or 1 in each run.
+        name: Name of the team, or of the quantity if it has no team.
+        team: Its team; None if it belongs to no single team.
+        label: Label of its axis.
+        is_share: The quantity is 0 or 1 in each run.
     """
 
     expression: str
@@ -75,12 +75,12 @@ class Measure:
 
 @dataclass(frozen=True)
 class Axis:
-    """A variable as an axis of places: its values where they are few, else bins.
+    """A variable as an axis: its values if they are few, else bins.
 
     Args:
         variable: The variable.
         index: The place of each point, (n_points,).
-        position: Where the places lie, (n_places,): values of the variable, or 0, 1, 2, ... where these are no numbers.
+        position: Positions of the places, (n_places,): values of the variable, or 0, 1, 2, ... if these are not numbers.
         texts: The values as texts; empty for bins.
         edges: Ends of the bins, (n_places + 1,); empty where the places are values.
         is_number: Positions are values of the variable.
@@ -103,14 +103,14 @@ class Axis:
 
     @property
     def is_log(self) -> bool:
-        """It is read by ratios."""
+        """Whether the axis is logarithmic."""
         if isinstance(self.variable, Range):
             return self.variable.is_log
         low, high = float(self.position.min()), float(self.position.max())
         return self.is_number and low > 0.0 and high >= WIDE_RATIO * low
 
     def place_text(self, place: int) -> str:
-        """A place as a text: "20 kt", "from 20 to 22.5 kt", "keep"."""
+        """Return the text of a place: "20 kt", "from 20 to 22.5 kt", "keep"."""
         unit = f" {self.unit}" if self.unit else ""
         if self.texts:
             return f"{self.texts[place]}{unit}"
@@ -126,8 +126,8 @@ def axis_of(
     Args:
         variable: The variable.
         points: The values at each point.
-        n_bins: Most bins.
-        is_even: Bins have equal widths, or ratios on a logarithmic axis; else they hold equally many points.
+        n_bins: Largest number of bins.
+        is_even: Bins have equal widths, or equal ratios on a logarithmic axis; else they contain equally many points.
     """
     given = [point[variable.name] for point in points]
     if not all(isinstance(value, (int, float)) and not isinstance(value, bool) for value in given):
@@ -166,16 +166,16 @@ def _mean_by(values: np.ndarray, group: np.ndarray, n_groups: int) -> np.ndarray
 def clustered_mean(
     values: np.ndarray, seed: np.ndarray, draw: np.ndarray | None, *, is_share: bool
 ) -> tuple[float, float, float]:
-    """Mean of runs and its 95 % interval, for runs that are not independent; NaN where there is none.
+    """Return the mean of runs that are not independent, and its 95 % interval; NaN if unknown.
 
-    Runs of one seed share their chance, and runs of one draw of points share their values. The variance is clustered by both
-    (Cameron, Gelbach and Miller 2011), or by one where the other has too few clusters; the interval is Student's with one degree of
-    freedom less than there are clusters. Of a share it is Wilson's, for as many independent runs as have this variance (Kish).
+    Runs with the same seed are correlated, and so are runs of points from the same draw. The variance is clustered by both
+    (Cameron, Gelbach and Miller 2011), or by one if the other has too few clusters; the interval is Student's with one degree of
+    freedom less than the number of clusters. For a share it is Wilson's, with Kish's effective number of independent runs.
 
     Args:
         values: Value of each run, (n,); NaN is left out.
         seed: Its seed, (n,).
-        draw: Its draw of points, (n,); None where the points were chosen, not drawn.
+        draw: Its draw of points, (n,); None if the points were not drawn.
         is_share: The values are 0 and 1.
     """
     is_known = np.isfinite(values)
@@ -260,7 +260,7 @@ class ReportData:
         return "length of the game [s]" if expression == "t" else self.results.title(expression)
 
     def point_name(self, point: int) -> str:
-        """The values of a point, without the name where one variable varies."""
+        """Return the values of a point, without the name of the variable if there is only one."""
         label = self.results.label(point)
         return label.split("=", 1)[1] if len(self.results.variables) == 1 else label
 
@@ -288,7 +288,7 @@ class ReportData:
 
     @cached_property
     def draw(self) -> np.ndarray | None:
-        """Which draw each run's point comes from, (n_runs,): points of one draw share values; None where points were chosen."""
+        """Number of the draw of each run's point, (n_runs,): points of one draw share values. None if the points were not drawn."""
         if not self.is_drawn:
             return None
         n_choices = math.prod(len(v.values) for v in self.results.variables if isinstance(v, Choice))
@@ -296,7 +296,7 @@ class ReportData:
         return np.asarray(self.point // per_draw)
 
     def known(self, expression: str) -> np.ndarray:
-        """The known values of a quantity; none for one that nobody reports."""
+        """Return the known values of a quantity, (n,); empty if no plugin reports it."""
         is_name = re.fullmatch(r"[\w.]+(\[-?\d+\])?", expression)
         if is_name and expression not in self.results.quantities:
             return np.empty(0)
@@ -328,7 +328,7 @@ class ReportData:
 
     @cached_property
     def rivals(self) -> tuple[int, ...]:
-        """Teams that score or win in some game, those with more wins first."""
+        """Teams that score or win in some game, ordered by wins."""
         found = {}
         for team in self.results.teams:
             scores, wins = (self.known(f"{name}[{team}]") for name in ("score", "wins"))
@@ -338,13 +338,13 @@ class ReportData:
 
     @cached_property
     def wins(self) -> tuple[Measure, ...]:
-        """Who wins; empty where nobody can."""
+        """Wins of the teams that score or win; empty for games without scores."""
         teams = [t for t in self.rivals if f"wins[{t}]" in self.results.quantities]
         return tuple(Measure(f"wins[{t}]", self.name_of(t), t, "share of the games won", True) for t in teams)
 
     @cached_property
     def scores(self) -> tuple[Measure, ...]:
-        """How much each team scores; without scores, how many of each are left at the end."""
+        """Scores of the teams; in games without scores, the entities left at the end."""
         if self.rivals:
             return tuple(Measure(f"score[{t}]", self.name_of(t), t, "score") for t in sorted(self.rivals))
         teams = [t for t in self.results.teams if varies(self.known(f"alive[{t}]"))]
@@ -352,12 +352,12 @@ class ReportData:
 
     @property
     def measures(self) -> tuple[Measure, ...]:
-        """All that is shown."""
+        """All quantities of the report."""
         return (*self.wins, *self.scores, *self.more)
 
     @property
     def groups(self) -> list[tuple[str, tuple[Measure, ...]]]:
-        """Measures that share a plot, with the beginning of its file's name."""
+        """Measures that share a plot, with the beginning of its file name."""
         found = [("wins", self.wins), ("score" if self.rivals else "left", self.scores)]
         found += [(file_name(m.expression), (m,)) for m in self.more]
         return [(stem, measures) for stem, measures in found if measures]
@@ -382,7 +382,7 @@ class ReportData:
 
     @cached_property
     def shown_variables(self) -> tuple[Variable, ...]:
-        """The variables that get plots, in the order in which they were given."""
+        """The variables with plots, in the order in which they were given."""
         if len(self.variables) <= MOST_VARIABLES:
             return self.variables
         ranked = self.by_strength()[:MOST_VARIABLES]

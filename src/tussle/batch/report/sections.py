@@ -36,9 +36,9 @@ MOST_MEANS = 60
 MOST_FAILED = 50
 MOST_SLOW = 10
 SMALL = 5
-"""Teams that have so many times fewer entities than the largest get a plot of their own."""
+"""Teams with fewer entities than the largest by this factor have their own plot."""
 MOST_CURVES = 6
-"""Points whose curves can be told apart in one plot."""
+"""Largest number of points with a curve each in one plot."""
 METHODS = {
     "lhs": "a Latin hypercube",
     "sobol": "a scrambled Sobol sequence",
@@ -71,7 +71,7 @@ class ReportTable:
     """A table with its text.
 
     Args:
-        title: What it shows; empty where the section says it.
+        title: What it shows; empty if the title of the section says it.
         columns: Name and kind of each column: "text", "number" (aligned right) or "code".
         rows: Cells as they are shown, row by row.
         caption: How to read it.
@@ -141,7 +141,7 @@ def won(data: ReportData) -> Section:
 
 
 def _outside(values: np.ndarray) -> str:
-    """What the caption says of games whose values the plot does not reach."""
+    """Return the sentence of the caption on values outside the plot; "" if there are none."""
     n = len(values) - len(plots.inside(values))
     far = f"from {number(values.min())} to {number(values.max())}"
     return f" The values go {far}; {count(n)} of {count(len(values))} lie beyond the plot." if n else ""
@@ -180,7 +180,7 @@ def _means(data: ReportData) -> ReportTable:
     results = data.results
 
     def is_score_again(name: str) -> bool:
-        """A metric reports the team's score once more."""
+        """Whether a metric repeats the team's score."""
         plugin, _, score = name.rpartition(".")
         return (
             bool(plugin)
@@ -188,7 +188,7 @@ def _means(data: ReportData) -> ReportTable:
             and np.array_equal(data.known(name), data.known(score))
         )
 
-    names = [q for q in results.quantities if not q.startswith(("wins[", "ties", "start[", "steps"))]
+    names = [q for q in results.quantities if not q.startswith(("wins[", "ties", "start[", "lost[", "steps"))]
     names = [q for q in names if varies(data.known(q)) and not is_score_again(q)]
     rows = [
         (
@@ -409,7 +409,7 @@ def answer(data: ReportData) -> str:
 
 
 def _most_and_least(data: ReportData) -> Iterator[str]:
-    """Where the first of the winners won most and least, along the strongest variable; nothing where chance could have done it."""
+    """Yield where the best team won most and least, along the strongest variable, if the intervals do not overlap."""
     if not data.variables:
         return
     leader = data.wins[0]
@@ -425,7 +425,7 @@ def _most_and_least(data: ReportData) -> Iterator[str]:
 
 
 def _who_was_left(data: ReportData) -> str:
-    """Where nobody scores, how many of each team were left."""
+    """Return how many of each team were left, for games without scores."""
     found = []
     for measure in data.scores:
         left_, start = data.results.means([measure.expression, measure.expression.replace("alive", "start")])
@@ -438,7 +438,7 @@ def _who_was_left(data: ReportData) -> str:
 
 
 def notes(data: ReportData) -> list[str]:
-    """What a reader must know before the rest."""
+    """Return notes on missing and failed games, for the top of the page."""
     results = data.results
     found = [sentence(note) for note in results.notes]
     if results.n_failed:

@@ -34,20 +34,20 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MOST_DOTS = 400
-"""Points that are shown one by one behind the means."""
+"""Largest number of points that are shown one by one behind the means."""
 MOST_PLACES = 20
-"""Choices in one plot, and points in a table."""
+"""Largest number of choices in a plot, and of points in a table."""
 MOST_CELLS = 16
-"""Bins along one side of a map."""
+"""Largest number of bins along one side of a map."""
 POINTS_PER_CELL = 5
 FEWEST_CELLS = 4
-"""Cells with games, below which a map says less than a table."""
+"""Fewest cells with games for which a map is drawn."""
 MOST_NUMBERS = 6
-"""Numbers to choose from that are compared with each other; more of them are rather read along an axis."""
+"""Largest number of values of a numeric choice that are compared in pairs."""
 
 
 def effects(data: ReportData) -> Section:
-    """Each quantity along each variable."""
+    """Return the means of each quantity along each variable."""
     title = "What the varied values do"
     axes = [axis_of(variable, data.points) for variable in data.shown_variables]
     found = [_effects_of(data, axes, stem, measures) for stem, measures in data.groups] if axes else []
@@ -62,7 +62,7 @@ def effects(data: ReportData) -> Section:
 
 
 def _effects_of(data: ReportData, axes: Sequence[Axis], stem: str, measures: Sequence[Measure]) -> list[Plot]:
-    """Some measures along each variable, on one scale."""
+    """Return plots of some measures along each variable, on one scale."""
     label, is_share = measures[0].label, measures[0].is_share
     lines = [[_series(data, axis, m) for m in measures] for axis in axes]
     limits = _limits(list(itertools.chain.from_iterable(lines)), is_share) if len(axes) > 1 else None
@@ -84,7 +84,7 @@ def _draw_effect(
 
 
 def _series(data: ReportData, axis: Axis, measure: Measure) -> plots.Series:
-    """Means of a quantity along an axis; single points behind them where there are bins and not too many points."""
+    """Return the means of a quantity along an axis, with single points behind them if there are bins and not too many points."""
     rows = data.means_at(axis, measure)[: None if axis.is_number else MOST_PLACES]
     found = plots.series_of(measure.name, measure.colour, measure.marker, rows)
     if axis.texts or measure.is_share or len(data.points) > MOST_DOTS:
@@ -217,7 +217,7 @@ def _strength(effect: Effect) -> float | None:
 
 
 def differences(data: ReportData) -> Section:
-    """What another choice changes, seed by seed."""
+    """Return the differences between the values of each choice, paired by seed."""
     rows, lead = list[list[str]](), []
     for variable in data.variables:
         axis = axis_of(variable, data.points)
@@ -246,7 +246,7 @@ def differences(data: ReportData) -> Section:
 
 
 def _compared(data: ReportData, axis: Axis, measure: Measure) -> list[PairedComparison]:
-    """Each further value with the first one.
+    """Compare each further value with the first one.
 
     Raises:
         ParameterError: A value cannot be named, or the points cannot be paired.
@@ -273,7 +273,7 @@ def _difference_cells(data: ReportData, measure: Measure, c: PairedComparison) -
 
 
 def points(data: ReportData) -> Section:
-    """A table of points, those with most and least of the first quantity where they are many."""
+    """Return a table of points; of many points, those with most and least of the first quantity."""
     if not data.has_points or not data.measures:
         return Section("points", "Point by point")
     columns = [data.mean_by_point(m) for m in data.measures]
