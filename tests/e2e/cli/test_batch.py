@@ -246,6 +246,7 @@ WRONG = {
     "until nothing": (["chance.xml", "--until", "score[9]:1"], 1, "there is no 'score[9]'"),
     "log out of range": (["chance.xml", "--record-runs", "3,12", "--runs", "12"], 1, "--record-runs '12' is not allowed"),
     "log is no number": (["chance.xml", "--record-runs", "a"], 1, "--record-runs 'a' is not allowed; it takes numbers of runs"),
+    "former name of an option": (["chance.xml", "--log", "3"], 2, "--log; it is now called --record-runs"),
     "sweep is not there": (["chance.xml", "--sweep", "sweep.toml"], 1, "sweep.toml"),
     "too many seeds": (["chance.xml", "--runs", "2", "--seed", str(2**64 - 1)], 1, "begin with a smaller one"),
     "runs": (["chance.xml", "--runs", "0"], 2, "Invalid value for '--runs'"),
