@@ -44,8 +44,7 @@ class Bytes:
         return np.array(out)
 
     def reals(self, n: int) -> np.ndarray:
-        planes = [self.take(n) for _ in range(8)]
-        return np.frombuffer(bytes(planes[k][i] for i in range(n) for k in range(8)), "<f8")
+        return np.frombuffer(self.take(8 * n), "<f8")
 
 
 @dataclass

@@ -13,7 +13,7 @@ from tussle.mission import read_mission
 from tussle.view import Live
 from tussle.view.entity import EntityState, Reading, ShownMessage
 from tussle.view.page import formatting
-from tussle.view.page.assemble import MODULES, SERVED, page_html
+from tussle.view.page.assemble import MAIN, SERVED, page_html, script_text
 from tussle.view.page.document import game_document, opening_data, reach_of
 
 WEB = files("tussle.view.page").joinpath("web")
@@ -109,28 +109,19 @@ def test_an_entity_is_told_with_its_plugins_and_messages():
 # -- modules and keys -------------------------------------------------------------------------------------------------------------
 
 
-def test_all_modules_are_on_the_page_and_import_what_others_export():
-    names = (*MODULES, SERVED)
-    assert {f.name for f in WEB.iterdir()} == {"page.html", "page.css", *names}
-    assert len(set(names)) == len(names)
-    exports = {}
-    for name in names:
-        exports[name] = set(
-            re.findall(
-                r"^export (?:const|class|function|async function) (\w+)",
-                WEB.joinpath(name).read_text(),
-                re.MULTILINE,
-            )
-        )
-    seen = [name for found in exports.values() for name in found]
-    assert len(seen) == len(set(seen)), "joined into one script, two modules would share a name"
-    order = (*MODULES[:-1], SERVED, MODULES[-1])
-    for i, name in enumerate(order):
-        for wanted, other in re.findall(
-            r"^import \{([^}]*)\} from '\./([\w.]+)';", WEB.joinpath(name).read_text(), re.MULTILINE
-        ):
-            assert other in order[:i], f"{name} imports {other}, which comes later"
-            assert {w.strip() for w in wanted.split(",")} <= exports[other], f"{name} from {other}"
+def test_all_modules_are_on_the_page_once_and_after_what_they_import():
+    modules = {f.name for f in WEB.iterdir() if f.name.endswith(".js")}
+    script = script_text([SERVED, MAIN])
+    place = {}
+    for name in modules:
+        first_line = WEB.joinpath(name).read_text().partition("\n")[0]
+        assert script.count(first_line) == 1, name
+        place[name] = script.index(first_line)
+    for name in modules:
+        for other in re.findall(r"^import [^;]*'\./([\w.]+)';", WEB.joinpath(name).read_text(), re.MULTILINE):
+            assert place[other] < place[name], f"{name} imports {other}, which comes later"
+    declared = re.findall(r"^(?:const|class|function|async function) (\w+)", script, re.MULTILINE)
+    assert len(declared) == len(set(declared)), "joined into one script, two modules would share a name"
 
 
 def test_only_a_page_that_is_served_can_ask_anybody(live):

@@ -69,7 +69,7 @@ def test_a_served_run_is_what_was_recorded(runs, monkeypatch, is_mapped):
                 assert sorted(seen) == frame.id.tolist()
                 off = np.array([seen[who].pos for who in frame.id.tolist()]) - frame.pos
                 assert np.linalg.norm(off, axis=1).max() <= document["positionError"] + 1e-11
-        assert len(json.loads(blob("events"))["t"]) == len(recording.events)
+        assert len(json.loads(blob("events"))) == len(recording.events)
         assert sum(n[0] for n in document["curves"]["n"]) == len(recording.frame(0))
         with pytest.raises(HTTPError, match="404"):
             blob("chunk-999")

@@ -6,40 +6,20 @@ import base64
 import hashlib
 import re
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from html import escape
 from importlib.resources import files
 from typing import Any
 
 from tussle.view.page.recorded import compact_json
 
-MODULES = (
-    *(
-        "event_texts.js",
-        "formatting.js",
-        "geometry.js",
-        "packing.js",
-        "sources.js",
-        "chunk.js",
-        "layer.js",
-        "live.js",
-        "camera.js",
-    ),
-    *(
-        "shaders.js",
-        "drawing.js",
-        "models.js",
-        "trails.js",
-        "scenery.js",
-        "reach.js",
-        "drawn.js",
-        "events.js",
-    ),
-    *("overlay.js", "timeline.js", "panels.js", "steering.js", "keys.js", "actions.js", "player.js"),
-)
-"""Modules of the page, each after those that it imports."""
+MAIN = "main.js"
+"""The module that starts the page; it and those that it imports are the script."""
 SERVED = "served.js"
 """The module that asks the page's server; a file does not hold it."""
+IMPORT = re.compile(r"^import [^;]*'\./([\w.]+)';\n", re.MULTILINE)
+DOC_COMMENT = re.compile(r"^ */\*\*(?:(?!\*/).)*\*/\n", re.MULTILINE | re.DOTALL)
+EXPORT = re.compile(r"^export (?=\w)", re.MULTILINE)
 NO_MARKUP = str.maketrans({c: f"\\u{ord(c):04x}" for c in "<>&"})
 
 
@@ -50,14 +30,8 @@ def page_html(document: Mapping[str, Any], blobs: Mapping[str, bytes] | None = N
         document: What it is told at once.
         blobs: Data by name, for a file; None for a page that asks its server.
     """
-    folder = files("tussle.view.page").joinpath("web")
-    modules = MODULES if blobs is not None else (*MODULES[:-1], SERVED, MODULES[-1])
-
-    def text(name: str) -> str:
-        return folder.joinpath(name).read_text(encoding="utf-8")
-
-    script = "(() => {\n'use strict';\n" + "\n".join(_joined(text(name)) for name in modules) + "})();\n"
-    style = text("page.css")
+    script = script_text([MAIN] if blobs is not None else [SERVED, MAIN])
+    style = web_text("page.css")
     # Nothing runs but this very script: what got in as text cannot.
     policy = (
         f"default-src 'none'; script-src '{_hash(script)}'; style-src '{_hash(style)}'; img-src data:; "
@@ -73,14 +47,33 @@ def page_html(document: Mapping[str, Any], blobs: Mapping[str, bytes] | None = N
         "blobs": "\n".join(_blob(name, data) for name, data in (blobs or {}).items()),
         "script": script,
     }
-    return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found[1]], text("page.html"))
+    return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found[1]], web_text("page.html"))
 
 
-def _joined(module: str) -> str:
-    """Return a module without its imports and exports, as a part of one script."""
-    return re.sub(
-        r"^export (?=\w)", "", re.sub(r"^import [^;]*;\n", "", module, flags=re.MULTILINE), flags=re.MULTILINE
-    )
+def web_text(name: str) -> str:
+    """Return the text of a file of the page."""
+    return files("tussle.view.page").joinpath("web", name).read_text(encoding="utf-8")
+
+
+def script_text(entries: Sequence[str]) -> str:
+    """Return modules and all that they import as one script, each module once and after its imports.
+
+    Not modules of the browser: from a file it loads none, and the hash in the page's policy covers this one script.
+    """
+    parts: dict[str, str] = {}
+
+    def add(name: str) -> None:
+        if name in parts:
+            return
+        text = parts[name] = web_text(name)
+        for imported in IMPORT.findall(text):
+            add(imported)
+        del parts[name]  # it comes after what it imports
+        parts[name] = EXPORT.sub("", DOC_COMMENT.sub("", IMPORT.sub("", text)))
+
+    for name in entries:
+        add(name)
+    return "(() => {\n'use strict';\n" + "\n".join(parts.values()) + "})();\n"
 
 
 def _hash(text: str) -> str:

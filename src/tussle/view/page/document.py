@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, Protocol
 
 import numpy as np
 
 from tussle import __version__
 from tussle.mission import Mission
+from tussle.view.frame import Event
 from tussle.view.page.packing import ints
 from tussle.view.scenery import Base, Region, Scenery
 from tussle.view.shapes import MODELS, Mesh
@@ -149,6 +150,11 @@ def digits_for(size: float) -> int:
 def mesh_data(mesh: Mesh, digits: int) -> dict[str, Any]:
     """Corners and triangles, each as one list of numbers."""
     return {"vertices": rounded(mesh.vertices.ravel(), digits), "faces": mesh.faces.ravel().tolist()}
+
+
+def event_rows(events: Iterable[Event]) -> list[list[Any]]:
+    """Time, kind, both ids and text of each event."""
+    return [[e.t, e.kind, e.id, e.other, e.text] for e in events]
 
 
 def models_data(names: set[str]) -> dict[str, Any]:

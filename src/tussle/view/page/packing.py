@@ -45,10 +45,9 @@ def column(values: np.ndarray, is_head: np.ndarray) -> bytes:
 
 
 def reals(values: np.ndarray) -> bytes:
-    """Pack floats without loss: eight byte planes, lowest byte first.
+    """Pack floats without loss, eight bytes each, lowest first.
 
     Args:
         values: (n,).
     """
-    raw = np.ascontiguousarray(values, "<f8").view(np.uint8).reshape(-1, 8)
-    return raw.T.tobytes()
+    return np.ascontiguousarray(values, "<f8").tobytes()

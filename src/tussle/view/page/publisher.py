@@ -18,6 +18,7 @@ from tussle.view.frame import Event, Frame
 from tussle.view.live import Live
 from tussle.view.page.chunks import FULL_HEALTH, UNIT, pack, step_of
 from tussle.view.page.commands import LARGEST_ID, Command, game_commands, number, read_command, whole
+from tussle.view.page.document import event_rows
 from tussle.view.page.drawing import drawing_message
 from tussle.view.page.failures import Failures
 from tussle.view.page.formatting import entity_sections, result_rows
@@ -212,7 +213,7 @@ class Publisher:
             n = 0
         new = events[n : n + MOST_EVENTS]
         reader.events_sent = events[: n + len(new)]
-        return {"from": n, "rows": [[e.t, e.kind, e.id, e.other, e.text] for e in new]}
+        return {"from": n, "rows": event_rows(new)}
 
     def _entity(self, reader: Reader) -> dict[str, Any] | None:
         state = self._live.entity(reader.chosen) if reader.chosen else None

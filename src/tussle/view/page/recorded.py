@@ -12,7 +12,7 @@ from tussle.errors import ParameterError, ViewError
 from tussle.mission import Mission
 from tussle.view.page.chunks import ANGLE_ERROR, FULL_HEALTH, UNIT, pack, position_error, step_of
 from tussle.view.page.compare import Comparison
-from tussle.view.page.document import game_document, terrain_bytes
+from tussle.view.page.document import event_rows, game_document, terrain_bytes
 from tussle.view.page.packing import reals
 from tussle.view.recording import Recording
 
@@ -139,10 +139,7 @@ class RecordedData:
         if name == "times":
             return reals(self._game.t[self.kept])
         if name == "events":
-            columns = ("t", "kind", "id", "other", "text")
-            return compact_json(
-                {c: [getattr(event, c) for event in self._game.events] for c in columns}
-            ).encode()
+            return compact_json(event_rows(self._game.events)).encode()
         if name == "terrain":
             return self._terrain
         kind, _, number = name.partition("-")

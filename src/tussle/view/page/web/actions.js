@@ -1,26 +1,39 @@
 // What can be done, by name: keys, buttons and settings come here.
+/** @import { Drawn } from './types' */
+/** @import { Player } from './player.js' */
 
-import { say } from './formatting.js';
-import { TRAIL_LENGTHS, Trails } from './trails.js';
+import { byId, field, say } from './formatting.js';
+import { TRAIL_LENGTHS } from './trails.js';
 
+/** @param {Player} player @returns {Record<string, () => void>} */
 export function actionsOf(player) {
-  const { camera, clock, drawn } = player;
-  const remember = () => camera.remember(player.chosen);
-  const dialog = (name) => () => document.getElementById(name).showModal();
-  const change = (act) => () => {
+  const { camera, clock, drawn, viewpoint } = player;
+  const dialog = (/** @type {string} */ name) => () => byId(name, HTMLDialogElement).showModal();
+  const change = (/** @type {() => void} */ act) => () => {
     act();
     showSettings(player);
     player.look();
   };
-  const follow = (direction) => () => {
-    const id = player.neighbour(direction);
-    if (!id) return;
-    const isFollowing = camera.mode === 'follow' || camera.mode === 'behind';
-    remember();
-    player.choose(id);
-    if (!isFollowing) player.enter('follow');
+  const flip = (/** @type {'labels' | 'grid' | 'links'} */ name) => change(() => { drawn[name] = !drawn[name]; });
+  const shift = (/** @type {'scale' | 'text'} */ name, /** @type {number} */ step) => change(() => {
+    const { min, max } = field(RANGES[name]);
+    drawn[name] = Math.max(Number(min), Math.min(Number(max), drawn[name] + step));
+  });
+  const trail = (/** @type {(length: number) => number} */ next) => change(() => {
+    drawn.trail = next(drawn.trail);
+    player.lookBack();
+    player.say(`Trails: ${trailText(drawn.trail)}`);
+  });
+  /** Change the view so that `undo` brings it back. */
+  const view = (/** @type {() => void} */ act) => () => {
+    viewpoint.remember();
+    act();
   };
-  const event = (isBack) => () => {
+  const zoom = (/** @type {number} */ factor) => change(() => {
+    viewpoint.leaveOverview();
+    camera.zoom(factor);
+  });
+  const event = (/** @type {boolean} */ isBack) => () => {
     const found = player.events.next(clock.t, isBack);
     if (found) player.jump(found);
   };
@@ -36,98 +49,96 @@ export function actionsOf(player) {
     nextEvent: event(false),
     lastEvent: event(true),
 
-    overview: () => { remember(); player.overview(false); },
-    top: () => { remember(); player.overview(true); },
-    reset: () => { remember(); player.reset(); },
-    follow: () => { remember(); player.enter('follow'); },
-    behind: () => { remember(); player.enter('behind'); },
-    free: () => player.enter('free'),
-    mode: () => { remember(); player.nextMode(); },
-    nextEntity: follow(1),
-    lastEntity: follow(-1),
-    nearer: change(() => { player.leaveOverview(); camera.zoom(0.8); }),
-    farther: change(() => { player.leaveOverview(); camera.zoom(1.25); }),
+    overview: view(() => viewpoint.overview(false)),
+    top: view(() => viewpoint.overview(true)),
+    reset: view(() => viewpoint.reset()),
+    follow: view(() => viewpoint.enter('follow')),
+    behind: view(() => viewpoint.enter('behind')),
+    free: () => viewpoint.enter('free'),
+    mode: view(() => viewpoint.nextMode()),
+    nextEntity: view(() => viewpoint.followNext(1)),
+    lastEntity: view(() => viewpoint.followNext(-1)),
+    nearer: zoom(0.8),
+    farther: zoom(1.25),
     undo: change(() => {
       const chosen = camera.undo();
       if (chosen !== null) player.choose(chosen, false);
     }),
     unchoose: change(() => {
-      const settings = document.getElementById('settings');
       if (player.isPicking) return player.pick(false);
-      if (settings.hidden) player.choose(0);
-      settings.hidden = true;
+      if (byId('settings').hidden) player.choose(0);
+      byId('settings').hidden = true;
+      return undefined;
     }),
 
-    larger: change(() => { drawn.scale = Math.min(12, drawn.scale + 1); }),
-    smaller: change(() => { drawn.scale = Math.max(-6, drawn.scale - 1); }),
+    larger: shift('scale', 1),
+    smaller: shift('scale', -1),
     usualSize: change(() => { drawn.scale = 0; }),
-    trails: change(() => { drawn.trail = (drawn.trail + 1) % TRAIL_LENGTHS.length; player.lookBack(); player.say(`Trails: ${trailWords(drawn.trail)}`); }),
-    shorterTrails: change(() => { drawn.trail = Math.max(0, drawn.trail - 1); player.say(`Trails: ${trailWords(drawn.trail)}`); }),
-    labels: change(() => { drawn.labels = !drawn.labels; }),
-    smallerText: change(() => { drawn.text = Math.max(-3, drawn.text - 1); }),
-    largerText: change(() => { drawn.text = Math.min(6, drawn.text + 1); }),
+    trails: trail((i) => (i + 1) % TRAIL_LENGTHS.length),
+    shorterTrails: trail((i) => Math.max(0, i - 1)),
+    labels: flip('labels'),
+    largerText: shift('text', 1),
+    smallerText: shift('text', -1),
     wire: change(() => { drawn.wire = true; }),
     solid: change(() => { drawn.wire = false; }),
-    grid: change(() => { drawn.grid = !drawn.grid; }),
-    links: change(() => { drawn.links = !drawn.links; }),
-    theme: () => player.nextTheme(),
-    save: () => player.savePicture(),
+    grid: flip('grid'),
+    links: flip('links'),
+    theme: () => player.picture.nextTheme(),
+    save: () => player.picture.save(),
 
     pick: () => player.pick(!player.isPicking),
     customKey: () => player.order('key', { key: ';' }),
-    anew: () => player.order('reset', { seed: Number(document.getElementById('seed').value) }),
+    anew: () => player.order('reset', { seed: Number(field('seed').value) }),
 
     help: dialog('help'),
     info: dialog('info'),
-    close: () => document.querySelector('dialog[open]').close(),
-    settings: () => { document.getElementById('settings').hidden = !document.getElementById('settings').hidden; },
+    close: () => /** @type {HTMLDialogElement} */ (document.querySelector('dialog[open]')).close(),
+    settings: () => { byId('settings').hidden = !byId('settings').hidden; },
   };
 }
 
-function trailWords(i) {
+/** @param {number} i */
+function trailText(i) {
   const seconds = TRAIL_LENGTHS[i];
-  if (seconds === 0) return 'none';
-  return seconds === Infinity ? 'all' : `${seconds} s`;
+  return seconds === 0 ? 'none' : seconds === Infinity ? 'all' : `${seconds} s`;
 }
 
-const CHECKS = ['labels', 'wire', 'least', 'grid', 'regions', 'shapes', 'rings', 'cones', 'links'];
-const RANGES = { trail: 'trail', size: 'scale', text: 'text' };
-/** Numbers of the settings: lengths [m] and an angle [degrees]. */
-const NUMBERS = ['ringRadius', 'coneRange', 'coneAngle', 'linkRange'];
+const CHECKS = /** @type {const} */ (['labels', 'wire', 'least', 'grid', 'regions', 'shapes', 'rings', 'cones', 'links']);
+/** Setting -> id of its slider. */
+const RANGES = /** @type {const} */ ({ trail: 'trail', scale: 'size', text: 'text' });
+/** Lengths [m] and an angle [degrees]. */
+const NUMBERS = /** @type {const} */ (['ringRadius', 'coneRange', 'coneAngle', 'linkRange']);
 
+/** @param {Player} player */
 export function listenToSettings(player) {
-  for (const name of CHECKS) {
-    document.getElementById(name).addEventListener('change', (event) => {
-      player.drawn[name] = event.target.checked;
-      player.look();
-    });
-  }
-  for (const [id, name] of Object.entries(RANGES)) {
-    document.getElementById(id).addEventListener('input', (event) => {
-      player.drawn[name] = Number(event.target.value);
-      if (name === 'trail') player.lookBack();
+  const { drawn } = player;
+  const listen = (/** @type {string} */ id, /** @type {string} */ kind, /** @type {(input: HTMLInputElement) => void} */ take) => {
+    field(id).addEventListener(kind, () => {
+      take(field(id));
       showSettings(player);
       player.look();
     });
-  }
-  for (const name of NUMBERS) {
-    const field = document.getElementById(name);
-    field.value = String(player.drawn[name]);
-    field.addEventListener('change', () => {
-      if (field.value !== '' && field.checkValidity()) player.drawn[name] = Number(field.value);
-      else field.value = String(player.drawn[name]);
-      player.look();
+  };
+  for (const name of CHECKS) listen(name, 'change', ({ checked }) => { drawn[name] = checked; });
+  for (const name of NUMBERS) listen(name, 'change', (input) => { if (input.value !== '' && input.checkValidity()) drawn[name] = Number(input.value); });
+  for (const [name, id] of /** @type {['trail' | 'scale' | 'text', string][]} */ (Object.entries(RANGES))) {
+    listen(id, 'input', ({ value }) => {
+      drawn[name] = Number(value);
+      if (name === 'trail') player.lookBack();
     });
   }
-  document.getElementById('loop').addEventListener('change', (event) => { player.clock.isLooping = event.target.checked; });
+  listen('loop', 'change', ({ checked }) => { player.clock.isLooping = checked; });
   showSettings(player);
 }
 
-/** Bring the settings up to what keys have changed. */
+/** Bring the settings up to what keys have changed. @param {{ drawn: Drawn }} player */
 function showSettings({ drawn }) {
-  for (const name of CHECKS) document.getElementById(name).checked = drawn[name];
-  for (const [id, name] of Object.entries(RANGES)) document.getElementById(id).value = String(drawn[name]);
-  say(document.getElementById('trail-says'), trailWords(drawn.trail));
-  say(document.getElementById('size-says'), `${Number((1.5 ** drawn.scale).toPrecision(2))}×`);
-  say(document.getElementById('text-says'), `${Math.round(100 * 1.15 ** drawn.text)} %`);
+  for (const name of CHECKS) field(name).checked = drawn[name];
+  for (const name of NUMBERS) field(name).value = String(drawn[name]);
+  field('trail').value = String(drawn.trail);
+  field('size').value = String(drawn.scale);
+  field('text').value = String(drawn.text);
+  say(byId('trail-says'), trailText(drawn.trail));
+  say(byId('size-says'), `${Number((1.5 ** drawn.scale).toPrecision(2))}×`);
+  say(byId('text-says'), `${Math.round(100 * 1.15 ** drawn.text)} %`);
 }

@@ -1,4 +1,5 @@
 // Frames that follow one another, as chunks.py packs them: states track after track, frame after frame.
+/** @import { PageData, Sample } from './types' */
 
 import { Reader } from './packing.js';
 
@@ -6,49 +7,70 @@ import { Reader } from './packing.js';
 const HEAD_BYTES = 52;
 
 export class Chunk {
-  /** `page` has the steps of attitudes and health. */
-  constructor(bytes, page) {
+  /** @param {Uint8Array} bytes @param {Pick<PageData, 'attitudeUnit' | 'healthSteps'>} units steps of attitudes and health */
+  constructor(bytes, { attitudeUnit, healthSteps }) {
     const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
     this.low = [0, 1, 2].map((i) => view.getFloat64(8 * i, true));
     this.step = view.getFloat64(24, true);
     const fullHealth = view.getFloat64(32, true);
-    [this.first, this.nFrames, this.nTracks] = [40, 44, 48].map((at) => view.getUint32(at, true));
-    const reader = new Reader(bytes);
-    reader.at = HEAD_BYTES;
+    this.first = view.getUint32(40, true);
+    this.nFrames = view.getUint32(44, true);
+    this.nTracks = view.getUint32(48, true);
+    const reader = new Reader(bytes, HEAD_BYTES);
     this.times = reader.reals(this.nFrames);
-    for (const name of ['id', 'team', 'block', 'begin', 'end']) this[name] = reader.ints(this.nTracks);
+    this.id = reader.ints(this.nTracks);
+    this.team = reader.ints(this.nTracks);
+    this.block = reader.ints(this.nTracks);
+    this.begin = reader.ints(this.nTracks);
+    this.end = reader.ints(this.nTracks);
     const counts = this.begin.map((begin, i) => this.end[i] - begin + 1);
     this.row = new Int32Array(this.nTracks);
     for (let i = 1; i < this.nTracks; i++) this.row[i] = this.row[i - 1] + counts[i - 1];
-    [this.x, this.y, this.z] = [0, 1, 2].map(() => reader.column(counts));
+    this.x = reader.column(counts);
+    this.y = reader.column(counts);
+    this.z = reader.column(counts);
     const [largest, ...others] = [0, 1, 2, 3].map(() => reader.column(counts));
-    this.quat = attitudes(largest, others, page.attitudeUnit);
-    this.health = Float32Array.from(reader.column(counts), (steps) => (steps / page.healthSteps) * fullHealth);
+    this.quat = attitudes(largest, others, attitudeUnit);
+    this.health = Float32Array.from(reader.column(counts), (steps) => (steps / healthSteps) * fullHealth);
     this.nStates = this.x.length;
+    /** @type {Map<number, number[]> | null} */
+    this.tracksOf = null;
   }
 
-  get last() {
-    return this.first + this.nFrames - 1;
-  }
-
-  /** The track of an id in a frame, counted from the chunk's first; -1 where it is not there. */
-  trackIn(id, frame) {
+  /** Id -> its tracks. @returns {Map<number, number[]>} */
+  get tracks() {
     if (!this.tracksOf) {
       this.tracksOf = new Map();
-      this.id.forEach((each, k) => this.tracksOf.set(each, [...(this.tracksOf.get(each) || []), k]));
+      this.id.forEach((id, k) => this.tracksOf.set(id, [...(this.tracksOf.get(id) || []), k]));
     }
-    const found = (this.tracksOf.get(id) || []).find((k) => this.begin[k] <= frame && this.end[k] >= frame);
-    return found === undefined ? -1 : found;
+    return this.tracksOf;
   }
 
-  placeOf(row) {
+  /** One of its frames. @param {number} frame counted from its first @returns {Sample} */
+  sample(frame) {
+    const isThere = (/** @type {number} */ k) => this.begin[k] <= frame && this.end[k] >= frame;
+    return {
+      t: this.times[frame],
+      ids: () => this.id.filter((_, k) => isThere(k)),
+      placeOf: (id) => {
+        const k = this.tracks.get(id)?.find(isThere);
+        return k === undefined ? null : this.place(this.row[k] + frame - this.begin[k]);
+      },
+    };
+  }
+
+  /** @param {number} row @param {number} after row of the next frame @param {number} share of the way to it */
+  place(row, after = row, share = 0) {
     const { low, step } = this;
-    return [low[0] + step * this.x[row], low[1] + step * this.y[row], low[2] + step * this.z[row]];
+    return [this.x, this.y, this.z].map((c, axis) => low[axis] + step * (c[row] + share * (c[after] - c[row])));
   }
 }
 
-/** Quaternions from which component is largest and steps of the three others, each up to sqrt(1/2). */
-export function attitudes(largest, others, unitSteps) {
+/**
+ * Quaternions from the number of the largest component and steps of the three others, each up to sqrt(1/2).
+ * @param {Int32Array} largest @param {Int32Array[]} others @param {number} unitSteps
+ */
+function attitudes(largest, others, unitSteps) {
   const out = new Float32Array(4 * largest.length);
   const step = Math.SQRT1_2 / unitSteps;
   for (let row = 0; row < largest.length; row++) {
@@ -63,48 +85,55 @@ export function attitudes(largest, others, unitSteps) {
   return out;
 }
 
-/** Entities at one moment, in rows: slots. */
+/** Entities at one time, in rows that are called slots. */
 export class Moment {
-  constructor(room) {
+  constructor(room = 16) {
     this.n = 0;
     this.t = NaN;
     this.frame = -1;
     this.reserve(room);
   }
 
+  /** @param {number} room */
   reserve(room) {
     this.room = room;
-    for (const name of ['id', 'team', 'block', 'track']) this[name] = new Int32Array(room);
-    for (const name of ['x', 'y', 'z']) this[name] = new Float64Array(room);
+    this.id = new Int32Array(room);
+    this.team = new Int32Array(room);
+    this.block = new Int32Array(room);
+    this.x = new Float64Array(room);
+    this.y = new Float64Array(room);
+    this.z = new Float64Array(room);
     this.quat = new Float32Array(4 * room);
     this.health = new Float32Array(room);
   }
 
-  /** Take over a frame of a chunk, counted from its first, and a share of the way to the next. */
-  fill(chunk, frame, share) {
+  /** Take over a frame of a chunk, counted from its first, and a share of the way to the next. @param {Chunk} chunk @param {number} frame */
+  fill(chunk, frame, share = 0) {
     if (this.room < chunk.nTracks) this.reserve(chunk.nTracks);
-    const { low, step } = chunk;
+    const { low: [east, north, up], step, x, y, z } = chunk;
     let n = 0;
     for (let k = 0; k < chunk.nTracks; k++) {
       if (chunk.begin[k] > frame || chunk.end[k] < frame) continue;
       const row = chunk.row[k] + frame - chunk.begin[k];
       const after = frame < chunk.end[k] ? row + 1 : row;
-      this.track[n] = k;
       this.id[n] = chunk.id[k];
       this.team[n] = chunk.team[k];
       this.block[n] = chunk.block[k];
-      this.x[n] = low[0] + step * (chunk.x[row] + share * (chunk.x[after] - chunk.x[row]));
-      this.y[n] = low[1] + step * (chunk.y[row] + share * (chunk.y[after] - chunk.y[row]));
-      this.z[n] = low[2] + step * (chunk.z[row] + share * (chunk.z[after] - chunk.z[row]));
+      this.x[n] = east + step * (x[row] + share * (x[after] - x[row]));
+      this.y[n] = north + step * (y[row] + share * (y[after] - y[row]));
+      this.z[n] = up + step * (z[row] + share * (z[after] - z[row]));
       this.health[n] = chunk.health[row];
-      turned(this.quat, 4 * n, chunk.quat, 4 * row, 4 * after, share);
+      blend(this.quat, 4 * n, chunk.quat, 4 * row, 4 * after, share);
       n++;
     }
     this.n = n;
+    this.t = chunk.times[frame];
+    this.frame = chunk.first + frame;
     this.slots = null;
+    return this;
   }
 
-  /** Row of an id; -1 where it is not there. */
+  /** Row of an id; -1 where it is not there. @param {number} id */
   slotOf(id) {
     if (!this.slots) {
       this.slots = new Map();
@@ -112,16 +141,33 @@ export class Moment {
     }
     return this.slots.get(id) ?? -1;
   }
+
+  ids() {
+    return this.id.subarray(0, this.n);
+  }
+
+  /** @param {number} slot */
+  placeIn(slot) {
+    return [this.x[slot], this.y[slot], this.z[slot]];
+  }
+
+  /** @param {number} id */
+  placeOf(id) {
+    const slot = this.slotOf(id);
+    return slot < 0 ? null : this.placeIn(slot);
+  }
 }
 
-/** An attitude between two, of one of which the opposite sign may be meant. */
-export function turned(out, at, quat, a, b, share) {
+/**
+ * An attitude between two, of one of which the opposite sign may be meant.
+ * @param {Float32Array} out @param {number} at @param {Float32Array} quat @param {number} a @param {number} b @param {number} share
+ */
+function blend(out, at, quat, a, b, share) {
   const same = quat[a] * quat[b] + quat[a + 1] * quat[b + 1] + quat[a + 2] * quat[b + 2] + quat[a + 3] * quat[b + 3];
   const far = same < 0 ? -share : share;
-  const near = 1 - share;
   let sum = 0;
   for (let k = 0; k < 4; k++) {
-    out[at + k] = near * quat[a + k] + far * quat[b + k];
+    out[at + k] = (1 - share) * quat[a + k] + far * quat[b + k];
     sum += out[at + k] * out[at + k];
   }
   const size = 1 / Math.sqrt(sum || 1);

@@ -1,151 +1,128 @@
 // Events: marks on the time line, what they say, and the last ones in a corner.
+/** @import { GameEvent } from './types' */
 
-import { element, eventText } from './formatting.js';
+import { byId, cleared, element, eventText } from './formatting.js';
 import { between } from './geometry.js';
-import { lastNotAfter } from './layer.js';
+import { lastWhere, Layer } from './layer.js';
+import { Clock } from './timeline.js';
 
-/** Colours that are told apart with every kind of colour vision; the shapes tell them apart as well. */
+/** Colours that are told apart with every kind of colour vision; the shapes tell them apart as well. @type {Record<string, string>} */
 export const KINDS = { capture: '#e8743b', collision: '#d9ae1f', birth: '#2fb38a', death: '#b59ad6', end: '#93a1b0', difference: '#e05a9c' };
-/** Captures, collisions and the end stand above a line, births and deaths below it. */
-const IS_ABOVE = { capture: true, collision: true, end: true, difference: true };
+/** Births and deaths are marked below a line, all others above it. */
+const BELOW = ['birth', 'death'];
+/** Pixels within which a mark is pointed at, and half the knob of the slider. */
+const [NEAR, KNOB] = [6, 7.5];
 
 export class EventLine {
+  /** @param {Layer} layer @param {Clock} clock @param {(event: GameEvent) => void} jump */
   constructor(layer, clock, jump) {
     this.layer = layer;
     this.clock = clock;
     this.jump = jump;
-    this.canvas = document.getElementById('events');
-    this.tip = document.getElementById('tip');
-    this.ticker = document.getElementById('ticker');
-    this.canvas.addEventListener('pointermove', (event) => this.point(event));
+    this.canvas = byId('events', HTMLCanvasElement);
+    this.tip = byId('tip');
+    /** The last event in the ticker. @type {GameEvent | undefined} */
+    this.newest = undefined;
+    this.canvas.addEventListener('pointermove', (event) => this.showTip(event));
     this.canvas.addEventListener('pointerleave', () => { this.tip.hidden = true; });
-    this.canvas.addEventListener('click', (event) => this.click(event));
-    this.shownInTicker = null;
+    this.canvas.addEventListener('click', (event) => {
+      const [nearest] = this.near(event);
+      if (nearest) this.jump(nearest);
+    });
   }
 
-  get marked() {
-    return this.layer.marked;
+  /** Bring marks and ticker up to a time. @param {number} t */
+  update(t) {
+    const { marked, start, end } = this.layer;
+    const isNew = this.drawnFor?.marked !== marked || this.drawnFor.start !== start || this.drawnFor.end !== end;
+    if (isNew) this.draw();
+    this.showTicker(t);
   }
 
-  /** Draw the marks where there are others than before. */
-  update() {
-    const { start, end } = this.layer;
-    const key = `${start} ${end}`;
-    if (this.drawnFor === this.marked && this.drawnSpan === key) return;
-    [this.drawnFor, this.drawnSpan] = [this.marked, key];
-    this.draw();
-  }
-
-  who(id) {
-    return this.layer.who(id);
-  }
-
-  /** Pixel of a time, from the left of the canvas; the ends are where the slider's knob can be. */
+  /** Pixel of a time, from the left of the canvas; the ends are where the slider's knob can be. @param {number} t */
   x(t) {
     const { start, end } = this.layer;
-    const width = this.canvas.clientWidth - 15;
-    return 7.5 + (end > start ? ((t - start) / (end - start)) * width : 0);
+    return KNOB + (end > start ? ((t - start) / (end - start)) * (this.canvas.clientWidth - 2 * KNOB) : 0);
   }
 
   /** Draw all marks: as many as fall on two pixels are one mark, the higher the more they are. */
   draw() {
-    const { canvas } = this;
-    const ratio = window.devicePixelRatio || 1;
-    canvas.width = Math.round(canvas.clientWidth * ratio);
-    canvas.height = Math.round(canvas.clientHeight * ratio);
-    const pen = canvas.getContext('2d');
-    pen.scale(ratio, ratio);
+    const { marked, start, end } = this.layer;
+    this.drawnFor = { marked, start, end };
+    const pen = cleared(this.canvas);
     const bins = new Map();
-    for (const { t, kind } of this.marked) {
+    for (const { t, kind } of marked) {
       const key = `${Math.round(this.x(t) / 2)} ${kind}`;
       bins.set(key, (bins.get(key) || 0) + 1);
     }
     for (const [key, count] of bins) {
       const [bin, kind] = key.split(' ');
-      const size = Math.min(13, 5 + 2.5 * Math.log2(count));
-      this.mark(pen, 2 * Number(bin), kind, size);
+      pen.fillStyle = KINDS[kind] || KINDS.end;
+      pen.fill(markOf(kind, 2 * Number(bin), Math.min(13, 5 + 2.5 * Math.log2(count))));
     }
   }
 
-  mark(pen, x, kind, size) {
-    pen.fillStyle = KINDS[kind] || KINDS.end;
-    pen.beginPath();
-    if (kind === 'collision') {
-      pen.moveTo(x, 18 - size - 5);
-      pen.lineTo(x + 4.5, 18 - size / 2 - 2.5);
-      pen.lineTo(x, 18);
-      pen.lineTo(x - 4.5, 18 - size / 2 - 2.5);
-    } else if (kind === 'birth') {
-      pen.moveTo(x, 20);
-      pen.lineTo(x + 3.6, 20 + size / 2 + 4);
-      pen.lineTo(x - 3.6, 20 + size / 2 + 4);
-    } else if (kind === 'death') {
-      pen.moveTo(x - 3.6, 20);
-      pen.lineTo(x + 3.6, 20);
-      pen.lineTo(x, 20 + size / 2 + 4);
-    } else if (kind === 'end' || kind === 'difference') {
-      pen.rect(x - 1, 4, 2, 22);
-    } else {
-      pen.arc(x, 18 - size, 3.2, 0, 2 * Math.PI);
-      pen.rect(x - 0.8, 18 - size, 1.6, size);
-    }
-    pen.fill();
+  /** Events marked near the mouse, the nearest first. @param {MouseEvent} event @returns {GameEvent[]} */
+  near({ clientX, clientY }) {
+    const { left, top } = this.canvas.getBoundingClientRect();
+    const isBelow = clientY - top >= 19;
+    const gap = (/** @type {GameEvent} */ { t }) => Math.abs(this.x(t) - (clientX - left));
+    const order = (/** @type {GameEvent} */ event) => gap(event) + (BELOW.includes(event.kind) === isBelow ? 0 : NEAR / 2);
+    return this.layer.marked.filter((event) => gap(event) <= NEAR).sort((a, b) => order(a) - order(b));
   }
 
-  /** What is marked near a pixel, the nearest first. */
-  near(event) {
-    const x = event.clientX - this.canvas.getBoundingClientRect().left;
-    const isAbove = event.clientY - this.canvas.getBoundingClientRect().top < 19;
-    const found = this.marked.map((happened) => ({ happened, gap: Math.abs(this.x(happened.t) - x) })).filter(({ gap }) => gap <= 6);
-    const order = ({ happened, gap }) => gap + (Boolean(IS_ABOVE[happened.kind]) === isAbove ? 0 : 3);
-    return found.sort((a, b) => order(a) - order(b)).map(({ happened }) => happened);
-  }
-
-  point(event) {
+  /** @param {MouseEvent} event */
+  showTip(event) {
     const found = this.near(event);
     this.tip.hidden = !found.length;
     if (!found.length) return;
-    const lines = found.slice(0, 5).map((happened) => this.line('div', happened));
+    const lines = found.slice(0, 5).map((each) => this.line('div', each));
     if (found.length > 5) lines.push(element('div', 'small', `and ${found.length - 5} more`));
     this.tip.replaceChildren(...lines);
-    const x = event.clientX - this.canvas.getBoundingClientRect().left;
-    const { clientWidth } = this.canvas;
-    this.tip.style.left = `${between(x - this.tip.offsetWidth / 2, 0, Math.max(0, clientWidth - this.tip.offsetWidth))}px`;
+    const left = event.clientX - this.canvas.getBoundingClientRect().left - this.tip.offsetWidth / 2;
+    this.tip.style.left = `${between(left, 0, Math.max(0, this.canvas.clientWidth - this.tip.offsetWidth))}px`;
   }
 
-  click(event) {
-    const [nearest] = this.near(event);
-    if (nearest) this.jump(nearest);
+  /** An element with mark, time and text of an event. @param {'div' | 'button'} tag @param {GameEvent} event */
+  line(tag, event) {
+    const shape = element('i', `is-${event.kind}`);
+    shape.style.setProperty('--kind', KINDS[event.kind] || KINDS.end);
+    const when = element('time', '', `${event.t.toFixed(this.clock.decimals)} s`);
+    return element(tag, '', '', shape, when, element('span', '', eventText(event, (id) => this.layer.who(id))));
   }
 
-  line(tag, happened) {
-    const line = element(tag);
-    const shape = element('i', `is-${happened.kind}`);
-    shape.style.setProperty('--kind', KINDS[happened.kind] || KINDS.end);
-    line.append(shape, element('time', '', `${happened.t.toFixed(this.clock.decimals)} s`), element('span', '', eventText(happened, (id) => this.who(id))));
-    return line;
-  }
-
-  /** The last few things that have happened, in the corner. */
-  tell(t) {
-    const last = lastNotAfter(this.marked, t);
-    const latest = this.marked.slice(Math.max(0, last - 3), last + 1);
-    const newest = latest[latest.length - 1] || null;
-    if (newest === this.shownInTicker) return;
-    this.shownInTicker = newest;
-    this.ticker.replaceChildren(...latest.map((happened) => {
-      const item = element('li');
-      const button = this.line('button', happened);
-      button.type = 'button';
-      button.addEventListener('click', () => this.jump(happened));
-      item.append(button);
-      return item;
+  /** Show the last events before a time, in the corner. @param {number} t */
+  showTicker(t) {
+    const { marked } = this.layer;
+    const last = lastWhere(marked.length, (i) => marked[i].t <= t + 1e-9);
+    if (marked[last] === this.newest) return;
+    this.newest = marked[last];
+    byId('ticker').replaceChildren(...marked.slice(Math.max(0, last - 3), last + 1).map((event) => {
+      const button = this.line('button', event);
+      button.addEventListener('click', () => this.jump(event));
+      return element('li', '', '', button);
     }));
   }
 
-  /** The first thing after a time, or the last one before it; undefined where there is none. */
+  /** The first event after a time, or the last one before it; undefined where there is none. @param {number} t @param {boolean} isBack */
   next(t, isBack) {
-    if (!isBack) return this.marked.find((happened) => happened.t > t + 1e-6);
-    return this.marked.findLast((happened) => happened.t < t - 1e-6);
+    const { marked } = this.layer;
+    return isBack ? marked.findLast((event) => event.t < t - 1e-6) : marked.find((event) => event.t > t + 1e-6);
   }
+}
+
+/** Outline of a mark on the time line. @param {string} kind @param {number} x @param {number} size */
+function markOf(kind, x, size) {
+  const [top, bottom] = [13 - size, 24 + size / 2];
+  if (kind === 'collision') return new Path2D(`M${x} ${top}L${x + 4.5} ${(top + 18) / 2}L${x} 18L${x - 4.5} ${(top + 18) / 2}Z`);
+  if (kind === 'birth') return new Path2D(`M${x} 20L${x + 3.6} ${bottom}L${x - 3.6} ${bottom}Z`);
+  if (kind === 'death') return new Path2D(`M${x - 3.6} 20L${x + 3.6} 20L${x} ${bottom}Z`);
+  const path = new Path2D();
+  if (kind === 'end' || kind === 'difference') {
+    path.rect(x - 1, 4, 2, 22);
+  } else {
+    path.arc(x, 18 - size, 3.2, 0, 2 * Math.PI);
+    path.rect(x - 0.8, 18 - size, 1.6, size);
+  }
+  return path;
 }

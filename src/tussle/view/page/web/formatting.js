@@ -1,55 +1,97 @@
-// How things are said: numbers, times, who somebody is, what happened.
+// Numbers, times, names and events as text, and the elements that show them.
+/** @import { Colour, GameEvent } from './types' */
 
 import { END_TEXTS, EVENT_TEXTS } from './event_texts.js';
 
-/** A number with so many decimals, with thin spaces between thousands. */
+/** A number with so many decimals, with thin spaces between thousands. @param {number} value */
 export function number(value, digits = 0) {
   const [whole, rest] = Math.abs(value).toFixed(digits).split('.');
   const grouped = whole.replace(/\B(?=(\d{3})+$)/g, '\u202f');
   return (value < 0 && Number(value.toFixed(digits)) !== 0 ? '−' : '') + grouped + (rest ? '.' + rest : '');
 }
 
-/** A length [m] in the unit that suits it. */
+/** A length in the unit that suits it. @param {number} metres */
 export function length(metres) {
   if (metres >= 1000) return `${number(metres / 1000, metres % 1000 ? 1 : 0)} km`;
   if (metres >= 1) return `${number(metres, metres % 1 ? 1 : 0)} m`;
   return metres >= 0.01 ? `${number(metres * 100, 0)} cm` : `${number(metres * 1000, metres < 0.00095 ? 2 : 1)} mm`;
 }
 
-/** A speed of playing, such as 0.5×. */
+/** A speed of playing, such as 0.5×. @param {number} speed */
 export function times(speed) {
   return speed === Infinity ? 'max' : `${speed}×`;
 }
 
-/** Decimals that tell the times of two frames apart. */
+/** Decimals that tell the times of two frames apart. @param {number} step seconds */
 export function decimalsOf(step) {
   return Math.min(4, Math.max(1, Math.ceil(-Math.log10(step) - 1e-6)));
 }
 
-/** The sentence for an event; `who` names an entity by its id. */
+/** An event as a sentence. @param {GameEvent} event @param {(id: number) => string} who */
 export function eventText(event, who) {
   const { kind, id, other, text } = event;
+  /** @type {Record<string, string>} */
   const parts = { id: id ? who(id) : '', other: other ? who(other) : '', text: kind === 'end' ? END_TEXTS[text] || text : text };
+  /** @param {string} template */
   const isKnown = (template) => [...template.matchAll(/\{(\w+)\}/g)].every(([, name]) => parts[name]);
   const template = (EVENT_TEXTS[kind] || []).find(isKnown);
   if (!template) return [kind, ...Object.values(parts)].filter(Boolean).join(' ');
   return template.replace(/\{(\w+)\}/g, (_, name) => parts[name]);
 }
 
-/** A new element with a class and a text. Whatever is said goes through here or `textContent`: a name is never read as HTML. */
-export function element(tag, className = '', text = '') {
+/** "rgb(r, g, b)" of three numbers. @param {Colour} colour */
+export function rgb(colour) {
+  return `rgb(${colour[0]}, ${colour[1]}, ${colour[2]})`;
+}
+
+/** The element of an id. @template {HTMLElement} [T=HTMLElement] @param {string} id @param {{ new (): T }} [_kind] @returns {T} */
+export function byId(id, _kind) {
+  return /** @type {T} */ (document.getElementById(id));
+}
+
+/** The input field of an id. @param {string} id */
+export const field = (id) => byId(id, HTMLInputElement);
+
+/**
+ * A new element with a class and a text. All text is written here or with `textContent`: a name is never read as HTML.
+ * @template {keyof HTMLElementTagNameMap} K @param {K} tag @param {...Node} children
+ */
+export function element(tag, className = '', text = '', ...children) {
   const made = document.createElement(tag);
   if (className) made.className = className;
   if (text) made.textContent = text;
+  made.append(...children);
   return made;
 }
 
-/** Set a text where it has changed: writing one, even the same, makes the browser lay out the page anew. */
-export function say(node, text) {
+/** Set a text where it has changed: writing one, even the same, makes the browser lay out the page anew. @param {Element} node */
+export function say(node, text = '') {
   if (node.textContent !== text) node.textContent = text;
 }
 
-/** "rgb(r, g, b)" of three numbers. */
-export function rgb(colour, opacity = 1) {
-  return `rgba(${colour[0]}, ${colour[1]}, ${colour[2]}, ${opacity})`;
+/** Fill a list with names and values. @param {Element} list @param {[string, string][]} rows */
+export function fillList(list, rows) {
+  if (list.children.length !== 2 * rows.length) list.replaceChildren(...rows.flatMap(() => [element('dt'), element('dd')]));
+  rows.flat().forEach((text, i) => say(list.children[i], text));
+}
+
+/** A value of the page's style. @param {string} name */
+export function styled(name) {
+  return getComputedStyle(document.body).getPropertyValue(name).trim();
+}
+
+/** Red, green and blue, 0 to 255, of a colour such as #6cb8e6. @param {string} text */
+export function parseColour(text) {
+  return [1, 3, 5].map((i) => parseInt(text.slice(i, i + 2), 16));
+}
+
+/** Match the pixels of a canvas to its size on the screen, empty it, and return its pen. @param {HTMLCanvasElement} canvas */
+export function cleared(canvas) {
+  const ratio = window.devicePixelRatio || 1;
+  const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((size) => Math.round(size * ratio));
+  if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
+  const pen = canvas.getContext('2d');
+  pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+  pen.clearRect(0, 0, canvas.clientWidth, canvas.clientHeight);
+  return pen;
 }

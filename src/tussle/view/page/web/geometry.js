@@ -1,44 +1,47 @@
 // Vectors are [x, y, z], East North Up, in metres; quaternions [w, x, y, z], body to world; matrices 16 numbers, column after column.
+/** @import { Vector } from './types' */
 
+/** @param {Vector} a @param {Vector} b */
 export const add = (a, b) => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
+/** @param {Vector} a @param {Vector} b */
 export const minus = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+/** @param {Vector} a @param {number} s */
 export const scaled = (a, s) => [a[0] * s, a[1] * s, a[2] * s];
+/** @param {Vector} a @param {Vector} b */
 export const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+/** @param {Vector} a @param {Vector} b */
 export const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+/** @param {Vector} a */
 export const norm = (a) => Math.hypot(a[0], a[1], a[2]);
+/** @param {number} value @param {number} low @param {number} high */
 export const between = (value, low, high) => Math.min(high, Math.max(low, value));
 
-/** A vector of length 1, or the given one where its length is 0. */
+/** A vector of length 1, or the given one where its length is 0. @param {Vector} a @returns {number[]} */
 export function unit(a) {
-  const size = norm(a);
-  return size > 0 ? scaled(a, 1 / size) : a;
+  return scaled(a, 1 / (norm(a) || 1));
 }
 
-/** An angle within a half turn of 0. */
+/** An angle within a half turn of 0. @param {number} angle */
 export function halfTurn(angle) {
   return angle - 2 * Math.PI * Math.round(angle / (2 * Math.PI));
 }
 
-/** Where the nose of a body points. */
+/** Direction of the nose of a body. @param {Vector} q quaternion */
 export function forward(q) {
-  const [w, x, y, z] = q;
+  const [w, x, y, z] = [q[0], q[1], q[2], q[3]];
   return [1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)];
 }
 
-/** Product of two matrices. */
+/** Product of two matrices. @param {ArrayLike<number>} a @param {ArrayLike<number>} b */
 function product(a, b) {
-  const out = new Float64Array(16);
-  for (let column = 0; column < 4; column++) {
-    for (let row = 0; row < 4; row++) {
-      let sum = 0;
-      for (let k = 0; k < 4; k++) sum += a[4 * k + row] * b[4 * column + k];
-      out[4 * column + row] = sum;
-    }
-  }
-  return out;
+  return Float64Array.from({ length: 16 }, (_, i) => [0, 1, 2, 3].reduce((sum, k) => sum + a[4 * k + (i % 4)] * b[(i & 12) + k], 0));
 }
 
-/** World to clip space for an eye with three axes: right, up, and away from what it looks at. */
+/**
+ * World to clip space for an eye with three axes: right, up, and away from what it looks at.
+ * @param {Vector} eye @param {Vector} right @param {Vector} up @param {Vector} away
+ * @param {number} fieldOfView radians @param {number} aspect @param {number} near @param {number} far
+ */
 export function perspective(eye, right, up, away, fieldOfView, aspect, near, far) {
   const f = 1 / Math.tan(fieldOfView / 2);
   const look = [

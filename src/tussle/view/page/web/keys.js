@@ -2,7 +2,7 @@
 
 import { element } from './formatting.js';
 
-/** Groups of [keys, what they do, name of the action]; the keys are those of the existing system where it has them. */
+/** Groups of [keys, what they do, names of the actions]; the keys are those of SCRIMMAGE where it has them. @type {[string, [string[], string, ...string[]][]][]} */
 const KEYS = [
   ['Time', [
     [[' ', 'b'], 'play, pause', 'play'],
@@ -44,9 +44,10 @@ const KEYS = [
     [['d'], 'how it is drawn', 'settings'],
   ]],
 ];
+/** @type {Record<string, string>} */
 const NAMES = { ' ': 'space', Backspace: 'Backspace', PageDown: 'PgDn', PageUp: 'PgUp', ArrowRight: '→', ArrowLeft: '←', Escape: 'Esc', '-': '−' };
 
-/** Key -> name of its action. */
+/** Key -> name of its action. @returns {Map<string, string>} */
 function bindings() {
   const found = new Map();
   for (const [, entries] of KEYS) {
@@ -56,37 +57,37 @@ function bindings() {
   return found.set('Backspace', 'back').set('=', 'larger').set('_', 'smaller').set('A', 'reset').set('H', 'help');
 }
 
+/** @param {Element} box @param {boolean} isLive */
 export function fillHelp(box, isLive) {
   box.replaceChildren(...KEYS.filter(([title]) => isLive || title !== 'Live game').map(([title, entries]) => {
-    const group = element('section');
-    group.append(element('h3', '', title));
-    for (const [keys, what] of entries) {
-      const line = element('div', 'key');
-      const names = element('span');
-      names.append(...keys.map((key) => element('kbd', '', NAMES[key] || key)));
-      line.append(names, element('span', '', what));
-      group.append(line);
-    }
-    return group;
+    const lines = entries.map(([keys, what]) => {
+      const names = keys.map((key) => element('kbd', '', NAMES[key] || key));
+      return element('div', 'key', '', element('span', '', '', ...names), element('span', '', what));
+    });
+    return element('section', '', '', element('h3', '', title), ...lines);
   }));
 }
 
-/** Listen to keys and to buttons with `data-do`. */
+/** Whether an element takes a key itself. @param {EventTarget | null} target @param {string} key */
+function takesKey(target, key) {
+  if (!(target instanceof HTMLElement)) return false;
+  if (target instanceof HTMLInputElement && target.type === 'number') return true;
+  if (target instanceof HTMLInputElement && target.type === 'range') return target.id !== 'time' && key.startsWith('Arrow');
+  return Boolean(target.closest('button, input[type="checkbox"]')) && (key === ' ' || key === 'Enter');
+}
+
+/** Listen to keys and to buttons with `data-do`. @param {Record<string, () => void>} actions */
 export function listen(actions) {
   const keys = bindings();
   document.addEventListener('keydown', (event) => {
-    if (event.ctrlKey || event.metaKey || event.altKey || document.querySelector('dialog[open]')) return;
-    const isInField = event.target instanceof HTMLInputElement && ['range', 'number'].includes(event.target.type) && event.target.id !== 'time';
-    const isButton = event.target instanceof HTMLElement && event.target.closest('button, input[type="checkbox"]');
-    if (isInField && (event.key.startsWith('Arrow') || event.target.type === 'number')) return;
-    if (isButton && (event.key === ' ' || event.key === 'Enter')) return;
+    if (event.ctrlKey || event.metaKey || event.altKey || document.querySelector('dialog[open]') || takesKey(event.target, event.key)) return;
     const action = keys.get(event.key);
     if (!action) return;
     event.preventDefault();
     actions[action]();
   });
   document.addEventListener('click', (event) => {
-    const button = event.target instanceof Element && event.target.closest('[data-do]');
+    const button = event.target instanceof Element ? /** @type {HTMLElement | null} */ (event.target.closest('[data-do]')) : null;
     if (!button) return;
     actions[button.dataset.do]();
     // A key goes to the page again, not to the button that was clicked last.

@@ -1,29 +1,42 @@
-// A game: who is there, where, and what has happened. Its subclasses are a recording, and a game that is played (live.js).
+// A game: its entities, where they are, and its events. The two subclasses are a recording (recorded.js) and a live game (live.js).
+/** @import { Curves, EventRow, GameEvent, PageData, Sample, Vector } from './types' */
 
-import { between, minus, scaled } from './geometry.js';
-import { Reader } from './packing.js';
-import { Chunk, Moment } from './chunk.js';
+import { minus, norm, scaled } from './geometry.js';
+import { Moment } from './chunk.js';
 
-/** States of a recording that are kept unpacked, at some 45 bytes each; the chunks that were used last stay. */
-const MOST_STATES = 4e6;
 export const NO_TEAM = { id: 0, name: '', colour: [150, 160, 172] };
+/** Moments so long before and after what is shown are compared for a velocity [s]; the first that differ count. */
+const VELOCITY_SPANS = [0.25, 1, 10, 60];
 
 export class Layer {
-  /** `changed` is called when there is something new to be shown. */
+  /** @param {PageData} page @param {() => void} changed called when there is something new to be shown */
   constructor(page, changed) {
     this.page = page;
     this.changed = changed;
     this.teams = new Map(page.teams.map((team) => [team.id, team]));
+    /** Id -> its block. @type {Map<number, number>} */
     this.blockOf = new Map();
+    /** @type {Map<number, number[]>} */
     this.colours = new Map();
+    /** @type {GameEvent[]} */
     this.events = [];
-    this.shown = new Moment(16);
-    [this.start, this.end] = [0, 0];
-    /** Entities of each team at some times, for the curves. */
-    this.curves = { t: [], n: page.teams.map(() => []) };
+    /** @type {GameEvent[]} */
+    this.marked = [];
+    this.shown = new Moment();
+    this.start = 0;
+    this.end = 0;
+    /** Entities of each team at some times. */
+    this.curves = this.emptyCurves();
+    /** A move above this is a jump [m]. */
+    this.leap = 0.25 * norm(minus(page.scenery.high, page.scenery.low));
   }
 
-  /** What happened, without the deaths that a capture or a collision tells of. `rows` are [t, kind, id, other, text]. */
+  /** @returns {Curves} */
+  emptyCurves() {
+    return { t: [], n: this.page.teams.map(() => /** @type {number[]} */ ([])) };
+  }
+
+  /** Take events, without the deaths that a capture or a collision tells of. @param {EventRow[]} rows */
   setEvents(rows) {
     const all = rows.map(([t, kind, id, other, text]) => ({ t, kind, id, other, text }));
     const isTold = new Set();
@@ -38,23 +51,24 @@ export class Layer {
     this.marked = this.events.filter(({ t, kind }) => kind !== 'birth' || t > this.start);
   }
 
-  /** Learn the names of those who are in a chunk. */
+  /** Learn the blocks of the entities in a chunk. @param {{ id: Int32Array, block: Int32Array }} chunk */
   meet(chunk) {
-    for (let k = 0; k < chunk.nTracks; k++) this.blockOf.set(chunk.id[k], chunk.block[k]);
+    chunk.id.forEach((id, k) => this.blockOf.set(id, chunk.block[k]));
   }
 
+  /** Name of an entity. @param {number} id */
   who(id) {
     const block = this.page.blocks[this.blockOf.get(id)];
     const number = this.page.idShift && id > this.page.idShift ? id - this.page.idShift : id;
     return block ? `${block.name} ${number}` : `${number}`;
   }
 
+  /** @param {number} id */
   teamOf(id) {
-    const block = this.page.blocks[this.blockOf.get(id)];
-    return (block && this.teams.get(block.team)) || NO_TEAM;
+    return this.teams.get(this.page.blocks[this.blockOf.get(id)]?.team) || NO_TEAM;
   }
 
-  /** Colour of a block's entities in a team: the block's own where it is of that team. */
+  /** Colour of a block's entities in a team: the block's own where it is of that team. @param {number} block @param {number} team */
   colour(block, team) {
     const key = 65536 * block + team;
     let found = this.colours.get(key);
@@ -66,176 +80,72 @@ export class Layer {
     return found;
   }
 
+  /** @param {number} slot */
   colourOf(slot) {
     return this.colour(this.shown.block[slot], this.shown.team[slot]);
   }
 
-  /** Entities of each team who are shown. */
-  counts() {
+  /** Entities of each team that are shown. */
+  counts(moment = this.shown) {
     const found = new Map(this.page.teams.map(({ id }) => [id, 0]));
-    for (let i = 0; i < this.shown.n; i++) found.set(this.shown.team[i], (found.get(this.shown.team[i]) || 0) + 1);
+    for (let i = 0; i < moment.n; i++) found.set(moment.team[i], (found.get(moment.team[i]) || 0) + 1);
     return this.page.teams.map(({ id }) => found.get(id));
   }
 
+  /** @param {number} id */
   slotOf(id) {
     return this.shown.slotOf(id);
   }
 
+  /** @param {number} slot */
   placeIn(slot) {
-    return [this.shown.x[slot], this.shown.y[slot], this.shown.z[slot]];
-  }
-}
-
-/** A recorded run, of which chunks are unpacked when they are first needed. */
-export class Recorded extends Layer {
-  /** `failed` is called with an error when a chunk cannot be read. */
-  constructor(page, source, changed, failed) {
-    super(page, changed);
-    this.source = source;
-    this.failed = failed;
-    this.chunks = new Map();
-    this.reading = new Set();
-    this.curves = page.curves;
+    return this.shown.placeIn(slot);
   }
 
-  async read() {
-    this.times = new Reader(await this.source.blob('times')).reals(this.page.nFrames);
-    [this.start, this.end] = [this.times[0], this.times[this.times.length - 1]];
-    // A slider gives back times whose last digits differ from those it was given.
-    this.slack = 1e-6 * ((this.end - this.start) / Math.max(1, this.times.length - 1));
-    const columns = JSON.parse(new TextDecoder().decode(await this.source.blob('events')));
-    this.setEvents(columns.t.map((t, i) => [t, columns.kind[i], columns.id[i], columns.other[i], columns.text[i]]));
-  }
-
-  get mostAtOnce() {
-    return this.page.mostAtOnce;
-  }
-
-  /** Number of the last frame that is not after a time, within a millionth of a frame. */
-  frameAt(t) {
-    return Math.max(0, lastWhere(this.times.length, (i) => this.times[i] <= t + this.slack));
-  }
-
-  /** Number of the chunk that goes on from a frame. */
-  chunkOf(frame) {
-    const { chunks } = this.page;
-    return Math.max(0, lastWhere(chunks.length, (i) => chunks[i][0] <= frame));
-  }
-
-  /** A chunk; null where it has to be read first, which begins now. */
-  chunk(number) {
-    const chunk = this.chunks.get(number);
-    if (chunk) {
-      this.chunks.delete(number);
-      this.chunks.set(number, chunk);
-      return chunk;
-    }
-    if (number >= 0 && number < this.page.chunks.length) this.unpack(number).catch(this.failed);
+  /** The last frame that is not after a time; null where it is not here. @param {number} _t @returns {Sample | null} */
+  sampleAt(_t) {
     return null;
   }
 
-  async unpack(number) {
-    if (this.reading.has(number)) return;
-    this.reading.add(number);
-    const chunk = new Chunk(await this.source.blob(`chunk-${number}`), this.page);
-    this.meet(chunk);
-    this.chunks.set(number, chunk);
-    this.reading.delete(number);
-    let nStates = 0;
-    for (const each of this.chunks.values()) nStates += each.nStates;
-    for (const [oldest, each] of this.chunks) {
-      if (nStates <= MOST_STATES || this.chunks.size <= 2) break;
-      nStates -= each.nStates;
-      this.chunks.delete(oldest);
+  /** Frames of some seconds before what is shown, newest first, so that they are few. @param {number} _seconds @param {number} _most @returns {Sample[]} */
+  samples(_seconds, _most) {
+    return [];
+  }
+
+  /** Velocity of an entity over the frames around [m/s]. @param {number} id */
+  velocity(id) {
+    for (const span of VELOCITY_SPANS) {
+      const [from, to] = [this.sampleAt(this.shown.t - span), this.sampleAt(this.shown.t + span)];
+      const [a, b] = [from?.placeOf(id), to?.placeOf(id)];
+      if (a && b && from.t < to.t) return norm(minus(b, a)) > this.leap ? [0, 0, 0] : scaled(minus(b, a), 1 / (to.t - from.t));
     }
-    this.changed();
+    return [0, 0, 0];
   }
 
-  /** The oldest frame that can be kept unpacked together with a frame. */
-  oldestBeside(frame) {
-    const { chunks, nStates } = this.page;
-    const most = Math.max(1, Math.floor((0.6 * MOST_STATES * chunks.length) / Math.max(1, nStates)));
-    return chunks[Math.max(0, this.chunkOf(frame) - most + 1)][0];
-  }
-
-  /** Set `shown` to a time, between frames on the straight way; false while it has to be read. */
-  show(t) {
-    const frame = this.frameAt(t);
-    const chunk = this.chunk(this.chunkOf(frame));
-    if (!chunk) return false;
-    if (this.shown.t === t) return true;
-    const next = frame + 1 < this.times.length ? this.times[frame + 1] : t;
-    const share = next > this.times[frame] ? between((t - this.times[frame]) / (next - this.times[frame]), 0, 1) : 0;
-    this.shown.fill(chunk, frame - chunk.first, share);
-    Object.assign(this.shown, { t, frame, chunk });
-    return true;
-  }
-
-  /** Read what comes next. */
-  lookAhead() {
-    this.chunk(this.chunkOf(this.shown.frame) + 1);
-  }
-
-  /** Where an entity was at a time; null where it was not there, or that is not unpacked. */
-  placeAt(id, t) {
-    const frame = this.frameAt(t);
-    const chunk = this.chunks.get(this.chunkOf(frame));
-    const track = chunk ? chunk.trackIn(id, frame - chunk.first) : -1;
-    return track < 0 ? null : chunk.placeOf(chunk.row[track] + frame - chunk.first - chunk.begin[track]);
-  }
-
-  /** Velocity [m/s] of who is shown in a slot, over the frames around it within half a second. */
-  velocity(slot) {
-    const { frame, chunk, track } = this.shown;
-    const { times } = this;
-    const k = track[slot];
-    const [begin, end] = [chunk.first + chunk.begin[k], chunk.first + chunk.end[k]];
-    let [a, b] = [frame, Math.min(frame + 1, end)];
-    while (a > begin && times[frame] - times[a - 1] <= 0.25) a--;
-    while (b < end && times[b + 1] - times[frame] <= 0.25) b++;
-    if (a === b) a = Math.max(begin, a - 1);
-    if (a === b) return [0, 0, 0];
-    const [from, to] = [a, b].map((each) => chunk.placeOf(chunk.row[k] + each - begin));
-    return scaled(minus(to, from), 1 / (times[b] - times[a]));
-  }
-
-  /** Lay out trails of the last seconds: see `Trails`. */
-  layTrails(lines, { seconds, most, isWanted, ageOf }) {
-    const { shown, times } = this;
-    const from = Math.max(this.frameAt(Math.max(this.start, times[shown.frame] - seconds)), this.oldestBeside(shown.frame));
-    const stride = Math.max(1, Math.ceil((shown.frame - from) / most));
-    for (let k = this.chunkOf(from); k <= this.chunkOf(shown.frame); k++) {
-      const chunk = this.chunk(k);
-      if (chunk) this.layChunk(lines, chunk, Math.floor(from / stride) * stride, stride, { isWanted, ageOf });
-    }
-  }
-
-  /** Lay out what a chunk has of the trails, in frames that a stride divides and in the last one. */
-  layChunk(lines, chunk, from, stride, { isWanted, ageOf }) {
-    const { shown, times } = this;
-    for (let k = 0; k < chunk.nTracks; k++) {
-      const first = Math.max(from, chunk.first + chunk.begin[k]);
-      const last = Math.min(shown.frame, chunk.first + chunk.end[k]);
-      if (first > last || !isWanted(chunk.id[k], chunk.team[k])) continue;
-      const colour = this.colour(chunk.block[k], chunk.team[k]);
-      const isHead = chunk === shown.chunk && last === shown.frame;
-      for (let frame = first; frame <= last; frame = nextFrame(frame, stride, last)) {
-        const row = chunk.row[k] + frame - chunk.first - chunk.begin[k];
-        lines.add(...chunk.placeOf(row), ageOf(times[frame]), colour, frame < last || isHead);
+  /**
+   * Trails of the last seconds: calls `lay` with the places of each entity, newest first, of one that has gone as well, and their times.
+   * @param {number} seconds @param {number} most points of each trail @param {Iterable<number> | null} only ids; null for all
+   * @param {(id: number, places: Vector[], times: number[]) => void} lay
+   */
+  trails(seconds, most, only, lay) {
+    const samples = [this.shown, ...this.samples(seconds, most)];
+    for (const id of only || new Set([...samples[samples.length - 1].ids(), ...this.shown.ids()])) {
+      /** @type {Vector[]} */
+      const places = [];
+      const times = [];
+      for (const sample of samples) {
+        const place = sample.placeOf(id);
+        const last = places[places.length - 1];
+        if (last && (!place || norm(minus(place, last)) > this.leap)) break;
+        if (place) times.push(sample.t);
+        if (place) places.push(place);
       }
-      const slot = isHead ? shown.slotOf(chunk.id[k]) : -1;
-      if (isHead) lines.add(...this.placeIn(slot), 0, colour, false);
+      if (places.length > 1) lay(id, places, times);
     }
   }
 }
 
-/** The frame after one that a stride divides; the last one always comes. */
-function nextFrame(frame, stride, last) {
-  const next = (Math.floor(frame / stride) + 1) * stride;
-  return frame < last && next > last ? last : next;
-}
-
-/** The last of n numbers from 0 for which a condition holds that holds for all before it; -1 without one. */
+/** The last of n numbers from 0 for which a condition holds that holds for all before it; -1 without one. @param {number} n @param {(i: number) => boolean} holds */
 export function lastWhere(n, holds) {
   let [low, high] = [-1, n];
   while (high - low > 1) {
@@ -246,7 +156,7 @@ export function lastWhere(n, holds) {
   return low;
 }
 
-/** Number of the last event that is not after a time; -1 without one. */
-export function lastNotAfter(events, t) {
-  return lastWhere(events.length, (i) => events[i].t <= t + 1e-9);
+/** Number of the last time that is not after a time; -1 without one. @param {ArrayLike<number>} times @param {number} t */
+export function lastNotAfter(times, t, slack = 1e-9) {
+  return lastWhere(times.length, (i) => times[i] <= t + slack);
 }

@@ -1,8 +1,9 @@
-// Entities: one mesh for each model, drawn at many places at once.
+// Models: one mesh drawn at many places at once.
+/** @import { Colour, Mesh, PageData, Vector, View } from './types' */
 
 import { add, cross, dot, minus, unit } from './geometry.js';
-import { MODEL_CORNERS, MODEL_PAINT } from './shaders.js';
-import { attribute, buffer, program, use } from './drawing.js';
+import { Instances, Renderer } from './renderer.js';
+import { Layer } from './layer.js';
 
 /** Angle between faces below which an edge looks round. */
 const ROUND = Math.cos((40 * Math.PI) / 180);
@@ -10,146 +11,121 @@ const ROUND = Math.cos((40 * Math.PI) / 180);
 const SHARP = Math.cos((8 * Math.PI) / 180);
 /** Of an instance: place, attitude, colour and lengths along its axes. */
 const INSTANCE_BYTES = 44;
+/** Quaternion of a body that is level and heads east. */
+export const LEVEL = [1, 0, 0, 0];
 
-/** A mesh with normals, round or sharp by the angle of its edges, and with its edges. */
-function prepared({ vertices, faces }) {
-  const key = (corner) => vertices.slice(3 * corner, 3 * corner + 3).join();
-  const place = (corner) => vertices.slice(3 * corner, 3 * corner + 3);
+/** Corners with normals, round or sharp by the angle of their edges, and the ends of sharp edges. @param {Mesh} mesh */
+export function prepared({ vertices, faces }) {
+  const place = (/** @type {number} */ corner) => vertices.slice(3 * corner, 3 * corner + 3);
+  /** Place -> normals of the faces around it. @type {Map<string, number[][]>} */
   const around = new Map();
+  /** Both ends -> normals of the faces beside the edge. @type {Map<string, { ends: number[][], normals: number[][] }>} */
   const edges = new Map();
-  const normals = [];
-  for (let f = 0; f < faces.length; f += 3) {
-    const corners = [faces[f], faces[f + 1], faces[f + 2]];
-    const [a, b, c] = corners.map(place);
-    const normal = cross(minus(b, a), minus(c, a));
-    normals.push(normal);
-    corners.forEach((corner, k) => {
-      const here = key(corner);
-      const there = key(corners[(k + 1) % 3]);
-      if (!around.has(here)) around.set(here, []);
-      around.get(here).push(normal);
-      const name = here < there ? `${here} ${there}` : `${there} ${here}`;
-      if (!edges.has(name)) edges.set(name, { ends: [place(corner), place(corners[(k + 1) % 3])], normals: [] });
-      edges.get(name).normals.push(unit(normal));
-    });
-  }
-  const out = [];
-  faces.forEach((corner, i) => {
-    const own = unit(normals[Math.floor(i / 3)]);
-    let sum = [0, 0, 0];
-    for (const other of around.get(key(corner))) if (dot(unit(other), own) > ROUND) sum = add(sum, other);
-    out.push(...place(corner), ...unit(sum));
-  });
-  const lines = [];
-  for (const { ends, normals: sides } of edges.values()) {
-    const isSharp = sides.length !== 2 || dot(sides[0], sides[1]) < SHARP;
-    if (isSharp) for (const end of ends) lines.push(...end, 0, 0, 1);
-  }
-  return { corners: new Float32Array(out), lines: new Float32Array(lines) };
+  const triangles = Array.from({ length: faces.length / 3 }, (_, f) => [0, 1, 2].map((k) => place(faces[3 * f + k])));
+  const normals = triangles.map(([a, b, c]) => cross(minus(b, a), minus(c, a)));
+  triangles.forEach((corners, f) => corners.forEach((here, k) => {
+    const there = corners[(k + 1) % 3];
+    if (!around.has(`${here}`)) around.set(`${here}`, []);
+    around.get(`${here}`).push(normals[f]);
+    const key = [`${here}`, `${there}`].sort().join(' ');
+    if (!edges.has(key)) edges.set(key, { ends: [here, there], normals: [] });
+    edges.get(key).normals.push(unit(normals[f]));
+  }));
+  const corners = triangles.flatMap((triangle, f) => triangle.flatMap((here) => {
+    const own = unit(normals[f]);
+    const alike = around.get(`${here}`).filter((other) => dot(unit(other), own) > ROUND);
+    return [...here, ...unit(alike.reduce(add, [0, 0, 0]))];
+  }));
+  const sharp = [...edges.values()].filter(({ normals: [a, b, ...more] }) => !b || more.length || dot(a, b) < SHARP);
+  return { corners: new Float32Array(corners), lines: new Float32Array(sharp.flatMap(({ ends }) => ends.flatMap((end) => [...end, 0, 0, 1]))) };
 }
 
-/** One mesh and the instances of it that are to be drawn. */
-export class Model {
-  constructor(gl, mesh, room) {
-    this.gl = gl;
-    this.n = 0;
-    this.instances = gl.createBuffer();
-    this.resize(Math.max(1, room));
+/** One mesh and the instances of it that are drawn. */
+export class Model extends Instances {
+  /** @param {Renderer} renderer @param {Mesh} mesh */
+  constructor(renderer, mesh) {
+    super(renderer, INSTANCE_BYTES);
     const { corners, lines } = prepared(mesh);
     this.solid = this.shape(corners);
     this.wire = this.shape(lines);
   }
 
-  resize(room) {
-    const old = this.colours;
-    this.room = room;
-    this.bytes = new ArrayBuffer(INSTANCE_BYTES * room);
-    this.floats = new Float32Array(this.bytes);
-    this.colours = new Uint8Array(this.bytes);
-    if (old) this.colours.set(old);
-    this.isRoomNew = true;
-  }
-
+  /** @param {Float32Array<ArrayBuffer>} corners place and normal of each */
   shape(corners) {
-    const { gl } = this;
-    const array = gl.createVertexArray();
-    gl.bindVertexArray(array);
-    buffer(gl, corners);
-    attribute(gl, 0, 3, gl.FLOAT, 24, 0);
-    attribute(gl, 1, 3, gl.FLOAT, 24, 12);
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.instances);
-    attribute(gl, 2, 3, gl.FLOAT, INSTANCE_BYTES, 0, 1);
-    attribute(gl, 3, 4, gl.FLOAT, INSTANCE_BYTES, 12, 1);
-    attribute(gl, 4, 4, gl.UNSIGNED_BYTE, INSTANCE_BYTES, 28, 1);
-    attribute(gl, 5, 3, gl.FLOAT, INSTANCE_BYTES, 32, 1);
-    gl.bindVertexArray(null);
+    const { renderer } = this;
+    const { gl } = renderer;
+    const array = renderer.array(() => {
+      renderer.corners(corners);
+      gl.bindBuffer(gl.ARRAY_BUFFER, this.buffer);
+      renderer.attribute(2, 3, gl.FLOAT, INSTANCE_BYTES, 0, 1);
+      renderer.attribute(3, 4, gl.FLOAT, INSTANCE_BYTES, 12, 1);
+      renderer.attribute(4, 4, gl.UNSIGNED_BYTE, INSTANCE_BYTES, 28, 1);
+      renderer.attribute(5, 3, gl.FLOAT, INSTANCE_BYTES, 32, 1);
+    });
     return { array, n: corners.length / 6 };
   }
 
-  /** `size` is one length [m] or three. */
-  add(x, y, z, quat, at, colour, size, mark) {
-    if (this.n >= this.room) this.resize(2 * this.room);
-    const f = (INSTANCE_BYTES / 4) * this.n;
-    const b = INSTANCE_BYTES * this.n + 28;
+  /**
+   * @param {number} x @param {number} y @param {number} z relative to the anchor
+   * @param {ArrayLike<number>} quat list that has the attitude from number `at` on @param {number} at
+   * @param {Colour} colour @param {number | Vector} size one length [m] or three @param {number} mark 255 for the chosen entity
+   */
+  add(x, y, z, quat, at, colour, size, mark = 0) {
+    const f = (INSTANCE_BYTES / 4) * this.append(28, colour, mark);
     this.floats[f] = x;
     this.floats[f + 1] = y;
     this.floats[f + 2] = z;
     for (let k = 0; k < 4; k++) this.floats[f + 3 + k] = quat[at + k];
-    this.colours[b] = colour[0];
-    this.colours[b + 1] = colour[1];
-    this.colours[b + 2] = colour[2];
-    this.colours[b + 3] = mark;
-    for (let k = 0; k < 3; k++) this.floats[f + 8 + k] = size.length ? size[k] : size;
-    this.n++;
+    for (let k = 0; k < 3; k++) this.floats[f + 8 + k] = typeof size === 'number' ? size : size[k];
   }
 
-  /** Hand the instances to the graphics card. */
-  hand() {
-    const { gl } = this;
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.instances);
-    if (this.isRoomNew) gl.bufferData(gl.ARRAY_BUFFER, this.bytes.byteLength, gl.DYNAMIC_DRAW);
-    this.isRoomNew = false;
-    gl.bufferSubData(gl.ARRAY_BUFFER, 0, this.colours, 0, INSTANCE_BYTES * this.n);
-  }
-
-  draw(isWire) {
-    const { gl } = this;
+  /** @param {View} view @param {Record<string, number>} look values of the program beside the view; `least` is in pixels */
+  draw(view, { scale = 1, least = 0, opacity = 1, flatness = 0, bright = 1 }, isWire = false) {
+    if (!this.n) return;
+    const { gl } = this.renderer;
     const { array, n } = isWire ? this.wire : this.solid;
+    this.renderer.use('model', { clip: view.clip, scale, least: least * view.ratio * view.perPixel, opacity, flatness: isWire ? 1 : flatness, bright });
     gl.bindVertexArray(array);
     gl.drawArraysInstanced(isWire ? gl.LINES : gl.TRIANGLES, 0, n, this.n);
-    gl.bindVertexArray(null);
+  }
+
+  /** Draw it once at a place. @param {View} view @param {Vector} place @param {Colour} colour @param {number | Vector} size @param {Record<string, number>} look */
+  drawAt(view, place, colour, size, look, quat = LEVEL) {
+    const [x, y, z] = minus(place, view.anchor);
+    this.n = 0;
+    this.add(x, y, z, quat, 0, colour, size);
+    this.upload();
+    this.draw(view, look);
   }
 }
 
 /** All entities of a game. */
 export class Entities {
-  constructor(gl, layer, { blocks, models }) {
-    this.gl = gl;
+  /** @param {Renderer} renderer @param {Layer} layer @param {PageData} page */
+  constructor(renderer, layer, { blocks, models }) {
     this.layer = layer;
-    this.program = program(gl, MODEL_CORNERS, MODEL_PAINT);
-    this.models = {};
-    for (const name of new Set(blocks.map((block) => block.model))) this.models[name] = new Model(gl, models[name], 64);
-    this.modelOf = blocks.map((block) => this.models[block.model]);
-    this.sizeOf = blocks.map((block) => block.scale);
+    const found = new Map(blocks.map(({ model }) => [model, new Model(renderer, models[model])]));
+    this.models = [...found.values()];
+    this.modelOf = blocks.map(({ model }) => found.get(model));
+    this.sizeOf = blocks.map(({ scale }) => scale);
   }
 
-  /** Place all who are shown. */
-  place(anchor, hidden, marked) {
-    const { layer } = this;
-    const { shown } = layer;
-    for (const model of Object.values(this.models)) model.n = 0;
+  /** Place all that are shown. @param {Vector} anchor @param {Set<number>} hidden teams @param {number} chosen */
+  place(anchor, hidden, chosen) {
+    const { shown } = this.layer;
+    for (const model of this.models) model.n = 0;
     for (let i = 0; i < shown.n; i++) {
       if (hidden.has(shown.team[i])) continue;
       const block = shown.block[i];
-      const mark = shown.id[i] === marked ? 255 : 0;
+      const mark = shown.id[i] === chosen ? 255 : 0;
       const [x, y, z] = [shown.x[i] - anchor[0], shown.y[i] - anchor[1], shown.z[i] - anchor[2]];
-      this.modelOf[block].add(x, y, z, shown.quat, 4 * i, layer.colourOf(i), this.sizeOf[block], mark);
+      this.modelOf[block].add(x, y, z, shown.quat, 4 * i, this.layer.colourOf(i), this.sizeOf[block], mark);
     }
-    for (const model of Object.values(this.models)) model.hand();
+    for (const model of this.models) model.upload();
   }
 
-  draw(view, { scale, least, isWire, bright }) {
-    use(this.gl, this.program, { clip: view.clip, scale, least: least * view.perPixel, opacity: 1, flatness: isWire ? 1 : 0, bright });
-    for (const model of Object.values(this.models)) if (model.n) model.draw(isWire);
+  /** @param {View} view @param {Record<string, number>} look @param {boolean} isWire */
+  draw(view, look, isWire) {
+    for (const model of this.models) model.draw(view, look, isWire);
   }
 }

@@ -1,37 +1,45 @@
 // What is drawn over the picture: labels, a ring around who is chosen, flashes where something happens.
 
-import { rgb } from './formatting.js';
-import { lastNotAfter } from './layer.js';
+/** @import { Colour, View } from './types' */
+
+import { parseColour, rgb, styled } from './formatting.js';
+import { lastWhere, Layer } from './layer.js';
 import { pixelOf } from './camera.js';
 import { KINDS } from './events.js';
 
 const MOST_LABELS = 150;
+const MOST_FLASHES = 200;
 /** Seconds, as the watcher feels them, that a flash lasts. */
 export const FLASH = 0.9;
 
 export class Overlay {
+  /** @param {HTMLCanvasElement} canvas */
   constructor(canvas) {
     this.canvas = canvas;
     this.pen = canvas.getContext('2d');
+    this.ratio = 1;
+    /** Boxes of the texts that are there. @type {number[][]} */
+    this.taken = [];
+    this.ink = '';
+    this.paper = '';
   }
 
-  begin(view, ratio) {
-    const { canvas, pen } = this;
-    if (canvas.width !== view.width || canvas.height !== view.height) {
-      canvas.width = view.width;
-      canvas.height = view.height;
-    }
-    pen.setTransform(1, 0, 0, 1, 0, 0);
-    pen.clearRect(0, 0, canvas.width, canvas.height);
+  /** Empty it. @param {View} view */
+  begin({ width, height, ratio }) {
+    const { canvas } = this;
+    if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
+    this.pen.clearRect(0, 0, width, height);
     this.ratio = ratio;
     this.taken = [];
-    this.style = getComputedStyle(document.body);
-    this.ink = this.style.getPropertyValue('--ink').trim();
-    this.paper = this.style.getPropertyValue('--ground').trim();
-    this.family = this.style.fontFamily;
+    this.ink = styled('--ink');
+    this.paper = styled('--ground');
+    this.family = getComputedStyle(document.body).fontFamily;
   }
 
-  /** Write a text some pixels beside a pixel, unless something stands there already; `must` writes it in any case. */
+  /**
+   * Write a text some pixels beside a pixel, unless something stands there already; `must` writes it in any case.
+   * @param {number} x @param {number} y @param {string} text @param {string} colour @param {number} size
+   */
   write(x, y, text, colour, size, { must = false, gap = 9 } = {}) {
     const { pen, ratio } = this;
     pen.font = `600 ${size * ratio}px ${this.family}`;
@@ -51,6 +59,13 @@ export class Overlay {
     return true;
   }
 
+  /** Write a text beside a place of the world. @param {View} view @param {ArrayLike<number>} place @param {string} text @param {string} colour @param {number} size */
+  writeAt(view, place, text, colour, size, options = {}) {
+    const pixel = pixelOf(view, place);
+    if (pixel) this.write(pixel[0], pixel[1], text, colour, size, options);
+  }
+
+  /** @param {number} x @param {number} y @param {number} radius @param {string} colour @param {number} width */
   ring(x, y, radius, colour, width, opacity = 1) {
     const { pen, ratio } = this;
     pen.globalAlpha = opacity;
@@ -62,64 +77,47 @@ export class Overlay {
     pen.globalAlpha = 1;
   }
 
-  /** Names of those nearest to the eye; `first` are written before all others. */
-  labels(view, layer, hidden, { size, isOn, first, pixelsOf }) {
+  /**
+   * Names of entities: those of `first`, and those nearest to the eye.
+   * @param {View} view @param {Layer} layer @param {number[]} first slots @param {number[]} slots
+   * @param {number} size @param {(slot: number, depth: number) => number} pixelsOf length of an entity
+   */
+  labels(view, layer, first, slots, size, pixelsOf) {
     const { shown } = layer;
-    const wanted = [];
-    for (const id of first) {
-      const slot = id ? layer.slotOf(id) : -1;
-      if (slot >= 0) wanted.push([0, slot, true]);
-    }
-    if (isOn) wanted.push(...this.nearest(view, layer, hidden));
+    const inView = slots.map((slot) => ({ slot, pixel: pixelOf(view, shown.placeIn(slot)) }))
+      .filter(({ pixel }) => pixel && pixel[0] > 0 && pixel[1] > 0 && pixel[0] < view.width && pixel[1] < view.height)
+      .sort((a, b) => a.pixel[2] - b.pixel[2]).slice(0, 2 * MOST_LABELS).map(({ slot }) => slot);
     let n = 0;
-    const done = new Set();
-    for (const [, slot, must] of wanted) {
-      if (n >= MOST_LABELS) break;
-      const pixel = pixelOf(view, layer.placeIn(slot));
-      if (!pixel || done.has(slot)) continue;
-      done.add(slot);
+    for (const slot of new Set([...first, ...inView])) {
+      const pixel = pixelOf(view, shown.placeIn(slot));
+      if (!pixel || n >= MOST_LABELS) continue;
+      const must = first.includes(slot);
       const colour = must ? this.ink : this.soft(layer.colourOf(slot));
       const gap = Math.max(9, 0.55 * pixelsOf(slot, pixel[2]));
       if (this.write(pixel[0], pixel[1] + 4 * this.ratio, layer.who(shown.id[slot]), colour, size, { must, gap })) n++;
     }
   }
 
-  /** Those in view by their distance, no more than twice what will be written. */
-  nearest(view, layer, hidden) {
-    const { shown } = layer;
-    const found = [];
-    for (let i = 0; i < shown.n; i++) {
-      if (hidden.has(shown.team[i])) continue;
-      const pixel = pixelOf(view, layer.placeIn(i));
-      if (pixel && pixel[0] > 0 && pixel[1] > 0 && pixel[0] < view.width && pixel[1] < view.height) found.push([pixel[2], i, false]);
-    }
-    return found.sort((a, b) => a[0] - b[0]).slice(0, 2 * MOST_LABELS);
-  }
-
-  /** A team's colour, so near to that of text that it can be read. */
+  /** A team's colour, so near to that of text that it can be read. @param {Colour} colour */
   soft(colour) {
-    const ink = [1, 3, 5].map((i) => parseInt(this.ink.slice(i, i + 2), 16));
-    return rgb(colour.map((c, i) => Math.round(0.45 * c + 0.55 * ink[i])));
+    return rgb(parseColour(this.ink).map((c, i) => Math.round(0.45 * colour[i] + 0.55 * c)));
   }
 
-  /** Rings that widen where somebody was captured, died or met somebody, up to `seconds` of the game ago. */
+  /**
+   * Rings that widen where somebody was captured, died or collided, up to some seconds of the game ago.
+   * @param {View} view @param {Layer} layer @param {number} t @param {number} seconds
+   */
   flashes(view, layer, t, seconds) {
-    for (const event of this.recent(layer, t, seconds)) {
-      const { kind, id, other } = event;
+    const { events } = layer;
+    const last = lastWhere(events.length, (i) => events[i].t <= t + 1e-9);
+    for (let i = last; i >= 0 && events[i].t > t - seconds && last - i < MOST_FLASHES; i--) {
+      const { kind, id, other, t: when } = events[i];
       if (kind === 'birth' || kind === 'end' || !id) continue;
-      const place = layer.placeAt(kind === 'capture' ? other : id, event.t);
+      const place = layer.sampleAt(when)?.placeOf(kind === 'capture' ? other : id);
       const pixel = place && pixelOf(view, place);
       if (!pixel) continue;
-      const age = (t - event.t) / seconds;
+      const age = (t - when) / seconds;
       this.ring(pixel[0], pixel[1], 5 + 26 * Math.sqrt(age), KINDS[kind] || this.ink, 2.5, 1 - age);
     }
-  }
-
-  recent(layer, t, seconds) {
-    const found = [];
-    for (let i = lastNotAfter(layer.events, t); i >= 0 && layer.events[i].t > t - seconds && found.length < 200; i--) {
-      found.push(layer.events[i]);
-    }
-    return found;
   }
 }

@@ -1,61 +1,50 @@
 // Numbers as packing.py writes them.
 
-import { length } from './formatting.js';
-
 /** Reads numbers one block after another. */
 export class Reader {
-  constructor(bytes) {
+  /** @param {Uint8Array} bytes @param {number} at first byte to read */
+  constructor(bytes, at = 0) {
     this.bytes = bytes;
-    this.at = 0;
+    this.at = at;
   }
 
-  /** n whole numbers: planes of bytes, zigzag. */
+  /** n whole numbers: planes of bytes, zigzag. @param {number} n */
   ints(n) {
     const { bytes } = this;
     const nPlanes = bytes[this.at++];
     const out = new Int32Array(n);
     for (let plane = 0; plane < nPlanes; plane++) {
-      const shift = 8 * plane;
       const from = this.at + plane * n;
-      for (let i = 0; i < n; i++) out[i] |= bytes[from + i] << shift;
+      for (let i = 0; i < n; i++) out[i] |= bytes[from + i] << (8 * plane);
     }
     for (let i = 0; i < n; i++) out[i] = (out[i] >>> 1) ^ -(out[i] & 1);
     this.at += nPlanes * n;
     return out;
   }
 
-  /** Series of whole numbers, of which each begins with its first one and goes on with differences, or differences of these. */
+  /** Series of whole numbers, each stored as its first number and differences, or differences of these. @param {Int32Array} counts */
   column(counts) {
     const order = this.bytes[this.at++];
-    let n = 0;
-    for (const count of counts) n += count;
+    const n = counts.reduce((sum, count) => sum + count, 0);
     const heads = this.ints(counts.length);
     const steps = this.ints(n - counts.length);
     const out = new Int32Array(n);
-    let row = 0;
-    let next = 0;
+    let [row, next] = [0, 0];
     for (let series = 0; series < counts.length; series++) {
-      let value = heads[series];
-      let slope = 0;
+      let [value, slope] = [heads[series], 0];
       out[row++] = value;
       for (let k = 1; k < counts[series]; k++) {
-        slope = order === 2 ? slope + steps[next] : steps[next];
-        next++;
-        value += slope;
-        out[row++] = value;
+        slope = order === 2 ? slope + steps[next++] : steps[next++];
+        out[row++] = value += slope;
       }
     }
     return out;
   }
 
-  /** n real numbers: eight planes of bytes. */
+  /** n real numbers. @param {number} n */
   reals(n) {
-    const raw = new Uint8Array(8 * n);
-    for (let plane = 0; plane < 8; plane++) {
-      for (let i = 0; i < n; i++) raw[8 * i + plane] = this.bytes[this.at + plane * n + i];
-    }
+    const out = new Float64Array(this.bytes.slice(this.at, this.at + 8 * n).buffer);
     this.at += 8 * n;
-    const view = new DataView(raw.buffer);
-    return Float64Array.from({ length: n }, (_, i) => view.getFloat64(8 * i, true));
+    return out;
   }
 }

@@ -1,42 +1,52 @@
-// The cards on the page: title, teams, scores, who is chosen, what is known of the run.
+// The cards on the page: title, teams, scores, the chosen entity, what is known of the run.
+/** @import { Curves, Mode, PageData, Status, Team } from './types' */
 
-import { element, length, number, rgb, say } from './formatting.js';
+import { byId, cleared, element, fillList, length, number, rgb, say, styled } from './formatting.js';
 import { between, forward, norm } from './geometry.js';
-import { attitudes } from './chunk.js';
-import { lastWhere, NO_TEAM } from './layer.js';
-import { append } from './live.js';
+import { lastNotAfter, NO_TEAM } from './layer.js';
+import { append, Live } from './live.js';
+import { Recorded } from './recorded.js';
 
 const CURVE_POINTS = 240;
 
 export class Panels {
+  /** @param {PageData} page @param {Live | Recorded} layer @param {Set<number>} hidden teams @param {() => void} changed */
   constructor(page, layer, hidden, changed) {
     this.page = page;
     this.layer = layer;
     this.hidden = hidden;
     this.changed = changed;
-    this.makeHead();
-    this.teams = page.teams.map((team, i) => this.makeTeam(team, i));
-    this.scores = page.teams.map((team) => this.makeScore(team));
-    this.makeInfo();
+    this.notes = '';
+    this.titles = '';
+    this.fillHead();
+    this.teams = page.teams.map((team) => this.makeTeam(team));
+    this.scores = page.teams.map((team) => this.makeRow(element('div', 'score'), 'scores', team, element('b')));
+    this.scored = layer instanceof Live ? layer.scores : this.captures();
+    this.fillInfo();
   }
 
-  makeHead() {
+  /** State of a live game; null of a recording. */
+  get status() {
+    return this.layer instanceof Live ? this.layer.status : null;
+  }
+
+  fillHead() {
     const { page, layer } = this;
-    document.querySelector('#head h1').textContent = page.title;
-    if (!layer.status) {
-      const seed = (page.facts.find(([name]) => name === 'Seed') || [])[1];
+    say(document.querySelector('#head h1'), page.title);
+    if (!this.status) {
+      const seed = page.facts.find(([name]) => name === 'Seed')?.[1];
       const n = `${number(page.nEntities)} ${page.nEntities === 1 ? 'entity' : 'entities'}`;
       const seconds = `${number(layer.end - layer.start, 1).replace(/\.0$/, '')} s`;
-      say(document.getElementById('subtitle'), [seed && `seed ${seed}`, n, seconds].filter(Boolean).join(' · '));
+      say(byId('subtitle'), [seed && `seed ${seed}`, n, seconds].filter(Boolean).join(' · '));
     }
-    const lead = document.getElementById('lead');
-    lead.hidden = !page.lead;
-    say(lead, page.lead || '');
+    byId('lead').hidden = !page.lead;
+    say(byId('lead'), page.lead);
+    say(document.querySelector('#scores h2'), this.status ? 'Score' : 'Captures');
     this.showNotes(page.notes);
     if (!page.isComplete) this.notice('This run was cut short: what there is of it is shown', true);
   }
 
-  /** How many notes there are, and the notes where that is clicked. */
+  /** Show the notes and how many they are. @param {string[]} notes */
   showNotes(notes) {
     const key = notes.join('\n');
     if (key === this.notes) return;
@@ -45,234 +55,195 @@ export class Panels {
     this.notice(notes.length ? `${notes.length} ${notes.length === 1 ? 'note' : 'notes'}` : '', false);
   }
 
+  /** @param {string} text @param {boolean} isWarning */
   notice(text, isWarning) {
-    const notice = document.getElementById('notice');
+    const notice = byId('notice');
     notice.hidden = !text;
     notice.classList.toggle('plain', !isWarning);
-    notice.dataset.do = 'info';
     say(notice, text);
   }
 
-  /** What a live game says of itself. */
-  showStatus(status) {
-    const { step, reached, rate, seed, isPaused, isOver, isSeeking, error, notes, metrics, steers } = status;
+  /** Show the state of a live game. @param {Status} status */
+  showStatus({ step, reached, rate, seed, isPaused, isOver, isSeeking, error, notes, metrics, steers }) {
     const state = isSeeking ? 'seeking' : isOver ? 'over' : isPaused ? 'paused' : `${Number(reached.toPrecision(2))}× real time`;
     const parts = [`seed ${seed}`, `step ${number(step)}`, state, rate && !isPaused && `${rate} frames/s`, !steers && 'another browser steers'];
-    say(document.getElementById('subtitle'), parts.filter(Boolean).join(' · '));
-    this.showNotes([...(error ? [error] : []), ...this.page.notes, ...notes.filter((note) => !this.page.notes.includes(note))]);
+    say(byId('subtitle'), parts.filter(Boolean).join(' · '));
+    this.showNotes([...new Set([...(error ? [error] : []), ...this.page.notes, ...notes])]);
     if (error) this.notice(error, true);
-    const rows = metrics.flatMap(([name, value]) => [element('dt', '', name), element('dd', '', value)]);
-    document.getElementById('metrics').replaceChildren(...rows);
+    fillList(byId('metrics'), metrics);
   }
 
-  makeTeam(team, i) {
-    const button = element('button', 'team');
-    button.type = 'button';
+  /**
+   * A row with the colour and the name of a team, a value and a curve.
+   * @template {HTMLElement} T @param {T} row @param {string} box @param {Team} team @param {HTMLElement} value
+   */
+  makeRow(row, box, team, value) {
+    const swatch = element('i');
+    swatch.style.setProperty('--team', rgb(team.colour));
+    const curve = element('canvas');
+    row.append(swatch, element('span', '', team.name || `team ${team.id}`), value, curve);
+    byId(box).append(row);
+    return { row, team, value, curve };
+  }
+
+  /** @param {Team} team */
+  makeTeam(team) {
+    const [count, most, button] = [element('b'), element('small'), element('button', 'team')];
     button.title = 'Show or hide';
     button.setAttribute('aria-pressed', 'true');
-    const swatch = element('i');
-    swatch.style.setProperty('--team', rgb(team.colour));
-    const [count, most, right] = [element('b'), element('small'), element('span')];
-    right.append(count, most);
-    const curve = document.createElement('canvas');
-    button.append(swatch, element('span', '', team.name || `team ${team.id}`), right, curve);
-    button.addEventListener('click', () => this.toggle(team.id, button));
-    document.getElementById('teams').append(button);
-    return { team, count, most, curve, i };
+    button.addEventListener('click', () => {
+      const isShown = this.hidden.delete(team.id) || !this.hidden.add(team.id);
+      button.classList.toggle('is-hidden', !isShown);
+      button.setAttribute('aria-pressed', String(isShown));
+      this.changed();
+    });
+    return { ...this.makeRow(button, 'teams', team, element('span', '', '', count, most)), count, most };
   }
 
-  makeScore(team) {
-    const line = element('div', 'score');
-    const swatch = element('i');
-    swatch.style.setProperty('--team', rgb(team.colour));
-    const [value, curve] = [element('b'), document.createElement('canvas')];
-    line.append(swatch, element('span', '', team.name || `team ${team.id}`), value, curve);
-    document.getElementById('scores').append(line);
-    return { team, value, curve, line };
-  }
-
-  toggle(team, button) {
-    if (this.hidden.has(team)) this.hidden.delete(team);
-    else this.hidden.add(team);
-    button.classList.toggle('is-hidden', this.hidden.has(team));
-    button.setAttribute('aria-pressed', String(!this.hidden.has(team)));
-    this.changed();
-  }
-
-  makeInfo() {
+  fillInfo() {
     const { page } = this;
-    const box = document.getElementById('info');
-    say(box.querySelector('h2'), page.title);
+    const box = byId('info');
     const degrees = (page.angleError * 180) / Math.PI;
-    const accuracy = page.positionError && `positions within ${length(page.positionError)}, attitudes within ${degrees.toFixed(2)}° of the recording; between its frames, on the straight way`;
-    const facts = [...page.facts, ...(accuracy ? [['Accuracy', accuracy]] : [])];
-    box.querySelector('dl').append(...facts.flatMap(([name, value]) => [element('dt', '', name), element('dd', '', value)]));
+    const accuracy = `positions within ${length(page.positionError)}, attitudes within ${degrees.toFixed(2)}° of the recording; between its frames, on the straight way`;
     const whole = page.source === 'embedded' ? ' This page is whole by itself: it needs no network.' : '';
+    say(box.querySelector('h2'), page.title);
+    fillList(box.querySelector('dl'), page.positionError ? [...page.facts, ['Accuracy', accuracy]] : page.facts);
     say(box.querySelector('.small'), `Made by ${page.generator}.${whole}`);
   }
 
-  /** How many are left of each team, and what each has scored, with the curves up to now. */
+  /** Show entities and score of each team, with the curves up to a time. @param {number} t */
   showTeams(t) {
-    const { layer } = this;
-    const muted = getComputedStyle(document.body).getPropertyValue('--muted').trim();
+    const { layer, scored } = this;
     const counts = layer.counts();
-    for (const { team, count, most, curve, i } of this.teams) {
+    this.teams.forEach(({ team, count, most, curve }, i) => {
       const highest = Math.max(1, counts[i], ...layer.curves.n[i]);
       say(count, number(counts[i]));
       say(most, ` / ${number(highest)}`);
-      if (curve.clientWidth) this.drawCurve(curve, layer.curves.t, layer.curves.n[i], [0, highest], t, rgb(team.colour), muted);
-    }
-    const [title, { t: at, n }] = this.scored();
-    const box = document.getElementById('scores');
-    box.hidden = !at.length;
-    if (box.hidden) return;
-    say(box.querySelector('h2'), title);
-    const now = lastWhere(at.length, (i) => at[i] <= t + 1e-9);
-    const all = n.flat();
-    const range = [Math.min(0, ...all), Math.max(1e-9, ...all)];
-    this.scores.forEach(({ team, value, curve, line }, i) => {
-      line.hidden = !n[i].some(Boolean);
-      const score = now < 0 ? 0 : n[i][now];
+      this.drawCurve(curve, layer.curves, i, [0, highest], t, team);
+    });
+    byId('scores').hidden = !scored.t.length;
+    const now = lastNotAfter(scored.t, t);
+    const all = scored.n.flat();
+    this.scores.forEach(({ row, team, value, curve }, i) => {
+      row.hidden = !scored.n[i].some(Boolean);
+      const score = scored.n[i][now] ?? 0;
       say(value, number(score, Number.isInteger(score) ? 0 : 2));
-      if (curve.clientWidth) this.drawCurve(curve, at, n[i], range, t, rgb(team.colour), muted);
+      this.drawCurve(curve, scored, i, [Math.min(0, ...all), Math.max(1e-9, ...all)], t, team);
     });
   }
 
-  /** What is plotted beside the numbers: scores of a live game; of a recording, which has only the last ones, captures. */
-  scored() {
+  /** Captures of each team over time: of a recording, which has only the last scores. */
+  captures() {
     const { layer, page } = this;
-    if (layer.status) return ['Score', layer.scores];
-    if (!this.captures) {
-      this.captures = { t: [], n: page.teams.map(() => []) };
-      const sums = page.teams.map(() => 0);
-      for (const { t, kind, id } of layer.events) {
-        const i = kind === 'capture' ? page.teams.findIndex((team) => team.id === layer.teamOf(id).id) : -1;
-        if (i < 0) continue;
-        if (!this.captures.t.length) append(this.captures, layer.start, sums);
-        append(this.captures, t, sums);
-        sums[i]++;
-        append(this.captures, t, sums);
-      }
+    const found = layer.emptyCurves();
+    const sums = page.teams.map(() => 0);
+    for (const { t, kind, id } of layer.events) {
+      const i = kind === 'capture' ? page.teams.findIndex((team) => team.id === layer.teamOf(id).id) : -1;
+      if (i < 0) continue;
+      if (!found.t.length) append(found, layer.start, sums);
+      append(found, t, sums);
+      sums[i]++;
+      append(found, t, sums);
     }
-    return ['Captures', this.captures];
+    return found;
   }
 
-  /** A curve over the whole game, and in colour up to now. */
-  drawCurve(canvas, at, values, [lowest, highest], t, colour, muted) {
+  /**
+   * Draw a curve over the whole game, and in colour up to now.
+   * @param {HTMLCanvasElement} canvas @param {Curves} curves @param {number} i which of them @param {number[]} range @param {number} t @param {Team} team
+   */
+  drawCurve(canvas, { t: at, n }, i, [lowest, highest], t, team) {
     const { start, end } = this.layer;
-    const ratio = window.devicePixelRatio || 1;
     const [width, height] = [canvas.clientWidth, canvas.clientHeight];
-    if (canvas.width !== Math.round(width * ratio)) {
-      canvas.width = Math.round(width * ratio);
-      canvas.height = Math.round(height * ratio);
-    }
-    const pen = canvas.getContext('2d');
-    pen.setTransform(ratio, 0, 0, ratio, 0, 0);
-    pen.clearRect(0, 0, width, height);
-    const x = (time) => between((time - start) / (end - start || 1), 0, 1) * (width - 6) + 2;
-    const y = (value) => height - 2 - ((value - lowest) / (highest - lowest || 1)) * (height - 5);
-    const now = lastWhere(at.length, (i) => at[i] <= t + 1e-9);
+    if (!width) return;
+    const pen = cleared(canvas);
+    const x = (/** @type {number} */ time) => between((time - start) / (end - start || 1), 0, 1) * (width - 6) + 2;
+    const y = (/** @type {number} */ value) => height - 2 - ((value - lowest) / (highest - lowest || 1)) * (height - 5);
     const stride = Math.max(1, Math.floor(at.length / CURVE_POINTS));
-    const trace = (last) => {
-      pen.beginPath();
-      for (let k = 0; k < last; k += stride) pen.lineTo(x(at[k]), y(values[k]));
-      if (last >= 0) pen.lineTo(x(at[last]), y(values[last]));
+    const traced = (/** @type {number} */ last) => {
+      const path = new Path2D();
+      for (let k = 0; k < last; k += stride) path.lineTo(x(at[k]), y(n[i][k]));
+      if (last >= 0) path.lineTo(x(at[last]), y(n[i][last]));
+      return path;
     };
     pen.globalAlpha = 0.45;
-    pen.strokeStyle = muted;
-    trace(at.length - 1);
-    pen.stroke();
-    if (now >= 0) {
-      trace(now);
-      pen.lineTo(x(t), y(values[now]));
-      pen.globalAlpha = 1;
-      pen.strokeStyle = colour;
-      pen.lineWidth = 1.6;
-      pen.stroke();
-      pen.lineTo(x(t), height - 1);
-      pen.lineTo(x(at[0]), height - 1);
-      pen.globalAlpha = 0.25;
-      pen.fillStyle = colour;
-      pen.fill();
-      pen.globalAlpha = 1;
-      pen.lineWidth = 1;
-      pen.beginPath();
-      pen.arc(x(t), y(values[now]), 2.4, 0, 2 * Math.PI);
-      pen.fill();
-    }
+    pen.strokeStyle = styled('--muted');
+    pen.stroke(traced(at.length - 1));
+    const now = lastNotAfter(at, t);
+    if (now < 0) return;
+    const path = traced(now);
+    const value = y(n[i][now]);
+    path.lineTo(x(t), value);
     pen.globalAlpha = 1;
+    pen.strokeStyle = pen.fillStyle = rgb(team.colour);
+    pen.lineWidth = 1.6;
+    pen.stroke(path);
+    const knob = new Path2D();
+    knob.arc(x(t), value, 2.4, 0, 2 * Math.PI);
+    pen.fill(knob);
+    path.lineTo(x(t), height - 1);
+    path.lineTo(x(at[0]), height - 1);
+    pen.globalAlpha = 0.25;
+    pen.fill(path);
   }
 
-  /** What is known of who is chosen. */
+  /** Show what is known of the chosen entity; 0 for none. @param {number} id @param {Mode} mode @param {number} t */
   showChosen(id, mode, t) {
-    const box = document.getElementById('chosen');
+    const box = byId('chosen');
     box.hidden = !id;
     if (!id) return;
-    const { layer } = this;
-    say(box.querySelector('h2'), layer.who(id));
-    const facts = this.factsOf(id, t);
-    const list = box.querySelector('dl');
-    if (list.children.length !== 2 * facts.length) {
-      list.replaceChildren(...facts.flatMap(([name]) => [element('dt', '', name), element('dd')]));
-    }
-    facts.forEach(([name, value], i) => {
-      say(list.children[2 * i], name);
-      say(list.children[2 * i + 1], value);
-    });
+    say(box.querySelector('h2'), this.layer.who(id));
+    fillList(box.querySelector('dl'), this.factsOf(id, t));
     this.showSections(id);
-    for (const button of box.querySelectorAll('.modes button')) {
+    for (const button of /** @type {NodeListOf<HTMLElement>} */ (box.querySelectorAll('.modes button'))) {
       button.classList.toggle('is-on', button.dataset.do === mode);
     }
   }
 
-  /** What a live game tells of its plugins' columns and messages. */
+  /** Show columns of plugins and messages of a live game's entity. @param {number} id */
   showSections(id) {
-    const box = document.getElementById('sections');
-    const { entity } = this.layer.status || {};
-    const sections = entity && entity.id === id ? entity.sections.slice(1) : [];
-    const key = sections.map(([title, rows]) => [title, ...rows.map(([name]) => name)].join('\n')).join('\n\n');
-    if (key !== this.sectionsFor) {
-      this.sectionsFor = key;
-      box.replaceChildren(...sections.map(([title, rows]) => {
-        const [part, list] = [element('section'), element('dl')];
-        list.append(...rows.flatMap(([name]) => [element('dt', '', name), element('dd')]));
-        part.append(element('h3', '', title), list);
-        return part;
-      }));
-    }
-    const cells = box.querySelectorAll('dd');
-    sections.flatMap(([, rows]) => rows).forEach(([, value], i) => say(cells[i], value));
+    const box = byId('sections');
+    const entity = this.status?.entity;
+    const sections = entity?.id === id ? entity.sections.slice(1) : [];
+    const titles = sections.map(([title]) => title).join('\n');
+    if (titles !== this.titles) box.replaceChildren(...sections.map(([title]) => element('section', '', '', element('h3', '', title), element('dl'))));
+    this.titles = titles;
+    sections.forEach(([, rows], i) => fillList(box.children[i].lastElementChild, rows));
   }
 
+  /** @param {number} id @param {number} t @returns {[string, string][]} */
   factsOf(id, t) {
     const { layer } = this;
     const slot = layer.slotOf(id);
     const team = slot >= 0 ? layer.teams.get(layer.shown.team[slot]) || NO_TEAM : layer.teamOf(id);
-    const facts = [['Team', team.name ? `${team.id} ${team.name}` : `${team.id}`]];
-    const when = (condition) => (layer.events.find(condition) || {}).t;
-    if (slot >= 0) {
-      facts.push(...this.stateOf(slot));
-    } else {
-      const born = when((event) => event.kind === 'birth' && event.id === id);
-      const gone = when(({ kind, id: one, other }) => (kind === 'capture' ? other === id : ['death', 'collision'].includes(kind) && (one === id || (kind === 'collision' && other === id))));
-      if (born > t) facts.push(['Comes at', `${born.toFixed(1)} s`]);
-      else facts.push(gone <= t ? ['Gone since', `${gone.toFixed(1)} s`] : ['Gone', 'not there at this time']);
-    }
-    const captures = layer.events.filter((event) => event.kind === 'capture' && event.id === id && event.t <= t).length;
-    if (captures) facts.push(['Captures', `${captures}`]);
-    return facts;
+    const nCaptures = layer.events.filter((event) => event.kind === 'capture' && event.id === id && event.t <= t).length;
+    return [
+      ['Team', `${team.id} ${team.name}`.trim()],
+      ...(slot >= 0 ? this.stateOf(slot) : [this.absence(id, t)]),
+      .../** @type {[string, string][]} */ (nCaptures ? [['Captures', `${nCaptures}`]] : []),
+    ];
   }
 
+  /** Since or until when an entity is not there. @param {number} id @param {number} t @returns {[string, string]} */
+  absence(id, t) {
+    const { events } = this.layer;
+    const born = events.find((event) => event.kind === 'birth' && event.id === id)?.t;
+    const gone = events.find(({ kind, id: one, other }) =>
+      (['death', 'collision'].includes(kind) && one === id) || (['capture', 'collision'].includes(kind) && other === id))?.t;
+    if (born > t) return ['Comes at', `${born.toFixed(1)} s`];
+    return gone <= t ? ['Gone since', `${gone.toFixed(1)} s`] : ['Gone', 'not there at this time'];
+  }
+
+  /** @param {number} slot @returns {[string, string][]} */
   stateOf(slot) {
-    const { layer } = this;
-    const [east, north, up] = layer.placeIn(slot);
-    const velocity = layer.velocity(slot);
-    const [noseEast, noseNorth] = forward(layer.shown.quat.subarray(4 * slot, 4 * slot + 4));
-    const heading = ((Math.atan2(noseNorth, noseEast) * 180) / Math.PI + 360) % 360;
-    const health = layer.shown.health[slot];
+    const { shown } = this.layer;
+    const [east, north, up] = shown.placeIn(slot);
+    const nose = forward(shown.quat.subarray(4 * slot, 4 * slot + 4));
+    const heading = ((Math.atan2(nose[1], nose[0]) * 180) / Math.PI + 360) % 360;
+    const health = shown.health[slot];
     return [
       ['East', `${number(east, 1)} m`], ['North', `${number(north, 1)} m`], ['Up', `${number(up, 1)} m`],
-      ['Speed', `${number(norm(velocity), 1)} m/s`], ['Heading', `${number(heading % 360)}°`],
+      ['Speed', `${number(norm(this.layer.velocity(shown.id[slot])), 1)} m/s`], ['Heading', `${number(heading)}°`],
       ['Health', number(health, health < 10 ? 2 : 0).replace(/(\.\d*?)0+$/, '$1').replace(/\.$/, '')],
     ];
   }

@@ -1,12 +1,15 @@
 // Data from the page's own server: by requests for ranges of frames, or by a socket while a game is played.
+/** @import { Hearer } from './types' */
 
-import { length } from './formatting.js';
 import { SOURCES } from './sources.js';
 
 const ADDRESS = location.origin + location.pathname.replace(/\/$/, '');
 
 /** A recorded run, of which the page asks for what it shows. */
 class RangeSource {
+  isLive = false;
+
+  /** @param {string} name */
   async blob(name) {
     const answer = await fetch(`${ADDRESS}/${name}`);
     if (!answer.ok) throw new Error((await answer.text()).trim());
@@ -18,7 +21,7 @@ class RangeSource {
 class SocketSource extends RangeSource {
   isLive = true;
 
-  /** `hear` has a function for each kind of message, called with its header and its data, and `lost`. */
+  /** @param {Hearer} hear called with header and data of each message */
   connect(hear) {
     this.socket = new WebSocket(ADDRESS.replace('http', 'ws'));
     this.socket.binaryType = 'arraybuffer';
@@ -26,12 +29,12 @@ class SocketSource extends RangeSource {
       if (typeof data === 'string') return hear.status(JSON.parse(data));
       const length = new DataView(data).getUint32(0, true);
       const header = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, length)));
-      return hear[header.kind](header, new Uint8Array(data, 4 + length));
+      return hear[/** @type {'frame' | 'past' | 'drawn'} */ (header.kind)](header, new Uint8Array(data, 4 + length));
     });
     this.socket.addEventListener('close', () => hear.lost());
   }
 
-  /** Order something; lost where the socket is not open. */
+  /** Send a command, if the socket is open. @param {string} command */
   send(command, fields = {}) {
     if (this.socket.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify({ do: command, ...fields }));
   }

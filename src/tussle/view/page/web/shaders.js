@@ -1,9 +1,5 @@
 // What runs on the graphics card.
 
-import { length } from './formatting.js';
-import { cross, dot } from './geometry.js';
-import { turned } from './chunk.js';
-
 const HEADER = '#version 300 es\nprecision highp float;\n';
 
 /** Light from above and the left, a brighter sky than ground. */

@@ -1,16 +1,17 @@
-// Where the page's data comes from. All sources give bytes by name; those of a server stand in served.js.
+// Where the page's data comes from. All sources return bytes by name; those that ask a server are in served.js.
+/** @import { Source } from './types' */
 
-/** Source named in the document -> makes it. */
+/** Source named in the document -> makes it. @type {Record<string, () => Source>} */
 export const SOURCES = { embedded: () => new EmbeddedSource() };
 
-/** Data that stands on the page itself. */
+/** Data in the page itself: base64 of zlib streams. */
 class EmbeddedSource {
-  /** Bytes by name: base64 of a zlib stream. */
+  isLive = false;
+
+  /** @param {string} name */
   async blob(name) {
     const raw = atob(document.getElementById(`data-${name}`).textContent);
-    const bytes = new Uint8Array(raw.length);
-    for (let i = 0; i < raw.length; i++) bytes[i] = raw.charCodeAt(i);
-    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream('deflate'));
+    const stream = new Blob([Uint8Array.from(raw, (c) => c.charCodeAt(0))]).stream().pipeThrough(new DecompressionStream('deflate'));
     return new Uint8Array(await new Response(stream).arrayBuffer());
   }
 }

@@ -1,59 +1,56 @@
 // The clock: what time it is, how fast it goes, and the slider that shows it. Of a recording it is this page's own, of a live game the
 // game's, which all who watch share.
+/** @import { PageData, Source } from './types' */
 
-import { decimalsOf, say, times } from './formatting.js';
+import { byId, decimalsOf, field, say, times } from './formatting.js';
 import { between } from './geometry.js';
+import { Layer } from './layer.js';
+import { Live } from './live.js';
+import { Recorded } from './recorded.js';
 
 const SPEEDS = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 1000];
 /** Decimals of a live game's times, whose step is not known. */
 const LIVE_DECIMALS = 2;
 
-class Clock {
+/** What both clocks have in common; `t`, `isPlaying` and `speed` are their own. */
+export class Clock {
+  /** @param {Layer} layer */
   constructor(layer) {
     this.layer = layer;
-    this.slider = document.getElementById('time');
-    this.parts = document.querySelectorAll('#clock b, #clock span');
-    this.span();
+    this.slider = field('time');
+    this.decimals = LIVE_DECIMALS;
+    this.isLooping = false;
   }
 
-  /** Let the slider reach as far as the game. */
-  span() {
-    this.slider.min = String(this.layer.start);
-    this.slider.max = String(this.layer.end);
-  }
-
-  show() {
-    const { layer, t } = this;
-    const { start, end } = layer;
-    this.span();
-    say(this.parts[0], t.toFixed(this.decimals));
-    say(this.parts[1], `/ ${end.toFixed(this.decimals)} s`);
-    if (document.activeElement !== this.slider || this.isPlaying) this.slider.value = String(t);
-    const share = end > start ? (t - start) / (end - start) : 0;
-    this.slider.style.setProperty('--done', `${100 * share}%`);
-    this.slider.setAttribute('aria-valuetext', `${t.toFixed(this.decimals)} seconds`);
-    const play = document.getElementById('play');
-    play.classList.toggle('is-playing', this.isPlaying);
-    play.setAttribute('aria-label', this.isPlaying ? 'Pause' : 'Play');
-    say(document.getElementById('speed'), times(this.speed));
+  /** @param {number} t @param {boolean} isPlaying @param {number} speed */
+  show(t, isPlaying, speed) {
+    const { slider, decimals } = this;
+    const { start, end } = this.layer;
+    slider.min = String(start);
+    slider.max = String(end);
+    if (document.activeElement !== slider || isPlaying) slider.value = String(t);
+    slider.style.setProperty('--done', `${end > start ? (100 * (t - start)) / (end - start) : 0}%`);
+    slider.setAttribute('aria-valuetext', `${t.toFixed(decimals)} seconds`);
+    say(document.querySelector('#clock b'), t.toFixed(decimals));
+    say(document.querySelector('#clock span'), `/ ${end.toFixed(decimals)} s`);
+    byId('play').classList.toggle('is-playing', isPlaying);
+    byId('play').setAttribute('aria-label', isPlaying ? 'Pause' : 'Play');
+    say(byId('speed'), times(speed));
   }
 }
 
 export class RecordedClock extends Clock {
+  /** @param {Recorded} layer @param {Partial<PageData>} page */
   constructor(layer, { begins, warp, isPlaying }) {
     super(layer);
+    this.layer = layer;
     this.t = begins ?? layer.start;
     this.isPlaying = Boolean(isPlaying) && this.t < layer.end;
     this.speed = warp === undefined ? 1 : warp ?? SPEEDS[SPEEDS.length - 1];
-    this.isLooping = false;
-    this.decimals = layer.times.length > 1 ? decimalsOf((layer.end - layer.start) / (layer.times.length - 1)) : 1;
+    if (layer.times.length > 1) this.decimals = decimalsOf((layer.end - layer.start) / (layer.times.length - 1));
   }
 
-  get frame() {
-    return this.layer.frameAt(this.t);
-  }
-
-  /** Move on by seconds of the watcher's time. */
+  /** Move on by seconds of the watcher's time. @param {number} seconds */
   advance(seconds) {
     const { layer } = this;
     if (!this.isPlaying) return;
@@ -72,20 +69,21 @@ export class RecordedClock extends Clock {
     this.isPlaying = false;
   }
 
+  /** @param {number} t */
   seek(t) {
     this.t = between(t, this.layer.start, this.layer.end);
   }
 
-  /** To the beginning of a frame some frames away; between two frames, one back is the beginning of the present one. */
+  /** To the beginning of a frame some frames away; between two frames, one back is the beginning of the present one. @param {number} n */
   step(n) {
     const { times } = this.layer;
-    const { frame } = this;
+    const frame = this.layer.frameAt(this.t);
     const isBetween = n < 0 && this.t > times[frame] + this.layer.slack;
     this.isPlaying = false;
     this.t = times[between(frame + n + (isBetween ? 1 : 0), 0, times.length - 1)];
   }
 
-  /** The next speed in the list. */
+  /** The next speed in the list, or the one before. @param {number} n */
   change(n) {
     const found = n > 0 ? SPEEDS.find((each) => each > this.speed) : SPEEDS.findLast((each) => each < this.speed);
     this.speed = found ?? this.speed;
@@ -99,18 +97,15 @@ export class RecordedClock extends Clock {
 }
 
 export class LiveClock extends Clock {
+  /** @param {Live} layer @param {Source} source */
   constructor(layer, source) {
     super(layer);
+    this.layer = layer;
     this.source = source;
-    this.decimals = LIVE_DECIMALS;
   }
 
   get t() {
     return this.layer.shown.t;
-  }
-
-  get frame() {
-    return this.layer.shown.frame;
   }
 
   get isPlaying() {
@@ -132,14 +127,17 @@ export class LiveClock extends Clock {
     this.source.send('pause');
   }
 
+  /** @param {number} t */
   seek(t) {
     this.source.send('seek', { t: between(t, this.layer.start, this.layer.end) });
   }
 
+  /** @param {number} n */
   step(n) {
     this.source.send('step', { n });
   }
 
+  /** @param {number} n */
   change(n) {
     this.source.send(n > 0 ? 'faster' : 'slower');
   }

@@ -1,0 +1,126 @@
+// A recorded run, whose chunks are unpacked when they are first needed.
+/** @import { EventRow, PageData, Sample, Source } from './types' */
+
+import { between } from './geometry.js';
+import { Reader } from './packing.js';
+import { Chunk } from './chunk.js';
+import { lastNotAfter, lastWhere, Layer } from './layer.js';
+
+/** States that are kept unpacked, at some 45 bytes each; the chunks that were used last stay. */
+const MOST_STATES = 4e6;
+
+export class Recorded extends Layer {
+  /** @param {PageData} page @param {Source} source @param {() => void} changed @param {(error: Error) => void} failed a chunk cannot be read */
+  constructor(page, source, changed, failed) {
+    super(page, changed);
+    this.source = source;
+    this.failed = failed;
+    /** @type {Map<number, Chunk>} */
+    this.chunks = new Map();
+    this.reading = new Set();
+    this.curves = page.curves;
+    this.times = new Float64Array(0);
+    this.slack = 0;
+  }
+
+  async read() {
+    this.times = new Reader(await this.source.blob('times')).reals(this.page.nFrames);
+    this.start = this.times[0];
+    this.end = this.times[this.times.length - 1];
+    // A slider gives back times whose last digits differ from those it was given.
+    this.slack = 1e-6 * ((this.end - this.start) / Math.max(1, this.times.length - 1));
+    /** @type {EventRow[]} */
+    const rows = JSON.parse(new TextDecoder().decode(await this.source.blob('events')));
+    this.setEvents(rows);
+  }
+
+  get mostAtOnce() {
+    return this.page.mostAtOnce;
+  }
+
+  /** Number of the last frame that is not after a time, within a millionth of a frame. @param {number} t */
+  frameAt(t) {
+    return Math.max(0, lastNotAfter(this.times, t, this.slack));
+  }
+
+  /** Number of the chunk that goes on from a frame. @param {number} frame */
+  chunkOf(frame) {
+    const { chunks } = this.page;
+    return Math.max(0, lastWhere(chunks.length, (i) => chunks[i][0] <= frame));
+  }
+
+  /** A chunk; null where it has to be read first, which begins now. @param {number} number */
+  chunk(number) {
+    const chunk = this.chunks.get(number);
+    if (chunk) {
+      this.chunks.delete(number);
+      this.chunks.set(number, chunk);
+      return chunk;
+    }
+    if (number < this.page.chunks.length) this.unpack(number).catch(this.failed);
+    return null;
+  }
+
+  /** @param {number} number */
+  async unpack(number) {
+    if (this.reading.has(number)) return;
+    this.reading.add(number);
+    const chunk = new Chunk(await this.source.blob(`chunk-${number}`), this.page);
+    this.meet(chunk);
+    this.chunks.set(number, chunk);
+    this.reading.delete(number);
+    let nStates = 0;
+    for (const each of this.chunks.values()) nStates += each.nStates;
+    for (const [oldest, each] of this.chunks) {
+      if (nStates <= MOST_STATES || this.chunks.size <= 2) break;
+      nStates -= each.nStates;
+      this.chunks.delete(oldest);
+    }
+    this.changed();
+  }
+
+  /** The oldest frame that can be kept unpacked together with a frame. @param {number} frame */
+  oldestBeside(frame) {
+    const { chunks, nStates } = this.page;
+    const most = Math.max(1, Math.floor((0.6 * MOST_STATES * chunks.length) / Math.max(1, nStates)));
+    return chunks[Math.max(0, this.chunkOf(frame) - most + 1)][0];
+  }
+
+  /** Set `shown` to a time, between frames on the straight way; false while it has to be read. @param {number} t */
+  show(t) {
+    const frame = this.frameAt(t);
+    const chunk = this.chunk(this.chunkOf(frame));
+    if (!chunk) return false;
+    if (this.shown.t === t) return true;
+    const next = frame + 1 < this.times.length ? this.times[frame + 1] : t;
+    const share = next > this.times[frame] ? between((t - this.times[frame]) / (next - this.times[frame]), 0, 1) : 0;
+    this.shown.fill(chunk, frame - chunk.first, share).t = t;
+    return true;
+  }
+
+  /** Read what comes next. */
+  lookAhead() {
+    this.chunk(this.chunkOf(this.shown.frame) + 1);
+  }
+
+  /** @param {number} t */
+  sampleAt(t) {
+    const frame = this.frameAt(t);
+    const chunk = this.chunks.get(this.chunkOf(frame));
+    return chunk ? chunk.sample(frame - chunk.first) : null;
+  }
+
+  /** @param {number} seconds @param {number} most @returns {Sample[]} */
+  samples(seconds, most) {
+    const { frame, t } = this.shown;
+    const oldest = Math.max(this.frameAt(Math.max(this.start, t - seconds)), this.oldestBeside(frame));
+    const stride = Math.max(1, Math.ceil((frame - oldest) / most));
+    const found = [];
+    // Frames that the stride divides are the same ones in the next picture: trails do not flicker.
+    for (let each = frame; each >= oldest; each = each % stride ? each - (each % stride) : each - stride) {
+      const chunk = this.chunk(this.chunkOf(each));
+      if (chunk && this.times[each] < t) found.push(chunk.sample(each - chunk.first));
+    }
+    return found;
+  }
+}

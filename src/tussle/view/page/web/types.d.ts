@@ -1,0 +1,72 @@
+/** Types of the data that the page receives and passes between its modules. Checked by tsc; never sent to a browser. */
+
+/** x, y, z [m], east north up. */
+export type Vector = ArrayLike<number>;
+export type Colour = ArrayLike<number>;
+/** Numbers of the corners of triangles, and the corners. */
+export interface Mesh { vertices: number[]; faces: number[]; }
+export interface Team { id: number; name: string; colour: number[]; }
+export interface Block { name: string; team: number; colour: number[]; model: string; scale: number; }
+/** Values of each team at some times. */
+export interface Curves { t: number[]; n: number[][]; }
+export interface GameEvent { t: number; kind: string; id: number; other: number; text: string; }
+export type EventRow = [t: number, kind: string, id: number, other: number, text: string];
+
+export interface Terrain { x: number[]; y: number[]; low: number; step: number; }
+export interface SceneryData {
+  low: number[]; high: number[]; ground: number; gridStep: number; originLength: number; background: number[] | null;
+  bases: { team: number; pos: number[]; radius: number; opacity: number }[];
+  regions: { name: string; team: number | null; isWall: boolean; mesh: Mesh; outline: number[] }[];
+  terrain: Terrain | null;
+}
+
+/** The document: what the page is told at once, see document.py, recorded.py and publisher.py. */
+export interface PageData {
+  source: 'embedded' | 'range' | 'socket'; generator: string; title: string; blocks: Block[]; teams: Team[]; models: Record<string, Mesh>;
+  scenery: SceneryData; opening: { position: number[] | null; target: number[] | null; mode: Mode; follow: number } | null;
+  reach: number; angle: number; scale: number; hasTrails: boolean; notes: string[]; facts: [string, string][]; idShift: number;
+  isComplete: boolean; attitudeUnit: number; healthSteps: number;
+  // Of a recorded run.
+  nFrames?: number; nStates?: number; nEntities?: number; mostAtOnce?: number; chunks?: [number, number][]; curves?: Curves; positionError?: number;
+  angleError?: number; begins?: number; warp?: number | null; isPlaying?: boolean; lead?: string;
+  // Of a live game.
+  seed?: number;
+}
+
+/** State of a live game, sent four times a second. */
+export interface Status {
+  t: number; step: number; span: [number, number]; epoch: number; seed: number; isPaused: boolean; isOver: boolean; isSeeking: boolean;
+  warp: number | null; reached: number; rate: number; notes: string[]; error: string | null; scores: Record<string, number>;
+  metrics: [string, string][]; events: { from: number; rows: EventRow[] }; refusal: string | null; steers: boolean;
+  entity: { id: number; sections: [string, [string, string][]][] } | null;
+}
+
+/** Shapes of plugins, see drawing.py. */
+export interface ShapesHeader {
+  parts: { kind: string; n: number; at: number; nVertices?: number; nFaces?: number }[]; texts: [string, number, number, number][]; width: number;
+}
+
+export interface Source {
+  isLive: boolean;
+  blob(name: string): Promise<Uint8Array>;
+  connect?(hear: Hearer): void;
+  send?(command: string, fields?: object): void;
+}
+export interface Hearer {
+  status(status: Status): void; frame(header: { epoch: number }, bytes: Uint8Array): void; lost(): void;
+  past(header: { epoch: number; seconds: number }, bytes: Uint8Array): void; drawn(header: ShapesHeader, bytes: Uint8Array): void;
+}
+
+export type Mode = 'overview' | 'follow' | 'behind' | 'free';
+/** What a picture is drawn from, see `Camera.view`. */
+export interface View {
+  clip: Float64Array; eye: number[]; right: number[]; up: number[]; away: number[]; width: number; height: number; anchor: Vector;
+  near: number; far: number; distance: number; perPixel: number; ratio: number;
+}
+/** Entities at a time. */
+export interface Sample { t: number; ids(): Iterable<number>; placeOf(id: number): number[] | null; }
+/** What is drawn and how, as the settings have it. */
+export interface Drawn {
+  scale: number; trail: number; text: number; labels: boolean; wire: boolean; least: boolean; grid: boolean; regions: boolean; shapes: boolean;
+  rings: boolean; cones: boolean; links: boolean; ringRadius: number; coneRange: number; coneAngle: number; linkRange: number;
+}

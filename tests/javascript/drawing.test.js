@@ -1,0 +1,126 @@
+// What is computed for the picture: views, models, links, texts.
+
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { Camera, pixelOf, placeBehind, STEEPEST } from '../../src/tussle/view/page/web/camera.js';
+import { decimalsOf, eventText, length, number, times } from '../../src/tussle/view/page/web/formatting.js';
+import { forward, halfTurn, minus, norm, unit } from '../../src/tussle/view/page/web/geometry.js';
+import { prepared } from '../../src/tussle/view/page/web/models.js';
+import { Reader } from '../../src/tussle/view/page/web/packing.js';
+import { pairsWithin } from '../../src/tussle/view/page/web/reach.js';
+
+/** @param {ArrayLike<number>} a @param {ArrayLike<number>} b */
+const isNear = (a, b, error = 1e-9) => assert.ok(Array.from(a).every((v, i) => Math.abs(v - b[i]) <= error), `${Array.from(a)} is not ${Array.from(b)}`);
+
+/** A camera that has come to rest. @param {Camera} camera */
+function rested(camera) {
+  while (camera.step(1, true));
+  return camera;
+}
+
+test('what the camera looks at is in the middle, and a pixel leads back to its place', () => {
+  const camera = new Camera(100);
+  camera.look([0, -50, 20], [1, 2, 3]);
+  const view = camera.view(400, 300, 1, [0, 0, 0]);
+  isNear(pixelOf(view, [1, 2, 3]), [200, 150, norm([1, 52, 17])], 1e-6);
+  isNear(placeBehind(view, camera, 200, 150), [1, 2, 3]);
+  assert.equal(pixelOf(view, [0, -100, 20]), null, 'it lies behind the eye');
+  const [x, y] = pixelOf(view, [5, 2, 3]);
+  isNear(pixelOf(view, placeBehind(view, camera, x, y)).slice(0, 2), [x, y], 1e-6);
+});
+
+test('a fitted view has all places inside the room that panels leave', () => {
+  const camera = new Camera(100);
+  const places = [[0, 0, 0], [80, 5, 3], [-30, 60, 10], [10, -90, 40]];
+  camera.fit((see) => places.forEach(([x, y, z]) => see(x, y, z)), 4 / 3, { left: 0.1, right: 0.2, top: 0.1, bottom: 0.3 });
+  const view = rested(camera).view(400, 300, 1, [0, 0, 0]);
+  for (const place of places) {
+    const [x, y] = pixelOf(view, place);
+    assert.ok(x > 39 && x < 321 && y > 29 && y < 211, `${x}, ${y}`);
+  }
+});
+
+test('following keeps the view and goes with the entity', () => {
+  const camera = new Camera(100);
+  camera.look([0, -50, 20], [1, 2, 3]);
+  const before = camera.view(400, 300, 1, [0, 0, 0]).eye;
+  camera.enter('follow', [10, 0, 0], 0);
+  isNear(camera.view(400, 300, 1, [0, 0, 0]).eye, before, 1e-6);
+  rested(camera);
+  isNear(camera.target, [10, 0, 0]);
+  camera.track([20, 0, 0], 1);
+  isNear(camera.target, [20, 0, 0]);
+  camera.enter('behind', [20, 0, 0], Math.PI / 2);
+  isNear(rested(camera).axes().away.slice(0, 2), [0, -Math.cos(camera.now.pitch)], 1e-6);
+});
+
+test('undo returns to the view before, and to who was chosen', () => {
+  const camera = rested(new Camera(100));
+  const [yaw, distance] = [camera.now.yaw, camera.distance];
+  camera.remember(5);
+  camera.turn(1, 9);
+  camera.zoom(0.5);
+  rested(camera);
+  assert.deepEqual([camera.now.pitch, Math.round(camera.distance)], [STEEPEST, 50]);
+  assert.equal(camera.undo(), 5);
+  rested(camera);
+  isNear([camera.now.yaw, camera.distance], [yaw, distance], 1e-6);
+  assert.equal(camera.undo(), null);
+});
+
+test('coming nearer to a place leaves it where it is', () => {
+  const camera = rested(new Camera(100));
+  const place = placeBehind(camera.view(400, 300, 1, [0, 0, 0]), camera, 300, 100);
+  camera.enter('free');
+  camera.zoom(0.5, place);
+  isNear(pixelOf(rested(camera).view(400, 300, 1, [0, 0, 0]), place).slice(0, 2), [300, 100], 1e-6);
+});
+
+test('angles and directions', () => {
+  isNear([halfTurn(7), halfTurn(-4)], [7 - 2 * Math.PI, 2 * Math.PI - 4]);
+  isNear(forward([Math.SQRT1_2, 0, 0, Math.SQRT1_2]), [0, 1, 0]);
+  assert.deepEqual([unit([0, 3, 4]), unit([0, 0, 0])], [[0, 0.6000000000000001, 0.8], [0, 0, 0]]);
+});
+
+test('a box has sharp edges and flat sides, a fine roof round ones', () => {
+  const tent = (height) => ({ vertices: [-1, 0, 0, 0, 0, height, 1, 0, 0, 0, 2, height], faces: [0, 1, 3, 1, 2, 3] });
+  const [steep, flat] = [prepared(tent(1)), prepared(tent(0.01))];
+  assert.equal(steep.corners.length, 6 * 6);
+  assert.equal(steep.lines.length / 12, 5, 'four sides and the ridge');
+  assert.equal(flat.lines.length / 12, 4, 'the ridge is no edge');
+  const normals = (corners, i) => corners.subarray(6 * i + 3, 6 * i + 6);
+  isNear(normals(flat.corners, 1), normals(flat.corners, 3), 1e-6);
+  assert.ok(norm(minus(normals(steep.corners, 1), normals(steep.corners, 3))) > 0.5);
+});
+
+test('links join those in reach, each pair once', () => {
+  const places = Array.from({ length: 60 }, (_, i) => [(i * 37) % 50, (i * 17) % 40, (i * 7) % 11]);
+  const slow = places.flatMap((a, i) => places.slice(0, i).filter((b) => norm(minus(a, b)) <= 9));
+  assert.equal(pairsWithin(places, 9).length, slow.length);
+  assert.ok(slow.length > 20);
+  assert.deepEqual(pairsWithin(places, 0), []);
+});
+
+test('whole numbers and differences of differences are read', () => {
+  const reader = new Reader(Uint8Array.from([1, 0, 1, 2, 3, 4, /* column */ 2, 1, 20, 1, 2, 2, 0]));
+  assert.deepEqual([...reader.ints(5)], [0, -1, 1, -2, 2]);
+  assert.deepEqual([...reader.column(Int32Array.of(4))], [10, 11, 13, 15]);
+});
+
+test('numbers, lengths and times as text', () => {
+  assert.deepEqual([number(1234567), number(-0.04, 1), number(-2.5, 1)], ['1\u202f234\u202f567', '0.0', '−2.5']);
+  assert.deepEqual([1500, 2, 0.05, 0.002, 0.0005].map(length), ['1.5 km', '2 m', '5 cm', '2.0 mm', '0.50 mm']);
+  assert.deepEqual([times(0.5), times(Infinity)], ['0.5×', 'max']);
+  assert.deepEqual([0.1, 0.04, 1, 1e-9].map(decimalsOf), [1, 2, 1, 4]);
+});
+
+test('events as sentences', () => {
+  const who = (id) => `drone ${id}`;
+  const say = (kind, id = 1, other = 0, text = '') => eventText({ t: 0, kind, id, other, text }, who);
+  assert.equal(say('capture', 1, 2), 'drone 1 captured drone 2');
+  assert.equal(say('collision', 1, 2), 'drone 1 and drone 2 collided');
+  assert.equal(say('collision'), 'drone 1 hit the ground');
+  assert.equal(say('death', 1, 3, 'fuel'), 'drone 1 died: fuel (drone 3)');
+  assert.equal(say('end', 0, 0, 'one_team'), 'The game ended: one team is left');
+  assert.equal(say('landing', 1, 0, 'soft'), 'landing drone 1 soft');
+});

@@ -1,0 +1,142 @@
+// Reading and playing games: chunks, recordings, live games, events.
+
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { Chunk, Moment } from '../../src/tussle/view/page/web/chunk.js';
+import { lastNotAfter, lastWhere, Layer } from '../../src/tussle/view/page/web/layer.js';
+import { append, Live } from '../../src/tussle/view/page/web/live.js';
+import { Recorded } from '../../src/tussle/view/page/web/recorded.js';
+import { chunkBytes, pageData, sourceOf } from './games.js';
+
+const TRACKS = [{ id: 7, begin: 0, x: [0, 2, 4] }, { id: 9, begin: 1, x: [100, 100] }];
+const nothing = () => {};
+
+/** A recording of two chunks whose second one begins with the last frame of the first. @param {(error: Error) => void} failed */
+async function recorded(failed = assert.ifError) {
+  const text = JSON.stringify([[0, 'birth', 7, 0, 'drone'], [1, 'capture', 7, 9, ''], [1, 'death', 9, 7, ''], [2, 'death', 5, 0, 'fuel']]);
+  const blobs = {
+    times: new Uint8Array(new Float64Array([0, 1, 2, 3]).buffer), events: new TextEncoder().encode(text),
+    'chunk-0': chunkBytes(0, [0, 1, 2], [TRACKS[0], { id: 9, begin: 0, x: [100, 100] }]), 'chunk-1': chunkBytes(2, [2, 3], [{ id: 7, begin: 0, x: [4, 400] }]),
+  };
+  const page = pageData({ nFrames: 4, nStates: 7, chunks: [[0, 2], [2, 3]], curves: { t: [], n: [[]] } });
+  const layer = new Recorded(page, sourceOf(blobs), nothing, failed);
+  await layer.read();
+  return layer;
+}
+
+/** Show a time of a recording, when what it needs is there. @param {Recorded} layer @param {number} t */
+async function shown(layer, t) {
+  layer.show(t);
+  await new Promise((done) => setTimeout(done));
+  assert.ok(layer.show(t));
+  return layer.shown;
+}
+
+test('a chunk holds tracks, of which each frame shows those that are there', () => {
+  const chunk = new Chunk(chunkBytes(5, [0, 1, 2], TRACKS), pageData());
+  assert.deepEqual([chunk.first, chunk.nFrames, chunk.nStates], [5, 3, 5]);
+  assert.deepEqual([...chunk.sample(0).ids()], [7]);
+  assert.deepEqual([...chunk.sample(1).ids()], [7, 9]);
+  assert.deepEqual(chunk.sample(1).placeOf(7), [11, 20, 30]);
+  assert.equal(chunk.sample(0).placeOf(9), null);
+  const moment = new Moment(1).fill(chunk, 1, 0.5);
+  assert.deepEqual([moment.n, moment.frame, moment.placeOf(7), moment.slotOf(3)], [2, 6, [11.5, 20, 30], -1]);
+  assert.deepEqual([...moment.quat.subarray(0, 4), moment.health[0]], [1, 0, 0, 0, 2]);
+});
+
+test('a recording is read chunk by chunk and shown between frames', async () => {
+  const layer = await recorded();
+  assert.equal(layer.show(0.5), false, 'its chunk is not there yet');
+  assert.deepEqual((await shown(layer, 0.5)).placeOf(7), [10.5, 20, 30]);
+  assert.equal((await shown(layer, 2.5)).frame, 2);
+  assert.deepEqual([layer.frameAt(1 - 1e-9), layer.frameAt(0.9), layer.chunkOf(2)], [1, 0, 1]);
+});
+
+test('a recording whose data cannot be read says so', async () => {
+  const errors = [];
+  const layer = await recorded((error) => errors.push(error));
+  layer.source.blob = async () => { throw new Error('gone'); };
+  layer.show(0);
+  await new Promise((done) => setTimeout(done));
+  assert.equal(errors[0].message, 'gone');
+});
+
+test('velocity is that of the frames around, and none over a jump', async () => {
+  const layer = await recorded();
+  await shown(layer, 1);
+  assert.deepEqual(layer.velocity(7), [1, 0, 0]);
+  await shown(layer, 3);
+  assert.deepEqual(layer.velocity(7), [0, 0, 0]);
+});
+
+test('trails lead back, of the dead too, and end at a jump', async () => {
+  const layer = await recorded();
+  await shown(layer, 0);
+  await shown(layer, 3);
+  /** Times of all trails, by id. @param {number[] | null} only */
+  const times = (only = null) => {
+    const found = [];
+    layer.trails(10, 100, only, (id, _, when) => found.push([id, when]));
+    return found;
+  };
+  assert.deepEqual(times(), [[9, [1, 0]]], 'the last place of 7 is a jump away from all others');
+  await shown(layer, 2);
+  assert.deepEqual(times(), [[7, [2, 1, 0]], [9, [1, 0]]]);
+  assert.deepEqual(times([9]), [[9, [1, 0]]]);
+});
+
+test('a capture tells of the death, and names come from births', async () => {
+  const layer = await recorded();
+  assert.deepEqual(layer.events.map(({ kind }) => kind), ['birth', 'capture', 'death']);
+  assert.deepEqual(layer.marked.map(({ t, kind }) => [t, kind]), [[1, 'capture'], [2, 'death']]);
+  assert.deepEqual([layer.who(7), layer.who(5), layer.teamOf(7).id, layer.teamOf(5).id], ['drone 7', '5', 1, 0]);
+  assert.equal(new Layer(pageData({ idShift: 10 }), nothing).who(13), '3');
+});
+
+test('colours are those of the block in its own team', () => {
+  const layer = new Layer(pageData({ teams: [{ id: 1, name: '', colour: [1, 1, 1] }, { id: 2, name: '', colour: [2, 2, 2] }] }), nothing);
+  assert.deepEqual([layer.colour(0, 1), layer.colour(0, 2)], [[1, 2, 3], [2, 2, 2]]);
+});
+
+test('a live game keeps its frames, and forgets them when it jumps', () => {
+  const layer = new Live(pageData(), nothing);
+  assert.equal(layer.show(), false);
+  const frame = (t, epoch = 1) => layer.takeFrame({ epoch }, chunkBytes(t, [t], [{ id: 7, begin: 0, x: [2 * t] }]));
+  frame(1);
+  frame(2);
+  assert.deepEqual([layer.show(), layer.end, layer.past.length, layer.curves.t], [true, 2, 2, [1, 2]]);
+  assert.deepEqual(layer.velocity(7), [1, 0, 0]);
+  layer.takePast({ epoch: 1, seconds: 5 }, chunkBytes(0, [0, 1], [{ id: 7, begin: 0, x: [0, 2] }, { id: 4, begin: 0, x: [90] }]));
+  assert.deepEqual(layer.past.map(({ t }) => t), [0, 1, 2]);
+  assert.equal(layer.who(4), 'drone 4', 'it was gone before the first frame');
+  assert.deepEqual(layer.samples(1.5, 10).map(({ t }) => t), [1]);
+  layer.takePast({ epoch: 1, seconds: 1e9 }, chunkBytes(0, [0, 0.5], [{ id: 7, begin: 0, x: [0, 2] }]));
+  assert.deepEqual(layer.curves, { t: [0, 0.5, 1, 2], n: [[1, 1, 1, 1]] });
+  frame(1, 2);
+  assert.deepEqual([layer.past.length, layer.curves.t], [1, [0, 0.5, 1]]);
+  layer.takePast({ epoch: 1, seconds: 5 }, new Uint8Array(0));
+  assert.equal(layer.past.length, 1, 'what was asked for before the jump is not taken');
+});
+
+test('events and scores of a live game grow, and are cut where it goes back', () => {
+  const layer = new Live(pageData(), nothing);
+  const status = (t, from, rows, score) =>
+    layer.takeStatus(({ t, span: [0, 9], events: { from, rows }, scores: { 1: score } }));
+  status(1, 0, [[0.5, 'death', 3, 0, '']], 4);
+  status(2, 1, [[1.5, 'death', 4, 0, '']], 5);
+  assert.deepEqual([layer.marked.length, layer.scores.t, layer.scores.n], [2, [1, 2], [[4, 5]]]);
+  status(1, 1, [], 4);
+  assert.deepEqual([layer.marked.length, layer.scores.t], [1, [1]]);
+});
+
+test('curves keep no more than some hundred moments', () => {
+  const curves = { t: ([]), n: ([[]]) };
+  for (let i = 0; i < 5000; i++) append(curves, i, [i]);
+  assert.ok(curves.t.length <= 600 && curves.t.length > 250);
+  assert.deepEqual(curves.t, curves.n[0]);
+});
+
+test('a place in an ordered list is found', () => {
+  assert.deepEqual([0, 1, 3, 9].map((n) => lastWhere(n, (i) => i < 3)), [-1, 0, 2, 2]);
+  assert.deepEqual([-1, 0, 1.5, 5].map((t) => lastNotAfter([0, 1, 2], t)), [-1, 0, 1, 2]);
+});

@@ -1,0 +1,31 @@
+"""Types and unit tests of the page's JavaScript: the commands of `npm test`, where Node.js and TypeScript are installed."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).parent
+ROOT = HERE.parents[1]
+
+
+def run(program: str, *arguments: str | Path) -> None:
+    """Run a program that must succeed. Where checks are run in earnest, the variable CI is set and it must be there."""
+    found = shutil.which(program) or shutil.which(program, path=ROOT / "node_modules" / ".bin")
+    if found is None and not os.environ.get("CI"):
+        pytest.skip(f"{program} is not installed here: install Node.js, then npm install")
+    assert found is not None, f"{program} is not installed"
+    done = subprocess.run([found, *arguments], check=False, capture_output=True, text=True, cwd=ROOT)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_types_of_the_page_and_of_its_tests():
+    run("tsc", "-p", HERE)
+
+
+def test_units_of_the_page():
+    run("node", "--test", *sorted(HERE.glob("*.test.js")))
