@@ -5,6 +5,7 @@ import math
 import pytest
 from recorded_games import hunt
 from served import Watched
+from watched_plugins import clickable
 
 from tussle import Recorder, Simulation
 from tussle.view import Recording
@@ -72,5 +73,23 @@ def test_two_runs_are_seen_together_from_where_they_differ(chromium, runs):
         watched.press("ArrowLeft")
         watched.wait("player.chosen > 1 && player.isDrawn")
         assert watched.tab.locator("#chosen h2").inner_text().startswith("B hunters ")
+        watched.close()
+        assert not watched.trouble, "\n".join(watched.trouble)
+
+
+def test_shapes_that_plugins_drew_are_seen_again(chromium, tmp_path):
+    with (
+        Simulation(clickable(), 1) as simulation,
+        Recorder(simulation, tmp_path / "run", shapes=True),
+    ):
+        simulation.run()
+    with Page(Recording(tmp_path / "run"), is_paused=True) as page:
+        watched = Watched(chromium, page)
+        watched.wait("player.isDrawn")
+        assert watched.tab.evaluate("() => player.shapes") == []
+        watched.press(".")
+        watched.wait("player.frame === 1 && player.shapes.some(([kind, n]) => kind === 'arrows' && n === 3)")
+        watched.press("End")
+        watched.wait("player.frame === 80 && player.shapes.length === 1")
         watched.close()
         assert not watched.trouble, "\n".join(watched.trouble)

@@ -61,6 +61,22 @@ test('a recording whose data cannot be read says so', async () => {
   assert.equal(errors[0].message, 'gone');
 });
 
+test('shapes are read in groups of frames, and last until the next ones', async () => {
+  const layer = await recorded();
+  assert.equal((await shown(layer, 1)) && layer.shapesShown(), null);
+  const message = (frame, width) => {
+    const header = new TextEncoder().encode(JSON.stringify({ width }).padEnd(16));
+    return [...new Uint8Array(Uint32Array.of(frame, 24, 16).buffer), ...header, 1, 2, 3, 4];
+  };
+  layer.page.shapeFrames = 64;
+  layer.source.blob = async () => Uint8Array.from([...message(0, 5), ...message(2, 6)]);
+  assert.equal(layer.shapesShown(), undefined, 'they are not there yet');
+  await new Promise((done) => setTimeout(done));
+  assert.deepEqual([layer.shapesShown().header.width, [...layer.shapesShown().bytes]], [5, [1, 2, 3, 4]]);
+  layer.shown.frame = 3;
+  assert.equal(layer.shapesShown().header.width, 6);
+});
+
 test('velocity is that of the frames around, and none over a jump', async () => {
   const layer = await recorded();
   await shown(layer, 1);

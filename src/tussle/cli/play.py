@@ -46,7 +46,13 @@ def simulate(loaded: Loaded, mission: Mission, seed: int, **more: Any) -> Simula
         raise type(error)(f"{place or loaded.path}: {error}") from error
 
 
-def record(simulation: Simulation, directory: Path, loaded: Loaded, period: float | None = None) -> Recorder:
+def record(
+    simulation: Simulation,
+    directory: Path,
+    loaded: Loaded,
+    period: float | None = None,
+    shapes: bool = False,
+) -> Recorder:
     """Return a recorder of a simulation.
 
     Raises:
@@ -55,8 +61,8 @@ def record(simulation: Simulation, directory: Path, loaded: Loaded, period: floa
     from tussle.record import Recorder
 
     return Recorder(
-        simulation, directory, period=period, mission_text=loaded.text, parameters=loaded.settings
-    )
+        simulation, directory, period=period, mission_text=loaded.text, parameters=loaded.settings, shapes=shapes
+    )  # fmt: skip
 
 
 def check(options: MissionOptions) -> None:

@@ -39,6 +39,7 @@ class RunOptions(MissionOptions):
     log_period: Annotated[
         float | None, option("S", "Time between recorded states [s]; by default every step.")
     ] = None
+    shapes: Annotated[bool, flag("--shapes", "Record the shapes that plugins draw, too.")] = False
     pace: Annotated[
         float | None,
         option("X", "Play at most X times as fast as real time. The result does not change."),
@@ -49,9 +50,9 @@ class RunOptions(MissionOptions):
     ] = None
 
     def __post_init__(self) -> None:
-        if self.no_log and (self.directory is not None or self.log_period is not None):
+        if self.no_log and (self.directory is not None or self.log_period is not None or self.shapes):
             raise typer.BadParameter(
-                "--no-log records nothing, so --out and --log-period are not allowed with it"
+                "--no-log records nothing, so --out, --log-period and --shapes are not allowed with it"
             )
         check_positive(pace=self.pace, log_period=self.log_period)
         is_changed = self.mission or self.more or self.settings or self.plugin_files

@@ -15,8 +15,21 @@ from tussle.errors import ParameterError, RecordError
 from tussle.record import run_file
 from tussle.record.events import BIRTH, END, Events
 from tussle.record.row_buffer import RowBuffer, RowSelection
-from tussle.record.schema import EVENTS, EVENTS_FILE, FILES, MISSION_FILE, TRAJECTORY, TRAJECTORY_FILE
+from tussle.record.schema import (
+    EVENTS,
+    EVENTS_FILE,
+    FILES,
+    MISSION_FILE,
+    SHAPES,
+    SHAPES_FILE,
+    TRAJECTORY,
+    TRAJECTORY_FILE,
+)
+from tussle.record.shapes import ShapeRows
 from tussle.record.stream import Stream
+
+MOST_LETTERS = 4_000_000
+"""Characters of shapes that are collected between two flushes."""
 
 
 class Recorded(Protocol):
@@ -47,6 +60,7 @@ class Recorder:
         mission_text: Mission file with all its values, saved as `mission.xml`.
         parameters: Values that were set in addition to the mission, for `run.json`.
         flush_every: Wall time between flushes [s].
+        shapes: Whether the shapes that plugins draw are recorded, too; of every step, whatever the period.
 
     Raises:
         RecordError: The directory holds a run, or cannot be written.
@@ -62,6 +76,7 @@ class Recorder:
         mission_text: str | None = None,
         parameters: Mapping[str, Any] | None = None,
         flush_every: float = 1.0,
+        shapes: bool = False,
     ) -> None:
         for name, value in (("period", period), ("flush_every", flush_every)):
             if value is not None and not 0.0 < value < float("inf"):
@@ -82,11 +97,11 @@ class Recorder:
         self._rows: RowSelection
         self._common_step = -1
         self._steps = np.full(sim.n_worlds, -1, np.int64)
-        self._open(mission_text)
+        self._open(mission_text, shapes)
         self._flush_at = time.monotonic() + flush_every
         self._begin()
 
-    def _open(self, mission_text: str | None) -> None:
+    def _open(self, mission_text: str | None, shapes: bool) -> None:
         try:
             self.directory.mkdir(parents=True, exist_ok=True)
             held = [name for name in FILES if (self.directory / name).exists()]
@@ -102,6 +117,14 @@ class Recorder:
             ) from error
         self._trajectory = Stream(self.directory / TRAJECTORY_FILE, TRAJECTORY)
         self._event_stream = Stream(self.directory / EVENTS_FILE, EVENTS)
+        self._streams = [self._trajectory, self._event_stream]
+        self._shapes: ShapeRows | None = None
+        if shapes:
+            self._shapes, self._shape_stream = (
+                ShapeRows(self.sim),
+                Stream(self.directory / SHAPES_FILE, SHAPES),
+            )
+            self._streams.append(self._shape_stream)
 
     def _begin(self) -> None:
         """Attach to the simulation, and record the births of the entities that exist."""
@@ -140,7 +163,7 @@ class Recorder:
                 if bodies.ints is not self._rows_source:
                     self._rows_source, self._rows = bodies.ints, RowSelection(bodies.ints)
                 self._add(bodies.floats, self._rows, step)
-        if time.monotonic() >= self._flush_at:
+        if time.monotonic() >= self._flush_at or (self._shapes and self._shapes.n_letters > MOST_LETTERS):
             self.flush()
 
     def _observe_apart(self, sim: Recorded) -> None:
@@ -184,7 +207,7 @@ class Recorder:
         except RecordError:
             self._detach()
             self.is_closed = True
-            for other in (self._trajectory, self._event_stream):
+            for other in self._streams:
                 other.abandon()
             raise
 
@@ -194,6 +217,8 @@ class Recorder:
             self._write(self._event_stream, self._take_events())
         if self._buffer.n:
             self._write(self._trajectory, self._buffer.take())
+        if self._shapes and (drawn := self._shapes.take()):
+            self._write(self._shape_stream, drawn)
         self._flush_at = time.monotonic() + self.flush_every
 
     def _take_events(self) -> pa.RecordBatch:
@@ -234,13 +259,13 @@ class Recorder:
             rows = RowSelection(sim.state.population.bodies.ints, unrecorded)
             self._add(sim.state.population.bodies.floats, rows, step[rows.world])
         self.flush()
-        for stream in (self._trajectory, self._event_stream):
+        for stream in self._streams:
             stream.close()
         run_file.write(
             self.directory,
             sim,
             self._timings,
-            [self._trajectory, self._event_stream],
+            self._streams,
             {"period": self.period, "parameters": self.parameters, "interrupted": interrupted},
         )
 
@@ -248,6 +273,8 @@ class Recorder:
         if self._observe in self.sim.observers:
             self.sim.observers.remove(self._observe)
         self.sim.events.forget(self._on_events)
+        if self._shapes is not None:
+            self._shapes.close()
 
     def __enter__(self) -> Self:
         return self

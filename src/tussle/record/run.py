@@ -24,6 +24,9 @@ from tussle.record.schema import (
     MISSION_FILE,
     RUN,
     RUN_FILE,
+    SHAPES,
+    SHAPES_FILE,
+    SHAPES_RULES,
     SUMMARY_FILE,
     TRAJECTORY,
     TRAJECTORY_FILE,
@@ -65,6 +68,12 @@ class Run:
         self._read_info()
         self.trajectory_table = self._read_table(TRAJECTORY_FILE, TRAJECTORY, TRAJECTORY_RULES, is_mapped)
         self.events_table = self._read_table(EVENTS_FILE, EVENTS, EVENTS_RULES, False)
+        has_shapes = (path / SHAPES_FILE).exists() or SHAPES_FILE in self.info.get("files", {})
+        self.shapes_table = (
+            self._read_table(SHAPES_FILE, SHAPES, SHAPES_RULES, is_mapped)
+            if has_shapes
+            else SHAPES.empty_table()
+        )
 
     def _read_info(self) -> None:
         path = self.path / RUN_FILE

@@ -6,17 +6,18 @@ import pyarrow as pa
 
 from tussle.documents import Document, Map, Maybe, Real, Team, Whole
 from tussle.errors import RecordError
-from tussle.record.table_values import COUNT, NUMBER, TEXT, Rules
+from tussle.record.table_values import COUNT, NUMBER, TEXT, Bounds, Rules
 
 FORMAT = 1
 """Version of the run directory's format; the loader refuses others."""
 
 TRAJECTORY_FILE = "trajectory.arrow"
 EVENTS_FILE = "events.arrow"
+SHAPES_FILE = "shapes.arrow"
 SUMMARY_FILE = "summary.csv"
 MISSION_FILE = "mission.xml"
 RUN_FILE = "run.json"
-FILES = (TRAJECTORY_FILE, EVENTS_FILE, SUMMARY_FILE, MISSION_FILE, RUN_FILE)
+FILES = (TRAJECTORY_FILE, EVENTS_FILE, SHAPES_FILE, SUMMARY_FILE, MISSION_FILE, RUN_FILE)
 
 FLOAT_COLUMNS = ("x", "y", "z", "vx", "vy", "vz", "qw", "qx", "qy", "qz", "health")
 """Float columns in the order of the body table."""
@@ -62,11 +63,26 @@ EVENTS = pa.schema(
     ]
 )
 
+SHAPES = pa.schema(
+    [
+        _field("world", _I, "number of the world in its stack"),
+        _field("t", _F, "time of the beginning of the step in which it was drawn [s]"),
+        _field("step", _I, "that step"),
+        _field("kind", pa.string(), "points, cloud, line, vectors, sphere, box, cone, text or mesh"),
+        _field("lifetime", _F, "how long it is seen [s]; 0 is until the next step"),
+        _field("attributes", pa.string(), "what it was drawn with, as a JSON object"),
+    ]
+)
+"""One row per shape that plugins drew, in the order of drawing."""
+
 TRAJECTORY_RULES: Rules = (
     {"world": COUNT, "t": NUMBER, "step": COUNT, "id": COUNT, "block": TEXT}
     | dict.fromkeys(("x", "y", "z", "qw", "qx", "qy", "qz"), NUMBER)
 )  # fmt: skip
 EVENTS_RULES: Rules = {"world": COUNT, "t": NUMBER, "step": COUNT, "kind": TEXT, "id": COUNT, "other": COUNT}
+SHAPES_RULES: Rules = {
+    "world": COUNT, "t": NUMBER, "step": COUNT, "kind": TEXT, "lifetime": Bounds(0.0), "attributes": TEXT,
+}  # fmt: skip
 
 _TEAMS = Map(Real(is_any=True), Team)
 _WORLD = {

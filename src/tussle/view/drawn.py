@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from tussle.engine.simulation import Simulation
+from tussle.record.shapes import attributes_in, lifetime_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +60,7 @@ class Sketchbook:
 
     def turn_page(self) -> None:
         """A step begins."""
-        self._lasting += [s for s in self._fresh if _lifetime(s) > 0.0]
+        self._lasting += [s for s in self._fresh if lifetime_of(s.attributes) > 0.0]
         self._fresh = []
 
     def shapes(self) -> tuple[Shape, ...]:
@@ -69,36 +68,11 @@ class Sketchbook:
         now = float(self._simulation.t[self._world])
         # As long as the dt that the clock rounds to matters not: a lifetime of 1 s is seen for ten steps of 0.1 s.
         slack = 1e-6 * self._simulation.mission.dt
-        self._lasting = [s for s in self._lasting if s.t <= now < s.t + _lifetime(s) - slack]
+        self._lasting = [s for s in self._lasting if s.t <= now < s.t + lifetime_of(s.attributes) - slack]
         return (*self._lasting, *self._fresh)
 
     def _add(self, kind: str, attributes: dict[str, Any]) -> None:
-        kept = _of_world(attributes, self._world)
+        kept = attributes_in(attributes, self._world)
         if kept is not None:
             t = float(self._simulation.t[self._world])
             self._fresh.append(Shape(kind, kept, t))
-
-
-def _lifetime(shape: Shape) -> float:
-    try:
-        return float(shape.attributes.get("lifetime", 0.0))
-    except (TypeError, ValueError):  # a plugin's mistake in a drawing must not stop its game
-        return 0.0
-
-
-def _of_world(attributes: dict[str, Any], world: int) -> dict[str, Any] | None:
-    """A copy of the attributes for one world; None where it has no part in them."""
-    copied = {k: v.copy() if isinstance(v, np.ndarray) else v for k, v in attributes.items()}
-    where = copied.pop("world", None)
-    if where is None:
-        return copied
-    chosen = np.asarray(where) == world
-    if chosen.ndim == 0:
-        return copied if chosen else None
-    if not chosen.any():
-        return None
-    n = len(chosen)
-    return {
-        k: v[..., chosen] if isinstance(v, np.ndarray) and v.ndim and v.shape[-1] == n else v
-        for k, v in copied.items()
-    }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from functools import cached_property
 from pathlib import Path
@@ -10,10 +11,12 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from tussle.api.draw import KINDS
 from tussle.errors import RecordError, TussleError
 from tussle.mission import Loaded, Mission, read_mission
 from tussle.record import Run, load_run
-from tussle.record.schema import MISSION_FILE, RUN_FILE, TRAJECTORY_FILE
+from tussle.record.schema import MISSION_FILE, RUN_FILE, SHAPES_FILE, TRAJECTORY_FILE
+from tussle.view.drawn import Shape
 from tussle.view.frame import Event, Frame, empty_frame
 from tussle.view.scenery import Scenery, scenery_of
 from tussle.view.style import Style
@@ -334,6 +337,45 @@ class Recording:
         rows = [mine[name].to_pylist() for name in ("t", "kind", "id", "other", "text")]
         found = [Event(*row) for row in zip(*rows, strict=True)]
         return sorted(found, key=lambda event: event.t)
+
+    # -- shapes of plugins ------------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _shapes(self) -> pa.Table:
+        table = self.run.shapes_table
+        return table.filter(pa.array(np.asarray(table["world"]) == self.world)) if len(table) else table
+
+    @property
+    def has_shapes(self) -> bool:
+        """Whether shapes that plugins drew were recorded."""
+        return len(self._shapes) > 0
+
+    @cached_property
+    def _shape_times(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Step, time and lifetime [s] of each shape, (n,) each."""
+        step, t, lifetime = (np.asarray(self._shapes[name]) for name in ("step", "t", "lifetime"))
+        return step, t, lifetime
+
+    def shapes(self, i: int) -> tuple[Shape, ...]:
+        """The shapes that are seen in a frame, in the order in which they were drawn.
+
+        Raises:
+            RecordError: A row of the table holds no shape.
+        """
+        step, t, lifetime = self._shape_times
+        now = self.t[i] + 1e-6 * self.dt  # as in `Sketchbook`
+        seen = (step < self.steps[i]) & ((step == self.steps[i] - 1) | (now < t + lifetime))
+        return tuple(self._shape(int(row), float(t[row])) for row in np.flatnonzero(seen))
+
+    def _shape(self, row: int, t: float) -> Shape:
+        kind, text = (self._shapes[name][row].as_py() for name in ("kind", "attributes"))
+        try:
+            attributes = json.loads(text)
+        except (ValueError, RecursionError):
+            attributes = None
+        if kind not in KINDS or not isinstance(attributes, dict):
+            raise RecordError(f"{self.path / SHAPES_FILE}: row {row} of world {self.world} holds no shape")
+        return Shape(kind, attributes, t)
 
     # -- the mission ------------------------------------------------------------------------------------------------------------
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from tussle.errors import ViewError
 from tussle.mission import Mission
+from tussle.view.drawn import Shape
 from tussle.view.frame import Event, Frame
 from tussle.view.scenery import Scenery
 from tussle.view.style import Colour, Style
@@ -202,6 +203,24 @@ class Comparison:
             np.concatenate([a.pos, b.pos + self.shift]), np.concatenate([a.quat, b.quat]),
             np.concatenate([a.vel, b.vel]), np.concatenate([a.health, b.health]),
         )  # fmt: skip
+
+    @property
+    def has_shapes(self) -> bool:
+        """Whether shapes that plugins drew were recorded of one of the runs."""
+        return self.a.has_shapes or self.b.has_shapes
+
+    def shapes(self, i: int) -> tuple[Shape, ...]:
+        """Return the shapes of both runs at a time index."""
+        a, b = (run.shapes(int(pair[i])) for run, pair in zip((self.a, self.b), self._pairs, strict=True))
+        return (*a, *(self._moved(shape) for shape in b))
+
+    def _moved(self, shape: Shape) -> Shape:
+        """A shape of the second run where that is seen."""
+        try:
+            pos = np.asarray(shape.attributes.get("pos", (0.0, 0.0, 0.0)), float).T + self.shift
+        except (TypeError, ValueError, OverflowError):  # it cannot be drawn, as the page will say
+            return shape
+        return replace(shape, attributes=shape.attributes | {"pos": pos.T})
 
     @cached_property
     def events(self) -> list[Event]:

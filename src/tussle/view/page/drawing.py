@@ -69,7 +69,7 @@ def read_drawing(shapes: tuple[Shape, ...], size: float) -> Drawing:
     for shape in shapes:
         try:
             _read(shape, drawing, size)
-        except (ViewError, TypeError, ValueError) as error:
+        except (ViewError, TypeError, ValueError, OverflowError) as error:
             note = f"a plugin drew {shape.kind}: {error}"
             if note not in drawing.notes:
                 drawing.notes.append(note)

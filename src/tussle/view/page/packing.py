@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import struct
+from typing import Any
+
 import numpy as np
 
 MOST = 2**28
@@ -51,3 +55,10 @@ def reals(values: np.ndarray) -> bytes:
         values: (n,).
     """
     return np.ascontiguousarray(values, "<f8").tobytes()
+
+
+def message(header: dict[str, Any], data: bytes) -> bytes:
+    """Return header and data as one block: length of the header, JSON header padded to four bytes, data."""
+    text = json.dumps(header, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 4)
+    return struct.pack("<I", len(text)) + text + data

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import json
 import math
-import struct
 import time
 from collections import deque
 from functools import cached_property
@@ -22,6 +21,7 @@ from tussle.view.page.document import event_rows
 from tussle.view.page.drawing import drawing_message
 from tussle.view.page.failures import Failures
 from tussle.view.page.formatting import entity_sections, result_rows
+from tussle.view.page.packing import message
 
 if TYPE_CHECKING:
     from aiohttp.web import WebSocketResponse
@@ -263,10 +263,3 @@ class Publisher:
         past = [frames[step] for step in sorted(frames)]
         header = {"kind": "past", "epoch": live.epoch, "seconds": seconds}
         reader.past.append(message(header, pack(past[0].step, past, self._step)))
-
-
-def message(header: dict[str, Any], data: bytes) -> bytes:
-    """Return a binary message: length of the header, JSON header padded to four bytes, data."""
-    text = json.dumps(header, separators=(",", ":")).encode()
-    text += b" " * (-len(text) % 4)
-    return struct.pack("<I", len(text)) + text + data

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import struct
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,8 @@ from tussle.mission import Mission
 from tussle.view.page.chunks import ANGLE_ERROR, FULL_HEALTH, UNIT, pack, position_error, step_of
 from tussle.view.page.compare import Comparison
 from tussle.view.page.document import event_rows, game_document, terrain_bytes
-from tussle.view.page.packing import reals
+from tussle.view.page.drawing import drawing_message
+from tussle.view.page.packing import message, reals
 from tussle.view.recording import Recording
 
 FILE_STATES, FILE_FRAMES = 150_000, 32
@@ -24,6 +26,8 @@ MOST_FRAMES = 1024
 """Frames of a chunk: with more a page has to read too much before it shows anything."""
 CURVE_POINTS = 240
 """Moments at which entities are counted for the curves of the teams."""
+SHAPE_FRAMES = 64
+"""Frames whose shapes are read at once."""
 LEAP_OF_EXTENT = 0.25
 """Share of the diagonal of all positions above which a move counts as a jump: across a closed world it is 0.57 or more."""
 
@@ -114,6 +118,7 @@ class RecordedData:
             "positionError": position_error(self.step),
             "angleError": ANGLE_ERROR,
             "chunks": self.chunks,
+            "shapeFrames": SHAPE_FRAMES if game.has_shapes else 0,
             "curves": self._curves(),
             **more,
         }
@@ -132,7 +137,12 @@ class RecordedData:
     def names(self) -> list[str]:
         """Names of all blobs."""
         terrain = [] if self._terrain is None else ["terrain"]
-        return ["times", "events", *terrain, *(f"chunk-{i}" for i in range(len(self.chunks)))]
+        chunks = (f"chunk-{i}" for i in range(len(self.chunks)))
+        return ["times", "events", *terrain, *chunks, *(f"shapes-{i}" for i in range(self._n_shape_blobs))]
+
+    @property
+    def _n_shape_blobs(self) -> int:
+        return -(-len(self.kept) // SHAPE_FRAMES) if self._game.has_shapes else 0
 
     def blob(self, name: str) -> bytes | None:
         """Return a blob by its name, or None."""
@@ -143,11 +153,25 @@ class RecordedData:
         if name == "terrain":
             return self._terrain
         kind, _, number = name.partition("-")
-        if kind != "chunk" or not number.isdecimal() or len(number) > 9 or int(number) >= len(self.chunks):
+        n_blobs = {"chunk": len(self.chunks), "shapes": self._n_shape_blobs}.get(kind, 0)
+        if not number.isdecimal() or len(number) > 9 or int(number) >= n_blobs:
             return None
+        if kind == "shapes":
+            return self._shapes(int(number) * SHAPE_FRAMES)
         first, last = self.chunks[int(number)]
         frames = [self._game.frame(int(i)) for i in self.kept[first : last + 1]]
         return pack(first, frames, self.step, self._leap)
+
+    def _shapes(self, first: int) -> bytes:
+        """Shapes of `SHAPE_FRAMES` frames: frame and length of each message, then the message; of equal ones only the first."""
+        parts, before = list[bytes](), b""
+        for number in range(first, min(first + SHAPE_FRAMES, len(self.kept))):
+            header, data, notes = drawing_message(self._game.shapes(int(self.kept[number])))
+            drawn = message(header | {"notes": notes}, data)
+            if drawn != before:
+                parts += [struct.pack("<2I", number, len(drawn)), drawn]
+            before = drawn
+        return b"".join(parts)
 
 
 def kept_frames(t: np.ndarray, period: float | None) -> np.ndarray:

@@ -1,5 +1,11 @@
 // Numbers as packing.py writes them.
 
+/** Header and data of a block that `message` of packing.py has made. @param {Uint8Array} bytes @returns {[any, Uint8Array]} */
+export function readMessage(bytes) {
+  const length = new DataView(bytes.buffer, bytes.byteOffset).getUint32(0, true);
+  return [JSON.parse(new TextDecoder().decode(bytes.subarray(4, 4 + length))), bytes.subarray(4 + length)];
+}
+
 /** Reads numbers one block after another. */
 export class Reader {
   /** @param {Uint8Array} bytes @param {number} at first byte to read */

@@ -46,6 +46,8 @@ export class Player {
     this.isLost = false;
     this.lookedBack = 0;
     this.drawnTime = NaN;
+    /** Shapes of a recording that are drawn. @type {ReturnType<Recorded['shapesShown']>} */
+    this.shapes = null;
     /** @type {Drawn} */
     this.drawn = {
       scale: 0, trail: 0, text: 0, labels: false, wire: false, least: true, grid: true, regions: true, shapes: true, rings: false,
@@ -194,7 +196,13 @@ export class Player {
   }
 
   draw() {
-    const { clock } = this;
+    const { clock, layer } = this;
+    const shapes = layer instanceof Recorded ? layer.shapesShown() : null;
+    if (shapes && shapes !== this.shapes) {
+      this.shapes = shapes;
+      this.picture.shapes.take(shapes.header, shapes.bytes);
+      if (shapes.header.notes.length) this.panels.showNotes([...new Set([...this.page.notes, ...shapes.header.notes])]);
+    }
     this.picture.draw();
     this.panels.showTeams(clock.t);
     this.panels.showChosen(this.chosen, this.camera.mode, clock.t);

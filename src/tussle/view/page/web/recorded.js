@@ -1,13 +1,16 @@
 // A recorded run, whose chunks are unpacked when they are first needed.
-/** @import { EventRow, PageData, Sample, Source } from './types' */
+/** @import { EventRow, PageData, Sample, ShapesHeader, Source } from './types' */
 
 import { between } from './geometry.js';
-import { Reader } from './packing.js';
+import { Reader, readMessage } from './packing.js';
 import { Chunk } from './chunk.js';
 import { lastNotAfter, lastWhere, Layer } from './layer.js';
 
 /** States that are kept unpacked, at some 45 bytes each; the chunks that were used last stay. */
 const MOST_STATES = 4e6;
+
+/** Groups of frames whose shapes are kept. */
+const MOST_SHAPES = 4;
 
 export class Recorded extends Layer {
   /** @param {PageData} page @param {Source} source @param {() => void} changed @param {(error: Error) => void} failed a chunk cannot be read */
@@ -18,6 +21,8 @@ export class Recorded extends Layer {
     /** @type {Map<number, Chunk>} */
     this.chunks = new Map();
     this.reading = new Set();
+    /** Shapes of plugins: groups of frames, each from a frame on. @type {Map<number, { frame: number, header: ShapesHeader, bytes: Uint8Array }[]>} */
+    this.shapes = new Map();
     this.curves = page.curves;
     this.times = new Float64Array(0);
     this.slack = 0;
@@ -101,6 +106,34 @@ export class Recorded extends Layer {
   /** Read what comes next. */
   lookAhead() {
     this.chunk(this.chunkOf(this.shown.frame) + 1);
+  }
+
+  /** Shapes of plugins in what is shown; null where there are none, or they have to be read first. */
+  shapesShown() {
+    const { page: { shapeFrames }, shown: { frame } } = this;
+    if (!shapeFrames) return null;
+    const number = Math.floor(frame / shapeFrames);
+    const found = this.shapes.get(number);
+    if (!found) this.readShapes(number).catch(this.failed);
+    return found?.[lastWhere(found.length, (i) => found[i].frame <= frame)];
+  }
+
+  /** @param {number} number */
+  async readShapes(number) {
+    const name = `shapes-${number}`;
+    if (this.reading.has(name)) return;
+    this.reading.add(name);
+    const bytes = await this.source.blob(name);
+    const view = new DataView(bytes.buffer, bytes.byteOffset);
+    const found = [];
+    for (let at = 0; at < bytes.length; at += 8 + view.getUint32(at + 4, true)) {
+      const [header, data] = readMessage(bytes.subarray(at + 8, at + 8 + view.getUint32(at + 4, true)));
+      found.push({ frame: view.getUint32(at, true), header, bytes: data });
+    }
+    this.shapes.set(number, found);
+    this.reading.delete(name);
+    if (this.shapes.size > MOST_SHAPES) this.shapes.delete(this.shapes.keys().next().value);
+    this.changed();
   }
 
   /** @param {number} t */

@@ -1,6 +1,7 @@
 // Data from the page's own server: by requests for ranges of frames, or by a socket while a game is played.
 /** @import { Hearer } from './types' */
 
+import { readMessage } from './packing.js';
 import { SOURCES } from './sources.js';
 
 const ADDRESS = location.origin + location.pathname.replace(/\/$/, '');
@@ -27,9 +28,8 @@ class SocketSource extends RangeSource {
     this.socket.binaryType = 'arraybuffer';
     this.socket.addEventListener('message', ({ data }) => {
       if (typeof data === 'string') return hear.status(JSON.parse(data));
-      const length = new DataView(data).getUint32(0, true);
-      const header = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, length)));
-      return hear[/** @type {'frame' | 'past' | 'drawn'} */ (header.kind)](header, new Uint8Array(data, 4 + length));
+      const [header, bytes] = readMessage(new Uint8Array(data));
+      return hear[/** @type {'frame' | 'past' | 'drawn'} */ (header.kind)](header, bytes);
     });
     this.socket.addEventListener('close', () => hear.lost());
   }

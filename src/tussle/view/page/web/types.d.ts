@@ -28,7 +28,7 @@ export interface PageData {
   isComplete: boolean; attitudeUnit: number; healthSteps: number;
   // Of a recorded run.
   nFrames?: number; nStates?: number; nEntities?: number; mostAtOnce?: number; chunks?: [number, number][]; curves?: Curves; positionError?: number;
-  angleError?: number; begins?: number; warp?: number | null; isPlaying?: boolean; lead?: string;
+  angleError?: number; begins?: number; warp?: number | null; isPlaying?: boolean; lead?: string; shapeFrames?: number;
   // Of a live game.
   seed?: number;
 }
@@ -43,7 +43,7 @@ export interface Status {
 
 /** Shapes of plugins, see drawing.py. */
 export interface ShapesHeader {
-  parts: { kind: string; n: number; at: number; nVertices?: number; nFaces?: number }[]; texts: [string, number, number, number][]; width: number;
+  parts: { kind: string; n: number; at: number; nVertices?: number; nFaces?: number }[]; texts: [string, number, number, number][]; width: number; notes?: string[];
 }
 
 export interface Source {
