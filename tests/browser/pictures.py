@@ -12,17 +12,20 @@ from pathlib import Path
 import numpy as np
 from playwright.sync_api import Browser, sync_playwright
 from served import Watched
+from waiting import wait_until
 
 from tussle import Block, Mission, Recorder, Simulation
 from tussle.api import Autonomy, Output
 from tussle.mission import read_mission
 from tussle.stock import SingleIntegrator
 from tussle.view import Live, Recording
+from tussle.view.export.html import write_html
 from tussle.view.page.compare import Comparison
 from tussle.view.page.server import Page
 
 IMAGES = Path(__file__).resolve().parents[2] / "docs" / "images"
 SIZE = {"width": 1100, "height": 640}
+NARROW = {"width": 400, "height": 780}
 GAME = "predator_prey"
 
 
@@ -35,9 +38,9 @@ def shoot(watched: Watched, name: str) -> None:
 
 
 @contextmanager
-def shown(browser: Browser, page: Page) -> Iterator[Watched]:
+def shown(browser: Browser, page: Page, size: dict[str, int] = SIZE) -> Iterator[Watched]:
     with page:
-        watched = Watched(browser, page, SIZE)
+        watched = Watched(browser, page, size)
         yield watched
         watched.close()
 
@@ -86,6 +89,37 @@ def replay(browser: Browser) -> None:
             seek(watched, 25.0)
             watched.press("k")
             shoot(watched, "view-replay")
+
+
+def narrow(browser: Browser) -> None:
+    """A recorded run in a window of 400 pixels, with an entity that is followed."""
+    with tempfile.TemporaryDirectory() as folder:
+        (run,) = recorded(Path(folder), "30")
+        with shown(browser, Page(run, is_paused=True), NARROW) as watched:
+            seek(watched, 25.0)
+            watched.press("ArrowLeft")
+            watched.wait("player.chosen > 0 && player.isDrawn")
+            watched.press("o")
+            shoot(watched, "view-narrow")
+
+
+def offline(browser: Browser) -> None:
+    """The page in a file, opened from there."""
+    with tempfile.TemporaryDirectory() as folder:
+        (run,) = recorded(Path(folder), "30")
+        path = Path(folder) / "page.html"
+        write_html(run, path)
+        tab = browser.new_page(viewport=SIZE, reduced_motion="reduce")
+        tab.set_default_timeout(90_000)
+        tab.goto(path.as_uri())
+        wait_until(tab, "Boolean(window.player && player.isReady)", 90.0)
+        tab.locator("#time").evaluate("(s) => { s.value = '25'; s.dispatchEvent(new Event('input')); }")
+        for key in ("ArrowLeft", "z", "z"):
+            tab.keyboard.press(key)
+        wait_until(tab, "player.t === 25 && player.isDrawn", 90.0)
+        tab.wait_for_timeout(3500)
+        tab.screenshot(path=IMAGES / "offline-page.png", timeout=300_000)
+        tab.close()
 
 
 def seek(watched: Watched, t: float) -> None:
@@ -144,6 +178,8 @@ PICTURES: dict[str, Callable[[Browser], None]] = {
     "chase": chase,
     "two-runs": two_runs,
     "replay": replay,
+    "narrow": narrow,
+    "offline": offline,
     "shapes": shapes,
 }
 

@@ -18,7 +18,7 @@ def shape(kind, **attributes):
 
 
 def read(kind, **attributes):
-    return read_drawing((shape(kind, **attributes),), 0.5)
+    return read_drawing((shape(kind, **attributes),))
 
 
 THREE = np.arange(9.0).reshape(3, 3)
@@ -70,45 +70,45 @@ def test_what_is_needed_is_told(kind):
     ],
 )
 def test_what_cannot_be_drawn_is_told_once_and_the_rest_is_drawn(kind, wrong, told):
-    drawing = read_drawing((shape(kind, **wrong), shape(kind, **wrong), shape("points", pos=THREE)), 0.5)
+    drawing = read_drawing((shape(kind, **wrong), shape(kind, **wrong), shape("points", pos=THREE)))
     (note,) = drawing.notes
     assert told in note
-    assert len(drawing.points) == 1
+    assert [len(rows) for rows in drawing.rows["points"]] == [3]
+
+
+def points(kind, **attributes):
+    """Size and colours of points that were read."""
+    (rows,) = read(kind, **attributes).rows["points"]
+    return rows[:, 3], rows[:, 4:]
 
 
 def test_colours_of_one_and_of_each_and_of_none():
-    (_, colour, size) = read("points", pos=THREE).points[0]
+    size, colour = points("points", pos=THREE)
     assert (colour == DRAWN).all()
-    assert (size == 0.5).all()
-    assert (read("points", pos=THREE, color=(1, 2, 300)).points[0][1] == (1, 2, 255)).all()
-    assert read("points", pos=THREE, colour=THREE).points[0][1].tolist() == THREE.T.tolist()
+    assert (size == 0.0).all()
+    assert (points("points", pos=THREE, color=(1, 2, 300))[1] == (1, 2, 255)).all()
+    assert points("points", pos=THREE, colour=THREE)[1].tolist() == THREE.T.tolist()
 
 
 def test_values_of_a_cloud_become_colours_from_dark_to_light():
-    colour = read("cloud", pos=THREE, value=[3.0, 5.0, 4.0]).points[0][1].astype(int).sum(axis=1)
+    colour = points("cloud", pos=THREE, value=[3.0, 5.0, 4.0])[1].sum(axis=1)
     assert colour[0] < colour[2] < colour[1]
-    bounded = read("cloud", pos=THREE, value=[3.0, 5.0, 4.0], low=5.0, high=9.0).points[0][1]
+    bounded = points("cloud", pos=THREE, value=[3.0, 5.0, 4.0], low=5.0, high=9.0)[1]
     assert (bounded == bounded[0]).all(), "all of them are at the lower end"
 
 
 def test_a_line_joins_each_point_to_the_next():
-    ends, colours = read("line", pos=THREE).lines[0]
-    assert ends.tolist() == [
-        [THREE[:, 0].tolist(), THREE[:, 1].tolist()],
-        [THREE[:, 1].tolist(), THREE[:, 2].tolist()],
-    ]
-    assert colours.shape == (2, 2, 3)
+    (rows,) = read("line", pos=THREE).rows["lines"]
+    assert rows[:, :6].tolist() == [[*THREE[:, 0], *THREE[:, 1]], [*THREE[:, 1], *THREE[:, 2]]]
 
 
 @pytest.mark.parametrize("direction", [(1, 0, 0), (0, 0, 2), (0, -1, 0), (-1, 0, 0), (1, 2, 3)])
 def test_a_cone_points_where_it_is_told(direction):
-    _, quat, scale, _, _ = read(
-        "cone", pos=(0, 0, 0), direction=direction, length=3.0, angle=np.pi / 2
-    ).solids["cone"][0]
-    w, x, y, z = quat[0]
+    (rows,) = read("cone", pos=(0, 0, 0), direction=direction, length=3.0, angle=np.pi / 2).rows["cone"]
+    w, x, y, z = rows[0, 3:7]
     axis = np.array([1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)])
     assert axis == pytest.approx(np.array(direction) / np.linalg.norm(direction))
-    assert scale[0] == pytest.approx([3.0, 3.0, 3.0])
+    assert rows[0, 7:10] == pytest.approx([3.0, 3.0, 3.0])
 
 
 NUMBERS = {"points": 7, "lines": 9, "arrows": 9, "sphere": 14, "box": 14, "cone": 14}

@@ -35,40 +35,33 @@ SCALE = np.array([(68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 98), (25
 
 @dataclass
 class Drawing:
-    """All shapes of one step, grouped by kind; n is the number of shapes of a group.
+    """The shapes of one step as numbers.
 
     Attributes:
-        points: Position [m], (n, 3), colour, (n, 3), and size of each [m], (n,); those of clouds too.
-        lines: Ends [m], (n, 2, 3), and colour of each end, (n, 2, 3).
+        rows: Kind -> rows of numbers, see `drawing_message`; of a mesh one row.
+        sizes: Numbers of vertices and of faces of each mesh.
+        texts: Each text with its position [m].
         width: Of the lines [pixels].
-        arrows: Ends [m], (n, 2, 3), and colours, (n, 3).
-        solids: Kind "sphere", "box" or "cone" -> position (n, 3), attitude (n, 4), scale (n, 3), colour (n, 3), opacity (n,).
-        texts: Text, position [m], (3,), and colour.
-        meshes: Vertices (v, 3), faces (f, 3), position (3,), attitude (4,), colour, opacity.
         notes: What could not be drawn, and why.
     """
 
-    points: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = field(default_factory=list)
-    lines: list[tuple[np.ndarray, np.ndarray]] = field(default_factory=list)
+    rows: dict[str, list[np.ndarray]] = field(default_factory=dict)
+    sizes: list[tuple[int, int]] = field(default_factory=list)
+    texts: list[list[Any]] = field(default_factory=list)
     width: float = 2.0
-    arrows: list[tuple[np.ndarray, np.ndarray]] = field(default_factory=list)
-    solids: dict[str, list[tuple[np.ndarray, ...]]] = field(default_factory=dict)
-    texts: list[tuple[str, np.ndarray]] = field(default_factory=list)
-    meshes: list[tuple[Any, ...]] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
+    def add(self, kind: str, *columns: np.ndarray) -> None:
+        """Add rows of a kind: columns (n,) or (n, k) side by side."""
+        self.rows.setdefault(kind, []).append(np.column_stack(columns))
 
-def read_drawing(shapes: tuple[Shape, ...], size: float) -> Drawing:
-    """Convert the shapes of one step. A shape that cannot be drawn is reported in a note.
 
-    Args:
-        shapes: The shapes.
-        size: Of points without a size of their own [m].
-    """
+def read_drawing(shapes: tuple[Shape, ...]) -> Drawing:
+    """Convert the shapes of one step. A shape that cannot be drawn is reported in a note."""
     drawing = Drawing()
     for shape in shapes:
         try:
-            _read(shape, drawing, size)
+            _read(shape, drawing)
         except (ViewError, TypeError, ValueError, OverflowError) as error:
             note = f"a plugin drew {shape.kind}: {error}"
             if note not in drawing.notes:
@@ -79,38 +72,29 @@ def read_drawing(shapes: tuple[Shape, ...], size: float) -> Drawing:
 def drawing_message(shapes: tuple[Shape, ...]) -> tuple[dict[str, Any], bytes, list[str]]:
     """Encode shapes for the page: header, 32-bit numbers, notes.
 
-    The header has `parts`, each with its kind, the number of things n and the place of its numbers in the data; `width` of lines
-    [pixels]; `texts` with their places. Numbers of one thing: of points place, size [m] (0 where nothing is said), colour (7); of lines
+    The header has `parts`, each with its kind, the number of rows n and the place of its numbers in the data; `width` of lines
+    [pixels]; `texts` with their places. Numbers of a row: of points place, size [m] (0 where nothing is said), colour (7); of lines
     and arrows both ends and colour (9); of spheres, boxes and cones place, attitude, three lengths, colour, opacity (14); a mesh, one
     part each, has place, attitude, colour and opacity (11), then its vertices and the numbers of its faces' corners.
     """
-    drawing = read_drawing(shapes, 0.0)
+    drawing = read_drawing(shapes)
+    meshes = drawing.rows.pop("mesh", [])[:MOST_MESHES]
+    found: list[tuple[str, np.ndarray, dict[str, int]]]
+    found = [(kind, np.concatenate(rows), {}) for kind, rows in drawing.rows.items()]
+    found += [
+        ("mesh", row, {"nVertices": n_vertices, "nFaces": n_faces})
+        for row, (n_vertices, n_faces) in zip(meshes, drawing.sizes, strict=False)
+    ]
     parts: list[dict[str, Any]] = []
-    arrays: list[np.ndarray] = []
-
-    def put(kind: str, rows: np.ndarray, **more: int) -> None:
+    data = b""
+    for kind, rows, more in found:
         if len(rows):
-            parts.append({"kind": kind, "n": len(rows), "at": sum(a.size for a in arrays), **more})
-            arrays.append(rows)
-
-    for kind, columns in (
-        ("points", [np.column_stack([p, s, c]) for p, c, s in drawing.points]),
-        ("lines", [np.column_stack([e.reshape(-1, 6), c[:, 0]]) for e, c in drawing.lines]),
-        ("arrows", [np.column_stack([e.reshape(-1, 6), c]) for e, c in drawing.arrows]),
-        *((kind, [np.column_stack(part) for part in found]) for kind, found in drawing.solids.items()),
-    ):
-        if columns:
-            put(kind, np.concatenate(columns))
-    for vertices, faces, pos, quat, colour, opacity in drawing.meshes[:MOST_MESHES]:
-        sizes = {"nVertices": len(vertices), "nFaces": len(faces)}
-        head = np.concatenate([pos, quat, colour, [opacity], vertices.ravel(), faces.ravel()])
-        put("mesh", head[None], **sizes)
-    texts = [[text, *pos.tolist()] for text, pos in drawing.texts[:MOST_TEXTS]]
-    data = b"".join(np.ascontiguousarray(a, "<f4").tobytes() for a in arrays)
-    return {"parts": parts, "width": drawing.width, "texts": texts}, data, drawing.notes
+            parts.append({"kind": kind, "n": len(rows), "at": len(data) // 4, **more})
+            data += np.ascontiguousarray(rows, "<f4").tobytes()
+    return {"parts": parts, "width": drawing.width, "texts": drawing.texts[:MOST_TEXTS]}, data, drawing.notes
 
 
-def _read(shape: Shape, drawing: Drawing, size: float) -> None:
+def _read(shape: Shape, drawing: Drawing) -> None:
     kind, given = shape.kind, shape.attributes
     allowed = ATTRIBUTES[kind]
     for name in given:
@@ -124,20 +108,18 @@ def _read(shape: Shape, drawing: Drawing, size: float) -> None:
         return
     pos = _vectors(given, "pos")
     n = len(pos)
-    opacity = _numbers(given, "opacity", n, 1.0)
     if kind in ("points", "cloud"):
-        drawing.points.append((pos, _cloud_colours(given, n), _numbers(given, "size", n, size)))
+        drawing.add("points", pos, _numbers(given, "size", n, 0.0), _cloud_colours(given, n))
     elif kind == "line":
-        colour = _colours(given, n)
-        drawing.lines.append((np.stack([pos[:-1], pos[1:]], 1), np.stack([colour[:-1], colour[1:]], 1)))
+        drawing.add("lines", pos[:-1], pos[1:], _colours(given, n)[:-1])
         drawing.width = float(given.get("width", drawing.width))
     elif kind == "vectors":
-        drawing.arrows.append((np.stack([pos, pos + _vectors(given, "direction", n)], 1), _colours(given, n)))
+        drawing.add("arrows", pos, pos + _vectors(given, "direction", n), _colours(given, n))
     elif kind == "text":
-        drawing.texts.extend((str(given.get("text", "?")), p) for p in pos)
+        drawing.texts.extend([str(given.get("text", "?")), *p] for p in pos.tolist())
     else:
         quat, scale = _SOLIDS[kind](given, n)
-        drawing.solids.setdefault(kind, []).append((pos, quat, scale, _colours(given, n), opacity))
+        drawing.add(kind, pos, quat, scale, _colours(given, n), _numbers(given, "opacity", n, 1.0))
 
 
 def _read_mesh(given: Mapping[str, Any], drawing: Drawing) -> None:
@@ -150,10 +132,11 @@ def _read_mesh(given: Mapping[str, Any], drawing: Drawing) -> None:
         or faces.max(initial=0) >= len(vertices)
     ):
         raise ViewError(f"faces must be numbers of three vertices each, (f, 3), below {len(vertices)}")
-    pos = _vectors(given, "pos", 1)[0] if "pos" in given else np.zeros(3)
-    quat = _quats(given, 1)[0]
-    opacity = float(_numbers(given, "opacity", 1, 1.0)[0])
-    drawing.meshes.append((vertices, faces, pos, quat, _colours(given, 1)[0], opacity))
+    pos = _vectors(given, "pos", 1) if "pos" in given else np.zeros((1, 3))
+    opacity = _numbers(given, "opacity", 1, 1.0)
+    corners = vertices.reshape(1, -1), faces.reshape(1, -1)
+    drawing.add("mesh", pos, _quats(given, 1), _colours(given, 1), opacity, *corners)
+    drawing.sizes.append((len(vertices), len(faces)))
 
 
 def _sphere(given: Mapping[str, Any], n: int) -> tuple[np.ndarray, np.ndarray]:
