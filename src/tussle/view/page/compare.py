@@ -63,16 +63,13 @@ def what_differs(a: Frame, b: Frame) -> str:
         parts = [f"{_named(ids)} only in {name}" for ids, name in ((only_a, "A"), (only_b, "B")) if len(ids)]
         return "; ".join(parts)
     found: list[tuple[str, np.ndarray, str]] = []
-    for name, unit in (("pos", "m"), ("vel", "m/s"), ("quat", ""), ("health", "")):
-        one, other = getattr(a, name), getattr(b, name)
+    units = {"pos": "m", "vel": "m/s", "quat": "", "health": "", "team": "", "block": ""}
+    for name, unit in units.items():
+        one, other = (np.asarray(getattr(frame, name), float) for frame in (a, b))
         same = (one == other) | (np.isnan(one) & np.isnan(other))
         rows = np.flatnonzero(~(same if same.ndim == 1 else same.all(axis=1)))
         if len(rows):
             found.append((name, rows, unit))
-    for name in ("team", "block"):
-        rows = np.flatnonzero(getattr(a, name) != getattr(b, name))
-        if len(rows):
-            found.append((name, rows, ""))
     if not found:
         return ""
     name, rows, unit = found[0]

@@ -12,7 +12,7 @@ from tussle import __version__
 from tussle.mission import Mission
 from tussle.view.frame import Event
 from tussle.view.page.packing import ints
-from tussle.view.scenery import Base, Region, Scenery
+from tussle.view.scenery import Scenery
 from tussle.view.shapes import MODELS, Mesh
 from tussle.view.style import Style
 from tussle.view.terrain import Terrain
@@ -64,17 +64,26 @@ def game_document(
     notes = [*style.notes, *scenery.notes, *filter(None, [terrain_note(scenery)])]
     opening = opening_data(viewer.get("camera"), notes)
     reach, angle = reach_of(mission)
-    blocks = blocks_data(game.blocks, game.block_teams, style)
+    models = {style.model(i) for i in range(len(game.blocks))} | {"sphere"}
     return {
         "format": FORMAT,
         "generator": f"tussle {__version__}",
         "title": game.name if title is None else title,
-        "blocks": blocks,
+        "blocks": [
+            {
+                "name": name,
+                "team": game.block_teams[i],
+                "colour": list(style.block_colour(i)),
+                "model": style.model(i),
+                "scale": style.scale(i),
+            }
+            for i, name in enumerate(game.blocks)
+        ],
         "teams": [
             {"id": team, "name": name, "colour": list(style.colour(team))}
             for team, name in game.teams.items()
         ],
-        "models": models_data({block["model"] for block in blocks} | {"sphere"}),
+        "models": {name: mesh_data(MODELS[name], 4) for name in MODELS if name in models},
         "scenery": scenery_data(scenery),
         "opening": opening,
         "reach": reach,
@@ -157,25 +166,6 @@ def event_rows(events: Iterable[Event]) -> list[list[Any]]:
     return [[e.t, e.kind, e.id, e.other, e.text] for e in events]
 
 
-def models_data(names: set[str]) -> dict[str, Any]:
-    """The models that a game needs, by name."""
-    return {name: mesh_data(MODELS[name], 4) for name in MODELS if name in names}
-
-
-def blocks_data(names: list[str], teams: list[int], style: Style) -> list[dict[str, Any]]:
-    """Name, team, colour, model and scale of each block."""
-    return [
-        {
-            "name": name,
-            "team": teams[i],
-            "colour": list(style.block_colour(i)),
-            "model": style.model(i),
-            "scale": style.scale(i),
-        }
-        for i, name in enumerate(names)
-    ]
-
-
 def scenery_data(scenery: Scenery) -> dict[str, Any]:
     """Extent, grid, axes, bases, regions and background; of the terrain, what `terrain_bytes` leaves out."""
     digits = digits_for(scenery.size)
@@ -186,28 +176,21 @@ def scenery_data(scenery: Scenery) -> dict[str, Any]:
         "gridStep": scenery.grid_step,
         "originLength": scenery.origin_length,
         "background": scenery.background and list(scenery.background),
-        "bases": [_base_data(base, digits) for base in scenery.bases],
-        "regions": [_region_data(region, digits) for region in scenery.boundaries],
+        "bases": [
+            {"team": b.team, "pos": rounded(b.pos, digits), "radius": b.radius, "opacity": b.opacity}
+            for b in scenery.bases
+        ],
+        "regions": [
+            {
+                "name": r.name,
+                "team": r.team,
+                "isWall": r.is_wall,
+                "mesh": mesh_data(r.mesh, digits),
+                "outline": rounded(r.outline.ravel(), digits),
+            }
+            for r in scenery.boundaries
+        ],
         "terrain": scenery.terrain and _terrain_data(scenery.terrain.thinned(MOST_HEIGHTS)),
-    }
-
-
-def _base_data(base: Base, digits: int) -> dict[str, Any]:
-    return {
-        "team": base.team,
-        "pos": rounded(base.pos, digits),
-        "radius": base.radius,
-        "opacity": base.opacity,
-    }
-
-
-def _region_data(region: Region, digits: int) -> dict[str, Any]:
-    return {
-        "name": region.name,
-        "team": region.team,
-        "isWall": region.is_wall,
-        "mesh": mesh_data(region.mesh, digits),
-        "outline": rounded(region.outline.ravel(), digits),
     }
 
 
