@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import shutil
 import sys
 import tempfile
@@ -10,7 +11,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
+import PIL.Image
 from playwright.sync_api import Browser, sync_playwright
+from playwright.sync_api import Page as Tab
 from served import Watched
 from waiting import wait_until
 
@@ -33,8 +36,13 @@ def shoot(watched: Watched, name: str) -> None:
     """Save the window as a picture."""
     watched.wait("player.isDrawn")
     watched.tab.wait_for_timeout(3500)  # until nothing is said any more
-    path = IMAGES / f"{name}.png"
-    watched.tab.screenshot(path=path, timeout=300_000)
+    save(watched.tab, name)
+
+
+def save(tab: Tab, name: str) -> None:
+    """Save what a tab shows, in 64 steps of each colour: the sky's grain, which hides its steps, would make the file large."""
+    taken = PIL.Image.open(io.BytesIO(tab.screenshot(timeout=300_000)))
+    taken.convert("RGB").point(lambda v: v & 0xFC | v >> 6).save(IMAGES / f"{name}.png", optimize=True)
 
 
 @contextmanager
@@ -61,13 +69,13 @@ def chase(browser: Browser) -> None:
         shoot(watched, "view-chase")
 
 
-def recorded(folder: Path, *speeds: str) -> list[Recording]:
-    """The same game with prey of some speeds [m/s]."""
+def recorded(folder: Path, *speeds: str, n: int = 30, seconds: float = 40.0) -> list[Recording]:
+    """The same game with n prey of some speeds [m/s]."""
     runs = []
     for speed in speeds:
-        loaded = read_mission(GAME, {"prey": "30", "prey.Boids.max_speed": speed})
+        loaded = read_mission(GAME, {"prey": str(n), "prey.Boids.max_speed": speed})
         with Simulation(loaded.mission, 1) as game, Recorder(game, folder / speed, mission_text=loaded.text):
-            game.run(until=40.0)
+            game.run(until=seconds)
         runs.append(Recording(folder / speed))
     return runs
 
@@ -100,25 +108,26 @@ def narrow(browser: Browser) -> None:
             watched.press("ArrowLeft")
             watched.wait("player.chosen > 0 && player.isDrawn")
             watched.press("o")
+            watched.press("k")
             shoot(watched, "view-narrow")
 
 
 def offline(browser: Browser) -> None:
     """The page in a file, opened from there."""
     with tempfile.TemporaryDirectory() as folder:
-        (run,) = recorded(Path(folder), "30")
+        (run,) = recorded(Path(folder), "30", n=100, seconds=70.0)
         path = Path(folder) / "page.html"
         write_html(run, path)
         tab = browser.new_page(viewport=SIZE, reduced_motion="reduce")
         tab.set_default_timeout(90_000)
         tab.goto(path.as_uri())
         wait_until(tab, "Boolean(window.player && player.isReady)", 90.0)
-        tab.locator("#time").evaluate("(s) => { s.value = '25'; s.dispatchEvent(new Event('input')); }")
-        for key in ("ArrowLeft", "z", "z"):
+        tab.locator("#time").evaluate("(s) => { s.value = '58'; s.dispatchEvent(new Event('input')); }")
+        for key in ("ArrowLeft", "o", "k"):
             tab.keyboard.press(key)
-        wait_until(tab, "player.t === 25 && player.isDrawn", 90.0)
+        wait_until(tab, "player.t === 58 && player.isDrawn", 90.0)
         tab.wait_for_timeout(3500)
-        tab.screenshot(path=IMAGES / "offline-page.png", timeout=300_000)
+        save(tab, "offline-page")
         tab.close()
 
 

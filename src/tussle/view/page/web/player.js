@@ -45,6 +45,8 @@ export class Player {
     this.isPicking = false;
     this.isLost = false;
     this.lookedBack = 0;
+    /** @type {number | undefined} */
+    this.looking = undefined;
     this.drawnTime = NaN;
     /** Shapes of a recording that are drawn. @type {ReturnType<Recorded['shapesShown']>} */
     this.shapes = null;
@@ -102,8 +104,9 @@ export class Player {
           const before = layer.shown.t;
           layer.takeFrame(header, bytes);
           // Of a game that is faster than frames are sent, most of a trail is not seen.
-          const isSparse = layer.shown.t - before > 0.1 * TRAIL_LENGTHS[this.drawn.trail] && performance.now() - this.lookedBack > LOOK_PERIOD;
-          if (isJump || isSparse) this.lookBack();
+          const isSparse = layer.shown.t - before > 0.1 * TRAIL_LENGTHS[this.drawn.trail];
+          if (isJump) this.lookBack();
+          else if (isSparse) this.lookBackSoon();
           resolve();
         },
         past: (header, bytes) => layer.takePast(header, bytes),
@@ -137,6 +140,14 @@ export class Player {
     this.lookedBack = performance.now();
     const seconds = TRAIL_LENGTHS[this.drawn.trail] || TRAIL_OF_CHOSEN;
     this.order('history', { seconds: Math.min(seconds, 0.1 * WHOLE_GAME) });
+  }
+
+  /** Look back once `LOOK_PERIOD` is over. */
+  lookBackSoon() {
+    this.looking ??= setTimeout(() => {
+      this.looking = undefined;
+      this.lookBack();
+    }, LOOK_PERIOD - (performance.now() - this.lookedBack));
   }
 
   listen() {

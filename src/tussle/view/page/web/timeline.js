@@ -20,14 +20,20 @@ export class Clock {
     this.slider = field('time');
     this.decimals = LIVE_DECIMALS;
     this.isLooping = false;
+    this.fitSlider();
+  }
+
+  /** Let the slider reach as far as the game. */
+  fitSlider() {
+    this.slider.min = String(this.layer.start);
+    this.slider.max = String(this.layer.end);
   }
 
   /** @param {number} t @param {boolean} isPlaying @param {number} speed */
   show(t, isPlaying, speed) {
     const { slider, decimals } = this;
     const { start, end } = this.layer;
-    slider.min = String(start);
-    slider.max = String(end);
+    this.fitSlider();
     if (document.activeElement !== slider || isPlaying) slider.value = String(t);
     slider.style.setProperty('--done', `${end > start ? (100 * (t - start)) / (end - start) : 0}%`);
     slider.setAttribute('aria-valuetext', `${t.toFixed(decimals)} seconds`);
