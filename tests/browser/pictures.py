@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import matplotlib.image
 import numpy as np
-import PIL.Image
 from playwright.sync_api import Browser, sync_playwright
 from playwright.sync_api import Page as Tab
 from served import Watched
@@ -41,8 +41,9 @@ def shoot(watched: Watched, name: str) -> None:
 
 def save(tab: Tab, name: str) -> None:
     """Save what a tab shows, in 64 steps of each colour: the sky's grain, which hides its steps, would make the file large."""
-    taken = PIL.Image.open(io.BytesIO(tab.screenshot(timeout=300_000)))
-    taken.convert("RGB").point(lambda v: v & 0xFC | v >> 6).save(IMAGES / f"{name}.png", optimize=True)
+    taken = matplotlib.image.imread(io.BytesIO(tab.screenshot(timeout=300_000)))[..., :3]
+    levels = (255 * taken).round().astype(np.uint8)
+    matplotlib.image.imsave(IMAGES / f"{name}.png", np.ascontiguousarray(levels & 0xFC | levels >> 6))
 
 
 @contextmanager
