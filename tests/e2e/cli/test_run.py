@@ -113,6 +113,21 @@ def test_log_period_thins_the_trajectory_and_changes_nothing(tussle, folder):
     assert steps[1] == {0.0, 1.0, 2.0, 3.0}
 
 
+def test_shapes_are_recorded_where_they_are_asked_for(tussle, folder):
+    (folder / "drawing.py").write_text(
+        '"""Draws."""\n\nfrom tussle.stock import Predator\n\n\nclass Drawing(Predator):\n    """Draws where it is."""\n\n'
+        "    def step(self, g):\n        super().step(g)\n        g.draw.sphere(pos=g.pos)\n"
+    )
+    plugin = ("--plugin-path", "drawing.py", "--set", "mind=Drawing")
+    plain = tussle("run", "game.xml", "--out", "plain", *plugin)
+    drawn = tussle("run", "game.xml", "--out", "drawn", *plugin, "--shapes")
+    tussle("run", "game.xml", "--out", "none", "--shapes")
+    assert hash_of(plain) == hash_of(drawn)
+    runs = [load_run(folder / name) for name in ("plain", "drawn", "none")]
+    assert all(run.is_complete for run in runs)
+    assert [run.shapes_table.num_rows for run in runs] == [0, 30, 0]
+
+
 def test_pace_takes_its_time_and_changes_nothing(tussle, folder):
     fast = tussle("run", "game.xml", "--out", "fast", "--end", "2")
     slow = tussle("run", "game.xml", "--out", "slow", "--end", "2", "--pace", "2")
