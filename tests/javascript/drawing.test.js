@@ -121,6 +121,6 @@ test('events as sentences', () => {
   assert.equal(say('collision', 1, 2), 'drone 1 and drone 2 collided');
   assert.equal(say('collision'), 'drone 1 hit the ground');
   assert.equal(say('death', 1, 3, 'fuel'), 'drone 1 died: fuel (drone 3)');
-  assert.equal(say('end', 0, 0, 'one_team'), 'The game ended: one team is left');
+  assert.equal(say('end', 0, 0, 'one_team'), 'the game ended: one team is left');
   assert.equal(say('landing', 1, 0, 'soft'), 'landing drone 1 soft');
 });

@@ -103,7 +103,7 @@ def run(options: RunOptions) -> int:
             interrupt = stack.enter_context(Interrupt())
             if not options.no_log:
                 directory = options.directory or _new_directory(name, seed)
-                recorder = record(simulation, directory, loaded, options.log_period)
+                recorder = record(simulation, directory, loaded, options.log_period, options.shapes)
             simulation.step()  # loads or compiles kernels, so it counts as preparation
         speed = Speed(began)
         _play(simulation, name, speed, options.pace, interrupt)
