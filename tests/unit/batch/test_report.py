@@ -81,7 +81,8 @@ def of_ranges(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def of_choices(tmp_path_factory):
-    return written(choices(), tmp_path_factory.mktemp("choices"))
+    place = tmp_path_factory.mktemp("choices")
+    return place / "report", *written(choices(), place)
 
 
 # -- that it is whole, and safe ---------------------------------------------------------------------------------------------
@@ -131,7 +132,7 @@ def test_the_page_answers_and_has_its_sections(of_paper, of_choices):
     _, page, _ = of_paper
     assert "keepers won 593 of 1,000 games (59.3 %, 95 % interval 56.2 to 62.3)" in page.text
     assert {"won", "plot-wins", "plot-margin", "left", "plot-left-1"} <= set(page.all("id"))
-    page, _ = of_choices
+    _, page, _ = of_choices
     assert "score of keepers tactic=keep → tactic=switch 40 " in page.text
 
 
@@ -191,18 +192,17 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {file.name: file.read_bytes() for file in folder.iterdir()}
 
 
-def test_the_same_batch_gives_the_same_bytes_whatever_the_user_has_set(tmp_path):
+def test_the_same_batch_gives_the_same_bytes_whatever_the_user_has_set(of_choices, tmp_path):
     import matplotlib as mpl
 
-    write_report(Results(choices()), tmp_path / "a")
     with mpl.rc_context(
         {"font.size": 20.0, "axes.facecolor": "red", "svg.hashsalt": None, "savefig.dpi": 50}
     ):
         write_report(Results(choices()), tmp_path / "b")
         assert mpl.rcParams["font.size"] == 20.0
-    assert contents(tmp_path / "a") == contents(tmp_path / "b")
+    assert contents(of_choices[0]) == contents(tmp_path / "b")
     assert "matplotlib.pyplot" not in sys.modules or not sys.modules["matplotlib.pyplot"].get_fignums()
-    assert not re.search(rb"\d\d:\d\d:\d\d|<dc:date>", (tmp_path / "a" / "wins.svg").read_bytes())
+    assert not re.search(rb"\d\d:\d\d:\d\d|<dc:date>", (tmp_path / "b" / "wins.svg").read_bytes())
 
 
 # -- that it stays small, and what it cannot do ------------------------------------------------------------------------------------
