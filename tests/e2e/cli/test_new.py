@@ -26,7 +26,8 @@ def test_each_begins_with_a_plugin_that_plays_and_a_test_that_passes(tussle, fol
     for prefix, kind, options in PLUGINS:
         file = f"mine/{prefix.lower()}_{kind}"
         done = tussle("new", kind, f"{prefix}{kind.capitalize()}", *options, "--out", "mine")
-        assert ("_one(self" in (folder / f"{file}.py").read_text()) is (prefix == "Simple")
+        if prefix == "Simple":
+            assert "_one(self" in (folder / f"{file}.py").read_text()
         assert f" {file}.py " in done.stdout
         assert f"\n tussle run {file}.xml --plugin-path {file}.py\n" in done.stdout
         played = tussle("run", f"{file}.xml", "--plugin-path", f"{file}.py", "--no-log", "--end", "3")

@@ -267,7 +267,7 @@ COLUMNS = {
         (lambda self, w: w.entitis, "Judge: w has no 'entitis' (did you mean 'entities'?)"),
         (lambda self, w: w.entities[0].agee, "an entity has no 'agee' (did you mean 'age'?)"),
         (lambda self, w: self.reach, "Judge.reach differs between worlds: read w.reach, not self.reach"),
-        (lambda self, w: setattr(w, "clas", 1), "clas = State(...) on the class, then w.clas = value"),
+        (lambda self, w: setattr(w, "clas", 1), "declare clas = State(...)"),
         (lambda self, w: setattr(w, "reach", 1.0), "Judge: w.reach is read-only"),
         (lambda self, w: setattr(w, "t", 1.0), "Judge: w.t is read-only"),
         (lambda self, w: setattr(w, "lost", 1), "Judge: lost has one value per team"),

@@ -552,7 +552,7 @@ def test_without_a_package_the_message_names_the_extra(flown, tmp_path, monkeypa
 
 
 def test_without_scipy_the_message_names_the_extra(hunted, monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "scipy", None)
+    monkeypatch.setitem(__import__("sys").modules, "scipy.spatial", None)
     with pytest.raises(MissingExtraError, match=r"scipy.*tussle\[view\]"):
         crowd_of(hunted.frame(0))
 
