@@ -24,7 +24,7 @@ from tussle.batch.statistics import (
     sign_test,
     wilson,
 )
-from tussle.cli.batch import play_batch
+from tussle.cli.batch import batch
 from tussle.errors import MissingExtraError
 
 
@@ -33,7 +33,7 @@ def test_without_scipy_the_extra_is_named(monkeypatch):
     with pytest.raises(MissingExtraError, match=r"scipy.*tussle\[batch\]"):
         wilson.__wrapped__(3, 10)  # not what another test has asked for
     with pytest.raises(MissingExtraError):  # before anything is looked at
-        play_batch(None, ())
+        batch(None)
 
 
 # -- shares ---------------------------------------------------------------------------------------------------------------
