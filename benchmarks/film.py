@@ -1,11 +1,10 @@
-"""Speed of making a film of a recorded run without a display, by part.
+"""Speed of making a film of a recorded run without a display.
 
     python benchmarks/film.py [--sizes 20 200 2000] [--repeats 3] [--json FILE]
 
 Sizes are entities in two flocks, filmed at 1280x720 in H.264 with trails, shadows and caption, with each offscreen window type that
-works on this machine. `pictures/s` is per wall time, including planning and the final wait for the encoder. The other columns are
-milliseconds per picture: reading states and trails, drawing, captions, waiting for the encoder, and CPU time of this process, in which
-Mesa draws with all cores. Other load on the machine affects all columns but the last.
+works on this machine. `pictures/s` is per wall time, with planning and the final wait for the encoder. `CPU ms` is CPU time of this
+process per picture, in which Mesa draws with all cores. Other load on the machine affects all columns but the last.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ from tussle import Block, Mission, Recorder, Simulation
 from tussle.stock import Boids, Unicycle
 from tussle.view import Recording
 from tussle.view.export.film import FilmOptions, write_film
-from tussle.view.export.film.window import CHOICE, LIBRARIES, is_there
+from tussle.view.export.film.renderer import LIBRARIES, WINDOW_VARIABLE, is_installed
 
 SIZES = (20, 200, 2000)
 SECONDS = 6.0
@@ -47,7 +46,7 @@ def recorded(n: int, folder: Path) -> Recording:
 
 def measure(recording: Recording, n: int, window: str, folder: Path) -> dict[str, Any]:
     """Film once."""
-    os.environ[CHOICE] = window
+    os.environ[WINDOW_VARIABLE] = window
     cpu, wall = time.process_time(), time.perf_counter()
     report = write_film(recording, mp4=folder / "film.mp4", options=FilmOptions(speed=1.0))
     cpu, wall = time.process_time() - cpu, time.perf_counter() - wall
@@ -56,16 +55,14 @@ def measure(recording: Recording, n: int, window: str, folder: Path) -> dict[str
         "entities": n,
         "window": window.removeprefix("vtk").removesuffix("RenderWindow"),
         "pictures/s": report.n_pictures / wall,
-        **{f"{part} ms": seconds * each for part, seconds in report.seconds.items() if part != "plan"},
         "CPU ms": cpu * each,
-        "plan s": report.seconds["plan"],
         "MB": (folder / "film.mp4").stat().st_size / 1e6,
     }
 
 
 def main() -> None:
     asked = measuring.arguments(__doc__, SIZES)
-    windows = [name for name, libraries in LIBRARIES.items() if any(map(is_there, libraries))]
+    windows = [name for name, libraries in LIBRARIES.items() if any(map(is_installed, libraries))]
     rows = []
     with tempfile.TemporaryDirectory() as name:
         for n in asked.sizes:

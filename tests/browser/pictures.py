@@ -178,7 +178,7 @@ def shapes(browser: Browser) -> None:
         Live(simulation, is_paused=True, viewer=viewer) as live,
         shown(browser, Page(live)) as watched,
     ):
-        watched.until(lambda: live._sketchbook.is_open)
+        watched.until(lambda: live._collector.is_open)
         live.step(30)
         watched.wait("player.frame === 30 && player.shapes.length > 1")
         shoot(watched, "view-shapes")

@@ -175,7 +175,7 @@ def test_a_point_is_picked_and_shapes_of_plugins_are_seen(chromium):
         watched.until(lambda: len(live.injections) == 1)
         assert live.injections[0].fields["pos"][2] == pytest.approx(0.0, abs=1e-6)
         watched.tab.mouse.click(400, 300)
-        watched.until(lambda: live._sketchbook.is_open)
+        watched.until(lambda: live._collector.is_open)
         live.step()
         watched.wait("player.shapes.some(([kind, n]) => kind === 'arrows' && n === 3)")
         assert len(live.injections) == 1, "a second click is no second point"

@@ -24,11 +24,11 @@ TIMES = {"start": "--from", "stop": "--to", "at": "--at"}
 
 def plot(options: PlotOptions) -> None:
     """Write the plots of a run, and print their names."""
-    from tussle.view.plots import Choice, write_plots
+    from tussle.view.plots import Selection, write_plots
 
     start = -math.inf if options.start is None else read_time("--from", options.start)
     stop = math.inf if options.stop is None else read_time("--to", options.stop)
-    selection = Choice(tuple(options.teams), tuple(options.entities), start, stop)
+    selection = Selection(tuple(options.teams), tuple(options.entities), start, stop)
     recording = Recording(options.run, options.world, tuple(options.plugin_files))
     directory = options.directory or options.run / "plots"
     written = write_plots(recording, directory, options.kinds, selection, options.between, options.form)

@@ -1,7 +1,6 @@
-"""What is seen of a game: of a recorded run at any time, and of a simulation while it is watched.
+"""Viewing of recorded runs and of running simulations.
 
-Nothing here is loaded before it is asked for: a recorded run needs Arrow, a page in the browser and a film need packages of the
-extra `tussle[view]`.
+Modules are loaded when a name is used; pages and films need the packages of the extra `tussle[view]`.
 """
 
 from importlib import import_module

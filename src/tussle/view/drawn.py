@@ -1,4 +1,4 @@
-"""The shapes that plugins draw, as they are seen after a step."""
+"""Shapes that plugins draw."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from tussle.record.shapes import attributes_in, lifetime_of
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """Something that a plugin has drawn.
+    """A shape that a plugin has drawn.
 
     Attributes:
         kind: One of `tussle.api.draw.KINDS`.
-        attributes: What it was drawn with; arrays are copies.
-        t: Time of the beginning of the step in which it was drawn [s].
+        attributes: Its attributes; arrays are copies.
+        t: Time at the beginning of the step that drew it [s].
     """
 
     kind: str
@@ -24,15 +24,15 @@ class Shape:
     t: float
 
 
-class Sketchbook:
-    """Collects what the plugins of a simulation draw, while it is open.
+class DrawCollector:
+    """Collects the shapes that the plugins of a simulation draw, while it is open.
 
-    A shape is seen until the next step, or for its `lifetime` [s] of simulated time. One with the attribute `world` is seen in
-    that world only: a number, or with shapes that have several items, one per item, of which this world's are kept.
+    A shape is visible until the next step, or for its `lifetime` [s] of simulated time. A shape with the attribute `world` is visible
+    in that world only; the attribute is a number, or an array with the world of each item of the shape.
 
     Args:
         simulation: The simulation.
-        world: The world that is watched.
+        world: Number of the world that is shown.
     """
 
     def __init__(self, simulation: Simulation, world: int) -> None:
@@ -42,31 +42,31 @@ class Sketchbook:
         self.is_open = False
 
     def open(self) -> None:
-        """Collect from now on."""
+        """Start collecting."""
         if not self.is_open:
             self._simulation.state.context.draw.sinks.append(self._add)
             self.is_open = True
 
     def close(self) -> None:
-        """Collect no more, and forget what there is."""
+        """Stop collecting and drop all shapes."""
         if self.is_open:
             self._simulation.state.context.draw.sinks.remove(self._add)
             self.is_open = False
         self.clear()
 
     def clear(self) -> None:
-        """Forget what there is: the game has jumped."""
+        """Drop all shapes."""
         self._fresh, self._lasting = [], []
 
-    def turn_page(self) -> None:
-        """A step begins."""
+    def begin_step(self) -> None:
+        """Keep only shapes with a lifetime; called before each step."""
         self._lasting += [s for s in self._fresh if lifetime_of(s.attributes) > 0.0]
         self._fresh = []
 
     def shapes(self) -> tuple[Shape, ...]:
-        """All that is seen now, in the order in which it was drawn."""
+        """The visible shapes, in the order in which they were drawn."""
         now = float(self._simulation.t[self._world])
-        # As long as the dt that the clock rounds to matters not: a lifetime of 1 s is seen for ten steps of 0.1 s.
+        # Tolerates rounding: a lifetime of 1 s lasts ten steps of 0.1 s.
         slack = 1e-6 * self._simulation.mission.dt
         self._lasting = [s for s in self._lasting if s.t <= now < s.t + lifetime_of(s.attributes) - slack]
         return (*self._lasting, *self._fresh)

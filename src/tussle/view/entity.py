@@ -1,4 +1,4 @@
-"""All that can be known of one entity at one moment."""
+"""The complete state of one entity: body, plugin columns, messages."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tussle.engine.table import Stored, Table
 from tussle.lists import RaggedColumn
 
 MOST_MESSAGES = 50
-"""Messages that are listed, of those heard and of those said."""
+"""Messages that are listed, of received and of sent ones."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Reading:
         value: A number, an array (k,) of one with several fields, an array (m, k) of a list, or a text.
         unit: Its SI unit; one per field where they differ, separated by blanks.
         fields: Names of the components.
-        doc: What it is.
+        doc: Its description.
     """
 
     value: Any
@@ -44,7 +44,7 @@ class ShownMessage:
 
     Attributes:
         topic: Network and name, "GlobalNetwork/Waypoint".
-        sender: Id of who said it, 0 for the world.
+        sender: Id of the sender, 0 for the world.
         fields: Field -> value.
     """
 
@@ -55,18 +55,18 @@ class ShownMessage:
 
 @dataclass(frozen=True, eq=False)
 class EntityState:
-    """One entity at one moment.
+    """State of one entity at one time.
 
     Attributes:
         t: Time [s].
         step: Number of the step that begins with this state.
-        id: Who.
+        id: Its id.
         team: Its team.
         block: Name of its block.
         body: Column -> reading.
         plugins: Plugin, such as "MotorSchemas.AvoidEntityMS" -> column -> reading.
-        heard: Messages that have arrived and that it has not read yet, at most 50.
-        said: Its messages that are on their way or that somebody has yet to read, at most 50.
+        heard: Messages that have arrived and are unread, at most 50.
+        said: Its messages that are under way or unread, at most 50.
     """
 
     t: float
@@ -81,7 +81,7 @@ class EntityState:
 
 
 def entity_state(simulation: Simulation, world: int, who: int) -> EntityState | None:
-    """The entity with an id; None where it is not there (any more). Of a world that has ended, as it was at the end."""
+    """The entity with an id; None if it does not exist. Of a world that has ended, its last state."""
     parked = simulation.state.parked.get(world)
     bodies = simulation.state.population.bodies if parked is None else parked.bodies
     found = np.flatnonzero((bodies.id == who) & (bodies.world == world))
@@ -118,13 +118,13 @@ def entity_state(simulation: Simulation, world: int, who: int) -> EntityState | 
 
 
 def _plain(value: Any) -> Any:
-    """A number as Python has it, an array as a copy."""
+    """A Python number, or a copy of an array."""
     array = np.array(value)
     return array if array.ndim else array.item()
 
 
 def _read_plugins(group: Group, row: int, held: Table | Stored, into: dict[str, dict[str, Reading]]) -> None:
-    """All columns of an entity's plugins, in the order of their declaration."""
+    """Add all columns of an entity's plugins in the order of their declaration."""
     for binding in group.walk():
         columns = into[".".join(binding.path)] = {}
         for name, column in type(binding.spec).columns.items():
@@ -141,18 +141,18 @@ def _read_plugins(group: Group, row: int, held: Table | Stored, into: dict[str, 
 
 
 def _heard(group: Group, world: int, who: int) -> list[ShownMessage]:
-    letters: list[ShownMessage] = []
+    messages: list[ShownMessage] = []
     for binding in group.walk():
         for name, column in type(binding.spec).columns.items():
             if isinstance(column, Subscribe):
                 inbox = binding.plugin.__dict__[name]
                 for delivery in inbox.deliveries:
-                    letters += _letters(inbox.topic, delivery, _for_whom(delivery, world, who))
-    return letters[-MOST_MESSAGES:]
+                    messages += _messages(inbox.topic, delivery, _for_whom(delivery, world, who))
+    return messages[-MOST_MESSAGES:]
 
 
 def _for_whom(delivery: Delivery, world: int, who: int) -> np.ndarray:
-    """Numbers of the messages in a parcel that an entity hears."""
+    """Numbers of the messages in a delivery that an entity receives."""
     batch, to = delivery.batch, delivery.to
     if isinstance(to, str):
         assert to in (EVERYONE, SAME_ENTITY)
@@ -163,12 +163,12 @@ def _for_whom(delivery: Delivery, world: int, who: int) -> np.ndarray:
 
 
 def _said(simulation: Simulation, world: int, who: int) -> list[ShownMessage]:
-    letters: list[ShownMessage] = []
+    messages: list[ShownMessage] = []
     for topic in simulation.state.message_bus.topics.values():
         for delivery in _under_way(topic):
             mine = (delivery.batch.world == world) & (delivery.batch.sender == who)
-            letters += _letters(topic, delivery, np.flatnonzero(mine))
-    return letters[-MOST_MESSAGES:]
+            messages += _messages(topic, delivery, np.flatnonzero(mine))
+    return messages[-MOST_MESSAGES:]
 
 
 def _under_way(topic: TopicBuffer) -> Iterator[Delivery]:
@@ -179,9 +179,9 @@ def _under_way(topic: TopicBuffer) -> Iterator[Delivery]:
     yield from known.values()
 
 
-def _letters(topic: TopicBuffer, delivery: Delivery, numbers: np.ndarray) -> list[ShownMessage]:
+def _messages(topic: TopicBuffer, delivery: Delivery, numbers: np.ndarray) -> list[ShownMessage]:
     batch = delivery.batch
-    letters = []
+    messages = []
     for i in numbers[-MOST_MESSAGES:]:
         fields: dict[str, Any] = {}
         for name, values in batch.data.items():
@@ -191,5 +191,5 @@ def _letters(topic: TopicBuffer, delivery: Delivery, numbers: np.ndarray) -> lis
                 fields[name] = values[int(i)]
             else:
                 fields[name] = _plain(values[..., i])
-        letters.append(ShownMessage(f"{topic.network}/{topic.name}", int(batch.sender[i]), fields))
-    return letters
+        messages.append(ShownMessage(f"{topic.network}/{topic.name}", int(batch.sender[i]), fields))
+    return messages

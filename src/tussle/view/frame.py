@@ -1,4 +1,4 @@
-"""What is seen of one world at one moment."""
+"""The state of one world at one time, and its events."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from tussle.engine.simulation import Simulation
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """All entities of one world at one moment; nothing of it is ever written to again.
+    """All entities of one world at one time; the arrays are not changed.
 
     Attributes:
         t: Time [s].
         step: Number of the step that begins with this state.
-        id: Who, ascending, (n,), int32.
+        id: Ids, ascending, (n,), int32.
         team: Team of each, (n,), int32.
         block: Number of its block's name, (n,), int32.
         pos: Position [m], (n, 3), world frame, East North Up.
         quat: Attitude (w, x, y, z), (n, 4), body (forward, left, up) to world.
         vel: Ground velocity [m/s], (n, 3), world frame.
-        health: What is left before it is removed at 0, (n,).
+        health: Health; an entity is removed at 0, (n,).
     """
 
     t: float
@@ -40,21 +40,21 @@ class Frame:
         return len(self.id)
 
     def row_of(self, who: int) -> int:
-        """Row of the entity with this id; -1 where it is not there."""
+        """Row of the entity with this id; -1 if it does not exist."""
         row = int(np.searchsorted(self.id, who))
         return row if row < len(self.id) and self.id[row] == who else -1
 
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something that happened in a game.
+    """An event of a game.
 
     Attributes:
-        t: Time of the beginning of the step in which it happened; of a birth or an end, its time [s].
+        t: Time at the beginning of its step; of a birth or an end, its own time [s].
         kind: "birth", "death", "capture", "collision" or "end".
-        id: Who was born, died, captured, or has the smaller id of two that met; 0 for an end.
-        other: Who was captured, who captured or met the dead, the larger id of two that met; 0 for nobody.
-        text: Block of the born, "ground" where one met that, why one died, why the world ended.
+        id: Entity that was born, died or captured; the smaller id in a collision; 0 for an end.
+        other: Entity that was captured, that captured or hit the dead one, or the larger id in a collision; 0 for none.
+        text: Block of a birth, "ground" for a collision with it, cause of a death or an end.
     """
 
     t: float
@@ -65,16 +65,16 @@ class Event:
 
 
 def empty_frame(t: float, step: int) -> Frame:
-    """A moment in which nobody is there."""
+    """A frame without entities."""
     none = np.zeros(0, np.int32)
     return Frame(t, step, none, none, none, np.zeros((0, 3)), np.zeros((0, 4)), np.zeros((0, 3)), np.zeros(0))
 
 
 class Lens:
-    """Makes frames of one world of a simulation. Who is there is looked up only when somebody has come or gone.
+    """Makes frames of one world of a simulation. Rows are looked up again only after births and removals.
 
     Args:
-        simulation: The simulation; it is looked at between its steps only.
+        simulation: The simulation; used between steps only.
         world: Number of the world.
     """
 
@@ -85,9 +85,9 @@ class Lens:
         self._who: tuple[np.ndarray, ...] = ()
 
     def look(self) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
-        """Real columns of the table in which the world lies, (22, n), and id, team and block of its entities, each (m,), int32.
+        """Real columns of the table that holds the world, (22, n), and id, team and block of its entities, each (m,), int32.
 
-        `order` then has their rows in that table; None when these are all rows as they lie.
+        `order` then has their rows in that table; None if these are all rows in order.
         """
         parked = self._simulation.state.parked.get(self._world)
         bodies = self._simulation.state.population.bodies if parked is None else parked.bodies
@@ -103,7 +103,7 @@ class Lens:
         return bodies.floats, self._who
 
     def frame(self) -> Frame:
-        """A copy of what is there now; of a world that has ended, its last state."""
+        """A copy of the present state; of a world that has ended, its last state."""
         floats, who = self.look()
         clock = self._simulation.state.context.clock
         step = int(clock.step[self._world])
@@ -116,11 +116,11 @@ class Lens:
 
 
 def _closed(array: np.ndarray) -> np.ndarray:
-    """The array, from now on read-only."""
+    """The array, made read-only."""
     array.flags.writeable = False
     return array
 
 
 def frame_of(simulation: Simulation, world: int = 0) -> Frame:
-    """A copy of what is in one world now; of a world that has ended, its last state."""
+    """A copy of the present state of a world; of one that has ended, its last state."""
     return Lens(simulation, world).frame()

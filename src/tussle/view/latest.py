@@ -1,4 +1,4 @@
-"""What one thread makes and others take without either waiting for the other."""
+"""A value that one thread makes and others read, without waiting for each other."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from typing import Generic, TypeVar
 T = TypeVar("T")
 
 LINGER = 0.25
-"""How long after it was last asked for a thing is still made anew [s]; who asks ten times a second always gets the newest."""
+"""Time after the last request during which the value is still renewed [s]; ten requests per second always get the newest."""
 
 
 class LatestValue(Generic[T]):
-    """A thing that is made only while somebody asks for it, and not too often.
+    """A value that is made only while it is requested, and at a limited rate.
 
-    The maker's thread calls `renew` whenever it has a moment; any other calls `take`, which returns at once what was made last.
+    The maker's thread calls `renew` from time to time; other threads call `take`, which returns the latest value at once.
 
     Args:
-        make: Makes it, in the maker's thread.
-        period: Least time between two of them [s].
-        ring: Wakes the maker when it sleeps.
+        make: Makes the value, in the maker's thread.
+        period: Least time between two values [s].
+        ring: Wakes the maker.
     """
 
     def __init__(self, make: Callable[[], T], period: float, ring: Callable[[], None]) -> None:
@@ -32,23 +32,23 @@ class LatestValue(Generic[T]):
         self._due = 0.0
 
     def take(self) -> T | None:
-        """The newest there is; None before the first."""
+        """The latest value; None before the first."""
         self._asked = time.monotonic()
         self._ring()
         return self.value
 
     @property
     def idle_for(self) -> float:
-        """Time since it was last asked for [s]."""
+        """Time since the last request [s]."""
         return time.monotonic() - self._asked
 
     def renew(self, version: int, *, is_still: bool = False, always: bool = False) -> None:
-        """Make it anew where that is called for.
+        """Make the value again if it is out of date and requested.
 
         Args:
-            version: Counts what has changed; of the same version, one is enough.
-            is_still: Nothing will change soon: there is no need to wait for the period to pass.
-            always: Make it even if nobody has asked.
+            version: Number of changes; the value is made once for each version.
+            is_still: Nothing will change soon, so the period need not pass.
+            always: Make it without a request.
         """
         if version == self._version:
             return

@@ -1,4 +1,4 @@
-"""A simulation that is watched: played in a thread of its own, paused, stepped, wound back, and seen without ever being held up."""
+"""Control and observation of a running simulation: pause, step, rewind, frames, without delaying it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tussle.engine.simulation import Simulation
 from tussle.engine.step_end import world_result
 from tussle.errors import ParameterError, PluginError
 from tussle.messages import CustomKeyPress, Message, WorldPointClicked
-from tussle.view.drawn import Shape, Sketchbook
+from tussle.view.drawn import DrawCollector, Shape
 from tussle.view.entity import EntityState, entity_state
 from tussle.view.frame import Event, Frame, Lens
 from tussle.view.latest import LINGER, LatestValue
@@ -27,37 +27,36 @@ from tussle.view.scenery import Scenery, scenery_of
 from tussle.view.style import Style
 
 FRAME_PERIOD = 1.0 / 30.0
-"""Least time between two frames [s]: browsers are sent no more."""
+"""Least time between two frames [s]."""
 STATE_PERIOD = 0.1
-"""Least time between two readings of an entity [s]: nobody reads faster."""
+"""Least time between two readings of an entity [s]."""
 RESULT_PERIOD = 0.5
-"""Least time between two results so far [s]."""
+"""Least time between two provisional results [s]."""
 FORGET_AFTER = 10.0
-"""How long after it was last asked for an entity is still remembered [s]."""
+"""Time after the last request at which the state of an entity is dropped [s]."""
 
 
 class Live:
-    """A simulation that is watched.
+    """Controls a simulation and observes it while it plays.
 
-    Controls return at once and are carried out between two steps, in the order in which they were given; a seek and a new beginning do
-    not wait for what is under way, and end it. What is seen is handed out at
-    once too: the newest that was made, and it is made only while somebody asks for it. No control and nobody who watches changes a
-    result, except for what is said to the plugins (`publish`); to wind back and go on leads to the same future, bit for bit.
+    Controls return at once and are executed between two steps, in their order; a seek and a reset end a seek that is under way.
+    Observations also return at once, with the latest value; values are made only while they are requested. Results do not depend on
+    controls and observers, except for messages to the plugins (`publish`); after rewinding, the game repeats bit for bit.
 
-    Simulations whose plugins hold things outside that cannot be saved are not wound back, and `notes` says why. What becomes of
-    recorders says `tussle.view.player.Player`.
+    Simulations whose plugins have state outside that cannot be saved cannot be rewound, and `notes` says why. `tussle.view.player.Player`
+    describes the effects on recorders.
 
     Args:
-        simulation: What is played; nobody else may step it meanwhile.
-        world: Number of the world that is watched. The game goes on until this one ends.
+        simulation: The simulation; it must not be stepped by others.
+        world: Number of the world that is shown. The game ends with it.
         pace: Simulated seconds per second; None is as fast as possible.
-        is_paused: Wait before the first step.
-        threaded: Play in a thread of its own, from now on. Without, the game stands still, each control is carried out by whoever
-            gives it, and what is seen is always of now.
+        is_paused: Start paused.
+        threaded: Play in a new thread. Otherwise the game stands still, controls are executed by the caller, and observations are
+            always current.
         snapshot_every: Least simulated time between snapshots [s]; they are also limited to 1 % of the CPU time.
-        memory: For snapshots and for the history of frames [MB], half of it for each.
-        viewer: What the mission file says for the viewer, see `tussle.mission.Loaded`.
-        folder: Folder of the mission file, where its terrain is looked for.
+        memory: Memory for snapshots and past frames [MB], half of it for each.
+        viewer: Viewer tags of the mission file, see `tussle.mission.Loaded`.
+        folder: Folder of the mission file, with its terrain.
 
     Raises:
         ParameterError: A value is not allowed.
@@ -86,17 +85,13 @@ class Live:
         self.simulation, self.world, self.viewer = simulation, world, dict(viewer or {})
         self._folder = folder
         self._clock = simulation.state.context.clock
-        self._sketchbook = Sketchbook(simulation, world)
+        self._collector = DrawCollector(simulation, world)
         self._pace = Pace(checked_warp(pace))
         self._player = Player(simulation, world, snapshot_every, 1e6 * memory)
-        self._playback = PlaybackController(
-            self._player, self._pace, self._sketchbook, is_paused, self._renew
-        )
+        self._playback = PlaybackController(self._player, self._pace, self._collector, is_paused, self._renew)
         ring = self._playback.ring
         self._frame: LatestValue[Frame] = LatestValue(Lens(simulation, world).frame, FRAME_PERIOD, ring)
-        self._shapes: LatestValue[tuple[Shape, ...]] = LatestValue(
-            self._sketchbook.shapes, FRAME_PERIOD, ring
-        )
+        self._shapes: LatestValue[tuple[Shape, ...]] = LatestValue(self._collector.shapes, FRAME_PERIOD, ring)
         self._result: LatestValue[WorldResult | None] = LatestValue(self._make_result, RESULT_PERIOD, ring)
         self._entities: dict[int, LatestValue[EntityState | None]] = {}
         self._renew(True)
@@ -113,30 +108,30 @@ class Live:
             self._playback.drain()
 
     def pause(self) -> None:
-        """Stand still after the step in hand."""
+        """Pause after the present step."""
         self._playback.is_paused = True
         self._playback.ring()
 
     def resume(self) -> None:
-        """Go on, when what was ordered before is done."""
+        """Play on, after the controls given before."""
         self._playback.is_paused = False
         self._playback.ring()
 
     def toggle(self) -> None:
-        """Pause, or go on."""
+        """Pause or resume."""
         (self.resume if self.is_paused else self.pause)()
 
     def step(self, n: int = 1) -> None:
-        """Make exactly n steps and stand still; a game that goes on is paused first."""
+        """Pause and make exactly n steps."""
         self.pause()
         self._give(lambda: self._playback.move(n))
 
     def step_back(self, n: int = 1) -> None:
-        """Go back n steps and stand still."""
+        """Pause and go back n steps."""
         self.step(-n)
 
     def seek(self, t: float) -> None:
-        """Go to the last step not after a time [s], back or forth, and there stand still or go on as now.
+        """Go to the last step not after a time [s], without pausing or resuming.
 
         Raises:
             ParameterError: The time is not a number.
@@ -145,7 +140,7 @@ class Live:
         self._give(lambda: self._playback.go(step), is_seek=True, may_cut_in=True)
 
     def reset(self, seed: int | None = None) -> None:
-        """Begin anew, with another seed where one is given, and stand still or go on as now.
+        """Restart, with another seed if one is given, without pausing or resuming.
 
         Raises:
             ParameterError: The seed is not a whole number.
@@ -156,11 +151,11 @@ class Live:
         self._give(lambda: self._playback.begin_anew(number), may_cut_in=True)
 
     def publish(self, type_: type[Message], *, network: str = "", topic: str = "", **fields: Any) -> None:
-        """Say something to the plugins: part of the next step, and of every replay of it. What is wrong with it is told in `notes`."""
+        """Publish a message to the plugins before the next step and its replays. Errors appear in `notes`."""
         self._give(lambda: self._playback.say(type_, network, topic, fields))
 
     def publish_click(self, point: Any) -> None:
-        """Tell the plugins of a point that somebody has picked [m], (3,): `WorldPointClicked`, on the network that reaches everyone.
+        """Publish `WorldPointClicked` with a point [m], (3,), on the network that reaches everyone.
 
         Raises:
             ParameterError: It is not three finite numbers.
@@ -171,12 +166,12 @@ class Live:
         self.publish(WorldPointClicked, pos=pos)
 
     def publish_key(self, key: str) -> None:
-        """Tell the plugins of a key that was pressed: `CustomKeyPress` on the network that reaches everyone."""
+        """Publish `CustomKeyPress` on the network that reaches everyone."""
         self.publish(CustomKeyPress, key=key)
 
     @property
     def warp(self) -> float:
-        """Simulated seconds per second that are wanted; inf is as fast as possible, and so is None when it is set."""
+        """Wanted simulated seconds per second; inf, or None when set, is as fast as possible."""
         return self._pace.warp
 
     @warp.setter
@@ -186,25 +181,25 @@ class Live:
         self._playback.ring()
 
     def faster(self) -> None:
-        """Warp up: doubled below 2, then one more."""
+        """Increase the warp: doubled below 2, then one more."""
         self.warp = faster(self.warp)
 
     def slower(self) -> None:
-        """Warp down: one less above 2, then halved; from as fast as possible, to what was reached."""
+        """Decrease the warp: one less above 2, then halved; from as fast as possible, to the speed that was reached."""
         self.warp = slower(self.warp, self.warp_reached)
 
     def stop(self, timeout: float = 10.0) -> None:
-        """End the thread after the step in hand, and leave the simulation to whoever made it. A second call does nothing."""
+        """End the thread after the present step and release the simulation. A second call does nothing."""
         self._playback.end()
         if self._thread is not None:
             self._thread.join(timeout)
             if self._thread.is_alive():
-                return  # a step takes that long; it is the last one
-        self._sketchbook.close()
+                return  # the last step takes that long
+        self._collector.close()
         self._player.close()
 
     def settle(self, timeout: float = 60.0) -> bool:
-        """Wait until all orders given before have been carried out; whether they have within that time [s]."""
+        """Wait until all controls given before were executed; return whether they were within a time [s]."""
         done = threading.Event()
 
         def tell() -> None:
@@ -220,7 +215,7 @@ class Live:
     def __exit__(self, *_: object) -> None:
         self.stop()
 
-    # -- where it stands ------------------------------------------------------------------------------------------------------------
+    # -- state ----------------------------------------------------------------------------------------------------------------------
 
     def _time_of(self, step: int) -> float:
         return float(self._clock.start + step * self._clock.dt)
@@ -233,17 +228,17 @@ class Live:
 
     @property
     def step_number(self) -> int:
-        """Number of the step that begins with what is shown; during a seek, that where it began."""
+        """Number of the step that begins with the visible state; during a seek, where the seek began."""
         return self._playback.shown[0]
 
     @property
     def t(self) -> float:
-        """Time of what is shown [s]."""
+        """Time of the visible state [s]."""
         return self._time_of(self._playback.shown[0])
 
     @property
     def span(self) -> tuple[float, float]:
-        """First and last time that has been simulated [s]."""
+        """First and last simulated time [s]."""
         return self._time_of(self._player.first_step), self._time_of(self._player.last_step)
 
     @property
@@ -256,22 +251,22 @@ class Live:
 
     @property
     def is_over(self) -> bool:
-        """The world has ended, or something has failed: it can only be wound back or begun anew."""
+        """The world has ended or a step failed; the game can only be rewound or reset."""
         return self._playback.shown[1]
 
     @property
     def is_seeking(self) -> bool:
-        """It is on its way to another time; what is shown is where it was."""
+        """A seek is under way; the visible state is the one before it."""
         return self._playback.is_seeking
 
     @property
     def epoch(self) -> int:
-        """How often the game has jumped in time or begun anew: trails end there."""
+        """Number of seeks and resets; trails end there."""
         return self._playback.epoch
 
     @property
     def error(self) -> Exception | None:
-        """What stopped the game; None while nothing has. It still can be wound back."""
+        """The error that stopped the game, which can still be rewound; None without one."""
         ended = self.simulation.state.results[self.world]
         return self._playback.error or (ended.error if ended is not None and self.is_over else None)
 
@@ -282,36 +277,36 @@ class Live:
 
     @property
     def warp_reached(self) -> float:
-        """Simulated seconds per second over the last second; 0 while it stands still."""
+        """Simulated seconds per second over the last second; 0 while paused."""
         return self._playback.speed.speed()[0]
 
     @property
     def steps_per_second(self) -> float:
-        """Over the last second; 0 while it stands still."""
+        """Steps per second over the last second; 0 while paused."""
         return self._playback.speed.speed()[1]
 
     @property
     def events(self) -> list[Event]:
-        """Events in order, those after the present too where it was wound back."""
+        """Events in order; after rewinding, also those after the present."""
         return list(self._player.events)
 
     @property
     def injections(self) -> list[Injection]:
-        """What was said to the plugins from outside."""
+        """Messages to the plugins from outside."""
         return list(self._player.injections)
 
-    # -- what is seen -------------------------------------------------------------------------------------------------------------
+    # -- observations -------------------------------------------------------------------------------------------------------------
 
     def frame(self) -> Frame:
-        """The newest frame there is. While nobody asks none is made: the first after a while may be an old one."""
+        """The latest frame. Frames are made only while requested: the first one after a while may be old."""
         frame = self._taken(self._frame)
         assert frame is not None
         return frame  # type: ignore[no-any-return]
 
     def frame_at(self, t: float) -> Frame:
-        """The last kept frame not after a time [s], for a look back while the game goes on; the first for times before it.
+        """The last kept frame not after a time [s], while the game goes on; the first for earlier times.
 
-        Positions are in half precision, and of a long game not every step is kept; `seek` gives all that was.
+        Values are in single precision, and of a long game not every step is kept; `seek` restores the full state.
 
         Raises:
             ParameterError: The time is not a number.
@@ -320,15 +315,15 @@ class Live:
         return self._player.history.at(step) or self.frame()
 
     def shapes(self) -> tuple[Shape, ...]:
-        """What plugins have drawn in the last step, and before where it lasts. Collected only while somebody asks."""
+        """Shapes drawn in the last step, and earlier ones that last. Collected only while requested."""
         return self._taken(self._shapes) or ()
 
     def result(self) -> WorldResult | None:
-        """What the game has come to so far, without its state hash until it ends; None when it is asked for first."""
+        """The provisional result, without state hash until the game ends; None at the first request."""
         return self._taken(self._result)  # type: ignore[no-any-return]
 
     def entity(self, who: int) -> EntityState | None:
-        """Body, plugin columns and messages of an entity; None where it is not there, and when it is asked for first."""
+        """Body, plugin columns and messages of an entity; None if it does not exist, and at the first request."""
         if who not in self._entities:
             make = lambda: entity_state(self.simulation, self.world, who)  # noqa: E731
             self._entities[who] = LatestValue(make, STATE_PERIOD, self._playback.ring)
@@ -342,7 +337,7 @@ class Live:
         return value
 
     def _renew(self, is_still: bool) -> None:
-        """Make anew what is asked for; between two steps, by whoever makes them."""
+        """Make requested values; called between steps by the playing thread."""
         playback, version = self._playback, self._playback.version
         if playback.is_seeking:
             return
@@ -355,12 +350,12 @@ class Live:
         for latest in values:
             try:
                 latest.renew(version, is_still=is_still, always=is_still and latest is self._frame)
-            except Exception as error:  # noqa: BLE001 - the game goes on, whatever cannot be seen of it
-                self._player.note(f"not all can be seen: {type(error).__name__}: {error}")
+            except Exception as error:  # noqa: BLE001 - an error of an observation does not stop the game
+                self._player.note(f"an observation failed: {type(error).__name__}: {error}")
         if self._shapes.idle_for < 4.0 * LINGER:
-            self._sketchbook.open()
+            self._collector.open()
         else:
-            self._sketchbook.close()
+            self._collector.close()
         for who, latest in list(self._entities.items()):
             if latest.idle_for > FORGET_AFTER:
                 self._entities.pop(who, None)
@@ -375,7 +370,7 @@ class Live:
             self._player.note(str(error))
             return None
 
-    # -- what stands still ----------------------------------------------------------------------------------------------------------
+    # -- constants ------------------------------------------------------------------------------------------------------------------
 
     @property
     def name(self) -> str:
@@ -407,5 +402,5 @@ class Live:
 
     @cached_property
     def scenery(self) -> Scenery:
-        """What stands still."""
+        """Ground, bases, boundaries and terrain."""
         return scenery_of(self.simulation.mission, self.viewer, folder=self._folder)

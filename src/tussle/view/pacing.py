@@ -1,4 +1,4 @@
-"""Time of the wall against simulated time: how long to wait, how fast it went, what may be spent beside the game."""
+"""Wall time and simulated time: waiting, measured speed, CPU shares."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from typing import Any
 from tussle.errors import ParameterError
 
 MOST_LAG = 0.25
-"""Time of the wall by which a game may be late and still make up for it [s]; one that is later starts counting anew."""
+"""Delay up to which a game catches up [s]; a larger delay is dropped."""
 WINDOW = 1.0
-"""Time of the wall over which speed is measured [s]."""
+"""Wall time over which speed is measured [s]."""
 MOMENT = 0.0005
-"""Least time between two looks at what has been saved [s]."""
+"""Least time between two checks of the saved CPU time [s]."""
 TICK = 0.05
-"""Least time between two readings of the speedometer [s]."""
+"""Least time between two readings of the speed [s]."""
 
 
 class Pace:
-    """Says how long to wait so that simulated time goes `warp` times as fast as the wall's.
+    """Computes how long to wait so that simulated time passes `warp` times as fast as wall time.
 
     Args:
         warp: Simulated seconds per second; inf is as fast as possible.
@@ -31,7 +31,7 @@ class Pace:
         self._anchor: tuple[float, float] | None = None
 
     def restart(self) -> None:
-        """Count anew from the next step."""
+        """Count from the next step."""
         self._anchor = None
 
     def wait(self, t: float, dt: float) -> float:
@@ -49,17 +49,17 @@ class Pace:
 
 
 class Speedometer:
-    """How fast a game has gone over the last second of the wall."""
+    """Speed of a game over the last second."""
 
     def __init__(self) -> None:
         self._readings: deque[tuple[float, float, int]] = deque()
 
     def restart(self) -> None:
-        """Forget what was read: the game stands still, or has jumped."""
+        """Drop the readings."""
         self._readings.clear()
 
     def read(self, t: float, step: int) -> None:
-        """Take a reading, unless the last one has just been taken."""
+        """Take a reading, at most every `TICK` seconds."""
         now = time.perf_counter()
         readings = self._readings
         if readings and now - readings[-1][0] < TICK:
@@ -69,7 +69,7 @@ class Speedometer:
             readings.popleft()
 
     def speed(self) -> tuple[float, float]:
-        """Simulated seconds per second, and steps per second; 0 for a game that stands still."""
+        """Simulated seconds and steps per second; 0 for a paused game."""
         readings = list(self._readings)
         if len(readings) < 2:
             return 0.0, 0.0
@@ -78,13 +78,13 @@ class Speedometer:
 
 
 class Allowance:
-    """What may be spent beside the game: a share of its thread's CPU time and of its rest, saved up to a point.
+    """Limits other work to a share of the thread's CPU time and of its waiting time, saved up to a limit.
 
-    CPU time, since on a machine with much else to do a share of the wall's would be a larger share of the game's. It begins with
-    what a quarter of a second brings.
+    CPU time, since on a busy machine a share of wall time would be a larger share of the game's time. It begins with the share of
+    a quarter of a second.
 
     Args:
-        share: Of that time.
+        share: The share, 0 to 1.
     """
 
     def __init__(self, share: float) -> None:
@@ -95,7 +95,7 @@ class Allowance:
         self._look_at = 0.0
 
     def rest(self, seconds: float) -> None:
-        """The game has waited on purpose: nobody is kept waiting by what is done in that time."""
+        """Add the share of a waiting time [s]."""
         self._save(seconds)
         self._look_at = 0.0
 
@@ -103,13 +103,13 @@ class Allowance:
         self._saved = min(self._saved + self.share * seconds, 4.0 * self.cost + self.share)
 
     def allows(self) -> bool:
-        """Whether what it cost last time can be paid for by now."""
-        # The thread's clock takes longer to read than the wall's, and little is saved in a moment.
+        """Whether the last cost has been saved."""
+        # The thread's clock takes longer to read than the wall clock.
         wall = time.perf_counter()
         if wall < self._look_at:
             return False
         now = time.thread_time()
-        self._save(max(0.0, now - self._last))  # another thread's clock stands elsewhere
+        self._save(max(0.0, now - self._last))  # clocks of threads differ
         self._last = now
         if self._saved >= self.cost:
             return True
@@ -117,7 +117,7 @@ class Allowance:
         return False
 
     def pay(self, seconds: float) -> None:
-        """It has been done, and took this long."""
+        """Subtract the cost of the work [s]."""
         self.cost = seconds
         self._saved -= seconds
 
@@ -143,7 +143,7 @@ def faster(warp: float) -> float:
 
 
 def slower(warp: float, reached: float) -> float:
-    """The next warp down: one less above 2, then halved; from as fast as possible, what had been reached."""
+    """The next warp down: one less above 2, then halved; from as fast as possible, the speed that was reached."""
     if math.isinf(warp):
         return max(1.0, float(math.floor(reached)))
     return 0.5 * warp if warp <= 2.0 else max(warp - 1.0, 1.0)

@@ -12,7 +12,7 @@ from typing import Any
 
 from tussle.errors import PluginError, TussleError
 from tussle.messages import Message
-from tussle.view.drawn import Sketchbook
+from tussle.view.drawn import DrawCollector
 from tussle.view.pacing import Pace, Speedometer
 from tussle.view.player import Player
 
@@ -43,7 +43,7 @@ class PlaybackController:
     Args:
         player: The game.
         pace: How fast it is played.
-        sketchbook: What its plugins draw.
+        collector: Shapes that its plugins draw.
         is_paused: Stand still until told otherwise.
         on_moment: Called between steps every few ms, and when it comes to a stand; told whether it stands still.
 
@@ -59,11 +59,11 @@ class PlaybackController:
         self,
         player: Player,
         pace: Pace,
-        sketchbook: Sketchbook,
+        collector: DrawCollector,
         is_paused: bool,
         on_moment: Callable[[bool], None],
     ) -> None:
-        self.player, self.pace, self.sketchbook = player, pace, sketchbook
+        self.player, self.pace, self.collector = player, pace, collector
         self.speed = Speedometer()
         self.is_paused = is_paused
         self.error: Exception | None = None
@@ -178,8 +178,8 @@ class PlaybackController:
             self._changed()
 
     def _advance(self) -> None:
-        if self.sketchbook.is_open:
-            self.sketchbook.turn_page()
+        if self.collector.is_open:
+            self.collector.begin_step()
         try:
             self.player.advance()
         except Exception as error:  # noqa: BLE001 - whatever a plugin does, whoever watches reads it
@@ -210,7 +210,7 @@ class PlaybackController:
         self._is_going = True
         self._goal = self.player.wind(step)
         self.epoch += 1
-        self.sketchbook.clear()
+        self.collector.clear()
         if was_broken and not self.player.is_broken:
             self.error = None
 
@@ -218,7 +218,7 @@ class PlaybackController:
         """Restart, with another seed if one is given."""
         self._goal, self._is_going, self.error = None, False, None
         self.epoch += 1
-        self.sketchbook.clear()
+        self.collector.clear()
         self.player.reset(seed)
         self.pace.restart()
         self.speed.restart()

@@ -1,4 +1,4 @@
-"""A game that can be played forwards and wound back."""
+"""A game that can be played forwards and rewound."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ if TYPE_CHECKING:
     from tussle.record import Recorder
 
 MOST_EVENTS = 100_000
-"""Events that are kept; collisions beyond that are not."""
+"""Events up to which collisions are kept."""
 
 
 @dataclass(frozen=True)
 class Injection:
-    """Something said to the plugins from outside.
+    """A message to the plugins from outside.
 
     Attributes:
-        step: The step that it is part of.
+        step: The step before which it is published.
         type: The message type.
-        network: The network that carries it; "" is the one that reaches everyone.
+        network: Its network; "" is the one that reaches everyone.
         topic: Its topic; "" is the type's name.
         fields: Field -> value.
     """
@@ -40,27 +40,27 @@ class Injection:
 
 
 class Player:
-    """One world of a simulation, played step by step, wound back by snapshots, and the same bits whenever it is played again.
+    """Plays one world of a simulation step by step and rewinds it by snapshots; a replay gives the same bits.
 
-    What is said from outside is part of the game from its step on and is said again when that step is played again. Observers and
-    listeners of the simulation, a recorder for one, are told of each step once: while steps are replayed they hear nothing. When
-    something is said in a step that had been played before, or the world begins anew, the game takes another course: recorders, whose
-    directory holds one game, are closed as of the furthest step played, and other observers are told of the new course.
+    Messages from outside belong to their step and are published again when it is replayed. Observers and listeners of the simulation,
+    such as a recorder, are called once for each step, and not during a replay. A message in a step that has been played before, or a
+    reset, changes the course of the game: recorders, whose directory holds one game, are closed at the furthest step, and other
+    observers see the new course.
 
     Args:
         simulation: The simulation.
-        world: The world that is watched; the game goes on until it ends.
+        world: Number of the world that is shown; the game ends with it.
         every: Least simulated time between snapshots [s].
         limit: Memory for snapshots and for frames [B], half of it for each.
 
     Attributes:
         timeline: Snapshots.
-        history: Frames as they went by.
-        step: Step that the world is in.
-        injections: What was said from outside, in order of its steps.
+        history: Past frames.
+        step: Present step of the world.
+        injections: Messages from outside, in order of their steps.
         events: Births, deaths, captures, collisions, ends, in order.
         notes: What the user should know, one line each.
-        is_broken: A step failed; only winding back helps.
+        is_broken: A step failed; the game can only be rewound.
     """
 
     def __init__(self, simulation: Simulation, world: int, every: float, limit: float) -> None:
@@ -72,40 +72,43 @@ class Player:
         self.notes: list[str] = []
         self.is_broken = False
         self.step = self._read_step()
-        self.first_step = self._told = self.step
-        self._tell_of_those_who_are_there()
-        simulation.events.listen(self._hear)
+        self.first_step = self._furthest_step = self.step
+        self._add_first_births()
+        simulation.events.listen(self._add_events)
         self._remember()
 
     def close(self) -> None:
-        """Leave the simulation as one that nobody watches."""
-        self.simulation.events.forget(self._hear)
+        """Stop listening to the simulation."""
+        self.simulation.events.forget(self._add_events)
 
     def _read_step(self) -> int:
         return int(self.simulation.state.context.clock.step[self.world])
 
     @property
     def last_step(self) -> int:
-        """The furthest step that has been reached."""
-        return max(self._told, self.step)
+        """The furthest step that was reached."""
+        return max(self._furthest_step, self.step)
 
     @property
     def is_over(self) -> bool:
-        """The world has ended, or broken."""
+        """The world has ended or a step failed."""
         return self.is_broken or not self.simulation.state.running[self.world]
 
     # -- forwards ---------------------------------------------------------------------------------------------------------------
 
     def advance(self) -> None:
-        """Make one step; none where the game is over."""
+        """Make one step, unless the game is over."""
         if self.is_over:
             return
         sim, step = self.simulation, self.step
-        sim.events.is_replaying = step < self._told
-        self._told = max(self._told, step + 1)
+        sim.events.is_replaying = step < self._furthest_step
+        self._furthest_step = max(self._furthest_step, step + 1)
         try:
-            for said in self.injections and [said for said in self.injections if said.step == step]:
-                sim.publish(said.type, [self.world], network=said.network, topic=said.topic, **said.fields)
+            for sent in self.injections:
+                if sent.step == step:
+                    sim.publish(
+                        sent.type, [self.world], network=sent.network, topic=sent.topic, **sent.fields
+                    )
             sim.step()
         except BaseException:
             self.is_broken = True
@@ -116,7 +119,7 @@ class Player:
         self._remember()
 
     def rest(self, seconds: float) -> None:
-        """The game has waited on purpose: time for what is done beside it."""
+        """Grant time for snapshots and history: the game has waited this long [s]."""
         self.timeline.rest(seconds)
         self.history.rest(seconds)
 
@@ -127,20 +130,20 @@ class Player:
     # -- backwards ----------------------------------------------------------------------------------------------------------------
 
     def wind(self, step: int) -> int:
-        """Go to the last moment not after a step from which it can be reached by `advance`.
+        """Restore the last snapshot not after a step.
 
         Returns:
-            The step to advance to: the one asked for, or the nearest that can be reached.
+            The step to advance to: the requested one, or the nearest that can be reached.
         """
         step, here = max(step, self.first_step), self.step
         if step == here and not self.is_broken:
             return step
         is_back = step < here or self.is_broken
         if is_back and self.timeline.refusal:
-            self.note(f"the game cannot be wound back: {self.timeline.refusal}")
+            self.note(f"the game cannot be rewound: {self.timeline.refusal}")
             return here
-        if is_back and not self.is_broken and here >= self._told:
-            self.timeline.keep(here)  # so that the present is at hand when it is wanted again
+        if is_back and not self.is_broken and here >= self._furthest_step:
+            self.timeline.keep(here)  # so that the present can be restored
         nearest = self.timeline.nearest(step)
         if nearest is not None and (is_back or nearest[0] > here):
             self.simulation.restore(nearest[1])
@@ -150,33 +153,33 @@ class Player:
     # -- another course -----------------------------------------------------------------------------------------------------------
 
     def publish(self, type_: type[Message], network: str, topic: str, fields: dict[str, Any]) -> None:
-        """Say something to the plugins: part of the next step.
+        """Publish a message to the plugins before the next step.
 
         Raises:
             ParameterError: The type has no such field.
             WiringError: There is no such network, or the topic carries another type.
         """
         if self.is_over:
-            self.note(f"{type_.__name__}: the game is over, and nobody hears it")
+            self.note(f"{type_.__name__}: the game is over, so the message is dropped")
             return
         self._check(type_, network, topic, fields)
         step = self.step
-        if step < self._told:
+        if step < self._furthest_step:
             self._end_recordings()
             self.timeline.forget_after(step)
             self.history.forget_after(step)
-            self.injections[:] = [said for said in self.injections if said.step <= step]
+            self.injections[:] = [sent for sent in self.injections if sent.step <= step]
             self._forget_events(step)
-            self._told = step
+            self._furthest_step = step
         self.injections.append(Injection(step, type_, network, topic, fields))
 
     def _check(self, type_: type[Message], network: str, topic: str, fields: dict[str, Any]) -> None:
-        """Say it in no world at all, so that what is wrong with it shows now and not in the step."""
+        """Publish the message to no world, so that errors are raised now and not in the step."""
         self.simulation.publish(type_, [], network=network, topic=topic)
         Messages.make(type_, np.zeros(1, np.int64), np.zeros(1, np.int64), fields)
 
     def reset(self, seed: int | None) -> None:
-        """Begin the world anew, with another seed where one is given."""
+        """Restart the world, with another seed if one is given."""
         self._end_recordings()
         for part in (self.timeline, self.history):
             part.clear()
@@ -184,13 +187,13 @@ class Player:
         self.events.clear()
         self.is_broken = False
         self.simulation.reset([self.world], None if seed is None else [seed])
-        self.first_step = self._told = self.step = self._read_step()
+        self.first_step = self._furthest_step = self.step = self._read_step()
         self._remember()
 
     def _end_recordings(self) -> None:
-        """Close the recorders as of the furthest step: what they have written is one game, and the next steps are another's."""
+        """Close the recorders at the furthest step: the next steps belong to another game."""
         recorders = self._recorders()
-        newest = self.timeline.nearest(self._told)
+        newest = self.timeline.nearest(self._furthest_step)
         if not recorders:
             return
         here = None
@@ -199,9 +202,9 @@ class Player:
             self.simulation.restore(newest[1])
         for recorder in recorders:
             t = float(self.simulation.t[self.world])
-            recorder.close("the game was wound back or begun anew, and took another course")
+            recorder.close("the game was rewound or restarted, and took another course")
             self.note(
-                f"{recorder.directory}: the recording ends at {t:g} s, since the game takes another course"
+                f"{recorder.directory}: the recording ends at {t:g} s, because the game takes another course"
             )
         if here is not None:
             self.simulation.restore(here)
@@ -214,14 +217,14 @@ class Player:
         owners = [getattr(observer, "__self__", None) for observer in self.simulation.observers]
         return [owner for owner in owners if isinstance(owner, Recorder)]
 
-    # -- words --------------------------------------------------------------------------------------------------------------------
+    # -- notes and events --------------------------------------------------------------------------------------------------------
 
     def note(self, text: str) -> None:
-        """Keep a note, once."""
+        """Add a note, once."""
         if text not in self.notes:
             self.notes.append(text)
 
-    def _tell_of_those_who_are_there(self) -> None:
+    def _add_first_births(self) -> None:
         frame = frame_of(self.simulation, self.world)
         names = self.simulation.state.context.block_names
         self.events += [
@@ -229,16 +232,18 @@ class Player:
             for who, block in zip(frame.id, frame.block, strict=True)
         ]
 
-    def _hear(self, told: Events) -> None:
+    def _add_events(self, reported: Events) -> None:
         clock = self.simulation.state.context.clock
-        for i in range(len(told)):
-            if told.world[i] != self.world:
+        for i in range(len(reported)):
+            if reported.world[i] != self.world:
                 continue
-            if len(self.events) >= MOST_EVENTS and told.kind == "collision":
-                self.note(f"of the collisions, those after the {MOST_EVENTS}th event are not kept")
+            if len(self.events) >= MOST_EVENTS and reported.kind == "collision":
+                self.note(f"collisions after event {MOST_EVENTS} are not kept")
                 return
-            t = float(clock.start + told.step[i] * clock.dt)
-            self.events.append(Event(t, told.kind, int(told.id[i]), int(told.other[i]), told.text[i]))
+            t = float(clock.start + reported.step[i] * clock.dt)
+            self.events.append(
+                Event(t, reported.kind, int(reported.id[i]), int(reported.other[i]), reported.text[i])
+            )
 
     def _forget_events(self, step: int) -> None:
         clock = self.simulation.state.context.clock

@@ -1,4 +1,4 @@
-"""A recorded run as frames and events, at any time of it."""
+"""Frames and events of a recorded run at any time."""
 
 from __future__ import annotations
 
@@ -22,23 +22,23 @@ from tussle.view.scenery import Scenery, scenery_of
 from tussle.view.style import Style
 
 MOST_EMPTY = 5_000_000
-"""Moments without anybody that are made up from what is said of steps; in memory they take some 300 MB."""
+"""Frames without entities that are added, in memory about 300 MB."""
 MOST_SAMPLED = 60
-"""Frames that stand for a run which stays in its file."""
+"""Frames that are sampled of a run that stays in its file."""
 POS, QUAT, VEL = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("vx", "vy", "vz")
 
 
 class Recording:
-    """One world of a run directory, whole or cut.
+    """One world of a run directory, complete or not.
 
-    The tables stay as they were read: a frame copies its own rows and looks at no others.
+    The tables stay as they were read: a frame reads only its own rows.
 
     Args:
         path: The run directory.
         world: Number of the world.
-        plugin_files: Python files whose plugins the run's mission names.
-        is_mapped: States stay in their file, and are checked when a frame is first made of them: a run of any size opens at once. Its
-            extent and its teams are then those of at most `MOST_SAMPLED` frames, spread evenly.
+        plugin_files: Python files with plugins of the run's mission.
+        is_mapped: States stay in their file and are checked when a frame is made of them, so a run of any size opens at once. Extent
+            and teams are then those of at most `MOST_SAMPLED` frames, evenly spaced.
 
     Attributes:
         run: The run directory as it was loaded.
@@ -48,11 +48,11 @@ class Recording:
         teams: Team number -> names of its blocks, in order of the teams.
         t: Time of each frame [s], (T,), ascending.
         steps: Step of each frame, (T,).
-        notes: What is missing, one line each.
-        id_shift: What ids of a second run are counted on from, which this one has not: 0.
+        notes: Missing parts of the run, one line each.
+        id_shift: Offset of the ids: 0.
 
     Raises:
-        RecordError: It is no run directory, or has no such world.
+        RecordError: It is not a run directory, is damaged, or does not have the world.
     """
 
     id_shift = 0
@@ -78,7 +78,7 @@ class Recording:
         self._find_frames()
         self._name_blocks()
 
-    # -- what there is --------------------------------------------------------------------------------------------------------
+    # -- tables ---------------------------------------------------------------------------------------------------------------
 
     def _whole(self, name: str) -> np.ndarray:
         """A column of all worlds."""
@@ -101,7 +101,7 @@ class Recording:
         return np.concatenate(parts, axis=1)
 
     def _find_frames(self) -> None:
-        """Where in the table each frame lies."""
+        """Find the rows of each frame."""
         first, worlds, step = self._frame_starts()
         last = np.concatenate([first[1:], self._starts[-1:]])[: len(first)]
         n_worlds = max(len(self.run.info.get("worlds", ())), int(worlds.max(initial=-1)) + 1)
@@ -119,14 +119,14 @@ class Recording:
         mine = mine[np.argsort(step[mine], kind="stable")]
         self._first, self._last, self.steps = first[mine], last[mine], step[mine]
         if (np.diff(self.steps) <= 0).any():
-            raise RecordError(f"{self.path / TRAJECTORY_FILE}: the rows of a step do not stand together")
+            raise RecordError(f"{self.path / TRAJECTORY_FILE}: the rows of a step are not contiguous")
         self._set_times()
         self._add_empty_frames()
         if (np.diff(self.t) < 0.0).any():
             raise RecordError(f"{self.path / TRAJECTORY_FILE}: times go back from one step to the next")
 
     def _set_times(self) -> None:
-        """Times of the frames; start and step length as `run.json` says, else as the table shows."""
+        """Set the times of frames; start and step length from `run.json`, else from the table."""
         self.t = self._at_rows("t", self._first)
         said = self.run.info.get("mission", {})
         self.start, self.dt = float(said.get("start", 0.0)), float(said.get("dt", 1.0))
@@ -135,7 +135,7 @@ class Recording:
             self.start = float(self.t[0]) - float(self.steps[0]) * self.dt
 
     def _at_rows(self, name: str, rows: np.ndarray) -> np.ndarray:
-        """Values of a real column in some rows, (n,); others are not read."""
+        """Values of a real column in some rows, (n,)."""
         found, order = np.empty(len(rows)), np.argsort(rows, kind="stable")
         edges = np.searchsorted(rows[order], self._starts)
         for number in np.flatnonzero(np.diff(edges)):
@@ -144,14 +144,14 @@ class Recording:
         return found
 
     def _usual_stride(self) -> int:
-        """The most steps between two frames with somebody in them."""
+        """The largest number of steps between two frames with entities."""
         period, strides = self.run.info.get("period"), np.diff(self.steps)
         if period:
             return max(1, math.ceil(float(period) / self.dt - 1e-9))
         return max(1, int(np.median(strides))) if len(strides) and not self.run.info else 1
 
     def _add_empty_frames(self) -> None:
-        """Frames of moments in which nobody is there: the table has no rows of them."""
+        """Add frames without entities, which have no rows in the table."""
         if not len(self.steps):
             return
         stride = self._usual_stride()
@@ -160,7 +160,7 @@ class Recording:
         n_missing = int((np.diff(edges)[gaps] // stride).sum())
         if n_missing > MOST_EMPTY:
             raise RecordError(
-                f"{self.path}: {n_missing:,} moments with nobody there, by the steps of {RUN_FILE} and {TRAJECTORY_FILE}; "
+                f"{self.path}: {n_missing:,} frames without entities, by the steps of {RUN_FILE} and {TRAJECTORY_FILE}; "
                 f"allowed are {MOST_EMPTY:,}"
             )
         missing = [np.arange(edges[i] + stride, edges[i + 1], stride) for i in gaps]
@@ -177,7 +177,7 @@ class Recording:
             self._last = np.concatenate([self._last, nothing])[order]
 
     def _last_step(self) -> int:
-        """The last step that is known to have been reached."""
+        """The last step that was reached."""
         worlds = self.run.info.get("worlds", ())
         said = int(worlds[self.world]["steps"]) if self.world < len(worlds) else 0
         return max(said, int(self.steps[-1]))
@@ -191,7 +191,7 @@ class Recording:
             names = tables[0].to_pylist()
         if any(table.to_pylist() != names for table in tables):
             raise RecordError(
-                f"{self.path / TRAJECTORY_FILE}: its blocks are not {', '.join(names)}, as in {RUN_FILE} and the first rows"
+                f"{self.path / TRAJECTORY_FILE}: the blocks differ from {', '.join(names)}, those of {RUN_FILE} and the first rows"
             )
         self.blocks: list[str] = names
         seen = self._teams_sampled() if self._is_mapped else self._teams_seen()
@@ -221,12 +221,12 @@ class Recording:
 
     @property
     def _sample(self) -> list[int]:
-        """Frames that stand for all where all are too many to be read."""
+        """Numbers of the sampled frames."""
         places = np.linspace(0, self.n_frames - 1, min(self.n_frames, MOST_SAMPLED))
         return [int(i) for i in np.unique(places.astype(np.int64))]
 
     def _teams_sampled(self) -> set[tuple[int, int]]:
-        """(block, team) of the entities of some frames."""
+        """(block, team) of the entities of the sampled frames."""
         frames = [self.frame(i) for i in self._sample]
         return {pair for f in frames for pair in set(zip(f.block.tolist(), f.team.tolist(), strict=True))}
 
@@ -244,7 +244,7 @@ class Recording:
 
     @property
     def is_complete(self) -> bool:
-        """All that was to be played has been, and all of it is here."""
+        """The run was played to its end, and all of it is recorded."""
         return self.run.is_complete
 
     def frame(self, i: int) -> Frame:
@@ -268,10 +268,10 @@ class Recording:
     def _check(
         self, step: int, ids: np.ndarray, block: np.ndarray, pos: np.ndarray, quat: np.ndarray
     ) -> None:
-        """See that the rows of a frame are what they are in a table that was checked as a whole.
+        """Check the rows of a frame of a table that was not checked as a whole.
 
         Raises:
-            RecordError: They are not.
+            RecordError: They are damaged.
         """
         wrong = ""
         if (np.diff(ids) <= 0).any() or ids[0] < 0:
@@ -306,7 +306,7 @@ class Recording:
         return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
     def _array(self, number: int, name: str) -> np.ndarray:
-        """A column of a batch, without a copy; of blocks their numbers."""
+        """A column of a batch without a copy; of `block` the numbers."""
         key = (number, name)
         if key not in self._arrays:
             column = self._batches[number][name]
@@ -363,7 +363,7 @@ class Recording:
             RecordError: A row of the table holds no shape.
         """
         step, t, lifetime = self._shape_times
-        now = self.t[i] + 1e-6 * self.dt  # as in `Sketchbook`
+        now = self.t[i] + 1e-6 * self.dt  # as in `DrawCollector`
         seen = (step < self.steps[i]) & ((step == self.steps[i] - 1) | (now < t + lifetime))
         return tuple(self._shape(int(row), float(t[row])) for row in np.flatnonzero(seen))
 
@@ -383,7 +383,7 @@ class Recording:
     def _loaded(self) -> Loaded | None:
         path = self.path / MISSION_FILE
         if not path.exists():
-            self.notes.append(f"{MISSION_FILE} is not there: a mission that was built in Python leaves none")
+            self.notes.append(f"{MISSION_FILE} is missing: a mission built in Python has none")
             return None
         try:
             return read_mission(path.resolve(), plugin_files=self._plugin_files)
@@ -396,12 +396,12 @@ class Recording:
 
     @property
     def mission(self) -> Mission | None:
-        """What was played; None where the run does not keep it or it needs plugins that are not here, which `notes` says."""
+        """The mission; None if the run does not hold it or it cannot be read, which `notes` says."""
         return None if self._loaded is None else self._loaded.mission
 
     @property
     def viewer(self) -> dict[str, Any]:
-        """What the mission file says for the viewer, see `tussle.mission.Loaded`; empty without one."""
+        """Viewer tags of the mission file, see `tussle.mission.Loaded`; empty without one."""
         return {} if self._loaded is None else self._loaded.viewer
 
     @property
@@ -416,7 +416,7 @@ class Recording:
 
     @cached_property
     def scenery(self) -> Scenery:
-        """What stands still."""
+        """Ground, bases, boundaries and terrain."""
         return scenery_of(self.mission, self.viewer, self.extent, self.path)
 
     def __len__(self) -> int:

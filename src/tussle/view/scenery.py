@@ -1,4 +1,4 @@
-"""What stands still in the picture: ground, grid, origin, bases, boundaries, terrain."""
+"""Scenery: ground, grid, origin, bases, boundaries, terrain."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ from tussle.view.solids import mesh_of, outline_of
 from tussle.view.terrain import Terrain, find_terrain
 
 LEAST_EXTENT = 50.0
-"""Width of what is shown of a game that takes place in one point [m]."""
+"""Least width of the visible box [m]."""
 N_GRID_LINES = 20
-"""Lines of the ground grid, about, where a mission does not say."""
+"""Approximate number of lines of the default ground grid."""
 
 
 @dataclass(frozen=True, eq=False)
 class Base:
-    """A team's home.
+    """The base of a team.
 
     Attributes:
         team: The team's number.
         pos: Its centre [m], (3,).
         radius: Its radius [m].
-        opacity: How it is drawn, 0 to 1.
+        opacity: Its opacity, 0 to 1.
     """
 
     team: int
@@ -48,10 +48,10 @@ class Region:
 
     Attributes:
         name: Its id or name.
-        team: Team that it belongs to; None for nobody's.
-        shape: What it is.
+        team: Its team; None without one.
+        shape: Its shape.
         is_wall: Whether it stops rays.
-        mesh: Its surface; of a plane, a square as wide as what is shown.
+        mesh: Its surface; of a plane, a square as wide as the visible box.
         outline: Its edges, or circles of a sphere, (k, 2, 3): ends of each line [m].
     """
 
@@ -65,20 +65,20 @@ class Region:
 
 @dataclass(frozen=True, eq=False)
 class Scenery:
-    """All that stands still.
+    """The static parts of a picture.
 
     Attributes:
-        origin: Where the world's frame touches Earth; in the world it is (0, 0, 0).
-        origin_length: Length of the axes to be drawn there [m]; 0 for none.
+        origin: Geodetic position of (0, 0, 0).
+        origin_length: Length of the axes at the origin [m]; 0 for none.
         ground: z of the ground grid [m].
-        low: Lower corner of what is to be shown [m], (3,).
+        low: Lower corner of the visible box [m], (3,).
         high: Upper corner [m], (3,).
         grid_step: Distance between lines of the ground grid [m].
-        bases: Homes of the teams.
+        bases: Bases of the teams.
         boundaries: Regions and walls.
-        terrain: The ground where it is not flat; None for a flat one.
-        background: Red, green, blue, 0 to 255; None for the viewer's own.
-        notes: What the mission asks for and does not get, one line each.
+        terrain: The terrain; None for flat ground.
+        background: Red, green, blue, 0 to 255; None for the default.
+        notes: Viewer tags that were not followed, one line each.
     """
 
     origin: Origin
@@ -95,7 +95,7 @@ class Scenery:
 
     @property
     def size(self) -> float:
-        """Length of the diagonal of what is to be shown [m]."""
+        """Diagonal of the visible box [m]."""
         return float(np.linalg.norm(self.high - self.low))
 
 
@@ -105,13 +105,13 @@ def scenery_of(
     extent: tuple[np.ndarray, np.ndarray] | None = None,
     folder: Path | None = None,
 ) -> Scenery:
-    """What stands still in a mission.
+    """The scenery of a mission.
 
     Args:
-        mission: The mission; None where it is not known, which leaves the ground and the grid.
-        viewer: What the mission file says for the viewer, see `tussle.mission.Loaded`.
-        extent: Lower and upper corner of all positions of a game [m], each (3,); by default where the mission's entities begin.
-        folder: Folder of the mission file, where its terrain is looked for.
+        mission: The mission; None if it is unknown, which leaves ground and grid.
+        viewer: Viewer tags of the mission file, see `tussle.mission.Loaded`.
+        extent: Lower and upper corner of all positions of a game [m], each (3,); by default of the initial positions.
+        folder: Folder of the mission file, with its terrain.
     """
     viewer = viewer or {}
     corners = [np.asarray(c, float) for c in extent or ()]
@@ -130,7 +130,7 @@ def scenery_of(
         ground=scene.ground.height if scene is not None and scene.ground is not None else 0.0,
         low=low,
         high=high,
-        grid_step=float(spacing) if spacing > 0.0 else _round_step(low, high),
+        grid_step=float(spacing) if spacing > 0.0 else _grid_step(low, high),
         bases=[
             Base(b.team, np.array(b.position), b.radius, b.opacity) for b in (scene.bases if scene else ())
         ],
@@ -145,7 +145,7 @@ def scenery_of(
 
 
 def _start(block: Block) -> list[np.ndarray]:
-    """Corners of where nearly all entities of a block begin: three standard deviations hold 997 of 1,000."""
+    """Corners of a box around nearly all initial positions of a block: three standard deviations hold 99.7 %."""
     spread = np.array(block.half_width) if block.placement == "uniform" else 3.0 * np.sqrt(block.variance)
     if block.count == 1 and not block.scatter_first:
         spread = np.zeros(3)
@@ -165,7 +165,7 @@ def _shapes(mission: Mission) -> list[tuple[str, int | None, Volume, bool]]:
 
 
 def _corners(shape: Volume) -> list[np.ndarray]:
-    """Of a box around a shape; none of one without end."""
+    """Corners of a box around a shape; none for an infinite one."""
     if isinstance(shape, Sphere):
         return [np.array(shape.center) - shape.radius, np.array(shape.center) + shape.radius]
     if isinstance(shape, (Cuboid, Polyhedron)):
@@ -177,7 +177,7 @@ def _corners(shape: Volume) -> list[np.ndarray]:
 
 
 def _at_least(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Box around corners (k, 3), no narrower than can be looked at."""
+    """A box around corners (k, 3), at least `LEAST_EXTENT` wide."""
     if not len(corners):
         corners = np.zeros((1, 3))
     low, high = corners.min(axis=0), corners.max(axis=0)
@@ -185,19 +185,23 @@ def _at_least(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return low - 0.5 * missing, high + 0.5 * missing
 
 
-def _round_step(low: np.ndarray, high: np.ndarray) -> float:
-    """1, 2 or 5 times a power of ten, so that some twenty lines cross what is shown."""
-    wanted = float((high - low)[:2].max()) / N_GRID_LINES
-    power = 10.0 ** math.floor(math.log10(wanted))
-    return next(step * power for step in (1.0, 2.0, 5.0, 10.0) if step * power >= wanted * (1.0 - 1e-9))
+def round_up(value: float) -> float:
+    """The least of 1, 2 and 5 times a power of ten that is not less than a value > 0."""
+    power = 10.0 ** math.floor(math.log10(value) + 1e-9)
+    return next(f * power for f in (1.0, 2.0, 5.0, 10.0) if f * power >= value * (1.0 - 1e-9))
+
+
+def _grid_step(low: np.ndarray, high: np.ndarray) -> float:
+    """A round step with which about `N_GRID_LINES` lines are visible."""
+    return round_up(float((high - low)[:2].max()) / N_GRID_LINES)
 
 
 def _origin_length(viewer: Mapping[str, Any], low: np.ndarray, high: np.ndarray) -> float:
-    """Of the axes at the origin: as the mission says; where it says nothing, as long as can be seen."""
+    """Length of the axes at the origin [m]: that of the mission, else a visible one."""
     if viewer.get("show_origin") is False:
         return 0.0
     said = viewer.get("origin_length", 0.0)
-    return float(said) if said > 0.0 else _round_step(low, high)
+    return float(said) if said > 0.0 else _grid_step(low, high)
 
 
 def _terrain(viewer: Mapping[str, Any], folder: Path | None, notes: list[str]) -> Terrain | None:
@@ -221,8 +225,6 @@ def _background(viewer: Mapping[str, Any], notes: list[str]) -> tuple[int, int, 
     except ValueError:
         red = green = blue = -1
     if min(red, green, blue) < 0 or max(red, green, blue) > 255:
-        notes.append(
-            f"background_color {text!r} is not three numbers from 0 to 255; the viewer's own is taken"
-        )
+        notes.append(f"background_color {text!r} is not three numbers from 0 to 255; the default is used")
         return None
     return red, green, blue

@@ -1,4 +1,4 @@
-"""Models that entities are drawn as, made here from a few corners each."""
+"""Meshes, and the models of entities."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Mesh:
             object.__setattr__(self, name, array)
 
     def placed(self, scale: float | Sequence[float] = 1.0, at: Sequence[float] = (0.0, 0.0, 0.0)) -> Mesh:
-        """The same larger by a factor > 0, one or one per axis, and moved [m]."""
+        """The mesh scaled by a factor > 0, one or one per axis, and moved [m]."""
         return Mesh(self.vertices * np.asarray(scale, float) + np.asarray(at, float), self.faces)
 
 
@@ -43,11 +43,10 @@ def joined(parts: Iterable[Mesh]) -> Mesh:
 
 
 def lofted(rings: Sequence[np.ndarray]) -> Mesh:
-    """A skin over rings of corners, closed by flat ends.
+    """A surface over rings of corners, closed by flat ends.
 
     Args:
-        rings: Corners [m], each (k, 3), all with the same convex outline order: counter-clockwise for who looks along the way from
-            the first ring to the last from its end.
+        rings: Corners of convex rings [m], each (k, 3), counter-clockwise seen from the last ring toward the first.
     """
     k = len(rings[0])
     faces = []
@@ -113,14 +112,14 @@ def _wheel(x: float, y: float, z: float, radius: float, width: float, k: int = 8
 
 
 def _hexagon(x: float, width: float, height: float, z: float) -> np.ndarray:
-    """A section across the x axis, lying, wider than high."""
+    """A hexagon across the x axis."""
     w, h = 0.5 * width, 0.5 * height
     ring = [(w, 0.0), (0.5 * w, h), (-0.5 * w, h), (-w, 0.0), (-0.5 * w, -h), (0.5 * w, -h)]
     return np.array([(x, y, z + up) for y, up in ring])
 
 
 def _slab(outline: Sequence[tuple[float, float]], low: float, high: float) -> Mesh:
-    """A flat piece: an outline in x, y, counter-clockwise from above, between two heights."""
+    """An outline in x and y, counter-clockwise from above, extruded between two heights."""
     return lofted([np.array([(x, y, z) for x, y in outline]) for z in (low, high)])
 
 
@@ -196,7 +195,7 @@ def _boat() -> Mesh:
 
 
 class _Models(Mapping[str, Mesh]):
-    """Models by name, each made when it is first asked for."""
+    """Models by name, each made at its first use."""
 
     def __init__(self, makers: Mapping[str, Callable[[], Mesh]]) -> None:
         self._makers = {name: cache(make) for name, make in makers.items()}

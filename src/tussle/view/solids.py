@@ -1,4 +1,4 @@
-"""Surfaces and edges of the shapes that stand in a scene."""
+"""Surfaces and edges of shapes of a scene."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def mesh_of(shape: Volume, low: np.ndarray, high: np.ndarray) -> Mesh:
 
     Args:
         shape: The shape.
-        low: Lower corner of what is shown [m], (3,); what has no end is drawn as far as that.
+        low: Lower corner of the visible box [m], (3,), to which infinite shapes are cut.
         high: Upper corner [m], (3,).
     """
     if isinstance(shape, Sphere):
@@ -27,7 +27,7 @@ def mesh_of(shape: Volume, low: np.ndarray, high: np.ndarray) -> Mesh:
 
 
 def outline_of(shape: Volume, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Edges of a shape, or three circles of a sphere: ends of each line [m], (k, 2, 3), float32."""
+    """Edges of a shape, or three circles of a sphere: ends of lines [m], (k, 2, 3), float32."""
     if isinstance(shape, Sphere):
         angle = 2.0 * np.pi * np.arange(N_CIRCLE + 1) / N_CIRCLE
         wave = np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], 1) * shape.radius
@@ -35,7 +35,7 @@ def outline_of(shape: Volume, low: np.ndarray, high: np.ndarray) -> np.ndarray:
         return np.concatenate([_lines(c) for c in circles]).astype(np.float32)
     sides = [_lines(np.concatenate([r, r[:1]])) for r in _rings(shape, low, high)]
     lines = np.concatenate([np.zeros((0, 2, 3)), *sides])
-    # Each edge belongs to two faces and is drawn once: as it goes up in (x, y, z).
+    # Each edge belongs to two faces; both copies get the same direction, and one is kept.
     rounded = lines.astype(np.float32)
     backward = [tuple(a) > tuple(b) for a, b in rounded.tolist()]
     rounded[backward] = rounded[backward][:, ::-1]
@@ -72,7 +72,7 @@ def _rings(shape: Volume, low: np.ndarray, high: np.ndarray) -> list[np.ndarray]
 
 
 def _corners(normals: np.ndarray, offsets: np.ndarray) -> np.ndarray:
-    """Where three faces of a bounded intersection of half-spaces meet, (k, 3)."""
+    """Corners of a bounded intersection of half-spaces, (k, 3)."""
     found: list[np.ndarray] = []
     slack = 1e-9 * (1.0 + float(np.abs(offsets).max()))
     for three in combinations(range(len(offsets)), 3):
@@ -88,7 +88,7 @@ def _corners(normals: np.ndarray, offsets: np.ndarray) -> np.ndarray:
 
 
 def _axes_in(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Two axes in a plane that with its normal are a right-handed frame."""
+    """Two axes in a plane that are right-handed with its normal."""
     helper = np.eye(3)[np.argmin(np.abs(normal))]
     first = np.cross(helper, normal)
     first /= np.linalg.norm(first)
@@ -96,7 +96,7 @@ def _axes_in(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _square(plane: Plane, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """The part of a plane nearest to the middle of what is shown, and as wide."""
+    """A square of a plane near the middle of the visible box, and as wide."""
     normal = np.array(plane.normal) / np.linalg.norm(plane.normal)
     middle = 0.5 * (np.asarray(low) + high)
     center = middle - ((middle - plane.point) @ normal) * normal
@@ -108,7 +108,7 @@ def _square(plane: Plane, low: np.ndarray, high: np.ndarray) -> np.ndarray:
 
 
 def _polygons(rings: list[np.ndarray]) -> Mesh:
-    """Convex polygons as triangles, each with corners of its own, so that edges are sharp."""
+    """Convex polygons as triangles that share no corners, so that edges are sharp."""
     vertices, faces, n = [np.zeros((0, 3))], [np.zeros((0, 3), int)], 0
     for ring in rings:
         i = np.arange(1, len(ring) - 1)

@@ -1,4 +1,4 @@
-"""How entities are drawn: colours of teams and blocks, and which model a block gets."""
+"""Colours of teams and blocks, and models of blocks."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _WORDS: Mapping[str, tuple[str, ...]] = {
     ),
     "sphere": ("sphere", "ball", "point", "marble", "oscillator"),
 }  # fmt: skip
-"""Words in the names that mission files give to models."""
+"""Words in names of visual models."""
 
 _MOTION_WORDS: Mapping[str, tuple[str, ...]] = {
     "aircraft": ("unicycle", "aircraft", "wing", "jsbsim"),
@@ -39,18 +39,18 @@ _MOTION_WORDS: Mapping[str, tuple[str, ...]] = {
 class Style:
     """Colours and models of a mission's entities.
 
-    A block is coloured as its `<color>` says, else as its team. A team has the colour of its first block that has one, else one of
-    a palette by its number. The model is what `visual_model` comes nearest to, else what suits the motion model; `visual_rpy`,
-    which turns the existing system's meshes, turns none of these, whose noses point forward as they are.
+    A block has its `<color>`, else that of its team. A team has the colour of its first block with one, else a colour of the palette
+    by its number. The model is the one nearest to `visual_model`, else one that suits the motion model. `visual_rpy` is ignored: it
+    turns the meshes of the existing system, and these point forward.
 
     Args:
         blocks: Names of the blocks.
         teams: Team of each block.
-        plugins: Names of the classes of each block's plugins, by which one without a model of its own is given one.
-        viewer: What the mission file says for the viewer, see `tussle.mission.Loaded`.
+        plugins: Names of the classes of each block's plugins, which choose the model of a block without `visual_model`.
+        viewer: Viewer tags of the mission file, see `tussle.mission.Loaded`.
 
     Attributes:
-        notes: What the mission asks for and does not get, one line each.
+        notes: Viewer tags that were not followed, one line each.
     """
 
     def __init__(
@@ -90,10 +90,8 @@ class Style:
         return self._models[block]
 
     def scale(self, block: int) -> float:
-        """How much larger than the model a block's entities are drawn."""
+        """Factor by which the model of a block is enlarged."""
         return self._scales[block]
-
-    # -- what the mission file says -------------------------------------------------------------------------------------------
 
     def _read_colour(self, block: str, text: str | None) -> Colour | None:
         if text is None:
@@ -102,7 +100,7 @@ class Style:
         values = [round(float(n)) for n in numbers]
         if len(values) != 3 or not all(0 <= v <= 255 for v in values):
             self.notes.append(
-                f"block {block!r}: color {text!r} is not three numbers from 0 to 255; the team's is taken"
+                f"block {block!r}: color {text!r} is not three numbers from 0 to 255; the team's colour is used"
             )
             return None
         return values[0], values[1], values[2]
@@ -114,7 +112,7 @@ class Style:
             scale = -1.0
         if 0.0 < scale < float("inf"):
             return scale
-        self.notes.append(f"block {block!r}: visual_scale {text!r} is not a number > 0; 1 is taken")
+        self.notes.append(f"block {block!r}: visual_scale {text!r} is not a number > 0; 1 is used")
         return 1.0
 
     def _read_model(self, block: str, asked: str | None, plugins: Sequence[str]) -> str:
@@ -124,13 +122,13 @@ class Style:
         found = _model_by_words(asked, _WORDS) or _model_by_likeness(asked)
         if not found:
             self.notes.append(
-                f"block {block!r}: there is nothing like visual_model {asked!r} here; it is drawn as {suitable}"
+                f"block {block!r}: visual_model {asked!r} is unknown; it is drawn as {suitable}"
             )
         return found or suitable
 
 
 def _model_by_words(name: str, words: Mapping[str, tuple[str, ...]]) -> str:
-    """The model one of whose words stands in a name; "" where none does. Short words count only when they stand alone."""
+    """The model with a word that a name contains, or ""; short words count only as whole words."""
     parts = set(re.findall(r"[A-Z]?[a-z]+\d*|[A-Z]+(?![a-z])\d*", name)) | {name}
     parts = {p.lower() for p in parts}
     whole = re.sub(r"[^a-z0-9]", "", name.lower())
@@ -141,7 +139,7 @@ def _model_by_words(name: str, words: Mapping[str, tuple[str, ...]]) -> str:
 
 
 def _model_by_likeness(name: str) -> str:
-    """The model with a word that is written nearly like a name; "" without one."""
+    """The model with a word that is spelled similarly to a name, or ""."""
     by_word = {word: model for model, words in _WORDS.items() for word in words}
     close = difflib.get_close_matches(name.lower(), by_word, n=1, cutoff=0.7)
     return by_word[close[0]] if close else ""

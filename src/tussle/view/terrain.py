@@ -1,4 +1,4 @@
-"""Ground of changing height, read from a file beside the mission."""
+"""Terrain, read from a file beside the mission."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from tussle.view.shapes import Mesh
 SUFFIX = ".asc"
 MOST_BYTES = 64_000_000
 MOST_CELLS = 4_000_000
-"""Heights that a file may hold: 64 MB of text at most, read in some seconds."""
+"""Largest number of heights in a file."""
 MOST_DRAWN = 40_000
-"""Heights that are drawn: 80,000 triangles, which a browser draws without effort."""
+"""Largest number of heights that are drawn: 80,000 triangles."""
 KEYS = ("ncols", "nrows", "xllcorner", "yllcorner", "xllcenter", "yllcenter", "cellsize", "nodata_value")
 NEEDED = ("ncols", "nrows", "cellsize")
 
 
 @dataclass(frozen=True, eq=False)
 class Terrain:
-    """Ground of changing height.
+    """Heights of the ground on a grid.
 
     Attributes:
         x: East of the columns [m], (nx,), ascending.
@@ -35,14 +35,14 @@ class Terrain:
     height: np.ndarray
 
     def thinned(self, most: int = MOST_DRAWN) -> Terrain:
-        """Every so-manieth column and row, so that there are at most so many heights."""
+        """Every k-th column and row, with the least k that leaves at most this number of heights."""
         stride = 1
         while len(self.x[::stride]) * len(self.y[::stride]) > most:
             stride += 1
         return Terrain(self.x[::stride], self.y[::stride], self.height[::stride, ::stride])
 
     def mesh(self, most: int = MOST_DRAWN) -> Mesh:
-        """Two triangles between each four neighbours, seen from above, of at most so many heights."""
+        """Two triangles between each four neighbours, of at most this number of heights."""
         thin = self.thinned(most)
         nx, ny = len(thin.x), len(thin.y)
         east, north = np.meshgrid(thin.x, thin.y)
@@ -90,7 +90,7 @@ def read_terrain(path: Path) -> Terrain:
 
 
 def _read_head(path: Path, lines: list[str]) -> tuple[dict[str, float], int]:
-    """Values by key, and the number of lines that they take."""
+    """Values by key, and the number of their lines."""
     head: dict[str, float] = {}
     number = 0
     for line in lines[: len(KEYS)]:
@@ -114,10 +114,10 @@ def _read_head(path: Path, lines: list[str]) -> tuple[dict[str, float], int]:
 
 
 def find_terrain(name: str, folder: Path | None) -> Terrain:
-    """The terrain that a mission names, from a file in the mission's folder or below it.
+    """Read the terrain that a mission names, from a file in the mission's folder or below it.
 
     Raises:
-        ViewError: There is none, or it cannot be read.
+        ViewError: The file does not exist or cannot be read.
     """
     if not name.endswith(SUFFIX):
         raise ViewError(

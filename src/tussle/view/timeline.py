@@ -1,4 +1,4 @@
-"""Where a game can be taken up again, and what was seen of it: snapshots and a light history of frames."""
+"""Snapshots of a game, and a compact history of its frames."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from tussle.view.frame import Frame, Lens
 from tussle.view.pacing import Allowance
 
 SNAPSHOT_SHARE = 0.01
-"""Share of the CPU time that goes into snapshots. To replay from one to the next then takes some 100 times as long as to take one."""
+"""Share of the CPU time for snapshots."""
 HISTORY_SHARE = 0.01
-"""Share of the CPU time that goes into the history of frames."""
+"""Share of the CPU time for the history of frames."""
 
 
 class Timeline:
     """Snapshots of a simulation while it plays, so that any earlier step can be reached by replaying from the one before it.
 
-    One is taken when `every` seconds have been simulated and the time for it has been saved up. When they take too much memory, the
-    one goes that is missed least: gaps grow in proportion to how far away they are. The first and the last stay.
+    A snapshot is taken when `every` seconds have been simulated and its CPU time is within the share. Beyond the memory limit
+    snapshots are dropped so that gaps grow in proportion to the distance from the present; the first and the last stay.
 
     Args:
         simulation: The simulation.
@@ -40,7 +40,7 @@ class Timeline:
         limit: Memory that they may take [B].
 
     Attributes:
-        refusal: Why no snapshot can be taken; "" while they can.
+        refusal: Why no snapshot can be taken; "" if they can.
         size: Memory that they take [B].
     """
 
@@ -53,15 +53,15 @@ class Timeline:
         self.size = 0
         self.refusal = ""
         if simulation.grade == "external":
-            self.refusal = "what its plugins deal with outside the simulation cannot be wound back (their grade is external)"
+            self.refusal = "its plugins have state outside the simulation (their grade is external)"
 
     @property
     def steps(self) -> list[int]:
-        """Steps of which there is a snapshot, ascending."""
+        """Steps with a snapshot, ascending."""
         return list(self._steps)
 
     def offer(self, step: int) -> None:
-        """Take a snapshot of the present, at this step, if one is due and can be afforded."""
+        """Take a snapshot of the present, at this step, if one is due and within the share."""
         place = bisect_right(self._steps, step)
         gap = (step - self._steps[place - 1]) * self._simulation.mission.dt if place else math.inf
         if gap < self._every * (1.0 - 1e-9):
@@ -99,7 +99,7 @@ class Timeline:
         del self._steps[number], self._saved[number]
 
     def rest(self, seconds: float) -> None:
-        """The game has waited on purpose."""
+        """Grant time: the game has waited this long [s]."""
         self._allowance.rest(seconds)
 
     def nearest(self, step: int) -> tuple[int, Snapshot] | None:
@@ -108,7 +108,7 @@ class Timeline:
         return (self._steps[place - 1], self._saved[place - 1][0]) if place else None
 
     def forget_after(self, step: int) -> None:
-        """Drop what belongs to a future that will not be."""
+        """Drop everything after a step."""
         while self._steps and self._steps[-1] > step:
             self._drop(-1)
 
@@ -118,9 +118,9 @@ class Timeline:
 
 
 class History:
-    """Frames of a game as it went by, in half the precision, to be looked through at once.
+    """Past frames of a game in single precision.
 
-    When they take too much memory, every other one goes, and half as many are kept from then on.
+    Beyond the memory limit every other frame is dropped, and half as many are kept from then on.
 
     Args:
         simulation: The simulation.
@@ -135,18 +135,18 @@ class History:
         self._allowance = Allowance(HISTORY_SHARE)
         self._stride = 1
         self.size = 0
-        # Appended to and replaced, never changed: who looks things up in another thread needs no lock.
+        # Appended to and replaced, never changed, so that readers in other threads need no lock.
         self._entries: list[tuple[int, tuple[np.ndarray, ...], np.ndarray]] = []
 
     def offer(self, step: int) -> None:
-        """Keep what is there now, at this step, if it is new and can be afforded."""
+        """Keep the present frame, at this step, if it is new and within the share."""
         if (self._entries and step < self._entries[-1][0] + self._stride) or not self._allowance.allows():
             return
         began = time.thread_time()
         floats, who = self._lens.look()
         order = slice(None) if self._lens.order is None else self._lens.order
         state = np.empty((_N_KEPT, len(who[0])), np.float32)
-        with np.errstate(over="ignore"):  # what is beyond 3e38 m is not to be seen
+        with np.errstate(over="ignore"):  # values beyond 3e38 become inf
             state[:_N_STATE] = floats[:_N_STATE, order]
             state[_N_STATE] = floats[OFFSETS["health"], order]
         self._entries.append((step, who, state))
@@ -161,7 +161,7 @@ class History:
         self.size = sum(state.nbytes + 200 for _, _, state in entries)
 
     def rest(self, seconds: float) -> None:
-        """The game has waited on purpose."""
+        """Grant time: the game has waited this long [s]."""
         self._allowance.rest(seconds)
 
     def at(self, step: int) -> Frame | None:
@@ -180,11 +180,11 @@ class History:
 
     @property
     def steps(self) -> list[int]:
-        """Steps of which there is a frame, ascending."""
+        """Steps with a frame, ascending."""
         return [entry[0] for entry in self._entries]
 
     def forget_after(self, step: int) -> None:
-        """Drop what belongs to a future that will not be."""
+        """Drop everything after a step."""
         self._keep_only([entry for entry in self._entries if entry[0] <= step])
 
     def clear(self) -> None:
@@ -199,7 +199,7 @@ assert (OFFSETS["vel"], OFFSETS["quat"]) == (3, 6), "pos, vel and quat are copie
 
 
 def memory_of(item: Any) -> int:
-    """Memory of all arrays and bytes in a nest of containers [B]; what several snapshots have in common counts in each."""
+    """Memory of all arrays and bytes in nested containers [B]; shared arrays count in each snapshot."""
     if isinstance(item, np.ndarray):
         return int(item.nbytes)
     if isinstance(item, bytes):

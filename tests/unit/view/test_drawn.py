@@ -5,7 +5,7 @@ from watched_plugins import clickable
 
 from tussle import Simulation
 from tussle.view import Live
-from tussle.view.drawn import Sketchbook
+from tussle.view.drawn import DrawCollector
 
 
 def test_shapes_of_the_last_step_and_those_that_last():
@@ -39,7 +39,7 @@ def test_a_jump_in_time_clears_the_page_and_a_replay_fills_it_again():
 
 def test_shapes_are_copies():
     sim = Simulation(clickable())
-    book = Sketchbook(sim, 0)
+    book = DrawCollector(sim, 0)
     book.open()
     book.open()
     sim.step()
@@ -54,7 +54,7 @@ def test_shapes_are_copies():
 
 def test_only_what_is_of_the_world_is_seen():
     sim = Simulation(clickable(), seeds=[1, 2])
-    books = [Sketchbook(sim, world) for world in range(2)]
+    books = [DrawCollector(sim, world) for world in range(2)]
     for book in books:
         book.open()
     sim.step()
@@ -67,7 +67,7 @@ def test_only_what_is_of_the_world_is_seen():
         assert text.kind == "text"  # said of no world: seen in all
     draw = sim.state.context.draw
     for book in books:
-        book.turn_page()
+        book.begin_step()
         book.clear()
     draw.sphere(pos=np.zeros(3), radius=2.0, world=1)
     draw.points(pos=np.zeros((3, 2)), world=np.array([0, 0]))
@@ -76,9 +76,9 @@ def test_only_what_is_of_the_world_is_seen():
 
 def test_a_lifetime_that_is_none_stops_no_game():
     sim = Simulation(clickable())
-    book = Sketchbook(sim, 0)
+    book = DrawCollector(sim, 0)
     book.open()
     sim.state.context.draw.text(pos=np.zeros(3), text="?", lifetime="long")
     assert len(book.shapes()) == 1
-    book.turn_page()
+    book.begin_step()
     assert book.shapes() == ()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import math
 import subprocess
 
@@ -16,17 +17,16 @@ from tussle.geodesy import Origin
 from tussle.scene import Cuboid
 from tussle.stock import Boids, Still, Straight, Unicycle, UnicyclePID
 from tussle.view import Recording
-from tussle.view.export.film import FilmOptions, encoders, write_film
-from tussle.view.export.film.cameras import Follow, Overview, Top
-from tussle.view.export.film.caption import Caption
-from tussle.view.export.film.film import usual_speed
+from tussle.view.export.film import FilmOptions, write_film
+from tussle.view.export.film import film as film_module
+from tussle.view.export.film.cameras import View, camera_of
+from tussle.view.export.film.captions import Captions
+from tussle.view.export.film.film import default_speed
 from tussle.view.export.film.ground import Tints
-from tussle.view.export.film.moments import Moments, between
-from tussle.view.export.film.stage import Stage
-from tussle.view.export.film.survey import crowd_of
-from tussle.view.export.film.tracks import Tracks
-from tussle.view.export.film.view import View
-from tussle.view.export.film.window import find_window
+from tussle.view.export.film.moments import Moments, interpolated
+from tussle.view.export.film.prescan import crowd_of
+from tussle.view.export.film.renderer import Renderer, find_window
+from tussle.view.export.film.trails import Trails
 from tussle.view.frame import Frame
 from tussle.view.scenery import Base, Region, Scenery
 from tussle.view.solids import mesh_of, outline_of
@@ -75,6 +75,35 @@ def pictures(path, size=SMALL):
     return np.frombuffer(data, np.uint8).reshape(-1, size[1], size[0], 3)
 
 
+def camera(name, moments, size=SMALL, **options):
+    return camera_of(moments, FilmOptions(camera=name, size=size, **options))
+
+
+def projected(view, points, size):
+    """Pixels of points, (n, 2), from the left and the top, and their distances in front of the camera, (n,)."""
+    right, up, back = view.axes() @ (np.asarray(points, float) - view.eye).T
+    scale = (
+        0.5
+        * size[1]
+        / view.half_height
+        * (1.0 if view.is_parallel else view.distance / np.maximum(-back, 1e-9))
+    )
+    return np.stack([0.5 * size[0] + scale * right, 0.5 * size[1] - scale * up], axis=1), -back
+
+
+def drawn(recording, scenery, size, frame, view):
+    """The picture of a frame, (height, width, 3)."""
+    with Renderer(recording.style, scenery, size) as renderer:
+        renderer.show(frame, view)
+        return renderer.picture().astype(int)
+
+
+def rows_of(frame, rows, t=None):
+    """Some rows of a frame."""
+    names = ("id", "team", "block", "pos", "quat", "vel", "health")
+    return Frame(frame.t if t is None else t, frame.step, *(getattr(frame, name)[rows] for name in names))
+
+
 def about(path):
     """What ffmpeg says of a file."""
     return subprocess.run(
@@ -102,26 +131,22 @@ def has_colour(picture, rgb, at, reach=3):
 # -- what is seen -------------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("camera", [Overview, Top, Follow])
-def test_entities_are_drawn_in_their_colours_where_the_projection_says(flown, camera):
+@pytest.mark.parametrize("name", ["overview", "top", "follow"])
+def test_entities_are_drawn_in_their_colours_where_the_projection_says(flown, name):
     size = (320, 240)
     moments = Moments(flown, 0.0, 4.0, 1.0, 10.0)
-    eye = camera(moments, size)
-    stage = Stage(flown.style, flown.scenery, size)
-    try:
-        for t in (0.0, 1.55, 4.0):
-            frame, view = moments.at(t), eye.view(t)
-            picture = stage.draw(frame, view)[..., :3]
-            pixels, depth = view.project(frame.pos, size)
-            assert (depth > 0.0).all()
-            for row, at in enumerate(pixels):
-                if (at > 0.0).all() and (at < size).all():
-                    assert has_colour(picture, flown.style.colour(int(frame.team[row])), at)
-            assert not has_colour(picture, flown.style.colour(1), (3, 3))
-            if camera is not Follow:
-                assert ((pixels > 0.0) & (pixels < size)).all()
-    finally:
-        stage.close()
+    eye = camera(name, moments, size)
+    for t in (0.0, 1.55, 4.0):
+        frame, view = moments.at(t), eye.view(t)
+        picture = drawn(flown, flown.scenery, size, frame, view)
+        pixels, depth = projected(view, frame.pos, size)
+        assert (depth > 0.0).all()
+        for row, at in enumerate(pixels):
+            if (at > 0.0).all() and (at < size).all():
+                assert has_colour(picture, flown.style.colour(int(frame.team[row])), at)
+        assert not has_colour(picture, flown.style.colour(1), (3, 3))
+        if name != "follow":
+            assert ((pixels > 0.0) & (pixels < size)).all()
 
 
 def test_a_nose_points_along_the_way(flown):
@@ -129,19 +154,9 @@ def test_a_nose_points_along_the_way(flown):
     size, moments = (240, 240), Moments(flown, 0.0, 4.0, 1.0, 10.0)
     frame = moments.at(2.0)
     row = frame.row_of(1)
-    one = Frame(
-        2.0,
-        20,
-        *(
-            a[row : row + 1]
-            for a in (frame.id, frame.team, frame.block, frame.pos, frame.quat, frame.vel, frame.health)
-        ),
-    )
     half = 8.0
     view = View(frame.pos[row] + (0, 0, 50.0), frame.pos[row], np.array([0.0, 1.0, 0.0]), half, True, 14.0)
-    stage = Stage(flown.style, flown.scenery, size)
-    picture = stage.draw(one, view)[..., :3].astype(int)
-    stage.close()
+    picture = drawn(flown, flown.scenery, size, rows_of(frame, [row]), view)
     blue = picture[..., 2] - picture[..., 0] > 60
     columns = np.flatnonzero(blue.any(axis=0))
     widest = int(np.argmax(blue.sum(axis=0)))
@@ -157,32 +172,32 @@ def test_a_nose_points_along_the_way(flown):
 def test_who_is_gone_is_not_drawn_and_a_ring_says_where(hunted):
     death = next(h for h in hunted.events if h.kind == "death")
     moments = Moments(hunted, 0.0, 12.0, 1.0, 10.0)
-    view = Overview(moments, SMALL).view(death.t)
-    tracks = Tracks(moments, 0.0)
+    view = camera("overview", moments).view(death.t)
+    trails = Trails(moments, 0.0)
     before, after = moments.at(death.t), moments.at(death.t + 0.1)
     assert before.row_of(death.id) >= 0
     assert after.row_of(death.id) < 0
-    ends, colours = tracks.lines(after, view)
+    ends, colours = trails.lines(after, view)
     assert (
         np.linalg.norm(ends.mean(axis=0) - before.pos[before.row_of(death.id)])
         < 1e-6 * view.model_length + 1e-9
     )
     assert (colours[:, 3] > 150.0).all()
-    faded, _ = tracks.lines(moments.at(min(death.t + 0.9, 12.0)), view)
+    faded, _ = trails.lines(moments.at(min(death.t + 0.9, 12.0)), view)
     others = [h for h in hunted.events if h.kind == "death" and death.t + 0.1 < h.t <= death.t + 0.9]
     assert len(faded) == len(ends) * len(others)
 
 
 def test_trails_go_through_where_entities_were_and_fade(flown):
     moments = Moments(flown, 0.0, 4.0, 1.0, 10.0)
-    ends, colours = Tracks(moments, 1.0).lines(moments.at(3.05), Overview(moments, SMALL).view(3.05))
+    ends, colours = Trails(moments, 1.0).lines(moments.at(3.05), camera("overview", moments).view(3.05))
     left = ends[:, 1] > 0.0
     np.testing.assert_allclose(ends[left][:, 1:], [[20.0, 30.0]] * left.sum(), atol=1e-6)
     assert ends[left][:, 0].max() == pytest.approx(30.5)
     assert ends[left][:, 0].min() == pytest.approx(20.5, abs=0.5)
     newest, oldest = np.argmax(ends[:, 0]), np.argmin(ends[:, 0])
     assert colours[newest, 3] > 150.0 > 20.0 > colours[oldest, 3]
-    none, _ = Tracks(moments, 0.0).lines(moments.at(3.05), Overview(moments, SMALL).view(3.05))
+    none, _ = Trails(moments, 0.0).lines(moments.at(3.05), camera("overview", moments).view(3.05))
     assert len(none) == 0
 
 
@@ -197,39 +212,21 @@ def test_scenery_is_drawn(flown):
         "terrain": Terrain(np.linspace(-30, 30, 9), np.linspace(-30, 30, 9), 10.0 * np.eye(9)),
     }
     view = View(np.array([0.0, -150.0, 80.0]), np.zeros(3), np.array([0.0, 0.0, 1.0]), 40.0)
-    nobody = flown.frame(0)
-    nobody = Frame(
-        0.0,
-        0,
-        *(
-            a[:0]
-            for a in (
-                nobody.id,
-                nobody.team,
-                nobody.block,
-                nobody.pos,
-                nobody.quat,
-                nobody.vel,
-                nobody.health,
-            )
-        ),
-    )
+    nobody = rows_of(flown.frame(0), slice(0))
 
-    def drawn(**things):
-        stage = Stage(flown.style, Scenery(Origin(), 0.0, 0.0, low, high, 10.0, **things), (160, 120))
-        picture = stage.draw(nobody, view)[..., :3].astype(int)
-        stage.close()
-        return picture
+    def with_things(**things):
+        scenery = Scenery(Origin(), 0.0, 0.0, low, high, 10.0, **things)
+        return drawn(flown, scenery, (160, 120), nobody, view)
 
-    empty = drawn()
+    empty = with_things()
     for name, thing in things.items():
-        changed = (np.abs(drawn(**{name: thing}) - empty).max(axis=2) > 12).sum()
+        changed = (np.abs(with_things(**{name: thing}) - empty).max(axis=2) > 12).sum()
         assert changed > 100, name
-    pixels, _ = view.project(np.array([[10.0, 10.0, 0.0]]), (160, 120))
+    pixels, _ = projected(view, np.array([[10.0, 10.0, 0.0]]), (160, 120))
     x, y = pixels[0].astype(int)
-    base = drawn(bases=things["bases"])[y, x] - empty[y, x]
+    base = with_things(bases=things["bases"])[y, x] - empty[y, x]
     assert base[2] - base[0] > 20, "team 1 is blue"
-    night = drawn(background=(20, 20, 40))
+    night = with_things(background=(20, 20, 40))
     assert night.mean() < 60 < 180 < empty.mean()
 
 
@@ -249,32 +246,31 @@ def test_words_are_written_and_can_be_left_out(flown, tmp_path):
     assert (np.abs(with_words - without)[120:200, 150:300].max(axis=2) > 40).sum() == 0
     moments = Moments(flown, 0.0, 4.0, 1.0, 25.0)
     changed = np.abs(ids - without).max(axis=2) > 40
-    view = Overview(moments, size).view(1.0)
-    for x, y in view.project(moments.at(1.0).pos, size)[0].round().astype(int):
+    view = camera("overview", moments, size).view(1.0)
+    for x, y in projected(view, moments.at(1.0).pos, size)[0].round().astype(int):
         assert changed[y - 20 : y, x - 8 : x + 8].any()
     assert not changed[:, :60].any()
 
 
 def test_the_caption_counts_who_is_left(hunted):
-    """The same words are drawn for the same numbers, and others for others."""
+    """The same text is drawn for the same numbers, and other text for others."""
     size = (640, 360)
-    caption = Caption(hunted, size, 1.0)
     moments = Moments(hunted, 0.0, 12.0, 1.0, 25.0)
-    view = Overview(moments, size).view(0.0)
-
-    def written(frame):
-        picture = np.full((size[1], size[0], 4), 200, np.uint8)
-        caption.draw(picture, frame, view)
-        return picture
-
+    view = camera("overview", moments, size).view(0.0)
     first, last = hunted.frame(0), hunted.frame(-1)
-    same_time = Frame(
-        first.t, 0, *(getattr(last, n) for n in ("id", "team", "block", "pos", "quat", "vel", "health"))
-    )
-    assert (written(first) == written(first)).all()
-    changed = np.flatnonzero((written(first) != written(same_time)).any(axis=(0, 2)))
-    assert len(changed)
-    assert changed.min() > 40, "the names stay, the numbers beside them do not"
+    with Renderer(hunted.style, hunted.scenery, size) as renderer:
+        captions = Captions(renderer, hunted, FilmOptions(size=size))
+
+        def written(frame):
+            renderer.show(rows_of(first, slice(0)), view)
+            captions.show(frame, view)
+            return renderer.picture()
+
+        assert (written(first) == written(first)).all()
+        changed = written(first) != written(rows_of(last, slice(None), t=first.t))
+    assert changed[30:110, :200].any()
+    assert not changed[:30].any(), "the time stays"
+    assert not changed[:, 200:].any()
 
 
 # -- the eye ------------------------------------------------------------------------------------------------------------------------
@@ -282,19 +278,19 @@ def test_the_caption_counts_who_is_left(hunted):
 
 def test_the_eye_sees_everybody_all_the_time(hunted):
     moments = Moments(hunted, 0.0, 12.0, 1.0, 25.0)
-    for camera in (Overview(moments, SMALL), Top(moments, SMALL)):
+    for eye in (camera("overview", moments), camera("top", moments)):
         for k in range(0, len(moments), 7):
             t = float(moments.t[k])
-            pixels, depth = camera.view(t).project(moments.at(t).pos, SMALL)
+            pixels, depth = projected(eye.view(t), moments.at(t).pos, SMALL)
             assert (depth > 0.0).all()
             assert ((pixels >= 0.0) & (pixels <= SMALL)).all()
 
 
 def test_zoom_comes_nearer_and_scale_makes_models_larger(flown):
     moments = Moments(flown, 0.0, 4.0, 1.0, 25.0)
-    for camera in (Overview, Top, Follow):
-        usual = camera(moments, SMALL).view(2.0)
-        near, large = camera(moments, SMALL, zoom=2.0).view(2.0), camera(moments, SMALL, scale=3.0).view(2.0)
+    for name in ("overview", "top", "follow"):
+        usual = camera(name, moments).view(2.0)
+        near, large = camera(name, moments, zoom=2.0).view(2.0), camera(name, moments, scale=3.0).view(2.0)
         assert near.half_height == pytest.approx(0.5 * usual.half_height)
         assert large.model_length == pytest.approx(3.0 * usual.model_length)
 
@@ -302,13 +298,13 @@ def test_zoom_comes_nearer_and_scale_makes_models_larger(flown):
 def test_the_eye_flies_behind_whom_it_follows_and_stays_where_that_is_lost(hunted):
     moments = Moments(hunted, 0.0, 12.0, 1.0, 25.0)
     death = next(h for h in hunted.events if h.kind == "death")
-    camera = Follow(moments, SMALL, who=death.id)
+    eye = camera("follow", moments, follow=death.id)
     for t in np.linspace(0.0, death.t, 5):
-        frame, view = moments.at(float(t)), camera.view(float(t))
-        at, depth = view.project(frame.pos[frame.row_of(death.id)][None], SMALL)
+        frame, view = moments.at(float(t)), eye.view(float(t))
+        at, depth = projected(view, frame.pos[frame.row_of(death.id)][None], SMALL)
         assert 0.4 * SMALL[0] < at[0, 0] < 0.6 * SMALL[0]
         assert depth[0] > 0.0
-    np.testing.assert_allclose(camera.view(12.0).target, camera.view(death.t + 0.1).target, atol=0.5)
+    np.testing.assert_allclose(eye.view(12.0).target, eye.view(death.t + 0.1).target, atol=0.5)
 
 
 def test_following_somebody_who_is_not_there_is_refused(flown, tmp_path):
@@ -352,17 +348,17 @@ def test_a_jump_is_not_flown_and_who_is_gone_flies_on():
             t, 0, np.array(ids, np.int32), one, 0 * one, pos, np.tile([1.0, 0, 0, 0], (n, 1)), vel, 1.0 * one
         )
 
-    middle = between(
+    middle = interpolated(
         frame(0.0, [1, 2, 3], [0, 0, 0], [10, 10, 10]), frame(1.0, [1, 3], [10, 900], [10, 10]), 0.5, 400.0
     )
     assert middle.t == 0.5
     np.testing.assert_allclose(middle.pos[:, 0], [5.0, 5.0, 0.0])
-    swinging = between(frame(0.0, [1], [0], [900]), frame(1.0, [1], [10], [-900]), 0.5, 400.0)
+    swinging = interpolated(frame(0.0, [1], [0], [900]), frame(1.0, [1], [10], [-900]), 0.5, 400.0)
     np.testing.assert_allclose(swinging.pos[0, 0], 5.0)
 
 
 def test_speed_is_such_that_a_film_lasts_half_a_minute():
-    assert [usual_speed(s) for s in (0.0, 12.0, 30.0, 31.0, 150.0, 500.0, 3000.0, 9001.0)] == [
+    assert [default_speed(s) for s in (0.0, 12.0, 30.0, 31.0, 150.0, 500.0, 3000.0, 9001.0)] == [
         1,
         1,
         1,
@@ -394,8 +390,6 @@ def test_an_mp4_has_all_its_pictures_and_lasts_as_long(flown, tmp_path):
     assert "64x48" in said
     assert "10 fps" in said
     assert [p.name for p in tmp_path.iterdir()] == ["a.mp4"]
-    assert set(report.seconds) == {"plan", "read", "draw", "write", "encode"}
-    assert report.pictures_per_second > 0.0
 
 
 def test_the_film_goes_on_while_the_game_does(hunted, tmp_path):
@@ -414,13 +408,13 @@ def test_a_gif_is_small_and_has_half_the_pictures(flown, tmp_path):
     report = write_film(
         flown, gif=tmp_path / "a.gif", options=FilmOptions(stop=0.8, speed=1.0, size=(960, 540))
     )
-    assert report.n_pictures == 21
+    assert report.n_pictures == 11
     seen = pictures(tmp_path / "a.gif", (640, 360))
-    assert len(seen) in (10, 11)
+    assert len(seen) == 11
     assert "Duration: 00:00:00.8" in about(tmp_path / "a.gif")
-    assert len(np.unique(seen[0].reshape(-1, 3), axis=0)) <= encoders.GIF_COLOURS
-    view = Overview(Moments(flown, 0.0, 0.8, 1.0, 25.0), (960, 540)).view(0.0)
-    for row, at in enumerate(view.project(flown.frame(0).pos, (640, 360))[0]):
+    assert len(np.unique(seen[0].reshape(-1, 3), axis=0)) <= film_module.GIF_COLOURS
+    view = camera("overview", Moments(flown, 0.0, 0.8, 1.0, 12.5), (640, 360)).view(0.0)
+    for row, at in enumerate(projected(view, flown.frame(0).pos, (640, 360))[0]):
         assert has_colour(seen[0], flown.style.colour(row + 1), at, reach=5)
     assert [p.name for p in tmp_path.iterdir()] == ["a.gif"]
 
@@ -430,7 +424,8 @@ def test_a_film_and_a_gif_and_a_picture_at_once(flown, tmp_path):
         flown, mp4=tmp_path / "a.mp4", gif=tmp_path / "a.gif", png=tmp_path / "a.png",
         options=FilmOptions(stop=1.0, fps=5.0, speed=1.0, **BARE),
     )  # fmt: skip
-    assert report.n_pictures == len(pictures(tmp_path / "a.mp4")) == len(pictures(tmp_path / "a.gif")) == 6
+    assert len(pictures(tmp_path / "a.mp4")) == len(pictures(tmp_path / "a.gif")) == 6
+    assert report.n_pictures == 6
     assert len(pictures(tmp_path / "a.png")) == 1
 
 
@@ -485,11 +480,18 @@ def test_a_file_that_cannot_be_written_is_told_and_leaves_nothing(flown, tmp_pat
     assert not list((tmp_path / "folder").iterdir())
 
 
-def test_an_encoder_that_fails_on_its_way_is_told_at_once_and_leaves_nothing(flown, tmp_path, monkeypatch):
-    monkeypatch.setattr(encoders, "H264", ("-c:v", "no-such-codec"))
-    with pytest.raises(ViewError, match=r"a\.mp4: cannot be written: .*no-such-codec"):
+@pytest.mark.filterwarnings(
+    "ignore::ResourceWarning"
+)  # imageio does not close the pipe to an encoder that has ended
+def test_an_encoder_that_fails_on_its_way_is_told_at_once_and_leaves_nothing(
+    flown, tmp_path, monkeypatch, capfd
+):
+    monkeypatch.setattr(film_module, "H264", ("-c:v", "no-such-codec"))
+    with pytest.raises(ViewError, match=r"a\.mp4: cannot be written: ffmpeg failed"):
         write_film(flown, mp4=tmp_path / "a.mp4", options=FilmOptions(fps=60.0, **BARE))
     assert not list(tmp_path.iterdir())
+    assert "no-such-codec" in capfd.readouterr().err
+    gc.collect()
 
 
 def test_an_interruption_leaves_nothing(flown, tmp_path):
@@ -529,7 +531,7 @@ def test_options_that_mean_nothing_are_refused(given, message):
 
 
 def test_without_a_way_to_draw_the_message_says_what_to_install(monkeypatch):
-    monkeypatch.setattr("tussle.view.export.film.window.is_there", lambda library: False)
+    monkeypatch.setattr("tussle.view.export.film.renderer.is_installed", lambda library: False)
     with pytest.raises(ViewError, match="neither is installed: apt-get install libosmesa6"):
         find_window()
 
@@ -538,16 +540,16 @@ def test_without_a_way_to_draw_the_message_says_what_to_install(monkeypatch):
     ("package", "message"),
     [
         ("pyvista", "films and pictures need pyvista"),
-        ("imageio_ffmpeg", "films need imageio-ffmpeg"),
-        ("matplotlib", "words on pictures need matplotlib"),
+        ("imageio_ffmpeg", "films need imageio and imageio-ffmpeg"),
+        ("matplotlib", "text on pictures needs matplotlib"),
     ],
 )
 def test_without_a_package_the_message_names_the_extra(flown, tmp_path, monkeypatch, package, message):
     monkeypatch.setitem(__import__("sys").modules, package, None)
     with pytest.raises(
-        MissingExtraError, match=rf"{message}, which is not installed: pip install 'tussle\[view\]'"
+        MissingExtraError, match=rf"{message}, which (is|are) not installed: pip install 'tussle\[view\]'"
     ):
-        write_film(flown, mp4=tmp_path / "a.mp4", options=FilmOptions(size=SMALL))
+        write_film(flown, mp4=tmp_path / "a.mp4", options=FilmOptions(size=(320, 240)))
     assert not list(tmp_path.iterdir())
 
 
@@ -576,9 +578,9 @@ def test_nobody_moves(tmp_path):
     """A film of one that stands still: no division by its speed, its spacing, or the length of its way."""
     mission = Mission(blocks=[Block(name="post", team=1, position=(3, 4, 0), motion=Still())], end=1.0)
     recording = Recording(record(mission, tmp_path / "run"))
-    for camera in ("overview", "top", "follow"):
+    for name in ("overview", "top", "follow"):
         report = write_film(
-            recording, mp4=tmp_path / f"{camera}.mp4", options=FilmOptions(camera=camera, fps=5.0, size=SMALL)
+            recording, mp4=tmp_path / f"{name}.mp4", options=FilmOptions(camera=name, fps=5.0, size=SMALL)
         )
         assert report.n_pictures == 6
-        assert len(pictures(tmp_path / f"{camera}.mp4")) == 6
+        assert len(pictures(tmp_path / f"{name}.mp4")) == 6

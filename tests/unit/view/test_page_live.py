@@ -179,7 +179,7 @@ def test_a_point_and_a_key_are_told_to_the_plugins():
         point, key = live.injections
         assert (point.type, key.type) == (WorldPointClicked, CustomKeyPress)
         assert point.fields["pos"].tolist() == [30.0, 40.0, 0.0]
-        client.wait(lambda: live._sketchbook.is_open)
+        client.wait(lambda: live._collector.is_open)
         live.step()
         client.wait(lambda: {"arrows"} == {part["kind"] for part in client.drawn.get("parts", ())})
         assert client.drawn["texts"][0][0] == "goal"

@@ -17,8 +17,8 @@ from tussle.stock import Still
 from tussle.view import Recording
 from tussle.view.plots import (
     KINDS,
-    Choice,
-    Tracks,
+    Selection,
+    Trajectories,
     altitude,
     captures,
     density,
@@ -86,7 +86,7 @@ def lines_by_colour(axes):
 
 def test_tracks_hold_the_states_of_the_chosen_by_entity_and_time(hunted):
     recording = Recording(hunted, 1)
-    tracks = Tracks(recording, Choice(teams=(1,), start=3.0, end=5.0))
+    tracks = Trajectories(recording, Selection(teams=(1,), start=3.0, end=5.0))
     assert tracks.teams == {1: "prey, late"}
     assert (tracks.frame_times[0], tracks.frame_times[-1]) == (pytest.approx(3.0), pytest.approx(5.0))
     pos = tracks.pos()
@@ -107,22 +107,22 @@ def test_tracks_hold_the_states_of_the_chosen_by_entity_and_time(hunted):
 
 
 @pytest.mark.parametrize(
-    ("choice", "said"),
+    ("selection", "said"),
     [
-        (Choice(entities=(400,)), r"there is no entity 400; there are 1 to \d+$"),
-        (Choice(teams=(3,)), r"there is no team 3; there are: 1 \(prey, late\), 2 \(hunters\)"),
+        (Selection(entities=(400,)), r"there is no entity 400; there are 1 to \d+$"),
+        (Selection(teams=(3,)), r"there is no team 3; there are: 1 \(prey, late\), 2 \(hunters\)"),
         (
-            Choice(start=50.0),
+            Selection(start=50.0),
             "nothing was recorded from 50 s",
         ),
-        (Choice(start=9.0, end=8.0), "nothing was recorded from 9 s to 8 s"),
-        (Choice(entities=(1,), teams=(2,)), "entity 1 is of team 1, which is not among those chosen"),
-        (Choice(entities=(29,), end=0.2), r"entity 29 is not there to 0.2 s; it is from [0-9.]+ s to [0-9.]+ s"),
+        (Selection(start=9.0, end=8.0), "nothing was recorded from 9 s to 8 s"),
+        (Selection(entities=(1,), teams=(2,)), "entity 1 is of team 1, which is not selected"),
+        (Selection(entities=(29,), end=0.2), r"entity 29 does not exist to 0.2 s; it does from [0-9.]+ s to [0-9.]+ s"),
     ],
 )  # fmt: skip
-def test_who_or_when_there_is_nobody_is_told(hunted, choice, said):
+def test_who_or_when_there_is_nobody_is_told(hunted, selection, said):
     with pytest.raises(ParameterError, match=said):
-        Tracks(Recording(hunted), choice)
+        Trajectories(Recording(hunted), selection)
 
 
 def test_of_ids_with_gaps_the_nearest_are_told(hunted, tmp_path):
@@ -131,15 +131,15 @@ def test_of_ids_with_gaps_the_nearest_are_told(hunted, tmp_path):
     ids = np.asarray(table["id"])
     recording.run.trajectory_table = table.filter((ids < 5) | (ids > 9))
     with pytest.raises(ParameterError, match="there is no entity 6"):
-        Tracks(recording, Choice(entities=(6,)))
+        Trajectories(recording, Selection(entities=(6,)))
 
 
 def test_a_team_that_has_gone_is_told(tmp_path):
     late = Block(name="late", team=2, count=1, rate=1.0, first_birth=4.0, motion=Still())
     first = Block(name="first", team=1, motion=Still())
     run = record(Mission(blocks=[first, late], end=6.0, end_conditions="time"), tmp_path / "run")
-    with pytest.raises(ParameterError, match="there is nobody of team 2 to 3 s"):
-        Tracks(Recording(run), Choice(teams=(2,), end=3.0))
+    with pytest.raises(ParameterError, match="there are no entities of team 2 to 3 s"):
+        Trajectories(Recording(run), Selection(teams=(2,), end=3.0))
 
 
 def test_a_run_without_states_is_told(collided, tmp_path):
@@ -150,7 +150,7 @@ def test_a_run_without_states_is_told(collided, tmp_path):
         data[: len(data) // 2]
     )  # all states lie in one batch, which is lost
     with pytest.raises(ViewError, match="cut: nothing was recorded"):
-        Tracks(Recording(cut))
+        Trajectories(Recording(cut))
 
 
 # -- maps ---------------------------------------------------------------------------------------------------------------------
@@ -169,7 +169,7 @@ def drawn_ways(axes):
 
 
 def test_ways_from_above_go_through_where_each_was_and_are_not_joined(hunted):
-    tracks = Tracks(Recording(hunted))
+    tracks = Trajectories(Recording(hunted))
     figure = trajectory(tracks)
     (axes,) = figure.axes
     ways = drawn_ways(axes)
@@ -193,7 +193,7 @@ def test_ways_from_above_go_through_where_each_was_and_are_not_joined(hunted):
 
 
 def test_each_mark_stands_where_somebody_began_stayed_or_died(hunted):
-    tracks = Tracks(Recording(hunted), Choice(teams=(1,)))
+    tracks = Trajectories(Recording(hunted), Selection(teams=(1,)))
     (axes,) = trajectory(tracks).axes
     from matplotlib.collections import PathCollection
 
@@ -209,18 +209,18 @@ def test_each_mark_stands_where_somebody_began_stayed_or_died(hunted):
 
 def test_of_very_many_some_ways_are_drawn_and_it_is_said(hunted, tmp_path, monkeypatch):
     for module in ("tussle.view.plots.maps", "tussle.view.plots.files"):
-        monkeypatch.setattr(f"{module}.MOST_TRACKS", 10)
-    tracks = Tracks(Recording(hunted))
+        monkeypatch.setattr(f"{module}.MAX_TRAJECTORIES", 10)
+    tracks = Trajectories(Recording(hunted))
     assert len(tracks) > 20
     assert sum(map(len, drawn_ways(trajectory(tracks).axes[0]).values())) <= 10
     written = write_plots(Recording(hunted), tmp_path, ["trajectory"])
-    assert f"10 of {len(tracks)} ways are drawn" in written.notes[-1]
+    assert f"10 of {len(tracks)} trajectories are drawn" in written.notes[-1]
 
 
 def test_many_points_become_pixels_in_an_svg(hunted, tmp_path, monkeypatch):
     write_plots(Recording(hunted), tmp_path, ["trajectory"], form="svg")
     lines = (tmp_path / "trajectory.svg").read_text()
-    monkeypatch.setattr(maps, "MOST_POINTS", 10)
+    monkeypatch.setattr(maps, "MAX_POINTS", 10)
     write_plots(Recording(hunted), tmp_path, ["trajectory"], form="svg")
     pixels = (tmp_path / "trajectory.svg").read_text()
     assert "<image" not in lines
@@ -238,7 +238,7 @@ def test_bases_and_boundaries_of_the_mission_stand_in_the_map(tmp_path):
     file.write_text(MISSION)
     loaded = read_mission(file)
     run = record(loaded.mission, tmp_path / "run", mission_text=loaded.text)
-    figure = trajectory(Tracks(Recording(run)))
+    figure = trajectory(Trajectories(Recording(run)))
     (axes,) = figure.axes
     (circle,) = [p for p in axes.patches if isinstance(p, Circle)]
     assert circle.radius == 25.0
@@ -251,26 +251,25 @@ def test_bases_and_boundaries_of_the_mission_stand_in_the_map(tmp_path):
 
 
 def test_heights_are_exaggerated_where_all_is_flat_and_the_plot_says_so(hunted, collided):
-    flat = trajectory3d(Tracks(Recording(collided)))
+    flat = trajectory3d(Trajectories(Recording(collided)))
     assert flat.axes[0].get_zlabel() == "up [m]"
-    assert flat.legends[0].get_title().get_text().startswith("Ways in space, 100 times as high")
-    deep = trajectory3d(Tracks(Recording(hunted)))
-    assert deep.legends[0].get_title().get_text().startswith("Ways in space · hunt")
+    assert flat.legends[0].get_title().get_text().startswith("Trajectories in space, heights times 100")
+    deep = trajectory3d(Trajectories(Recording(hunted)))
+    assert deep.legends[0].get_title().get_text().startswith("Trajectories in space · hunt")
 
 
-def test_all_of_a_scene_in_space_lies_on_the_sheet(hunted):
-    figure = trajectory3d(Tracks(Recording(hunted)))
+def test_all_of_a_scene_in_space_lies_on_the_figure(hunted):
+    figure = trajectory3d(Trajectories(Recording(hunted)))
     figure.draw_without_rendering()
-    low, high = maps._seen(figure.axes[0])
-    head = figure.legends[0].get_window_extent().y0
-    assert low.min() >= 0.0
-    assert high[0] <= figure.bbox.width
-    assert high[1] <= head
-    assert high[0] - low[0] > 0.9 * figure.bbox.width or high[1] - low[1] > 0.9 * head
+    axes = figure.axes[0]
+    boxes = [axis.get_tightbbox() for axis in (axes.xaxis, axes.yaxis, axes.zaxis)]
+    assert min(box.y0 for box in boxes) >= 0.0 <= min(box.x0 for box in boxes)
+    assert max(box.x1 for box in boxes) <= figure.bbox.width
+    assert max(box.y1 for box in boxes) <= figure.legends[0].get_window_extent().y0
 
 
 def test_the_maps_of_where_they_were_hold_all_the_time_they_were_there(hunted):
-    tracks = Tracks(Recording(hunted))
+    tracks = Trajectories(Recording(hunted))
     figure = density(tracks)
     dt = 0.1
     images = [axes.images[0] for axes in figure.axes if axes.images]
@@ -281,8 +280,8 @@ def test_the_maps_of_where_they_were_hold_all_the_time_they_were_there(hunted):
 
 
 def test_very_many_teams_share_one_map(tmp_path, monkeypatch, hunted):
-    monkeypatch.setattr(maps, "MOST_MAPS", 1)
-    figure = density(Tracks(Recording(hunted)))
+    monkeypatch.setattr(maps, "MAX_MAPS", 1)
+    figure = density(Trajectories(Recording(hunted)))
     assert len([axes for axes in figure.axes if axes.images]) == 1
     assert figure.axes[0].get_title(loc="left") == "all 2 teams"
 
@@ -293,7 +292,7 @@ def test_very_many_teams_share_one_map(tmp_path, monkeypatch, hunted):
 @pytest.mark.parametrize(("plot", "column"), [(speed, 3), (altitude, 2)])
 def test_few_are_lines_and_many_are_a_band_around_their_median(hunted, plot, column):
     recording = Recording(hunted)
-    tracks = Tracks(recording)
+    tracks = Trajectories(recording)
     figure = plot(tracks)
     lines = lines_by_colour(figure.axes[0])
     values = tracks.speed if plot is speed else tracks.column("z")
@@ -312,7 +311,7 @@ def test_few_are_lines_and_many_are_a_band_around_their_median(hunted, plot, col
 
 
 def test_chosen_entities_have_lines_of_their_own(hunted):
-    tracks = Tracks(Recording(hunted), Choice(entities=(2, 27, 26)))
+    tracks = Trajectories(Recording(hunted), Selection(entities=(2, 27, 26)))
     figure = speed(tracks)
     assert [name.partition(" ")[0] for name in legend_of(figure)][:3] == ["2", "26", "27"]
     assert len(lines_by_colour(figure.axes[0])) == 3
@@ -324,7 +323,7 @@ def test_a_line_is_broken_where_the_entity_was_not_there(hunted):
     who = np.asarray(recording.run.trajectory_table["id"])
     gone = (who == 2) & (step > 20) & (step < 30)
     recording.run.trajectory_table = recording.run.trajectory_table.filter(~gone)
-    tracks = Tracks(recording, Choice(entities=(2,)))
+    tracks = Trajectories(recording, Selection(entities=(2,)))
     (line,) = lines_by_colour(speed(tracks).axes[0]).values()
     assert np.isnan(line.get_ydata()).sum() == 1
     assert len(drawn_ways(trajectory(tracks).axes[0])[COLOURS[1]]) == 2
@@ -344,7 +343,7 @@ def test_the_distance_of_two_is_that_of_their_positions_with_its_least(collided)
         "1 died: collision",
     ]
     assert figure.axes[0].get_ylim()[0] == 0.0
-    later = distance(recording, 1, 2, Choice(start=1.0)).axes[0].lines[0]
+    later = distance(recording, 1, 2, Selection(start=1.0)).axes[0].lines[0]
     assert later.get_xdata()[0] == pytest.approx(1.0)
 
 
@@ -355,7 +354,8 @@ def test_two_that_have_no_distance_are_told(hunted, tmp_path):
     dead = next(h for h in recording.events if h.kind == "death")
     late = next(h for h in recording.events if h.kind == "birth" and h.t > dead.t)
     with pytest.raises(
-        ParameterError, match=f"entities {dead.id} and {late.id} are never there together: {dead.id} is"
+        ParameterError,
+        match=f"entities {dead.id} and {late.id} never exist at the same time: {dead.id} exists",
     ):
         distance(recording, dead.id, late.id)
 
@@ -365,7 +365,7 @@ def test_two_that_have_no_distance_are_told(hunted, tmp_path):
 
 def test_who_is_left_is_counted_in_each_frame_and_deaths_are_marked_on_the_curve(hunted):
     recording = Recording(hunted)
-    figure = left(Tracks(recording))
+    figure = left(Trajectories(recording))
     curves = lines_by_colour(figure.axes[0])
     for team, colour in COLOURS.items():
         t, n = curves[colour].get_data()
@@ -382,19 +382,19 @@ def test_who_is_left_is_counted_in_each_frame_and_deaths_are_marked_on_the_curve
 
 def test_captures_are_counted_for_who_made_them_and_collisions_for_all(hunted, collided):
     recording = Recording(hunted)
-    figure = captures(Tracks(recording))
+    figure = captures(Trajectories(recording))
     caught = [h.t for h in recording.events if h.kind == "capture"]
     (curve,) = lines_by_colour(figure.axes[0]).values()
     assert (curve.get_color(), curve.get_ydata()[-1]) == (COLOURS[2], len(caught))
     np.testing.assert_array_equal(curve.get_xdata()[1:-1], caught)
     assert legend_of(figure) == [f"hunters: {len(caught)}"]
-    late = captures(Tracks(recording, Choice(start=5.0)))
+    late = captures(Trajectories(recording, Selection(start=5.0)))
     assert legend_of(late) == [f"hunters: {sum(t >= 5.0 for t in caught)}"]
-    met = captures(Tracks(Recording(collided)))
+    met = captures(Trajectories(Recording(collided)))
     assert met.axes[0].get_ylabel() == "collisions so far"
     assert met.axes[0].lines[0].get_ydata()[-1] == 1
     with pytest.raises(ParameterError, match="there are no captures and no collisions"):
-        captures(Tracks(recording, Choice(teams=(1,))))
+        captures(Trajectories(recording, Selection(teams=(1,))))
 
 
 # -- files --------------------------------------------------------------------------------------------------------------------
@@ -410,7 +410,7 @@ def test_what_shows_something_is_written_and_the_rest_is_said(hunted, collided, 
     flat = write_plots(Recording(collided), tmp_path / "b")
     assert [f.stem for f in flat.files] == ["trajectory", "speed", "left", "captures", "density"]
     assert any("all are at 100 m" in note for note in flat.notes)
-    one = write_plots(Recording(hunted, 1), tmp_path / "c", choice=Choice(entities=(2,)))
+    one = write_plots(Recording(hunted, 1), tmp_path / "c", selection=Selection(entities=(2,)))
     assert [f.stem for f in one.files] == [
         f"{name}-world-1" for name in ("trajectory", "trajectory3d", "speed", "altitude", "density")
     ]
@@ -478,7 +478,7 @@ def test_a_cut_run_is_plotted_as_far_as_it_goes_and_it_is_said(tmp_path):
     data = (cut / "trajectory.arrow").read_bytes()
     (cut / "trajectory.arrow").write_bytes(data[: len(data) * 2 // 3])
     written = write_plots(Recording(cut), tmp_path / "plots")
-    assert 2.0 < Tracks(Recording(cut)).frame_times[-1] < 4.5
+    assert 2.0 < Trajectories(Recording(cut)).frame_times[-1] < 4.5
     assert len(written.files) == 7
     assert any("run.json is missing" in note for note in written.notes)
     assert any("trajectory.arrow" in note for note in written.notes)

@@ -69,7 +69,7 @@ def test_what_it_says_of_the_mission_without_having_the_file(played):
     assert recording.teams == {1: "prey, late", 2: "hunters"}
     assert recording.mission is None
     assert recording.viewer == {}
-    assert recording.notes == ["mission.xml is not there: a mission that was built in Python leaves none"]
+    assert recording.notes == ["mission.xml is missing: a mission built in Python has none"]
     assert [recording.style.model(b) for b in range(3)] == ["aircraft"] * 3
 
 
@@ -212,8 +212,8 @@ def test_a_mission_whose_plugins_are_not_here(tmp_path):
 @pytest.mark.parametrize(
     ("name", "row", "value", "said"),
     [
-        ("step", -1, 2**31 - 1, "moments with nobody there, by the steps of run.json and trajectory.arrow"),
-        ("step", -1, 0, "the rows of a step do not stand together"),
+        ("step", -1, 2**31 - 1, "frames without entities, by the steps of run.json and trajectory.arrow"),
+        ("step", -1, 0, "the rows of a step are not contiguous"),
         ("t", 0, 1e9, "times go back from one step to the next"),
         ("id", 1, 1, "the ids of a step do not ascend in row 1"),
     ],
@@ -239,11 +239,11 @@ def test_a_run_file_that_says_something_else_than_the_table_is_refused(tmp_path,
     info = json.loads(file.read_text())
     info["worlds"][0]["steps"] = 10**18
     file.write_text(json.dumps(info))
-    with pytest.raises(RecordError, match=r"moments with nobody there, by the steps of run\.json"):
+    with pytest.raises(RecordError, match=r"frames without entities, by the steps of run\.json"):
         Recording(tmp_path / "run")
     info["mission"]["blocks"].pop()
     file.write_text(json.dumps(info))
-    with pytest.raises(RecordError, match=r"trajectory.arrow: its blocks are not prey, late, as in run.json"):
+    with pytest.raises(RecordError, match=r"trajectory.arrow: the blocks differ from prey, late"):
         Recording(tmp_path / "run", 1)
     info["worlds"][0]["steps"] = "many"
     file.write_text(json.dumps(info))

@@ -51,7 +51,7 @@ def test_without_one_the_motion_model_decides(plugins, model):
 def test_a_model_like_nothing_here_is_told():
     found = looks(("SimpleCar",), visual_model="xqy")
     assert found.model(0) == "car"
-    assert found.notes == ["block 'robot': there is nothing like visual_model 'xqy' here; it is drawn as car"]
+    assert found.notes == ["block 'robot': visual_model 'xqy' is unknown; it is drawn as car"]
 
 
 def test_colours_of_blocks_and_teams():

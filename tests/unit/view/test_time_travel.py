@@ -137,7 +137,7 @@ def test_after_the_end_nobody_hears():
     live.seek(100.0)
     live.publish_key("k")
     assert live.injections == []
-    assert live.notes == ["CustomKeyPress: the game is over, and nobody hears it"]
+    assert live.notes == ["CustomKeyPress: the game is over, so the message is dropped"]
 
 
 def test_happenings_of_a_future_that_will_not_be_are_forgotten():
@@ -209,7 +209,7 @@ def test_a_recording_ends_as_of_the_farthest_step_when_the_game_takes_another_co
     assert heard == [*range(40), *range(first, first + 5)]
 
 
-# -- what cannot be wound back --------------------------------------------------------------------------------------------------------
+# -- what cannot be rewound --------------------------------------------------------------------------------------------------------
 
 
 class Mute(Autonomy):
@@ -247,7 +247,7 @@ def test_games_with_something_outside_go_forward_only_and_say_why(plugin, why):
         live.seek(0.0)
         assert live.step_number == 10
         (note,) = live.notes
-        assert note.startswith("the game cannot be wound back: ")
+        assert note.startswith("the game cannot be rewound: ")
         assert why in note
         live.seek(2.0)
         assert live.step_number == 20

@@ -1,1 +1,1 @@
-"""What can be made of a recorded run: a page that plays it, films and pictures, tables."""
+"""Exports of recorded runs: HTML page, films and pictures, MCAP, tables."""

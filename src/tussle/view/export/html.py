@@ -1,4 +1,4 @@
-"""One page that plays a recorded run by itself: it can be mailed, and asks nobody for anything."""
+"""Export of a recorded run as one HTML page that plays it offline."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class HtmlExport:
         n_bytes: Its size [B].
         position_error: Largest distance between a position on the page and the recorded one [m].
         angle_error: Largest angle between an attitude on the page and the recorded one [rad].
-        notes: What is missing or left out, one line each, as the page says it.
+        notes: Missing parts, one line each, as on the page.
     """
 
     path: Path
@@ -42,18 +42,18 @@ def write_html(
 ) -> HtmlExport:
     """Write the page of a recorded run. The same run and options give the same bytes.
 
-    Positions are rounded to a centimetre or less, attitudes to some hundredths of a degree, health to 1/255 of the most that anybody
-    has in the frames around; the page says how far it may be off. Events are all kept.
+    Positions are rounded to a centimetre or less, attitudes to some hundredths of a degree, health to 1/255 of its maximum in
+    neighbouring frames; the page states the errors. All events are kept.
 
     Args:
-        recording: The run; of one that was cut short, what there is.
-        path: The file, replaced where it is there.
-        period: Time between frames that are kept [s]; None keeps all.
+        recording: The run, complete or not.
+        path: The file; an existing one is replaced.
+        period: Time between frames [s]; None keeps all frames.
         title: Its heading; by default the recording's name.
 
     Raises:
         ParameterError: The period is not allowed.
-        ViewError: There is nothing to show, or the file cannot be written.
+        ViewError: The run holds no states, or the file cannot be written.
     """
     data = RecordedData(recording, is_file=True, period=period, title=title)
     document = data.document()

@@ -1,12 +1,12 @@
-"""A run as an MCAP file, which Foxglove opens.
+"""A run as an MCAP file for Foxglove.
 
 Open the file in Foxglove and add:
 
-* a 3D panel, whose fixed frame is `world` (East North Up): `/models` draws each entity in its team's colour and lets it move with its
-  transform in `/tf`; `/scene` draws bases and boundaries; `/labels` writes ids beside the entities when it is switched on. Choose
-  an entity's frame, such as `prey/17`, as display frame to fly with it;
+* a 3D panel, whose fixed frame is `world` (East North Up): `/models` draws each entity in its team's colour and moves it with its
+  transform in `/tf`; `/scene` draws bases and boundaries; `/labels` writes ids beside the entities when it is switched on. With an
+  entity's frame, such as `prey/17`, as display frame the camera moves with that entity;
 * a Log panel for `/events`: births are debug messages, deaths and the end information, captures and collisions warnings;
-* a Plot panel with `/teams.alive.team_1` and so on: how many are left.
+* a Plot panel with `/teams.alive.team_1` and so on: entities left by team.
 
 The file's clock is the simulated time: t = 12.5 s is 1970-01-01 00:00:12.5 UTC.
 """
@@ -14,53 +14,49 @@ The file's clock is the simulated time: t = 12.5 s is 1970-01-01 00:00:12.5 UTC.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from tussle.errors import MissingExtraError, ParameterError, ViewError
-from tussle.view.export import foxglove_schemas as schemas
-from tussle.view.export.film.survey import crowd_of
-from tussle.view.export.foxglove_entities import Log, SceneEntities
-from tussle.view.export.foxglove_scene import WORLD, as_json, stamp, standing
+from tussle.view.export.film.prescan import crowd_of
+from tussle.view.export.foxglove_scene import WORLD, SceneEntities, scenery_entities, stamp
 from tussle.view.export.whole_file import whole_file
 from tussle.view.frame import Frame
 from tussle.view.page.recorded import kept_frames
 from tussle.view.recording import Recording
 
+if TYPE_CHECKING:
+    from foxglove import Context
+
 CHUNK = 1 << 20
 """Bytes that are compressed together; a reader that jumps reads as much."""
 SPACING = 0.5
-"""Length of a model as a share of the usual distance between neighbours, where it would be too small to be seen."""
+"""Length of a model as a share of the median distance between neighbours, where it would be too small to be seen."""
 N_SPACINGS = 20
-"""Moments at which that distance is looked at."""
-TOPICS = {
-    "/tf": schemas.FRAME_TRANSFORMS,
-    "/models": schemas.SCENE_UPDATE,
-    "/labels": schemas.SCENE_UPDATE,
-    "/scene": schemas.SCENE_UPDATE,
-    "/events": schemas.LOG,
-}
+"""Frames that are sampled for that distance."""
+MAX_TIME = 2.0**32
+"""Times of the file format are less [s]: 136 years."""
 
 
 @dataclass
 class McapReport:
-    """What was written.
+    """A file that was written.
 
     Attributes:
         path: The file.
-        n_frames: Moments in it.
+        n_frames: Frames in it.
         n_messages: Messages of each topic.
         notes: What the user should know, one line each.
     """
 
     path: Path
     n_frames: int = 0
-    n_messages: dict[str, int] = field(default_factory=dict)
+    n_messages: Counter[str] = field(default_factory=Counter)
     notes: list[str] = field(default_factory=list)
 
 
@@ -72,19 +68,19 @@ def write_mcap(
     scale: float = 1.0,
     show: Callable[[int, int], None] | None = None,
 ) -> McapReport:
-    """Write a run as an MCAP file of JSON messages, compressed with Zstandard; of one that was cut short, what there is.
+    """Write a run, complete or not, as an MCAP file of Foxglove's messages, compressed with Zstandard.
 
     Args:
         recording: The run.
-        path: The file, replaced where it is there.
-        period: Time between moments that are kept [s]; None keeps all. Events are all kept.
-        scale: Factor by which models are larger than they would be, which is so that they can be seen.
-        show: Told after each moment how many are written, and of how many.
+        path: The file; an existing one is replaced.
+        period: Time between frames that are written [s]; None writes all. Events are all written.
+        scale: Factor by which models are enlarged beyond the default, with which they can be seen.
+        show: Called after each frame with the numbers of frames written and to write.
 
     Raises:
         ParameterError: The period or the scale is not allowed.
         ViewError: There is nothing to write, or the file cannot be written.
-        MissingExtraError: The package mcap is not installed.
+        MissingExtraError: The package foxglove-sdk is not installed.
     """
     for name, value in (("period", period), ("scale", scale)):
         if value is not None and not 0.0 < value < math.inf:
@@ -92,32 +88,44 @@ def write_mcap(
     kept = kept_frames(recording.t, period)
     if not len(kept):
         raise ViewError(f"{recording.path}: the run holds no states, so there is nothing to write")
+    try:
+        import foxglove
+        from foxglove.mcap import MCAPWriteOptions
+    except ImportError as error:
+        raise MissingExtraError(
+            "MCAP files need foxglove-sdk, which is not installed: pip install 'tussle[view]'"
+        ) from error
     report = McapReport(Path(path))
+    context = foxglove.Context()
+    options = MCAPWriteOptions(chunk_size=CHUNK, compression_threads=0)
     with (
         whole_file(Path(path)) as part,
-        part.open("wb") as file,
-        Messages(file, recording, report) as messages,
+        foxglove.open_mcap(part, allow_overwrite=True, context=context, writer_options=options) as file,
     ):
-        entities = SceneEntities(recording, kept, messages.put, messages.ns, scale * usual_scale(recording))
-        first = float(recording.t[0])
-        messages.put("/scene", first, {"deletions": [], "entities": standing(recording, messages.ns(first))})
-        log = Log(recording, messages.put, messages.ns, entities)
+        messages = _Messages(recording, report, context)
+        file.write_metadata("run", messages.metadata())
+        entities = SceneEntities(recording, kept, scale * default_scale(recording))
+        messages.put_scenery()
+        events = list(reversed(recording.events))
+
+        def log_until(t: float) -> None:
+            while events and events[-1].t <= t:
+                event = events.pop()
+                messages.put("/events", event.t, entities.log_line(event, messages.ns(event.t)))
+
         for n, i in enumerate(kept, 1):
             frame = recording.frame(int(i))
-            entities.meet(frame)
-            log.until(frame.t)
-            entities.tell(frame)
-            messages.put_transforms(frame, entities)
-            messages.put_teams(frame)
+            log_until(frame.t)
+            messages.put_frame(frame, entities)
             if show is not None:
                 show(n, len(kept))
-        log.until(math.inf)
+        log_until(math.inf)
         report.n_frames = len(kept)
     return report
 
 
-def usual_scale(recording: Recording) -> float:
-    """Factor by which models are larger than life so that they can be told from afar; 1 where they are near each other."""
+def default_scale(recording: Recording) -> float:
+    """Factor by which models are enlarged so that they can be seen from afar; 1 where they are near each other."""
     spacings = [
         crowd_of(recording.frame(int(i)))[0]
         for i in np.unique(np.linspace(0, recording.n_frames - 1, N_SPACINGS).round())
@@ -127,87 +135,85 @@ def usual_scale(recording: Recording) -> float:
     return max(1.0, SPACING * float(np.median(known)) / longest) if known else 1.0
 
 
-class Messages:
-    """The file that is open, with its topics."""
+class _Messages:
+    """The topics of a file that is open."""
 
-    def __init__(self, file: Any, recording: Recording, report: McapReport) -> None:
-        try:
-            from mcap.writer import CompressionType, Writer
-        except ImportError as error:
-            raise MissingExtraError(
-                "MCAP files need mcap, which is not installed: pip install 'tussle[view]'"
-            ) from error
-        self._writer = Writer(file, chunk_size=CHUNK, compression=CompressionType.ZSTD)
-        self._writer.start(profile="", library=f"tussle {version('tussle')}")
-        self._report = report
-        self._run = recording.path
-        self._channels: dict[str, int] = {}
+    def __init__(self, recording: Recording, report: McapReport, context: Context) -> None:
+        from foxglove import Channel
+        from foxglove.channels import FrameTransformsChannel, LogChannel, SceneUpdateChannel
+
+        self._recording, self._report = recording, report
         self._keys = {team: f"team_{team}" for team in recording.teams}
+        counts = {key: {"type": "integer"} for key in self._keys.values()}
+        properties = {"t": {"type": "number"}, "alive": {"type": "object", "properties": counts}}
+        schema = {"title": "tussle.Teams", "type": "object", "properties": properties}
+        about = {self._keys[team]: names for team, names in recording.teams.items()}
+        self._channels: dict[str, Any] = {
+            "/tf": FrameTransformsChannel("/tf", context=context),
+            **{
+                topic: SceneUpdateChannel(topic, context=context)
+                for topic in ("/models", "/labels", "/scene")
+            },
+            "/events": LogChannel("/events", context=context),
+            "/teams": Channel("/teams", schema=schema, context=context, metadata=about),
+        }
         # The clock of the file counts from 0 upward.
         self._shift = max(0, -math.floor(float(recording.t[0])))
         if self._shift:
             report.notes.append(
                 f"t = 0 is {self._shift} s after the beginning of the file's clock, which knows no earlier times"
             )
-        self._add_topics(recording)
 
-    def _add_topics(self, recording: Recording) -> None:
-        known: dict[str, int] = {}
-        names = {f"team_{team}": names for team, names in recording.teams.items()}
-        for topic, schema in {**TOPICS, "/teams": schemas.teams_schema(self._keys.values())}.items():
-            title = schema["title"]
-            if title not in known:
-                known[title] = self._writer.register_schema(title, "jsonschema", as_json(schema))
-            about = names if topic == "/teams" else {}
-            self._channels[topic] = self._writer.register_channel(topic, "json", known[title], about)
-            self._report.n_messages[topic] = 0
+    def metadata(self) -> dict[str, str]:
+        """Mission, world and seed."""
+        recording = self._recording
         worlds = recording.run.info.get("worlds", [])
         seed = str(worlds[recording.world]["seed"]) if recording.world < len(worlds) else ""
-        about = {"mission": recording.name, "world": str(recording.world), "seed": seed}
-        self._writer.add_metadata("run", about)
+        return {"mission": recording.name, "world": str(recording.world), "seed": seed}
 
     def ns(self, t: float) -> int:
         """A simulated time [s] on the file's clock [ns].
 
         Raises:
-            ViewError: It does not fit there.
+            ViewError: It does not fit.
         """
-        ns = (t + self._shift) * 1e9
-        if not 0.0 <= ns < 2.0**63:
-            raise ViewError(f"{self._run}: {t:g} s is not a time of this file format, which takes 292 years")
-        return round(ns)
+        shifted = t + self._shift
+        if not 0.0 <= shifted < MAX_TIME:
+            raise ViewError(
+                f"{self._recording.path}: {t:g} s is not a time of this file format, which takes 136 years"
+            )
+        return round(shifted * 1e9)
 
     def put(self, topic: str, t: float, message: Any) -> None:
-        """Add a message of a time [s]; times do not go back."""
-        self._put(topic, self.ns(t), as_json(message))
+        """Add a message of a time [s]."""
+        self._channels[topic].log(message, log_time=self.ns(t))
+        self._report.n_messages[topic] += 1
 
-    def _put(self, topic: str, ns: int, data: bytes) -> None:
-        n = self._report.n_messages[topic]
-        self._writer.add_message(self._channels[topic], ns, data, ns, n)
-        self._report.n_messages[topic] = n + 1
+    def put_scenery(self) -> None:
+        """Add bases, boundaries and terrain."""
+        from foxglove.messages import SceneUpdate
 
-    def put_transforms(self, frame: Frame, entities: SceneEntities) -> None:
-        """Add where all entities are; put together by hand, for there are millions of them."""
-        ns = self.ns(frame.t)
-        when = as_json(stamp(ns)).decode()
-        parts = [
-            f'{{"timestamp":{when},"parent_frame_id":"{WORLD}","child_frame_id":{entities.quoted[who]},'
-            f'"translation":{{"x":{x:.4f},"y":{y:.4f},"z":{z:.4f}}},'
-            f'"rotation":{{"x":{qx:.6f},"y":{qy:.6f},"z":{qz:.6f},"w":{qw:.6f}}}}}'
-            for who, (x, y, z), (qw, qx, qy, qz) in zip(
-                frame.id.tolist(), frame.pos.tolist(), frame.quat.tolist(), strict=True
+        t = float(self._recording.t[0])
+        self.put("/scene", t, SceneUpdate(entities=scenery_entities(self._recording, self.ns(t))))
+
+    def put_frame(self, frame: Frame, entities: SceneEntities) -> None:
+        """Add a frame: new models and labels, all transforms, entities left by team."""
+        from foxglove import messages as fg
+
+        for topic, found in zip(("/models", "/labels"), entities.new(frame, self.ns), strict=True):
+            if found:
+                self.put(topic, frame.t, fg.SceneUpdate(entities=found))
+        when, states = (
+            stamp(self.ns(frame.t)),
+            (entities.names(frame), frame.pos.tolist(), frame.quat.tolist()),
+        )
+        transforms = [
+            fg.FrameTransform(
+                timestamp=when, parent_frame_id=WORLD, child_frame_id=name,
+                translation=fg.Vector3(x=x, y=y, z=z), rotation=fg.Quaternion(x=qx, y=qy, z=qz, w=qw),
             )
-        ]
-        self._put("/tf", ns, f'{{"transforms":[{",".join(parts)}]}}'.encode())
-
-    def put_teams(self, frame: Frame) -> None:
-        """Add how many are left."""
+            for name, (x, y, z), (qw, qx, qy, qz) in zip(*states, strict=True)
+        ]  # fmt: skip
+        self.put("/tf", frame.t, fg.FrameTransforms(transforms=transforms))
         alive = {key: int((frame.team == team).sum()) for team, key in self._keys.items()}
-        self.put("/teams", frame.t, {"timestamp": stamp(self.ns(frame.t)), "t": frame.t, "alive": alive})
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        if kind is None:
-            self._writer.finish()  # type: ignore[no-untyped-call]
+        self.put("/teams", frame.t, {"t": frame.t, "alive": alive})

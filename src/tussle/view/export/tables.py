@@ -1,4 +1,4 @@
-"""The tables of a run as CSV or Parquet, batch by batch."""
+"""Export of a run's tables as CSV or Parquet, batch by batch."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ from tussle.view.export.whole_file import whole_file
 
 KINDS = ("csv", "parquet")
 ROWS_OF_A_GROUP = 1 << 18
-"""Rows that Parquet keeps together, and so in memory: some 30 MB."""
+"""Rows of a Parquet row group: about 30 MB of memory."""
 
 
 @dataclass
 class TablesReport:
-    """What was written.
+    """The files that were written.
 
     Attributes:
         paths: The files: states, events.
         rows: Rows of each.
-        notes: What is missing, one line each.
+        notes: Missing parts of the run, one line each.
     """
 
     paths: list[Path] = field(default_factory=list)
@@ -54,20 +54,20 @@ def write_tables(
     world: int | None = None,
     show: Callable[[int], None] | None = None,
 ) -> TablesReport:
-    """Write the states of a run to a file and its events to one beside it: to `states.events.csv` for `states.csv`.
+    """Write the states of a run to a file and its events to a second file: to `states.events.csv` for `states.csv`.
 
-    The tables have the columns of the recorded ones. One batch is in memory at a time, so the size of the run does not matter. Of a
-    run that was cut short, its whole batches are written.
+    The tables have the columns of the recorded ones. One batch is in memory at a time. Of an incomplete run, the complete batches
+    are written.
 
     Args:
         run: The run directory.
-        path: The file of states, replaced where it is there.
+        path: The file of states; an existing one is replaced.
         kind: "csv" or "parquet".
         world: Only this world; None for all of them.
-        show: Told after each batch how many rows of states have been read.
+        show: Called after each batch with the number of rows of states read.
 
     Raises:
-        ParameterError: There is no such kind.
+        ParameterError: The kind does not exist.
         RecordError: It is no run directory, or has no such world.
         ViewError: A file cannot be written.
     """
@@ -81,24 +81,24 @@ def write_tables(
         (TRAJECTORY_FILE, TRAJECTORY, TRAJECTORY_RULES, target, show),
         (EVENTS_FILE, EVENTS, EVENTS_RULES, beside, None),
     )
-    for name, schema, rules, file, told in tables:
+    for name, schema, rules, file, report_rows in tables:
         batches = read_batches(place / name, report.notes, RecordError, schema, rules)
-        report.rows.append(_write(batches, schema, file, kind, world, told))
+        report.rows.append(_write(batches, schema, file, kind, world, report_rows))
         report.paths.append(file)
     return report
 
 
 def _check(place: Path, world: int | None, report: TablesReport) -> None:
-    """Whether there is such a run and world.
+    """Check that the run and the world exist.
 
     Raises:
-        RecordError: There is not.
+        RecordError: One of them does not.
     """
     if (place / RUN_FILE).exists():
         worlds = RUN.read(place / RUN_FILE)["worlds"]
     else:
         report.notes.append(
-            f"{RUN_FILE} is missing: the run is still going on or was killed; what was written is exported"
+            f"{RUN_FILE} is missing: the run is still going on or was killed; its states so far are exported"
         )
         return
     if world is not None and not 0 <= world < len(worlds):
@@ -113,7 +113,7 @@ def _write(
     world: int | None,
     show: Callable[[int], None] | None,
 ) -> int:
-    """Write batches to a file, whole or not at all; the number of rows written."""
+    """Write batches to a file; return the number of rows written."""
     plain = pa.schema(
         [pa.field(f.name, pa.string() if pa.types.is_dictionary(f.type) else f.type) for f in schema]
     )
@@ -135,7 +135,7 @@ def _write(
 
 
 def _grouped(batches: Iterator[pa.RecordBatch], schema: pa.Schema, n: int) -> Iterator[pa.Table]:
-    """Batches joined to tables of at least so many rows, with words in place of their numbers."""
+    """Batches joined to tables of at least n rows, with texts in place of dictionary indices."""
     waiting: list[pa.Table] = []
     for batch in batches:
         waiting.append(pa.table([batch[name].cast(schema.field(name).type) for name in schema.names], schema))

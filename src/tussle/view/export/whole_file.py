@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all."""
+"""Files that are written completely or not at all."""
 
 from __future__ import annotations
 
@@ -11,16 +11,17 @@ from tussle.errors import ViewError
 
 
 @contextmanager
-def whole_file(path: Path) -> Iterator[Path]:
-    """A file to write instead of another, whose place it takes when all went well.
+def whole_file(path: Path, suffix: str = ".part") -> Iterator[Path]:
+    """A temporary file with this suffix that replaces the file if nothing was raised, and is deleted else.
 
     Raises:
-        ViewError: It cannot be written.
+        ViewError: The file cannot be written.
     """
-    part = path.with_name(f".{path.name}.part")
+    part = path.with_name(f".{path.name}{suffix}")
     try:
         if path.is_dir():
             raise unwritable(path, "it is a directory")
+        part.touch()
         yield part
         part.replace(path)
     except OSError as error:
@@ -32,7 +33,7 @@ def whole_file(path: Path) -> Iterator[Path]:
 
 
 def unwritable(path: Path, why: OSError | str) -> ViewError:
-    """The error of a file that cannot be written."""
+    """The error for a file that cannot be written."""
     if isinstance(why, OSError):
         why = os.strerror(why.errno) if why.errno else str(why)
     return ViewError(f"{path}: cannot be written: {why}")

@@ -4,19 +4,19 @@ Each is a function of the chosen part of a recording that gives a Matplotlib fig
 writes several into files.
 """
 
-from tussle.view.plots.choice import Choice, Tracks
 from tussle.view.plots.counts import captures, left
 from tussle.view.plots.curves import altitude, distance, speed
 from tussle.view.plots.files import KINDS, Plots, write_plots
 from tussle.view.plots.maps import density, trajectory, trajectory3d
+from tussle.view.plots.selection import Selection, Trajectories
 from tussle.view.plots.sheet import FORMATS, plot_style
 
 __all__ = [
     "FORMATS",
     "KINDS",
-    "Choice",
     "Plots",
-    "Tracks",
+    "Selection",
+    "Trajectories",
     "altitude",
     "captures",
     "density",

@@ -1,4 +1,4 @@
-"""Plots of counts over time: who is left of each team, captures and collisions so far."""
+"""Plots of counts over time: entities left, captures, collisions."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from tussle.batch.report.drawing import rule_y
 from tussle.errors import ParameterError
 from tussle.palette import INK, MUTED, colour_of
-from tussle.view.plots.choice import Tracks
+from tussle.view.plots.selection import Trajectories
 from tussle.view.plots.sheet import Handle, add_head, line_look, line_sign, mark_sign, sheet, time_axis
 
 if TYPE_CHECKING:
@@ -18,13 +18,13 @@ if TYPE_CHECKING:
 
 
 MOST_MARKS = 80
-"""Deaths of one team that are marked one by one."""
+"""Deaths of a team up to which each is marked."""
 CAUSE_MARKS = ("x", "+", "d", "1")
-"""Of why one died, in order of the alphabet; where there are more causes, the last stands for all the rest."""
+"""Markers of causes of death in alphabetical order; the last one stands for all further causes."""
 
 
-def left(tracks: Tracks) -> Figure:
-    """How many of each team are there over time, with a mark for each death and its cause."""
+def left(tracks: Trajectories) -> Figure:
+    """Number of entities of each team over time, with a mark for each death and its cause."""
     figure = sheet(2.5)
     axes: Any = figure.subplots()
     n_frames = len(tracks.frame_times)
@@ -39,12 +39,12 @@ def left(tracks: Tracks) -> Figure:
     _whole_numbers(axes)
     axes.set_ylabel("entities")
     time_axis(axes, tracks.frame_times)
-    add_head(figure, tracks, "Who is left", [*signs, *_cause_signs(tracks, causes)])
+    add_head(figure, tracks, "Entities left", [*signs, *_cause_signs(tracks, causes)])
     return figure
 
 
-def captures(tracks: Tracks) -> Figure:
-    """Captures of each team and collisions so far, counted from the begin of the span.
+def captures(tracks: Trajectories) -> Figure:
+    """Captures of each team and collisions since the beginning of the span.
 
     Raises:
         ParameterError: There are none.
@@ -75,21 +75,21 @@ def captures(tracks: Tracks) -> Figure:
     return figure
 
 
-def has_captures(tracks: Tracks) -> bool:
-    """Whether there is anything to be seen in the plot of captures."""
+def has_captures(tracks: Trajectories) -> bool:
+    """Whether the plot of captures has data."""
     return bool(_captures(tracks) or _collisions(tracks))
 
 
-def _is_chosen(tracks: Tracks, who: int) -> bool:
-    """Whether one is among the chosen teams and entities, there in the span or not."""
-    choice = tracks.choice
-    return (not choice.entities or who in choice.entities) and (
-        not choice.teams or tracks.team_of.get(who) in choice.teams
+def _is_chosen(tracks: Trajectories, who: int) -> bool:
+    """Whether an entity is selected by id and team, at any time."""
+    selection = tracks.selection
+    return (not selection.entities or who in selection.entities) and (
+        not selection.teams or tracks.team_of.get(who) in selection.teams
     )
 
 
-def _captures(tracks: Tracks) -> dict[int, list[float]]:
-    """Times of the captures by each team [s]; of chosen captors."""
+def _captures(tracks: Trajectories) -> dict[int, list[float]]:
+    """Times of the captures by selected entities [s], by team."""
     found: dict[int, list[float]] = {}
     for h in tracks.events:
         if h.kind == "capture" and h.id in tracks.team_of and _is_chosen(tracks, h.id):
@@ -97,8 +97,8 @@ def _captures(tracks: Tracks) -> dict[int, list[float]]:
     return found
 
 
-def _collisions(tracks: Tracks) -> list[float]:
-    """Times of the collisions in which a chosen one took part [s]."""
+def _collisions(tracks: Trajectories) -> list[float]:
+    """Times of the collisions of selected entities [s]."""
     return [
         h.t
         for h in tracks.events
@@ -106,13 +106,13 @@ def _collisions(tracks: Tracks) -> list[float]:
     ]
 
 
-def _staircase(axes: Axes, tracks: Tracks, times: list[float], **look: Any) -> None:
-    """The number of events so far, over the whole span."""
+def _staircase(axes: Axes, tracks: Trajectories, times: list[float], **look: Any) -> None:
+    """Draw the number of events so far over the whole span."""
     first, last = tracks.frame_times[0], tracks.frame_times[-1]
     axes.step([first, *times, last], [*range(len(times) + 1), len(times)], where="post", **look)
 
 
-def _mark_deaths(axes: Axes, tracks: Tracks, team: int, n: np.ndarray) -> set[str]:
+def _mark_deaths(axes: Axes, tracks: Trajectories, team: int, n: np.ndarray) -> set[str]:
     """Mark deaths of a team on its curve.
 
     Args:
@@ -137,14 +137,14 @@ def _mark_deaths(axes: Axes, tracks: Tracks, team: int, n: np.ndarray) -> set[st
     return {h.text for h in deaths}
 
 
-def _causes(tracks: Tracks) -> dict[str, str]:
+def _causes(tracks: Trajectories) -> dict[str, str]:
     """Mark of each cause of death in the recording."""
     texts = sorted({h.text for h in tracks.recording.events if h.kind == "death"})
     last = len(CAUSE_MARKS) - 1
     return {text: CAUSE_MARKS[min(i, last)] for i, text in enumerate(texts)}
 
 
-def _cause_signs(tracks: Tracks, seen: set[str]) -> list[Handle]:
+def _cause_signs(tracks: Trajectories, seen: set[str]) -> list[Handle]:
     """The marks that were drawn, each with all that it stands for."""
     words: dict[str, list[str]] = {}
     for text, mark in _causes(tracks).items():
@@ -154,7 +154,7 @@ def _cause_signs(tracks: Tracks, seen: set[str]) -> list[Handle]:
 
 
 def _whole_numbers(axes: Axes) -> None:
-    """Whole numbers from 0 on the y axis, when all is drawn."""
+    """Let the y axis start at 0, with whole numbers; called after drawing."""
     from matplotlib.ticker import MaxNLocator
 
     axes.yaxis.set_major_locator(MaxNLocator(6, integer=True, steps=[1, 2, 5, 10]))

@@ -11,7 +11,7 @@ from tussle.batch.report.drawing import rule_y, shortened
 from tussle.errors import ParameterError
 from tussle.palette import INK, MUTED, PAPER, colour_of, mixed
 from tussle.palette import TEAM_COLOURS as COLOURS
-from tussle.view.plots.choice import Choice, Tracks
+from tussle.view.plots.selection import Selection, Trajectories
 from tussle.view.plots.sheet import Handle, add_head, line_look, line_sign, mark_sign, sheet, time_axis
 from tussle.view.recording import Recording
 
@@ -21,37 +21,37 @@ if TYPE_CHECKING:
 
 
 MANY = 12
-"""Entities of a team from which on its curve is a band: more lines cannot be followed."""
+"""Largest team with a line for each entity; larger teams get a band."""
 MOST_TIMES = 400
-"""Points of a band: about one for two pixels."""
+"""Points of a band."""
 
 
-def speed(tracks: Tracks) -> Figure:
+def speed(tracks: Trajectories) -> Figure:
     """Speed over time: a line for each entity, a band of quantiles for a team of many."""
     return _over_time(tracks, tracks.speed, "Speed", "speed [m/s]")
 
 
-def altitude(tracks: Tracks) -> Figure:
+def altitude(tracks: Trajectories) -> Figure:
     """Altitude over time: a line for each entity, a band of quantiles for a team of many."""
     return _over_time(tracks, tracks.column("z"), "Altitude", "altitude [m]")
 
 
-def distance(recording: Recording, one: int, other: int, choice: Choice | None = None) -> Figure:
-    """Distance between two entities while both are there, with its least value.
+def distance(recording: Recording, one: int, other: int, selection: Selection | None = None) -> Figure:
+    """Distance between two entities while both exist, with its least value.
 
     Args:
-        recording: What was recorded.
+        recording: The recorded run.
         one: Id of the first.
         other: Id of the second.
-        choice: Its times say when; the rest of it means nothing here.
+        selection: Only its times are used.
 
     Raises:
-        ParameterError: One is not there, or not at any time when the other is, or they are one.
+        ParameterError: An entity does not exist, the two never exist at the same time, or they are the same.
     """
     if one == other:
         raise ParameterError(f"the distance from entity {one} to itself is 0; it takes two entities")
-    times = choice or Choice()
-    tracks = Tracks(recording, Choice(entities=(one, other), start=times.start, end=times.end))
+    times = selection or Selection()
+    tracks = Trajectories(recording, Selection(entities=(one, other), start=times.start, end=times.end))
     frames, metres = _apart(tracks, one, other)
     t = tracks.frame_times[frames]
     figure = sheet(2.3)
@@ -72,12 +72,12 @@ def distance(recording: Recording, one: int, other: int, choice: Choice | None =
     time_axis(axes, t)
     rule_y(axes)
     names = (f"{who} ({shortened(tracks.teams[tracks.team_of[who]], 12)})" for who in (one, other))
-    add_head(figure, tracks, "Between {} and {}".format(*names), signs)
+    add_head(figure, tracks, "Distance between {} and {}".format(*names), signs)
     return figure
 
 
-def _apart(tracks: Tracks, one: int, other: int) -> tuple[np.ndarray, np.ndarray]:
-    """Frames in which both are there, (T,), and their distance in these [m], (T,)."""
+def _apart(tracks: Trajectories, one: int, other: int) -> tuple[np.ndarray, np.ndarray]:
+    """Frames in which both exist, (T,), and their distance [m], (T,)."""
     pos = tracks.pos()
     first, second = (slice(*tracks.first[i : i + 2]) for i in np.searchsorted(tracks.who, (one, other)))
     both, mine, its = np.intersect1d(
@@ -85,19 +85,19 @@ def _apart(tracks: Tracks, one: int, other: int) -> tuple[np.ndarray, np.ndarray
     )
     if not len(both):
         spans = (
-            f"{who} is there from {tracks.t[rows][0]:g} s to {tracks.t[rows][-1]:g} s"
+            f"{who} exists from {tracks.t[rows][0]:g} s to {tracks.t[rows][-1]:g} s"
             for who, rows in ((one, first), (other, second))
         )
         raise ParameterError(
-            f"{tracks.recording.path}: entities {one} and {other} are never there together: {', '.join(spans)}"
+            f"{tracks.recording.path}: entities {one} and {other} never exist at the same time: {', '.join(spans)}"
         )
     return both, np.linalg.norm(pos[first][mine] - pos[second][its], axis=1)
 
 
-def _over_time(tracks: Tracks, values: np.ndarray, what: str, label: str) -> Figure:
+def _over_time(tracks: Trajectories, values: np.ndarray, what: str, label: str) -> Figure:
     figure = sheet(2.5)
     axes: Any = figure.subplots()
-    if tracks.choice.entities and len(tracks) <= len(COLOURS):
+    if tracks.selection.entities and len(tracks) <= len(COLOURS):
         signs = _named_lines(axes, tracks, values)
     else:
         signs = _teams_over_time(axes, tracks, values)
@@ -109,7 +109,7 @@ def _over_time(tracks: Tracks, values: np.ndarray, what: str, label: str) -> Fig
     return figure
 
 
-def _named_lines(axes: Axes, tracks: Tracks, values: np.ndarray) -> list[Handle]:
+def _named_lines(axes: Axes, tracks: Trajectories, values: np.ndarray) -> list[Handle]:
     """A line for each entity, in a colour of its own."""
     signs = []
     for i, (who, team, rows) in enumerate(tracks.each()):
@@ -120,7 +120,7 @@ def _named_lines(axes: Axes, tracks: Tracks, values: np.ndarray) -> list[Handle]
     return signs + _death_sign(tracks)
 
 
-def _teams_over_time(axes: Axes, tracks: Tracks, values: np.ndarray) -> list[Handle]:
+def _teams_over_time(axes: Axes, tracks: Trajectories, values: np.ndarray) -> list[Handle]:
     """Bands below, lines above them."""
     count = {team: int((tracks.team == team).sum()) for team in tracks.teams}
     many = [team for team in count if count[team] > MANY]
@@ -137,32 +137,25 @@ def _teams_over_time(axes: Axes, tracks: Tracks, values: np.ndarray) -> list[Han
     return signs + (_death_sign(tracks) if len(many) < len(count) else [])
 
 
-def _line(axes: Axes, tracks: Tracks, values: np.ndarray, rows: slice, **options: Any) -> None:
-    """Draw one entity's values; broken where it was not there."""
+def _line(axes: Axes, tracks: Trajectories, values: np.ndarray, rows: slice, **options: Any) -> None:
+    """Draw the values of one entity, with gaps where it did not exist."""
     t, v = tracks.t[rows], values[rows]
     breaks = np.flatnonzero(tracks.is_breaking[rows])[1:]
     axes.plot(np.insert(t, breaks, np.nan), np.insert(v, breaks, np.nan), zorder=2.5, **options)
 
 
-def _cross(axes: Axes, tracks: Tracks, values: np.ndarray, who: int, rows: slice, colour: str) -> None:
-    """Mark the death of one, if it died."""
+def _cross(axes: Axes, tracks: Trajectories, values: np.ndarray, who: int, rows: slice, colour: str) -> None:
+    """Mark the death of an entity, if it died."""
     if who in tracks.deaths:
-        axes.plot(
-            tracks.t[rows][-1],
-            values[rows][-1],
-            "x",
-            color=colour,
-            markersize=4.5,
-            markeredgewidth=1.2,
-            zorder=3,
-        )
+        look: dict[str, Any] = {"color": colour, "markersize": 4.5, "markeredgewidth": 1.2, "zorder": 3}
+        axes.plot(tracks.t[rows][-1], values[rows][-1], "x", **look)
 
 
-def _death_sign(tracks: Tracks) -> list[Handle]:
+def _death_sign(tracks: Trajectories) -> list[Handle]:
     return [(mark_sign("x", MUTED), "died")] if tracks.deaths else []
 
 
-def _band(axes: Axes, tracks: Tracks, values: np.ndarray, team: int) -> None:
+def _band(axes: Axes, tracks: Trajectories, values: np.ndarray, team: int) -> None:
     """Median, middle half and middle nine tenths of a team over time."""
     frames = np.unique(np.linspace(0, len(tracks.frame_times) - 1, MOST_TIMES).round().astype(int))
     mine = np.repeat(tracks.team == team, np.diff(tracks.first)) & np.isin(tracks.frame, frames)

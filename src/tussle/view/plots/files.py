@@ -10,17 +10,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tussle.errors import ParameterError, ViewError, listed, nearest_name
-from tussle.view.plots.choice import Choice, Tracks
 from tussle.view.plots.counts import captures, has_captures, left
 from tussle.view.plots.curves import altitude, distance, speed
-from tussle.view.plots.maps import MOST_TRACKS, density, trajectory, trajectory3d
-from tussle.view.plots.sheet import check_format, plot_style, save
+from tussle.view.plots.maps import MAX_TRAJECTORIES, density, trajectory, trajectory3d
+from tussle.view.plots.selection import Selection, Trajectories
+from tussle.view.plots.sheet import FORMATS, plot_style, save
 from tussle.view.recording import Recording
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-PLOTS: Mapping[str, Callable[[Tracks], Figure]] = {
+PLOTS: Mapping[str, Callable[[Trajectories], Figure]] = {
     "trajectory": trajectory,
     "trajectory3d": trajectory3d,
     "speed": speed,
@@ -33,16 +33,16 @@ DISTANCE = "distance"
 KINDS = (*PLOTS, DISTANCE)
 """Names of the plots."""
 FLAT = 1e-3
-"""Heights that differ by less are one [m]."""
+"""Heights that differ by less are equal [m]."""
 
 
 @dataclass(frozen=True)
 class Plots:
-    """Plots that have been written.
+    """Plots that were written.
 
     Attributes:
         files: The files, in the order of their kinds.
-        notes: What who looks at them should know, one line each.
+        notes: What the user should know, one line each.
     """
 
     files: tuple[Path, ...]
@@ -53,36 +53,39 @@ def write_plots(
     recording: Recording,
     directory: str | Path,
     kinds: Sequence[str] = (),
-    choice: Choice | None = None,
+    selection: Selection | None = None,
     between: tuple[int, int] | None = None,
     form: str = "png",
 ) -> Plots:
     """Write plots of a recording, one file each; the same recording gives the same bytes.
 
     Args:
-        recording: What was recorded.
-        directory: Where to; made if need be.
-        kinds: Which plots, of `KINDS`; by default the distance where two entities are given, else all that show something.
-        choice: Who is plotted, and when.
+        recording: The recorded run.
+        directory: Directory of the files; made if it does not exist.
+        kinds: Plots, of `KINDS`; by default the distance if two entities are given, else all that have data.
+        selection: Entities and times.
         between: Ids of the two whose distance is plotted.
         form: "png", "svg" or "pdf".
 
     Raises:
-        ParameterError: There is no such plot, format, team or entity, or nothing of what was recorded is chosen.
+        ParameterError: A plot, format, team or entity does not exist, or the selection is empty.
         ViewError: Nothing was recorded, or a file cannot be written.
         MissingExtraError: Matplotlib is not installed.
     """
-    check_format(form)
-    _check_kinds(kinds, between)
-    chosen = choice or Choice()
+    _check(kinds, between, form)
+    chosen = selection or Selection()
     is_all = not kinds and between is None
     names = list(dict.fromkeys(kinds)) or ([DISTANCE] if between else list(PLOTS))
     notes: list[str] = []
     with plot_style():
-        tracks = Tracks(recording, chosen) if names != [DISTANCE] else None
+        tracks = Trajectories(recording, chosen) if names != [DISTANCE] else None
         if is_all and tracks is not None:
-            names, notes = _worth_showing(tracks)
-        place = _made(Path(directory))
+            names, notes = _with_data(tracks)
+        place = Path(directory)
+        try:
+            place.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise ViewError(f"{place}: the plots cannot be written: {error.strerror or error}") from error
         files, missing = [], set()
         for name in names:
             if name == DISTANCE:
@@ -95,13 +98,15 @@ def write_plots(
             files.append(place / f"{name}{suffix}{world}.{form}")
             missing |= set(save(figure, files[-1], form))
     if tracks is not None:
-        notes += _notes_of_ways(tracks, names)
+        notes += _notes_of_lines(tracks, names)
     if missing:
         notes.append(f"the font has no {''.join(sorted(missing))}")
     return Plots(tuple(files), (*dict.fromkeys(recording.notes), *notes))
 
 
-def _check_kinds(kinds: Sequence[str], between: tuple[int, int] | None) -> None:
+def _check(kinds: Sequence[str], between: tuple[int, int] | None, form: str) -> None:
+    if form not in FORMATS:
+        raise ParameterError(f"there is no format {form!r}{nearest_name(form, FORMATS)}; {listed(FORMATS)}")
     for kind in kinds:
         if kind not in KINDS:
             raise ParameterError(f"there is no plot {kind!r}{nearest_name(kind, KINDS)}; {listed(KINDS)}")
@@ -113,34 +118,26 @@ def _check_kinds(kinds: Sequence[str], between: tuple[int, int] | None) -> None:
         )
 
 
-def _worth_showing(tracks: Tracks) -> tuple[list[str], list[str]]:
-    """The plots that show something, and why the others do not."""
+def _with_data(tracks: Trajectories) -> tuple[list[str], list[str]]:
+    """The plots that have data, and notes on the others."""
     names, notes = list(PLOTS), []
     height = tracks.column("z")
     if np.ptp(height) < FLAT:
         names = [name for name in names if name not in ("altitude", "trajectory3d")]
         notes.append(
-            f"altitude and trajectory3d are left out: all are at {height[0]:g} m; kinds that are named are drawn all the same"
+            f"altitude and trajectory3d are left out: all are at {height[0]:g} m; kinds that are named are always drawn"
         )
-    if tracks.choice.entities:
+    if tracks.selection.entities:
         names = [name for name in names if name not in ("left", "captures")]
     elif not has_captures(tracks):
         names.remove("captures")
     return names, notes
 
 
-def _notes_of_ways(tracks: Tracks, names: Sequence[str]) -> list[str]:
-    """That not all ways are drawn, if so."""
-    if len(tracks) <= MOST_TRACKS or not {"trajectory", "trajectory3d"} & set(names):
+def _notes_of_lines(tracks: Trajectories, names: Sequence[str]) -> list[str]:
+    """A note if not all trajectories are drawn."""
+    if len(tracks) <= MAX_TRAJECTORIES or not {"trajectory", "trajectory3d"} & set(names):
         return []
     return [
-        f"{MOST_TRACKS} of {len(tracks)} ways are drawn, evenly through all ids; choose teams or entities to see others"
+        f"{MAX_TRAJECTORIES} of {len(tracks)} trajectories are drawn, evenly spaced by id; select teams or entities to see others"
     ]
-
-
-def _made(directory: Path) -> Path:
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ViewError(f"{directory}: the plots cannot be written: {error.strerror or error}") from error
-    return directory

@@ -2,49 +2,58 @@
 
 from __future__ import annotations
 
-import math
-import time
+import itertools
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Self
+from typing import Any
 
 import numpy as np
 
-from tussle.errors import ViewError
-from tussle.view.export.film.cameras import CAMERAS, Camera, Follow
-from tussle.view.export.film.caption import Caption
-from tussle.view.export.film.encoders import Encoder, GifEncoder, mp4_encoder, png_encoder
+from tussle.errors import MissingExtraError, ViewError
+from tussle.view.export.film.cameras import Camera, camera_of
+from tussle.view.export.film.captions import Captions
 from tussle.view.export.film.moments import Moments
 from tussle.view.export.film.options import FilmOptions
-from tussle.view.export.film.stage import Stage
-from tussle.view.export.film.tracks import Tracks
+from tussle.view.export.film.renderer import Renderer
+from tussle.view.export.film.trails import Trails
+from tussle.view.export.whole_file import whole_file
 from tussle.view.recording import Recording
+from tussle.view.scenery import round_up
 
-FILM_LARGER, PICTURE_LARGER = 1.5, 2.5
-"""Factors by which pictures of a film and a single picture are drawn larger than they are shown. Making them smaller smooths edges;
-the graphics library takes twice the time for the same."""
-LARGEST_DRAWN = 8192
-"""Pixels that every graphics library can draw side by side."""
-USUAL_LENGTH = 30.0
-"""Length that a film has at most when no speed is said [s]."""
+FILM_SCALE, PICTURE_SCALE = 1.5, 2.5
+"""Factors by which pictures are drawn larger than they are written; reducing them smooths edges at half the cost of VTK's smoothing."""
+MAX_DRAWN = 8192
+"""Width and height [pixels] that every graphics library can draw."""
+DEFAULT_DURATION = 30.0
+"""Longest film at the default speed [s]."""
 TRAIL = 9.0
-"""Length of a trail when none is said, in lengths of a model at the usual speed."""
+"""Default length of a trail, in lengths of a model at the median speed."""
+GIF_WIDTH, GIF_FPS, GIF_COLOURS = 640, 12.5, 128
+"""Largest width, pictures per second and colours of a GIF, which has no motion compression."""
+N_PALETTE_SAMPLES = 4
+PART = ".part.mp4"
+"""Suffix of an unfinished film, by which imageio chooses ffmpeg."""
+H264 = ("-preset", "veryfast", "-crf", "23", "-movflags", "+faststart")
+
+Arrange = Callable[[float], None]
+"""Arranges a scene as at a time [s]."""
+Count = Callable[[], None]
+"""Called after each picture."""
+_Writer = Callable[[Path, Renderer, Moments, FilmOptions, Arrange, Count], None]
 
 
 @dataclass
 class FilmReport:
-    """What came of a film.
+    """A film that was written.
 
     Attributes:
-        n_pictures: Pictures of the film; 0 when only a single one was asked for.
-        start: Time of the first [s].
-        stop: Time of the last [s].
+        n_pictures: Pictures of the film; of the MP4 if a GIF was written too.
+        start: Time of the first picture [s].
+        stop: Time of the last picture [s].
         speed: Simulated seconds per second of film.
         duration: Length of the film [s].
-        seconds: Wall time of its parts [s]: "plan", "read", "draw", "write" and "encode", the last of which is waiting for what other
-            processes do meanwhile.
         notes: What the user should know, one line each.
     """
 
@@ -53,22 +62,7 @@ class FilmReport:
     stop: float = 0.0
     speed: float = 1.0
     duration: float = 0.0
-    seconds: dict[str, float] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
-
-    @contextmanager
-    def timed(self, part: str) -> Iterator[None]:
-        """Adds the wall time of what is done inside."""
-        began = time.perf_counter()
-        try:
-            yield
-        finally:
-            self.seconds[part] = self.seconds.get(part, 0.0) + time.perf_counter() - began
-
-    @property
-    def pictures_per_second(self) -> float:
-        """How fast the film was made."""
-        return self.n_pictures / max(sum(self.seconds.values()), 1e-9)
 
 
 def write_film(
@@ -80,35 +74,59 @@ def write_film(
     options: FilmOptions | None = None,
     show: Callable[[int, int], None] | None = None,
 ) -> FilmReport:
-    """Film a recorded run; of one that was cut short, what there is.
+    """Film a recorded run, complete or not.
 
     Args:
         recording: The run.
-        mp4: File for a film in H.264, which browsers and slides play.
-        gif: File for a film for places that take only pictures; smaller and with fewer pictures per second.
-        png: File for one picture.
-        options: How; the films share it.
-        show: Told after each picture how many are done, and of how many.
+        mp4: File of a film in H.264, which browsers and slides play.
+        gif: File of a GIF: smaller, with fewer pictures per second.
+        png: File of one picture.
+        options: How to film.
+        show: Called after each picture with the numbers of pictures drawn and to draw.
 
     Raises:
-        ViewError: There is nothing to film, who is to be followed is not there, nothing can draw, or a file cannot be written.
+        ViewError: There is nothing to film or draw with, the followed entity is never there, or a file cannot be written.
         MissingExtraError: A package is not installed.
     """
     options = options or FilmOptions()
     report = FilmReport()
-    with report.timed("plan"):
-        moments = plan(recording, options, report)
-        camera = camera_of(moments, options)
+    moments = plan(recording, options, report)
     if png is not None:
-        write_picture(Path(png), moments, camera, options, report)
-    if mp4 is not None or gif is not None:
-        files = [None if path is None else Path(path) for path in (mp4, gif)]
-        write_pictures(files[0], files[1], moments, camera, options, report, show)
+        _write_picture(Path(png), moments, options, report)
+    wanted: list[tuple[str | Path | None, FilmOptions, _Writer]] = [
+        (mp4, options, _write_mp4),
+        (gif, gif_options(options), _write_gif),
+    ]
+    films = [
+        (Path(path), chosen, write, Moments(recording, report.start, report.stop, report.speed, chosen.fps))
+        for path, chosen, write in wanted
+        if path is not None
+    ]
+    n_pictures = sum(len(moments) for *_, moments in films)
+
+    drawn = itertools.count(1)
+
+    def count() -> None:
+        n = next(drawn)
+        if show is not None:
+            show(n, n_pictures)
+
+    for path, chosen, write, moments in films:
+        camera = camera_of(moments, chosen)
+        with (
+            whole_file(path, PART) as part,
+            _scene(moments, camera, chosen, FILM_SCALE, report.speed) as (renderer, arrange),
+        ):
+            write(part, renderer, moments, chosen, arrange, count)
+            if not part.stat().st_size:
+                raise ViewError(f"{path}: cannot be written: ffmpeg wrote nothing")
+        if not report.n_pictures:
+            report.n_pictures, report.duration = len(moments), len(moments) / chosen.fps
     return report
 
 
 def plan(recording: Recording, options: FilmOptions, report: FilmReport) -> Moments:
-    """The moments that are filmed; what is not as it was asked for goes into the report's notes.
+    """The pictures of a film; limits that differ from the wanted ones go into the report's notes.
 
     Raises:
         ViewError: There is nothing to film.
@@ -131,97 +149,57 @@ def plan(recording: Recording, options: FilmOptions, report: FilmReport) -> Mome
         report.notes.append(
             f"the run is recorded until t = {last:g} s; the film ends there, not at {stop:g} s"
         )
-    start, stop = max(start, first), min(stop, last)
-    speed = usual_speed(stop - start) if options.speed is None else options.speed
-    moments = Moments(recording, start, stop, speed, options.fps)
-    report.start, report.stop, report.speed = start, stop, speed
-    return moments
+    report.start, report.stop = max(start, first), min(stop, last)
+    report.speed = options.speed or default_speed(report.stop - report.start)
+    return Moments(recording, report.start, report.stop, report.speed, options.fps)
 
 
-def usual_speed(span: float) -> float:
-    """The least of 1, 2, 5, 10, 20, ... with which so many simulated seconds are a film of half a minute or less."""
-    wanted = max(1.0, span / USUAL_LENGTH)
-    power = 10.0 ** math.floor(math.log10(wanted) + 1e-9)
-    return next(f * power for f in (1.0, 2.0, 5.0, 10.0) if f * power >= wanted * (1.0 - 1e-9))
+def default_speed(span: float) -> float:
+    """The least of 1, 2, 5, 10, 20, ... with which a film of so many simulated seconds takes half a minute or less."""
+    return round_up(max(1.0, span / DEFAULT_DURATION))
 
 
-def camera_of(moments: Moments, options: FilmOptions) -> Camera:
-    """The eye of a film.
-
-    Raises:
-        ViewError: Who is to be followed is not there.
-    """
-    if options.camera == "follow":
-        return Follow(moments, options.size, options.zoom, options.scale, options.follow)
-    return CAMERAS[options.camera](moments, options.size, options.zoom, options.scale)
+def gif_options(options: FilmOptions) -> FilmOptions:
+    """Options of a GIF: one picture in a whole number of the film's, at most `GIF_WIDTH` wide."""
+    share = min(1.0, GIF_WIDTH / options.size[0])
+    width, height = (max(16, 2 * round(0.5 * share * n)) for n in options.size)
+    return replace(options, size=(width, height), fps=options.fps / max(1, round(options.fps / GIF_FPS)))
 
 
-class Easel:
-    """All that makes pictures of one size.
+@contextmanager
+def _scene(
+    moments: Moments, camera: Camera, options: FilmOptions, scale: float, speed: float
+) -> Iterator[tuple[Renderer, Arrange]]:
+    """A renderer, and a function that arranges its scene as at a time [s]."""
+    scale = min(scale, MAX_DRAWN / max(options.size))
+    width, height = (round(scale * n) for n in options.size)
+    recording = moments.recording
+    with Renderer(recording.style, recording.scenery, (width, height), scale) as renderer:
+        length = default_trail(moments, camera) if options.trails is None else options.trails
+        trails = Trails(moments, length)
+        captions = Captions(renderer, recording, options, speed)
 
-    Args:
-        moments: The film.
-        camera: Its eye.
-        options: How it is made.
-        larger: Factor by which pictures are drawn larger than they are shown.
-        speed: What the caption says of it; 0 for a picture that stands still.
-        report: Where wall times go.
+        def arrange(t: float) -> None:
+            frame, view = moments.at(t), camera.view(t)
+            renderer.show(frame, view, trails.lines(frame, view))
+            captions.show(frame, view)
 
-    Attributes:
-        drawn: Width and height of the pictures [pixels].
-    """
-
-    def __init__(
-        self,
-        moments: Moments,
-        camera: Camera,
-        options: FilmOptions,
-        larger: float,
-        speed: float,
-        report: FilmReport,
-    ) -> None:
-        larger = min(larger, LARGEST_DRAWN / max(options.size))
-        self.drawn = (round(larger * options.size[0]), round(larger * options.size[1]))
-        recording = moments.recording
-        self._moments, self._camera, self._report = moments, camera, report
-        self._stage = Stage(recording.style, recording.scenery, self.drawn, larger)
-        trail = usual_trail(moments, camera) if options.trails is None else options.trails
-        self._tracks = Tracks(moments, trail)
-        self._caption = Caption(recording, self.drawn, speed, options.captions, options.labels)
-
-    def picture(self, t: float) -> np.ndarray:
-        """What is seen at a time [s], (height, width, 4), uint8: red, green, blue, and nothing."""
-        with self._report.timed("read"):
-            frame, view = self._moments.at(t), self._camera.view(t)
-            lines = self._tracks.lines(frame, view)
-        with self._report.timed("draw"):
-            picture = self._stage.draw(frame, view, lines)
-        with self._report.timed("write"):
-            self._caption.draw(picture, frame, view)
-        return picture
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._stage.close()
+        yield renderer, arrange
 
 
-def usual_trail(moments: Moments, camera: Camera) -> float:
-    """How much of the past is shown of entities at the usual speed [s]."""
+def default_trail(moments: Moments, camera: Camera) -> float:
+    """Duration of the trail of an entity at the median speed [s]."""
     middle = float(moments.t[len(moments) // 2])
     vel = np.linalg.norm(moments.at(middle).vel, axis=1)
     speed = float(np.median(vel)) if len(vel) else 0.0
     return TRAIL * camera.view(middle).model_length / speed if speed > 1e-6 else 0.0
 
 
-def write_picture(
-    path: Path, moments: Moments, camera: Camera, options: FilmOptions, report: FilmReport
-) -> None:
+def _write_picture(path: Path, moments: Moments, options: FilmOptions, report: FilmReport) -> None:
     """Write one picture.
 
     Raises:
-        ViewError: It is of a time that is not recorded, or cannot be drawn or written.
+        ViewError: Its time is not recorded, or it cannot be drawn or written.
     """
     first, last = float(moments.recording.t[0]), float(moments.recording.t[-1])
     at = 0.5 * (report.start + report.stop) if options.at is None else options.at
@@ -229,41 +207,78 @@ def write_picture(
         raise ViewError(
             f"{moments.recording.path}: there is no picture of t = {at:g} s: the run is recorded from t = {first:g} s to {last:g} s"
         )
+    camera = camera_of(moments, options)
     with (
-        Easel(moments, camera, options, PICTURE_LARGER, 0.0, report) as easel,
-        png_encoder(path, easel.drawn, options.size) as encoder,
+        whole_file(path) as part,
+        _scene(moments, camera, options, PICTURE_SCALE, 0.0) as (renderer, arrange),
     ):
-        encoder.put(easel.picture(at))
+        arrange(at)
+        _reduced(renderer.picture(), options).save(part, format="png")
 
 
-def write_pictures(
-    mp4: Path | None,
-    gif: Path | None,
-    moments: Moments,
-    camera: Camera,
-    options: FilmOptions,
-    report: FilmReport,
-    show: Callable[[int, int], None] | None,
+def _reduced(picture: np.ndarray, options: FilmOptions) -> Any:
+    """A picture in the size of the file, as an image of Pillow."""
+    from PIL import Image
+
+    return Image.fromarray(picture).resize(options.size, Image.Resampling.BOX)
+
+
+def _write_mp4(
+    path: Path, renderer: Renderer, moments: Moments, options: FilmOptions, arrange: Arrange, count: Count
 ) -> None:
-    """Write a film to one file or two.
+    """Write a film in H.264.
 
     Raises:
-        ViewError: It cannot be drawn, or a file cannot be written.
+        MissingExtraError: A package that PyVista needs is not installed.
+        ViewError: There is no ffmpeg for this machine.
     """
-    n = len(moments)
-    with Easel(moments, camera, options, FILM_LARGER, moments.speed, report) as easel, ExitStack() as files:
-        encoders: list[Encoder] = []
-        if mp4 is not None:
-            encoders.append(files.enter_context(mp4_encoder(mp4, easel.drawn, options.size, options.fps)))
-        if gif is not None:
-            encoders.append(files.enter_context(GifEncoder(gif, easel.drawn, options.size, options.fps)))
-        for k, t in enumerate(moments.t):
-            picture = easel.picture(float(t))
-            with report.timed("encode"):
-                for encoder in encoders:
-                    encoder.put(picture)
-            report.n_pictures, report.duration = k + 1, (k + 1) / options.fps
-            if show is not None:
-                show(k + 1, n)
-        with report.timed("encode"):
-            files.close()
+    try:
+        import imageio  # noqa: F401
+        import imageio_ffmpeg  # type: ignore[import-untyped]
+
+        imageio_ffmpeg.get_ffmpeg_exe()
+    except ImportError as error:
+        raise MissingExtraError(
+            "films need imageio and imageio-ffmpeg, which are not installed: pip install 'tussle[view]'"
+        ) from error
+    except RuntimeError as error:
+        raise ViewError(f"films need ffmpeg, and imageio-ffmpeg brings none here: {error}") from error
+    plotter, (width, height) = renderer.plotter, options.size
+    plotter.open_movie(
+        path, framerate=options.fps, quality=None, macro_block_size=1, ffmpeg_log_level="error",
+        output_params=["-vf", f"scale={width}:{height}:flags=area", *H264],
+    )  # fmt: skip
+    for t in moments.t:
+        arrange(float(t))
+        try:
+            plotter.write_frame()
+        except OSError as error:
+            raise OSError(f"ffmpeg failed: {str(error).splitlines()[0]}") from error
+        count()
+    plotter.mwriter.close()
+
+
+def _write_gif(
+    path: Path, renderer: Renderer, moments: Moments, options: FilmOptions, arrange: Arrange, count: Count
+) -> None:
+    """Write a GIF with one palette, that of some of its pictures: a palette for each would double its size."""
+    from PIL import Image
+
+    def picture(t: float) -> Any:
+        arrange(float(t))
+        return _reduced(renderer.picture(), options)
+
+    def pictures() -> Iterator[Any]:
+        for t in moments.t:
+            yield picture(t).quantize(palette=palette, dither=Image.Dither.NONE)
+            count()
+
+    samples = moments.t[np.linspace(0, len(moments) - 1, N_PALETTE_SAMPLES).astype(int)]
+    together = Image.fromarray(np.concatenate([np.asarray(picture(t)) for t in samples]))
+    palette = together.quantize(
+        GIF_COLOURS, Image.Quantize.FASTOCTREE
+    )  # the other methods lose teams, or the ground
+    images = pictures()
+    next(images).save(
+        path, format="gif", save_all=True, append_images=images, duration=1000.0 / options.fps, loop=0
+    )

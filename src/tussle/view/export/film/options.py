@@ -1,4 +1,4 @@
-"""What one may choose about a film."""
+"""Options of a film."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 from tussle.errors import ParameterError, listed, nearest_name
-from tussle.view.export.film.cameras import CAMERAS
 
+CAMERAS = ("overview", "top", "follow")
 LEAST_SIZE, MOST_SIZE = 16, 7680
 MOST_FPS = 240.0
 LEAST_FACTOR, MOST_FACTOR = 1e-6, 1e6
@@ -15,7 +15,7 @@ LEAST_FACTOR, MOST_FACTOR = 1e-6, 1e6
 
 @dataclass(frozen=True)
 class FilmOptions:
-    """How a film is made.
+    """Options of a film.
 
     Args:
         camera: "overview", "top" or "follow".
@@ -26,11 +26,11 @@ class FilmOptions:
         fps: Pictures per second.
         size: Width and height [pixels], even numbers.
         at: Time of a single picture [s]; by default the middle of the film.
-        trails: How much of the past a trail shows [s], 0 for none; by default what suits the picture.
-        labels: Ids stand beside entities.
-        captions: The time, the teams and the size of the grid are written on it.
-        zoom: Factor by which the eye is nearer than it would be.
-        scale: Factor by which models are larger than they would be.
+        trails: Duration that a trail shows [s], 0 for none; by default chosen by speed and size of the entities.
+        labels: Show ids of entities.
+        captions: Show time, teams, title and size of the grid.
+        zoom: Zoom factor.
+        scale: Factor by which models are enlarged.
 
     Raises:
         ParameterError: A value is not allowed.
