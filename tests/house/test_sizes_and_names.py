@@ -49,10 +49,6 @@ def test_modules_have_names_that_say_something():
     ]
 
 
-STILL_SHARED = "Base Choice Comparison Game Messages Publisher Source Table Tracks Whole"
-"""Names that a class of `view`, `batch` or `cli` shares with another one."""
-
-
 def test_public_classes_have_names_of_their_own():
     places = defaultdict(list)
     for path in python_files("src"):
@@ -60,8 +56,7 @@ def test_public_classes_have_names_of_their_own():
             for node in parsed(path).body:
                 if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                     places[node.name].append(f"{relative(path)}:{node.lineno}")
-    shared = {name: at for name, at in places.items() if len(at) > 1}
-    assert not {name: shared[name] for name in shared.keys() - STILL_SHARED.split()}
+    assert not {name: at for name, at in places.items() if len(at) > 1}
 
 
 def test_modules_change_no_globals_and_leave_nothing_unimplemented():

@@ -13,7 +13,7 @@ import numpy as np
 from tussle.errors import ViewError
 from tussle.geodesy import Origin
 from tussle.mission import Block, Mission
-from tussle.scene import Cuboid, Plane, Polyhedron, Sphere, Volume
+from tussle.scene import Base, Cuboid, Plane, Polyhedron, Sphere, Volume
 from tussle.stock import Boundary
 from tussle.view.shapes import Mesh
 from tussle.view.solids import mesh_of, outline_of
@@ -23,23 +23,6 @@ LEAST_EXTENT = 50.0
 """Least width of the visible box [m]."""
 N_GRID_LINES = 20
 """Approximate number of lines of the default ground grid."""
-
-
-@dataclass(frozen=True, eq=False)
-class Base:
-    """The base of a team.
-
-    Attributes:
-        team: The team's number.
-        pos: Its centre [m], (3,).
-        radius: Its radius [m].
-        opacity: Its opacity, 0 to 1.
-    """
-
-    team: int
-    pos: np.ndarray
-    radius: float
-    opacity: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,9 +114,7 @@ def scenery_of(
         low=low,
         high=high,
         grid_step=float(spacing) if spacing > 0.0 else _grid_step(low, high),
-        bases=[
-            Base(b.team, np.array(b.position), b.radius, b.opacity) for b in (scene.bases if scene else ())
-        ],
+        bases=list(scene.bases) if scene else [],
         boundaries=[
             Region(name, team, shape, is_wall, mesh_of(shape, low, high), outline_of(shape, low, high))
             for name, team, shape, is_wall in (_shapes(mission) if mission is not None else ())

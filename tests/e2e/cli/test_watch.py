@@ -30,14 +30,14 @@ class Broken(Predator):
 
 FAILING = """\
 from tussle.stock import Predator
-from tussle.view.page.publisher import Publisher
+from tussle.view.page.publisher import FramePublisher
 
 
 def broken(self):
     raise RuntimeError("shapes are broken")
 
 
-Publisher._make_drawing = broken
+FramePublisher._make_drawing = broken
 
 
 class Hunter(Predator):

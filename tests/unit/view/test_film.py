@@ -14,7 +14,7 @@ from recorded_games import hunt, record
 from tussle import Block, Mission
 from tussle.errors import MissingExtraError, ParameterError, ViewError
 from tussle.geodesy import Origin
-from tussle.scene import Cuboid
+from tussle.scene import Base, Cuboid
 from tussle.stock import Boids, Still, Straight, Unicycle, UnicyclePID
 from tussle.view import Recording
 from tussle.view.export.film import FilmOptions, write_film
@@ -28,7 +28,7 @@ from tussle.view.export.film.prescan import crowd_of
 from tussle.view.export.film.renderer import Renderer, find_window
 from tussle.view.export.film.trails import Trails
 from tussle.view.frame import Frame
-from tussle.view.scenery import Base, Region, Scenery
+from tussle.view.scenery import Region, Scenery
 from tussle.view.solids import mesh_of, outline_of
 from tussle.view.terrain import Terrain
 
@@ -205,7 +205,7 @@ def test_scenery_is_drawn(flown):
     shape = Cuboid(center=(0, 0, 10), lengths=(60, 60, 20))
     low, high = np.full(3, -40.0), np.full(3, 40.0)
     things = {
-        "bases": [Base(1, np.array([10.0, 10.0, 0.0]), 8.0, 1.0)],
+        "bases": [Base(1, (10.0, 10.0, 0.0), 8.0, 1.0)],
         "boundaries": [
             Region("zone", 2, shape, False, mesh_of(shape, low, high), outline_of(shape, low, high))
         ],

@@ -14,10 +14,10 @@ from recorded_games import hunt, record
 from tussle.errors import MissingExtraError, ParameterError, ViewError
 from tussle.event_texts import event_text
 from tussle.geodesy import Origin
-from tussle.scene import Cuboid
+from tussle.scene import Base, Cuboid
 from tussle.view import MODELS, Recording
 from tussle.view.export.mcap_file import default_scale, write_mcap
-from tussle.view.scenery import Base, Region, Scenery
+from tussle.view.scenery import Region, Scenery
 from tussle.view.solids import mesh_of, outline_of
 from tussle.view.terrain import Terrain
 
@@ -284,7 +284,7 @@ def test_what_stands_is_in_the_scene(hunted, tmp_path, monkeypatch):
     mesh, outline = mesh_of(shape, low, high), outline_of(shape, low, high)
     regions = [Region(name, team, shape, False, mesh, outline) for name, team in (("zone", 2), ("free", 0))]
     scenery = Scenery(
-        Origin(), 10.0, 0.0, low, high, 10.0, [Base(1, np.array([1.0, 2.0, 3.0]), 8.0, 1.0)], regions,
+        Origin(), 10.0, 0.0, low, high, 10.0, [Base(1, (1.0, 2.0, 3.0), 8.0, 1.0)], regions,
         Terrain(np.arange(5.0), np.arange(4.0), np.ones((4, 5))),
     )  # fmt: skip
     monkeypatch.setitem(hunted.__dict__, "scenery", scenery)

@@ -120,7 +120,7 @@ def scenery_entities(recording: Recording, ns: int) -> list[fg.SceneEntity]:
     for i, base in enumerate(scenery.bases, 1):
         d = 2.0 * base.radius
         sphere = fg.SpherePrimitive(
-            pose=pose(base.pos.tolist()), size=fg.Vector3(x=d, y=d, z=d),
+            pose=pose(list(base.position)), size=fg.Vector3(x=d, y=d, z=d),
             color=colour(style.colour(base.team), 0.35 * base.opacity),
         )  # fmt: skip
         found.append(entity(f"base {i}", WORLD, ns, notes=[("team", str(base.team))], spheres=[sphere]))

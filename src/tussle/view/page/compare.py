@@ -144,7 +144,7 @@ class Comparison:
         low, high = np.minimum(one.low, other.low + self.shift), np.maximum(one.high, other.high + self.shift)
         if not self.shift.any():
             return replace(one, low=low, high=high)
-        bases = [replace(base, pos=base.pos + self.shift) for base in other.bases]
+        bases = [replace(base, position=tuple(np.add(base.position, self.shift))) for base in other.bases]
         regions = [
             replace(
                 r,

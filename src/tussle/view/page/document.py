@@ -145,7 +145,7 @@ def reach_of(mission: Mission | None) -> tuple[float, float]:
     return reach, angle
 
 
-def rounded(values: np.ndarray, digits: int) -> list[Any]:
+def rounded(values: Any, digits: int) -> list[Any]:
     """Return rounded numbers as nested lists of the array's shape."""
     flat: list[Any] = np.round(np.asarray(values, np.float64), digits).tolist()
     return flat
@@ -177,7 +177,7 @@ def scenery_data(scenery: Scenery) -> dict[str, Any]:
         "originLength": scenery.origin_length,
         "background": scenery.background and list(scenery.background),
         "bases": [
-            {"team": b.team, "pos": rounded(b.pos, digits), "radius": b.radius, "opacity": b.opacity}
+            {"team": b.team, "pos": rounded(b.position, digits), "radius": b.radius, "opacity": b.opacity}
             for b in scenery.bases
         ],
         "regions": [

@@ -71,7 +71,7 @@ class Reader:
         self.chosen = id
 
 
-class Publisher:
+class FramePublisher:
     """Encodes each frame once for all browsers. A browser gets the newest frame after it has read the previous one.
 
     While nobody watches, the game is asked for nothing. All methods but `n_readers` are called in the server's loop.

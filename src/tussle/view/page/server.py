@@ -17,7 +17,7 @@ from tussle.view.page.assemble import page_html
 from tussle.view.page.compare import Comparison
 from tussle.view.page.document import game_document, terrain_bytes
 from tussle.view.page.failures import Failures
-from tussle.view.page.publisher import Publisher
+from tussle.view.page.publisher import FramePublisher
 from tussle.view.page.recorded import RecordedData
 from tussle.view.recording import Recording
 
@@ -78,9 +78,9 @@ class Page:
         viewer = dict(game.viewer if viewer is None else viewer)
         notes: list[str] = []
         self._data: RecordedData | None = None
-        self.publisher: Publisher | None = None
+        self.publisher: FramePublisher | None = None
         if isinstance(game, Live):
-            self.publisher = Publisher(game, self._failures, _period(viewer, notes), one_steers)
+            self.publisher = FramePublisher(game, self._failures, _period(viewer, notes), one_steers)
             document = (
                 game_document(game, mission or game.simulation.mission, viewer) | self.publisher.document()
             )

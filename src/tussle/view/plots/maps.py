@@ -234,7 +234,7 @@ def _draw_scenery(axes: Axes, tracks: Trajectories) -> list[Handle]:
     corners = np.array([axes.get_xlim(), axes.get_ylim()])
     signs: dict[str, Handle] = {}
     for base in scenery.bases:
-        place = base.pos[:2]
+        place = np.array(base.position[:2])
         if _is_in_picture(place - base.radius, place + base.radius, corners):
             colour = colour_of(base.team)
             pale = mixed(colour, PAPER, 0.8)

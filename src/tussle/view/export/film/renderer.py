@@ -182,9 +182,9 @@ class Renderer:
         lift = max(scenery.size * 1e-4, 0.01)
         for base in scenery.bases:
             rgb = style.colour(base.team)
-            dome = ball(3).placed(2.0 * base.radius, base.pos.tolist())
+            dome = ball(3).placed(2.0 * base.radius, list(base.position))
             self._add(self._surface(dome), color=rgb, opacity=0.27 * base.opacity)
-            place = (base.pos[0], base.pos[1], max(scenery.ground, 0.0) + lift)
+            place = (base.position[0], base.position[1], max(scenery.ground, 0.0) + lift)
             circle = self._pyvista.Polygon(center=place, radius=base.radius, n_sides=64, fill=False)
             self._add(circle, on_ground=True, color=rgb, opacity=0.86, line_width=2.0 * self._line_width)
         for region in scenery.boundaries:
