@@ -32,7 +32,7 @@ def test_bases_boundaries_walls_and_origin():
     assert seen.origin == Origin(0.5, 0.1, 30.0)
     assert seen.ground == -3.0
     (base,) = seen.bases
-    assert (base.team, base.pos.tolist(), base.radius, base.opacity) == (2, [-400.0, 0.0, 0.0], 50.0, 0.5)
+    assert (base.team, base.position, base.radius, base.opacity) == (2, (-400.0, 0.0, 0.0), 50.0, 0.5)
     names = [(b.name, b.team, b.is_wall, type(b.shape)) for b in seen.boundaries]
     assert names == [
         ("field", None, False, Sphere), ("7", None, False, Plane), ("wall 1", None, True, Cuboid), ("fence", 4, False, Cuboid),
