@@ -181,7 +181,7 @@ class Index:
         made: list[tuple[bool, int]] = []
 
         def find(begin: int, end: int) -> None:
-            part = kernels.SPANS, begin, end, room * begin // n, room * end // n
+            part = kernels.SPANS, begin, end, room * begin // max(n, 1), room * end // max(n, 1)
             _, used, most = kernels.cut_blocks(*table, arrays, blocks.points, part)
             made.append((used <= part[-1], most))
 

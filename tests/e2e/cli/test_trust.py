@@ -154,7 +154,7 @@ def test_no_file_outside_of_the_directory_is_run_even_when_trusted(here, ran, tm
         assert any(
             words in err
             for words in (
-                "lies outside of the batch directory",
+                "is outside of the batch directory",
                 "there is no such plugin file",
                 "inside the directory",
             )

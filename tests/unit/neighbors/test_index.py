@@ -82,6 +82,8 @@ def test_empty_worlds_and_tables():
     index = Index()
     index.layout(np.zeros(0, np.int64), np.zeros(0, np.int64), 2)
     index.build(np.zeros(0), np.zeros(0), np.zeros(0), np.ones(2))
+    assert index.blocks(0, 0, lambda n, run: run(0, n)).n_blocks == 0
+    index.build(np.zeros(0), np.zeros(0), np.zeros(0), np.ones(2))
     assert index.blocks(0, 0).n_blocks == 0
     s = stack([np.zeros((3, 0)), np.ones((3, 1)), np.zeros((3, 0))])
     index = s.index(10.0)
