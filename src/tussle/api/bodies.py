@@ -222,7 +222,7 @@ class Bodies:
     def by_place(self, index: Index, name: str, split: Split | None = None) -> tuple[np.ndarray, ...]:
         """Components of a column by place of an index, as floats, each (n,), padded for lanes; for kernels.
 
-        `split` calls a function over parts of the rows in several threads.
+        `split` calls a function for parts of the rows in several threads.
         """
         key = (id(index), name)
         kept = self._by_place.get(key)
@@ -231,32 +231,17 @@ class Bodies:
             kept = self._by_place[key] = CachedArrays(-1, tuple(padded(self.n) for _ in range(k)))
         if kept.built == index.built and (kept.version == self.version or name in INTS):
             return kept.columns  # type: ignore[no-any-return]
-        values = (
-            None
-            if name == "level_forward"
-            else self.derived(name)
-            if name in DERIVED
-            else getattr(self, name)
-        )
+        if name == "level_forward":
+            values = self.quat  # computed on the way to the places
+        else:
+            values = self.derived(name) if name in DERIVED else getattr(self, name)
         if split is not None and kept.built != index.built:
-            split(self.n, lambda *part: self._put_by_place(name, values, index.place, kept.columns, *part))
+            split(self.n, lambda *part: put_by_place(name, values, index.place, kept.columns, *part))
         else:
             for part in self._since(kept.version) if kept.built == index.built else [(0, self.n)]:
-                self._put_by_place(name, values, index.place, kept.columns, *part)
+                put_by_place(name, values, index.place, kept.columns, *part)
         kept.version, kept.built = self.version, index.built
         return kept.columns  # type: ignore[no-any-return]
-
-    def _put_by_place(
-        self, name: str, values: Any, place: np.ndarray, columns: Any, first: int, last: int
-    ) -> None:
-        """Put the values of rows [first, last) to their places; of level_forward, from the quaternions."""
-        if name == "level_forward":
-            kernels.level_forward_by_place(self.quat, first, last, place, *columns)
-        elif name in INTS:
-            kernels.ints_by_place(values, first, last, place, columns[0])
-        else:
-            for column, source in zip(columns, np.atleast_2d(values), strict=True):
-                kernels.floats_by_place(source, first, last, place, column)
 
     def any_index(self) -> Index:
         """Index for searches without a radius, preferably an existing one; results do not depend on the choice."""
@@ -277,6 +262,19 @@ class Bodies:
         x, y, _ = self.pos[:, self.world == self.world[0]]
         area = (x.max() - x.min() + 1.0) * (y.max() - y.min() + 1.0)
         return float(2.0 ** np.ceil(np.log2(np.sqrt(64.0 * area / len(x)) + 1.0)))
+
+
+def put_by_place(
+    name: str, values: np.ndarray, place: np.ndarray, columns: tuple[np.ndarray, ...], first: int, last: int
+) -> None:
+    """Write the values of rows [first, last) to columns by place; for level_forward, `values` are quaternions (4, n)."""
+    if name == "level_forward":
+        kernels.level_forward_by_place(values, first, last, place, *columns)
+    elif name in INTS:
+        kernels.ints_by_place(values, first, last, place, columns[0])
+    else:
+        for column, source in zip(columns, np.atleast_2d(values), strict=True):
+            kernels.floats_by_place(source, first, last, place, column)
 
 
 def derive(name: str, quat: np.ndarray, first: int, last: int, base: int, out: np.ndarray) -> None:

@@ -18,6 +18,7 @@ from tussle.rng import stream_key
 from tussle.scene import Scene
 
 PARTS_PER_THREAD = 4
+"""Parts that `Context.split` makes for each thread: a slow thread then delays the others less."""
 
 
 @dataclass
@@ -59,10 +60,7 @@ class Context:
         return np.asarray(self.seeds[world] ^ self.block_keys[block])
 
     def split(self, n: int, run: Callable[[int, int], Any], least: int = 64) -> None:
-        """Call run(first, last) on consecutive parts of [0, n): in parallel if `threads` > 1 and n >= 2 * least, else in one call.
-
-        There are several parts for each thread, so that a thread that is held up does not hold up the others.
-        """
+        """Call run(first, last) on consecutive parts of [0, n): in parallel if `threads` > 1 and n >= 2 * least, else in one call."""
         if self.threads == 1 or n < 2 * least:
             run(0, n)
             return

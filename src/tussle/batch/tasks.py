@@ -70,7 +70,7 @@ class Finished:
 
 @dataclass(frozen=True)
 class Heartbeat:
-    """Sign of life of whoever plays.
+    """Sign of life of a process that plays.
 
     Attributes:
         under_way: Sum over the runs under way of the part of the longest game that each has played, 0 to 1 each.

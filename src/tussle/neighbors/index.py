@@ -28,7 +28,7 @@ class Blocks:
     """Groups of up to LANES nearby query rows, each with the spans of places that contain its neighbours.
 
     Block b holds queries[block_first[b] : block_first[b + 1]]; its candidates are the places span_start[s] to span_end[s] - 1 for s
-    from span_first[b] to span_last[b] - 1. Walking them in this order is the order of (cell row, cell, id), in any stack.
+    from span_first[b] to span_last[b] - 1. This is the order of (cell row, cell, id), independent of the stack.
 
     Attributes:
         cuts: queries, block_first, block_strip, span_first, span_last, (5, n + 1); queries are the n sorted places of the query rows.
@@ -150,9 +150,9 @@ class Index:
         return out
 
     def blocks(self, first: int, last: int, split: Split | None = None) -> Blocks:
-        """Blocks of rows [first, last) of the table, good until the next build; one object for each range.
+        """Return the blocks of rows [first, last) of the table, valid until the next build; one object per range.
 
-        `split` calls a function over parts of the blocks in several threads.
+        `split` calls a function for parts of the blocks in several threads.
         """
         blocks = self._blocks.get((first, last))
         if blocks is None:

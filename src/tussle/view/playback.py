@@ -44,8 +44,8 @@ class PlaybackController:
         player: The game.
         pace: How fast it is played.
         collector: Shapes that its plugins draw.
-        is_paused: Stand still until told otherwise.
-        on_moment: Called between steps every few ms, and when it comes to a stand; told whether it stands still.
+        is_paused: Start paused.
+        on_moment: Called with whether playback is paused: every few ms between steps, and when it pauses.
 
     Attributes:
         is_paused: It stands still when all orders are carried out.

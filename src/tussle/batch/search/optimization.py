@@ -270,7 +270,7 @@ def optimize(
         ParameterError: A variable, the quantity or a number is not allowed.
         MissionError: The mission cannot be read, or cannot be played with any of the values that are proposed first.
         MissingExtraError: Optuna is not installed.
-        BatchError: The directory holds another search, or somebody else searches there.
+        BatchError: The directory holds another search, or another process is searching there.
         RecordError: The directory cannot be written.
     """
     optimization = Optimization(mission, objective, vary=vary, **search)

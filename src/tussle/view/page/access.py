@@ -39,7 +39,7 @@ class Access:
         port: Its port.
 
     Attributes:
-        token: The part of the address that only those know who have been told.
+        token: Secret part of the address.
     """
 
     def __init__(self, host: str, port: int) -> None:

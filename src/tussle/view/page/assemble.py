@@ -27,7 +27,7 @@ def page_html(document: Mapping[str, Any], blobs: Mapping[str, bytes] | None = N
     """Return the HTML text of the page.
 
     Args:
-        document: What it is told at once.
+        document: Data that the page needs before its first picture.
         blobs: Data by name, for a file; None for a page that asks its server.
     """
     script = script_text([MAIN] if blobs is not None else [SERVED, MAIN])

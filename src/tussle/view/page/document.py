@@ -18,7 +18,7 @@ from tussle.view.style import Style
 from tussle.view.terrain import Terrain
 
 FORMAT = 2
-"""Version of the document and of the chunks, told to whoever reads them from a file."""
+"""Version of the document and of the chunks, for programs that read them from a file."""
 MOST_HEIGHTS = 250_000
 """Heights of the terrain on the page: with some half a million triangles a browser still draws without effort."""
 HEIGHT_STEPS = 65_535

@@ -114,7 +114,7 @@ class FramePublisher:
         return step_of(scenery.low, scenery.high, smallest)
 
     async def run(self) -> None:
-        """Make frames while somebody watches."""
+        """Make frames while at least one browser is connected."""
         while True:
             if self.readers:
                 with self._failures.caught():
