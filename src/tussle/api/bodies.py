@@ -68,6 +68,7 @@ class Bodies:
         pos: Position [m], (3, n), world frame; likewise vel [m/s], quat (w, x, y, z), omega [rad/s], force [N], torque [N m],
             health, radius [m], mass [kg], and id, team, world, block, block_index.
         loads: Forces and torques, (6, n).
+        has_loads: Whether forces and torques may differ from zero.
         born: Step of its world in which each entity was born, (n,); 0 for initial entities.
         scans: Entities move one after another, so that indexes are updated row by row.
     """
@@ -106,6 +107,7 @@ class Bodies:
     def replace(self, floats: np.ndarray, ints: np.ndarray) -> None:
         """Replace all rows, and discard all derived quantities."""
         self.floats, self.ints = floats, ints
+        self.has_loads = True
         self.n = floats.shape[1]
         for name in _COLUMNS:
             self.__dict__.pop(name, None)
@@ -143,6 +145,12 @@ class Bodies:
             if len(self._touched) > MOST_RANGES:
                 self._oldest = self.version
                 self._touched.clear()
+
+    def clear_loads(self) -> None:
+        """Set all forces and torques to zero."""
+        if self.has_loads:
+            self.loads.fill(0.0)
+            self.has_loads = False
 
     def _since(self, version: int) -> list[tuple[int, int]]:
         """Row ranges that have changed since a version of the table."""
@@ -188,6 +196,10 @@ class Bodies:
 
         `split` calls a function for parts of the rows in several threads.
         """
+        return self.refreshed(self.laid_out(reach), split)
+
+    def laid_out(self, reach: float | np.ndarray) -> CachedArrays:
+        """Neighbour index for `reach` [m], and the arrays that it is built from; valid until the next `replace`."""
         if self.scans:
             reach = EVERYWHERE
         key = reach if isinstance(reach, float) else reach.tobytes()
@@ -200,17 +212,21 @@ class Bodies:
             index.layout(self.world, self.id, self.n_worlds)
             reaches = np.full(self.n_worlds, reach) if isinstance(reach, float) else reach
             kept = self._laid_out[key] = CachedArrays(-1, (index, reaches, *self.pos))
-        index, reaches, x, y, z = kept.columns
+        return kept
+
+    def refreshed(self, kept: CachedArrays, split: Split | None) -> Index:
+        """The neighbour index of `laid_out`, built again if entities have moved."""
         if kept.version != self.version:
-            ranges = self._since(kept.version)
-            if self.scans and kept.version >= 0 and ranges != [(0, self.n)]:
+            index, reaches, x, y, z = kept.columns
+            ranges = self._since(kept.version) if self.scans and kept.version >= 0 else [(0, self.n)]
+            if ranges == [(0, self.n)]:
+                index.build(x, y, z, reaches, split)
+            else:
                 for first, last in ranges:
                     index.update(first, last, x, y, z)
-            else:
-                index.build(x, y, z, reaches, split)
             kept.version = self.version
         self._newest = kept
-        return index  # type: ignore[no-any-return]
+        return kept.columns[0]  # type: ignore[no-any-return]
 
     def _forget(self, key: Any) -> None:
         """Discard the index of a reach and the columns in its order."""

@@ -185,7 +185,7 @@ class GroupView:
         if self.context.threads == 1:
             run(0, self.n)
         else:
-            self._split_rows(self.n, run)
+            self.split_rows(self.n, run)
 
     def begin(
         self, plugin: Any = None, phase: float = 0.0, dt: float | None = None, substep: int = 0
@@ -249,9 +249,10 @@ class GroupView:
             return self._bodies.index(EVERYWHERE)
         if self.context.threads == 1:
             return self._bodies.index(self.reach(radius))
-        return self._bodies.index(self.reach(radius), self._split_rows)
+        return self._bodies.index(self.reach(radius), self.split_rows)
 
-    def _split_rows(self, n: int, run: Callable[[int, int], Any]) -> None:
+    def split_rows(self, n: int, run: Callable[[int, int], Any]) -> None:
+        """Call run(first, last) for parts of n rows in several threads."""
         self.context.split(n, run, ROWS_PER_THREAD)
 
     def any_index(self) -> Index:
@@ -267,7 +268,7 @@ class GroupView:
         """Components of a body column of all entities, by place of an index; for kernels."""
         if self.context.threads == 1:
             return self._bodies.by_place(index, name)
-        return self._bodies.by_place(index, name, self._split_rows)
+        return self._bodies.by_place(index, name, self.split_rows)
 
     def near(self, radius: float | np.ndarray, teams: str | int | None = None) -> Pairs:
         """Pairs of a row and another entity of its world at a distance < radius.

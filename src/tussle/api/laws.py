@@ -250,7 +250,7 @@ class WalkPlan:
         if self.lists:
             return self.listed(g, blocks.n_blocks, lambda *last: self.run(*arrays, *last, blocks.most))
         out = np.empty((len(self.names), g.n))
-        run = self.run_single if g.one_per_world else self.run
+        run = self.run_single if g._bodies.scans else self.run
         if g.context.threads == 1:
             run(*arrays, out, g.first, (0, blocks.n_blocks), blocks.most)
         else:
@@ -259,29 +259,37 @@ class WalkPlan:
 
     def gather(self, plugin: Any, g: GroupView) -> tuple[Blocks, tuple[Any, ...]]:
         """Return the blocks of the rows and the arguments of the kernels, for the current positions."""
-        key = id(self), id(plugin)
-        index = g.index(self.reach(g, plugin.__dict__))
-        split = None if g.context.threads == 1 else g.context.split
+        key, bodies = (id(self), id(plugin)), g._bodies
+        split = None if g.context.threads == 1 else g.split_rows
         kept = g.walks.get(key)
-        if kept is not None and kept[0] is index:
-            _, blocks, arrays = kept
-            if g.one_per_world and not self.lists:  # each row has its whole world as candidates
+        if kept is not None and kept[0] is not None:
+            index = bodies.refreshed(kept[0], split)
+        else:
+            radius = self.reach(g, plugin.__dict__)
+            index = g.index(radius)
+        share = None if split is None else g.context.split
+        if kept is not None and kept[1] is index:
+            _, _, blocks, arrays = kept
+            if bodies.scans and not self.lists:  # each row has its whole world as candidates
                 for name in self.moving:
-                    g.by_place(index, name)
+                    bodies.by_place(index, name, split)
                 return blocks, arrays
-            if index.blocks(g.first, g.last, split).spans is arrays[0][1]:
+            if index.blocks(g.first, g.last, share).spans is arrays[0][1]:
                 for name, _ in self.other:
-                    g.by_place(index, name)
+                    bodies.by_place(index, name, split)
                 return blocks, arrays
-        blocks = index.blocks(g.first, g.last, split)
+            radius = self.reach(g, plugin.__dict__)
+        blocks = index.blocks(g.first, g.last, share)
         others: tuple[np.ndarray, ...] = ()
         for name, places in self.other:
-            columns = g.by_place(index, name)
+            columns = bodies.by_place(index, name, split)
             others += columns if len(columns) == len(places) else tuple([columns[place] for place in places])
         own = self.own(g, plugin.__dict__)
         arrays = (blocks.cuts, blocks.spans, index.order), (blocks.points, index.points), others, own
         if self.keeps:
-            g.walks[key] = index, blocks, arrays
+            is_constant = not isinstance(radius, np.ndarray) or not radius.flags.writeable
+            laid_out = bodies.laid_out(g.reach(radius)) if is_constant else None
+            g.walks[key] = laid_out, index, blocks, arrays
         return blocks, arrays
 
     def listed(self, g: GroupView, n_blocks: int, run: Callable[..., int]) -> Listed:

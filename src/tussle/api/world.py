@@ -24,7 +24,10 @@ class WorldBodies(BodyView):
     def __getattr__(self, name: str) -> Any:
         if name in WRITABLE:
             array = getattr(self._bodies, name)
-            self.__dict__[name] = array
+            if name == "health":
+                self.__dict__[name] = array
+            else:
+                self._bodies.has_loads = True
             return array
         return super().__getattr__(name)
 

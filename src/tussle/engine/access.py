@@ -151,6 +151,7 @@ def write(state: SimulationState, path: str, values: Any) -> None:
             # Unchanged rows keep their motion state: setting it from the attitude would round it.
             differs = np.atleast_2d(target[..., rows[mine]] != part).any(axis=0)
             target[..., rows[mine]] = part
+            bodies.has_loads = True
             bodies.touch(group.first, group.last)
             if name in ("pos", "vel", "quat") and differs.any():
                 group.moving.begin(group.motion.plugin)

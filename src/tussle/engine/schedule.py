@@ -55,7 +55,7 @@ def compose(state: SimulationState) -> list[Call]:
     for group in groups:
         calls += [_entity_call(state, "sensor", group, b) for b in group.sensors]
     if state.interactions:
-        calls.append(Call("reset forces", partial(_clear_forces, state)))
+        calls.append(Call("reset forces", state.population.bodies.clear_loads))
     calls += [_world_call(state, "interaction", r) for r in state.interactions if steps(r)]
     if state.interactions:
         calls.append(Call("apply moves", partial(apply_moves, state)))
@@ -67,10 +67,6 @@ def compose(state: SimulationState) -> list[Call]:
     calls.append(Call("deliver messages", partial(deliver, state)))
     calls.append(Call("check, remove, end", partial(end_step, state)))
     return calls
-
-
-def _clear_forces(state: SimulationState) -> None:
-    state.population.bodies.loads.fill(0.0)
 
 
 def _motion(state: SimulationState, groups: list[Group]) -> list[Call]:

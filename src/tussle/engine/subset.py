@@ -129,6 +129,7 @@ def call_world_plugin(
         for dtype, array in part.arrays.items():
             table.arrays[dtype][:, index] = array if per == "entity" else array[:, index]
     bodies.floats[:, rows] = sub_bodies.floats
+    bodies.has_loads = True
     bodies.touch(0, bodies.n)
     view.deaths += [(rows[r], why) for r, why in sub_view.deaths]
     view.moved += [rows[r] for r in sub_view.moved]

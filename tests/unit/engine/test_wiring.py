@@ -22,7 +22,14 @@ from tussle.api import (
     service,
 )
 from tussle.errors import DeclarationError, ParameterError, WiringError
-from tussle.stock import DirectController, NoisyState, SingleIntegratorControllerSimple, Unicycle, UnicyclePID
+from tussle.stock import (
+    DirectController,
+    NoisyState,
+    SingleIntegratorControllerSimple,
+    Still,
+    Unicycle,
+    UnicyclePID,
+)
 
 
 class Pilot(Autonomy):
@@ -492,3 +499,36 @@ def test_forces_are_summed_by_interactions_and_consumed_by_the_motion_model():
     sim = alone(game, 1)
     # The first step is free of force, since interactions come after motion; nine steps at -8 m/s^2.
     assert sim.read("a.vel")[0][0, 0].tolist() == pytest.approx([0.0, 0.0, -8.0 * 0.9])
+
+
+@pytest.mark.parametrize("worlds", [[0, 1], [1]], ids=["together", "with different clocks"])
+def test_forces_and_torques_last_until_the_next_step(worlds):
+    """In every way to write them: by an interaction, by one with a rate in some worlds only, and from outside."""
+
+    class Push(Interaction):
+        at = State(dtype=int, per="world")
+
+        def start(self, w):
+            self.at[:] = 0
+
+        def step(self, w):
+            self.at += 1
+            w.bodies.force[0] += self.at[w.world] == 2
+            w.bodies.torque[1] += self.at[w.world] == 2
+
+    pushes = [Push(name="every"), Push(name="slow", rate=5.0)]
+    sim = Simulation(mission(block(autonomy=[], motion=Still()), interactions=pushes, end=2.0), [1, 2])
+    sim.step(3)
+    sim.reset(worlds)
+    found = []
+    for _ in range(6):
+        sim.step(1)
+        found.append({name: tuple(sim.read(name)[0][1, 0, :2]) for name in ("a.force", "a.torque")})
+    forces, torques = ([each[name] for each in found] for name in ("a.force", "a.torque"))
+    pushed = [0.0, 1.0, 1.0, 0.0, 0.0, 0.0]  # `slow` is called second in the third step
+    assert [force[0] for force in forces] == pushed
+    assert [torque[1] for torque in torques] == pushed
+    sim.write("a.force", 3.0)
+    assert sim.read("a.force")[0].any()
+    sim.step(1)
+    assert not sim.read("a.force")[0].any()
