@@ -78,14 +78,12 @@ class GroupView:
         self._components: dict[str, tuple[np.ndarray, ...]] = {}
         self.first, self.last = first, last
         self.n = last - first
-        self._reaches: dict[int, tuple[np.ndarray, float | np.ndarray]] = {}
-        self.walks: dict[tuple[int, int], Any] = {}  # see `tussle.api.laws.WalkPlan.gather`
+        self.kept: dict[Any, Any] = {}  # values that hold until rows or parameters change
 
     def renew(self) -> None:
         """Discard values that depend on seeds and parameters, after rows have been replaced in place."""
         self.__dict__.pop("_seeds", None)
-        self._reaches.clear()
-        self.walks.clear()
+        self.kept.clear()
 
     def __getattr__(self, name: str) -> Any:
         if name in FLOATS or name in INTS:
@@ -180,12 +178,20 @@ class GroupView:
         """True states of all entities of all groups."""
         return self._bodies.view
 
-    def split(self, run: Callable[[int, int], Any]) -> None:
-        """Call run(first, last) for parts of the rows, in several threads if there are enough rows; for kernels."""
+    def split(self, kernel: Callable[..., Any], *arguments: Any) -> None:
+        """Call kernel(*arguments, (first, last)) for parts of the rows, in several threads if there are enough rows."""
         if self.context.threads == 1:
-            run(0, self.n)
+            kernel(*arguments, (0, self.n))
         else:
-            self.split_rows(self.n, run)
+            self.split_rows(self.n, lambda *part: kernel(*arguments, part))
+
+    def once(self, function: Callable[..., Any], *parameters: np.ndarray) -> Any:
+        """Return function(*parameters), evaluated again only after rows or parameters have changed; for columns of parameters."""
+        key = function, id(parameters[0])
+        kept = self.kept.get(key)
+        if kept is None:
+            kept = self.kept[key] = function(*parameters), parameters
+        return kept[0]
 
     def begin(
         self, plugin: Any = None, phase: float = 0.0, dt: float | None = None, substep: int = 0
@@ -233,14 +239,14 @@ class GroupView:
         """Longest radius of each world [m]: a float if equal in all worlds, otherwise (n_worlds,)."""
         if not isinstance(radius, np.ndarray):
             return float(radius)
-        known = self._reaches.get(id(radius))
+        known: tuple[np.ndarray, float | np.ndarray] | None = self.kept.get(id(radius))
         if known is not None:
             return known[1]
         longest = np.zeros(self._bodies.n_worlds)
         common = kernels.longest_reach(radius, self.world, longest)
         reach = longest if common < 0.0 else float(common)
-        if not radius.flags.writeable:  # parameters do not change until the next repack
-            self._reaches[id(radius)] = (radius, reach)
+        if not radius.flags.writeable:  # a parameter
+            self.kept[id(radius)] = radius, reach
         return reach
 
     def index(self, radius: float | np.ndarray) -> Index:

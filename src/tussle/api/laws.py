@@ -261,7 +261,7 @@ class WalkPlan:
         """Return the blocks of the rows and the arguments of the kernels, for the current positions."""
         key, bodies = (id(self), id(plugin)), g._bodies
         split = None if g.context.threads == 1 else g.split_rows
-        kept = g.walks.get(key)
+        kept = g.kept.get(key)
         if kept is not None and kept[0] is not None:
             index = bodies.refreshed(kept[0], split)
         else:
@@ -289,7 +289,7 @@ class WalkPlan:
         if self.keeps:
             is_constant = not isinstance(radius, np.ndarray) or not radius.flags.writeable
             laid_out = bodies.laid_out(g.reach(radius)) if is_constant else None
-            g.walks[key] = laid_out, index, blocks, arrays
+            g.kept[key] = laid_out, index, blocks, arrays
         return blocks, arrays
 
     def listed(self, g: GroupView, n_blocks: int, run: Callable[..., int]) -> Listed:

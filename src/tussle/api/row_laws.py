@@ -191,7 +191,7 @@ class Rows:
             return np.asarray(np.atleast_2d(g.column(name))[place], float)
 
         given, kept = tuple(map(column, self.given)), tuple(map(column, self.kept))
-        g.split(lambda *part: self.kernel(given, kept, dt, substeps, part))
+        g.split(self.kernel, given, kept, dt, substeps)
 
 
 def step_rows(plugin: Any, g: GroupView) -> None:

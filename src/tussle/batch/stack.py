@@ -20,6 +20,8 @@ from tussle.mission import Mission
 
 ROWS = 8192
 """Entities of a stack, about: with more rows a row costs no less, and the cache overflows."""
+SEQUENTIAL_ROWS = 4 * ROWS
+"""The same where entities move one after another: a call has one row per world, so that more worlds cost less each."""
 MOST = 256
 BEAT_EVERY = 0.25  # [s]
 
@@ -30,7 +32,8 @@ Take = Callable[[int], Sequence[BatchRun]]
 def stack_size(mission: Mission) -> int:
     """Best number of worlds of a mission in a stack."""
     n = max(1, sum(block.count for block in mission.blocks))
-    return max(1, min(MOST, ROWS // n, most_worlds(mission)))
+    rows = SEQUENTIAL_ROWS if mission.update == "sequential" else ROWS
+    return max(1, min(MOST, rows // n, most_worlds(mission)))
 
 
 def most_worlds(mission: Mission) -> int:

@@ -376,7 +376,7 @@ class Group:
         if self.moving.context.threads == 1:
             self.integrate(self.x, u, self.p, dt, substeps)
         else:
-            self.moving.split(lambda *part: self._integrate_part(slice(*part), u, dt, substeps))
+            self.moving.split(self._integrate_part, u, dt, substeps)
         self.publish()
 
     def publish(self) -> None:
@@ -384,8 +384,9 @@ class Group:
         self.motion.plugin.to_body(self.moving)
         self.bodies.touch(self.first, self.last)
 
-    def _integrate_part(self, rows: slice, u: np.ndarray, dt: float, substeps: int) -> None:
-        """Integrate some rows on a copy, as kernels need contiguous arrays."""
+    def _integrate_part(self, u: np.ndarray, dt: float, substeps: int, part: tuple[int, int]) -> None:
+        """Integrate rows [first, last) on a copy, as kernels need contiguous arrays."""
+        rows = slice(*part)
         x = np.ascontiguousarray(self.x[:, rows])
         self.integrate(
             x, np.ascontiguousarray(u[:, rows]), np.ascontiguousarray(self.p[:, rows]), dt, substeps

@@ -98,7 +98,24 @@ def square_of(radius):  # type: ignore[no-untyped-def]
     return radius * radius if radius > 0.0 else -1.0
 
 
+@device
+def sum_of(lane):  # type: ignore[no-untyped-def]
+    """Sum of eight numbers, in pairs."""
+    return ((lane[0] + lane[1]) + (lane[2] + lane[3])) + ((lane[4] + lane[5]) + (lane[6] + lane[7]))
+
+
+@device
+def first_of(lane):  # type: ignore[no-untyped-def]
+    """Lane with the smallest of eight numbers, among equal ones that with the smallest of the next eight."""
+    best = 0
+    for k in range(1, LANES):
+        if lane[k] < lane[best] or (lane[k] == lane[best] and lane[LANES + k] < lane[LANES + best]):
+            best = k
+    return best
+
+
 FROM_LANES = [
+    "below",
     "bits",
     "choose",
     "inverse_sqrt",
@@ -106,7 +123,6 @@ FROM_LANES = [
     "load",
     "lowest",
     "number",
-    "ones",
     "splat",
     "store",
     "truth",
@@ -133,6 +149,8 @@ def make_walk(laws: Sequence[Law], where: Law | None, code_of: Callable[[str], s
         "square_of": square_of,
         "find_near": find_near,
         "find_teams": find_teams,
+        "sum_of": sum_of,
+        "first_of": first_of,
     }
     parts, at = [], 0
     for law in laws:
@@ -140,8 +158,8 @@ def make_walk(laws: Sequence[Law], where: Law | None, code_of: Callable[[str], s
         at += len(law.reductions)
     text = WalkText(parts, part_of(where, at, scope) if where else None, at)
     if any(is_interpreted(law.function) for law in laws):
-        run = walk_in_python(laws, where, text.own, text.other)
-        return Walk(text.own, text.other, run, run, at)
+        run, single = (walk_in_python(laws, where, text.own, text.other, n) for n in (1, LANES))
+        return Walk(text.own, text.other, run, single, at)
     other, own = " ".join("F" * len(text.other)), " ".join(code_of(name) for name in text.own)
     out = "(I2w F2w) i8 (i8 i8) i8 -> i8" if text.lists_pairs else "F2w i8 (i8 i8) i8"
     signature = f"(I2 I2 I) (F2 F2) ({other}) ({own}) {out}"

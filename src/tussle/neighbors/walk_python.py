@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from operator import add
 from typing import Any
 
 import numpy as np
@@ -16,9 +17,12 @@ Values = Mapping[str, Any]
 
 
 def walk_in_python(
-    laws: Sequence[Law], where: Law | None, own_names: Sequence[str], other_names: Sequence[str]
+    laws: Sequence[Law], where: Law | None, own_names: Sequence[str], other_names: Sequence[str], n_lanes: int
 ) -> Callable[..., int]:
-    """Return a function with the arguments of the kernel of these laws; see `make_walk`."""
+    """Return a function with the arguments of the kernel of these laws; see `make_walk`.
+
+    The neighbours of an agent are in `n_lanes` lanes: 1 for the kernel that has agents in the lanes.
+    """
 
     def walk(
         longs: Any, points: Any, other: Any, own: Any, out: Any, first: int, part: Any, most: int
@@ -30,19 +34,22 @@ def walk_in_python(
                 me = cuts[0, q]
                 i = order[me] - first
                 mine = {name: np.float64(column[i]) for name, column in zip(own_names, own, strict=True)}
-                totals = [Totals(law, mine) for law in laws]
-                places = (p for s in range(*cuts[3:5, b]) for p in range(*spans[:, s]) if p != me)
-                for p in places:
+                totals = [[Totals(law, mine) for law in laws] for _ in range(n_lanes)]
+                found = (
+                    (p, spans[0, s]) for s in range(*cuts[3:5, b]) for p in range(*spans[:, s]) if p != me
+                )
+                for p, start in found:
                     theirs = {name: column[p] for name, column in zip(other_names, other, strict=True)}
                     pair = {**mine, **theirs, **between(points[1][:, p] - points[1][:, me])}
-                    for each in totals if where is None or call(where, pair) else ():
+                    for each in totals[(p - start) % n_lanes] if where is None or call(where, pair) else ():
                         values = each.add(pair)
                         if values is not None and each.law.lists:
                             if n_listed < out[1].shape[1]:
                                 out[0][:, n_listed], out[1][:, n_listed] = (i, order[p]), values
                             n_listed += 1
                 if not laws[0].lists:
-                    out[:, i] = [value for each in totals for value in each.results()]
+                    every = (reduced(lanes) for lanes in zip(*totals, strict=True))
+                    out[:, i] = [value for each in every for value in each.results()]
         return n_listed
 
     return walk
@@ -104,7 +111,27 @@ class Totals:
                 self.sums[k] = value
         return values
 
+    def absorb(self, other: Totals) -> Totals:
+        """Add the contributions of other lanes."""
+        is_closer = other.closest < self.closest
+        for k, reduction in enumerate(self.law.reductions.values()):
+            mine, theirs = self.sums[k], other.sums[k]
+            if reduction == "nearest":
+                self.sums[k] = theirs if is_closer else mine
+            else:
+                self.sums[k] = {"min": min, "max": max}.get(reduction, add)(mine, theirs)
+        self.closest = min(self.closest, other.closest)
+        self.n += other.n
+        return self
+
     def results(self) -> Iterator[float]:
         """Yield the reduced contributions in order."""
         for total, reduction in zip(self.sums, self.law.reductions.values(), strict=True):
             yield total / max(self.n, 1) if reduction == "mean" else total
+
+
+def reduced(lanes: Sequence[Totals]) -> Totals:
+    """Reduce lanes, in pairs."""
+    while len(lanes) > 1:
+        lanes = [a.absorb(b) for a, b in zip(lanes[::2], lanes[1::2], strict=True)]
+    return lanes[0]

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from tussle.neighbors.law import OTHER, Law
 
 START = {"min": math.inf, "max": -math.inf, "nearest": math.nan}
 """Initial values of reductions that do not start at 0."""
+RESULTS = {"min": "lane[:LANES].min()", "max": "lane[:LANES].max()", "nearest": "lane[first_lane]"}
+"""Expressions that reduce the lanes of one agent, for reductions that are not sums."""
 
 
 @dataclass(frozen=True)
@@ -99,58 +101,19 @@ class Part:
             yield f"        out[1][{k}, n_listed] = lane[(results_at + {k}) * LANES + k]"
         yield "    n_listed += 1"
 
-    def single_begin(self) -> Iterator[str]:
-        """Code before the loop over the neighbours of one agent."""
-        for k, reduction in self.reductions:
-            yield f"a_{k} = {START.get(reduction, 0.0)}"
-        if "mean" in self.law.reductions.values():
-            yield f"n_{self.at} = 0"
-        if "nearest" in self.law.reductions.values():
-            yield f"best_{self.at}, best_id_{self.at} = np.inf, np.inf"
-
-    def single_step(self, limit: int) -> Iterator[str]:
-        """Code for LANES neighbours of one agent."""
-        at, values = self.at, [(k, r) for k, r in self.reductions if r != "count"]
-        yield f"hits = near_{limit} & {self.law.teams or 'all'}_"
-        yield "if hits != 0:"
-        yield from indented(1, self.contributions())
-        if self.can_skip:
-            yield f"    hits &= bits(counts_{at})"
-        if "mean" in self.law.reductions.values():
-            yield f"    n_{at} += ones(hits)"
-        for k, reduction in self.reductions:
-            if reduction == "count":
-                yield f"    a_{k} += float(ones(hits & bits(v_{k})))"
-            else:
-                yield f"    store(lane, {k} * LANES, v_{k})"
-        if "nearest" in self.law.reductions.values():
-            yield "    store(lane, squares_at * LANES, distance_squared_)"
-            yield "    store(lane, (squares_at + 1) * LANES, other_id_)"
-        if not values:
-            return
-        yield "    while hits != 0:"
-        yield "        j = lowest(hits)"
-        yield "        hits &= hits - 1"
-        if "nearest" in self.law.reductions.values():
-            yield "        square, number = lane[squares_at * LANES + j], lane[(squares_at + 1) * LANES + j]"
-            yield f"        closer = square < best_{at} or (square == best_{at} and number < best_id_{at})"
-            yield "        if closer:"
-            yield f"            best_{at}, best_id_{at} = square, number"
-        for k, reduction in values:
-            value = f"lane[{k} * LANES + j]"
-            if reduction in ("sum", "mean"):
-                yield f"        a_{k} += {value}"
-                continue
-            sign = "<" if reduction == "min" else ">"
-            yield f"        if {'closer' if reduction == 'nearest' else f'{value} {sign} a_{k}'}:"
-            yield f"            a_{k} = {value}"
-
     def single_end(self) -> Iterator[str]:
-        """Code that writes the contributions of one agent to its row."""
+        """Code that reduces the lanes of one agent and writes its row."""
+        if "mean" in self.law.reductions.values():
+            yield f"store(lane, 0, n_{self.at})"
+            yield "n = sum_of(lane)"
+        if "nearest" in self.law.reductions.values():
+            yield f"store(lane, 0, best_{self.at})"
+            yield f"store(lane, LANES, best_id_{self.at})"
+            yield "first_lane = first_of(lane)"
         for k, reduction in self.reductions:
-            if reduction == "mean":
-                yield f"a_{k} = a_{k} / n_{self.at} if n_{self.at} > 0 else 0.0"
-            yield f"out[{k}, i] = a_{k}"
+            yield f"store(lane, 0, a_{k})"
+            value = RESULTS.get(reduction, "sum_of(lane)")
+            yield f"out[{k}, i] = {f'{value} / n if n > 0.0 else 0.0' if reduction == 'mean' else value}"
 
     def end(self) -> Iterator[str]:
         """Code after the loop."""
@@ -232,56 +195,53 @@ class WalkText:
             yield "    return n_listed"
 
     def single_lines(self) -> Iterator[str]:
-        """Text of the kernel that has neighbours in the lanes; contributions are added in the order of the other kernel."""
-        every = [*self.parts, *([self.where] if self.where else [])]
-        names = sorted({name for part in every for name in part.law.names})
+        """Text of the kernel that has neighbours in the lanes, which are reduced at the end."""
         yield from self.head()
-        yield f"    squares_at = {self.n_out}"
-        yield "    lane = np.empty((squares_at + 2) * LANES)"
+        yield "    lane = np.empty(2 * LANES)"
         yield "    for b in range(begin, stop):"
         yield "        for q in range(block_first[b], block_first[b + 1]):"
         yield "            me = queries[q]"
         yield "            i = order[me] - first"
         for name in self.taken:
             yield f"            {name}_ = splat(1.0 * by_row_{name}[i])"  # converts flags to numbers
+        if self.by_team:
+            yield "            mine = splat(float(by_row_team[i]))"
         for at, radii in enumerate(self.limits):
             yield f"            limit2_{at} = {square(radii)}"
         for part in self.parts:
-            yield from indented(3, part.single_begin())
+            yield from indented(3, part.begin())
         yield "            for s in range(span_first[b], span_last[b]):"
         yield "                for p in range(span_start[s], span_end[s], LANES):"
-        yield from indented(5, self.single_neighbors(names))
+        yield from indented(5, self.single_neighbors())
         for part in self.parts:
-            yield from indented(5, part.single_step(self.limits.index(part.law.radii)))
+            near = f"near_{self.limits.index(part.law.radii)}"
+            yield f"                    inside = {f'{near} & {part.law.teams}_' if part.law.teams else near}"
+            yield "                    if bits(inside) != 0:"
+            yield from indented(6, distances(part.law.names))
+            yield from indented(6, part.step())
         for part in self.parts:
             yield from indented(3, part.single_end())
 
-    def single_neighbors(self, names: Sequence[str]) -> Iterator[str]:
+    def single_neighbors(self) -> Iterator[str]:
         """Code that loads LANES neighbours of one agent, and their masks by existence, team and distance."""
         for axis in "xyz":
             yield f"offset_{axis}_ = load(s{axis}, p) - s{axis}[me]"
         yield "distance_squared_ = offset_x_ * offset_x_ + offset_y_ * offset_y_ + offset_z_ * offset_z_"
-        yield "all_ = (1 << min(LANES, span_end[s] - p)) - 1"
-        yield "if p <= me < p + LANES:"
-        yield "    all_ &= ~(1 << (me - p))"
+        yield "counted = below(span_end[s] - p) & (below(me - p) | ~below(me - p + 1))"
         for at in range(len(self.limits)):
-            yield f"near_{at} = bits(distance_squared_ < limit2_{at}) & all_"
-        yield f"if {' | '.join(f'near_{at}' for at in range(len(self.limits)))} == 0:"
+            yield f"near_{at} = (distance_squared_ < limit2_{at}) & counted"
+        yield f"if {' | '.join(f'bits(near_{at})' for at in range(len(self.limits)))} == 0:"
         yield "    continue"
-        if "distance" in names:
-            yield "distance_ = lanes_sqrt(distance_squared_)"
-        if "inverse_distance" in names:
-            yield "inverse_distance_ = inverse_sqrt(distance_squared_)"
-        for name in names:
-            if name.startswith(OTHER):
-                yield f"{name}_ = load(by_place_{name}, p)"
+        for name in self.other:
+            yield f"{name}_ = load(by_place_{name}, p)"
         if self.where:
+            yield from distances(self.where.law.names)
             yield from self.where.contributions()
-            counts = f" & bits(counts_{self.where.at})" if self.where.can_skip else ""
-            yield f"all_ &= bits(v_{self.where.at}){counts}"
+            counts = f" & counts_{self.where.at}" if self.where.can_skip else ""
+            for at in range(len(self.limits)):
+                yield f"near_{at} = near_{at} & v_{self.where.at}{counts}"
         if self.by_team:
-            yield "own_ = all_ & bits(load(by_place_other_team, p) == float(by_row_team[i]))"
-            yield "other_ = all_ & ~own_"
+            yield "own_, other_ = other_team_ == mine, other_team_ != mine"
 
     def take_lanes(self) -> Iterator[str]:
         """Code that loads the lanes' columns into `lane`; unused lanes get a negative squared radius."""
@@ -364,10 +324,7 @@ class WalkText:
             yield f"near_{other}[n_near_{other}] = p"
             yield f"n_near_{other} += bits(distance_squared_ < limit2_{other}) != 0"
         taken = {name for part in [*parts, *([self.where] if self.where else [])] for name in part.law.names}
-        if "distance" in taken:
-            yield "distance_ = lanes_sqrt(distance_squared_)"
-        if "inverse_distance" in taken:
-            yield "inverse_distance_ = inverse_sqrt(distance_squared_)"
+        yield from distances(taken)
         for name in sorted(taken):
             if name.startswith(OTHER):
                 yield f"{name}_ = splat(by_place_{name}[p])"
@@ -388,6 +345,14 @@ class WalkText:
         yield "        i = order[queries[q0 + k]] - first"
         yield f"        for at in range({self.n_out}):"
         yield f"            out[at, i] = lane[({self.results_at} + at) * LANES + k]"
+
+
+def distances(names: Collection[str]) -> Iterator[str]:
+    """Code for the distances of pairs, as far as they are among the names that a law takes."""
+    if "distance" in names:
+        yield "distance_ = lanes_sqrt(distance_squared_)"
+    if "inverse_distance" in names:
+        yield "inverse_distance_ = inverse_sqrt(distance_squared_)"
 
 
 def square(radii: tuple[str | float, ...]) -> str:

@@ -20,6 +20,15 @@ def play(autonomy, steps=3, n=300, motion=SingleIntegrator(), spread=30.0, updat
         return [sim.state_hash(world) for world in range(sim.n_worlds)]
 
 
+def added(numbers, lanes):
+    """Sum of numbers in the order of the kernels: in one lane, or in eight lanes that are then added in pairs."""
+    sums = [0.0] * 8
+    for number, lane in zip(numbers, lanes, strict=True):
+        sums[lane] += number
+    a, b, c, d, e, f, g, h = sums
+    return ((a + b) + (c + d)) + ((e + f) + (g + h))
+
+
 class Every(Autonomy):
     """Each reduction, under an `if`, against the function itself called for pair after pair."""
 
@@ -55,14 +64,13 @@ class Every(Autonomy):
                 near.offset[0, k], near.distance[k], near_id[k], g.team[i], near_team[k], near_vel[1, k], self.gain[i], self.drops[i],
             )  # fmt: skip
             if values is not None:
-                table[i].append((*values, near.distance[k]))
+                lane = (near_id[k] - 1) % 8 if g.one_per_world else 0  # candidates are in order of id then
+                table[i].append((*values, near.distance[k], lane))
         for i, rows in enumerate(table):
-            n, total, mean, low, high, closest = 0, 0.0, 0.0, math.inf, -math.inf, (math.inf, math.nan)
-            for own, amount, distance, *_ in rows:
-                n, total, mean = n + own, total + amount, mean + distance
-                low, high = min(low, amount), max(high, amount)
-            for *_, other_id, distance in rows:
-                closest = min(closest, (distance, other_id))
-            expected = n, total, mean / len(rows) if rows else 0.0, low, high, closest[1]
+            own, amounts, distances, *_, ids, ranges, lanes = zip(*rows, strict=True) if rows else [()] * 8
+            closest = min(zip(ranges, ids, strict=True), default=(math.inf, math.nan))
+            total, mean = added(amounts, lanes), added(distances, lanes) / max(len(rows), 1)
+            low, high = min(amounts, default=math.inf), max(amounts, default=-math.inf)
+            expected = sum(own), total, mean, low, high, closest[1]
             np.testing.assert_array_equal([found.values[k, i] for k in range(6)], expected)
         self.velocity[0], self.velocity[1] = found.mean, np.where(found.n > 0, found.total, -1.0)

@@ -115,8 +115,11 @@ block = Block(
     controller=Trim(),
     motion=Car(),
 )
-simulation = Simulation(Mission(blocks=[block], end=1.0))
-simulation.run()
+hashes = []
+for update in ("synchronous", "sequential"):
+    simulation = Simulation(Mission(blocks=[block], end=1.0, update=update))
+    simulation.run()
+    hashes.append(simulation.state_hash())
 sys.setprofile(None)
 print(" ".join(sorted(seen & {"half", "drive", "derivative", "law", "pairs", "ahead", "trim"})))
-print(simulation.state_hash())
+print(*hashes)

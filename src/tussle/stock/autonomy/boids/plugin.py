@@ -143,7 +143,7 @@ class Boids(Autonomy):
     def step(self, g: GroupView) -> None:
         wanted = np.empty((3, g.n))
         pos = g.components("pos")
-        sees_all = kernels.sees_all(self.fov_az, self.fov_el)
+        sees_all = g.once(kernels.sees_all, self.fov_az, self.fov_el)
         if self.means == "historic":
             seen = (self.historic if sees_all else self.historic_in_view)(g).values
             kernels.historic_means(pos, seen)
@@ -153,11 +153,11 @@ class Boids(Autonomy):
             self.max_speed, self.goal_weight, self.avoid_team_weight, self.avoid_nonteam_weight, self.centroid_weight,
             self.align_weight,
         )  # fmt: skip
-        g.split(lambda *part: kernels.law(pos, self.target, seen, weights, wanted, part))
+        g.split(kernels.law, pos, self.target, seen, weights, wanted)
         wired = self.wired
         if "turn_rate" in wired or "pitch_rate" in wired or "speed" in wired:
-            quat, commands = g.components("quat"), (self.speed, self.turn_rate, self.pitch_rate)
-            g.split(lambda *part: kernels.rates(wanted, quat, self.max_speed, *commands, part))
+            commands = self.speed, self.turn_rate, self.pitch_rate
+            g.split(kernels.rates, wanted, g.components("quat"), self.max_speed, *commands)
         if "velocity" in wired:
             kernels.velocity(wanted, self.max_speed, self.velocity)
         if "desired_heading" in wired or "desired_altitude" in wired or "desired_speed" in wired:

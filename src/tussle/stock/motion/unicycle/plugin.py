@@ -91,8 +91,4 @@ class Unicycle(MotionModel):
         third_max = self.pitch_rate_max if pitches else self.velocity_z_max
         commands = self.speed, self.turn_rate, third
         limits, flags = (self.vel_max, self.turn_rate_max, third_max), (pitches, self.enable_roll)
-        body.split(
-            lambda *part: kernels.to_body(
-                self.x, commands, limits, flags, body.dt, body.table, body.first, part
-            )
-        )
+        body.split(kernels.to_body, self.x, commands, limits, flags, body.dt, body.table, body.first)
