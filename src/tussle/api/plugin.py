@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Self, TypeVar
 
@@ -222,12 +222,15 @@ class Plugin:
         own = self.__dict__
         return (type(self), own["instance_name"], own["rate"], tuple(own["_values"].items()))
 
+    def given(self) -> Iterator[tuple[str, Any]]:
+        """Yield names and values of the parameters that differ from their defaults, and the plugins inside this one by name."""
+        values = self.__dict__["_values"]
+        yield from ((k, values[k]) for k, c in self.params().items() if values[k] != c.default)
+        yield from ((k, list(values[k])) for k in self.children() if values[k])
+
     def __repr__(self) -> str:
         own = self.__dict__
-        parts = [
-            f"{k}={own['_values'][k]!r}" for k, c in self.params().items() if own["_values"][k] != c.default
-        ]
-        parts += [f"{k}={list(own['_values'][k])!r}" for k in self.children() if own["_values"][k]]
+        parts = [f"{name}={value!r}" for name, value in self.given()]
         if own["instance_name"] != type(self).__name__:
             parts.append(f"name={own['instance_name']!r}")
         if own["rate"] is not None:

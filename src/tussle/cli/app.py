@@ -14,6 +14,7 @@ from tussle.cli.terminal import OK, out, run_guarded
 COMMANDS = {
     "run": (play_options.RunOptions, "tussle.cli.play:run"),
     "check": (MissionOptions, "tussle.cli.play:check"),
+    "convert": (play_options.ConvertOptions, "tussle.cli.play:convert"),
     "describe": (play_options.DescribeOptions, "tussle.cli.pages:describe"),
     "plugins": (PluginOptions, "tussle.cli.pages:plugins"),
     "missions": (play_options.MissionsOptions, "tussle.cli.pages:missions"),

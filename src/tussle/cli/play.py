@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime as dt
 import itertools
 import re
+import shlex
 import sys
 import time
 from collections.abc import Callable
@@ -16,13 +17,13 @@ import typer
 
 from tussle.cli.interrupt import Interrupt
 from tussle.cli.options import MissionOptions
-from tussle.cli.play_options import RunOptions
+from tussle.cli.play_options import ConvertOptions, RunOptions
 from tussle.cli.progress import ProgressMeter, compiling
 from tussle.cli.summary import Speed, show_summary
 from tussle.cli.terminal import out, say, say_note
 from tussle.engine.simulation import Simulation
 from tussle.errors import BatchError, MissionError, ParameterError, RecordError, WiringError
-from tussle.mission import Loaded, Mission
+from tussle.mission import Loaded, Mission, to_python, to_xml
 
 if TYPE_CHECKING:
     from tussle.batch.reload import PlannedRun
@@ -74,6 +75,28 @@ def check(options: MissionOptions) -> None:
         out().print(
             f"{options.mission} can be played: {n} entities, grade {simulation.grade}{notes}", soft_wrap=True
         )
+
+
+def convert(options: ConvertOptions) -> None:
+    """Write a mission as a mission file or as Python code.
+
+    Raises:
+        MissionError: The mission cannot be written in this form, or the file exists already or cannot be written.
+    """
+    loaded, mission, seed = options.read()
+    if loaded.viewer:
+        say_note(f"{options.to} has no settings of the viewer, such as colours")
+    is_code = options.to.suffix == ".py"
+    text = (to_python if is_code else to_xml)(mission, seed)
+    try:
+        with options.to.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError:
+        raise MissionError(f"{options.to}: exists already; choose another name, or remove it") from None
+    except OSError as error:
+        raise MissionError(f"{options.to}: cannot be written: {error.strerror or error}") from error
+    command = "python" if is_code else "tussle run"
+    out().print(f"{options.to} plays the same game: {command} {shlex.quote(str(options.to))}", soft_wrap=True)
 
 
 def run(options: RunOptions) -> int:

@@ -86,6 +86,20 @@ class DoctorOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
+class ConvertOptions(MissionOptions):
+    """Write a mission with all its values as one mission file, or as the Python code that builds it."""
+
+    to: Annotated[Path, option("FILE", "The file to write: NAME.xml or NAME.py.")]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.to.suffix not in (".xml", ".py"):
+            raise typer.BadParameter(
+                f"--to {self.to} is not allowed; it takes a name that ends in .xml or .py"
+            )
+
+
+@dataclass(frozen=True, kw_only=True)
 class NewOptions:
     """Write a working plugin, its test, and a mission that uses it."""
 

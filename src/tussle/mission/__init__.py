@@ -5,6 +5,7 @@ from tussle.mission.limits import Limits
 from tussle.mission.plugin_files import PluginFile, load_plugin_file
 from tussle.mission.source import shipped_missions
 from tussle.mission.spec import Block, Mission
+from tussle.mission.write import to_python, to_xml
 from tussle.mission.xml import Loaded, read_mission
 
 __all__ = [
@@ -17,4 +18,6 @@ __all__ = [
     "load_plugin_file",
     "read_mission",
     "shipped_missions",
+    "to_python",
+    "to_xml",
 ]

@@ -275,7 +275,7 @@ class EntityReader:
             "position": fields.position(self.origin),
             "heading": fields.number("heading", "rad"),
             "roll": fields.number("roll", "rad"),
-            "climb": -fields.number("pitch", "rad"),
+            "climb": 0.0 - fields.number("pitch", "rad"),
             "velocity": velocity if any(velocity) else None,
             "speed": fields.number("speed"),
             "placement": fields.read(

@@ -11,7 +11,8 @@ from typing import Any, Protocol, Self
 import numpy as np
 import pyarrow as pa
 
-from tussle.errors import ParameterError, RecordError
+from tussle.errors import MissionError, ParameterError, RecordError
+from tussle.mission import to_xml
 from tussle.record import run_file
 from tussle.record.events import BIRTH, END, Events
 from tussle.record.row_buffer import RowBuffer, RowSelection
@@ -57,7 +58,8 @@ class Recorder:
         sim: The simulation; recording starts with its present state.
         directory: Run directory; created if it does not exist. It must not hold a run.
         period: Time between recorded states [s]; None records every step.
-        mission_text: Mission file with all its values, saved as `mission.xml`.
+        mission_text: Mission file with all its values, saved as `mission.xml`; by default the mission of the simulation is written,
+            if a mission file can hold it.
         parameters: Values that were set in addition to the mission, for `run.json`.
         flush_every: Wall time between flushes [s].
         shapes: Whether the shapes that plugins draw are recorded, too; of every step, whatever the period.
@@ -109,7 +111,8 @@ class Recorder:
                 raise RecordError(
                     f"{self.directory}: holds a run already ({held[0]}); choose another directory, or remove it"
                 )
-            if mission_text is not None:
+            mission_text = mission_text or self._written_back()
+            if mission_text:
                 (self.directory / MISSION_FILE).write_text(mission_text, encoding="utf-8")
         except OSError as error:
             raise RecordError(
@@ -125,6 +128,13 @@ class Recorder:
                 Stream(self.directory / SHAPES_FILE, SHAPES),
             )
             self._streams.append(self._shape_stream)
+
+    def _written_back(self) -> str:
+        seeds = self.sim.state.context.seeds
+        try:
+            return to_xml(self.sim.mission, int(seeds[0]) if len(seeds) == 1 else None)
+        except MissionError:  # there is no tag for something in it
+            return ""
 
     def _begin(self) -> None:
         """Attach to the simulation, and record the births of the entities that exist."""

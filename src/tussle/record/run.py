@@ -142,7 +142,7 @@ class Run:
 
     @property
     def mission(self) -> str | None:
-        """Text of the mission file with all its values; None for a mission built in Python."""
+        """Text of the mission file with all its values; None if a mission file cannot hold it."""
         path = self.path / MISSION_FILE
         return read_text(path, RecordError, Limits.large().text) if path.exists() else None
 

@@ -383,7 +383,9 @@ class Recording:
     def _loaded(self) -> Loaded | None:
         path = self.path / MISSION_FILE
         if not path.exists():
-            self.notes.append(f"{MISSION_FILE} is missing: a mission built in Python has none")
+            self.notes.append(
+                f"{MISSION_FILE} is missing: a mission file cannot hold everything of the mission"
+            )
             return None
         try:
             return read_mission(path.resolve(), plugin_files=self._plugin_files)

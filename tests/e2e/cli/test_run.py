@@ -7,6 +7,7 @@ import json
 import re
 import shlex
 import subprocess
+import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -68,6 +69,31 @@ def test_it_is_the_same_again_and_another_with_another_seed(process, tussle, fol
     assert hash_of(first) == hash_of(again) != hash_of(other)
     kept = tussle("run", "out/mission.xml", "--no-log")
     assert hash_of(kept) == hash_of(first)
+
+
+def test_a_converted_mission_plays_the_same_game(tussle, folder):
+    played = tussle("run", "game.xml", "--no-log", "--end", "2", "prey.count=3")
+    for name in ("other.xml", "game.py"):
+        done = tussle("convert", "game.xml", "--to", name, "--end", "2", "prey.count=3")
+        assert f"{name} plays the same game" in done.stdout
+    assert hash_of(tussle("run", "other.xml", "--no-log")) == hash_of(played)
+    script = subprocess.run(
+        [sys.executable, "game.py"], cwd=folder, capture_output=True, text=True, check=True
+    )
+    assert f"state_hash='{hash_of(played)}'" in script.stdout
+
+
+@pytest.mark.parametrize(
+    ("to", "code", "words"),
+    [
+        ("game.xml", 1, "game.xml: exists already"),
+        ("no/game.py", 1, "cannot be written"),
+        ("game.txt", 2, "ends in .xml or .py"),
+    ],
+)
+def test_a_conversion_overwrites_nothing(tussle, to, code, words):
+    done = tussle("convert", "game.xml", "--to", to, code=code)
+    assert words in done.stderr
 
 
 def test_without_log_nothing_is_written(tussle, folder):

@@ -67,9 +67,8 @@ def test_what_it_says_of_the_mission_without_having_the_file(played):
     assert recording.blocks == ["prey", "late", "hunters"]
     assert recording.block_teams == [1, 1, 2]
     assert recording.teams == {1: "prey, late", 2: "hunters"}
-    assert recording.mission is None
-    assert recording.viewer == {}
-    assert recording.notes == ["mission.xml is missing: a mission built in Python has none"]
+    assert recording.mission.end == 30.0
+    assert (recording.viewer, recording.notes) == ({}, [])
     assert [recording.style.model(b) for b in range(3)] == ["aircraft"] * 3
 
 

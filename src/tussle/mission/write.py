@@ -1,0 +1,269 @@
+"""Missions written back: `to_xml` as a mission file, `to_python` as the Python code that builds it."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from tussle import stock
+from tussle.api.plugin import Plugin
+from tussle.errors import MissionError, ParameterError
+from tussle.mission import codecs
+from tussle.mission.entities import block_names
+from tussle.mission.node import Node
+from tussle.mission.plugin_tags import RATED
+from tussle.mission.problems import Place
+from tussle.mission.spec import Block, Mission
+from tussle.mission.tags import BASE, ENTITY, RUN, WORLD, TagSpec
+from tussle.scene import Base, Scene
+from tussle.texts import shown
+
+NOWHERE = Place("", 0)
+COMPONENTS = {
+    "position": ("x", "y", "z"),
+    "velocity": ("vx", "vy", "vz"),
+    "variance": ("variance_x", "variance_y", "variance_z"),
+    "half_width": ("half_width_x", "half_width_y", "half_width_z"),
+}
+"""Values of a block that are three tags each."""
+TAGS = {
+    "count": "count",
+    "placement": "placement",
+    "scatter_first": "use_variance_all_ents",
+    "heading": "heading",
+    "heading_variance": "variance_heading",
+    "roll": "roll",
+    "speed": "speed",
+    "health": "health",
+    "radius": "radius",
+    "mass": "mass",
+    "rate": "generate_rate",
+    "slots": "generate_count",
+    "first_birth": "generate_start_time",
+    "interval_sd": "generate_time_variance",
+}
+"""Values of a block that are one tag each."""
+
+
+def to_xml(mission: Mission, seed: int | None = None) -> str:
+    """Write a mission as a mission file, which plays to the same state hash. Plugins are written by the names of their classes.
+
+    Args:
+        mission: The mission.
+        seed: Written as <seed>, unless it is None.
+
+    Raises:
+        MissionError: A value of the mission cannot be written in a mission file.
+    """
+    for name in ("ground", "walls", "boundaries"):
+        if getattr(mission.scene, name) != getattr(Scene(), name):
+            raise MissionError(
+                f"mission: scene.{name} has no tag in mission files; write the mission as Python instead"
+            )
+    root = _node("runscript", {"name": mission.name} if mission.name else {})
+    run = {
+        name: codecs.written(getattr(mission, name)) for name in ("start", "end", "dt", "motion_multiplier")
+    }
+    if mission.update != RUN["update"].default:
+        run["update"] = mission.update
+    root.children = [_node("run", run), _node("end_condition", text=", ".join(mission.end_conditions))]
+    if seed is not None:
+        root.children.append(_node("seed", text=str(seed)))
+    origin = mission.scene.origin
+    for name in ("latitude", "longitude", "altitude"):
+        root.children.append(_value(f"{name}_origin", getattr(origin, name), WORLD))
+    plugins = (
+        ("network", mission.networks),
+        ("entity_interaction", mission.interactions),
+        ("metrics", mission.metrics),
+    )
+    root.children += [_plugin(tag, plugin, "mission") for tag, made in plugins for plugin in made]
+    entities = [_entity(block) for block in mission.blocks]
+    root.children += entities
+    for block, name in zip(mission.blocks, block_names(entities), strict=True):
+        if block.name != name:
+            raise MissionError(
+                f"block {block.name!r}: the name would be read back as {name!r}; call it {name!r}"
+            )
+    for base in mission.scene.bases:
+        _add_base(base, mission.blocks, entities)
+    return f'<?xml version="1.0"?>\n{root.to_text()}'
+
+
+def _node(tag: str, attributes: dict[str, str] | None = None, text: str = "") -> Node:
+    return Node(tag, attributes or {}, text, [], NOWHERE)
+
+
+def _value(tag: str, value: Any, tags: dict[str, TagSpec]) -> Node:
+    """A tag with a value in SI units; its unit is written where a bare number has another one."""
+    unit = tags[tag].unit
+    return _node(tag, text=codecs.written(value, (unit.replace("deg", "rad"),), (unit,)))
+
+
+def _entity(block: Block) -> Node:
+    node = _node("entity")
+    node.children = [
+        _node("name", text=block.name),
+        _value("team_id", block.team, ENTITY),
+    ]  # a file without team is noted
+    values: dict[str, Any] = {}
+    for name, tags in COMPONENTS.items():
+        given = getattr(block, name)
+        values |= dict(zip(tags, given, strict=True)) if given is not None else {}
+    if block.velocity is not None and not any(block.velocity):
+        values["speed"] = 0.0  # in a file, a velocity of 0 means that there is only a speed
+    for name, tag in TAGS.items():
+        values.setdefault(tag, getattr(block, name))
+    values["pitch"] = -block.climb
+    if block.rate is None:
+        values = {tag: value for tag, value in values.items() if not tag.startswith("generate_")}
+    for tag, value in values.items():
+        if not _is_default(value, ENTITY[tag].default):
+            node.children.append(_value(tag, value, ENTITY))
+    kinds: dict[str, Sequence[Plugin]] = {
+        "autonomy": block.autonomy, "controller": block.controller, "motion_model": [block.motion], "sensor": block.sensor
+    }  # fmt: skip
+    node.children += [
+        _plugin(tag, plugin, f"block {block.name!r}") for tag, made in kinds.items() for plugin in made
+    ]
+    return node
+
+
+def _is_default(value: Any, default: str) -> bool:
+    if isinstance(value, (bool, str)):
+        return codecs.written(value) == default
+    return default != "none" and value == float(default)
+
+
+def _plugin(tag: str, plugin: Plugin, where: str) -> Node:
+    if plugin.rate is not None and tag not in RATED:
+        raise MissionError(
+            f"{where}: {plugin.instance_name}: mission files have no loop_rate for a {tag}; write the mission as Python instead"
+        )
+    try:
+        return _node(tag, _attributes(plugin), type(plugin).__name__)
+    except (MissionError, ParameterError) as error:
+        raise MissionError(f"{where}: {plugin.instance_name}: {error}") from error
+
+
+def _attributes(plugin: Plugin) -> dict[str, str]:
+    """Attributes of a plugin's tag: name, rate, and the parameters that differ from their defaults."""
+    found = {} if plugin.instance_name == type(plugin).__name__ else {"name": plugin.instance_name}
+    if plugin.rate is not None:
+        found["loop_rate"] = codecs.written(plugin.rate)
+    # Without those whose default differs from the existing system's, the reader would note that.
+    said = {name: plugin.values[name] for name in plugin.historic_attributes.differs}
+    for name, value in (said | dict(plugin.given())).items():
+        if name in plugin.children():
+            found[name] = " ".join(
+                codecs.inline_text(type(each).__name__, _attributes(each)) for each in value
+            )
+            continue
+        column = plugin.params()[name]
+        text = codecs.written(value, column.units, column.text_units)
+        if column.convert(text) != value:
+            raise MissionError(f"{name} = {shown(repr(value))} would not be read back unchanged")
+        found[name] = text
+    return found
+
+
+def _add_base(base: Base, blocks: Sequence[Block], entities: Sequence[Node]) -> None:
+    for block, entity in zip(blocks, entities, strict=True):
+        if block.team == base.team:
+            values = dict(zip("xyz", base.position, strict=True)) | {
+                "radius": base.radius,
+                "opacity": base.opacity,
+            }
+            node = _node("base")
+            node.children = [_value(tag, value, BASE) for tag, value in values.items()]
+            entity.children.append(node)
+            return
+    raise MissionError(
+        f"mission: the base of team {base.team} has no block of this team, in whose <entity> it would stand"
+    )
+
+
+def to_python(mission: Mission, seed: int | None = None) -> str:
+    """Write the Python code that builds a mission and plays it.
+
+    Args:
+        mission: The mission.
+        seed: Seed of the game; 1 if it is None.
+
+    Raises:
+        MissionError: Two classes have the same name.
+    """
+    imports: dict[str, str] = {"Mission": "tussle", "Simulation": "tussle"}
+    made = "\n".join(_code(mission, imports))
+    by_module = {
+        module: sorted(n for n, m in imports.items() if m == module) for module in sorted({*imports.values()})
+    }
+    return (
+        "\n".join(_import(module, names) for module, names in by_module.items()) + f"\n\nmission = {made}\n\n"
+        'if __name__ == "__main__":\n'
+        f"    with Simulation(mission, {1 if seed is None else seed}) as simulation:\n"
+        "        simulation.run()\n"
+        '        print(*simulation.result(), sep="\\n")\n'
+    )
+
+
+def _import(module: str, names: Sequence[str]) -> str:
+    line = f"from {module} import {', '.join(names)}"
+    return (
+        line
+        if len(line) < 100
+        else f"from {module} import (\n" + "".join(f"    {name},\n" for name in names) + ")"
+    )
+
+
+def _code(value: Any, imports: dict[str, str]) -> list[str]:
+    """Lines of code of a value; `imports` receives the names that it needs, with their modules."""
+    if isinstance(value, str):
+        return [json.dumps(value, ensure_ascii=False)]
+    if isinstance(value, (tuple, list)) and any(map(_is_made, value)):
+        return ["[", *(f"    {line}" for each in value for line in _comma(_code(each, imports))), "]"]
+    if not _is_made(value):
+        return [repr(value)]
+    name = type(value).__name__
+    module = "tussle" if isinstance(value, (Block, Mission)) else type(value).__module__
+    module = "tussle.stock" if module.startswith("tussle.stock.") else module
+    if imports.setdefault(name, module) != module:
+        raise MissionError(
+            f"two classes are called {name}, in {imports[name]} and {module}; rename one of them"
+        )
+    lines, is_flat = [], True
+    for key, each in _arguments(value):
+        first, *rest = _comma(_code(each, imports))
+        lines += [f"    {key}={first}", *(f"    {line}" for line in rest)]
+        is_flat = is_flat and not rest
+    flat = f"{name}({', '.join(line.strip().removesuffix(',') for line in lines)})"
+    return [flat] if is_flat and len(flat) < 80 else [f"{name}(", *lines, ")"]
+
+
+def _is_made(value: Any) -> bool:
+    """Whether a value is made by calling its class."""
+    return isinstance(value, Plugin) or dataclasses.is_dataclass(value)
+
+
+def _comma(lines: list[str]) -> list[str]:
+    return [*lines[:-1], f"{lines[-1]},"]
+
+
+def _arguments(value: Any) -> Iterator[tuple[str, Any]]:
+    """Arguments that make a plugin or dataclass, as far as they differ from their defaults."""
+    if isinstance(value, Plugin):
+        yield from value.given()
+        yield from [("name", value.instance_name)] * (value.instance_name != type(value).__name__)
+        yield from [("rate", value.rate)] * (value.rate is not None)
+        return
+    for field in dataclasses.fields(value):
+        given = getattr(value, field.name)
+        default = field.default if field.default_factory is dataclasses.MISSING else field.default_factory()
+        if field.name == "networks":  # those that a mission adds by itself are first
+            added = tuple(stock.load(name)() for name in stock.ALWAYS_THERE)
+            given = given[len(added) :] if given[: len(added)] == added else given
+        is_one = isinstance(given, tuple) and len(given) == 1 and isinstance(given[0], Plugin)
+        if given != default and field.repr:
+            yield field.name, given[0] if is_one else given
