@@ -1,5 +1,6 @@
-"""The hashes that are kept, whatever the stack, the threads, and who stops the game in between. What else a stack may go through
-is drawn at random in property/determinism and property/fuzz.
+"""The hashes that are kept, whatever the stack, the threads, and who stops the game in between.
+
+What else a stack may go through is drawn at random in property/determinism and property/fuzz.
 """
 
 from __future__ import annotations

@@ -34,7 +34,11 @@ OLD = {
 @pytest.mark.skipif(os.uname().machine != "x86_64", reason="the settings name x86-64 processors")
 def test_an_old_processor_gives_the_golden_hashes():
     folder = store.directory() / OLD["NUMBA_CPU_NAME"]
-    env = os.environ | {"PYTHONPATH": str(Path(tussle.__file__).parents[1]), "TUSSLE_CACHE_DIR": str(folder)} | OLD
+    env = (
+        os.environ
+        | {"PYTHONPATH": str(Path(tussle.__file__).parents[1]), "TUSSLE_CACHE_DIR": str(folder)}
+        | OLD
+    )
     command = [sys.executable, "-W", "error", str(PROGRAM)]
     done = subprocess.run(command, env=env, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
