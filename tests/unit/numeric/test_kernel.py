@@ -562,8 +562,9 @@ def test_edits_are_seen_and_only_what_changed_compiles(project):
 
 def test_processes_may_fill_the_cache_at_once(project):
     running = [project.start() for _ in range(3)]
-    outputs = [process.communicate()[0].split() for process in running]
-    assert [process.returncode for process in running] == [0, 0, 0]
+    ended = [process.communicate() for process in running]
+    assert [process.returncode for process in running] == [0, 0, 0], ended
+    outputs = [out.split() for out, _ in ended]
     assert {tuple(words[:5]) for words in outputs} == {("20.0", "1.5", "2.0", "3.0", "7.0")}
     assert sum(int(words[5]) for words in outputs) == 5  # each kernel is compiled by one of them
     assert project() == [20.0, 1.5, 2.0, 3.0, 7.0, 0, 5]
