@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import pytest
 from playwright.sync_api import Browser, ConsoleMessage, Page, Request, sync_playwright
@@ -37,8 +38,8 @@ def chromium() -> Iterator[Browser]:
         browser.close()
 
 
-@pytest.fixture
-def watched(chromium: Browser) -> Iterator[Callable[..., Page]]:
+@contextmanager
+def _watched(chromium: Browser) -> Iterator[Callable[..., Page]]:
     """Opens pages of the browser; at the end, the test fails where one of them complained or asked for anything else.
 
     Called with the beginning of all addresses that may be asked for, and options of the page.
@@ -71,3 +72,17 @@ def watched(chromium: Browser) -> Iterator[Callable[..., Page]]:
     for page in pages:
         page.close()
     assert not trouble, "\n".join(trouble)
+
+
+@pytest.fixture
+def watched(chromium: Browser) -> Iterator[Callable[..., Page]]:
+    """Opens pages for one test, see `_watched`."""
+    with _watched(chromium) as new:
+        yield new
+
+
+@pytest.fixture(scope="module")
+def watched_by_module(chromium: Browser) -> Iterator[Callable[..., Page]]:
+    """Opens pages for a module, see `_watched`."""
+    with _watched(chromium) as new:
+        yield new

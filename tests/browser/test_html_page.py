@@ -33,9 +33,26 @@ def hunted(tmp_path_factory):
 
 
 @pytest.fixture
-def page(watched, hunted):
-    """The page, ready, and nothing moving on it."""
+def new_page(watched, hunted):
+    """The page, ready, and nothing moving on it: for tests that change its settings."""
     return opened(watched, hunted[1].path)
+
+
+@pytest.fixture(scope="module")
+def kept_page(watched_by_module, hunted):
+    return opened(watched_by_module, hunted[1].path)
+
+
+@pytest.fixture
+def page(kept_page):
+    """The page of the tests before, as at its beginning: for tests that change the time, the view and who is chosen."""
+    if kept_page.evaluate("() => player.isPlaying"):
+        kept_page.keyboard.press("Space")
+    for key in ("Escape", "Home", "r", "o"):
+        kept_page.keyboard.press(key)
+    beginning = "player.t === 0 && !player.isPlaying && player.chosen === 0 && player.mode === 'overview'"
+    wait_until(kept_page, f"{beginning} && player.isDrawn")
+    return kept_page
 
 
 def opened(watched, path, **options):
@@ -87,6 +104,8 @@ def test_the_clock_goes_as_fast_as_is_said(page):
     )
     # On a machine that is busy with other things, frames of more than a second are not made up for.
     assert 0.1 < elapsed[1] / elapsed[0] < 0.75
+    page.keyboard.press("]")
+    wait_until(page, "player.speed === 1")
 
 
 def test_a_step_goes_one_frame_on_or_back(page, hunted):
@@ -296,27 +315,27 @@ def n_blue_and_vermilion(page):
     return int(((blue - red > 0.35) & (blue > green)).sum()), int(((red - blue > 0.35) & (red > green)).sum())
 
 
-def test_entities_are_drawn_in_the_colours_of_their_teams(page, hunted):
-    happened = [m["t"] for m in page.evaluate("() => player.events")]
+def test_entities_are_drawn_in_the_colours_of_their_teams(new_page, hunted):
+    happened = [m["t"] for m in new_page.evaluate("() => player.events")]
     # What happens flashes for a second, in a colour that is like the hunters'.
-    seek(page, next(t for t in hunted[0].t.tolist() if all(not t - 1.0 < h <= t for h in happened)))
-    if page.evaluate("() => player.drawn.labels"):
-        page.keyboard.press("l")
-    page.locator("#trail").evaluate("(s) => { s.value = '0'; s.dispatchEvent(new Event('input')); }")
-    page.keyboard.press("g")
-    prey, hunters = n_blue_and_vermilion(page)
+    seek(new_page, next(t for t in hunted[0].t.tolist() if all(not t - 1.0 < h <= t for h in happened)))
+    if new_page.evaluate("() => player.drawn.labels"):
+        new_page.keyboard.press("l")
+    new_page.locator("#trail").evaluate("(s) => { s.value = '0'; s.dispatchEvent(new Event('input')); }")
+    new_page.keyboard.press("g")
+    prey, hunters = n_blue_and_vermilion(new_page)
     assert prey > 100
     assert hunters > 50
     for _ in range(6):
-        page.keyboard.press("+")
-    page.keyboard.press("w")
-    assert n_blue_and_vermilion(page) != (prey, hunters)
-    page.keyboard.press("s")
-    assert n_blue_and_vermilion(page)[0] > 2 * prey
-    page.keyboard.press("0")
-    assert n_blue_and_vermilion(page) == (prey, hunters)
-    page.locator("#teams .team").last.click()
-    assert n_blue_and_vermilion(page)[1] == 0
+        new_page.keyboard.press("+")
+    new_page.keyboard.press("w")
+    assert n_blue_and_vermilion(new_page) != (prey, hunters)
+    new_page.keyboard.press("s")
+    assert n_blue_and_vermilion(new_page)[0] > 2 * prey
+    new_page.keyboard.press("0")
+    assert n_blue_and_vermilion(new_page) == (prey, hunters)
+    new_page.locator("#teams .team").last.click()
+    assert n_blue_and_vermilion(new_page)[1] == 0
 
 
 def test_the_saved_picture_has_the_name_of_the_game_and_the_time(page):
@@ -327,35 +346,35 @@ def test_the_saved_picture_has_the_name_of_the_game_and_the_time(page):
     assert matplotlib.image.imread(download.value.path(), "png").shape[:2] == (650, 900)
 
 
-def test_a_team_can_be_hidden(page):
-    page.locator("#teams .team").first.click()
-    wait_until(page, "player.drawn.hidden.length === 1")
-    page.keyboard.press("ArrowRight")
-    wait_until(page, "player.chosen > 0 && player.isDrawn")
-    assert page.locator("#chosen dd").first.inner_text() == "2 hunters"
+def test_a_team_can_be_hidden(new_page):
+    new_page.locator("#teams .team").first.click()
+    wait_until(new_page, "player.drawn.hidden.length === 1")
+    new_page.keyboard.press("ArrowRight")
+    wait_until(new_page, "player.chosen > 0 && player.isDrawn")
+    assert new_page.locator("#chosen dd").first.inner_text() == "2 hunters"
 
 
-def test_settings_and_keys_say_the_same(page):
-    page.keyboard.press("d")
-    assert page.locator("#settings").is_visible()
-    page.keyboard.press("l")
-    is_on = page.evaluate("() => player.drawn.labels")
-    assert page.locator("#labels").is_checked() is is_on
-    page.locator("#trail").evaluate("(s) => { s.value = '7'; s.dispatchEvent(new Event('input')); }")
-    wait_until(page, "player.drawn.trail === 7")
-    assert page.locator("#trail-says").inner_text() == "all"
-    page.keyboard.press("k")
-    wait_until(page, "player.drawn.theme === 'dark'")
+def test_settings_and_keys_say_the_same(new_page):
+    new_page.keyboard.press("d")
+    assert new_page.locator("#settings").is_visible()
+    new_page.keyboard.press("l")
+    is_on = new_page.evaluate("() => player.drawn.labels")
+    assert new_page.locator("#labels").is_checked() is is_on
+    new_page.locator("#trail").evaluate("(s) => { s.value = '7'; s.dispatchEvent(new Event('input')); }")
+    wait_until(new_page, "player.drawn.trail === 7")
+    assert new_page.locator("#trail-says").inner_text() == "all"
+    new_page.keyboard.press("k")
+    wait_until(new_page, "player.drawn.theme === 'dark'")
 
 
-def test_the_help_names_every_key_and_closes(page):
-    page.keyboard.press("h")
-    keys = page.locator("#help kbd").all_inner_texts()
+def test_the_help_names_every_key_and_closes(new_page):
+    new_page.keyboard.press("h")
+    keys = new_page.locator("#help kbd").all_inner_texts()
     assert {"space", *"[],.aruzZ+−0twslhnNb", "←", "→", "PgDn", "Esc"} <= set(keys)
-    page.keyboard.press("Escape")
-    assert page.locator("#help").is_hidden()
-    page.keyboard.press("i")
-    assert "positions within" in page.locator("#info").inner_text()
+    new_page.keyboard.press("Escape")
+    assert new_page.locator("#help").is_hidden()
+    new_page.keyboard.press("i")
+    assert "positions within" in new_page.locator("#info").inner_text()
 
 
 # -- other pages and other browsers -------------------------------------------------------------------------------------------------------

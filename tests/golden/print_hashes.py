@@ -1,4 +1,4 @@
-"""Prints the hashes of the golden missions named as arguments (all by default) as JSON. Run in subprocesses by test_portability."""
+"""Prints the hashes of all golden missions and for which processor was compiled, as JSON. Run in a subprocess by test_portability."""
 
 import json
 import sys
@@ -7,10 +7,9 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parent))
 
 from golden_runs import play_all
-from missions import NAMES
-
-from tussle.numeric.kernel import stats
+from numba.core.registry import cpu_target
+from numpy._core._multiarray_umath import __cpu_features__
 
 if __name__ == "__main__":
-    hashes = play_all(sys.argv[1:] or NAMES)
-    print(json.dumps({"hashes": hashes, "compiled": stats.compiled, "loaded": stats.loaded}))
+    processor = [sum(__cpu_features__.values()), *cpu_target.target_context.codegen().magic_tuple()]
+    print(json.dumps({"hashes": play_all(), "processor": processor}))

@@ -32,7 +32,8 @@ def directory() -> Path:
     no absolute path to it, a folder for temporary files is used instead.
     """
     chosen = _chosen()
-    if chosen is not None and (is_private(chosen) or not os.path.lexists(chosen)):
+    # In this order: another process may make the folder in between.
+    if chosen is not None and (not os.path.lexists(chosen) or is_private(chosen)):
         return chosen
     warn_once(
         f"compiled kernels are not stored in {chosen or 'your home folder'}: the folder must belong to you and be writable only by "

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
-from cli_process import COMMAND, environment
+from cli_process import COMMAND, call, environment
 
 from tussle.batch import Batch, InProcess, load_batch
 from tussle.errors import BatchError
@@ -133,12 +133,6 @@ def all_gone(group):
     return not members(group)
 
 
-def kill_group(process):
-    os.killpg(process.pid, signal.SIGKILL)
-    process.communicate()
-    assert all_gone(process.pid)
-
-
 def end(process, seconds=600.0):
     """Wait for the end: exit code, output, and messages, but for what a slow machine says besides."""
     try:
@@ -173,57 +167,48 @@ def n_finished(folder):
         return 0
 
 
-MOMENTS = {
-    "it begins": lambda folder: (folder / "out" / "batch.json").exists(),
-    "the middle": lambda folder: bytes_of_parts(folder) > 60_000,
-    "it ends": lambda folder: (folder / "out" / "alive.parquet.part").exists() or (folder / "out" / "alive.parquet").exists(),
+COPIES = re.compile("note: .* are copies of another run .*\n")
+STOPS = {
+    "it begins": (signal.SIGKILL, lambda folder, _: (folder / "out" / "batch.json").exists()),
+    "a terminal": (signal.SIGINT, lambda folder, before: bytes_of_parts(folder) > before + 5000),
+    "a batch system": (signal.SIGTERM, lambda folder, before: bytes_of_parts(folder) > before + 5000),
+    "the middle": (signal.SIGKILL, lambda folder, _: bytes_of_parts(folder) > 60_000),
+    "it ends": (signal.SIGKILL, lambda folder, _: any((folder / "out").glob("alive.parquet*"))),
 }  # fmt: skip
 
-COPIES = re.compile("note: .* are copies of another run .*\n")
 
-
-def test_killed_again_and_again_with_all_its_processes(folder):
+def test_stopped_again_and_again_with_all_its_processes(folder):
     before = 0
-    for name, moment in MOMENTS.items():
-        process = started(folder)
-        reached = wait_until(lambda is_time=moment: is_time(folder), process)
-        kill_group(process)
+    for name, (number, moment) in STOPS.items():
+        process, size = started(folder), bytes_of_parts(folder)
+        reached = wait_until(lambda is_time=moment, size=size: is_time(folder, size), process)
+        assert reached or name == "it ends"
+        os.killpg(process.pid, number)
+        code, out, err = end(process)
+        assert all_gone(process.pid)
         n = n_finished(folder)
         assert n >= before
+        if number != signal.SIGKILL:
+            assert (code, out) == (128 + number, "")
+            assert err.endswith("interrupted: finished runs are kept in out; the same command continues\n")
+            assert n > before
         if name == "the middle":
-            assert reached
             assert 0 < n < 2 * RUNS
         before = n
     code, _, err = end(started(folder))
-    there = f"note: {before} of 120 runs were there already, in out\n" if before else ""
-    assert (code, COPIES.sub("", err)) == (0, there)
+    assert (code, COPIES.sub("", err)) == (0, f"note: {before} of 120 runs were there already, in out\n")
     check_whole(folder)
 
 
-def test_a_process_that_plays_is_killed_while_another_command_comes(folder):
+def test_a_process_that_plays_is_killed_while_another_command_comes(folder, monkeypatch):
     process = started(folder)
     assert wait_until(lambda: bytes_of_parts(folder) > 20_000, process)
     os.kill(workers(process)[0], signal.SIGKILL)
-    code, out, err = end(started(folder))
-    assert (code, out, err) == (4, "", "error: out: another process is playing this batch\n")
+    monkeypatch.chdir(folder)
+    other = call(*ARGUMENTS)
+    said = "error: out: another process is playing this batch\n"
+    assert (other.returncode, other.stdout, other.stderr) == (4, "", said)
     code, _, err = end(process)
     assert (code, COPIES.sub("", err)) == (0, "")
     assert all_gone(process.pid)
     check_whole(folder)
-
-
-def test_stopped_by_signals(folder):
-    n = 0
-    for number, code in ((signal.SIGINT, 130), (signal.SIGTERM, 143)):
-        process = started(folder)
-        size = bytes_of_parts(folder)
-        assert wait_until(lambda size=size: bytes_of_parts(folder) > size + 5000, process)
-        os.killpg(
-            process.pid, number
-        )  # as a terminal and a batch system do; the second ends the processes that play
-        found, out, err = end(process)
-        assert (found, out) == (code, "")
-        assert err == "interrupted: finished runs are kept in out; the same command continues\n"
-        assert all_gone(process.pid)
-        n, before = n_finished(folder), n
-        assert n > before

@@ -68,8 +68,8 @@ def test_the_page_says_who_won_how_surely_and_what_differs(tussle, paired):
     ]
 
 
-def test_json_has_all_of_it(process, paired):
-    found = json.loads(process("analyze", paired, "--json").stdout)
+def test_json_has_all_of_it(tussle, paired):
+    found = json.loads(tussle("analyze", paired, "--json").stdout)
     assert (found["n_runs"], found["n_failed"], found["n_points"]) == (160, 1, 4)
     assert [point["label"] for point in found["points"]][3] == "tactic=switch, prey.Boids.speed=30 kt"
     (comparison,) = found["comparisons"]

@@ -10,8 +10,8 @@ from tussle.cli import pages, terminal
 from tussle.mission import shipped_missions
 
 
-def test_the_version(process):
-    assert process("--version").stdout == f"tussle {package.__version__}\n"
+def test_the_version(tussle):
+    assert tussle("--version").stdout == f"tussle {package.__version__}\n"
 
 
 def test_help_names_all_commands_options_and_exit_codes(tussle):

@@ -12,8 +12,8 @@ def played(tussle, folder):
     return folder / "played"
 
 
-def test_the_plots_lie_in_the_run_and_their_paths_are_printed(process, played):
-    said = process("plot", "played")
+def test_the_plots_lie_in_the_run_and_their_paths_are_printed(tussle, played):
+    said = tussle("plot", "played")
     paths = said.stdout.splitlines()
     assert paths[0] == "played/plots/trajectory.png"
     assert all((played.parent / path).stat().st_size > 5000 for path in paths)

@@ -16,8 +16,8 @@ def played(folder):
     )
 
 
-def test_the_report_lies_in_the_batch_and_its_path_is_printed(process, played):
-    said = process("report", "played")
+def test_the_report_lies_in_the_batch_and_its_path_is_printed(tussle, played):
+    said = tussle("report", "played")
     page = played / "report" / "index.html"
     assert said.stdout.startswith("played/report/index.html (")
     assert "keepers won" in page.read_text()

@@ -62,8 +62,8 @@ def test_the_run_directory_opens(tussle, folder):
     ]  # fmt: skip
 
 
-def test_it_is_the_same_again_and_another_with_another_seed(process, tussle, folder):
-    first = process("run", "game.xml", "--no-log")
+def test_it_is_the_same_again_and_another_with_another_seed(tussle, folder):
+    first = tussle("run", "game.xml", "--no-log")
     again = tussle("run", "game.xml", "--out", "out")
     other = tussle("run", "game.xml", "--no-log", "--seed", "8")
     assert hash_of(first) == hash_of(again) != hash_of(other)
@@ -204,10 +204,10 @@ class Fails(Predator):
 '''
 
 
-def test_a_plugin_that_fails_ends_the_game_and_what_was_played_is_kept(process, tussle, folder):
+def test_a_plugin_that_fails_ends_the_game_and_what_was_played_is_kept(tussle, folder):
     (folder / "fails.py").write_text(FAILING)
     arguments = ["run", "game.xml", "--plugin-path", "fails.py", "--set", "mind=Fails", "--out", "out"]
-    done = process(*arguments, code=3)
+    done = tussle(*arguments, code=3)
     (line,) = done.stderr.splitlines()
     assert re.fullmatch(r"error: Fails, .*step 10: fails\.py:11: RuntimeError: out of fuel", line)
     assert " ended  a plugin failed, at t = 1 s" in done.stdout.splitlines()

@@ -18,7 +18,7 @@ from tussle.units import parse
 
 DRAWN = ("lhs", "sobol", "saltelli", "product")
 SEEDS = st.integers(0, 2**32)
-N = st.integers(1, 40) | st.integers(101, 130)
+N = st.integers(1, 16) | st.integers(101, 110)
 """Latin hypercubes of up to 100 points are improved by exchanges, which takes a while."""
 
 slow_law = settings(max_examples=40)
@@ -73,7 +73,7 @@ def test_the_text_of_a_value_is_that_value(variable, share):
 @given(
     variables=st.tuples(ranges("x"), choices("y"), ranges("z")),
     method=st.sampled_from(DRAWN),
-    n=st.integers(1, 30),
+    n=st.integers(1, 12),
     seed=SEEDS,
 )
 def test_points_lie_within_bounds_and_come_again(variables, method, n, seed):

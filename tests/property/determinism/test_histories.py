@@ -100,6 +100,9 @@ class History:
                 values, _ = sim.read(f"{block.name}.{column}")
                 if writes and values.size:
                     sim.write(f"{block.name}.{column}", values)
+            for plugin in (*block.autonomy, block.motion):
+                for column in (*type(plugin).states(), *type(plugin).outputs()):
+                    sim.read(f"{block.name}.{plugin.instance_name}.{column}")
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -201,12 +201,8 @@ def compare(moved, still, motion: Motion, tolerance: float) -> None:
 
 
 MOTIONS = {
-    "turn": Motion(turn=0.7),
     "quarter turn": Motion(turn=math.pi / 2),
-    "half turn": Motion(turn=math.pi),
     "turn across West": Motion(turn=-2.9),
-    "shift": Motion(shift=(1234.5, -777.0, 31.0)),
-    "mirror": Motion(mirror=True),
     "all at once": Motion(turn=2.0, shift=(-300.0, 55.5, 10.0), mirror=True),
 }
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from small_worlds import Drift, Note, Talker, block, mission
+from small_worlds import Drift, Note, block, mission
 
 from tussle import Simulation
 from tussle.api import (
@@ -333,65 +333,6 @@ def test_a_published_column_is_not_read():
 
 
 # -- stacks -----------------------------------------------------------------------------------------------------------------------
-
-
-class Storm(EasyInteraction):
-    """Uses everything that a world number could get wrong."""
-
-    strength = Param(0.5, ge=0.0)
-    n = State(dtype=int, per="world")
-    hits = State(dtype=int)
-    by_team = State(dtype=int, per="team")
-
-    def step_one(self, w):
-        w.n += len(w.inbox(Note))
-        for e in w.entities:
-            other = e.nearest(team="other")
-            if other is not None and w.uniform("hit") < 0.2:
-                other.hits += 1
-                w.by_team[other.team] += 1
-                other.health -= 0.1 * w.strength * other.hits
-            elif w.normal() > 1.0:
-                w.move(e, pos=e.pos + 1.0)
-        if w.uniform() < 0.2:
-            w.spawn("a", pos=(w.n, 0.0, 0.0))
-
-    def result_one(self, w):
-        return {"n": w.n, "by_team": w.by_team}
-
-
-def stormy(**values):
-    common = {"variance": (200, 200, 0), "scatter_first": True, "autonomy": [Drift(), Talker()]}
-    return mission(
-        block("a", count=5, team=1, **common),
-        block("b", count=20, team=2, **common),
-        interactions=[Storm(**values)],
-        end_conditions="time",
-    )
-
-
-def results(game, seeds, params=None):
-    sim = Simulation(game, seeds=seeds, params=params)
-    return [(r.state_hash, r.metrics) for r in sim.run()]
-
-
-@pytest.mark.parametrize("values", [{}, {"rate": 5.0}])
-def test_world_k_of_a_stack_is_world_k_alone(values):
-    game = stormy(**values)
-    stacked = results(game, [3, 4, 5], {"Storm.strength": [0.1, 0.5, 2.0]})
-    assert stacked == [
-        results(game, [s], {"Storm.strength": [v]})[0] for s, v in ((3, 0.1), (4, 0.5), (5, 2.0))
-    ]
-    assert len({str(r) for r in stacked}) == 3
-    sim = Simulation(game, seeds=[3, 4, 5], params={"Storm.strength": [0.1, 0.5, 2.0]})
-    sim.step(3)
-    saved = sim.snapshot()
-    sim.reset([1])  # clocks differ, and the plugin with a rate is called for some worlds
-    sim.run()
-    assert [(r.state_hash, r.metrics) for r in sim.result()] == stacked
-    sim.restore(saved)
-    sim.run()
-    assert [(r.state_hash, r.metrics) for r in sim.result()] == stacked
 
 
 class Unused(Message):

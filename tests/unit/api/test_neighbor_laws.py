@@ -29,14 +29,6 @@ def test_a_law_is_its_function_called_for_each_pair_bit_for_bit(order):
     play(Every(), **order)
 
 
-def test_neither_stack_nor_threads_change_a_bit():
-    class Light(Every):
-        step = lambda self, g: self.velocity.__setitem__(slice(0, 3), self.law(g).values[1:4].clip(-1.0, 1.0))  # noqa: E731
-
-    alone = [play(Light(), n=600, seeds=[seed])[0] for seed in (5, 6)]
-    assert play(Light(), n=600, seeds=[6, 7, 5], threads=3)[::2] == alone[::-1]
-
-
 @UPDATES
 def test_laws_together_are_the_laws_alone(order):
     class Both(Autonomy):

@@ -83,36 +83,6 @@ def test_a_whole_number_with_a_unit_is_a_real_parameter() -> None:
         Runner(prey_team=1.5)
 
 
-def test_easy_mode_draws_what_vector_mode_draws() -> None:
-    class Easy(EasyAutonomy):
-        seen = State("u n")
-        speed = Output(unit="m/s")
-        turn_rate = Output(unit="rad/s")
-        pitch_rate = Output(unit="rad/s")
-
-        def step_one(self, me):
-            me.seen = me.uniform("wind"), me.normal("gust")
-
-    class Vector(Autonomy):
-        seen = State("u n")
-
-        def step(self, g):
-            self.seen[:] = g.uniform("wind"), g.normal("gust")
-
-    pair = [Easy(name="same"), Vector(name="other")]
-    game = Mission(blocks=[block(count=4, autonomy=pair, motion=MODEL)])
-    sim = Simulation(game, seeds=[5, 6])
-    sim.step(3)
-    easy, _ = sim.read("a.same.seen")
-    alone = Simulation(
-        game.replace(blocks=[block(count=4, autonomy=[Easy(name="x"), Vector(name="same")], motion=MODEL)]),
-        seeds=[5, 6],
-    )
-    alone.step(3)
-    assert easy.tobytes() == alone.read("a.same.seen")[0].tobytes()
-    assert len(np.unique(easy)) == easy.size
-
-
 def test_parameters_are_given_by_name() -> None:
     with pytest.raises(ParameterError, match=r"Unicycle\(5\): .* by name; there are: vel_max"):
         Unicycle(5)

@@ -10,7 +10,6 @@ import pytest
 from small_worlds import (
     Drift,
     Listener,
-    Note,
     NoteMetric,
     Reaper,
     Talker,
@@ -129,21 +128,6 @@ def test_a_game_that_is_decided_before_it_begins_ends_with_the_first_step_also_a
     sim.step(3)
     sim.reset([1], params={"Reaper.at": 0.0})
     assert [r.steps for r in sim.run()] == [5, 1]
-
-
-def test_worlds_end_apart_and_each_as_it_would_alone():
-    game = mission(
-        *teams(autonomy=Wander()), end_conditions="time, one_team", interactions=[Reaper(team=1)], end=2.0
-    )
-    at = [0.5, 99.0, 0.2, 1.0]
-    sim = Simulation(game, seeds=[1, 2, 3, 4], params={"Reaper.at": at})
-    results = sim.run()
-    assert [r.steps for r in results] == [5, 20, 2, 10]
-    assert [r.end for r in results] == ["one_team", "time", "one_team", "one_team"]
-    for k, r in enumerate(results):
-        lone = Simulation(game, seeds=k + 1, params={"Reaper.at": at[k]})
-        lone.run()
-        assert lone.state_hash() == r.state_hash == sim.state_hash(k)
 
 
 def test_without_health_an_entity_is_removed():
@@ -313,21 +297,6 @@ def test_resets_that_cannot_be(arguments, message):
 # -- snapshots --------------------------------------------------------------------------------------------------------------------
 
 
-def test_a_snapshot_keeps_worlds_that_have_ended_and_clocks_that_differ():
-    game = mission(
-        *teams(autonomy=Wander()), end_conditions="time, one_team", interactions=[Reaper(team=1)], end=2.0
-    )
-    sim = Simulation(game, seeds=[1, 2, 3], params={"Reaper.at": [0.2, 99.0, 1.0]})
-    sim.step(5)
-    sim.reset([2])
-    sim.step(2)
-    saved = sim.snapshot()
-    first = [(r.end, r.steps, r.state_hash) for r in sim.run()]
-    sim.restore(saved)
-    assert sim.state.running.tolist() == [False, True, True]
-    assert [(r.end, r.steps, r.state_hash) for r in sim.run()] == first
-
-
 def test_restore_takes_parameters_back_for_those_yet_to_be_born():
     game = mission(block(count=3, rate=5.0), end=1.0)
     sim = Simulation(game, seeds=[1, 2])
@@ -337,24 +306,6 @@ def test_restore_takes_parameters_back_for_those_yet_to_be_born():
     sim.step(3)
     sim.restore(saved)
     assert [r.state_hash for r in sim.run()] == hashes(game, [1, 2])
-
-
-def test_restore_takes_messages_back():
-    class Herald(Interaction):
-        def step(self, w):
-            w.publish(Note, np.flatnonzero(w.step_count == 2), value=7)
-
-    game = mission(
-        block(autonomy=[Drift(), Listener()]),
-        block("b", autonomy=[Drift(), Talker(last=2)]),
-        interactions=[Herald()],
-    )
-    sim = Simulation(game)
-    start = sim.snapshot()
-    first = sim.run()[0].state_hash
-    sim.restore(start)
-    assert sim.run()[0].state_hash == first
-    assert sim.read("a.Listener.n_heard")[0][0, 0] == 3
 
 
 def test_snapshots_of_something_else_are_refused():

@@ -1,6 +1,5 @@
 """The page of a live game, as one sees it who speaks its protocol: what is sent, and what each command does."""
 
-import math
 import struct
 import threading
 import time
@@ -9,10 +8,9 @@ import numpy as np
 import pytest
 from page_client import PageClient
 from recorded_games import hunt
-from watched_plugins import clickable, failing
+from watched_plugins import failing
 
 from tussle import Block, Mission, Simulation
-from tussle.messages import CustomKeyPress, WorldPointClicked
 from tussle.stock import Still
 from tussle.view import Live
 from tussle.view.page.server import Page
@@ -47,58 +45,6 @@ def test_entities_are_sent_where_they_are(game):
         assert np.abs(seen.pos - frame.pos[row]).max() <= 0.001 + 1e-9
         assert abs(seen.quat @ frame.quat[row]) > 1.0 - 1e-6
         assert (seen.team, seen.block, seen.health) == (frame.team[row], frame.block[row], 1.0)
-
-
-def test_pause_stops_the_clock_and_resume_moves_it(game):
-    live, _, client = game
-    client.order("resume")
-    client.wait(lambda: live.step_number > 3)
-    client.order("pause")
-    client.wait(lambda: live.is_paused and live.settle())
-    there = live.step_number
-    time.sleep(0.3)
-    assert live.step_number == there
-    client.wait(lambda: client.status["isPaused"] and client.status["step"] == there)
-
-
-def test_a_step_back_and_a_seek_lead_to_the_same_future(game):
-    live, _, client = game
-    client.order("step", n=40)
-    client.wait(stands_at(live, 40))
-    future = live.simulation.state_hash()
-    client.order("step", n=-1)
-    client.wait(stands_at(live, 39))
-    client.order("seek", t=1.0)
-    client.wait(stands_at(live, 10))
-    client.wait(lambda: client.t == pytest.approx(1.0))
-    client.order("seek", t=1e9)
-    client.wait(stands_at(live, 40))
-    assert live.simulation.state_hash() == future
-    client.wait(lambda: client.status["epoch"] == live.epoch)
-
-
-def test_speeds(game):
-    live, _, client = game
-    for command, fields, warp in (
-        ("warp", {"value": None}, math.inf), ("warp", {"value": 1}, 1.0), ("faster", {}, 2.0), ("slower", {}, 1.0),
-    ):  # fmt: skip
-        client.order(command, **fields)
-        client.wait(lambda warp=warp: live.warp == warp)
-    client.wait(lambda: client.status["warp"] == 1.0)
-
-
-def test_the_chosen_entity_is_told_with_its_plugins_to_who_chose_it(game):
-    live, page, client = game
-    who = max(live.frame().id.tolist())
-    with PageClient(page.url) as other:
-        client.order("choose", id=who)
-        told = client.wait(lambda: client.status["entity"])
-        assert told["id"] == who
-        assert any(title == "Predator" for title, _ in told["sections"])
-        other.wait(lambda: other.status)
-        assert other.status["entity"] is None
-        client.wait(lambda: page.n_readers == 2)
-    client.wait(lambda: page.n_readers == 1)
 
 
 def test_only_the_first_of_several_steers_where_one_steers():
@@ -164,25 +110,6 @@ def test_events_are_told_once_and_again_where_the_game_takes_another_course(game
     live.settle()
     client.wait(lambda: len(client.events) == len(live.events) < 60)
     assert client.events[-1][0] < 1.0 + 1e-9
-
-
-def test_a_point_and_a_key_are_told_to_the_plugins():
-    with (
-        Simulation(clickable(), 1) as simulation,
-        Live(simulation, is_paused=True) as live,
-        Page(live) as page,
-        PageClient(page.url) as client,
-    ):
-        client.order("point", pos=[30.0, 40.0, 0.0])
-        client.order("key", key=";")
-        client.wait(lambda: len(live.injections) == 2)
-        point, key = live.injections
-        assert (point.type, key.type) == (WorldPointClicked, CustomKeyPress)
-        assert point.fields["pos"].tolist() == [30.0, 40.0, 0.0]
-        client.wait(lambda: live._collector.is_open)
-        live.step()
-        client.wait(lambda: {"arrows"} == {part["kind"] for part in client.drawn.get("parts", ())})
-        assert client.drawn["texts"][0][0] == "goal"
 
 
 def test_begin_anew_with_another_seed(game):
