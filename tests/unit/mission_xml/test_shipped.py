@@ -15,12 +15,10 @@ from tussle.stock import Boids, DirectController, Predator, SimpleCapture, Simpl
 PAGE = Path(__file__).parents[3] / "docs" / "mission-format.md"
 RUN_AS_THEY_ARE = {
     "straight.xml": 3, "straight-no-gui.xml": 2, "unicycle.xml": 2, "harmonic-oscillator.xml": 1, "waypoint_follower.xml": 2,
-    "batch-example-mission.xml": 2, "straight_include/straight_complete.xml": 2,
+    "batch-example-mission.xml": 2, "straight_include/straight_complete.xml": 2, "capture-the-flag-simple.xml": 4,
 }  # fmt: skip
 """Number of blocks of each."""
 WAIT_FOR_PLUGINS = {
-    "capture-the-flag-simple.xml": "EnforceBoundaryInteraction CaptureInBoundaryInteraction FlagCaptureInteraction FlagCaptureMetrics "
-    "BoundaryDefense TakeFlag",
     "colliding_spheres.xml": "BulletCollision SimpleCarControllerHeading SimpleCar",
     "fixed_wing_6dof.xml": "AircraftPIDController FixedWing6DOF",
     "multirotor-test.xml": "RigidBody6DOFStateSensor MultirotorTests Multirotor MultirotorControllerPID",
