@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cache
 
-from golden_plugins import Beacon, Car, Nursery, Wanderer
+from golden_plugins import Balloon, Beacon, Car, Nursery, Wanderer
 
 from tussle import Block, Mission
 from tussle.stock import (
@@ -16,6 +16,7 @@ from tussle.stock import (
     CaptureInBoundaryInteraction,
     DirectController,
     EnforceBoundaryInteraction,
+    ExternalForceField,
     FlagCaptureInteraction,
     FlagCaptureMetrics,
     LocalNetwork,
@@ -24,6 +25,7 @@ from tussle.stock import (
     NoisyContacts,
     NoisyState,
     Predator,
+    RandomAttrit,
     SimpleAircraft,
     SimpleAircraftControllerPID,
     SimpleCapture,
@@ -262,6 +264,25 @@ def flags() -> Mission:
     )
 
 
+def winds() -> Mission:
+    """Balloons in gusts and in a force that changes, and with losses at random."""
+    balloon = Block(
+        name="balloon",
+        count=12,
+        team=1,
+        position=(0.0, 0.0, 40.0),
+        variance=(100.0, 100.0, 100.0),
+        motion=Balloon(),
+    )
+    winds = [
+        ExternalForceField(force_type="dryden", wind_heading="30 deg"),
+        ExternalForceField(name="squall", force_type="variable", force_change_period=(0.5, 0.2)),
+    ]
+    return Mission(
+        blocks=[balloon], interactions=[*winds, RandomAttrit(start_after=1.0, duration=4.0)], end=5.0
+    )
+
+
 STEPS: dict[str, int] = {
     "chase_synchronous": 24,
     "chase_sequential": 24,
@@ -277,6 +298,7 @@ STEPS: dict[str, int] = {
     "births_synchronous": 40,
     "births_sequential": 40,
     "flags": 50,
+    "winds": 40,
 }
 """Steps after which a mission's hashes are taken."""
 

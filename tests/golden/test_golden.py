@@ -209,6 +209,7 @@ STATES = {
     "births_synchronous": ("slow.Beacon.rumour", 0),
     "births_sequential": ("slow.Beacon.rumour", 0),
     "flags": ("runner.SingleIntegrator.x", 6),
+    "winds": ("balloon.Balloon.x", 3),
 }
 
 

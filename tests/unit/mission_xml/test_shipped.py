@@ -57,7 +57,10 @@ GAMES = {
 }
 
 
-ON_REGIONS = {"capture_the_flag": {"runner_speed": "15"}, "boundary_defense": {"defenders": "100", "raiders": "25"}}
+ON_REGIONS = {
+    "capture_the_flag": {"runner_speed": "15"},
+    "boundary_defense": {"defenders": "100", "raiders": "25"},
+}
 
 
 @pytest.mark.parametrize("name", ON_REGIONS)
