@@ -9,6 +9,7 @@ import numpy as np
 
 from tussle.errors import ParameterError, listed, nearest_name
 from tussle.geodesy import Origin
+from tussle.prism import Prism
 from tussle.shapes import (
     Convex,
     Cuboid,
@@ -30,6 +31,7 @@ __all__ = [
     "Origin",
     "Plane",
     "Polyhedron",
+    "Prism",
     "Scene",
     "Sphere",
     "TeamRegion",

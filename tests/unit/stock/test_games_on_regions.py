@@ -91,6 +91,26 @@ def test_an_id_belongs_to_one_boundary(rules, text):
         Simulation(game).run()
 
 
+def test_a_concave_no_fly_region_and_a_polyhedron():
+    corners = "[ 3.5 -9 ] [ 12.5 -9 ] [ 12.5 9 ] [ 3.5 9 ] [ 3.5 1 ] [ 9.5 1 ] [ 9.5 -1 ] [ 3.5 -1 ]"
+    rules = [
+        Boundary(name="zone", boundary_id=1, shape="polygon", polygon_points=corners, lengths=(1, 1, 20)),
+        EnforceBoundaryInteraction(active_boundary_ids=(2,), no_fly_boundary_ids=(1,)),
+        Boundary(
+            name="pyramid", boundary_id=2, shape="polyhedron",
+            polyhedron_points=((20, 20, -20), (20, -20, -20), (-20, 20, -20), (-20, -20, -20), (0, 0, 20.5)),
+        ),
+    ]  # fmt: skip
+    ways = {"notch": (0, 0, 0), "wall": (0, 2, 0), "under": (0, 2, -11), "top": (0, 0, 10.2)}
+    blocks = [block(name, position=at, autonomy=Drift(to=(10, 0, 0))) for name, at in ways.items()]
+    game = mission(*blocks, interactions=rules, end=10.0)
+    steps = {name: steps_flown(Simulation(game), name) for name in ways}
+    # The pyramid is 20 (20.5 - z) / 40.5 wide to one side at height z.
+    assert steps == {"notch": 10, "wall": 4, "under": 16, "top": 6}
+    assert rules[0].regions()[0].center == (7.25, 0.0, 0.0)
+    assert rules[2].regions()[0].center == (0.0, 0.0, -11.9)
+
+
 def guarded(*intruders, end=3.0, guards=((0.0, 0.0),), **rule):
     """Resting defenders of team 1 at (x, y) in a ball of 20 m, and intruders that come along the x axis at 10 m/s."""
     home = [block(f"g{i}", team=1, position=(x, y, 0), autonomy=Drift(to=(0, 0, 0))) for i, (x, y) in enumerate(guards)]  # fmt: skip
