@@ -246,6 +246,14 @@ class FlagCaptured(Message):
     boundary = Field(dtype=int, doc="Id of the flag's boundary.")
 
 
+class RewardGiven(Message):
+    """An entity earned a reward."""
+
+    entity = EntityRef()
+    team = Field(dtype=int, doc="Team of the entity.")
+    reward = Field()
+
+
 class Waypoint(Message):
     """A target position."""
 
