@@ -166,8 +166,11 @@ def flag_game(*runners, end=30.0, **rule):
 
 
 def test_a_flag_is_fetched_once():
-    sim = Simulation(flag_game(30.5))
+    sim, told = Simulation(flag_game(30.5)), []
+    sim.events.listen(told.append)
     result = sim.run()[0]
+    flags = [(e.step.tolist(), e.id.tolist(), e.text) for e in told if e.kind == "flag"]
+    assert flags == [([25], [2], ["took the flag"]), ([66], [2], ["brought the flag home"])]
     # 26 steps to 4.5 m; then 41 steps to 45.5 m, which lies within 5 m of 50 m.
     assert sim.read("Told.step_of")[0][0, 1:].tolist() == [26, 67]
     assert result.metrics["FlagCaptureMetrics"] == {
