@@ -10,6 +10,7 @@ EVENT_TEXTS = {
     "collision": ["{id} and {other} collided", "{id} hit the {text}", "{id} hit the ground"],
     "death": ["{id} died: {text} ({other})", "{id} died: {text}", "{id} died ({other})", "{id} died"],
     "difference": ["the two runs differ from here on"],
+    "flag": ["{id} {text}"],
     "end": ["the game ended: {text}"],
 }
 """Sentences of each kind of event; the first one whose parts are all known is used. The page has them from here."""

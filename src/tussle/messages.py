@@ -230,6 +230,30 @@ class BoundaryCrossed(Message):
     inside = Field(dtype=bool, doc="Whether it is inside now.")
 
 
+class FlagTaken(Message):
+    """An entity took a flag."""
+
+    entity = EntityRef()
+    team = Field(dtype=int, doc="Team of the entity.")
+    boundary = Field(dtype=int, doc="Id of the flag's boundary.")
+
+
+class FlagCaptured(Message):
+    """An entity brought a flag home."""
+
+    entity = EntityRef()
+    team = Field(dtype=int, doc="Team of the entity.")
+    boundary = Field(dtype=int, doc="Id of the flag's boundary.")
+
+
+class RewardGiven(Message):
+    """An entity earned a reward."""
+
+    entity = EntityRef()
+    team = Field(dtype=int, doc="Team of the entity.")
+    reward = Field()
+
+
 class Waypoint(Message):
     """A target position."""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tussle import stock
+from tussle.stock import Boundary
 from tussle.testing import check_plugin
 
 COMPANIONS = {
@@ -21,9 +22,20 @@ COMPANIONS = {
 }
 
 
+BOUNDARIES = [
+    Boundary(name="west", boundary_id=1, team=1, shape="sphere", center=(-4.0, 0.0, 4.0), radius=8.0),
+    Boundary(name="east", boundary_id=2, team=2, shape="sphere", center=(4.0, 0.0, 4.0), radius=8.0),
+    *(Boundary(name=f"wide {i}", boundary_id=i, lengths=(30.0, 12.0, 12.0)) for i in (3, 4)),
+]
+ON_REGIONS = (
+    "BoundaryDefense", "CaptureInBoundaryInteraction", "EnforceBoundaryInteraction", "FlagCaptureInteraction", "TakeFlag",
+)  # fmt: skip
+"""Those that cannot work without the boundaries that they name."""
+
+
 @pytest.mark.parametrize("name", stock.manifest())
 def test_plugin_meets_the_contract(name: str) -> None:
-    check_plugin(stock.load(name))
+    check_plugin(stock.load(name), companions=BOUNDARIES if name in ON_REGIONS else ())
 
 
 @pytest.mark.parametrize("name", COMPANIONS)

@@ -5,20 +5,27 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cache
 
-from golden_plugins import Beacon, Car, Nursery, Wanderer
+from golden_plugins import Balloon, Beacon, Car, Nursery, Wanderer
 
 from tussle import Block, Mission
 from tussle.stock import (
     AvoidEntityMS,
     Boids,
     Boundary,
+    BoundaryDefense,
+    CaptureInBoundaryInteraction,
     DirectController,
+    EnforceBoundaryInteraction,
+    ExternalForceField,
+    FlagCaptureInteraction,
+    FlagCaptureMetrics,
     LocalNetwork,
     MotorSchemas,
     MoveToGoalMS,
     NoisyContacts,
     NoisyState,
     Predator,
+    RandomAttrit,
     SimpleAircraft,
     SimpleAircraftControllerPID,
     SimpleCapture,
@@ -28,6 +35,7 @@ from tussle.stock import (
     SingleIntegratorControllerSimple,
     SphereNetwork,
     Straight,
+    TakeFlag,
     Unicycle,
     UnicyclePID,
     WaypointDispatcher,
@@ -230,6 +238,51 @@ def births_sequential() -> Mission:
     return _nursery("sequential")
 
 
+def flags() -> Mission:
+    """Runners fetch a flag from a region that others defend, and are removed outside the field."""
+    ball = lambda number, east, radius: Boundary(  # noqa: E731
+        name=f"ball {number}", boundary_id=number, team=number, shape="sphere", center=(east, 0.0, 0.0), radius=radius,
+    )  # fmt: skip
+    runner = Block(
+        name="runner", team=2, count=12, position=(40.0, 0.0, 0.0), variance=(64.0, 64.0, 64.0),
+        autonomy=TakeFlag(), motion=SingleIntegrator(max_speed=20.0),
+    )  # fmt: skip
+    defender = Block(
+        name="defender", team=1, count=4, position=(-10.0, 0.0, 0.0), variance=(100.0, 100.0, 9.0),
+        autonomy=BoundaryDefense(), motion=SingleIntegrator(max_speed=12.0),
+    )  # fmt: skip
+    rules = [
+        ball(1, 0.0, 25.0), ball(2, 50.0, 20.0), Boundary(name="field", boundary_id=3, lengths=(120.0, 60.0, 40.0), rpy=(0.0, 0.0, 0.1)),
+        EnforceBoundaryInteraction(active_boundary_ids=(3,)), CaptureInBoundaryInteraction(cool_down_period=0.8),
+        FlagCaptureInteraction(flag_boundary_id=1, capture_boundary_id=2),
+    ]  # fmt: skip
+    return Mission(
+        blocks=[runner, defender],
+        interactions=rules,
+        metrics=[SimpleCaptureMetrics(), FlagCaptureMetrics()],
+        end=5.0,
+    )
+
+
+def winds() -> Mission:
+    """Balloons in gusts and in a force that changes, and with losses at random."""
+    balloon = Block(
+        name="balloon",
+        count=12,
+        team=1,
+        position=(0.0, 0.0, 40.0),
+        variance=(100.0, 100.0, 100.0),
+        motion=Balloon(),
+    )
+    winds = [
+        ExternalForceField(force_type="dryden", wind_heading="30 deg"),
+        ExternalForceField(name="squall", force_type="variable", force_change_period=(0.5, 0.2)),
+    ]
+    return Mission(
+        blocks=[balloon], interactions=[*winds, RandomAttrit(start_after=1.0, duration=4.0)], end=5.0
+    )
+
+
 STEPS: dict[str, int] = {
     "chase_synchronous": 24,
     "chase_sequential": 24,
@@ -244,6 +297,8 @@ STEPS: dict[str, int] = {
     "last_captured_first": 24,
     "births_synchronous": 40,
     "births_sequential": 40,
+    "flags": 50,
+    "winds": 40,
 }
 """Steps after which a mission's hashes are taken."""
 

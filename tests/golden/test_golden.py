@@ -105,6 +105,8 @@ STATES = {
     "last_captured_first": ("prey.Boids.target", 0),
     "births_synchronous": ("slow.Beacon.rumour", 0),
     "births_sequential": ("slow.Beacon.rumour", 0),
+    "flags": ("runner.SingleIntegrator.x", 6),
+    "winds": ("balloon.Balloon.x", 3),
 }
 
 

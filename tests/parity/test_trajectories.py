@@ -23,6 +23,8 @@ NEEDED = [
     ("SimpleAircraft", "waypoint_follower", 10.0),
     ("Unicycle3D", "unicycle", 10.0),
     ("Unicycle3D", "batch-example-mission", 1e-5),
+    ("TakeFlag", "capture-the-flag-simple", 0.9),
+    ("BoundaryDefense", "capture-the-flag-simple", 0.9),
 ]
 
 
@@ -38,6 +40,22 @@ def test_it_flies_as_recorded_over_the_whole_length(name: str) -> None:
     assert flight.last_frame == recording.last_frame
     if name != "harmonic-oscillator":
         counts_alike(flight, recording)
+
+
+def test_capture_the_flag_is_played_as_recorded() -> None:
+    """Its 1000 s agree; compared are 100 s, in which both runners are captured and the defenders return."""
+    recording = load("capture-the-flag-simple")
+    flight = fly(historic(mission("capture-the-flag-simple").replace(end=100.0)), recording)
+    assert len(flight.error) > 90
+    assert flight.max_error <= LIMIT
+    assert flight.strangers is None
+    assert flight.last_frame == {**recording.last_frame, 1: 1000, 3: 1000}
+    assert flight.result is not None
+    for team, row in recording.summary.items():
+        counted = {name: by_team[team] for m in flight.result.metrics.values() for name, by_team in m.items()}
+        for column in ("entity_count", "team_coll", "NonTeamCapture", "flags_taken", "flags_captured"):
+            assert counted[column] == row[column], (team, column)
+        assert flight.result.scores[team] == row["score"]
 
 
 def counts_alike(flight: Flight, recording: Recording) -> None:

@@ -17,7 +17,7 @@ import unicycle_rk4
 from tussle import Mission
 from tussle.api import MotionBody, State
 from tussle.numeric.quaternion import quat_conjugate
-from tussle.stock import SimpleAircraft, Unicycle3D
+from tussle.stock import BoundaryDefense, SimpleAircraft, TakeFlag, Unicycle3D
 
 Integrator = Callable[[np.ndarray, np.ndarray, np.ndarray, float, int], None]
 Floats = np.ndarray
@@ -99,14 +99,43 @@ class RelativeUnicycle3D(Unicycle3D):
         self.x[8:12, rows] = quat_conjugate(self.x[3:7, rows])
 
 
-VARIANTS: dict[type, type] = {SimpleAircraft: ClampingAircraft, Unicycle3D: RelativeUnicycle3D}
+class LateTakeFlag(TakeFlag):
+    """Stands still in the first step: its regions become known by messages that are delivered at the end of that step.
+
+    tussle's entities know the regions of the mission at once, also those that are born later, which never heard of them there.
+    """
+
+    def step(self, g: Any) -> None:
+        super().step(g)
+        self.velocity[:, g.step_count == 0] = 0.0
+
+
+class LateBoundaryDefense(BoundaryDefense):
+    """Stands still in the first step, as LateTakeFlag."""
+
+    def step(self, g: Any) -> None:
+        super().step(g)
+        self.velocity[:, g.step_count == 0] = 0.0
+
+
+VARIANTS: dict[type, type] = {
+    SimpleAircraft: ClampingAircraft,
+    Unicycle3D: RelativeUnicycle3D,
+    TakeFlag: LateTakeFlag,
+    BoundaryDefense: LateBoundaryDefense,
+}
 
 
 def historic(mission: Mission, variants: dict[type, type] = VARIANTS) -> Mission:
-    """The mission with each motion model that has a variant replaced by it."""
+    """The mission with each motion model and autonomy that has a variant replaced by it."""
 
-    def swap(motion: Any) -> Any:
-        cls = variants.get(type(motion))
-        return cls(name=motion.instance_name, **motion.values) if cls else motion
+    def swap(plugin: Any) -> Any:
+        cls = variants.get(type(plugin))
+        return cls(name=plugin.instance_name, **plugin.values) if cls else plugin
 
-    return mission.replace(blocks=[dataclasses.replace(b, motion=swap(b.motion)) for b in mission.blocks])
+    return mission.replace(
+        blocks=[
+            dataclasses.replace(b, motion=swap(b.motion), autonomy=tuple(map(swap, b.autonomy)))
+            for b in mission.blocks
+        ]
+    )

@@ -208,9 +208,25 @@ class WorldView(GroupView):
 
     def uniform_by(self, label: str, world: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
         """Uniform draws in [0, 1), (m,), keyed by (world, first, second) and not by position in the arrays."""
+        return np.asarray(self._keyed(rng.uniform, label, world, first, second, 1)[0])
+
+    def normal_by(
+        self, label: str, world: np.ndarray, first: np.ndarray, second: np.ndarray, k: int = 1
+    ) -> np.ndarray:
+        """Standard normal draws, (k, m), keyed as those of `uniform_by`."""
+        return self._keyed(rng.normal, label, world, first, second, k)
+
+    def _keyed(
+        self,
+        law: Callable[..., np.ndarray],
+        label: str,
+        world: np.ndarray,
+        first: np.ndarray,
+        second: np.ndarray,
+        k: int,
+    ) -> np.ndarray:
         seeds = self.context.seeds[world] ^ (first.astype(np.uint64) * GOLDEN)
-        draws = rng.uniform(seeds, self._stream(label), second, self.context.clock.step[world], 0, 1)
-        return np.asarray(draws[0])
+        return law(seeds, self._stream(label), second, self.context.clock.step[world], 0, k)
 
     def call(self, service: str, *args: Any, **kwargs: Any) -> Any:
         """Call a service of a world plugin."""

@@ -1,4 +1,4 @@
-"""Event notification: births, deaths, captures, collisions and ends. Costs nothing without listeners."""
+"""Event notification: births, deaths, captures, collisions, flags and ends. Costs nothing without listeners."""
 
 from __future__ import annotations
 
@@ -9,14 +9,16 @@ import numpy as np
 from tussle.api.bodies import Bodies
 from tussle.api.context import Context
 from tussle.api.world import WorldView
-from tussle.messages import EntityCaptured, EntityCollided, EntityHitGround, Message
+from tussle.messages import EntityCaptured, EntityCollided, EntityHitGround, FlagCaptured, FlagTaken, Message
 from tussle.record import Events
-from tussle.record.events import BIRTH, CAPTURE, COLLISION, DEATH, END
+from tussle.record.events import BIRTH, CAPTURE, COLLISION, DEATH, END, FLAG
 
 REPORTED: dict[type[Message], tuple[str, str, str, str]] = {
     EntityCaptured: (CAPTURE, "source", "target", ""),
     EntityCollided: (COLLISION, "first", "second", ""),
     EntityHitGround: (COLLISION, "entity", "", "ground"),
+    FlagTaken: (FLAG, "entity", "", "took the flag"),
+    FlagCaptured: (FLAG, "entity", "", "brought the flag home"),
 }
 """Message type -> event kind, message fields for the event's `id` and `other` ("" for none), and the event's text."""
 
@@ -62,7 +64,7 @@ class Listeners:
         self._report(Events(BIRTH, new.world, step, new.id, np.zeros_like(new.id), text))
 
     def messages(self, view: WorldView) -> None:
-        """Report captures and collisions of this step, from the messages in the outboxes."""
+        """Report captures, collisions and flags of this step, from the messages in the outboxes."""
         if self._causes:
             self._causes.clear()
         for type_ in REPORTED:

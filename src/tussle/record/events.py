@@ -1,4 +1,4 @@
-"""Events of a game: births, deaths, captures, collisions and ends."""
+"""Events of a game: births, deaths, captures, collisions, flags and ends."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ BIRTH: Final = "birth"
 DEATH: Final = "death"
 CAPTURE: Final = "capture"
 COLLISION: Final = "collision"
+FLAG: Final = "flag"
 END: Final = "end"
 
 
@@ -19,12 +20,12 @@ class Events:
     """Events of one kind in one step, ordered by world.
 
     Attributes:
-        kind: "birth", "death", "capture", "collision" or "end".
+        kind: "birth", "death", "capture", "collision", "flag" or "end".
         world: World of each, (m,).
         step: Step of the event, (m,): that of the last trajectory row before it; for births and ends, that of the row with it.
-        id: Entity that was born, died or captured, or the smaller id of a collision; 0 for ends, (m,).
+        id: Entity that was born, died, captured or has a flag, or the smaller id of a collision; 0 for ends, (m,).
         other: Entity that was captured, that captured or hit the dead one, or the larger id of a collision; 0 for none, (m,).
-        text: Block of a birth, "ground" for a collision with it, cause of a death, or reason of an end, (m,).
+        text: Block of a birth, "ground" for a collision with it, cause of a death, what happened to a flag, or reason of an end, (m,).
     """
 
     kind: str

@@ -52,14 +52,20 @@ EVENTS = pa.schema(
         _field("world", _I, "number of the world in its stack"),
         _field("t", _F, "time of the beginning of the event's step; of a birth or an end, its own time [s]"),
         _field("step", _I, "that step"),
-        _field("kind", pa.string(), "birth, death, capture, collision or end"),
-        _field("id", _I, "entity that was born, died or captured, or the smaller id of a collision"),
+        _field("kind", pa.string(), "birth, death, capture, collision, flag or end"),
+        _field(
+            "id", _I, "entity that was born, died, captured or has a flag, or the smaller id of a collision"
+        ),
         _field(
             "other",
             _I,
             "entity that was captured, captured or hit the dead one, or the larger id; 0 for none",
         ),
-        _field("text", pa.string(), "block of a birth, cause of a death, reason of an end"),
+        _field(
+            "text",
+            pa.string(),
+            "block of a birth, cause of a death, what happened to a flag, reason of an end",
+        ),
     ]
 )
 

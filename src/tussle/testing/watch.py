@@ -22,7 +22,7 @@ from tussle.testing.lines import BODY_ROWS, Key, keys_of, lines_of
 MEMORY = "memory in columns"
 BOUND = frozenset({"_values", "instance_name", "rate", "is_bound", "is_for_one", "wired", "_look", "_rows"})
 HOOKS = ("spawn", "step", "from_body", "to_body", "start", "route", "result_of", "rejects")
-DRAWS = ("uniform", "normal", "normal_pairs", "uniform_pairs", "uniform_by")
+DRAWS = ("uniform", "normal", "normal_pairs", "uniform_pairs", "uniform_by", "normal_by")
 
 Own = dict[Key, Any]
 """Lines that a hook may write -> their rows that it may write."""

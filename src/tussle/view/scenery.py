@@ -13,8 +13,7 @@ import numpy as np
 from tussle.errors import ViewError
 from tussle.geodesy import Origin
 from tussle.mission import Block, Mission
-from tussle.scene import Base, Cuboid, Plane, Polyhedron, Sphere, Volume
-from tussle.stock import Boundary
+from tussle.scene import Base, Cuboid, Plane, Polyhedron, Prism, Sphere, Volume
 from tussle.view.shapes import Mesh
 from tussle.view.solids import mesh_of, outline_of
 from tussle.view.terrain import Terrain, find_terrain
@@ -139,9 +138,7 @@ def _shapes(mission: Mission) -> list[tuple[str, int | None, Volume, bool]]:
     scene = mission.scene
     found += [(str(name), None, shape, False) for name, shape in scene.boundaries.items()]
     found += [(f"wall {i + 1}", None, shape, True) for i, shape in enumerate(scene.walls)]
-    found += [
-        (p.instance_name, p.team, p.region(), False) for p in mission.interactions if isinstance(p, Boundary)
-    ]
+    found += [(p.instance_name, r.team, r.shape, False) for p in mission.interactions for r in p.regions()]
     return found
 
 
@@ -149,7 +146,7 @@ def _corners(shape: Volume) -> list[np.ndarray]:
     """Corners of a box around a shape; none for an infinite one."""
     if isinstance(shape, Sphere):
         return [np.array(shape.center) - shape.radius, np.array(shape.center) + shape.radius]
-    if isinstance(shape, (Cuboid, Polyhedron)):
+    if isinstance(shape, (Cuboid, Polyhedron, Prism)):
         nothing = np.zeros(3)
         vertices = mesh_of(shape, nothing, nothing).vertices.astype(float)
         return [vertices.min(axis=0), vertices.max(axis=0)]

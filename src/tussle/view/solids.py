@@ -6,7 +6,7 @@ from itertools import combinations
 
 import numpy as np
 
-from tussle.scene import Convex, FlatGround, Plane, Sphere, Volume
+from tussle.scene import Convex, FlatGround, Plane, Prism, Sphere, Volume
 from tussle.view.shapes import Mesh, ball
 
 N_CIRCLE = 48
@@ -53,6 +53,8 @@ def _rings(shape: Volume, low: np.ndarray, high: np.ndarray) -> list[np.ndarray]
         shape = Plane((0.0, 0.0, shape.height), (0.0, 0.0, 1.0))
     if isinstance(shape, Plane):
         return [_square(shape, low, high)]
+    if isinstance(shape, Prism):
+        return _walls(shape)
     if not isinstance(shape, Convex):
         return []
     faces = shape.half_spaces()
@@ -69,6 +71,20 @@ def _rings(shape: Volume, low: np.ndarray, high: np.ndarray) -> list[np.ndarray]
         about = own - own.mean(axis=0)
         rings.append(own[np.argsort(np.arctan2(about @ second, about @ first))])
     return rings
+
+
+def _walls(prism: Prism) -> list[np.ndarray]:
+    """Corners of the vertical faces of a prism, each (4, 3); its ends, which may be concave, are left open."""
+    first = np.array(prism.corners)
+    second = np.roll(first, -1, axis=0)
+    x, y = first.T
+    if (x * second[:, 1] - y * second[:, 0]).sum() < 0.0:  # clockwise seen from above
+        first, second = second, first
+    heights = (prism.low, prism.low, prism.high, prism.high)
+    return [
+        np.array([(*p, z) for p, z in zip((a, b, b, a), heights, strict=True)])
+        for a, b in zip(first, second, strict=True)
+    ]
 
 
 def _corners(normals: np.ndarray, offsets: np.ndarray) -> np.ndarray:

@@ -15,12 +15,10 @@ from tussle.stock import Boids, DirectController, Predator, SimpleCapture, Simpl
 PAGE = Path(__file__).parents[3] / "docs" / "mission-format.md"
 RUN_AS_THEY_ARE = {
     "straight.xml": 3, "straight-no-gui.xml": 2, "unicycle.xml": 2, "harmonic-oscillator.xml": 1, "waypoint_follower.xml": 2,
-    "batch-example-mission.xml": 2, "straight_include/straight_complete.xml": 2,
+    "batch-example-mission.xml": 2, "straight_include/straight_complete.xml": 2, "capture-the-flag-simple.xml": 4,
 }  # fmt: skip
 """Number of blocks of each."""
 WAIT_FOR_PLUGINS = {
-    "capture-the-flag-simple.xml": "EnforceBoundaryInteraction CaptureInBoundaryInteraction FlagCaptureInteraction FlagCaptureMetrics "
-    "BoundaryDefense TakeFlag",
     "colliding_spheres.xml": "BulletCollision SimpleCarControllerHeading SimpleCar",
     "fixed_wing_6dof.xml": "AircraftPIDController FixedWing6DOF",
     "multirotor-test.xml": "RigidBody6DOFStateSensor MultirotorTests Multirotor MultirotorControllerPID",
@@ -59,6 +57,23 @@ GAMES = {
 }
 
 
+ON_REGIONS = {
+    "capture_the_flag": {"runner_speed": "15"},
+    "boundary_defense": {"defenders": "100", "raiders": "25"},
+}
+
+
+@pytest.mark.parametrize("name", ON_REGIONS)
+def test_the_games_on_regions_are_contested(name):
+    """In the first minute defenders capture, and a flag is taken in spite of them."""
+    mission = read_mission(name, {**ON_REGIONS[name], "end": "60"}, strict=True).mission
+    result = Simulation(mission, seeds=1).run()[0]
+    captures = result.metrics["SimpleCaptureMetrics"]["NonTeamCapture"]
+    assert captures[1] > 5
+    assert sum(captures.values()) == sum(b.count for b in mission.blocks) - sum(result.alive.values())
+    assert sum(result.metrics["FlagCaptureMetrics"]["flags_taken"].values()) > 0
+
+
 @pytest.mark.parametrize("name", GAMES)
 def test_the_games_are_those_built_in_python(name):
     loaded = read_mission(name, {"end": "20"}, strict=True)
@@ -73,7 +88,7 @@ def test_the_games_are_those_built_in_python(name):
 
 def test_shipped_missions_have_titles_and_are_packaged():
     shipped = shipped_missions()
-    assert set(shipped) == {*GAMES}
+    assert set(shipped) == {*GAMES, *ON_REGIONS}
     for path, title in shipped.values():
         assert title
         assert read_mission(path, strict=True).name == title

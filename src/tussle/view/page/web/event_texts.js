@@ -22,6 +22,9 @@ export const EVENT_TEXTS = {
   "difference": [
     "the two runs differ from here on"
   ],
+  "flag": [
+    "{id} {text}"
+  ],
   "end": [
     "the game ended: {text}"
   ]

@@ -7,7 +7,7 @@ import { lastWhere, Layer } from './layer.js';
 import { Clock } from './timeline.js';
 
 /** Colours that are told apart with every kind of colour vision; the shapes tell them apart as well. @type {Record<string, string>} */
-export const KINDS = { capture: '#e8743b', collision: '#d9ae1f', birth: '#2fb38a', death: '#b59ad6', end: '#93a1b0', difference: '#e05a9c' };
+export const KINDS = { capture: '#e8743b', collision: '#d9ae1f', flag: '#4aa3df', birth: '#2fb38a', death: '#b59ad6', end: '#93a1b0', difference: '#e05a9c' };
 /** Births and deaths are marked below a line, all others above it. */
 const BELOW = ['birth', 'death'];
 /** Pixels within which a mark is pointed at, and half the knob of the slider. */
@@ -115,6 +115,7 @@ export class EventLine {
 function markOf(kind, x, size) {
   const [top, bottom] = [13 - size, 24 + size / 2];
   if (kind === 'collision') return new Path2D(`M${x} ${top}L${x + 4.5} ${(top + 18) / 2}L${x} 18L${x - 4.5} ${(top + 18) / 2}Z`);
+  if (kind === 'flag') return new Path2D(`M${x - 0.8} 18V${top - 3}L${x + 7} ${top}L${x + 0.8} ${top + 3}V18Z`);
   if (kind === 'birth') return new Path2D(`M${x} 20L${x + 3.6} ${bottom}L${x - 3.6} ${bottom}Z`);
   if (kind === 'death') return new Path2D(`M${x - 3.6} 20L${x + 3.6} 20L${x} ${bottom}Z`);
   const path = new Path2D();

@@ -1,0 +1,55 @@
+"""Captures of intruders by the defenders of a region."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tussle.api import Interaction, Param, State, WorldView
+from tussle.messages import EntityCaptured
+
+
+class CaptureInBoundaryInteraction(Interaction):
+    """Entities of a boundary's team capture others within `capture_range`, if both are inside the boundary.
+
+    Each intruder is captured by its nearest defender (on ties the smaller id). Without a cool-down, a defender captures all of these
+    in one step; with one, the nearest, and then nobody until the cool-down has passed. In the existing system distances were measured
+    at the positions of the start of the step.
+
+    Raises:
+        MissionError: `boundary_id` is not the id of exactly one boundary of the mission.
+    """
+
+    grade = "portable"
+
+    boundary_id = Param(1, structural=True, doc="Boundary that is defended by its team.")
+    capture_range = Param(5.0, unit="m", ge=0.0, doc="Distance below which intruders are captured.")
+    cool_down_period = Param(0.0, unit="s", ge=0.0, doc="Time from a capture to the defender's next one.")
+    ready_at = State(unit="s", default=-np.inf, per="entity", doc="Time of the entity's next capture.")
+
+    def step(self, w: WorldView) -> None:
+        region = w.region(self.boundary_id)
+        is_inside = region.shape.contains(w.pos)
+        now = w.t[w.world] + 1e-6 * w.dt
+        defends = is_inside & (w.team == region.team) & (now >= self.ready_at)
+        near = w.near(np.where(defends, self.capture_range[w.world], 0.0), teams="other")
+        near = near[is_inside[near.other]]
+        if not len(near):
+            return
+        order = np.lexsort((w.id[near.row], near.distance))
+        order = order[_first_of(near.other[order])]
+        cools = self.cool_down_period[w.world[near.row[order]]] > 0.0
+        order = order[~cools | _first_of(near.row[order])]
+        source, target = near.row[order], near.other[order]
+        self.ready_at[source] = w.t[w.world[source]] + self.cool_down_period[w.world[source]]
+        w.publish(
+            EntityCaptured, w.world[source], source=w.id[source], target=w.id[target],
+            source_team=w.team[source], target_team=w.team[target],
+        )  # fmt: skip
+        w.kill(target, "captured")
+
+
+def _first_of(values: np.ndarray) -> np.ndarray:
+    """Whether each value, (m,), occurs for the first time."""
+    is_first = np.zeros(len(values), bool)
+    is_first[np.unique(values, return_index=True)[1]] = True
+    return is_first

@@ -1,0 +1,47 @@
+"""Rules of capturing a flag."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tussle.api import Interaction, Param, State, WorldView
+from tussle.messages import FlagCaptured, FlagTaken
+
+
+class FlagCaptureInteraction(Interaction):
+    """A flag in one region, and the region to which opponents must bring it.
+
+    An entity that is not of the flag's team takes the flag by entering its boundary; of several in one step, the nearest to the
+    centre (on ties the smaller id). It captures the flag, once per game, by entering the capture boundary. When the carrier is
+    removed, the flag is free again, at its place. Publishes `FlagTaken` and `FlagCaptured`. In the existing system, of several
+    entities that took a flag in one step each published it and the last one had it.
+
+    Raises:
+        MissionError: An id is not that of exactly one boundary of the mission.
+    """
+
+    grade = "portable"
+
+    flag_boundary_id = Param(2, structural=True, doc="Boundary of the flag; its team owns the flag.")
+    capture_boundary_id = Param(1, structural=True, doc="Boundary to which the flag must be brought.")
+    carrier = State(dtype=int, per="world", doc="Id of the entity that has the flag; 0 if it is free.")
+    is_captured = State(dtype=bool, per="world", doc="Whether the flag has been captured.")
+
+    def step(self, w: WorldView) -> None:
+        flag, home = w.region(self.flag_boundary_id), w.region(self.capture_boundary_id)
+        self.carrier[w.rows_at(np.arange(w.n_worlds), self.carrier) < 0] = 0
+        is_free = (self.carrier == 0) & ~self.is_captured
+        rows = np.flatnonzero(is_free[w.world] & (w.team != flag.team) & flag.shape.contains(w.pos))
+        if len(rows):
+            x, y, z = w.pos[:, rows] - np.array(flag.center)[:, None]
+            rows = rows[np.lexsort((w.id[rows], x * x + y * y + z * z))]
+            world, first = np.unique(w.world[rows], return_index=True)
+            self.carrier[world] = w.id[rows[first]]
+            self._publish(w, FlagTaken, rows[first])
+        carries = (self.carrier[w.world] == w.id) & ~self.is_captured[w.world]
+        rows = np.flatnonzero(carries & home.shape.contains(w.pos))
+        self.is_captured[w.world[rows]] = True
+        self._publish(w, FlagCaptured, rows)
+
+    def _publish(self, w: WorldView, event: type[FlagTaken | FlagCaptured], rows: np.ndarray) -> None:
+        w.publish(event, w.world[rows], entity=w.id[rows], team=w.team[rows], boundary=self.flag_boundary_id)
