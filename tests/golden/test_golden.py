@@ -208,6 +208,7 @@ STATES = {
     "last_captured_first": ("prey.Boids.target", 0),
     "births_synchronous": ("slow.Beacon.rumour", 0),
     "births_sequential": ("slow.Beacon.rumour", 0),
+    "vehicles": ("quadrotor.GoTo.goal", 0),
 }
 
 
