@@ -19,6 +19,7 @@ COMPANIONS = {
     # Those that are flown by a controller, which works between the substeps.
     "SimpleAircraft": ["SimpleAircraftControllerPID"],
     "Unicycle": ["UnicyclePID"],
+    "SimpleQuadrotor": ["SimpleQuadrotorControllerLQR"],
 }
 
 

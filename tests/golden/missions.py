@@ -9,16 +9,26 @@ from golden_plugins import Balloon, Beacon, Car, Nursery, Wanderer
 
 from tussle import Block, Mission
 from tussle.stock import (
+    AircraftToSingleIntegratorController,
     AvoidEntityMS,
+    Ballistic,
     Boids,
     Boundary,
     BoundaryDefense,
     CaptureInBoundaryInteraction,
     DirectController,
+    DoubleIntegrator,
+    DoubleIntegratorControllerVelYaw,
+    DoubleIntegratorControllerWaypoint,
+    DubinsAirplane,
+    DubinsAirplane3D,
+    DubinsAirplaneController,
     EnforceBoundaryInteraction,
     ExternalForceField,
     FlagCaptureInteraction,
     FlagCaptureMetrics,
+    GoTo,
+    GroundCollision,
     LocalNetwork,
     MotorSchemas,
     MoveToGoalMS,
@@ -30,13 +40,19 @@ from tussle.stock import (
     SimpleAircraftControllerPID,
     SimpleCapture,
     SimpleCaptureMetrics,
+    SimpleCar,
+    SimpleCarControllerHeading,
     SimpleCollision,
+    SimpleQuadrotor,
+    SimpleQuadrotorControllerLQR,
     SingleIntegrator,
     SingleIntegratorControllerSimple,
+    SingleIntegratorControllerWaypoint,
     SphereNetwork,
     Straight,
     TakeFlag,
     Unicycle,
+    UnicycleControllerPoint,
     UnicyclePID,
     WaypointDispatcher,
     WaypointGenerator,
@@ -283,6 +299,34 @@ def winds() -> Mission:
     )
 
 
+def vehicles() -> Mission:
+    """Each kinematic vehicle goes to points with a controller of its own; a ball falls."""
+    cars = {"tolerance_in_2d": True, "mode": "reverse"}
+    pairs = {
+        "quadrotor": (SimpleQuadrotorControllerLQR(), SimpleQuadrotor(), {}),
+        "car": (SimpleCarControllerHeading(), SimpleCar(enable_gravity=True), cars),
+        "drone": (DoubleIntegratorControllerVelYaw(), DoubleIntegrator(max_vel=9.0, max_acc=4.0, motion_model_sets_yaw=False), {}),
+        "puck": (DoubleIntegratorControllerWaypoint(), DoubleIntegrator(max_vel=9.0, max_acc=4.0), {}),
+        "glider": (DubinsAirplaneController(), DubinsAirplane(speed_min=12.0), {"mode": "loop"}),
+        "jet": (DubinsAirplaneController(), DubinsAirplane3D(), {"speed": 60.0}),
+        "point": (SingleIntegratorControllerWaypoint(), SingleIntegrator(), {}),
+        "ahead": (UnicycleControllerPoint(), Unicycle(vel_max=20.0), {}),
+        "kite": (AircraftToSingleIntegratorController(), SingleIntegrator(), {}),
+    }  # fmt: skip
+    blocks = [
+        Block(
+            name=name, team=1, count=3, position=(0.0, 0.0, 50.0), variance=(25.0, 25.0, 9.0), heading_variance=1.0, speed=3.0,
+            autonomy=GoTo(waypoints=((12.0, 0.0, 52.0), (12.0, 15.0, 47.0)), tolerance=8.0, **values), controller=controller, motion=motion,
+        )
+        for name, (controller, motion, values) in pairs.items()
+    ]  # fmt: skip
+    ball = Block(
+        name="ball", team=2, count=2, position=(0.0, 0.0, 9.0), velocity=(3.0, 1.0, 2.0), motion=Ballistic()
+    )
+    ground = GroundCollision(remove_on_collision=False)
+    return Mission(blocks=[*blocks, ball], motion_multiplier=3, end=4.0, interactions=[ground])
+
+
 STEPS: dict[str, int] = {
     "chase_synchronous": 24,
     "chase_sequential": 24,
@@ -299,6 +343,7 @@ STEPS: dict[str, int] = {
     "births_sequential": 40,
     "flags": 50,
     "winds": 40,
+    "vehicles": 30,
 }
 """Steps after which a mission's hashes are taken."""
 

@@ -107,6 +107,7 @@ STATES = {
     "births_sequential": ("slow.Beacon.rumour", 0),
     "flags": ("runner.SingleIntegrator.x", 6),
     "winds": ("balloon.Balloon.x", 3),
+    "vehicles": ("quadrotor.GoTo.goal", 0),
 }
 
 

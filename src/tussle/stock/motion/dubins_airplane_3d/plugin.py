@@ -1,0 +1,62 @@
+"""An aeroplane that follows any speed, elevation and bank."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from tussle.api import Input, MotionBody, MotionModel, Param, State, row_law
+from tussle.numeric import sincos
+from tussle.numeric.paths import clamp, coordinated_turn
+
+QUARTER = math.pi / 2
+
+
+class DubinsAirplane3D(MotionModel):
+    """An aeroplane in coordinated turns, whose speed, elevation and bank follow their commands without delay and without limits.
+
+    The equations of `DubinsAirplane` (Owen, Beard, McLain 2015, "Implementing Dubins airplane paths on fixed-wing UAVs", equation 5),
+    with limits of the speed only, by default none. Elevation and bank stay within 90 degrees; a bank beyond 89 degrees turns like one
+    of 89 degrees.
+
+    The existing system turns a banked body about its own z axis, at (g / V) tan(roll) there, so that its heading turns at
+    (g / V) sin(roll) / cos(pitch); a positive desired_pitch lowers the nose; and a force gives a velocity of force over mass.
+    """
+
+    grade = "portable"
+
+    speed_max = Param(math.inf, unit="m/s", doc="Largest speed.")
+    speed_min = Param(-math.inf, unit="m/s", doc="Smallest speed.")
+    x = State(
+        "x y z yaw pitch roll v yaw_rate",
+        unit="m m m rad rad rad m/s rad/s",
+        doc="Position, heading, elevation (nose up), bank (right wing down), speed, yaw rate.",
+    )
+    desired_speed = Input(unit="m/s", doc="Speed along the body x axis.")
+    desired_pitch = Input(unit="rad", doc="Elevation, nose up positive.")
+    desired_roll = Input(unit="rad", doc="Bank, right wing down positive.")
+
+    @row_law("x", "pos", "vel", "yaw", "climb", "roll")
+    @staticmethod
+    def flown(
+        x: float, y: float, z: float, yaw: float, desired_speed: float, desired_pitch: float, desired_roll: float,
+        speed_max: float, speed_min: float, dt: float,
+    ) -> Any:  # fmt: skip
+        """State and body after dt."""
+        v, pitch = clamp(desired_speed, speed_min, speed_max), clamp(desired_pitch, -QUARTER, QUARTER)
+        return coordinated_turn(x, y, z, yaw, v, pitch, clamp(desired_roll, -QUARTER, QUARTER), dt)
+
+    def from_body(self, body: MotionBody, rows: np.ndarray) -> None:
+        """Copy position, attitude, speed along the nose and yaw rate."""
+        parts = [*body.pos, body.yaw, body.climb, body.roll, body.forward_speed, body.omega[2]]
+        self.x[:, rows] = np.array(parts)[:, rows]
+
+    def to_body(self, body: MotionBody) -> None:
+        """Write position, velocity, attitude and yaw rate."""
+        x = self.x
+        (turn, rise), (ahead, level) = sincos(x[3:5])
+        body.pos[:], body.omega[2] = x[:3], x[7]
+        body.vel[:] = x[6] * np.array([level * ahead, level * turn, rise])
+        body.set_attitude(x[5], x[4], x[3])
