@@ -41,13 +41,14 @@ def truth(text: str) -> bool:
 
 
 def row(text: str, parts: Sequence[Part]) -> tuple[float, ...]:
-    """Parse one number per component to SI units: "1, 0.2, 1, 45", "0.0 5.0" or "[ 0 5 ]"; with commas, each may have a unit.
+    """Parse one number per component to SI units: "1, 0.2, 1, 45", "0.0 5.0", "[ 0 5 ]" or, for a matrix, "[ 1 0 ] [ 0 1 ]".
+
+    With commas, each may have a unit.
 
     Raises:
         ParameterError: The count is wrong, or an item is not a number.
     """
-    bare = text.strip()
-    bare = bare[1:-1] if bare.startswith("[") and bare.endswith("]") else bare
+    bare = (", " if "," in text else " ").join(rows(text)) if text.lstrip().startswith("[") else text.strip()
     items = [item.strip() for item in bare.split(",")] if "," in bare else bare.split()
     if items and not items[-1] and "," in bare:
         items.pop()

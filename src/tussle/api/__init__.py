@@ -26,6 +26,7 @@ from tussle.api.kinds import (
 from tussle.api.laws import neighbors, together
 from tussle.api.motion import MotionBody, MotionModel
 from tussle.api.plugin import HistoricAttributes, Plugin, service
+from tussle.api.rigid_body import InertiaParam, PositiveParam, RigidBodyModel
 from tussle.api.row_laws import row_law
 from tussle.api.world import WorldView
 from tussle.columns import (
@@ -64,6 +65,7 @@ __all__ = [
     "GroupView",
     "Handle",
     "HistoricAttributes",
+    "InertiaParam",
     "Input",
     "Interaction",
     "Me",
@@ -79,8 +81,10 @@ __all__ = [
     "Output",
     "Param",
     "Plugin",
+    "PositiveParam",
     "Publish",
     "RaggedColumn",
+    "RigidBodyModel",
     "Sensor",
     "State",
     "Subscribe",

@@ -7,6 +7,7 @@ import math
 from tussle.neighbors.kernels import row_of
 from tussle.numeric import atan2
 from tussle.numeric.kernel import device, kernel
+from tussle.numeric.quaternion import quat_normalize, quat_rotate
 
 
 @kernel("F2 i8 i8 i8 Fw")
@@ -148,3 +149,23 @@ def check(pos, quat, health, faulty):
         faulty[i] = bad
         count += 1 if bad or not (health[i] > 0.0) else 0
     return count
+
+
+@kernel("F2 F2w i8")
+def write_rigid_bodies(state, table, first):
+    """Write rigid bodies to the body table.
+
+    Args:
+        state: Position [m], velocity [m/s], quaternion body to world, angular velocity [rad/s] in the body frame, (13, n).
+        table: Body table, with angular velocity in the world frame, (>= 13, N); written.
+        first: First row of the bodies in the table.
+    """
+    for i in range(state.shape[1]):
+        row = first + i
+        for k in range(6):
+            table[k, row] = state[k, i]
+        w, x, y, z = quat_normalize(state[6, i], state[7, i], state[8, i], state[9, i])
+        table[6, row], table[7, row], table[8, row], table[9, row] = w, x, y, z
+        table[10, row], table[11, row], table[12, row] = quat_rotate(
+            w, x, y, z, state[10, i], state[11, i], state[12, i]
+        )

@@ -67,11 +67,12 @@ class MotionModel(EntityPlugin):
     """The dynamics of an entity: x' = f(x, u); abstract.
 
     A model declares one `State` with named fields, its inputs and parameters, and `derivative`: a static function whose arguments
-    are matched by name to fields, inputs, parameters, force_x ... torque_z (world frame) and mass, and which returns the derivatives
-    of the fields in order. It is integrated by the shared fourth-order Runge-Kutta method. Alternatively, a model consists of
-    `row_law`s, which also return body columns, so that one kernel can run controllers with row laws and the model in all substeps;
-    or it has a kernel: `advance = kernel` with arguments (x, u, p, dt, substeps), x (m, n), u (k, n) inputs and p (q, n) parameters
-    in order of declaration; or a property `advance` that returns the kernel of the structural variant.
+    are matched by name to fields, inputs, parameters, force_x ... torque_z (world frame) and mass, and which returns the
+    derivatives of the fields in order. Columns with fields, force and torque can be taken whole, as tuples; structural parameters
+    are constants. It is integrated by the shared fourth-order Runge-Kutta method. Alternatively, a model consists of `row_law`s,
+    which also return body columns, so that one kernel can run controllers with row laws and the model in all substeps; or it has
+    a kernel: `advance = kernel` with arguments (x, u, p, dt, substeps), x (m, n), u (k, n) inputs and p (q, n) parameters in
+    order of declaration; or a property `advance` that returns the kernel of the structural variant.
 
     Raises:
         DeclarationError: There is not exactly one state, it is a list, or an argument of `derivative` is unknown.
@@ -101,7 +102,12 @@ class MotionModel(EntityPlugin):
                 f"{cls.__name__} declares {len(states)} states with fields; a motion model must have one, such as x = State('east north')"
             )
         if cls.derivative is not None:
-            allowed = [*states[0].fields, *cls._input_names(), *cls._param_names(), *BODY_INPUTS]
+            named = [*cls._named_numbers(), *(k for k, c in cls.params().items() if c.structural)]
+            allowed = list(
+                dict.fromkeys(
+                    (*states[0].fields, *cls._input_names(), *cls._param_names(), *named, *BODY_INPUTS)
+                )
+            )
             for name in inspect.signature(cls.derivative).parameters:
                 if name not in allowed:
                     raise DeclarationError(
@@ -125,7 +131,20 @@ class MotionModel(EntityPlugin):
 
     @classmethod
     def _param_names(cls) -> list[str]:
-        return [name for k, c in cls.row_params().items() for name in (c.fields or (k,))]
+        return [name for k, c in cls.row_params().items() for name in _numbers(k, c)]
+
+    @classmethod
+    def _named_numbers(cls) -> dict[str, tuple[str, ...] | str]:
+        """Further names in `derivative`: whole columns, and fields of parameters whose name is not taken."""
+        found: dict[str, tuple[str, ...] | str] = {"force": BODY_INPUTS[:3], "torque": BODY_INPUTS[3:6]}
+        found |= {k: c.fields for k, c in cls.states().items() if c.fields}
+        found |= {k: c.channels for k, c in cls.inputs().items() if c.fields}
+        fields: dict[str, list[str]] = {}
+        for k, c in cls.row_params().items():
+            found[k] = _numbers(k, c) if c.fields else k
+            for field, number in zip(c.fields, _numbers(k, c), strict=False):
+                fields.setdefault(field, []).append(number)
+        return {**{k: numbers[0] for k, numbers in fields.items() if len(numbers) == 1}, **found}
 
     def active_inputs(self) -> list[str]:
         """Names of the inputs that this instance uses, in order of declaration; structural parameters may disable some."""
@@ -142,7 +161,8 @@ class MotionModel(EntityPlugin):
         names = {name for law in self.row_laws.values() for name in law.arguments}
         if self.derivative is not None and not names:
             names = set(inspect.signature(self.derivative).parameters)
-        return [name for name in BODY_INPUTS if name in names]
+        own = self._param_names()
+        return [name for name in BODY_INPUTS if (name in names or name[:-2] in names) and name not in own]
 
     @property
     def advance(self) -> Any:
@@ -156,6 +176,8 @@ class MotionModel(EntityPlugin):
             list(self.state().fields),
             [*self.input_channels(), *self.body_inputs()],
             self._param_names(),
+            self._named_numbers(),
+            {k: self.values[k] for k, c in self.params().items() if c.structural},
         )
         return lambda x, u, p, dt, substeps: rk4(f, x, u, p, dt, substeps)
 
@@ -226,6 +248,11 @@ class MotionModel(EntityPlugin):
             integrate(x, np.ascontiguousarray(np.broadcast_to(u[k], (len(names), n))), p, dt, substeps)
             path[k + 1] = x
         return path[..., 0] if is_single else path
+
+
+def _numbers(name: str, param: Param) -> tuple[str, ...]:
+    """Names of the numbers of a parameter among those of its plugin."""
+    return tuple(f"{name}_{field}" for field in param.fields) or (name,)
 
 
 assert [OFFSETS[name] for name in ("pos", "vel", "quat", "omega")] == [0, 3, 6, 10]  # as kernels write them

@@ -14,6 +14,7 @@ from tussle.api.easy.plugins import EasyEntityPlugin
 from tussle.api.group import GroupView
 from tussle.api.kinds import Behavior
 from tussle.api.motion import MotionBody
+from tussle.api.rigid_body import RigidBodyModel
 from tussle.columns import (
     Channel,
     EntityRef,
@@ -107,7 +108,8 @@ def check_hooks(spec: Any, where: str) -> None:
         needed = ("step_one",)
     if getattr(type(spec), "passthrough", False) or (spec.kind == "controller" and type(spec).row_laws):
         return
-    abstract = [c for c in type(spec).__mro__ if c.__module__.startswith("tussle.api.")]
+    mro = type(spec).__mro__
+    abstract = [c for c in mro if c.__module__.startswith("tussle.api.") and c is not RigidBodyModel]
     for hook in needed:
         if any(getattr(type(spec), hook) is getattr(base, hook, None) for base in abstract):
             own = [
@@ -219,7 +221,7 @@ class Group:
             if isinstance(column, Param):
                 if column.structural:
                     plugin.__dict__[name] = spec.values[name]
-                if column.ragged:
+                elif column.ragged:
                     binding.ragged[name] = self.table.add_list(column)
             elif isinstance(column, State) and column.ragged:
                 binding.ragged[name] = self.table.add_list(column)

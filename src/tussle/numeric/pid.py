@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from tussle.numeric.elementary import wrap
+import math
+
+from tussle.numeric.elementary import atan2, wrap
 from tussle.numeric.kernel import device
 
 
@@ -56,3 +58,29 @@ def pid_angle_loop(error, gains, memory, dt):
     error = wrap(error)
     command, integral = pid(error, wrap(has_error * (error - last)), dt, kp, ki, kd, band, integral)
     return command, (integral, error, 1.0)
+
+
+TRIM_TIME = 2.0
+"""Time constant [s] of the trim in `slope_error`: slower than an aircraft pitches."""
+TRIM_MAX = 0.5
+"""Largest trim [rad], so that it does not wind up where the slope cannot be flown."""
+
+
+@device
+def slope_error(slope, climb, vel, trim, dt):
+    """Return the error of the elevation that flies a slope, and the new trim.
+
+    The desired elevation is the slope plus the trim, which becomes the angle of attack: it is the integral of the error of the slope.
+    So the loop of the elevation is fast, and no error of the slope remains.
+
+    Args:
+        slope: Desired slope of the path [rad].
+        climb: Elevation [rad].
+        vel: Velocity [m/s], world frame.
+        trim: Trim of the last call [rad].
+        dt: Time since the last call [s].
+    """
+    vx, vy, vz = vel
+    trim = trim + min(dt / TRIM_TIME, 1.0) * (slope - atan2(vz, math.sqrt(vx * vx + vy * vy)))
+    trim = min(max(trim, -TRIM_MAX), TRIM_MAX)
+    return slope + trim - climb, trim

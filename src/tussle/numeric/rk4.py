@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from typing import Any
 
@@ -18,7 +18,12 @@ DERIVATIVE = "Fw Fw Fw Fw"  # x (m,), u (k,), p (q,), dx (m,)
 
 
 def compile_derivative(
-    function: Callable[..., Any], x_names: Sequence[str], u_names: Sequence[str], p_names: Sequence[str]
+    function: Callable[..., Any],
+    x_names: Sequence[str],
+    u_names: Sequence[str],
+    p_names: Sequence[str],
+    others: Mapping[str, Sequence[str] | str] | None = None,
+    constants: Mapping[str, Any] | None = None,
 ) -> Kernel:
     """Compile a state equation with named arguments to a kernel `void(x, u, p, dx)` over arrays.
 
@@ -29,6 +34,10 @@ def compile_derivative(
         x_names: Names of the states.
         u_names: Names of the inputs.
         p_names: Names of the parameters.
+        others: Names of tuples of states, inputs and parameters, and other names of one of them.
+        constants: Values that are the same for all rows: numbers, truth values, texts, tuples of them.
+
+    An argument that has a default may be none of the names.
 
     Raises:
         DeclarationError: An argument is not one of the names, or a name is declared twice.
@@ -41,7 +50,14 @@ def compile_derivative(
                     f"{label(function)}: {name!r} is declared twice among states, inputs and parameters"
                 )
             where[name] = f"{array}[{place}]"
-    arguments = list(inspect.signature(function).parameters)
+    for name, parts in (others or {}).items():
+        if isinstance(parts, str):
+            where.setdefault(name, where[parts])
+        elif where.keys() >= set(parts):
+            where.setdefault(name, f"({''.join(f'{where[part]}, ' for part in parts)})")
+    where = {**{name: repr(value) for name, value in (constants or {}).items()}, **where}
+    declared = inspect.signature(function).parameters
+    arguments = [name for name, each in declared.items() if name in where or each.default is each.empty]
     for name in arguments:
         if name not in where:
             raise DeclarationError(
@@ -49,7 +65,7 @@ def compile_derivative(
                 f"{nearest_name(name, where)}; {listed(where)}"
             )
     targets = ", ".join(f"dx[{place}]" for place in range(len(x_names)))
-    values = ", ".join(where[name] for name in arguments)
+    values = ", ".join(f"{name}={where[name]}" for name in arguments)
     scope: dict[str, Any] = {
         "function": function if isinstance(function, (Device, Kernel)) else device(function)
     }

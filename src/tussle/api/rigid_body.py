@@ -1,0 +1,85 @@
+"""Motion models whose state is that of a rigid body."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from tussle.api import kernels
+from tussle.api.motion import MotionBody, MotionModel
+from tussle.columns import Param, State
+from tussle.errors import ParameterError
+from tussle.numeric.quaternion import quat_rotate_inverse
+
+
+class InertiaParam(Param):
+    """An inertia tensor about the center of mass, body frame, written as "[ xx xy xz ] [ yx yy yz ] [ zx zy zz ]" or nine numbers.
+
+    Args:
+        default: The nine elements, row by row.
+        unit: SI unit.
+        text_unit: Unit in mission files, where it is not SI.
+        doc: One-line description.
+
+    Raises:
+        ParameterError: The matrix is not positive definite.
+    """
+
+    def __init__(self, default: Any, *, unit: str = "kg*m^2", text_unit: str = "", doc: str = "") -> None:
+        super().__init__(
+            default, fields="xx xy xz yx yy yz zx zy zz", unit=unit, text_unit=text_unit, doc=doc
+        )
+
+    def _item(self, value: Any, where: str) -> Any:
+        item = super()._item(value, where)
+        xx, xy, xz, yx, yy, yz, zx, zy, zz = item
+        xy, xz, yz = 0.5 * (xy + yx), 0.5 * (xz + zx), 0.5 * (yz + zy)
+        minor = xx * yy - xy * xy
+        if not (xx > 0.0 and minor > 0.0 and zz * minor > xx * yz * yz + yy * xz * xz - 2.0 * xy * yz * xz):
+            raise ParameterError(
+                f"{self._place(where)} = {item} is not allowed; an inertia tensor is positive definite"
+            )
+        return item
+
+
+class PositiveParam(Param):
+    """A positive size, such as a mass, without a smallest value: near 0 the equations become too stiff for any step.
+
+    So the conformance kit tries a tenth of the default, and not the smallest positive number, as for `gt=0.0`.
+    """
+
+    def is_within(self, number: float) -> bool:
+        """Whether a number is positive."""
+        return number > 0.0 and super().is_within(number)
+
+    def allowed(self) -> str:
+        """Describe the allowed values."""
+        return f"{super().allowed()} > 0"
+
+
+class RigidBodyModel(MotionModel):
+    """A motion model with six degrees of freedom; abstract.
+
+    A subclass adds `derivative`, which may take the state as the tuple `rigid_body` and compute its rates with the functions of
+    `tussle.numeric.rigid_body`.
+    """
+
+    rigid_body = State(
+        "x y z vx vy vz qw qx qy qz p q r",
+        unit="m m m m/s m/s m/s 1 1 1 1 rad/s rad/s rad/s",
+        doc="Position, velocity, world frame; quaternion body to world; angular velocity, body frame.",
+    )
+
+    def from_body(self, body: MotionBody, rows: np.ndarray) -> None:
+        """Copy position, velocity, attitude and angular velocity."""
+        quat = body.quat[:, rows]
+        state = self.rigid_body
+        state[:3, rows] = body.pos[:, rows]
+        state[3:6, rows] = body.vel[:, rows]
+        state[6:10, rows] = quat
+        state[10:, rows] = quat_rotate_inverse(quat, body.omega[:, rows])
+
+    def to_body(self, body: MotionBody) -> None:
+        """Write position, velocity, attitude and angular velocity."""
+        kernels.write_rigid_bodies(self.rigid_body, body.table, body.first)
