@@ -19,6 +19,7 @@ from tussle.stock import (
     NoisyContacts,
     NoisyState,
     Predator,
+    RadioNetwork,
     SimpleAircraft,
     SimpleAircraftControllerPID,
     SimpleCapture,
@@ -27,6 +28,7 @@ from tussle.stock import (
     SingleIntegrator,
     SingleIntegratorControllerSimple,
     SphereNetwork,
+    Still,
     Straight,
     Unicycle,
     UnicyclePID,
@@ -134,6 +136,22 @@ def births_and_radio() -> Mission:
     )  # fmt: skip
 
 
+def radio() -> Mission:
+    """A radio with all its losses, between entities that are born and jammed."""
+    node = lambda name, count, **when: Block(  # noqa: E731
+        name=name, team=1, count=count, variance=(900.0, 900.0, 25.0), autonomy=Beacon(network="RadioNetwork"),
+        motion=SingleIntegrator(), **when,
+    )  # fmt: skip
+    network = RadioNetwork(
+        range=40.0, prob_transmit=0.9, filter_comms_plane=True, comms_boundary_epsilon=3.0, path_loss_exponent=2.7, fading="rayleigh",
+        jammer_team=2, jammer_range=25.0, bandwidth=5000.0, queue_limit=60.0, half_duplex=True, is_stochastic_delay=True,
+    )  # fmt: skip
+    jammer = Block(name="jammer", team=2, position=(20.0, 0.0, 0.0), motion=Still())
+    return Mission(
+        blocks=[node("first", 9), jammer, node("late", 9, rate=4.0)], end=3.0, networks=[network], interactions=[Nursery()],
+    )  # fmt: skip
+
+
 def narrow_view() -> Mission:
     """Flocking with a limited field of view, next to a flock without."""
     flock = lambda name, **view: Block(  # noqa: E731
@@ -237,6 +255,7 @@ STEPS: dict[str, int] = {
     "aircraft": 40,
     "schemas": 24,
     "births_and_radio": 24,
+    "radio": 24,
     "narrow_view": 24,
     "slow_clocks": 24,
     "cars": 24,

@@ -24,6 +24,7 @@ from tussle.api.kinds import (
     WorldPlugin,
 )
 from tussle.api.laws import neighbors, together
+from tussle.api.links import Links
 from tussle.api.motion import MotionBody, MotionModel
 from tussle.api.plugin import HistoricAttributes, Plugin, service
 from tussle.api.row_laws import row_law
@@ -66,6 +67,7 @@ __all__ = [
     "HistoricAttributes",
     "Input",
     "Interaction",
+    "Links",
     "Me",
     "Member",
     "Message",
