@@ -32,6 +32,7 @@ __all__ = [
     "Polyhedron",
     "Scene",
     "Sphere",
+    "TeamRegion",
     "Volume",
 ]
 
@@ -63,6 +64,23 @@ class Base:
             raise ParameterError(
                 f"Base.opacity = {self.opacity!r} is not allowed; it takes a number from 0 to 1"
             )
+
+
+@dataclass(frozen=True)
+class TeamRegion:
+    """A region of a mission that belongs to a team.
+
+    Args:
+        boundary: Its id.
+        team: The team's id.
+        center: Its centre [m], (3,), world frame; of a plane, a point on it.
+        shape: Its shape.
+    """
+
+    boundary: int
+    team: int
+    center: Vector
+    shape: Volume
 
 
 @dataclass(frozen=True)

@@ -61,10 +61,14 @@ class Convex(Volume):
     def _faces(self) -> tuple[tuple[Vector, float], ...]:
         return self.half_spaces()
 
+    @cached_property
+    def _face_columns(self) -> np.ndarray:
+        """Components of the normals and offset of each face, (4, faces, 1)."""
+        return np.array([(*normal, offset) for normal, offset in self._faces]).T[:, :, None]
+
     def contains(self, pos: np.ndarray) -> np.ndarray:
-        inside = np.ones(np.shape(pos)[1:], np.bool_)
-        for normal, offset in self._faces:
-            inside &= _along(normal, pos) < offset
+        east, north, up, offset = self._face_columns
+        inside: np.ndarray = (east * pos[0] + north * pos[1] + up * pos[2] < offset).all(axis=0)
         return inside
 
     def inward(self, pos: np.ndarray) -> np.ndarray:

@@ -39,6 +39,7 @@ HOOKS = (
     "result",
     "result_one",
     "result_of",
+    "regions",
     "rejects",
     "route",
     "from_body",

@@ -13,9 +13,9 @@ import numpy as np
 
 from tussle.api.clock import Clock
 from tussle.api.draw import Draw
-from tussle.errors import PluginError, TussleError, listed, nearest_name
+from tussle.errors import MissionError, PluginError, TussleError, listed, nearest_name
 from tussle.rng import stream_key
-from tussle.scene import Scene
+from tussle.scene import Scene, TeamRegion
 
 PARTS_PER_THREAD = 4
 """Parts that `Context.split` makes for each thread: a slow thread then delays the others less."""
@@ -33,6 +33,7 @@ class Context:
         teams: Team numbers of the mission, ascending.
         running: Whether each world is still running, (n_worlds,).
         services: Service name -> function, for the services of world plugins.
+        regions: Regions that world plugins define.
         topic: Function that returns the topic of a network, name and message type.
         threads: Number of threads that `split` may use.
         draw: Receives the shapes that plugins draw.
@@ -46,6 +47,7 @@ class Context:
     teams: np.ndarray
     running: np.ndarray
     services: dict[str, Callable[..., Any]] = field(default_factory=dict)
+    regions: list[TeamRegion] = field(default_factory=list)
     topic: Callable[..., Any] = field(init=False)
     threads: int = 1
     draw: Draw = field(default_factory=Draw)
@@ -75,6 +77,20 @@ class Context:
         if self._pool is not None:
             self._pool.shutdown()
             self._pool = None
+
+    def region(self, boundary: float) -> TeamRegion:
+        """The region with this id.
+
+        Raises:
+            MissionError: No region, or more than one, has the id.
+        """
+        found = [region for region in self.regions if region.boundary == boundary]
+        if len(found) == 1:
+            return found[0]
+        ids = sorted({region.boundary for region in self.regions})
+        raise MissionError(
+            f"{len(found) or 'no'} boundaries of the mission have the id {boundary:g}; {listed(map(str, ids))}"
+        )
 
     def find_service(self, name: str, own: dict[str, Callable[..., Any]]) -> Callable[..., Any]:
         """The service `name` of the entity's plugins, else of the world plugins.

@@ -26,7 +26,7 @@ from tussle.api.draw import Draw
 from tussle.api.pairs import Nearest, Pairs, find_nearest, find_pairs
 from tussle.errors import PluginError, listed, nearest_name
 from tussle.neighbors.index import Index
-from tussle.scene import Scene
+from tussle.scene import Scene, TeamRegion
 
 ROWS_PER_THREAD = 4096
 """Minimum number of rows per thread: a kernel takes about 20 ns per row, starting a thread 50 us."""
@@ -169,6 +169,14 @@ class GroupView:
     def scene(self) -> Scene:
         return self.context.scene
 
+    def region(self, boundary: float) -> TeamRegion:
+        """The region with this id, its team and its centre, as a `Boundary` of the mission defines it.
+
+        Raises:
+            MissionError: No region, or more than one, has the id.
+        """
+        return self.context.region(boundary)
+
     @property
     def draw(self) -> Draw:
         return self.context.draw
@@ -286,9 +294,20 @@ class GroupView:
         rows = self.first, self.last
         return find_pairs(self.index(radius), rows, self.pos, radius, teams, self.bodies)
 
-    def nearest(self, k: int = 1, teams: str | int | np.ndarray | None = None) -> Nearest:
-        """The k nearest other entities of each row, at any distance; `teams` as in `near`, or one team per row."""
-        return find_nearest(self._bodies, (self.first, self.last), self.pos, k, teams)
+    def nearest(
+        self, k: int = 1, teams: str | int | np.ndarray | None = None, among: np.ndarray | None = None
+    ) -> Nearest:
+        """The k nearest other entities of each row, at any distance.
+
+        Args:
+            k: Number of entities.
+            teams: As in `near`, or one team per row, (n,).
+            among: Instead of `teams`: the rows of `bodies` to choose from, a boolean mask, (N,).
+
+        Raises:
+            ParameterError: Both `teams` and `among` are given, or a value is not allowed.
+        """
+        return find_nearest(self._bodies, (self.first, self.last), self.pos, k, teams, among)
 
     # -- random numbers and services ------------------------------------------------------------------------------------------------
 

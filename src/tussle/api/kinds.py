@@ -13,6 +13,7 @@ from tussle.api.row_laws import step_rows
 from tussle.api.world import WorldView
 from tussle.columns import Output, Param
 from tussle.messages import Messages
+from tussle.scene import TeamRegion
 
 
 class EntityPlugin(Plugin):
@@ -76,6 +77,10 @@ class WorldPlugin(Plugin):
     """A plugin of the world; abstract. Parameters have one value per world."""
 
     kind: ClassVar[str] = "world plugin"
+
+    def regions(self) -> tuple[TeamRegion, ...]:
+        """Regions that this plugin defines, for `w.region` and pictures; its structural parameters are known."""
+        return ()
 
     def start(self, w: WorldView) -> None:
         """Called at the start of worlds, after their initial entities are placed."""

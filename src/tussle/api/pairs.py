@@ -86,10 +86,26 @@ def find_pairs(
     return Pairs(queries.pairs(index, *rows, x, y, z, reach, bodies.team, _checked(teams)), bodies)
 
 
-def find_nearest(bodies: Bodies, rows: tuple[int, int], pos: np.ndarray, k: int, teams: Any) -> Nearest:
+def find_nearest(
+    bodies: Bodies,
+    rows: tuple[int, int],
+    pos: np.ndarray,
+    k: int,
+    teams: Any,
+    among: np.ndarray | None = None,
+) -> Nearest:
     """See `GroupView.nearest`. Rows [first, last) of the body table are at `pos` [m], (3, n)."""
     index, (x, y, z) = bodies.any_index(), pos
-    if isinstance(teams, np.ndarray):
+    if among is not None:
+        if teams is not None:
+            raise ParameterError("g.nearest takes teams or among, not both")
+        mask = np.asarray(among)
+        if mask.dtype != bool or mask.shape != (bodies.n,):
+            raise ParameterError(
+                f"g.nearest: among is a boolean mask of shape ({bodies.n},), not {mask.dtype} {mask.shape}"
+            )
+        other, distance = queries.nearest(index, *rows, x, y, z, k, mask.astype(np.int64), 1)
+    elif isinstance(teams, np.ndarray):
         other, square = np.empty((k, len(x)), np.int64), np.empty((k, len(x)))
         order = index.row_world, index.place, index.order
         table = (*index.table, bodies.by_place(index, "team")[0])

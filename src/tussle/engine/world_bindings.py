@@ -81,6 +81,7 @@ class WorldBinding:
         world_binding.tables["world"].allocate(n_worlds)
         world_binding.tables["entity"].allocate(view.n)
         world_binding.fill_params(overrides, np.arange(n_worlds))
+        view.context.regions += spec.regions()
         for service in type(spec).services:
             view.context.services[service] = getattr(world_binding.plugin, service)
         world_binding.attach()

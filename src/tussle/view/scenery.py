@@ -14,7 +14,6 @@ from tussle.errors import ViewError
 from tussle.geodesy import Origin
 from tussle.mission import Block, Mission
 from tussle.scene import Base, Cuboid, Plane, Polyhedron, Sphere, Volume
-from tussle.stock import Boundary
 from tussle.view.shapes import Mesh
 from tussle.view.solids import mesh_of, outline_of
 from tussle.view.terrain import Terrain, find_terrain
@@ -139,9 +138,7 @@ def _shapes(mission: Mission) -> list[tuple[str, int | None, Volume, bool]]:
     scene = mission.scene
     found += [(str(name), None, shape, False) for name, shape in scene.boundaries.items()]
     found += [(f"wall {i + 1}", None, shape, True) for i, shape in enumerate(scene.walls)]
-    found += [
-        (p.instance_name, p.team, p.region(), False) for p in mission.interactions if isinstance(p, Boundary)
-    ]
+    found += [(p.instance_name, r.team, r.shape, False) for p in mission.interactions for r in p.regions()]
     return found
 
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from tussle.api import HistoricAttributes, Interaction, Param, State, WorldView, service
 from tussle.messages import BoundaryCrossed, BoundaryShape
-from tussle.scene import Cuboid, Plane, Sphere
+from tussle.scene import Cuboid, Plane, Sphere, TeamRegion, Volume
+from tussle.shapes import Vector
 
 
 class Boundary(Interaction):
@@ -41,13 +44,14 @@ class Boundary(Interaction):
     is_known = State(dtype=bool, per="entity", doc="Whether `was_inside` of the entity is valid.")
     is_told = State(dtype=bool, per="world", doc="Whether the shape has been published.")
 
-    def region(self) -> Cuboid | Sphere | Plane:
+    def region(self) -> Volume:
         """Return the region as a shape of the scene."""
-        if self.shape == "sphere":
-            return Sphere(center=self.center, radius=self.radius)
-        if self.shape == "plane":
-            return Plane(point=self.center, normal=self.normal)
-        return Cuboid(center=self.center, lengths=self.lengths, rpy=self.rpy)
+        given = self.values
+        return _volume(*(given[name] for name in ("shape", "center", "lengths", "rpy", "radius", "normal")))
+
+    def regions(self) -> tuple[TeamRegion, ...]:
+        """Return the region with its id, team and centre."""
+        return (TeamRegion(self.boundary_id, self.team, self.center, self.region()),)
 
     def step(self, w: WorldView) -> None:
         fresh = np.flatnonzero(~self.is_told & (np.bincount(w.world, minlength=w.n_worlds) > 0))
@@ -71,3 +75,15 @@ class Boundary(Interaction):
     def is_inside(self, pos: np.ndarray) -> np.ndarray:
         """Return whether points [m], (3, n), lie inside, (n,)."""
         return np.asarray(self.region().contains(pos))
+
+
+@lru_cache(maxsize=256)
+def _volume(
+    shape: str, center: Vector, lengths: Vector, rpy: Vector, radius: float, normal: Vector
+) -> Volume:
+    """A region as a shape of the scene; kept, because finding its faces takes longer than a step."""
+    if shape == "sphere":
+        return Sphere(center=center, radius=radius)
+    if shape == "plane":
+        return Plane(point=center, normal=normal)
+    return Cuboid(center=center, lengths=lengths, rpy=rpy)
