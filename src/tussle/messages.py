@@ -84,6 +84,16 @@ class Messages:
                 data[name] = np.ascontiguousarray(values[..., index])
         return Messages(self.type, self.world[index], self.sender[index], data)
 
+    def sizes(self) -> np.ndarray:
+        """Size of each message [byte], (n,): 8 for each number, also of lists; 0 for objects."""
+        size = np.zeros(self.n)
+        for name, column in self.type.fields.items():
+            if isinstance(column, Numbers):
+                values = self.data[name]
+                of_list = values.count if isinstance(values, RaggedColumn) else 1
+                size += 8.0 * max(1, len(column.fields)) * of_list
+        return size
+
     @classmethod
     def empty(cls, type_: type[Message]) -> Messages:
         """The empty batch of a type; one shared object per type."""

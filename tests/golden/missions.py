@@ -35,6 +35,7 @@ from tussle.stock import (
     NoisyContacts,
     NoisyState,
     Predator,
+    RadioNetwork,
     RandomAttrit,
     SimpleAircraft,
     SimpleAircraftControllerPID,
@@ -49,6 +50,7 @@ from tussle.stock import (
     SingleIntegratorControllerSimple,
     SingleIntegratorControllerWaypoint,
     SphereNetwork,
+    Still,
     Straight,
     TakeFlag,
     Unicycle,
@@ -155,6 +157,22 @@ def births_and_radio() -> Mission:
     return Mission(
         blocks=[beacon("first", 6), listener, beacon("late", 14, rate=4.0, slots=2, first_birth=0.3, interval_sd=0.2)], end=5.0,
         networks=[SphereNetwork(range=60.0, prob_transmit=0.6, comm_delay=0.35), LocalNetwork()], interactions=[Nursery()],
+    )  # fmt: skip
+
+
+def radio() -> Mission:
+    """A radio with all its losses, between entities that are born and jammed."""
+    node = lambda name, count, **when: Block(  # noqa: E731
+        name=name, team=1, count=count, variance=(900.0, 900.0, 25.0), autonomy=Beacon(network="RadioNetwork"),
+        motion=SingleIntegrator(), **when,
+    )  # fmt: skip
+    network = RadioNetwork(
+        range=40.0, prob_transmit=0.9, filter_comms_plane=True, comms_boundary_epsilon=3.0, path_loss_exponent=2.7, fading="rayleigh",
+        jammer_team=2, jammer_range=25.0, bandwidth=5000.0, queue_limit=60.0, half_duplex=True, is_stochastic_delay=True,
+    )  # fmt: skip
+    jammer = Block(name="jammer", team=2, position=(20.0, 0.0, 0.0), motion=Still())
+    return Mission(
+        blocks=[node("first", 9), jammer, node("late", 9, rate=4.0)], end=3.0, networks=[network], interactions=[Nursery()],
     )  # fmt: skip
 
 
@@ -334,6 +352,7 @@ STEPS: dict[str, int] = {
     "aircraft": 40,
     "schemas": 24,
     "births_and_radio": 24,
+    "radio": 24,
     "narrow_view": 24,
     "slow_clocks": 24,
     "cars": 24,

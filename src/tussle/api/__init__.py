@@ -24,6 +24,7 @@ from tussle.api.kinds import (
     WorldPlugin,
 )
 from tussle.api.laws import neighbors, together
+from tussle.api.links import Links
 from tussle.api.motion import MotionBody, MotionModel
 from tussle.api.plugin import HistoricAttributes, Plugin, service
 from tussle.api.rigid_body import InertiaParam, PositiveParam, RigidBodyModel
@@ -68,6 +69,7 @@ __all__ = [
     "InertiaParam",
     "Input",
     "Interaction",
+    "Links",
     "Me",
     "Member",
     "Message",

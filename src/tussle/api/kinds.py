@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import numpy as np
@@ -11,6 +12,7 @@ from tussle.api.plugin import HistoricAttributes, Plugin
 from tussle.api.row_laws import step_rows
 from tussle.api.world import WorldView
 from tussle.columns import Output, Param
+from tussle.messages import Messages
 from tussle.scene import TeamRegion
 
 
@@ -116,12 +118,37 @@ class Metric(WorldPlugin):
 
 
 class Network(WorldPlugin):
-    """Carries messages between entities; abstract."""
+    """Carries messages between entities; abstract.
+
+    A network with `losses` counts its links: copies of messages to others within reach, delivered and lost. The counts are part of
+    the result of each world.
+    """
 
     kind = "network"
+    losses: ClassVar[tuple[str, ...]] = ()
+    """Reasons for which a message to an entity within reach may be lost; see `Links`."""
     historic_attributes = HistoricAttributes(least_zero=("comm_delay",))
     comm_delay = Param(0.0, unit="s", ge=0.0, doc="Time from sending to the earliest delivery.")
+    monitor_publisher_topics = Param(
+        "", doc="Topics whose published messages are counted, by commas; * is all together."
+    )
+    monitor_subscriber_topics = Param(
+        "", doc="Topics whose received messages are counted, by commas; * is all together."
+    )
+    csv_filename = Param("", doc="File of a run directory for these counts, step by step.")
+    link_counts: np.ndarray
+    """In a simulation: links delivered, then lost for each reason, (1 + n_losses, n_worlds)."""
 
-    def route(self, w: WorldView, messages: Any) -> Any:
+    def transmit(self, w: WorldView, outboxes: Sequence[Messages]) -> Any:
+        """Route the messages of all topics of a step: `Links`, or what `route` returns for each topic."""
+        return [self.route(w, messages) for messages in outboxes]
+
+    def route(self, w: WorldView, messages: Messages) -> Any:
         """Receivers of each message: `EVERYONE`, `SAME_ENTITY`, or (message numbers, body rows of the receivers), each (m,)."""
         raise TypeError(f"{type(self).__name__} has no route")
+
+    def result(self, w: WorldView) -> dict[str, np.ndarray]:
+        if not self.losses:
+            return {}
+        lost = {f"lost_{name}": self.link_counts[1 + i] for i, name in enumerate(self.losses)}
+        return {"sent": self.link_counts.sum(axis=0), "delivered": self.link_counts[0], **lost}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -55,16 +55,18 @@ def show_summary(simulation: Simulation, name: str, speed: Speed, directory: Pat
     result, mission = simulation.result()[0], simulation.mission
     n = sum(block.count for block in mission.blocks)
     facts = f"seed {result.seed} · {n} entities · {result.steps} steps of {mission.dt:g} s"
+    networks = [network.instance_name for network in mission.networks]
     of_world = (
         (plugin, f"{key} {_number(value)}")
         for plugin, named in result.metrics.items()
         for key, value in named.items()
-        if not isinstance(value, dict)
+        if not isinstance(value, dict) and plugin not in networks
     )
     put(
         "",
         title(mission.name or name, facts),
         *team_tables(result, mission),
+        *network_tables(result, networks),
         fact_list(
             [
                 ("ended", f"{end_text(result.end)}, at t = {result.t:g} s"),
@@ -93,6 +95,17 @@ def team_tables(result: WorldResult, mission: Mission) -> list[Padding]:
             cells += [_number(result.scores.get(team, 0.0)), "won" if team == result.winner else ""]
         rows.append(("green" if team == result.winner else "", cells))
     return number_tables(head, rows)
+
+
+def network_tables(result: WorldResult, networks: Sequence[str]) -> list[Padding]:
+    """Return tables of networks that lose messages: messages to others within reach, those delivered, and lost for each reason."""
+    counts = {name: result.metrics[name] for name in networks if name in result.metrics}
+    lost = dict.fromkeys(
+        k for found in counts.values() for k, n in found.items() if k.startswith("lost_") and n
+    )
+    columns = ["sent", "delivered", *lost]
+    rows = [("", [name, *(str(found.get(k, "")) for k in columns)]) for name, found in counts.items()]
+    return number_tables(["network", *(k.replace("_", " ") for k in columns)], rows) if rows else []
 
 
 def _team_columns(result: WorldResult) -> Iterator[tuple[str, dict[int, Any]]]:

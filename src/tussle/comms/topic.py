@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from tussle.messages import Message, Messages
+from tussle.numeric.segments import order_by_row
 
 EVERYONE: Final = "everyone"
 SAME_ENTITY: Final = "same entity"
@@ -72,6 +73,13 @@ class TopicBuffer:
             self._joined = Messages.concatenate(self.sent) if self.sent else Messages.empty(self.type)
         return self._joined
 
+    def is_receiver(self, n: int) -> np.ndarray:
+        """Whether each of the n rows of the body table subscribes to the topic, (n,)."""
+        found = np.zeros(n, bool)
+        for inbox in self.inboxes:
+            found[inbox.view.first : inbox.view.last] = True
+        return found
+
     def clear_outbox(self) -> None:
         self.sent.clear()
         self._joined = None
@@ -80,18 +88,21 @@ class TopicBuffer:
         """Queue messages for delivery."""
         self.queue.append(Delivery(batch, due, to))
 
-    def deliver(self, step: np.ndarray) -> None:
-        """Deliver all messages that are due at the end of the worlds' steps, (n_worlds,)."""
+    def deliver(self, step: np.ndarray) -> list[Delivery]:
+        """Deliver all messages that are due at the end of the worlds' steps, (n_worlds,), and return them."""
         waiting: list[Delivery] = []
+        delivered: list[Delivery] = []
         for delivery in self.queue:
             is_due = delivery.due <= step[delivery.batch.world]
             due = delivery if is_due.all() else delivery.select(is_due)
             if due.batch.n:
+                delivered.append(due)
                 for inbox in self.inboxes:
                     inbox.deliveries.append(due)
             if not is_due.all():
                 waiting.append(delivery.select(~is_due))
         self.queue = waiting
+        return delivered
 
     def drop_worlds(self, gone: np.ndarray) -> None:
         """Discard all messages of the worlds where gone, (n_worlds,), is true."""
@@ -150,9 +161,23 @@ class Inbox:
             batches.append(delivery.batch.take(number))
         if not rows:
             return np.zeros(0, np.int64), Messages.empty(self.topic.type)
+        if len(rows) == 1:
+            return rows[0], batches[0]
         row = np.concatenate(rows)
-        order = np.argsort(row, kind="stable")
+        order = order_by_row(row, self.view.n)
         return row[order], Messages.join(batches).take(order)
+
+    def count_by_world(self, delivery: Delivery, n_worlds: int) -> np.ndarray:
+        """Number of copies of messages that receivers get from a delivery, in each world, (n_worlds,)."""
+        if delivery.to == EVERYONE:
+            first, last = self._broadcast_range(delivery)
+            copies, world = last - first, self.view.world
+        else:
+            row, _ = self._receivers(delivery)
+            copies, world = np.ones(len(row), np.int64), self.view.world[row]
+        found = np.zeros(n_worlds, np.int64)
+        np.add.at(found, world, copies)
+        return found
 
     def latest(self) -> tuple[np.ndarray, Messages]:
         """(row, messages): the last message of each row that received one."""
@@ -216,9 +241,11 @@ class Inbox:
         view, batch = self.view, delivery.batch
         number, ids = (np.arange(batch.n), batch.sender) if isinstance(delivery.to, str) else delivery.to
         row = view.bodies_rows(batch.world[number], ids) - view.first
-        here = np.flatnonzero((row >= 0) & (row < view.n))
-        here = here[np.argsort(row[here], kind="stable")]
-        return row[here], number[here]
+        is_here = (row >= 0) & (row < view.n)
+        if not is_here.all():
+            row, number = row[is_here], number[is_here]
+        order = order_by_row(row, view.n)
+        return row[order], number[order]
 
     def clear(self, heard: np.ndarray | None = None) -> None:
         """Discard the messages that were read: those of the worlds where `heard`, (n_worlds,), is true, by default of all."""

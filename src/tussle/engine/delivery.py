@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import math
+from typing import Any
 
 import numpy as np
 
+from tussle.api.links import Links
 from tussle.comms import EVERYONE, SAME_ENTITY, TopicBuffer
 from tussle.engine import failure
 from tussle.engine.state import SimulationState
@@ -16,16 +17,22 @@ from tussle.messages import Messages, SpawnEntity
 
 def deliver(state: SimulationState) -> None:
     """Route the messages published in this step, and deliver those that are due."""
-    step = state.context.clock.step
-    for topic in state.message_bus.topics.values():
+    step, topics = state.context.clock.step, state.message_bus.topics.values()
+    sent: dict[str, list[TopicBuffer]] = {}
+    for topic in topics:
         if topic.sent:
             if topic.type is SpawnEntity:
                 _request_births(state, topic.outbox())
-            if topic.inboxes:
-                _send(state, topic)
-            topic.clear_outbox()
+            state.events.published(topic)
+            if topic.inboxes or state.networks[topic.network].plugin.losses:
+                sent.setdefault(topic.network, []).append(topic)
+    for name, of_network in sent.items():
+        _send(state, state.networks[name], of_network)
+    for topic in topics:
+        topic.clear_outbox()
         if topic.queue:
-            topic.deliver(step)
+            state.events.received(topic, topic.deliver(step))
+    state.events.delivered(state.running)
 
 
 def _request_births(state: SimulationState, batch: Messages) -> None:
@@ -49,18 +56,23 @@ def _request_births(state: SimulationState, batch: Messages) -> None:
             )
 
 
-def _send(state: SimulationState, topic: TopicBuffer) -> None:
-    network, batch = state.networks[topic.network], topic.outbox()
+def _send(state: SimulationState, network: WorldBinding, topics: list[TopicBuffer]) -> None:
+    view = network.view
+    view.begin(network.plugin, 1.0, state.context.clock.dt)
     try:
-        _route(state, topic, network, batch)
+        routes = network.plugin.transmit(view, [topic.outbox() for topic in topics])
+        if isinstance(routes, Links):
+            _post_links(state, network, topics, routes)
+        else:
+            for topic, to in zip(topics, routes, strict=True):
+                _post(state, network, topic, to)
     except Exception as error:
-        raise failure.in_call(error, network.plugin, network.view) from error
+        raise failure.in_call(error, network.plugin, view) from error
 
 
-def _route(state: SimulationState, topic: TopicBuffer, network: WorldBinding, batch: Messages) -> None:
-    clock, view = state.context.clock, network.view
-    view.begin(network.plugin, 1.0, clock.dt)
-    to = network.plugin.route(view, batch)
+def _post(state: SimulationState, network: WorldBinding, topic: TopicBuffer, to: Any) -> None:
+    """Queue the messages of a topic for receivers as `Network.route` returns them."""
+    clock, batch = state.context.clock, topic.outbox()
     if not isinstance(to, str):
         number, rows = to
         to = (np.asarray(number, np.int64), state.population.bodies.id[np.asarray(rows, np.int64)])
@@ -68,6 +80,48 @@ def _route(state: SimulationState, topic: TopicBuffer, network: WorldBinding, ba
         raise WiringError(
             f"{topic.network}.route returned {to!r}; it must return EVERYONE, SAME_ENTITY or (message numbers, rows)"
         )
-    delay = network.plugin.comm_delay[batch.world]
-    steps = np.array([max(0, math.ceil(d / clock.dt - 1e-9)) for d in delay], np.int64)
-    topic.post(batch, to, clock.step[batch.world] + steps)
+    if topic.inboxes:
+        steps = _steps(network.plugin.comm_delay, clock.dt)[batch.world]
+        topic.post(batch, to, clock.step[batch.world] + steps)
+
+
+def _post_links(
+    state: SimulationState, network: WorldBinding, topics: list[TopicBuffer], links: Links
+) -> None:
+    """Count the links of a network, and queue the messages that are received."""
+    _count_links(state, network, topics, links)
+    clock, ids = state.context.clock, state.population.bodies.id
+    own, heard = np.flatnonzero(links.sender >= 0), np.flatnonzero(links.outcome == 0)
+    number = np.concatenate([own, links.message[heard]])
+    row = np.concatenate([links.sender[own], links.receiver[heard]])
+    more = np.zeros(len(number)) if links.delay is None else np.append(np.zeros(len(own)), links.delay[heard])
+    steps = _steps(network.plugin.comm_delay[links.world[number]] + more, clock.dt)
+    for topic, first, last in zip(topics, links.starts[:-1], links.starts[1:], strict=True):
+        here = (number >= first) & (number < last)
+        for late in np.flatnonzero(np.bincount(steps[here])) if topic.inboxes else ():
+            mine = here & (steps == late)
+            # Only messages with a receiver: others may be there only because of another world of the stack.
+            is_kept = np.zeros(len(links.world), bool)
+            is_kept[number[mine]] = True
+            batch = topic.outbox().take(np.flatnonzero(is_kept[first:last]))
+            to = (np.cumsum(is_kept) - 1)[number[mine]], ids[row[mine]]
+            topic.post(batch, to, clock.step[batch.world] + late)
+
+
+def _count_links(
+    state: SimulationState, network: WorldBinding, topics: list[TopicBuffer], links: Links
+) -> None:
+    """Count the links of a network to subscribers."""
+    counts, bodies = network.plugin.link_counts, state.population.bodies
+    place = links.outcome * state.n_worlds + links.world[links.message]
+    subscribes = np.zeros(len(place), bool)
+    firsts, lasts = np.searchsorted(links.message, [links.starts[:-1], links.starts[1:]])
+    for topic, first, last in zip(topics, firsts, lasts, strict=True):
+        subscribes[first:last] = topic.is_receiver(bodies.n)[links.receiver[first:last]]
+    counts += np.bincount(place[subscribes], minlength=counts.size).reshape(counts.shape)
+    state.events.links(network.spec.instance_name, bodies.id, links, subscribes)
+
+
+def _steps(delay: np.ndarray, dt: float) -> np.ndarray:
+    """Number of whole steps until a delay [s] is over."""
+    return np.maximum(0, np.ceil(delay / dt - 1e-9)).astype(np.int64)

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tussle.api.bodies import Bodies
 from tussle.api.context import Context
+from tussle.api.links import Links
 from tussle.api.world import WorldView
+from tussle.comms.topic import Delivery, TopicBuffer
 from tussle.messages import EntityCaptured, EntityCollided, EntityHitGround, FlagCaptured, FlagTaken, Message
 from tussle.record import Events
 from tussle.record.events import BIRTH, CAPTURE, COLLISION, DEATH, END, FLAG
+
+if TYPE_CHECKING:
+    from tussle.record.traffic import Traffic
 
 REPORTED: dict[type[Message], tuple[str, str, str, str]] = {
     EntityCaptured: (CAPTURE, "source", "target", ""),
@@ -29,11 +35,13 @@ class Listeners:
     Attributes:
         is_replaying: The steps were reported before; listeners are not called again.
         on_change: Called when a listener is added or removed.
+        traffic: Objects that count messages.
     """
 
     def __init__(self, context: Context) -> None:
         self.is_replaying = False
         self.on_change: Callable[[], None] = lambda: None
+        self.traffic: list[Traffic] = []
         self._context = context
         self._listeners: list[Callable[[Events], None]] = []
         self._causes: dict[tuple[int, int], int] = {}
@@ -107,3 +115,29 @@ class Listeners:
         """Report the end of a world."""
         numbers, none = np.array([world]), np.zeros(1, np.int64)
         self._report(Events(END, numbers, self._context.clock.step[numbers], none, none, [reason]))
+
+    def published(self, topic: TopicBuffer) -> None:
+        """Report the messages of a topic that are published in this step."""
+        for counter in () if self.is_replaying else self.traffic:
+            worlds = np.bincount(topic.outbox().world, minlength=len(self._context.seeds))
+            counter.published(topic.network, topic.name, worlds)
+
+    def received(self, topic: TopicBuffer, deliveries: Sequence[Delivery]) -> None:
+        """Report the messages of a topic that are received at the end of this step."""
+        for counter in () if self.is_replaying else self.traffic:
+            for inbox in topic.inboxes if counter.counts_received(topic.network, topic.name) else ():
+                for delivery in deliveries:
+                    copies = inbox.count_by_world(delivery, len(self._context.seeds))
+                    counter.received(topic.network, topic.name, copies)
+
+    def links(self, network: str, ids: np.ndarray, links: Links, chosen: np.ndarray) -> None:
+        """Report the links of a network in this step where `chosen`, (m,), is true; `ids` are those of all rows."""
+        for counter in () if self.is_replaying else self.traffic:
+            message, receiver = links.message[chosen], ids[links.receiver[chosen]]
+            sender = ids[links.sender[message]]
+            counter.links(network, links.world[message], sender, receiver, links.outcome[chosen])
+
+    def delivered(self, running: np.ndarray) -> None:
+        """Report that all messages of a step are delivered, in the worlds where `running`, (n_worlds,), is true."""
+        for counter in () if self.is_replaying else self.traffic:
+            counter.end_step(self._context.clock.t, running)

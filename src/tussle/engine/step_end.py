@@ -142,7 +142,7 @@ def world_result(state: SimulationState, world: int, reason: str, is_hashed: boo
     steps = int(clock.step[world])
     result = WorldResult(world, int(state.context.seeds[world]), reason, steps, float(clock.t[world]), alive)
     scores: dict[int, float] = {}
-    for world_binding in [*state.interactions, *state.metrics]:
+    for world_binding in state.world_bindings:
         world_binding.view.begin(world_binding.plugin)
         try:
             found = world_binding.plugin.result_of(world_binding.view, world)

@@ -75,6 +75,9 @@ class WorldBinding:
                 raise WiringError(
                     f"{spec.instance_name}.{name}: a world plugin reads w.inbox({column.message.__name__}) instead of a Subscribe"
                 )
+        if losses := getattr(type(spec), "losses", ()):  # not hashed: counting does not change a game
+            world_binding._add("world", "link_counts", int, 1 + len(losses), 0)
+            world_binding.memory.append((world_binding.places["link_counts"][1], 0))
         world_binding.tables["world"].allocate(n_worlds)
         world_binding.tables["entity"].allocate(view.n)
         world_binding.fill_params(overrides, np.arange(n_worlds))
@@ -111,7 +114,8 @@ class WorldBinding:
         declared = type(self.spec).columns
         for name, (per, place) in self.places.items():
             array = self.tables[per].array(place)
-            self.plugin.__dict__[name] = array if isinstance(declared[name], State) else read_only(array)
+            is_param = isinstance(declared.get(name), Param)
+            self.plugin.__dict__[name] = read_only(array) if is_param else array
 
     def copy(self) -> dict[str, Stored]:
         return {per: table.copy() for per, table in self.tables.items()}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from tussle.numeric.kernel import kernel
 
 
@@ -45,3 +47,22 @@ def segment_first_min(start, values, out):
             if at < 0 or values[k] < values[at]:
                 at = k
         out[i] = at
+
+
+@kernel("I Iw Iw")
+def count_and_place(row, place, order):
+    """Counting sort. Row numbers (m,) are 0 ... n - 1; place (n + 1,), 0 on entry, is scratch; order (m,) is written."""
+    for k in range(row.shape[0]):
+        place[row[k] + 1] += 1
+    for i in range(1, place.shape[0]):
+        place[i] += place[i - 1]
+    for k in range(row.shape[0]):
+        order[place[row[k]]] = k
+        place[row[k]] += 1
+
+
+def order_by_row(row: np.ndarray, n: int) -> np.ndarray:
+    """Stable order of items by their row numbers, (m,); the numbers are 0 ... n - 1."""
+    order = np.empty(len(row), np.int64)
+    count_and_place(np.ascontiguousarray(row, np.int64), np.zeros(n + 1, np.int64), order)
+    return order

@@ -20,6 +20,8 @@ from tussle.record.schema import (
     EVENTS,
     EVENTS_FILE,
     FILES,
+    LINKS,
+    LINKS_FILE,
     MISSION_FILE,
     SHAPES,
     SHAPES_FILE,
@@ -28,6 +30,7 @@ from tussle.record.schema import (
 )
 from tussle.record.shapes import ShapeRows
 from tussle.record.stream import Stream
+from tussle.record.traffic import Traffic, check_file_names
 
 MOST_LETTERS = 4_000_000
 """Characters of shapes that are collected between two flushes."""
@@ -66,7 +69,7 @@ class Recorder:
 
     Raises:
         RecordError: The directory holds a run, or cannot be written.
-        ParameterError: `period` or `flush_every` is not positive and finite.
+        ParameterError: `period` or `flush_every` is not positive and finite, or a network's `csv_filename` is no plain file name.
     """
 
     def __init__(
@@ -83,6 +86,7 @@ class Recorder:
         for name, value in (("period", period), ("flush_every", flush_every)):
             if value is not None and not 0.0 < value < float("inf"):
                 raise ParameterError(f"{name} = {value!r} is not allowed; it takes a number of seconds > 0")
+        check_file_names(sim.mission.networks)
         self.sim, self.directory = sim, Path(directory)
         self.period, self.flush_every = period, flush_every
         self.parameters = dict(parameters or {})
@@ -128,6 +132,7 @@ class Recorder:
                 Stream(self.directory / SHAPES_FILE, SHAPES),
             )
             self._streams.append(self._shape_stream)
+        self._traffic = Traffic(self.sim.mission.networks, self.directory, self.sim.n_worlds)
 
     def _written_back(self) -> str:
         seeds = self.sim.state.context.seeds
@@ -150,6 +155,7 @@ class Recorder:
         self._write(self._trajectory, self._buffer.take())
         sim.observers.append(self._observe)
         sim.events.listen(self._on_events)
+        sim.events.traffic.append(self._traffic)
 
     # -- during the game ------------------------------------------------------------------------------------------------------
 
@@ -269,6 +275,9 @@ class Recorder:
             rows = RowSelection(sim.state.population.bodies.ints, unrecorded)
             self._add(sim.state.population.bodies.floats, rows, step[rows.world])
         self.flush()
+        if self._traffic.has_links:
+            self._streams.append(Stream(self.directory / LINKS_FILE, LINKS))
+            self._write(self._streams[-1], self._traffic.take_links())
         for stream in self._streams:
             stream.close()
         run_file.write(
@@ -283,6 +292,9 @@ class Recorder:
         if self._observe in self.sim.observers:
             self.sim.observers.remove(self._observe)
         self.sim.events.forget(self._on_events)
+        if self._traffic in self.sim.events.traffic:
+            self.sim.events.traffic.remove(self._traffic)
+        self._traffic.close()
         if self._shapes is not None:
             self._shapes.close()
 

@@ -21,6 +21,9 @@ from tussle.record.schema import (
     EVENTS_FILE,
     EVENTS_RULES,
     FILES,
+    LINKS,
+    LINKS_FILE,
+    LINKS_RULES,
     MISSION_FILE,
     RUN,
     RUN_FILE,
@@ -68,12 +71,13 @@ class Run:
         self._read_info()
         self.trajectory_table = self._read_table(TRAJECTORY_FILE, TRAJECTORY, TRAJECTORY_RULES, is_mapped)
         self.events_table = self._read_table(EVENTS_FILE, EVENTS, EVENTS_RULES, False)
-        has_shapes = (path / SHAPES_FILE).exists() or SHAPES_FILE in self.info.get("files", {})
-        self.shapes_table = (
-            self._read_table(SHAPES_FILE, SHAPES, SHAPES_RULES, is_mapped)
-            if has_shapes
-            else SHAPES.empty_table()
-        )
+        self.shapes_table = self._read_if_written(SHAPES_FILE, SHAPES, SHAPES_RULES, is_mapped)
+        self.links_table = self._read_if_written(LINKS_FILE, LINKS, LINKS_RULES, False)
+
+    def _read_if_written(self, name: str, schema: pa.Schema, rules: Rules, is_mapped: bool) -> pa.Table:
+        """The table of a file that only some runs have; empty if this one has none."""
+        is_written = (self.path / name).exists() or name in self.info.get("files", {})
+        return self._read_table(name, schema, rules, is_mapped) if is_written else schema.empty_table()
 
     def _read_info(self) -> None:
         path = self.path / RUN_FILE
@@ -120,6 +124,11 @@ class Run:
     def events(self) -> Any:
         """Births, deaths, captures, collisions and ends, as a frame."""
         return self._frame(self.events_table)
+
+    @cached_property
+    def links(self) -> Any:
+        """Messages by network, sender, receiver and outcome, as a frame; written when the recorder is closed."""
+        return self._frame(self.links_table)
 
     @cached_property
     def summary(self) -> Any:

@@ -14,10 +14,11 @@ FORMAT = 1
 TRAJECTORY_FILE = "trajectory.arrow"
 EVENTS_FILE = "events.arrow"
 SHAPES_FILE = "shapes.arrow"
+LINKS_FILE = "links.arrow"
 SUMMARY_FILE = "summary.csv"
 MISSION_FILE = "mission.xml"
 RUN_FILE = "run.json"
-FILES = (TRAJECTORY_FILE, EVENTS_FILE, SHAPES_FILE, SUMMARY_FILE, MISSION_FILE, RUN_FILE)
+FILES = (TRAJECTORY_FILE, EVENTS_FILE, SHAPES_FILE, LINKS_FILE, SUMMARY_FILE, MISSION_FILE, RUN_FILE)
 
 FLOAT_COLUMNS = ("x", "y", "z", "vx", "vy", "vz", "qw", "qx", "qy", "qz", "health")
 """Float columns in the order of the body table."""
@@ -81,6 +82,18 @@ SHAPES = pa.schema(
 )
 """One row per shape that plugins drew, in the order of drawing."""
 
+LINKS = pa.schema(
+    [
+        _field("world", _I, "number of the world in its stack"),
+        _field("network", pa.string(), "name of the network"),
+        _field("sender", _I, "entity that sent"),
+        _field("receiver", _I, "entity within its reach"),
+        _field("outcome", pa.string(), "delivered, or why the messages were lost"),
+        _field("messages", pa.int64(), "number of messages"),
+    ]
+)
+"""One row per link and outcome that occurred, ordered by world, network, sender, receiver and outcome."""
+
 TRAJECTORY_RULES: Rules = (
     {"world": COUNT, "t": NUMBER, "step": COUNT, "id": COUNT, "block": TEXT}
     | dict.fromkeys(("x", "y", "z", "qw", "qx", "qy", "qz"), NUMBER)
@@ -88,6 +101,10 @@ TRAJECTORY_RULES: Rules = (
 EVENTS_RULES: Rules = {"world": COUNT, "t": NUMBER, "step": COUNT, "kind": TEXT, "id": COUNT, "other": COUNT}
 SHAPES_RULES: Rules = {
     "world": COUNT, "t": NUMBER, "step": COUNT, "kind": TEXT, "lifetime": Bounds(0.0), "attributes": TEXT,
+}  # fmt: skip
+
+LINKS_RULES: Rules = {
+    "world": COUNT, "network": TEXT, "sender": COUNT, "receiver": COUNT, "outcome": TEXT, "messages": COUNT,
 }  # fmt: skip
 
 _TEAMS = Map(Real(is_any=True), Team)

@@ -20,7 +20,7 @@ RULE = "declarations"
 HOOKS_NAMES = """
     spawn spawn_one step step_one start start_one result result_one route regions rejects from_body to_body derivative advance
     active_inputs reads_all grade passthrough
-    abstract kind historic_attributes
+    abstract kind historic_attributes transmit losses
 """
 HOOKS = frozenset(HOOKS_NAMES.split())
 MACHINERY = frozenset({"columns", "services", "row_laws", "me_type", "world_types", "__signature__"})

@@ -50,7 +50,7 @@ def lines_of(sim: Simulation) -> dict[Key, Line]:
     found["clock",] = Line("the clock", sim.state.context.clock.step, worlds, False)
     found["seeds",] = Line("the seeds", sim.state.context.seeds, worlds, False)
 
-    def add(table: Table, place: ColumnPlace, column: Column, name: str, world: np.ndarray) -> None:
+    def add(table: Table, place: ColumnPlace, column: Column | None, name: str, world: np.ndarray) -> None:
         is_made = isinstance(column, (State, Output)) and bool(np.isfinite(column.default).all())
         for key in keys_of(table, place):
             if key not in found or isinstance(column, Output):
@@ -66,5 +66,5 @@ def lines_of(sim: Simulation) -> dict[Key, Line]:
         for name, (per, place) in world_binding.places.items():
             label = f"{world_binding.spec.instance_name}.{name}"
             world = bodies.world if per == "entity" else worlds
-            add(world_binding.tables[per], place, type(world_binding.spec).columns[name], label, world)
+            add(world_binding.tables[per], place, type(world_binding.spec).columns.get(name), label, world)
     return found

@@ -20,8 +20,10 @@ from tussle.testing.game import SEEDS, STEPS, ConformanceGame
 from tussle.testing.lines import BODY_ROWS, Key, keys_of, lines_of
 
 MEMORY = "memory in columns"
-BOUND = frozenset({"_values", "instance_name", "rate", "is_bound", "is_for_one", "wired", "_look", "_rows"})
-HOOKS = ("spawn", "step", "from_body", "to_body", "start", "route", "result_of", "rejects")
+BOUND = frozenset(
+    {"link_counts", "_values", "instance_name", "rate", "is_bound", "is_for_one", "wired", "_look", "_rows"}
+)
+HOOKS = ("spawn", "step", "from_body", "to_body", "start", "transmit", "result_of", "rejects")
 DRAWS = ("uniform", "normal", "normal_pairs", "uniform_pairs", "uniform_by", "normal_by")
 
 Own = dict[Key, Any]
@@ -167,7 +169,7 @@ def _own(group: Group, binding: Binding, hook: str) -> Own:
 
 def _own_of_world(sim: Simulation, world_binding: WorldBinding, hook: str) -> Own:
     """What a world plugin may write: its states; an interaction also health, forces, and the bodies that it moves by `w.move`."""
-    if hook not in {"start", "step"}:
+    if hook not in {"start", "step", "transmit"}:
         return {}
     places = [world_binding.places[name] for name in type(world_binding.spec).states()]
     own: Own = {

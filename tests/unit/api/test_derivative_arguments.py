@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tussle.api import Input, InertiaParam, MotionModel, Param, PositiveParam, RigidBodyModel, State
+from tussle.api import InertiaParam, Input, MotionModel, Param, PositiveParam, RigidBodyModel, State
 from tussle.errors import ParameterError
 from tussle.testing import check_plugin
 
@@ -43,7 +43,9 @@ def test_a_state_equation_takes_whole_columns_constants_and_defaults():
     path = Glider().rollout([0.0, 0.0], [[1.0, 0.0, 0.5, 0.0, 0.0, 0.25]], dt=1.0)
     total = 3.0 + 40.0 + 600.0 + 8000.0 + 10000.0 * (1.0 + 10.0)
     assert path[1, 1] == pytest.approx(total / 2.0 + 0.75)
-    changed = Glider(table=[(0.0, 0.0), (9.0, 0.0)]).rollout([0.0, 0.0], [[1.0, 0.0, 0.5, 0.0, 0.0, 0.25]], dt=1.0)
+    changed = Glider(table=[(0.0, 0.0), (9.0, 0.0)]).rollout(
+        [0.0, 0.0], [[1.0, 0.0, 0.5, 0.0, 0.0, 0.25]], dt=1.0
+    )
     assert changed[1, 1] - path[1, 1] == pytest.approx(500.0)
 
 
@@ -67,7 +69,21 @@ class Brick(RigidBodyModel):
 
     @staticmethod
     def derivative(rigid_body):
-        return (rigid_body[3], rigid_body[4], rigid_body[5], 0.0, 0.0, -9.81, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        return (
+            rigid_body[3],
+            rigid_body[4],
+            rigid_body[5],
+            0.0,
+            0.0,
+            -9.81,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+        )
 
 
 def test_a_rigid_body_needs_a_state_equation_only():

@@ -137,6 +137,15 @@ def test_losses_are_the_same_in_a_stack_and_whoever_else_talks():
     assert np.array_equal(heard(alone(more, 5), "crowd.Listener")[0], first)
 
 
+def test_messages_of_one_sender_on_two_topics_are_lost_independently():
+    radio = {"network": "SphereNetwork"}
+    talkers = Talker(**radio), Talker(topic="Other", name="Second", **radio)
+    listeners = Listener(**radio), Listener(topic="Other", name="Second", **radio)
+    networks = [SphereNetwork(prob_transmit=0.5)]
+    sim = alone(mission(still("a", *talkers), still("b", *listeners, count=30), networks=networks), 5)
+    assert not np.array_equal(heard(sim, "b.Listener"), heard(sim, "b.Second"))
+
+
 @pytest.mark.parametrize(("delay", "read_in"), [(0.0, 3), (0.1, 4), (0.25, 6), (0.3, 6), (0.5, 8)])
 def test_a_delayed_message_arrives_on_time_though_nobody_talks_any_more(delay, read_in):
     """Said in step 2; handed over at the end of the first step at or after t + delay, read in the next."""

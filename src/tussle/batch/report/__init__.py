@@ -84,7 +84,15 @@ def sections_of(data: ReportData) -> list[Section]:
             of_variables.differences,
             of_variables.points,
         ]
-        chosen = [of_games.won, of_games.scores, *effects, of_games.left, of_games.ended, *chosen]
+        chosen = [
+            of_games.won,
+            of_games.scores,
+            *effects,
+            of_games.left,
+            of_games.ended,
+            of_games.networks,
+            *chosen,
+        ]
     return _with_own_names([made for section in chosen if not (made := section(data)).is_empty])
 
 

@@ -189,7 +189,8 @@ def _means(data: ReportData) -> ReportTable:
         )
 
     names = [q for q in results.quantities if not q.startswith(("wins[", "ties", "start[", "lost[", "steps"))]
-    names = [q for q in names if varies(data.known(q)) and not is_score_again(q)]
+    is_count = is_of_network(data)  # these have their own section
+    names = [q for q in names if varies(data.known(q)) and not is_score_again(q) and not is_count(q)]
     rows = [
         (
             data.title(m.name), estimate(m.value), interval(m.low, m.high), estimate(m.sd),
@@ -256,6 +257,42 @@ def _curve(
 ) -> plots.Series:
     s = data.results.survival(team, point)
     return plots.Series(name, colour, dashes, s.mean, s.low, s.high, s.t)
+
+
+def networks(data: ReportData) -> Section:
+    """What became of the messages of networks that lose some."""
+    means = {
+        m.name: m.value
+        for m in data.results.means(list(filter(is_of_network(data), data.results.quantities)))
+    }
+    names = list(dict.fromkeys(name.rpartition(".")[0] for name in means))
+    reasons = dict.fromkeys(
+        name.rpartition(".lost_")[2] for name, value in means.items() if ".lost_" in name and value > 0.0
+    )
+
+    def row(network: str) -> list[str]:
+        sent = means[f"{network}.sent"]
+        parts = ["delivered", *(f"lost_{reason}" for reason in reasons)]
+        shares = [means.get(f"{network}.{part}") for part in parts]
+        return [
+            network, estimate(sent), *("" if n is None or not sent else percent(n / sent) for n in shares),
+        ]  # fmt: skip
+
+    columns = [
+        ("network", "text"),
+        *numbers("messages", "delivered", *(f"lost: {r.replace('_', ' ')}" for r in reasons)),
+    ]
+    caption = "Mean number per game of messages to others within reach, each receiver counted, and what became of them."
+    tables = [ReportTable("", columns, [row(name) for name in names], caption)] if names else []
+    return Section("networks", "What became of the messages", tables=tables)
+
+
+def is_of_network(data: ReportData) -> Callable[[str], bool]:
+    """A function that returns whether a quantity is a count of a network."""
+    every = set(data.results.quantities)
+    plugins = {name.removesuffix(".delivered") for name in every if name.endswith(".delivered")}
+    found = {plugin for plugin in plugins if f"{plugin}.sent" in every}
+    return lambda name: name.rpartition(".")[0] in found
 
 
 def ended(data: ReportData) -> Section:

@@ -1,0 +1,134 @@
+"""Radio with fading, bandwidth, queues and jammers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from tussle.api import Links, Messages, Network, Param, State, WorldView, neighbors
+from tussle.numeric import exp, log
+from tussle.stock.network.radio_network import kernels
+
+QUEUE, PLANE, FADING, JAMMED, HALF_DUPLEX, CHANCE = range(6)
+LEAST = 0.01
+"""Rayleigh fading: receivers that would receive a smaller share of the messages are out of reach."""
+NEAREST = 1e-3
+"""Distance below which a jammer's power does not grow any more [m]."""
+
+
+class RadioNetwork(Network):
+    """Broadcasts each message by radio to the entities around the sender; the sender itself always receives it.
+
+    At distance d the ratio of signal to noise is (range / d)^path_loss_exponent, with 1 as the least that can be received. A jammer at
+    distance d of the receiver adds (jammer_range / d)^path_loss_exponent to the noise of 1; those beyond `jammer_range`, weaker than
+    the noise, are neglected. With Rayleigh fading the signal's power is exponentially distributed, independently for each message and
+    receiver, so the share exp(-noise / signal) is received (Goldsmith 2005, Wireless Communications, section 6.3.1).
+
+    A transmitter sends its messages one after another. With `half_duplex`, the messages of a step begin at a random time in the step,
+    and a receiver that sends itself at some time of a message does not receive it. Whether a message is received is decided at the
+    positions of the step in which it is published, even if it waits in the queue. Messages of several senders do not collide.
+    """
+
+    grade = "portable"
+    losses = ("queue", "plane", "fading", "jammed", "half_duplex", "chance")
+
+    range = Param(
+        100.0, unit="m", gt=0.0, doc="Distance below which messages are received; with fading, 37 % of them."
+    )
+    prob_transmit = Param(
+        1.0, ge=0.0, le=1.0, doc="Probability that a receiver gets a message, besides all other losses."
+    )
+    filter_comms_plane = Param(
+        False, doc="Block messages across a horizontal plane, such as the water surface."
+    )
+    comms_boundary_altitude = Param(0.0, unit="m", doc="Altitude of the plane.")
+    comms_boundary_epsilon = Param(0.0, unit="m", ge=0.0, doc="Distance by which both sides overlap.")
+    path_loss_exponent = Param(2.0, ge=1.0, le=10.0, doc="Decay of power with distance; 2 in free space.")
+    fading = Param("none", choices=("none", "rayleigh"), doc="Distribution of the received power.")
+    jammer_team = Param(-1, doc="Team whose entities jam all receivers near them; -1 is none.")
+    jammer_range = Param(100.0, unit="m", ge=0.0, doc="Distance at which a jammer is as strong as the noise.")
+    bandwidth = Param(math.inf, gt=0.0, doc="Bandwidth of each sender [bit/s].")
+    overhead = Param(28.0, ge=0.0, doc="Bytes of a message beside 8 for each number; 28 are UDP over IPv4.")
+    queue_limit = Param(
+        math.inf, ge=0.0, doc="Bytes waiting at a sender above which new messages are dropped."
+    )
+    half_duplex = Param(False, doc="A sender does not receive while it sends.")
+    is_stochastic_delay = Param(False, doc="Draw the delay of each message and receiver.")
+    delay_jitter = Param(
+        0.05, unit="s", ge=0.0, doc="Half width of the uniform distribution around comm_delay."
+    )
+    busy_until = State(
+        unit="s", per="entity", default=-math.inf, doc="Time at which the transmitter is free."
+    )
+
+    @neighbors("jammer_range", power="sum")
+    @staticmethod
+    def jamming(
+        distance: float, other_team: int, jammer_team: int, jammer_range: float, path_loss_exponent: float
+    ) -> tuple[float] | None:
+        if other_team != jammer_team:
+            return None
+        return (exp(path_loss_exponent * log(jammer_range / max(distance, NEAREST))),)
+
+    def transmit(self, w: WorldView, outboxes: Sequence[Messages]) -> Links:
+        """Decide which messages are received, and when."""
+        factor = exp(log(-math.log(LEAST)) / self.path_loss_exponent) if self.fading == "rayleigh" else 1.0
+        links = Links(w, outboxes, (factor * self.range)[w.world])
+        world, message = links.world[links.message], links.message
+        start, end, is_sent, on_air = self._send(w, links, outboxes)
+        if not is_sent.all():
+            links.lose(QUEUE, ~is_sent[message])
+        plane = self.filter_comms_plane, self.comms_boundary_altitude, self.comms_boundary_epsilon
+        links.lose_across(w, PLANE, *plane)
+        self._fade(w, links, world)
+        if self.half_duplex.any():
+            first, last = on_air[0][links.receiver], on_air[1][links.receiver]
+            is_busy = (first < end[message]) & (start[message] < last)
+            links.lose(HALF_DUPLEX, self.half_duplex[world] & is_busy)
+        links.lose_by_chance(w, CHANCE, "chance", self.prob_transmit)
+        late = np.maximum(0.0, end - w.t[links.world])[message]
+        if self.is_stochastic_delay.any():
+            jitter = np.where(self.is_stochastic_delay, self.delay_jitter, 0.0)[world]
+            late += jitter * (2.0 * links.uniform(w, "delay") - 1.0)
+        links.delay = late
+        return links
+
+    def _fade(self, w: WorldView, links: Links, world: np.ndarray) -> None:
+        has_jammers = bool((w.team == self.jammer_team[w.world]).any())
+        if self.fading == "none" and not has_jammers:
+            return
+        ratio = np.maximum(links.distance, NEAREST) / self.range[world]
+        weakness = exp(self.path_loss_exponent[world] * log(ratio))
+        noise = 1.0 + self.jamming(w).power[links.receiver] if has_jammers else np.ones(len(world))
+        if self.fading == "none":
+            links.lose(JAMMED, (noise > 1.0) & (weakness * noise >= 1.0))
+        else:
+            draw = links.uniform(w, "fading")
+            links.lose(FADING, draw >= exp(-weakness))
+            links.lose(JAMMED, draw >= exp(-weakness * noise))
+
+    def _send(
+        self, w: WorldView, links: Links, outboxes: Sequence[Messages]
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, tuple[np.ndarray, np.ndarray]]:
+        """Start and end of each message on the air [s] and whether it is sent, (k,); first and last time on the air of each row, (n,)."""
+        size = np.concatenate([batch.sizes() for batch in outboxes]) + self.overhead[links.world]
+        begin, own = w.t - w.dt, w.world
+        waits = np.maximum(0.0, self.busy_until - begin[own])
+        ahead = np.where(waits > 0.0, waits * np.minimum(self.bandwidth, 1e300)[own] / 8.0, 0.0)
+        on_air = (
+            np.where(waits > 0.0, begin[own], np.inf),
+            np.where(waits > 0.0, self.busy_until, -np.inf),
+        )
+        offset = np.zeros(w.n)
+        if self.half_duplex.any():
+            sent = np.flatnonzero(links.sender >= 0)
+            air = np.bincount(links.sender[sent], 8.0 * size[sent] / self.bandwidth[links.world[sent]], w.n)
+            draw = w.uniform_by("offset", own, w.id, np.zeros(w.n, np.int64))
+            offset = np.where(self.half_duplex[own], draw * np.maximum(0.0, w.dt - air), 0.0)
+        k = len(size)
+        span = np.zeros(k), np.zeros(k), np.zeros(k, bool)
+        limits, queue = (self.bandwidth, self.queue_limit, begin), (ahead, self.busy_until)
+        kernels.send(links.sender, links.world, size, limits, offset, queue, on_air, span)
+        return *span, on_air
