@@ -230,6 +230,13 @@ class BoundaryCrossed(Message):
     inside = Field(dtype=bool, doc="Whether it is inside now.")
 
 
+class TextMessage(Message):
+    """A text, such as the name of a state on the topic `State`, or of an event on the topic `Event`."""
+
+    text = Handle(doc="The text.")
+    to = EntityRef(doc="Entity that it is for; none if it is for all that receive it.")
+
+
 class Waypoint(Message):
     """A target position."""
 

@@ -27,6 +27,7 @@ from tussle.api.laws import neighbors, together
 from tussle.api.motion import MotionBody, MotionModel
 from tussle.api.plugin import HistoricAttributes, Plugin, service
 from tussle.api.row_laws import row_law
+from tussle.api.state_follower import StateFollower
 from tussle.api.world import WorldView
 from tussle.columns import (
     Children,
@@ -83,6 +84,7 @@ __all__ = [
     "RaggedColumn",
     "Sensor",
     "State",
+    "StateFollower",
     "Subscribe",
     "WorldPlugin",
     "WorldView",

@@ -13,7 +13,7 @@ import numpy as np
 from tussle import units
 from tussle.columns import MOST_INTEGER
 from tussle.errors import MissionError, ParameterError
-from tussle.texts import shown
+from tussle.texts import ROW, shown
 
 RATIO = re.compile(r"\s*([-+.\deE]+)\s*/\s*([-+.\deE]+)\s*", re.ASCII)
 BEHAVIOR = re.compile(r"\s*\[\s*([^\s\[\]='\"]+)")
@@ -111,6 +111,18 @@ def inline_plugins(text: str) -> list[InlinePlugin]:
     if text[place:].strip(" \t\n,"):
         raise MissionError(f"{shown(text[place:])} is not a plugin; it takes [ NAME key='value' ... ]")
     return found
+
+
+def word_rows(text: str, fields: Sequence[str]) -> list[dict[str, str]]:
+    """Parse rows of words, one per field: "[ a b ] [ c d ]".
+
+    Raises:
+        MissionError: The text has another form.
+    """
+    found = [match[1].split() for match in ROW.finditer(text)]
+    if ROW.sub("", text).strip(" \t\n,") or not all(len(row) == len(fields) for row in found):
+        raise MissionError(f"{shown(text)} is not allowed; it takes rows [ {' '.join(fields)} ]")
+    return [dict(zip(fields, row, strict=True)) for row in found]
 
 
 def inline_text(name: str, attributes: Mapping[str, str]) -> str:

@@ -19,7 +19,7 @@ from tussle.errors import ConformanceError, TussleError, listed
 RULE = "declarations"
 HOOKS_NAMES = """
     spawn spawn_one step step_one start start_one result result_one route rejects from_body to_body derivative advance
-    active_inputs reads_all grade passthrough
+    active_inputs unused_states check_values reads_all grade passthrough
     abstract kind historic_attributes
 """
 HOOKS = frozenset(HOOKS_NAMES.split())

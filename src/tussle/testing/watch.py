@@ -20,7 +20,9 @@ from tussle.testing.game import SEEDS, STEPS, ConformanceGame
 from tussle.testing.lines import BODY_ROWS, Key, keys_of, lines_of
 
 MEMORY = "memory in columns"
-BOUND = frozenset({"_values", "instance_name", "rate", "is_bound", "is_for_one", "wired", "_look", "_rows"})
+BOUND = frozenset(
+    {"_values", "instance_name", "rate", "active_in", "is_bound", "is_for_one", "wired", "_look", "_rows"}
+)
 HOOKS = ("spawn", "step", "from_body", "to_body", "start", "route", "result_of", "rejects")
 DRAWS = ("uniform", "normal", "normal_pairs", "uniform_pairs", "uniform_by")
 
