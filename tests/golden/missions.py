@@ -9,10 +9,12 @@ from golden_plugins import Beacon, Car, Nursery, Wanderer
 
 from tussle import Block, Mission
 from tussle.stock import (
+    AutonomyExecutor,
     AvoidEntityMS,
     Boids,
     Boundary,
     DirectController,
+    GraphvizFSM,
     LocalNetwork,
     MotorSchemas,
     MoveToGoalMS,
@@ -28,6 +30,7 @@ from tussle.stock import (
     SingleIntegratorControllerSimple,
     SphereNetwork,
     Straight,
+    TrailMS,
     Unicycle,
     UnicyclePID,
     WaypointDispatcher,
@@ -230,6 +233,36 @@ def births_sequential() -> Mission:
     return _nursery("sequential")
 
 
+def machines() -> Mission:
+    """State machines, behaviours and autonomies by state, one of which claims, and followers of one another."""
+    fsm = GraphvizFSM(graphviz_fsm="digraph { qi -> a -> b -> c -> a }")
+    schemas = MotorSchemas(
+        max_speed=12.0,
+        behaviors=[
+            AvoidEntityMS(sphere_of_influence=30.0),
+            MoveToGoalMS(goal=(100.0, 20.0, 60.0), distance_pid=(0.2, 0.1, 0.1, 1e3), states="a, c"),
+            TrailMS(trail_id=1, states="b"),
+        ],
+    )
+    executor = AutonomyExecutor(
+        autonomies=[
+            Straight(states="a"),
+            Boids(states="b", comms_range=50.0),
+            Predator(states="c", capture_range=30.0),
+        ]
+    )
+    common = {"variance": (400.0, 400.0, 0.0), "heading_variance": 1.0}
+    return Mission(
+        blocks=[
+            Block(name="robot", team=1, count=5, autonomy=[fsm, schemas], motion=SingleIntegrator(), **common),
+            Block(
+                name="switch", team=2, count=4, autonomy=[fsm, executor], controller=UnicyclePID(), motion=Unicycle(), **common
+            ),
+        ],
+        end=5.0, interactions=[SimpleCapture(capture_range=10.0)],
+    )  # fmt: skip
+
+
 STEPS: dict[str, int] = {
     "chase_synchronous": 24,
     "chase_sequential": 24,
@@ -244,6 +277,7 @@ STEPS: dict[str, int] = {
     "last_captured_first": 24,
     "births_synchronous": 40,
     "births_sequential": 40,
+    "machines": 24,
 }
 """Steps after which a mission's hashes are taken."""
 
