@@ -287,6 +287,13 @@ class CustomKeyPress(Message):
     key = Handle(doc="Name of the key.")
 
 
+class RemoveEntity(Message):
+    """Request the removal of an entity; it is removed at the end of the step."""
+
+    entity = EntityRef(doc="Entity that is removed.")
+    why = Handle(doc="Cause of its death, for the events.")
+
+
 class SpawnEntity(Message):
     """Request a new entity of a block; it appears at the beginning of the next step."""
 
