@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tussle import units
+from tussle import texts, units
 from tussle.columns import MOST_INTEGER
 from tussle.errors import MissionError, ParameterError
-from tussle.texts import ROW, shown
+from tussle.texts import shown
 
 RATIO = re.compile(r"\s*([-+.\deE]+)\s*/\s*([-+.\deE]+)\s*", re.ASCII)
 BEHAVIOR = re.compile(r"\s*\[\s*([^\s\[\]='\"]+)")
@@ -117,10 +117,11 @@ def word_rows(text: str, fields: Sequence[str]) -> list[dict[str, str]]:
     """Parse rows of words, one per field: "[ a b ] [ c d ]".
 
     Raises:
-        MissionError: The text has another form.
+        ParameterError: There is text outside the brackets, or a bracket is not closed.
+        MissionError: A row has another number of words.
     """
-    found = [match[1].split() for match in ROW.finditer(text)]
-    if ROW.sub("", text).strip(" \t\n,") or not all(len(row) == len(fields) for row in found):
+    found = [row.split() for row in texts.rows(text)]
+    if not all(len(row) == len(fields) for row in found):
         raise MissionError(f"{shown(text)} is not allowed; it takes rows [ {' '.join(fields)} ]")
     return [dict(zip(fields, row, strict=True)) for row in found]
 
