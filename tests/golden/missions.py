@@ -9,11 +9,14 @@ from golden_plugins import Beacon, Car, Nursery, Wanderer
 
 from tussle import Block, Mission
 from tussle.stock import (
+    AuctionAssign,
     AutonomyExecutor,
     AvoidEntityMS,
     Boids,
     Boundary,
+    Control3D,
     DirectController,
+    GoToWaypoint,
     GraphvizFSM,
     LocalNetwork,
     MotorSchemas,
@@ -263,6 +266,30 @@ def machines() -> Mission:
     )  # fmt: skip
 
 
+def errands() -> Mission:
+    """Auctions over a radio, waypoints of the entities' own, circles around them, and points that a user may click."""
+    bidder = lambda name, **values: Block(  # noqa: E731
+        name=name, team=1, count=3, variance=(900.0, 900.0, 0.0), autonomy=AuctionAssign(duration=0.5, **values),
+        motion=SingleIntegrator(),
+    )  # fmt: skip
+    circler = Block(
+        name="circler", team=2, count=4, position=(0.0, 0.0, 50.0), variance=(400.0, 400.0, 25.0), heading_variance=1.0,
+        autonomy=[
+            GoToWaypoint(waypoint="XYZ 0.2 X 5 60 0 0 0 40 -1"),
+            WaypointDispatcher(waypointlist_network="LocalNetwork", loiter_radius=30.0),
+            MotorSchemas(behaviors=[MoveToGoalMS()]),
+        ],
+        controller=UnicyclePID(), motion=Unicycle(),
+    )  # fmt: skip
+    tower = Block(
+        name="tower", autonomy=[WaypointGenerator(mode="loiter", network_name="LocalNetwork"), Control3D()], motion=SingleIntegrator()
+    )  # fmt: skip
+    return Mission(
+        blocks=[bidder("head"), bidder("others", auctioneer=False), circler, tower],
+        networks=[SphereNetwork(name="CommsNetwork", range=60.0, prob_transmit=0.8)], end=5.0,
+    )  # fmt: skip
+
+
 STEPS: dict[str, int] = {
     "chase_synchronous": 24,
     "chase_sequential": 24,
@@ -278,6 +305,7 @@ STEPS: dict[str, int] = {
     "births_synchronous": 40,
     "births_sequential": 40,
     "machines": 24,
+    "errands": 24,
 }
 """Steps after which a mission's hashes are taken."""
 
