@@ -208,6 +208,8 @@ STATES = {
     "last_captured_first": ("prey.Boids.target", 0),
     "births_synchronous": ("slow.Beacon.rumour", 0),
     "births_sequential": ("slow.Beacon.rumour", 0),
+    "machines": ("robot.MotorSchemas.MoveToGoalMS.integral", None),
+    "errands": ("head.AuctionAssign.deadline", None),
 }
 
 
