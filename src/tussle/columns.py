@@ -406,11 +406,27 @@ class Handle(Column):
 
 
 class Children(Column):
-    """Plugins inside a plugin: a list of plugins of one kind, bound with private channels."""
+    """Plugins inside a plugin: a list of plugins of one kind.
 
-    def __init__(self, kind: type, doc: str = "") -> None:
+    Args:
+        kind: Base class of the plugins.
+        by_state: They may have `states`, in which they act (see `tussle.api.StateFollower`).
+        shares_channels: Their channels are those of the entity; otherwise they are private to the outer plugin.
+        fields: Text parameters of `kind`, if a mission file gives each plugin as a row of their values: "[ a b ] [ c d ]".
+        doc: One-line description.
+    """
+
+    def __init__(
+        self,
+        kind: type,
+        by_state: bool = False,
+        shares_channels: bool = False,
+        fields: str = "",
+        doc: str = "",
+    ) -> None:
         super().__init__(doc=doc)
-        self.kind = kind
+        self.kind, self.by_state, self.shares_channels = kind, by_state, shares_channels
+        self.fields = _fields(fields, "Children")
 
 
 class Field(Numbers):
@@ -458,4 +474,14 @@ class Publish(Topic):
 
 
 class Subscribe(Topic):
-    """The receiving end of a topic."""
+    """The receiving end of a topic.
+
+    Args:
+        message: The message type.
+        from_outside: Messages may come from outside, by `Simulation.publish`: no warning if no plugin publishes them.
+        **place: Topic, network and `doc`, as for `Publish`.
+    """
+
+    def __init__(self, message: type, *, from_outside: bool = False, **place: str) -> None:
+        super().__init__(message, **place)
+        self.from_outside = from_outside

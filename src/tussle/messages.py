@@ -264,6 +264,13 @@ class RewardGiven(Message):
     reward = Field()
 
 
+class TextMessage(Message):
+    """A text, such as the name of a state on the topic `State`, or of an event on the topic `Event`."""
+
+    text = Handle(doc="The text.")
+    to = EntityRef(doc="Entity that it is for; none if it is for all that receive it.")
+
+
 class Waypoint(Message):
     """A target position."""
 
@@ -312,6 +319,13 @@ class CustomKeyPress(Message):
     """A user of the viewer pressed the key that is reserved for plugins; sender is 0."""
 
     key = Handle(doc="Name of the key.")
+
+
+class RemoveEntity(Message):
+    """Request the removal of an entity; it is removed at the end of the step."""
+
+    entity = EntityRef(doc="Entity that is removed.")
+    why = Handle(doc="Cause of its death, for the events.")
 
 
 class SpawnEntity(Message):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from tussle import stock
@@ -16,11 +18,22 @@ COMPANIONS = {
     "SimpleCollisionMetrics": ["SimpleCollision", "GroundCollision"],
     "WaypointDispatcher": ["WaypointGenerator"],
     "MoveToGoalMS": ["WaypointDispatcher"],
+    "GoToWaypoint": ["WaypointDispatcher"],
     # Those that are flown by a controller, which works between the substeps.
     "SimpleAircraft": ["SimpleAircraftControllerPID"],
     "Unicycle": ["UnicyclePID"],
     "SimpleQuadrotor": ["SimpleQuadrotorControllerLQR"],
 }
+
+RECORD = "id,t,x,y,z,qw,qx,qy,qz,vx,vy,vz\n"
+FILES = {
+    "TrajectoryRecordPlayback": (
+        "trajectory.txt",
+        RECORD
+        + "".join(f"{i},{k / 10},{i},{k},5,1,0,0,0,{k / 3},1,0\n" for i in range(1, 80) for k in range(12)),
+    )
+}
+"""Files that a plugin reads, by plugin."""
 
 
 BOUNDARIES = [
@@ -35,7 +48,11 @@ ON_REGIONS = (
 
 
 @pytest.mark.parametrize("name", stock.manifest())
-def test_plugin_meets_the_contract(name: str) -> None:
+def test_plugin_meets_the_contract(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    if name in FILES:
+        monkeypatch.chdir(tmp_path)
+        file, text = FILES[name]
+        Path(file).write_text(text)
     check_plugin(stock.load(name), companions=BOUNDARIES if name in ON_REGIONS else ())
 
 

@@ -10,12 +10,15 @@ from golden_plugins import Balloon, Beacon, Car, Nursery, Wanderer
 from tussle import Block, Mission
 from tussle.stock import (
     AircraftToSingleIntegratorController,
+    AuctionAssign,
+    AutonomyExecutor,
     AvoidEntityMS,
     Ballistic,
     Boids,
     Boundary,
     BoundaryDefense,
     CaptureInBoundaryInteraction,
+    Control3D,
     DirectController,
     DoubleIntegrator,
     DoubleIntegratorControllerVelYaw,
@@ -28,6 +31,8 @@ from tussle.stock import (
     FlagCaptureInteraction,
     FlagCaptureMetrics,
     GoTo,
+    GoToWaypoint,
+    GraphvizFSM,
     GroundCollision,
     LocalNetwork,
     MotorSchemas,
@@ -53,6 +58,7 @@ from tussle.stock import (
     Still,
     Straight,
     TakeFlag,
+    TrailMS,
     Unicycle,
     UnicycleControllerPoint,
     UnicyclePID,
@@ -345,6 +351,60 @@ def vehicles() -> Mission:
     return Mission(blocks=[*blocks, ball], motion_multiplier=3, end=4.0, interactions=[ground])
 
 
+def machines() -> Mission:
+    """State machines, behaviours and autonomies by state, one of which claims, and followers of one another."""
+    fsm = GraphvizFSM(graphviz_fsm="digraph { qi -> a -> b -> c -> a }")
+    schemas = MotorSchemas(
+        max_speed=12.0,
+        behaviors=[
+            AvoidEntityMS(sphere_of_influence=30.0),
+            MoveToGoalMS(goal=(100.0, 20.0, 60.0), distance_pid=(0.2, 0.1, 0.1, 1e3), states="a, c"),
+            TrailMS(trail_id=1, states="b"),
+        ],
+    )
+    executor = AutonomyExecutor(
+        autonomies=[
+            Straight(states="a"),
+            Boids(states="b", comms_range=50.0),
+            Predator(states="c", capture_range=30.0),
+        ]
+    )
+    common = {"variance": (400.0, 400.0, 0.0), "heading_variance": 1.0}
+    return Mission(
+        blocks=[
+            Block(name="robot", team=1, count=5, autonomy=[fsm, schemas], motion=SingleIntegrator(), **common),
+            Block(
+                name="switch", team=2, count=4, autonomy=[fsm, executor], controller=UnicyclePID(), motion=Unicycle(), **common
+            ),
+        ],
+        end=5.0, interactions=[SimpleCapture(capture_range=10.0)],
+    )  # fmt: skip
+
+
+def errands() -> Mission:
+    """Auctions over a radio, waypoints of the entities' own, circles around them, and points that a user may click."""
+    bidder = lambda name, **values: Block(  # noqa: E731
+        name=name, team=1, count=3, variance=(900.0, 900.0, 0.0), autonomy=AuctionAssign(duration=0.5, **values),
+        motion=SingleIntegrator(),
+    )  # fmt: skip
+    circler = Block(
+        name="circler", team=2, count=4, position=(0.0, 0.0, 50.0), variance=(400.0, 400.0, 25.0), heading_variance=1.0,
+        autonomy=[
+            GoToWaypoint(waypoint="XYZ 0.2 X 5 60 0 0 0 40 -1"),
+            WaypointDispatcher(waypointlist_network="LocalNetwork", loiter_radius=30.0),
+            MotorSchemas(behaviors=[MoveToGoalMS()]),
+        ],
+        controller=UnicyclePID(), motion=Unicycle(),
+    )  # fmt: skip
+    tower = Block(
+        name="tower", autonomy=[WaypointGenerator(mode="loiter", network_name="LocalNetwork"), Control3D()], motion=SingleIntegrator()
+    )  # fmt: skip
+    return Mission(
+        blocks=[bidder("head"), bidder("others", auctioneer=False), circler, tower],
+        networks=[SphereNetwork(name="CommsNetwork", range=60.0, prob_transmit=0.8)], end=5.0,
+    )  # fmt: skip
+
+
 STEPS: dict[str, int] = {
     "chase_synchronous": 24,
     "chase_sequential": 24,
@@ -363,6 +423,8 @@ STEPS: dict[str, int] = {
     "flags": 50,
     "winds": 40,
     "vehicles": 30,
+    "machines": 24,
+    "errands": 24,
 }
 """Steps after which a mission's hashes are taken."""
 

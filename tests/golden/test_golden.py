@@ -108,6 +108,8 @@ STATES = {
     "flags": ("runner.SingleIntegrator.x", 6),
     "winds": ("balloon.Balloon.x", 3),
     "vehicles": ("quadrotor.GoTo.goal", 0),
+    "machines": ("robot.MotorSchemas.MoveToGoalMS.integral", None),
+    "errands": ("head.AuctionAssign.deadline", None),
 }
 
 

@@ -29,6 +29,7 @@ from tussle.api.motion import MotionBody, MotionModel
 from tussle.api.plugin import HistoricAttributes, Plugin, service
 from tussle.api.rigid_body import InertiaParam, PositiveParam, RigidBodyModel
 from tussle.api.row_laws import row_law
+from tussle.api.state_follower import StateFollower
 from tussle.api.world import WorldView
 from tussle.columns import (
     Children,
@@ -89,6 +90,7 @@ __all__ = [
     "RigidBodyModel",
     "Sensor",
     "State",
+    "StateFollower",
     "Subscribe",
     "WorldPlugin",
     "WorldView",

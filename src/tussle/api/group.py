@@ -9,6 +9,7 @@ import numpy as np
 
 from tussle import rng
 from tussle.api import kernels
+from tussle.api.acting import restart, step_some
 from tussle.api.bodies import (
     DERIVED,
     EVERYWHERE,
@@ -208,11 +209,24 @@ class GroupView:
         self._caller, self.phase, self.substep = plugin, phase, substep
         self.dt = self._period if dt is None else dt
 
-    def step(self, plugin: Any) -> None:
-        """Step a plugin inside the calling one, with its own random draws."""
+    def step(self, plugin: Any, active: np.ndarray | None = None) -> None:
+        """Step a plugin inside the calling one, with its own random draws.
+
+        With `active`, (n,), only for the rows where it is true: the columns of the others keep their values.
+        """
         caller, self._caller = self._caller, plugin
-        plugin.step(self)
+        if active is None or active.all():
+            plugin.step(self)
+        elif active.any():
+            step_some(plugin, self, active)
         self._caller = caller
+
+    def restart(self, plugin: Any, rows: np.ndarray) -> None:
+        """Set the states of a plugin inside the calling one to those of new entities, for some rows, (m,)."""
+        if len(rows):
+            caller, self._caller = self._caller, plugin
+            restart(plugin, self, rows)
+            self._caller = caller
 
     def fail(self, row: int, why: str) -> None:
         """End the world of a row with an error at the end of this step; other worlds continue. For plugins with handles."""

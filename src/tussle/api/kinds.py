@@ -23,6 +23,10 @@ class EntityPlugin(Plugin):
     wired: frozenset[str]
     """In a simulation: names of the outputs that other plugins read. Other outputs need not be written."""
 
+    def unused_states(self) -> tuple[str, ...]:
+        """Return names of `State` columns that this instance leaves at their defaults; they are not part of the state hash."""
+        return ()
+
     def spawn(self, g: GroupView, rows: np.ndarray) -> None:
         """Initialise columns of newborn entities beyond the declared defaults; `rows` are row numbers in `g`, (m,)."""
 

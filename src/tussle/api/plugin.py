@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Self, TypeVar
 
@@ -29,7 +29,7 @@ C = TypeVar("C", bound=Column)
 
 GRADES = ("portable", "machine", "external")
 RATE = Param(1.0, unit="1/s", gt=0.0, lt=math.inf)
-RESERVED = ("name", "rate")
+RESERVED = ("name", "rate", "states")
 
 
 @dataclass(frozen=True)
@@ -66,6 +66,8 @@ class Plugin:
     Args:
         name: Name of this instance, by default the class name. Plugins of one class in one entity need different names.
         rate: Calls per second [Hz]; None calls it in every step.
+        states: States of the entity in which a plugin inside another one acts, such as "Search, Track"; None for all. `active_in` has
+            their names.
         **values: Parameters, by their declared names.
 
     Raises:
@@ -118,7 +120,12 @@ class Plugin:
         cls.__signature__ = inspect.Signature(params)  # type: ignore[attr-defined]
 
     def __init__(
-        self, *unnamed: Any, name: str | None = None, rate: float | str | None = None, **values: Any
+        self,
+        *unnamed: Any,
+        name: str | None = None,
+        rate: float | str | None = None,
+        states: str | Iterable[str] | None = None,
+        **values: Any,
     ) -> None:
         cls = type(self)
         if unnamed:
@@ -143,13 +150,24 @@ class Plugin:
                     raise ParameterError(
                         f"{cls.__name__}.{key}: {plugin!r} cannot have a rate; set the rate of {cls.__name__}"
                     )
+                if plugin.__dict__["active_in"] and not child.by_state:
+                    raise ParameterError(
+                        f"{cls.__name__}.{key}: {plugin!r} cannot have states; {cls.__name__} does not follow the state of its entity"
+                    )
             names = [plugin.instance_name for plugin in resolved[key]]
             for twice in names:
                 if names.count(twice) > 1:
                     raise ParameterError(
                         f"{cls.__name__}.{key}: two plugins are called {twice!r}; rename one with name=..."
                     )
-        self.__dict__.update(_values=resolved, instance_name=name or cls.__name__, rate=rate)
+        words = states.replace(",", " ").split() if isinstance(states, str) else (states or ())
+        self.__dict__.update(
+            _values=resolved, instance_name=name or cls.__name__, rate=rate, active_in=tuple(words)
+        )
+        self.check_values()
+
+    def check_values(self) -> None:
+        """Check parameters that must fit together, as data; a hook that raises `ParameterError` if they do not."""
 
     # -- declarations ---------------------------------------------------------------------------------------------------
 
@@ -199,16 +217,17 @@ class Plugin:
             **self.values,
             "name": self.__dict__["instance_name"],
             "rate": self.__dict__["rate"],
+            "states": self.__dict__["active_in"],
             **values,
         }
         return type(self)(**merged)
 
     def structure(self) -> tuple[Any, ...]:
-        """Key that is equal for plugins that can share a group: class, name, rate, structural parameters and children."""
+        """Key that is equal for plugins that can share a group: class, name, rate, states, structural parameters and children."""
         own = self.__dict__["_values"]
         fixed = tuple((k, own[k]) for k, c in self.params().items() if c.structural)
         inner = tuple((k, tuple(c.structure() for c in own[k])) for k in self.children())
-        return (type(self), self.__dict__["instance_name"], self.__dict__["rate"], fixed, inner)
+        return (type(self), *self._when(), fixed, inner)
 
     def __eq__(self, other: object) -> bool:
         if type(self) is not type(other):
@@ -220,7 +239,11 @@ class Plugin:
 
     def _identity(self) -> tuple[Any, ...]:
         own = self.__dict__
-        return (type(self), own["instance_name"], own["rate"], tuple(own["_values"].items()))
+        return (type(self), *self._when(), tuple(own["_values"].items()))
+
+    def _when(self) -> tuple[Any, ...]:
+        own = self.__dict__
+        return own["instance_name"], own["rate"], own["active_in"]
 
     def given(self) -> Iterator[tuple[str, Any]]:
         """Yield names and values of the parameters that differ from their defaults, and the plugins inside this one by name."""
@@ -235,6 +258,8 @@ class Plugin:
             parts.append(f"name={own['instance_name']!r}")
         if own["rate"] is not None:
             parts.append(f"rate={own['rate']!r}")
+        if own["active_in"]:
+            parts.append(f"states={', '.join(own['active_in'])!r}")
         return f"{type(self).__name__}({', '.join(parts)})"
 
     # -- bound ----------------------------------------------------------------------------------------------------------

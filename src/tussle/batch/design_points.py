@@ -216,4 +216,11 @@ def _split_plugin(plugin: Any, path: str, own: dict[str, Any], is_of_block: bool
         for key in type(plugin).children()
         for c in plugin.values[key]
     ]
-    return (type(plugin), plugin.instance_name, plugin.rate, tuple(fixed), tuple(inner))
+    return (
+        type(plugin),
+        plugin.instance_name,
+        plugin.rate,
+        plugin.active_in,
+        tuple(fixed),
+        tuple(inner),
+    )

@@ -48,7 +48,7 @@ class TopicBuffer:
         name: The topic's name.
         type: The message type.
         inboxes: The receiving ends.
-        is_published: Whether a plugin of the mission publishes it.
+        is_published: Whether a plugin of the mission publishes it, or messages may come from outside.
     """
 
     def __init__(self, network: str, name: str, type_: type[Message]) -> None:
@@ -79,6 +79,12 @@ class TopicBuffer:
         for inbox in self.inboxes:
             found[inbox.view.first : inbox.view.last] = True
         return found
+
+    def retain(self, first: int, keep: Callable[[Messages], np.ndarray]) -> None:
+        """Withdraw the messages of the outbox from batch number `first` on where keep(batch), (n,), is false."""
+        kept = [batch.take(np.flatnonzero(keep(batch))) for batch in self.sent[first:]]
+        self.sent[first:] = [batch for batch in kept if batch.n]
+        self._joined = None
 
     def clear_outbox(self) -> None:
         self.sent.clear()

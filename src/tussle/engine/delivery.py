@@ -12,7 +12,7 @@ from tussle.engine import failure
 from tussle.engine.state import SimulationState
 from tussle.engine.world_bindings import WorldBinding
 from tussle.errors import WiringError, listed, nearest_name
-from tussle.messages import Messages, SpawnEntity
+from tussle.messages import Messages, RemoveEntity, SpawnEntity
 
 
 def deliver(state: SimulationState) -> None:
@@ -23,6 +23,8 @@ def deliver(state: SimulationState) -> None:
         if topic.sent:
             if topic.type is SpawnEntity:
                 _request_births(state, topic.outbox())
+            if topic.type is RemoveEntity:
+                _request_deaths(state, topic.outbox())
             state.events.published(topic)
             if topic.inboxes or state.networks[topic.network].plugin.losses:
                 sent.setdefault(topic.network, []).append(topic)
@@ -54,6 +56,14 @@ def _request_births(state: SimulationState, batch: Messages) -> None:
             state.record_failure(
                 world, state.error(world, text, where=f"sent by entity {int(batch.sender[i])}")
             )
+
+
+def _request_deaths(state: SimulationState, batch: Messages) -> None:
+    """Turn `RemoveEntity` messages into deaths of this step."""
+    rows = state.population.bodies.rows_of(batch.world, batch.entity)
+    for why in dict.fromkeys(map(str, batch.why)):
+        of_cause = np.array([str(each) == why for each in batch.why])
+        state.world_view.kill(rows[(rows >= 0) & of_cause], why)
 
 
 def _send(state: SimulationState, network: WorldBinding, topics: list[TopicBuffer]) -> None:

@@ -73,7 +73,7 @@ def not_finite(group: Group, bodies: Bodies, row: int, step: int) -> PluginError
     """The error for a body row whose state is not finite. Names the first plugin output, in call order, that is not finite."""
     i, world = row - group.first, int(bodies.world[row])
     who = f"{group.block_of(i)} {int(bodies.id[row])}"
-    for binding in [*group.autonomies, *group.controllers]:
+    for binding in [*(b for a in group.autonomies for b in a.walk()), *group.controllers]:
         if found := _not_finite_output(binding, group, i):
             text = f"{found} is not a finite number"
             break

@@ -202,7 +202,14 @@ class Group:
 
     # -- binding ------------------------------------------------------------------------------------------------------------
 
-    def _bind(self, spec: Any, view: GroupView, path: tuple[str, ...], is_motion: bool = False) -> Binding:
+    def _bind(
+        self,
+        spec: Any,
+        view: GroupView,
+        path: tuple[str, ...],
+        is_motion: bool = False,
+        is_private: bool = False,
+    ) -> Binding:
         check_hooks(spec, f"{self.wiring.where}: {spec.instance_name}")
         binding = Binding(spec.bound(), spec, view, (*path, spec.instance_name))
         plugin, key = binding.plugin, binding.path
@@ -231,18 +238,20 @@ class Group:
                 binding.places[name] = self.table.add((key, name), column.dtype, len(column.fields), default)
                 binding.writable.add(name)
             elif isinstance(column, Channel):
-                self._bind_channel(binding, name, column, bool(path))
-                if path:
+                self._bind_channel(binding, name, column, is_private)
+                if is_private:
                     wired.add(name)
             elif isinstance(column, Handle):
                 binding.handles[name] = []
             elif isinstance(column, (Publish, Subscribe)):
                 topic = self._topic(spec, column)
+                topic.is_published |= isinstance(column, Subscribe) and column.from_outside
                 plugin.__dict__[name] = (
                     Publisher(topic, view) if isinstance(column, Publish) else Inbox(topic, view)
                 )
-        for name in type(spec).children():
-            inner = [self._bind(child, view, binding.path) for child in spec.values[name]]
+        for name, children in type(spec).children().items():
+            hides = is_private or not children.shares_channels
+            inner = [self._bind(child, view, binding.path, is_private=hides) for child in spec.values[name]]
             plugin.__dict__[name] = [b.plugin for b in inner]
             binding.children += inner
         plugin.__dict__["wired"] = frozenset(wired)
@@ -251,11 +260,11 @@ class Group:
                 one.services[service] = getattr(plugin, service)
         return binding
 
-    def _bind_channel(self, binding: Binding, name: str, column: Channel, is_child: bool) -> None:
+    def _bind_channel(self, binding: Binding, name: str, column: Channel, is_private: bool) -> None:
         link = self.wiring.links.get((id(binding.spec), name))
         if link is None:  # the plugin is inside another one, or a structural parameter disables the channel
             is_read = any(k == name for k, _ in read_channels(binding.spec))
-            if is_child and is_read and not column.optional:  # type: ignore[attr-defined]
+            if is_private and is_read and not column.optional:  # type: ignore[attr-defined]
                 sensed, channel = self.wiring.sensed, column.channels[0]
                 raise WiringError(
                     f"{self.wiring.where}: {'.'.join(binding.path)}.{name}: a plugin inside another one can only read channels that "
@@ -267,6 +276,11 @@ class Group:
         else:
             binding.places[name] = link.place
             if link.rows is not None:
+                if isinstance(column, Output) and len(binding.path) > 1:
+                    raise WiringError(
+                        f"{self.wiring.where}: {'.'.join(binding.path)}.{name}: a plugin inside another one can only write channels that "
+                        f"their reader declares together, as one input; {' '.join(column.channels)} are read separately"
+                    )
                 binding.links[name] = link
         if isinstance(column, Output):
             binding.writable.add(name)

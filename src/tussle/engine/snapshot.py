@@ -171,6 +171,7 @@ def _hashed_columns(group: Group, binding: Binding, rows: np.ndarray) -> Iterato
         is_memory = isinstance(column, (State, EntityRef)) or (
             isinstance(column, Output) and name in binding.plugin.wired
         )
+        is_memory &= name not in binding.spec.unused_states()
         label = ".".join((*binding.path, name))
         if is_memory and name in binding.ragged:
             lists = group.table.lists[binding.ragged[name]].take(rows)

@@ -77,6 +77,7 @@ class Wiring:
             WiringError: No plugin writes an input's channel, or its writer has another unit or other fields.
         """
         working = [c for c in controllers if not c.passthrough]
+        autonomies = [plugin for autonomy in autonomies for plugin in sharing(autonomy)]
         self._check_passthrough(controllers, [*working, motion])
         sense = self._bus(sensors, [])
         self._join(sense, sensors, [])
@@ -218,10 +219,18 @@ class Wiring:
         )
 
 
+def sharing(plugin: Any) -> Iterator[Any]:
+    """Yield a plugin and all plugins inside it that share the channels of the entity."""
+    yield plugin
+    for name, column in plugin.children().items():
+        for child in plugin.values[name] if column.shares_channels else ():
+            yield from sharing(child)
+
+
 def _nested(plugin: Any) -> Iterator[Any]:
-    """All plugins nested in a plugin."""
-    for name in plugin.children():
-        for child in plugin.values[name]:
+    """All plugins nested in a plugin that have private channels."""
+    for name, column in plugin.children().items():
+        for child in () if column.shares_channels else plugin.values[name]:
             yield child
             yield from _nested(child)
 

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tussle import units
+from tussle import texts, units
 from tussle.columns import MOST_INTEGER
 from tussle.errors import MissionError, ParameterError
 from tussle.texts import shown
@@ -111,6 +111,19 @@ def inline_plugins(text: str) -> list[InlinePlugin]:
     if text[place:].strip(" \t\n,"):
         raise MissionError(f"{shown(text[place:])} is not a plugin; it takes [ NAME key='value' ... ]")
     return found
+
+
+def word_rows(text: str, fields: Sequence[str]) -> list[dict[str, str]]:
+    """Parse rows of words, one per field: "[ a b ] [ c d ]".
+
+    Raises:
+        ParameterError: There is text outside the brackets, or a bracket is not closed.
+        MissionError: A row has another number of words.
+    """
+    found = [row.split() for row in texts.rows(text)]
+    if not all(len(row) == len(fields) for row in found):
+        raise MissionError(f"{shown(text)} is not allowed; it takes rows [ {' '.join(fields)} ]")
+    return [dict(zip(fields, row, strict=True)) for row in found]
 
 
 def inline_text(name: str, attributes: Mapping[str, str]) -> str:

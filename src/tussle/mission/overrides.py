@@ -99,6 +99,7 @@ class TreeEditor:
         node.children = [
             Node(key, plugin.attributes, plugin.name, [], node.place)
             for key in inner
+            if not cls.children()[renamed.get(key, key)].fields
             for plugin in codecs.inline_plugins(node.attributes[key])
         ]
         return _named(node, inner)

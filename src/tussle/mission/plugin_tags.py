@@ -111,7 +111,7 @@ class PluginReader:
         if not is_right:
             return None
         try:
-            return cls(name=name, rate=rate, **values)
+            return cls(name=name, rate=rate, states=written.attributes.get("states"), **values)
         except TussleError as error:
             self.problems.error(written.where(""), str(error))
             return None
@@ -198,8 +198,14 @@ class PluginReader:
             raise MissionError(f"plugins are nested more than {MOST_NESTED} deep")
         place = written.where(parameter)
         taken: set[str] = set()
+        column = cls.children()[parameter]
+        if column.fields:
+            rows = codecs.word_rows(text, column.fields)
+            names = [free_name(column.kind.__name__, taken) for _ in rows]
+            return [column.kind(name=name, **row) for name, row in zip(names, rows, strict=True)]
+        tag = next((tag for tag, known in KINDS.items() if known is column.kind), "behaviors")
         made = [
-            self.make(PluginTag("behaviors", name, attributes, lambda _: place), taken, depth + 1)
+            self.make(PluginTag(tag, name, attributes, lambda _: place), taken, depth + 1)
             for name, attributes in codecs.inline_plugins(text)
         ]
         return [plugin for plugin in made if plugin is not None]

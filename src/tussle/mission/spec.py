@@ -73,6 +73,10 @@ def _plugins(where: str, value: Any, kind: type) -> tuple[Any, ...]:
         if not isinstance(plugin, kind):
             hint = " (it is a class; call it to make an instance)" if isinstance(plugin, type) else ""
             raise MissionError(f"{where}: {plugin!r} is not of kind {kind.__name__}{hint}")
+        if getattr(plugin, "active_in", ()):
+            raise MissionError(
+                f"{where}: {plugin!r} has states, which only plugins inside another one follow; leave them out"
+            )
     names = [p.instance_name for p in plugins]
     for name in names:
         if names.count(name) > 1:

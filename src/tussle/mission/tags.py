@@ -203,6 +203,11 @@ PLUGIN = {
         "0",
         "1/s",
     ),
+    "states": TagSpec(
+        "Of a plugin inside another one: states of the entity in which it acts, separated by commas or blanks.",
+        "all",
+        reads="text",
+    ),
     "param_common": TagSpec(
         "Name of a <param_common>; the tag's own attributes take precedence.", "none", reads="text"
     ),

@@ -18,9 +18,9 @@ from tussle.errors import ConformanceError, TussleError, listed
 
 RULE = "declarations"
 HOOKS_NAMES = """
-    spawn spawn_one step step_one start start_one result result_one route regions rejects from_body to_body derivative advance
-    active_inputs reads_all grade passthrough
-    abstract kind historic_attributes transmit losses
+    spawn spawn_one step step_one start start_one result result_one route regions rejects from_body to_body
+    derivative advance active_inputs reads_all grade passthrough abstract kind historic_attributes transmit
+    losses unused_states check_values
 """
 HOOKS = frozenset(HOOKS_NAMES.split())
 MACHINERY = frozenset({"columns", "services", "row_laws", "me_type", "world_types", "__signature__"})

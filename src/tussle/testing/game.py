@@ -21,7 +21,7 @@ from tussle.api import (
 )
 from tussle.columns import Channel, Topic
 from tussle.engine.simulation import Simulation
-from tussle.engine.wiring import BELIEF, read_channels
+from tussle.engine.wiring import BELIEF, read_channels, sharing
 from tussle.mission import Block, Mission
 from tussle.stock import ALWAYS_THERE, GlobalNetwork, MotorSchemas
 from tussle.testing.partners import (
@@ -101,14 +101,11 @@ def build(plugin: Any, companions: Sequence[Any] = ()) -> ConformanceGame:
 
 
 def _with_children(plugin: Any) -> Any:
-    inner = {}
+    inner: dict[str, Any] = {}
     for name, column in plugin.children().items():
         if not plugin.values[name]:
-            inner[name] = [
-                SignalBehavior()
-                if issubclass(SignalBehavior, column.kind) and column.kind is not Autonomy
-                else driver((), (), (), ())
-            ]
+            made = column.kind if column.fields else SignalBehavior
+            inner[name] = [driver((), (), (), ()) if column.kind is Autonomy else made()]
     return plugin.replace(**inner) if inner else plugin
 
 
@@ -221,7 +218,7 @@ def _slots(
     missing = _without([c for a in inner for _, c in read_channels(a)], measured)
     readers = [[c for _, c in read_channels(p)] for p in (*controllers, *motions)]
     wanted = next((columns for columns in readers if columns), [])
-    written = [c for a in autonomies for c in type(a).outputs().values()]
+    written = [c for a in autonomies for b in sharing(a) for c in type(b).outputs().values()]
     pilot = driver(_without(wanted, written), measured, publishes, subscribes)
     if not motions:
         last = [c for c in controllers if not c.passthrough] or controllers

@@ -21,7 +21,18 @@ from tussle.testing.lines import BODY_ROWS, Key, keys_of, lines_of
 
 MEMORY = "memory in columns"
 BOUND = frozenset(
-    {"link_counts", "_values", "instance_name", "rate", "is_bound", "is_for_one", "wired", "_look", "_rows"}
+    {
+        "link_counts",
+        "_values",
+        "instance_name",
+        "rate",
+        "active_in",
+        "is_bound",
+        "is_for_one",
+        "wired",
+        "_look",
+        "_rows",
+    }
 )
 HOOKS = ("spawn", "step", "from_body", "to_body", "start", "transmit", "result_of", "rejects")
 DRAWS = ("uniform", "normal", "normal_pairs", "uniform_pairs", "uniform_by", "normal_by")

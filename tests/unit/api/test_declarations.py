@@ -142,7 +142,7 @@ def test_the_signature_shows_names_and_defaults():
 
     parameters = inspect.signature(Sample).parameters
     assert parameters["speed"].default == 20.0
-    assert list(parameters)[-2:] == ["name", "rate"]
+    assert list(parameters)[-3:] == ["name", "rate", "states"]
 
 
 def test_a_plugin_is_a_value_and_has_no_arrays():

@@ -182,9 +182,8 @@ def test_back_and_forth():
     assert visits("back_and_forth", 1, 3) == [0, 0, 0]
 
 
-def test_once_through_and_staying_with_the_first():
-    assert visits("follow_once", 3, 5) == [1, 2, 2, 2, 2]
-    assert visits("loiter", 3, 3) == [0, 0, 0]
+def test_once_through():
+    assert visits("follow_once", 3, 5) == visits("loiter", 3, 5) == [1, 2, 2, 2, 2]
 
 
 def test_what_is_reached_is_told_once():
@@ -262,3 +261,35 @@ def test_an_empty_list_leads_nowhere():
     sim.run()
     assert led(sim, "n_lists") == 1
     assert led(sim, "goal") == [0.0, 0.0, 0.0]
+
+
+def test_loiter_circles_around_the_last_waypoint():
+    led = block(
+        "led", position=(0.0, 0.0, 100.0), motion=SingleIntegrator(),
+        autonomy=[
+            WaypointDispatcher(loiter_radius=50.0, lead_distance=20.0),
+            MotorSchemas(max_speed=10.0, behaviors=[MoveToGoalMS(distance_pid=(1e3, 0.0, 0.0, 0.0))]),
+        ],
+    )  # fmt: skip
+    tower = block(
+        "tower",
+        autonomy=WaypointGenerator(waypoints=[point(100.0, 0.0, 120.0)], mode="loiter"),
+        motion=Still(),
+    )
+    sim = Simulation(mission(led, tower, end=1000.0))
+    sim.step(800)
+    angle = []
+    for _ in range(300):
+        sim.step()
+        x, y, z = sim.read("led.pos")[0][0, 0]
+        # The point is a step old, v dt L / R = 0.4 m, and steps of 1 m are chords, (L - v dt) v dt / (2 R) = 0.19 m.
+        assert math.hypot(x - 100.0, y) == pytest.approx(50.58, abs=0.02)
+        assert z == pytest.approx(120.0, abs=0.1)
+        angle.append(math.atan2(y, x - 100.0))
+    turned = np.diff(np.unwrap(angle))
+    assert turned == pytest.approx(np.full(299, 1.0 / 50.58), rel=0.01)  # counter-clockwise at 10 m/s
+
+
+def test_a_circle_begins_at_its_center_too():
+    sim = flight([point(0.0)], (0.0, 0.0, 0.0), mode="loiter", steps=3)
+    assert led(sim, "goal") == pytest.approx([50.0, 50.0, 0.0])

@@ -4,49 +4,65 @@ from __future__ import annotations
 
 import numpy as np
 
-from tussle.api import Autonomy, Behavior, Children, GroupView, HistoricAttributes, Output, Param, service
+from tussle.api import (
+    Behavior,
+    Children,
+    GroupView,
+    HistoricAttributes,
+    Output,
+    Param,
+    StateFollower,
+    service,
+)
 from tussle.numeric import atan2
 
 
-class MotorSchemas(Autonomy):
+class MotorSchemas(StateFollower):
     """Combines the velocities of its behaviours (Arkin 1989): their sum weighted by gain, over the gains of those that are not zero.
 
     A behaviour whose velocity is zero, such as avoidance with nobody near, therefore does not dilute the others. If all are zero, the
     entity flies straight on at `max_speed`. The result is written as heading, altitude and speed, and as `velocity`.
+
+    A behaviour with `states` acts in these states of the entity only, which are told by messages on the topic `state_topic_name`; in
+    the others its memory does not change.
     """
 
     grade = "portable"
     historic_attributes = HistoricAttributes(
-        unread=("state_topic_name", "network_name", "pub_vel_vec"),
+        unread=("pub_vel_vec",),
         differs={
             "behaviors": "MotorSchemas without behaviors flies straight on; "
             "in the existing system it avoids others and goes to (100, 0, 0)"
         },
     )
 
+    network_name = Param("LocalNetwork", doc="Network that carries the state.")
     max_speed = Param(
         21.0, unit="m/s", gt=0.0, doc="Largest speed of a behaviour, and speed without behaviours."
     )
     add_lower_bound_to_vz = Param(False, doc="Limit the vertical velocity to at least vz_lower_bound.")
     vz_lower_bound = Param(-1.0, unit="m/s", doc="Lowest vertical velocity, with add_lower_bound_to_vz.")
-    behaviors = Children(Behavior, doc="The combined behaviours.")
+    behaviors = Children(Behavior, by_state=True, doc="The combined behaviours.")
     desired_heading = Output(unit="rad")
     desired_altitude = Output(unit="m")
     desired_speed = Output(unit="m/s")
     velocity = Output("velocity_x velocity_y velocity_z", unit="m/s")
 
     def step(self, g: GroupView) -> None:
+        self.read_state()
         total = np.zeros((3, g.n))
         weight = np.zeros(g.n)
         for behavior in self.behaviors:
-            g.step(behavior)
+            acts = self.acts(behavior)
+            g.step(behavior, acts)
             velocity = behavior.desired_velocity
+            gain = behavior.gain if acts is None else np.where(acts, behavior.gain, 0.0)
             length = np.sqrt(
                 velocity[0] * velocity[0] + velocity[1] * velocity[1] + velocity[2] * velocity[2]
             )
             shorter = np.minimum(1.0, self.max_speed / np.where(length > 0.0, length, 1.0))
-            total += behavior.gain * shorter * velocity
-            weight += np.where(length > 0.0, behavior.gain, 0.0)
+            total += gain * shorter * velocity
+            weight += np.where(length > 0.0, gain, 0.0)
         wished = weight > 0.0
         v = np.where(wished, total / np.where(wished, weight, 1.0), self.max_speed * g.forward)
         self.desired_heading[:] = atan2(v[1], v[0])

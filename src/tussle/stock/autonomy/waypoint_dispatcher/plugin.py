@@ -24,11 +24,12 @@ class WaypointDispatcher(Autonomy):
 
     The point lies `lead_distance` ahead of the entity's projection onto the line, but never beyond the next waypoint. Within the
     tolerance of a waypoint the next one becomes current, and a `WaypointStatus` is published. The list is flown once, back and forth,
-    or as a closed circuit (racetrack); loiter stays at the first waypoint. A new list starts at its first waypoint. Until that is
-    reached, and at the end of a list, the line starts at the entity itself.
+    or as a closed circuit (racetrack). With loiter it is flown once; then the entity circles around the last waypoint,
+    counter-clockwise at `loiter_radius`: the point lies `lead_distance` ahead on the tangent of that circle. A new list starts at its
+    first waypoint. Until that is reached, and at the end of a list, the line starts at the entity itself.
 
-    The existing system published its status in every step at the end of a list, and stayed one step longer at the turning points of
-    back_and_forth.
+    The existing system published its status in every step at the end of a list, stayed one step longer at the turning points of
+    back_and_forth, and had no loiter.
     """
 
     grade = "portable"
@@ -37,6 +38,7 @@ class WaypointDispatcher(Autonomy):
     filter_dist = Param(
         1.0, unit="m", ge=0.0, doc="Waypoints nearer than this to their predecessor are dropped."
     )
+    loiter_radius = Param(50.0, unit="m", ge=0.0, doc="Radius of the circle with the mode loiter.")
     tolerance_in_2d = Param(False, doc="Measure tolerances in the horizontal plane.")
     waypointlist_network = Param("GlobalNetwork", doc="Network of the waypoint lists.")
     waypoint_network = Param("LocalNetwork", doc="Network of the published waypoint and status.")
@@ -66,11 +68,24 @@ class WaypointDispatcher(Autonomy):
         direction = unit(line)
         along = direction[0] * way[0] + direction[1] * way[1] + direction[2] * way[2]
         ahead = np.maximum(along, 0.0) + self.lead_distance[rows]
-        self.goal.publish(rows, pos=np.where(ahead >= length, target, begin + direction * ahead))
+        goal = np.where(ahead >= length, target, begin + direction * ahead)
+        circles = (self.mode[rows] == LOITER) & self.is_done[rows]
+        self.goal.publish(rows, pos=np.where(circles, self._on_tangent(rows, pos, target), goal))
         dx, dy, dz = target - pos
         dz = np.where(self.tolerance_in_2d[rows], 0.0, dz)
         is_there = np.sqrt(dx * dx + dy * dy + dz * dz) <= tolerance
         self._advance(rows[is_there])
+
+    def _on_tangent(self, rows: np.ndarray, pos: np.ndarray, center: np.ndarray) -> np.ndarray:
+        """Points ahead on the tangents of circles, (3, m), at the feet of positions on them."""
+        x, y = pos[:2] - center[:2]
+        distance = np.sqrt(x * x + y * y)
+        is_center = distance == 0.0
+        x, y = (
+            np.where(is_center, at, v / np.where(is_center, 1.0, distance)) for at, v in ((1.0, x), (0.0, y))
+        )
+        radius, lead = self.loiter_radius[rows], self.lead_distance[rows]
+        return np.stack([center[0] + radius * x - lead * y, center[1] + radius * y + lead * x, center[2]])
 
     def _start_lists(self, rows: np.ndarray, heard: Messages) -> None:
         """Start the lists that the rows received."""
@@ -94,9 +109,9 @@ class WaypointDispatcher(Autonomy):
             self.is_returning[rows], here == 0, here + 1 == n_points
         )
         returning = self.is_returning[rows] ^ turns_back
-        ends = (mode == FOLLOW_ONCE) & (here + 1 == n_points)
+        ends = ((mode == FOLLOW_ONCE) | (mode == LOITER)) & (here + 1 == n_points)
         after = np.where(returning, np.maximum(here - 1, 0), np.minimum(here + 1, n_points - 1))
-        after = np.where(mode == RACETRACK, (here + 1) % n_points, np.where(mode == LOITER, here, after))
+        after = np.where(mode == RACETRACK, (here + 1) % n_points, after)
         is_changed = (after != here) | (ends & ~self.is_done[rows])
         self.previous[rows], self.current[rows] = here, after
         self.is_returning[rows], self.is_done[rows] = returning, ends

@@ -1,0 +1,5 @@
+"""AuctionAssign: auctions a task."""
+
+from tussle.stock.autonomy.auction_assign.plugin import AuctionAssign, BidAuction, ResultAuction, StartAuction
+
+__all__ = ["AuctionAssign", "BidAuction", "ResultAuction", "StartAuction"]

@@ -1,0 +1,35 @@
+"""An autonomy that switches between others by the state of the entity."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tussle.api import Autonomy, Children, GroupView, HistoricAttributes, Param, StateFollower
+
+
+class AutonomyExecutor(StateFollower):
+    """Runs those of its autonomies that act in the state of the entity, in their order; autonomies without `states` always run.
+
+    The state is told by messages on the topic `state_topic_name`, for instance by GraphvizFSM. When the state makes an autonomy act
+    again, its memory is set to that of a new entity. Its outputs are those of the entity: if several autonomies write one channel, the
+    last one counts, and a channel that nobody writes keeps its value.
+    """
+
+    grade = "portable"
+    historic_attributes = HistoricAttributes(
+        differs={
+            "autonomies": "AutonomyExecutor without autonomies does nothing; in the existing system it has Straight"
+        }
+    )
+
+    network_name = Param("LocalNetwork", doc="Network that carries the state.")
+    autonomies = Children(Autonomy, by_state=True, shares_channels=True, doc="The autonomies.")
+
+    def step(self, g: GroupView) -> None:
+        before = self.state.copy()
+        self.read_state()
+        for autonomy in self.autonomies:
+            acts, acted = self.acts(autonomy), self.acts(autonomy, before)
+            if acts is not None and acted is not None:
+                g.restart(autonomy, np.flatnonzero(acts & ~acted))
+            g.step(autonomy, acts)

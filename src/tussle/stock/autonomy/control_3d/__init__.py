@@ -1,0 +1,5 @@
+"""Control3D: is steered from the viewer."""
+
+from tussle.stock.autonomy.control_3d.plugin import Control3D
+
+__all__ = ["Control3D"]

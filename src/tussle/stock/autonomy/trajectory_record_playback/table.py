@@ -1,0 +1,84 @@
+"""TrajectoryTable trajectories, read from a table."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from tussle.errors import ParameterError, listed, nearest_name
+
+COLUMNS = ("id", "t", "x", "y", "z", "qw", "qx", "qy", "qz", "vx", "vy", "vz")
+
+
+class TrajectoryTable(NamedTuple):
+    """States of entities at times.
+
+    Attributes:
+        id: Ids, ascending, (m,).
+        start: First state of each, then the number of states, (m + 1,).
+        t: Time of each state [s], ascending for each entity, (k,).
+        values: x y z [m], qw qx qy qz, vx vy vz [m/s], (10, k).
+    """
+
+    id: np.ndarray
+    start: np.ndarray
+    t: np.ndarray
+    values: np.ndarray
+
+    def at(self, ids: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Last state of each entity, (n,), not after a time, or its first one: its number, and the time of its last state."""
+        place = np.searchsorted(self.id, ids)
+        first, end = self.start[place], self.start[place + 1]
+        low, high = first.copy(), end.copy()
+        while (low < high).any():  # bisection, for all rows at once
+            middle = np.minimum((low + high) // 2, end - 1)
+            is_past = (low < high) & (self.t[middle] <= t)
+            low, high = np.where(is_past, middle + 1, low), np.where(is_past | (low >= high), high, middle)
+        return np.maximum(low - 1, first), self.t[end - 1]
+
+
+def read_recorded(name: str) -> TrajectoryTable:
+    """Read a table in CSV with the columns of a recorded run; of several worlds, the first one.
+
+    Raises:
+        ParameterError: The file cannot be read, has no such columns, or a value is no finite number.
+    """
+    path = Path(name)
+    try:
+        about = path.stat()
+    except OSError as error:
+        raise ParameterError(f"{name}: {error.strerror}; it takes a table of `tussle export --csv`") from None
+    return _read(name, about.st_mtime_ns, about.st_size)
+
+
+@lru_cache(maxsize=8)
+def _read(name: str, _changed: int, _size: int) -> TrajectoryTable:
+    import pyarrow as pa
+    from pyarrow import csv
+
+    try:
+        table = csv.read_csv(name)
+    except (pa.ArrowInvalid, OSError) as error:
+        raise ParameterError(f"{name} is no table in CSV: {' '.join(str(error).split())[:200]}") from None
+    missing = next((column for column in COLUMNS if column not in table.column_names), None)
+    if missing:
+        guess = nearest_name(missing, table.column_names)
+        raise ParameterError(f"{name} has no column {missing!r}{guess}; {listed(table.column_names)}")
+    data: dict[str, Any] = {}
+    for column in (*COLUMNS, *({"world"} & set(table.column_names))):
+        try:
+            data[column] = table[column].to_numpy().astype(float)
+        except (TypeError, ValueError):
+            raise ParameterError(f"{name}: column {column!r} has values that are no numbers") from None
+        bad = np.flatnonzero(~np.isfinite(data[column]))
+        if len(bad):
+            raise ParameterError(f"{name}, line {bad[0] + 2}: {column} is not a finite number")
+    order = np.lexsort((data["t"], data["id"]))
+    if "world" in data:
+        order = order[data["world"][order] == data["world"].min(initial=np.inf)]
+    ids, start = np.unique(data["id"][order].astype(np.int64), return_index=True)
+    values = np.stack([data[column][order] for column in COLUMNS[2:]])
+    return TrajectoryTable(ids, np.append(start, len(order)), data["t"][order], values)
