@@ -153,13 +153,18 @@ def _attributes(plugin: Plugin) -> dict[str, str]:
     found = {} if plugin.instance_name == type(plugin).__name__ else {"name": plugin.instance_name}
     if plugin.rate is not None:
         found["loop_rate"] = codecs.written(plugin.rate)
+    if plugin.active_in:
+        found["states"] = ", ".join(plugin.active_in)
     # Without those whose default differs from the existing system's, the reader would note that.
     said = {name: plugin.values[name] for name in plugin.historic_attributes.differs}
     for name, value in (said | dict(plugin.given())).items():
         if name in plugin.children():
-            found[name] = " ".join(
-                codecs.inline_text(type(each).__name__, _attributes(each)) for each in value
-            )
+            if fields := plugin.children()[name].fields:
+                rows = (" ".join(each.values[field] for field in fields) for each in value)
+                found[name] = " ".join(f"[ {row} ]" for row in rows)
+            else:
+                inner = (codecs.inline_text(type(each).__name__, _attributes(each)) for each in value)
+                found[name] = " ".join(inner)
             continue
         column = plugin.params()[name]
         text = codecs.written(value, column.units, column.text_units)
@@ -257,6 +262,7 @@ def _arguments(value: Any) -> Iterator[tuple[str, Any]]:
         yield from value.given()
         yield from [("name", value.instance_name)] * (value.instance_name != type(value).__name__)
         yield from [("rate", value.rate)] * (value.rate is not None)
+        yield from [("states", ", ".join(value.active_in))] * bool(value.active_in)
         return
     for field in dataclasses.fields(value):
         given = getattr(value, field.name)

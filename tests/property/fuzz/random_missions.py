@@ -105,9 +105,10 @@ def made(chance: random.Random, kind: type[Plugin], teams: list[int], blocks: li
             values[name] = chance.choice(["GlobalNetwork", "SphereNetwork", "LocalNetwork"])
         elif name == "capture_range":
             values[name] = chance.choice([5.0, 15.0, 60.0])
-    for name in kind.children():
-        behaviors = [made(chance, b, teams, blocks) for b in plugins(Behavior)]
-        values[name] = chance.sample(behaviors, chance.randint(1, len(behaviors)))
+    for name, column in kind.children().items():
+        fitting = [c for k in KINDS for c in plugins(k) if issubclass(c, column.kind) and not c.children()]
+        inner = [made(chance, c, teams, blocks).replace(rate=None) for c in fitting]
+        values[name] = chance.sample(inner, chance.randint(1, min(4, len(inner))))
     if kind.kind in ("autonomy", "controller", "sensor", "interaction", "metric") and chance.random() < 0.25:
         values["rate"] = chance.choice(RATES)
     return kind(**values)

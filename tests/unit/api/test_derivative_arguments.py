@@ -24,7 +24,7 @@ class Glider(MotionModel):
 
     @staticmethod
     def derivative(place, mass, weights, z, table, pushes, force, first, second=10.0):
-        x, v = place
+        _, v = place
         total = weights[0] + 10.0 * weights[1] + 100.0 * z + 1000.0 * table[1][0] + 10000.0 * (first + second)
         return v, total / mass + pushes[1] + force[2]
 

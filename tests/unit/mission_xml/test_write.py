@@ -66,7 +66,8 @@ def test_what_only_a_file_or_only_python_can_leave_out_is_kept(tmp_path):
         blocks=[
             Block(
                 name="a", team=3, velocity=(0.0, 0.0, 0.0), speed=5.0, climb="10 deg", heading=0.1, rate=0.3, slots=2,
-                count=4, motion=Still(), autonomy=[MotorSchemas(behaviors=[MoveToGoalMS(goal=(1, 2, 3), name="home")], rate=5.0)],
+                count=4, motion=Still(),
+                autonomy=[MotorSchemas(behaviors=[MoveToGoalMS(goal=(1, 2, 3), name="home", states="Search, Track")], rate=5)],
             )
         ],
         networks=[SphereNetwork(name="radio")],
