@@ -11,7 +11,7 @@ from gambles import game
 
 from tussle import Block, Mission, Simulation
 from tussle.api import Autonomy, Param, State
-from tussle.batch.design_points import build_points, exactly, group_points, read_points, with_value
+from tussle.batch.design_points import build_points, exactly, group_points, read_points, split, with_value
 from tussle.errors import MissionError, ParameterError, TussleError
 from tussle.stock import AvoidEntityMS, Boundary, MotorSchemas, MoveToGoalMS, SingleIntegrator, Still
 
@@ -205,3 +205,8 @@ def test_a_missions_text_has_every_digit_of_every_number():
         return exactly(Mission(blocks=[block], end=0.2))
 
     assert listed(3000, 1.0) != listed(3000, np.nextafter(1.0, 2.0))
+
+
+def test_points_whose_behaviours_act_in_other_states_share_no_stack():
+    assert split(schemas(states="x y"))[0] == split(schemas(states=["x", "y"]))[0]
+    assert split(schemas(states="x"))[0] != split(schemas(states="y"))[0]

@@ -21,7 +21,7 @@ from tussle.api import (
     State,
     Subscribe,
 )
-from tussle.errors import MissionError, ParameterError, WiringError
+from tussle.errors import MissionError, ParameterError, PluginError, WiringError
 from tussle.messages import CaptureEntity, TextMessage
 from tussle.mission import read_mission
 from tussle.stock import (
@@ -387,9 +387,7 @@ def test_an_executor_hands_on_the_inputs_of_sensors_and_names_who_is_wrong():
         def step(self, g):
             self.velocity[:] = np.nan
 
-    with pytest.raises(
-        Exception, match=r"AutonomyExecutor.* output 'velocity_x' = nan|Nan.* output 'velocity_x' = nan"
-    ):
+    with pytest.raises(PluginError, match=r"Nan, a 1, world 0, step 0: output 'velocity_x' = nan"):
         Simulation(game(Nan()), on_error="raise").run()
 
 
