@@ -29,8 +29,6 @@ def predator_prey(lines):
     assert [int(line.split()[0]) for line in games] == [1, 2, 3]
     won = [sum(f" {end} " in line for line in games) for end in ("team 2", "team 3", "tie")]
     assert totals == f"team 2 won {won[0]}, team 3 won {won[1]}, {won[2]} ties"
-    fewer = output_of("01_predator_prey.py", "--seeds", "2", "--end", "120")
-    assert fewer[:3] == lines[:3]
 
 
 def your_own_chaser(lines):

@@ -204,13 +204,13 @@ class Device:
         # Numba reads this attribute of unknown objects: in compiled code the device is its dispatcher.
         return self.dispatcher._numba_type_
 
-    def __call__(self, *args: Any) -> Any:
+    def __call__(self, *args: Any, **named: Any) -> Any:
         if is_interpreted(self.py_func):
-            return self.py_func(*args)
+            return self.py_func(*args, **named)
         if self._for_python is None:
             self._for_python = jitted(renamed(self.py_func, Fingerprint(self.py_func).digest), **self.options)
         with compiling():  # argument types may be new
-            return self._for_python(*args)
+            return self._for_python(*args, **named)
 
 
 def device(function: Callable[..., Any]) -> Any:

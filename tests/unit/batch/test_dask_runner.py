@@ -237,11 +237,17 @@ def test_without_workers_it_waits_only_so_long():
         assert time.monotonic() - began < 300.0
 
 
-def test_workers_that_come_later_play():
-    batch = short_batch(2)
-    with cluster_of(0) as own, connect(own.scheduler_address) as client:
-        executor = OnDask(client, look=lambda _: own.scale(1))
-        assert rows(batch.play(None, executor)) == rows(batch.play(None, InProcess()))
+def test_workers_that_come_later_play_and_threads_that_are_of_no_use_are_told_once():
+    batch = short_batch(3)
+    match = "2 threads are idle; start more workers of one thread each"
+    with (
+        cluster_of(0, threads_per_worker=3) as own,
+        connect(own.scheduler_address) as client,
+        pytest.warns(RuntimeWarning, match=match) as told,
+    ):
+        results = batch.play(None, OnDask(client, stack=2, look=lambda _: own.scale(1)))
+    assert len(told) == 1
+    assert rows(results) == rows(batch.play(None, InProcess()))
 
 
 def test_closing_it_ends_what_is_under_way(cluster, client, tmp_path):
@@ -354,19 +360,6 @@ def test_versions_that_differ_are_named_on_both_sides():
         BatchError, match=r"worker tcp://a:1 has numpy .*, numba .*; the batch has numpy 1.0, numba 0.1"
     ):
         check_same_code(here | {"numpy": "1.0", "numba": "0.1"}, "tcp://a:1")
-
-
-def test_threads_that_are_of_no_use_are_told_once():
-    batch = short_batch(3)
-    match = "2 threads are idle; start more workers of one thread each"
-    with (
-        cluster_of(1, threads_per_worker=3) as own,
-        connect(own.scheduler_address) as client,
-        pytest.warns(RuntimeWarning, match=match) as told,
-    ):
-        results = batch.play(None, OnDask(client, stack=2))
-    assert len(told) == 1
-    assert rows(results) == rows(batch.play(None, InProcess()))
 
 
 # -- the way there ----------------------------------------------------------------------------------------------------------
