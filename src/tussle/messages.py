@@ -256,6 +256,13 @@ class FlagCaptured(Message):
     boundary = Field(dtype=int, doc="Id of the flag's boundary.")
 
 
+class RoadGraph(Message):
+    """A graph of roads, sent once at the start."""
+
+    graph = Field(dtype=int, doc="Id of the graph.")
+    roads = Handle(doc="A `networkx` graph; each node has the attribute pos [m], (3,), world frame.")
+
+
 class RewardGiven(Message):
     """An entity earned a reward."""
 

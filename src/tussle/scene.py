@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -107,6 +107,10 @@ class Scene:
         object.__setattr__(self, "walls", tuple(self.walls))
         object.__setattr__(self, "boundaries", dict(self.boundaries))
         object.__setattr__(self, "bases", tuple(self.bases))
+
+    def with_walls(self, walls: tuple[Volume, ...]) -> Scene:
+        """The scene with further walls."""
+        return replace(self, walls=(*self.walls, *walls)) if walls else self
 
     def boundary(self, name: int | str) -> Volume:
         """The region with this id or name.

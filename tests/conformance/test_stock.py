@@ -25,13 +25,18 @@ COMPANIONS = {
     "SimpleQuadrotor": ["SimpleQuadrotorControllerLQR"],
 }
 
+GRAPHML = """<graphml xmlns="http://graphml.graphdrawing.org/xmlns"><key id="x" for="node" attr.name="x" attr.type="double"/>
+<key id="y" for="node" attr.name="y" attr.type="double"/><graph edgedefault="directed">
+<node id="a"><data key="x">1</data><data key="y">2</data></node></graph></graphml>"""
 RECORD = "id,t,x,y,z,qw,qx,qy,qz,vx,vy,vz\n"
 FILES = {
     "TrajectoryRecordPlayback": (
         "trajectory.txt",
         RECORD
         + "".join(f"{i},{k / 10},{i},{k},5,1,0,0,0,{k / 3},1,0\n" for i in range(1, 80) for k in range(12)),
-    )
+    ),
+    "MapGen2D": ("maze_2d_1", "P2 3 2 255  0 9 255  255 255 0"),
+    "GraphInteraction": ("default", GRAPHML),
 }
 """Files that a plugin reads, by plugin."""
 
@@ -49,6 +54,8 @@ ON_REGIONS = (
 
 @pytest.mark.parametrize("name", stock.manifest())
 def test_plugin_meets_the_contract(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    if name == "GraphInteraction":
+        pytest.importorskip("networkx")
     if name in FILES:
         monkeypatch.chdir(tmp_path)
         file, text = FILES[name]

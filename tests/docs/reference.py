@@ -40,6 +40,7 @@ HOOKS = (
     "result_one",
     "result_of",
     "regions",
+    "walls",
     "rejects",
     "route",
     "from_body",

@@ -46,7 +46,9 @@ def requirements(project: dict, *extras: str) -> set[str]:
             found |= requirements(project, *inner[1].split(","))
         else:
             name = re.match(r"[A-Za-z0-9._-]+", line)[0].lower().replace("-", "_")
-            found.add(name.removesuffix("_sdk"))  # foxglove-sdk is imported as foxglove
+            found.add(
+                {"foxglove_sdk": "foxglove", "pillow": "pil"}.get(name, name)
+            )  # names under which they are imported
     return found
 
 
@@ -111,8 +113,8 @@ def test_declared_dependencies_are_the_imported_ones():
     extras = [name for name in project["optional-dependencies"] if name not in ("test", "frames")]
     used = {name.lower() for name in third_party("src")}
     declared = requirements(project, *extras)
-    assert used - {"llvmlite", "mpl_toolkits", "pil", "vtkmodules"} == declared, (
-        "llvmlite comes with numba, mpl_toolkits with matplotlib, PIL (Pillow) and vtkmodules with pyvista"
+    assert used - {"llvmlite", "mpl_toolkits", "vtkmodules"} == declared, (
+        "llvmlite comes with numba, mpl_toolkits with matplotlib, vtkmodules with pyvista"
     )
 
 

@@ -13,7 +13,7 @@ from tussle.api.row_laws import step_rows
 from tussle.api.world import WorldView
 from tussle.columns import Output, Param
 from tussle.messages import Messages
-from tussle.scene import TeamRegion
+from tussle.scene import TeamRegion, Volume
 
 
 class EntityPlugin(Plugin):
@@ -84,6 +84,10 @@ class WorldPlugin(Plugin):
 
     def regions(self) -> tuple[TeamRegion, ...]:
         """Regions that this plugin defines, for `w.region` and pictures; its structural parameters are known."""
+        return ()
+
+    def walls(self) -> tuple[Volume, ...]:
+        """Walls that this plugin adds to the scene; its structural parameters are known."""
         return ()
 
     def start(self, w: WorldView) -> None:

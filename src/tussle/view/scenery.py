@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from tussle.errors import ViewError
+from tussle.errors import TussleError, ViewError
 from tussle.geodesy import Origin
 from tussle.mission import Block, Mission
 from tussle.scene import Base, Cuboid, Plane, Polyhedron, Prism, Sphere, Volume
@@ -97,15 +97,16 @@ def scenery_of(
     """
     viewer = viewer or {}
     corners = [np.asarray(c, float) for c in extent or ()]
+    notes: list[str] = []
+    shapes = _shapes(mission, notes) if mission is not None else []
     if mission is not None:
         if not corners:
             corners += [c for block in mission.blocks for c in _start(block)]
         corners += [np.add(b.position, s * b.radius) for b in mission.scene.bases for s in (-1.0, 1.0)]
-        corners += [c for _, _, shape, _ in _shapes(mission) for c in _corners(shape)]
+        corners += [c for _, _, shape, _ in shapes for c in _corners(shape)]
     low, high = _at_least(np.array(corners).reshape(-1, 3))
     scene = None if mission is None else mission.scene
     spacing = viewer.get("grid_spacing", 0.0)
-    notes: list[str] = []
     return Scenery(
         origin=Origin() if scene is None else scene.origin,
         origin_length=_origin_length(viewer, low, high),
@@ -116,7 +117,7 @@ def scenery_of(
         bases=list(scene.bases) if scene else [],
         boundaries=[
             Region(name, team, shape, is_wall, mesh_of(shape, low, high), outline_of(shape, low, high))
-            for name, team, shape, is_wall in (_shapes(mission) if mission is not None else ())
+            for name, team, shape, is_wall in shapes
         ],
         terrain=_terrain(viewer, folder, notes),
         background=_background(viewer, notes),
@@ -132,13 +133,18 @@ def _start(block: Block) -> list[np.ndarray]:
     return [np.array(block.position) - spread, np.array(block.position) + spread]
 
 
-def _shapes(mission: Mission) -> list[tuple[str, int | None, Volume, bool]]:
-    """Name, team, shape and whether it is a wall, of all regions of a mission."""
+def _shapes(mission: Mission, notes: list[str]) -> list[tuple[str, int | None, Volume, bool]]:
+    """Name, team, shape and whether it is a wall, of all regions of a mission; walls of plugins have no names."""
     found: list[tuple[str, int | None, Volume, bool]] = []
     scene = mission.scene
     found += [(str(name), None, shape, False) for name, shape in scene.boundaries.items()]
     found += [(f"wall {i + 1}", None, shape, True) for i, shape in enumerate(scene.walls)]
     found += [(p.instance_name, r.team, r.shape, False) for p in mission.interactions for r in p.regions()]
+    for plugin in mission.interactions:
+        try:
+            found += [("", None, wall, True) for wall in plugin.walls()]
+        except TussleError as error:  # the file of a recorded run's map may be elsewhere
+            notes.append(f"{error}; its walls are not shown")
     return found
 
 
