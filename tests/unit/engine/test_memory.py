@@ -18,7 +18,7 @@ MOST_GROWTH = (
     1.0 + 0.002 * N_GAMES
 )  # [MB]; allocators settle for some thousand games. What was kept took 20 kB a game and more
 MODELS = [
-    *"HarmonicOscillator Still External Unicycle SimpleQuadrotor".split(),
+    *["HarmonicOscillator", "Still", "External", "Unicycle", "SimpleQuadrotor"],
     "an author's own",
     "classes made on the fly",
 ]
