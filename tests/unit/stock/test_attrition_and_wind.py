@@ -10,7 +10,7 @@ import pytest
 from small_worlds import Drift, block, mission
 
 from tussle import Simulation
-from tussle.stock import ExternalForceField, RandomAttrit, Still
+from tussle.stock import Ballistic, ExternalForceField, RandomAttrit, Still
 from tussle.stock.interaction.external_force_field import dryden
 
 
@@ -27,6 +27,15 @@ def test_a_team_shrinks_linearly_to_those_that_are_left_alive():
         assert alive.sum(axis=1).tolist() == [max(2, left)] * 2, step
     assert np.flatnonzero(alive[0]).tolist() == [2, 6]
     assert sim.read("b.pos")[1].all()
+
+
+def test_a_team_that_appears_late_is_not_lost_at_once():
+    late = block("late", team=1, count=10, first_birth=1.0)
+    rule = RandomAttrit(start_after=0.0, duration=4.0, leave_alive=())
+    sim = Simulation(mission(late, interactions=[rule], end=3.0, end_conditions="time"))
+    for steps, left in ((11, 8), (9, 5), (10, 3)):  # ceil(10 (1 - t / 4))
+        sim.step(steps)
+        assert sim.read("late.pos")[1].sum() == left
 
 
 def test_all_are_equally_likely_to_be_lost():
@@ -56,6 +65,15 @@ def test_a_constant_force_and_moments_near_the_ground():
     for name, torque in (("high", (0.0, 0.0, 0.0)), ("low", (-5.0, 4.0, 0.0))):
         assert sim.read(f"{name}.force")[0][0, 0].tolist() == [1.0, 2.0, 3.0]
         assert sim.read(f"{name}.torque")[0][0, 0] == pytest.approx(torque, abs=1e-12)
+
+
+def test_a_constant_force_accelerates_a_mass():
+    wind = ExternalForceField(constant_force=(3.0, 0.0, 2.0 * 9.81))
+    ball = block(autonomy=(), motion=Ballistic(), mass=2.0)
+    sim = Simulation(mission(ball, interactions=[wind]))
+    sim.step(10)
+    # The force is there from the end of the first step on; gravity from the beginning.
+    assert sim.read("a.pos")[0][0, 0] == pytest.approx([0.5 * 1.5 * 0.9**2, 0.0, -9.81 * (0.005 + 0.09)])
 
 
 def test_a_variable_force_is_the_same_for_all_and_changes_after_a_while():

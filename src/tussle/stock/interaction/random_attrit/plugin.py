@@ -21,13 +21,18 @@ class RandomAttrit(Interaction):
     duration = Param(30.0, unit="s", gt=0.0, doc="Time from the beginning of the losses to the last one.")
     team = Param(1, doc="Team that has losses.")
     leave_alive = Param((1, 2), ragged=True, doc="Ids of entities that are not removed.")
-    n_start = State(dtype=int, default=-1, per="world", doc="Size of the team at start_after; -1 before.")
+    n_start = State(
+        dtype=int,
+        default=-1,
+        per="world",
+        doc="Size of the team at start_after, or when it appears; -1 before.",
+    )
 
     def step(self, w: WorldView) -> None:
         is_team = w.team == self.team[w.world]
         count = np.bincount(w.world[is_team], minlength=w.n_worlds)
         elapsed = w.t + 1e-6 * w.dt - self.start_after
-        begins = (self.n_start < 0) & (elapsed >= 0.0)
+        begins = (self.n_start < 0) & (elapsed >= 0.0) & (count > 0)
         self.n_start[begins] = count[begins]
         left = np.ceil(self.n_start * np.maximum(0.0, 1.0 - elapsed / self.duration))
         n_lost = np.where(self.n_start < 0, 0, count - left.astype(np.int64))
