@@ -50,7 +50,15 @@ class Radio(Autonomy):
 
 def still(name, x, count=1, team=1, **radio):
     autonomy = Radio(**radio) if radio else ()
-    return Block(name=name, team=team, count=count, position=(x, 0.0, 0.0), motion=Still(), autonomy=autonomy)
+    return Block(
+        name=name,
+        team=team,
+        count=count,
+        position=(x, 0.0, 0.0),
+        variance=(0.0, 0.0, 0.0),
+        motion=Still(),
+        autonomy=autonomy,
+    )
 
 
 def talks(name, x, **values):
