@@ -98,6 +98,8 @@ STATES = {
     "aircraft": ("plane.SimpleAircraftControllerPID.lateral", 0),
     "schemas": ("robot.MotorSchemas.MoveToGoalMS.integral", None),
     "births_and_radio": ("first.Beacon.rumour", 1),
+    "radio": ("first.Beacon.rumour", 1),
+    "sensors": ("swarm.SimpleINS.error", 0),
     "narrow_view": ("narrow.Boids.target", 2),
     "slow_clocks": ("prey.UnicyclePID.heading", 2),
     "cars": ("car.Wanderer.wish", None),
