@@ -107,9 +107,9 @@ def _post_links(
     more = np.zeros(len(number)) if links.delay is None else np.append(np.zeros(len(own)), links.delay[heard])
     steps = _steps(network.plugin.comm_delay[links.world[number]] + more, clock.dt)
     for topic, first, last in zip(topics, links.starts[:-1], links.starts[1:], strict=True):
-        here = (number >= first) & (number < last)
+        here = np.flatnonzero((number >= first) & (number < last))
         for late in np.unique(steps[here]) if topic.inboxes else ():
-            mine = here & (steps == late)
+            mine = here[steps[here] == late]
             # Only messages with a receiver: others may be there only because of another world of the stack.
             is_kept = np.zeros(len(links.world), bool)
             is_kept[number[mine]] = True

@@ -11,11 +11,9 @@ from tussle.api import Links, Messages, Network, Param, State, WorldView
 from tussle.numeric import exp, log
 from tussle.stock.network.radio_network import kernels
 
-QUEUE, PLANE, FADING, JAMMED, HALF_DUPLEX, CHANCE = range(6)
+QUEUE, PLANE, _, _, HALF_DUPLEX, CHANCE = range(6)
 LEAST = 0.01
 """Rayleigh fading: receivers that would receive a smaller share of the messages are out of reach."""
-NEAREST = 1e-3
-"""Distance below which a jammer's power does not grow any more [m]."""
 
 
 class RadioNetwork(Network):
@@ -90,21 +88,17 @@ class RadioNetwork(Network):
         is_jammer = w.team == self.jammer_team[w.world]
         if self.fading == "none" and not is_jammer.any():
             return
-        ratio = np.maximum(links.distance, NEAREST) / self.range[world]
-        weakness = exp(self.path_loss_exponent[world] * log(ratio))
-        noise = (self._noise(w, is_jammer) if is_jammer.any() else np.ones(w.n))[links.receiver]
-        if self.fading == "none":
-            links.lose(JAMMED, (noise > 1.0) & (weakness * noise >= 1.0))
-        else:
-            draw = links.uniform(w, "fading")
-            links.lose(FADING, draw >= exp(-weakness))
-            links.lose(JAMMED, draw >= exp(-weakness * noise))
+        noise = self._noise(w, is_jammer) if is_jammer.any() else np.ones(w.n)
+        fades = self.fading == "rayleigh"
+        draw = links.uniform(w, "fading") if fades else links.distance
+        limits = self.range, self.path_loss_exponent
+        kernels.fade((links.receiver, world), links.distance, draw, noise, limits, fades, links.outcome)
 
     def _noise(self, w: WorldView, is_jammer: np.ndarray) -> np.ndarray:
         """Power of noise and jammers at each row, (n,)."""
         near = w.near(np.where(is_jammer, self.jammer_range[w.world], 0.0))
         world = w.world[near.row]
-        ratio = self.jammer_range[world] / np.maximum(near.distance, NEAREST)
+        ratio = self.jammer_range[world] / np.maximum(near.distance, kernels.NEAREST)
         power = exp(self.path_loss_exponent[world] * log(ratio))
         order = np.lexsort((w.id[near.row], near.other))  # rounding must not depend on the order of the rows
         noise = np.ones(w.n)
