@@ -244,6 +244,14 @@ def test_the_file_of_counts_is_a_plain_name(tmp_path, name):
         )
 
 
+def test_a_topic_that_is_not_there_is_not_counted_silently(tmp_path):
+    networks = [SphereNetwork(monitor_publisher_topics="Reprt, *", csv_filename="radio.csv")]
+    with pytest.warns(
+        RuntimeWarning, match=r"SphereNetwork had no topic 'Reprt' to count \(did you mean 'Report'\?\)"
+    ):
+        recorded(tmp_path / "run", networks, talks("a", 0.0, network="SphereNetwork"))
+
+
 def test_two_networks_do_not_write_one_file_nor_over_another(tmp_path):
     networks = [SphereNetwork(csv_filename="counts.csv"), GlobalNetwork(csv_filename="counts.csv")]
     block = talks("a", 0.0, network="SphereNetwork")
