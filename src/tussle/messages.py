@@ -81,7 +81,7 @@ class Messages:
             elif isinstance(column, Handle):
                 data[name] = [values[i] for i in index]
             else:
-                data[name] = np.ascontiguousarray(values[..., index])
+                data[name] = np.take(values, index, axis=-1)
         return Messages(self.type, self.world[index], self.sender[index], data)
 
     def sizes(self) -> np.ndarray:
@@ -306,6 +306,14 @@ class WaypointStatus(Message):
     index = Field(dtype=int, doc="Index of the next waypoint.")
     n_waypoints = Field(dtype=int, doc="Length of the list.")
     is_done = Field(dtype=bool, doc="Whether the end of the list was reached.")
+
+
+class GPSStatus(Message):
+    """What a satellite receiver measures."""
+
+    geodetic = Field("latitude longitude altitude", unit="rad rad m", doc="Position of the last fix, WGS84.")
+    has_fix = Field(dtype=bool, doc="Whether there is a fix now.")
+    t = Field(unit="s", doc="Time of the last fix.")
 
 
 class BoundaryShape(Message):

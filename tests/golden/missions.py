@@ -9,6 +9,7 @@ from golden_plugins import Balloon, Beacon, Car, Nursery, Wanderer
 
 from tussle import Block, Mission
 from tussle.stock import (
+    GPS,
     AircraftToSingleIntegratorController,
     AuctionAssign,
     AutonomyExecutor,
@@ -18,6 +19,7 @@ from tussle.stock import (
     Boundary,
     BoundaryDefense,
     CaptureInBoundaryInteraction,
+    ContactBlobCamera,
     Control3D,
     DirectController,
     DoubleIntegrator,
@@ -28,6 +30,7 @@ from tussle.stock import (
     DubinsAirplaneController,
     EnforceBoundaryInteraction,
     ExternalForceField,
+    FieldOfView,
     FlagCaptureInteraction,
     FlagCaptureMetrics,
     GoTo,
@@ -35,6 +38,7 @@ from tussle.stock import (
     GraphvizFSM,
     GroundCollision,
     LocalNetwork,
+    LOSSensor,
     MotorSchemas,
     MoveToGoalMS,
     NoisyContacts,
@@ -49,6 +53,7 @@ from tussle.stock import (
     SimpleCar,
     SimpleCarControllerHeading,
     SimpleCollision,
+    SimpleINS,
     SimpleQuadrotor,
     SimpleQuadrotorControllerLQR,
     SingleIntegrator,
@@ -179,6 +184,22 @@ def radio() -> Mission:
     jammer = Block(name="jammer", team=2, position=(20.0, 0.0, 0.0), motion=Still())
     return Mission(
         blocks=[node("first", 9), jammer, node("late", 9, rate=4.0)], end=3.0, networks=[network], interactions=[Nursery()],
+    )  # fmt: skip
+
+
+def sensors() -> Mission:
+    """Navigation that drifts and is denied, cameras and a range finder; the belief steers."""
+    swarm = Block(
+        name="swarm", team=1, count=8, position=(0.0, 0.0, 20.0), variance=(400.0, 400.0, 25.0), heading_variance=1.0, speed=10.0,
+        autonomy=Straight(speed=10.0), controller=UnicyclePID(), motion=Unicycle(vel_max=15.0, turn_rate_max=1.0, pitch_rate_max=1.0),
+        sensor=[
+            GPS(gps_denied_ids="1", noise=(2.0, 2.0, 4.0)), SimpleINS(orient_noise_0=(0.0, 0.01), orient_noise_1=(0.0, 0.01)),
+            FieldOfView(bearing_noise=0.01, elevation_noise=0.01, range_noise=0.05, false_negative_probability=0.1),
+            ContactBlobCamera(azimuth_fov="120 deg", size_noise_0=(0.0, 1.0)), LOSSensor(rpy="0 60 0"),
+        ],
+    )  # fmt: skip
+    return Mission(
+        blocks=[swarm], motion_multiplier=2, end=3.0, interactions=[Boundary(boundary_id=1, shape="sphere", radius=15.0)],
     )  # fmt: skip
 
 
@@ -413,6 +434,7 @@ STEPS: dict[str, int] = {
     "schemas": 24,
     "births_and_radio": 24,
     "radio": 24,
+    "sensors": 24,
     "narrow_view": 24,
     "slow_clocks": 24,
     "cars": 24,

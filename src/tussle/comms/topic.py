@@ -158,20 +158,21 @@ class Inbox:
 
         Messages to everyone make rows x messages items; `latest` and `by_row` avoid this.
         """
-        rows, batches = [], []
+        if not self.deliveries:
+            return np.zeros(0, np.int64), Messages.empty(self.topic.type)
+        rows, numbers, n = [], [], 0
         for delivery in self.deliveries:
             row, number = (
                 self._receivers(delivery) if delivery.to != EVERYONE else self._broadcast_pairs(delivery)
             )
             rows.append(row)
-            batches.append(delivery.batch.take(number))
-        if not rows:
-            return np.zeros(0, np.int64), Messages.empty(self.topic.type)
-        if len(rows) == 1:
-            return rows[0], batches[0]
-        row = np.concatenate(rows)
-        order = order_by_row(row, self.view.n)
-        return row[order], Messages.join(batches).take(order)
+            numbers.append(number + n)
+            n += delivery.batch.n
+        row, number = np.concatenate(rows), np.concatenate(numbers)
+        if len(rows) > 1:
+            order = order_by_row(row, self.view.n)
+            row, number = row[order], number[order]
+        return row, Messages.join([delivery.batch for delivery in self.deliveries]).take(number)
 
     def count_by_world(self, delivery: Delivery, n_worlds: int) -> np.ndarray:
         """Number of copies of messages that receivers get from a delivery, in each world, (n_worlds,)."""

@@ -107,9 +107,9 @@ def _post_links(
     more = np.zeros(len(number)) if links.delay is None else np.append(np.zeros(len(own)), links.delay[heard])
     steps = _steps(network.plugin.comm_delay[links.world[number]] + more, clock.dt)
     for topic, first, last in zip(topics, links.starts[:-1], links.starts[1:], strict=True):
-        here = (number >= first) & (number < last)
-        for late in np.flatnonzero(np.bincount(steps[here])) if topic.inboxes else ():
-            mine = here & (steps == late)
+        here = np.flatnonzero((number >= first) & (number < last))
+        for late in np.unique(steps[here]) if topic.inboxes else ():
+            mine = here[steps[here] == late]
             # Only messages with a receiver: others may be there only because of another world of the stack.
             is_kept = np.zeros(len(links.world), bool)
             is_kept[number[mine]] = True
@@ -134,4 +134,4 @@ def _count_links(
 
 def _steps(delay: np.ndarray, dt: float) -> np.ndarray:
     """Number of whole steps until a delay [s] is over."""
-    return np.maximum(0, np.ceil(delay / dt - 1e-9)).astype(np.int64)
+    return np.clip(np.ceil(delay / dt - 1e-9), 0.0, 2.0**53).astype(np.int64)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
@@ -278,6 +279,8 @@ class Recorder:
         if self._traffic.has_links:
             self._streams.append(Stream(self.directory / LINKS_FILE, LINKS))
             self._write(self._streams[-1], self._traffic.take_links())
+        for text in self._traffic.unknown_topics(sim.state.message_bus.topics):
+            warnings.warn(text, RuntimeWarning, stacklevel=2)
         for stream in self._streams:
             stream.close()
         run_file.write(

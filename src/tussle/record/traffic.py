@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, TextIO
 
 import numpy as np
 import pyarrow as pa
 
-from tussle.errors import ParameterError, RecordError, listed
+from tussle.errors import ParameterError, RecordError, listed, nearest_name
 from tussle.record.schema import FILES, LINKS
 
 MOST_LINKS = 1_000_000
@@ -112,6 +112,18 @@ class Traffic:
         """Write the counts of a step: time of its beginning [s], (n_worlds,), and which worlds played it."""
         for monitor in self._monitors.values():
             monitor.end_step(t, running)
+
+    def unknown_topics(self, topics: Iterable[tuple[str, str]]) -> list[str]:
+        """A warning for each monitored topic that is not in `topics`, (network, name) of all topics that the game had."""
+        known: dict[str, list[str]] = {name: [] for name in self._monitors}
+        for network, name in topics:
+            known.setdefault(network, []).append(name)
+        return [
+            f"{network} had no topic {topic!r} to count{nearest_name(topic, known[network])}; {listed(known[network])}"
+            for network, monitor in self._monitors.items()
+            for topic in dict.fromkeys(topic for _, topic in monitor.counts)
+            if topic not in ("*", *known[network])
+        ]
 
     def close(self) -> None:
         for monitor in self._monitors.values():

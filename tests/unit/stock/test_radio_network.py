@@ -50,7 +50,15 @@ class Radio(Autonomy):
 
 def still(name, x, count=1, team=1, **radio):
     autonomy = Radio(**radio) if radio else ()
-    return Block(name=name, team=team, count=count, position=(x, 0.0, 0.0), motion=Still(), autonomy=autonomy)
+    return Block(
+        name=name,
+        team=team,
+        count=count,
+        position=(x, 0.0, 0.0),
+        variance=(0.0, 0.0, 0.0),
+        motion=Still(),
+        autonomy=autonomy,
+    )
 
 
 def talks(name, x, **values):
@@ -234,6 +242,14 @@ def test_the_file_of_counts_is_a_plain_name(tmp_path, name):
         recorded(
             tmp_path / "run", [GlobalNetwork(csv_filename=name)], talks("a", 0.0, network="GlobalNetwork")
         )
+
+
+def test_a_topic_that_is_not_there_is_not_counted_silently(tmp_path):
+    networks = [SphereNetwork(monitor_publisher_topics="Reprt, *", csv_filename="radio.csv")]
+    with pytest.warns(
+        RuntimeWarning, match=r"SphereNetwork had no topic 'Reprt' to count \(did you mean 'Report'\?\)"
+    ):
+        recorded(tmp_path / "run", networks, talks("a", 0.0, network="SphereNetwork"))
 
 
 def test_two_networks_do_not_write_one_file_nor_over_another(tmp_path):

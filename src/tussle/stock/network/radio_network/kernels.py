@@ -1,8 +1,14 @@
-"""When each message is on the air."""
+"""When each message is on the air, and whether its signal is strong enough."""
 
 from __future__ import annotations
 
+from tussle.numeric import exp, log
 from tussle.numeric.kernel import kernel
+
+FADING, JAMMED = 3, 4
+"""Outcomes of links, one more than the places of the reasons in `RadioNetwork.losses`."""
+NEAREST = 1e-3
+"""Distance below which powers do not grow any more [m]."""
 
 
 @kernel("I I F (F F F) F (Fw Fw) (Fw Fw) (Fw Fw Bw)")
@@ -33,3 +39,30 @@ def send(row, world, size, limits, offset, queue, on_air, span):
             busy_until[own] = end[k]
             first[own] = min(first[own], start[k])
             last[own] = end[k]
+
+
+@kernel("(I I) F F F (F F) b1 Iw")
+def fade(place, distance, draw, noise, limits, fades, outcome):
+    """Set the outcome of links whose signal is too weak.
+
+    Args:
+        place: Row of each receiver, and world of each link, (m,) each.
+        distance: Distance of sender and receiver [m], (m,).
+        draw: Uniform draws, (m,).
+        noise: Power of noise and jammers at each row; the noise alone is 1, (n,).
+        limits: Range [m] and path loss exponent, (n_worlds,) each.
+        fades: Whether the signal's power is exponentially distributed; otherwise it is the mean.
+        outcome: Outcomes, (m,); those that are 0 may change.
+    """
+    row, world = place
+    reach, exponent = limits
+    for k in range(distance.shape[0]):
+        if outcome[k] == 0:
+            ratio = max(distance[k], NEAREST) / reach[world[k]]
+            n = exponent[world[k]]
+            least = ratio * ratio if n == 2.0 else exp(n * log(ratio))
+            power = -log(1.0 - draw[k]) if fades else 1.0
+            if fades and power < least:
+                outcome[k] = FADING
+            elif noise[row[k]] > 1.0 and power < least * noise[row[k]]:
+                outcome[k] = JAMMED

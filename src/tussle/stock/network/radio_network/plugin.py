@@ -7,15 +7,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tussle.api import Links, Messages, Network, Param, State, WorldView, neighbors
+from tussle.api import Links, Messages, Network, Param, State, WorldView
 from tussle.numeric import exp, log
 from tussle.stock.network.radio_network import kernels
 
-QUEUE, PLANE, FADING, JAMMED, HALF_DUPLEX, CHANCE = range(6)
+QUEUE, PLANE, _, _, HALF_DUPLEX, CHANCE = range(6)
 LEAST = 0.01
 """Rayleigh fading: receivers that would receive a smaller share of the messages are out of reach."""
-NEAREST = 1e-3
-"""Distance below which a jammer's power does not grow any more [m]."""
 
 
 class RadioNetwork(Network):
@@ -63,15 +61,6 @@ class RadioNetwork(Network):
         unit="s", per="entity", default=-math.inf, doc="Time at which the transmitter is free."
     )
 
-    @neighbors("jammer_range", power="sum")
-    @staticmethod
-    def jamming(
-        distance: float, other_team: int, jammer_team: int, jammer_range: float, path_loss_exponent: float
-    ) -> tuple[float] | None:
-        if other_team != jammer_team:
-            return None
-        return (exp(path_loss_exponent * log(jammer_range / max(distance, NEAREST))),)
-
     def transmit(self, w: WorldView, outboxes: Sequence[Messages]) -> Links:
         """Decide which messages are received, and when."""
         factor = exp(log(-math.log(LEAST)) / self.path_loss_exponent) if self.fading == "rayleigh" else 1.0
@@ -96,18 +85,25 @@ class RadioNetwork(Network):
         return links
 
     def _fade(self, w: WorldView, links: Links, world: np.ndarray) -> None:
-        has_jammers = bool((w.team == self.jammer_team[w.world]).any())
-        if self.fading == "none" and not has_jammers:
+        is_jammer = w.team == self.jammer_team[w.world]
+        if self.fading == "none" and not is_jammer.any():
             return
-        ratio = np.maximum(links.distance, NEAREST) / self.range[world]
-        weakness = exp(self.path_loss_exponent[world] * log(ratio))
-        noise = 1.0 + self.jamming(w).power[links.receiver] if has_jammers else np.ones(len(world))
-        if self.fading == "none":
-            links.lose(JAMMED, (noise > 1.0) & (weakness * noise >= 1.0))
-        else:
-            draw = links.uniform(w, "fading")
-            links.lose(FADING, draw >= exp(-weakness))
-            links.lose(JAMMED, draw >= exp(-weakness * noise))
+        noise = self._noise(w, is_jammer) if is_jammer.any() else np.ones(w.n)
+        fades = self.fading == "rayleigh"
+        draw = links.uniform(w, "fading") if fades else links.distance
+        limits = self.range, self.path_loss_exponent
+        kernels.fade((links.receiver, world), links.distance, draw, noise, limits, fades, links.outcome)
+
+    def _noise(self, w: WorldView, is_jammer: np.ndarray) -> np.ndarray:
+        """Power of noise and jammers at each row, (n,)."""
+        near = w.near(np.where(is_jammer, self.jammer_range[w.world], 0.0))
+        world = w.world[near.row]
+        ratio = self.jammer_range[world] / np.maximum(near.distance, kernels.NEAREST)
+        power = exp(self.path_loss_exponent[world] * log(ratio))
+        order = np.lexsort((w.id[near.row], near.other))  # rounding must not depend on the order of the rows
+        noise = np.ones(w.n)
+        np.add.at(noise, near.other[order], power[order])
+        return noise
 
     def _send(
         self, w: WorldView, links: Links, outboxes: Sequence[Messages]

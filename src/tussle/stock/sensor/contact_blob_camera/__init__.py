@@ -1,0 +1,5 @@
+"""ContactBlobCamera: boxes around entities in an image."""
+
+from tussle.stock.sensor.contact_blob_camera.plugin import ContactBlobCamera
+
+__all__ = ["ContactBlobCamera"]
