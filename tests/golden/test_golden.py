@@ -110,6 +110,7 @@ STATES = {
     "vehicles": ("quadrotor.GoTo.goal", 0),
     "machines": ("robot.MotorSchemas.MoveToGoalMS.integral", None),
     "errands": ("head.AuctionAssign.deadline", None),
+    "six_degrees": ("jet.FixedWing6DOFControllerPID.trim", None),
 }
 
 
