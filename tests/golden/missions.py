@@ -10,6 +10,7 @@ from golden_plugins import Balloon, Beacon, Car, Nursery, Wanderer
 from tussle import Block, Mission
 from tussle.stock import (
     GPS,
+    UUV6DOF,
     AircraftToSingleIntegratorController,
     AuctionAssign,
     AutonomyExecutor,
@@ -31,6 +32,8 @@ from tussle.stock import (
     EnforceBoundaryInteraction,
     ExternalForceField,
     FieldOfView,
+    FixedWing6DOF,
+    FixedWing6DOFControllerPID,
     FlagCaptureInteraction,
     FlagCaptureMetrics,
     GoTo,
@@ -39,13 +42,19 @@ from tussle.stock import (
     GroundCollision,
     LocalNetwork,
     LOSSensor,
+    MotionBattery,
     MotorSchemas,
     MoveToGoalMS,
+    Multirotor,
+    MultirotorControllerPID,
     NoisyContacts,
     NoisyState,
     Predator,
     RadioNetwork,
     RandomAttrit,
+    RigidBody6DOF,
+    RigidBody6DOFControllerPID,
+    RigidBody6DOFStateSensor,
     SimpleAircraft,
     SimpleAircraftControllerPID,
     SimpleCapture,
@@ -67,6 +76,8 @@ from tussle.stock import (
     Unicycle,
     UnicycleControllerPoint,
     UnicyclePID,
+    UUV6DOFLinearEnergy,
+    UUV6DOFPIDController,
     WaypointDispatcher,
     WaypointGenerator,
 )
@@ -426,6 +437,31 @@ def errands() -> Mission:
     )  # fmt: skip
 
 
+def six_degrees() -> Mission:
+    """A rigid body, a multirotor, an aircraft and an underwater vehicle, each with its controller."""
+    fleet = {
+        "body": (
+            20.0,
+            100.0,
+            RigidBody6DOF(),
+            [MotionBattery(charge_max=10.0), RigidBody6DOFControllerPID()],
+        ),
+        "copter": (0.0, 50.0, Multirotor(), [MultirotorControllerPID()]),
+        "jet": (222.0, 200.0, FixedWing6DOF(wind=(5.0, 2.0, 0.0)), [FixedWing6DOFControllerPID()]),
+        "remus": (1.0, -20.0, UUV6DOF(), [UUV6DOFPIDController(), UUV6DOFLinearEnergy()]),
+    }
+    return Mission(
+        blocks=[
+            Block(
+                name=name, team=1, count=4, position=(0.0, 0.0, z), variance=(100.0, 100.0, 1.0), heading_variance=1.0, speed=speed,
+                autonomy=Straight(speed=speed), controller=controllers, motion=motion, sensor=RigidBody6DOFStateSensor(),
+            )
+            for name, (speed, z, motion, controllers) in fleet.items()
+        ],
+        dt=0.05, motion_multiplier=2, end=2.0,
+    )  # fmt: skip
+
+
 STEPS: dict[str, int] = {
     "chase_synchronous": 24,
     "chase_sequential": 24,
@@ -447,6 +483,7 @@ STEPS: dict[str, int] = {
     "vehicles": 30,
     "machines": 24,
     "errands": 24,
+    "six_degrees": 24,
 }
 """Steps after which a mission's hashes are taken."""
 

@@ -99,28 +99,6 @@ def states_of(plugin, path):
     for name in type(plugin).children():
         for child in plugin.values[name]:
             yield from states_of(child, path)
-STATES = {
-    "chase_synchronous": ("prey.Boids.target", 0),
-    "chase_sequential": ("prey.Boids.target", 0),
-    "two_flocks": ("west.SingleIntegrator.x", 6),
-    "aircraft": ("plane.SimpleAircraftControllerPID.lateral", 0),
-    "schemas": ("robot.MotorSchemas.MoveToGoalMS.integral", None),
-    "births_and_radio": ("first.Beacon.rumour", 1),
-    "radio": ("first.Beacon.rumour", 1),
-    "sensors": ("swarm.SimpleINS.error", 0),
-    "narrow_view": ("narrow.Boids.target", 2),
-    "slow_clocks": ("prey.UnicyclePID.heading", 2),
-    "cars": ("car.Wanderer.wish", None),
-    "hunters_first": ("prey.Boids.target", 0),
-    "last_captured_first": ("prey.Boids.target", 0),
-    "births_synchronous": ("slow.Beacon.rumour", 0),
-    "births_sequential": ("slow.Beacon.rumour", 0),
-    "flags": ("runner.SingleIntegrator.x", 6),
-    "winds": ("balloon.Balloon.x", 3),
-    "vehicles": ("quadrotor.GoTo.goal", 0),
-    "machines": ("robot.MotorSchemas.MoveToGoalMS.integral", None),
-    "errands": ("head.AuctionAssign.deadline", None),
-}
 
 
 @every_mission

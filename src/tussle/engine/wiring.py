@@ -48,6 +48,13 @@ def read_channels(plugin: Any) -> list[tuple[str, Channel]]:
     return [(k, inputs[k]) for k in names]
 
 
+def written_channels(plugin: Any) -> dict[str, Channel]:
+    """Output columns that a plugin writes, in order of declaration."""
+    outputs: dict[str, Channel] = {**type(plugin).outputs()}
+    names = plugin.offered_outputs() if hasattr(type(plugin), "offered_outputs") else outputs
+    return {k: outputs[k] for k in names}
+
+
 class Wiring:
     """Channel connections of one group.
 
@@ -115,7 +122,7 @@ class Wiring:
             for _, column in read_channels(plugin):
                 self._add(bus, column)
         for plugin in producers:
-            for column in type(plugin).outputs().values():
+            for column in written_channels(plugin).values():
                 self._add(bus, column)
         return bus
 
@@ -133,11 +140,11 @@ class Wiring:
         self, bus: Bus, producers: Sequence[Any], consumers: Sequence[Any], fallback: Bus | None = None
     ) -> None:
         for plugin in producers:
-            for column in type(plugin).outputs().values():
+            for column in written_channels(plugin).values():
                 for channel in column.channels:
                     bus.writers.setdefault(channel, []).append(plugin.instance_name)
         for plugin in producers:
-            for name, column in type(plugin).outputs().items():
+            for name, column in written_channels(plugin).items():
                 self._check_form(plugin, column, bus)
                 self.links[id(plugin), name] = self._link(column, bus)
         for plugin in consumers:
@@ -148,7 +155,7 @@ class Wiring:
             if len(names) > 1:
                 self.writers.append((self.where, channel, names))
         for plugin in producers:
-            for name, column in type(plugin).outputs().items():
+            for name, column in written_channels(plugin).items():
                 if name in BELIEF or any(c in bus.read for c in column.channels):
                     self.wired.setdefault(id(plugin), set()).add(name)
                 if bus.read.isdisjoint(column.channels) and not consumers:

@@ -21,7 +21,7 @@ from tussle.api import (
 )
 from tussle.columns import Channel, Topic
 from tussle.engine.simulation import Simulation
-from tussle.engine.wiring import BELIEF, read_channels, sharing
+from tussle.engine.wiring import BELIEF, read_channels, sharing, written_channels
 from tussle.mission import Block, Mission
 from tussle.stock import ALWAYS_THERE, GlobalNetwork, MotorSchemas
 from tussle.testing.partners import (
@@ -218,11 +218,11 @@ def _slots(
     missing = _without([c for a in inner for _, c in read_channels(a)], measured)
     readers = [[c for _, c in read_channels(p)] for p in (*controllers, *motions)]
     wanted = next((columns for columns in readers if columns), [])
-    written = [c for a in autonomies for b in sharing(a) for c in type(b).outputs().values()]
+    written = [c for a in autonomies for b in sharing(a) for c in written_channels(b).values()]
     pilot = driver(_without(wanted, written), measured, publishes, subscribes)
     if not motions:
         last = [c for c in controllers if not c.passthrough] or controllers
-        end = list(type(last[-1]).outputs().values()) if last else []
+        end = list(written_channels(last[-1]).values()) if last else []
         motions = [sink(end or [*Driver.outputs().values(), *_without(written, [])])]
     sensors = [*sensors, *([signal_sensor(missing)] if missing else [])]
     return {
