@@ -46,16 +46,16 @@ class InertiaParam(Param):
 class PositiveParam(Param):
     """A positive size, such as a mass, without a smallest value: near 0 the equations become too stiff for any step.
 
-    So the conformance kit tries a tenth of the default, and not the smallest positive number, as for `gt=0.0`.
+    So the conformance kit tries a tenth of the default, and no number near 0.
+
+    Args:
+        default: Value in SI units.
+        unit: SI unit.
+        doc: One-line description.
     """
 
-    def is_within(self, number: float) -> bool:
-        """Whether a number is positive."""
-        return number > 0.0 and super().is_within(number)
-
-    def allowed(self) -> str:
-        """Describe the allowed values."""
-        return f"{super().allowed()} > 0"
+    def __init__(self, default: float, *, unit: str = "", doc: str = "") -> None:
+        super().__init__(default, unit=unit, gt=0.0, doc=doc)
 
 
 class RigidBodyModel(MotionModel):

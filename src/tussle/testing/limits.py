@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from tussle.api import PositiveParam
 from tussle.columns import Handle, Param
 from tussle.engine.simulation import Simulation
 from tussle.errors import ConformanceError, MissionError, PluginError
@@ -71,7 +72,7 @@ def _values(column: Param, default: Any) -> Iterator[Any]:
     if not column.choices:
         tried = [b for b in (column.ge, column.le) if b is not None and math.isfinite(b)]
         for bound, sign in ((column.gt, 1.0), (column.lt, -1.0)):
-            if bound is not None and math.isfinite(bound):
+            if bound is not None and math.isfinite(bound) and not isinstance(column, PositiveParam):
                 distance = abs(default - bound) if math.isfinite(default) and default != bound else 1.0
                 tried.append(bound + sign * (NEAR * distance if column.dtype is float else 1))
         if math.isfinite(default):

@@ -17,6 +17,7 @@ from tussle.api import (
     Autonomy,
     Behavior,
     Controller,
+    InertiaParam,
     Interaction,
     Metric,
     MotionModel,
@@ -33,7 +34,7 @@ RATES = (1.0, 2.5, 3.0, 4.0, 9.0)
 
 def plugins(kind: type) -> list[type[Plugin]]:
     """All classes of a kind: those that ship and the golden missions' own."""
-    shipped = [stock.load(name) for name in stock.manifest()]
+    shipped = [c for c in dict.fromkeys(map(stock.load, stock.manifest())) if c.grade != "external"]
     known = [*shipped, Beacon, Wanderer, Car, Nursery]
     return [c for c in known if next(k for k in KINDS if issubclass(c, k)) is kind]
 
@@ -82,7 +83,7 @@ def value(chance: random.Random, param: Param, teams: list[int]) -> Any:
     default = param.default
     if param.choices:
         return chance.choice(param.choices)
-    if param.is_text or param.ragged:
+    if param.is_text or param.ragged or isinstance(param, InertiaParam):
         return default
     if param.dtype is bool:
         return chance.random() < 0.5
