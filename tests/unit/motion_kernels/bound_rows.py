@@ -24,4 +24,6 @@ def bound(plugin, n):
 
 def seen(n, dt, **columns):
     """A view of n rows with these body columns."""
-    return SimpleNamespace(n=n, dt=dt, column=columns.__getitem__, split=lambda run, *given: run(*given, (0, n)), **columns)
+    return SimpleNamespace(
+        n=n, dt=dt, column=columns.__getitem__, split=lambda run, *given: run(*given, (0, n)), **columns
+    )

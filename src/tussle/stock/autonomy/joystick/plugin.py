@@ -38,7 +38,7 @@ class JoystickButtons(Message):
     pressed = Field(ragged=True, doc="Numbers of the pressed buttons.")
 
 
-class Axis(NamedTuple):
+class JoystickAxis(NamedTuple):
     """How an axis gives a channel."""
 
     channel: str
@@ -51,7 +51,7 @@ class Axis(NamedTuple):
 
 
 @cache
-def axes(text: str) -> tuple[Axis, ...]:
+def axes(text: str) -> tuple[JoystickAxis, ...]:
     """Parse rows [channel axis input_min input_max output_min output_max factor].
 
     Raises:
@@ -64,7 +64,7 @@ def axes(text: str) -> tuple[Axis, ...]:
             raise ParameterError(
                 f"there is no channel {channel!r}{nearest_name(channel, CHANNEL_UNITS)}; {listed(CHANNEL_UNITS)}"
             )
-        axis = Axis(channel, *texts.row(rest, [(name, "", "") for name in NUMBERS]))
+        axis = JoystickAxis(channel, *texts.row(rest, [(name, "", "") for name in NUMBERS]))
         if axis.input_min == axis.input_max:
             raise ParameterError(f"{texts.shown(row)}: input_min and input_max are equal")
         found.append(axis)
