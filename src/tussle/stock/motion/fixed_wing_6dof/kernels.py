@@ -27,7 +27,15 @@ def attached(alpha):
 
 
 @device
-def air_force(air, omega, surfaces, alpha_rate, wing, drag, lift, side_force):
+def flow_of(air):
+    """Speed in the plane of symmetry and speed [m/s], angle of attack and sideslip [rad] of a velocity relative to the air [m/s]."""
+    u, v, w = air
+    level = math.sqrt(u * u + w * w + LEAST)
+    return level, math.sqrt(level * level + v * v), atan2(w, u), atan2(v, level)
+
+
+@device
+def air_force(air, flow, omega, surfaces, alpha_rate, wing, drag, lift, side_force):
     """Aerodynamic force [N] (x, y, z): lift and drag in the plane of symmetry, side force along the y axis.
 
     Lift approaches that at 26 degrees, see `attached`.
@@ -36,6 +44,7 @@ def air_force(air, omega, surfaces, alpha_rate, wing, drag, lift, side_force):
 
     Args:
         air: Velocity relative to the air [m/s].
+        flow: See `flow_of`.
         omega: Angular velocity [rad/s].
         surfaces: Elevator, aileron, rudder [rad].
         alpha_rate: Rate of the angle of attack [rad/s].
@@ -45,11 +54,9 @@ def air_force(air, omega, surfaces, alpha_rate, wing, drag, lift, side_force):
         side_force: C_Y by beta and rudder.
     """
     density, span, area, chord, efficiency = wing
-    u, v, w = air
+    u, _, w = air
     elevator, _, rudder = surfaces
-    level = math.sqrt(u * u + w * w + LEAST)
-    speed = math.sqrt(level * level + v * v)
-    alpha, beta = atan2(w, u), atan2(v, level)
+    level, speed, alpha, beta = flow
     half = 0.5 * chord / speed
     c_lift = (
         lift[0]
@@ -66,11 +73,11 @@ def air_force(air, omega, surfaces, alpha_rate, wing, drag, lift, side_force):
 
 
 @device
-def air_moment(air, omega, surfaces, alpha_rate, wing, roll_moment, pitch_moment, yaw_moment):
+def air_moment(flow, omega, surfaces, alpha_rate, wing, roll_moment, pitch_moment, yaw_moment):
     """Aerodynamic moment [N m] (roll, pitch, yaw), linear in alpha, beta, surfaces and rates; arguments as in `air_force`.
 
     Args:
-        air: Velocity relative to the air.
+        flow: See `flow_of`.
         omega: Angular velocity.
         surfaces: Elevator, aileron, rudder.
         alpha_rate: Rate of the angle of attack.
@@ -80,12 +87,9 @@ def air_moment(air, omega, surfaces, alpha_rate, wing, roll_moment, pitch_moment
         yaw_moment: C_n by beta, roll rate, yaw rate, aileron, rudder.
     """
     density, span, area, chord, _ = wing
-    u, v, w = air
     p, q, r = omega
     elevator, aileron, rudder = surfaces
-    level = math.sqrt(u * u + w * w + LEAST)
-    speed = math.sqrt(level * level + v * v)
-    alpha, beta = atan2(w, u), atan2(v, level)
+    _, speed, alpha, beta = flow
     half_span, half_chord = 0.5 * span / speed, 0.5 * chord / speed
     roll = (
         roll_moment[0] * beta + half_span * (roll_moment[1] * p + roll_moment[2] * r)

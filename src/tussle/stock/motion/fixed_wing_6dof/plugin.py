@@ -136,15 +136,16 @@ class FixedWing6DOF(RigidBodyModel):
         vx, vy, vz = rigid_body[3], rigid_body[4], rigid_body[5]
         forward, left, up = to_body(rigid_body, (vx - wind[0], vy - wind[1], vz - wind[2]))
         air, omega = (forward, -left, -up), (rigid_body[10], -rigid_body[11], -rigid_body[12])
+        flow = kernels.flow_of(air)
         fx, fy, fz = force
         ground = kernels.ground_push(rigid_body[2], vz, mass) if use_ground_model else 0.0
         others = to_body(rigid_body, (fx, fy, fz + ground - mass * gravity_magnitude))
-        x, y, z = kernels.air_force(air, omega, surfaces, 0.0, wing, drag, lift, side_force)
+        x, y, z = kernels.air_force(air, flow, omega, surfaces, 0.0, wing, drag, lift, side_force)
         total = x + thrust + others[0], y - others[1], z - others[2]
         rate = kernels.alpha_rate_of(air, omega, total, mass, wing, lift)
-        x, y, z = kernels.air_force(air, omega, surfaces, rate, wing, drag, lift, side_force)
+        x, y, z = kernels.air_force(air, flow, omega, surfaces, rate, wing, drag, lift, side_force)
         roll, pitch, yaw = kernels.air_moment(
-            air, omega, surfaces, rate, wing, roll_moment, pitch_moment, yaw_moment
+            flow, omega, surfaces, rate, wing, roll_moment, pitch_moment, yaw_moment
         )
         tx, ty, tz = to_body(rigid_body, torque)
         px, py, pz = to_world(rigid_body, (x + thrust, -y, -z))
