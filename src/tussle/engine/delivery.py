@@ -100,22 +100,33 @@ def _post_links(
 ) -> None:
     """Count the links of a network, and queue the messages that are received."""
     _count_links(state, network, topics, links)
-    clock, ids = state.context.clock, state.population.bodies.id
     own, heard = np.flatnonzero(links.sender >= 0), np.flatnonzero(links.outcome == 0)
     number = np.concatenate([own, links.message[heard]])
-    row = np.concatenate([links.sender[own], links.receiver[heard]])
-    more = np.zeros(len(number)) if links.delay is None else np.append(np.zeros(len(own)), links.delay[heard])
-    steps = _steps(network.plugin.comm_delay[links.world[number]] + more, clock.dt)
+    ids = state.population.bodies.id[np.concatenate([links.sender[own], links.receiver[heard]])]
+    delay = network.plugin.comm_delay[links.world[number]]
+    if links.delay is not None:
+        delay[len(own) :] += links.delay[heard]
+    steps = _steps(delay, state.context.clock.dt)
     for topic, first, last in zip(topics, links.starts[:-1], links.starts[1:], strict=True):
-        here = np.flatnonzero((number >= first) & (number < last))
-        for late in np.unique(steps[here]) if topic.inboxes else ():
-            mine = here[steps[here] == late]
-            # Only messages with a receiver: others may be there only because of another world of the stack.
-            is_kept = np.zeros(len(links.world), bool)
-            is_kept[number[mine]] = True
-            batch = topic.outbox().take(np.flatnonzero(is_kept[first:last]))
-            to = (np.cumsum(is_kept) - 1)[number[mine]], ids[row[mine]]
-            topic.post(batch, to, clock.step[batch.world] + late)
+        here: Any = (number >= first) & (number < last) if len(topics) > 1 else slice(None)
+        if topic.inboxes:
+            _post_copies(topic, number[here] - first, ids[here], steps[here], state.context.clock.step)
+
+
+def _post_copies(
+    topic: TopicBuffer, number: np.ndarray, ids: np.ndarray, steps: np.ndarray, now: np.ndarray
+) -> None:
+    """Queue copies of a topic's messages: message number, id of the receiver and number of steps until then, (m,) each."""
+    batch = topic.outbox()
+    lates = steps[:1] if (steps == steps[:1]).all() else np.unique(steps)
+    for late in lates:
+        mine: Any = steps == late if len(lates) > 1 else slice(None)
+        # Only messages with a receiver: others may be there only because of another world of the stack.
+        is_kept = np.zeros(batch.n, bool)
+        is_kept[number[mine]] = True
+        part = batch if is_kept.all() else batch.take(np.flatnonzero(is_kept))
+        place = number[mine] if part is batch else (np.cumsum(is_kept) - 1)[number[mine]]
+        topic.post(part, (place, ids[mine]), now[part.world] + late)
 
 
 def _count_links(

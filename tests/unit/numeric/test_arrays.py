@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tussle.numeric.arrays import matmul, unit
+from tussle.numeric.segments import order_by_row
 
 DRAW = np.random.default_rng(3)
 
@@ -41,3 +42,9 @@ def test_a_column_of_the_product_does_not_depend_on_the_others():
 def test_sizes_that_do_not_fit_are_refused():
     with pytest.raises(ValueError, match=r"not \(2, 3\) and \(2, 3\)"):
         matmul(np.ones((2, 3)), np.ones((2, 3)))
+
+
+def test_items_are_ordered_by_row_and_keep_their_order_within_one():
+    row = np.random.default_rng(1).integers(0, 50, 500)
+    assert np.array_equal(order_by_row(row, 60), np.argsort(row, kind="stable"))
+    assert len(order_by_row(row[:0], 0)) == 0

@@ -12,6 +12,7 @@ from tussle.numeric import exp, log
 from tussle.stock.network.radio_network import kernels
 
 QUEUE, PLANE, _, _, HALF_DUPLEX, CHANCE = range(6)
+NOBODY = -1
 LEAST = 0.01
 """Rayleigh fading: receivers that would receive a smaller share of the messages are out of reach."""
 
@@ -45,7 +46,7 @@ class RadioNetwork(Network):
     comms_boundary_epsilon = Param(0.0, unit="m", ge=0.0, doc="Distance by which both sides overlap.")
     path_loss_exponent = Param(2.0, ge=1.0, le=10.0, doc="Decay of power with distance; 2 in free space.")
     fading = Param("none", choices=("none", "rayleigh"), doc="Distribution of the received power.")
-    jammer_team = Param(-1, doc="Team whose entities jam all receivers near them; -1 is none.")
+    jammer_team = Param(NOBODY, doc="Team whose entities jam all receivers near them; -1 is none.")
     jammer_range = Param(100.0, unit="m", ge=0.0, doc="Distance at which a jammer is as strong as the noise.")
     bandwidth = Param(math.inf, gt=0.0, doc="Bandwidth of each sender [bit/s].")
     overhead = Param(28.0, ge=0.0, doc="Bytes of a message beside 8 for each number; 28 are UDP over IPv4.")
@@ -85,7 +86,8 @@ class RadioNetwork(Network):
         return links
 
     def _fade(self, w: WorldView, links: Links, world: np.ndarray) -> None:
-        is_jammer = w.team == self.jammer_team[w.world]
+        jammer_team = self.jammer_team[w.world]
+        is_jammer = (w.team == jammer_team) & (jammer_team != NOBODY)
         if self.fading == "none" and not is_jammer.any():
             return
         noise = self._noise(w, is_jammer) if is_jammer.any() else np.ones(w.n)
