@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import os
-import pty
 import re
 import shutil
 import signal
-import subprocess
 import sys
-import termios
 from pathlib import Path
 
 import gambles
 import pytest
-from cli_process import COMMAND, call, environment
+from cli_process import call
+from test_terminal import ESCAPE, seen
 
 from tussle.batch import InProcess, load_batch
 
@@ -157,18 +154,8 @@ def test_a_run_of_a_batch_is_played_again_whatever_became_of_its_files(here, fol
     (folder / "parts" / "metrics.xml").write_text("<metrics>Chips</metrics>")
     (folder / "chance.xml").write_text(gambles.MISSION.replace("<metrics>Chips</metrics>", include))
     command = (
-        "batch",
-        "chance.xml",
-        "reds=5",
-        "--vary",
-        "odds=0.1:0.4",
-        "--vary",
-        "mood=never,decide",
-        "--samples",
-        2,
-        "--runs",
-        3,
-    )
+        "batch", "chance.xml", "reds=5", "--vary", "odds=0.1:0.4", "--vary", "mood=never,decide", "--samples", 2, "--runs", 3,
+    )  # fmt: skip
     assert here(*command, "--end", "0.7", "--out", "out", *PLUGINS)[0] == 5  # of those that cannot decide
     for changed in (True, False):
         for name in ("chance.xml", "plugins.py", "parts/metrics.xml"):
@@ -321,19 +308,8 @@ def test_runs_that_fail_are_counted_and_if_all_fail_it_is_an_error(here):
 
 def test_a_game_that_takes_longer_than_it_may_is_given_up(here):
     code, _, err = here(
-        "batch",
-        "chance.xml",
-        "how=sleep",
-        "--runs",
-        1,
-        "--seed",
-        3,
-        "--run-timeout",
-        1,
-        "--out",
-        "out",
-        *PLUGINS,
-    )
+        "batch", "chance.xml", "how=sleep", "--runs", 1, "--seed", 3, "--run-timeout", 1, "--out", "out", *PLUGINS,
+    )  # fmt: skip
     assert (code, err) == (
         3,
         "error: all runs failed; the first: it took longer than the 1.0 s that a run may\n",
@@ -361,38 +337,13 @@ def test_a_plugin_that_kills_the_command_kills_it_only_once(process, folder):
 
 # -- on a terminal --------------------------------------------------------------------------------------------------------------
 
-ESCAPE = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
-
 
 def test_a_bar_tells_how_far_it_is_and_lines_do_not_break(folder):
-    ours, its = pty.openpty()
-    termios.tcsetwinsize(its, (24, 80))
     command = [
-        "batch",
-        "chance.xml",
-        "--runs",
-        "300",
-        "--stack",
-        "20",
-        "--processes",
-        "1",
-        "--vary",
-        "odds=0.1,0.3",
-        *PLUGINS,
-    ]
-    process = subprocess.Popen(
-        [*COMMAND, *command], stdin=its, stdout=its, stderr=its, cwd=folder, env=environment()
-    )
-    os.close(its)
-    chunks = []
-    try:
-        while chunk := os.read(ours, 65536):
-            chunks.append(chunk)
-    except OSError:  # the last one who held the terminal has gone
-        pass
-    os.close(ours)
-    text = b"".join(chunks).decode()
-    assert process.wait(timeout=300) == 0
+        "batch", "chance.xml", "--runs", "300", "--stack", "20", "--processes", "1", "--vary", "odds=0.1,0.3", *PLUGINS,
+    ]  # fmt: skip
+    text, code = seen(folder, *command)
+    assert code == 0
     lines = [line.rstrip() for line in re.split(r"[\r\n]", ESCAPE.sub("", text))]
     bars = [line for line in lines if "runs/s" in line and line.startswith("chance ")]
     assert len(bars) >= 5

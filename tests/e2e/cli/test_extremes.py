@@ -27,34 +27,9 @@ MISSION = """\
 </runscript>
 """
 PLACES = [
-    "start",
-    "end",
-    "dt",
-    "warp",
-    "substeps",
-    "seed",
-    "period",
-    "grid",
-    "range",
-    "team",
-    "n",
-    "x",
-    "variance",
-    "health",
-    "radius",
-    "mass",
-    "heading",
-    "births",
-    "first",
-    "spread",
-    "rate",
-    "speed",
-    "controls",
-    "senses",
-    "noise",
-    "sight",
-    "limit",
-]
+    "start", "end", "dt", "warp", "substeps", "seed", "period", "grid", "range", "team", "n", "x", "variance", "health",
+    "radius", "mass", "heading", "births", "first", "spread", "rate", "speed", "controls", "senses", "noise", "sight", "limit",
+]  # fmt: skip
 SMALL = ("--size", "64x48")
 ONCE = ("--runs", "1", "--processes", "1")
 OPTIONS = {

@@ -187,17 +187,8 @@ def test_a_directory_widens_nothing(here, option, value):
 
 def test_what_a_directory_cannot_grant_is_granted_on_the_command_line(here):
     command = (
-        "batch",
-        "chance.xml",
-        "--runs",
-        2,
-        "--out",
-        "large",
-        "--processes",
-        1,
-        *PLUGINS,
-        "--allow-large",
-    )
+        "batch", "chance.xml", "--runs", 2, "--out", "large", "--processes", 1, *PLUGINS, "--allow-large",
+    )  # fmt: skip
     assert here(*command, "--record-runs", "1")[0] == 0
     assert here("run", "--from", "large:1", "--no-log")[0] == 4
     assert here("run", "--from", "large:1", "--no-log", "--allow-large")[0] == 0
