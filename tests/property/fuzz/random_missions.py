@@ -29,12 +29,15 @@ from tussle.api import (
 )
 
 KINDS = (Behavior, Autonomy, Controller, MotionModel, Sensor, Interaction, Metric, Network)
+ON_FILES = ("GraphInteraction", "MapGen2D", "TrajectoryRecordPlayback")
+"""Plugins that read a file, which random missions do not have."""
 RATES = (1.0, 2.5, 3.0, 4.0, 9.0)
 
 
 def plugins(kind: type) -> list[type[Plugin]]:
     """All classes of a kind: those that ship and the golden missions' own."""
-    shipped = [c for c in dict.fromkeys(map(stock.load, stock.manifest())) if c.grade != "external"]
+    every = dict.fromkeys(map(stock.load, stock.manifest()))
+    shipped = [c for c in every if c.grade != "external" and c.__name__ not in ON_FILES]
     known = [*shipped, Beacon, Wanderer, Car, Nursery]
     return [c for c in known if next(k for k in KINDS if issubclass(c, k)) is kind]
 
