@@ -10,19 +10,15 @@ from pathlib import Path
 from tussle import Block, Mission, Simulation
 from tussle.api import Autonomy
 from tussle.api.bodies import MOST_INDEXES
-from tussle.stock import Boids, Still, Unicycle
+from tussle.stock import Boids, Still, Unicycle, manifest
 
 N_GAMES = int(os.environ.get("TUSSLE_MEMORY_GAMES", "120"))
 """Games per model; the promise is about two thousand, which takes minutes."""
 MOST_GROWTH = (
     1.0 + 0.002 * N_GAMES
 )  # [MB]; allocators settle for some thousand games. What was kept took 20 kB a game and more
-MODELS = [
-    *["HarmonicOscillator", "Still", "External", "Unicycle", "SimpleQuadrotor"],
-    "an author's own",
-    "classes made on the fly",
-]
-"""One of each form: a kernel of its own, state equations for the shared integrator, from outside."""
+SHIPPED = [name for name, path in manifest().items() if ".motion." in path]
+MODELS = [*SHIPPED, "an author's own", "classes made on the fly"]
 
 
 class Looker(Autonomy):
