@@ -43,7 +43,8 @@ def lines_of(text: str, head: str) -> list[list[str]]:
 def test_the_page_says_who_won_how_surely_and_what_differs(tussle, paired):
     text = tussle("analyze", paired).stdout
     lines = text.splitlines()
-    assert lines[1:4] == [" A made game", " 160 runs · 4 points × 40 seeds · 1 failed", f" {paired}"]
+    assert lines[1:3] == [" A made game", " 160 runs · 4 points × 40 seeds · 1 failed"]
+    assert text.replace("\n", "").count(str(paired)) == 1
     assert max(map(len, lines)) <= 80
     keepers, _switchers, ties = lines_of(text, "who won")
     assert keepers[:2] == ["2", "keepers"]

@@ -83,7 +83,7 @@ def test_a_disk_that_is_full_before_the_start_is_told_before_the_start(tmp_path)
     said, _ = (child := start(tmp_path / "run", 100)).communicate(timeout=600)
     assert child.returncode == 3
     assert said.count("\n") == 1
-    assert "cannot be written: File too large" in said
+    assert "cannot record a run there: File too large" in said
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="nothing is unwritable to the superuser")

@@ -8,6 +8,7 @@ from xml.sax.saxutils import quoteattr
 
 from tussle import stock
 from tussle.api import Plugin
+from tussle.columns import Publish, Subscribe
 from tussle.engine.simulation import Simulation
 from tussle.errors import MissionError, TussleError
 from tussle.mission import Block, Mission
@@ -36,6 +37,8 @@ LINEUPS: dict[str, list[tuple[str, str, str]]] = {
         ("Boids", SELF, "SingleIntegrator"),
         ("Boids", SELF, "Unicycle"),
         ("Straight", SELF, "HarmonicOscillator"),
+        ("MultirotorTests", SELF, "Multirotor"),
+        ("GoTo", f"UUV6DOFPIDController {SELF}", "UUV6DOF"),
     ],
 }
 USUAL = [("Boids", "DirectController", "Unicycle")]
@@ -55,8 +58,7 @@ TEXT = """\
     <x>0</x> <y>0</y> <z>200</z>
     <variance_x>40000</variance_x> <variance_y>40000</variance_y> <variance_z>400</variance_z>
     <speed>15</speed>
-{autonomy}    <controller>{controller}</controller>
-    <motion_model{pitching}>{motion}</motion_model>
+{autonomy}{controller}    <motion_model{pitching}>{motion}</motion_model>
 {sensor}  </entity>
 
   <entity>
@@ -84,10 +86,14 @@ def mission_text(kind: str, name: str, plugin: Plugin) -> str:
     Raises:
         MissionError: The plugin does not fit any stock plugins.
     """
-    autonomies, controller, motion = (part.replace(SELF, name) for part in _lineup(kind, plugin))
+    autonomies, controllers, motion = (part.replace(SELF, name) for part in _lineup(kind, plugin))
     autonomy = "".join(f"    <autonomy>{each}</autonomy>\n" for each in autonomies.split())
+    controller = "".join(f"    <controller>{each}</controller>\n" for each in controllers.split())
     tags = {"interaction": "entity_interaction", "metric": "metrics", "network": "network"}
-    world = f"\n  <{tags[kind]}>{name}</{tags[kind]}>\n" if kind in tags else ""
+    world = "".join(
+        f"\n  <network name={quoteattr(each)}>SphereNetwork</network>\n" for each in _networks(plugin)
+    )
+    world += f"\n  <{tags[kind]}>{name}</{tags[kind]}>\n" if kind in tags else ""
     sensor = f"    <sensor>{name}</sensor>\n" if kind == "sensor" else ""
     pitching = ' use_pitch="true"' if motion == "Unicycle" else ""
     return TEXT.format(
@@ -99,7 +105,7 @@ def mission_text(kind: str, name: str, plugin: Plugin) -> str:
 def _lineup(kind: str, plugin: Plugin) -> tuple[str, str, str]:
     """Return the first lineup that can be built."""
     why = ""
-    for lineup in LINEUPS.get(kind, USUAL):
+    for lineup in [*LINEUPS.get(kind, USUAL), *_to_points(kind, plugin)]:
         try:
             with Simulation(_mission(kind, plugin, lineup)):
                 return lineup
@@ -108,6 +114,26 @@ def _lineup(kind: str, plugin: Plugin) -> tuple[str, str, str]:
     raise MissionError(
         f"no mission could be written for {plugin!r}: it fits none of the stock plugins ({why})"
     )
+
+
+def _to_points(kind: str, plugin: Plugin) -> Iterator[tuple[str, str, str]]:
+    """Lineups that go to points, with the controllers or motion models that connect to the plugin."""
+    stocked = {name: stock.load(name) for name in stock.manifest()}
+    of_kind = {
+        which: {n: c for n, c in stocked.items() if c.kind == which} for which in ("controller", "motion")
+    }
+    if kind == "motion":
+        needed = {
+            channel
+            for column in plugin.inputs().values()
+            for channel in column.channels
+            if not column.optional
+        }
+        for name, controller in of_kind["controller"].items():
+            if needed <= {channel for column in controller.outputs().values() for channel in column.channels}:
+                yield "GoTo", name, SELF
+    if kind == "controller":
+        yield from (("GoTo", SELF, name) for name in of_kind["motion"])
 
 
 def _mission(kind: str, plugin: Plugin, lineup: tuple[str, str, str]) -> Mission:
@@ -122,6 +148,15 @@ def _mission(kind: str, plugin: Plugin, lineup: tuple[str, str, str]) -> Mission
     return Mission(blocks=[block], end=1.0, **world)
 
 
+def _networks(plugin: Plugin) -> list[str]:
+    """Networks of the plugin's topics that a mission does not add by itself."""
+    topics = [*plugin.declared(Publish).values(), *plugin.declared(Subscribe).values()]
+    names = dict.fromkeys(plugin.values[topic.network_param] for topic in topics if topic.network_param)
+    return [name for name in names if name not in stock.ALWAYS_THERE]
+
+
 def _world(kind: str, plugin: Plugin) -> Iterator[tuple[str, Any]]:
+    if networks := [stock.load("SphereNetwork")(name=name) for name in _networks(plugin)]:
+        yield "networks", networks
     if kind in ("interaction", "metric", "network"):
         yield f"{kind}s", plugin
