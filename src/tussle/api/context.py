@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import pairwise
@@ -67,11 +67,22 @@ class Context:
             run(0, n)
             return
         if self._pool is None:
-            self._pool = ThreadPoolExecutor(self.threads)
+            self._pool = ThreadPoolExecutor(self.threads - 1)
         n_parts = min(PARTS_PER_THREAD * self.threads, n // least)
         edges = [n * i // n_parts for i in range(n_parts + 1)]
-        for done in [self._pool.submit(run, a, b) for a, b in pairwise(edges) if b > a]:
-            done.result()
+        parts = iter([part for part in pairwise(edges) if part[1] > part[0]])
+
+        def work() -> None:
+            for part in parts:  # all threads take from the same iterator
+                run(*part)
+
+        others = [self._pool.submit(work) for _ in range(self.threads - 1)]
+        try:
+            work()
+        finally:
+            wait(others)
+        for other in others:
+            other.result()
 
     def close(self) -> None:
         if self._pool is not None:

@@ -20,10 +20,10 @@ from small_worlds import (
     mission,
 )
 
-from tussle import Simulation
+from tussle import Block, Mission, Simulation
 from tussle.api import Autonomy, Interaction, Metric, Output, Param, State
 from tussle.errors import MissionError, ParameterError, SnapshotError
-from tussle.stock import NoisyContacts, Predator, SimpleCapture, SimpleCollision, Unicycle
+from tussle.stock import NoisyContacts, Predator, SimpleCapture, SimpleCollision, Still, Unicycle
 
 
 class Tally(Metric):
@@ -538,3 +538,17 @@ def test_a_ragged_param_belongs_to_the_mission():
     assert sim.read("b.Path.n")[0].tolist() == [[1]]
     with pytest.raises(ParameterError, match=r"a\.Path\.points"):
         Simulation(game, params={"a.Path.points": [(1.0, 2.0)]})
+
+
+def test_an_error_in_one_part_is_raised_when_all_parts_have_ended():
+    begun = []
+
+    def run(first, last):
+        begun.append((first, last))
+        if first == 0:
+            raise ZeroDivisionError
+
+    with Simulation(Mission(blocks=[Block(name="a", motion=Still())]), threads=3) as sim:
+        with pytest.raises(ZeroDivisionError):
+            sim.state.context.split(1000, run)
+        assert sum(last - first for first, last in begun) == 1000
