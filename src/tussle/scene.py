@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tussle.errors import ParameterError, listed, nearest_name
+from tussle.errors import MissionError, ParameterError, listed, nearest_name
 from tussle.geodesy import Origin
 from tussle.prism import Prism
 from tussle.shapes import (
@@ -83,6 +83,22 @@ class TeamRegion:
     team: int
     center: Vector
     shape: Volume
+
+
+def find_region(regions: Iterable[TeamRegion], boundary: float) -> TeamRegion:
+    """The region with an id.
+
+    Raises:
+        MissionError: No region, or more than one, has the id.
+    """
+    known = list(regions)
+    found = [region for region in known if region.boundary == boundary]
+    if len(found) == 1:
+        return found[0]
+    ids = sorted({region.boundary for region in known})
+    raise MissionError(
+        f"{len(found) or 'no'} boundaries of the mission have the id {boundary:g}; {listed(map(str, ids))}"
+    )
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -15,8 +15,8 @@ from tussle.messages import Messages
 def step_some(plugin: Any, view: Any, active: np.ndarray) -> None:
     """Step a plugin; for rows where active, (n,), is false its columns keep their values and its messages are withdrawn."""
     idle = np.flatnonzero(~active)
-    restore = [_holder(own, idle) for own in _walk(plugin)]
-    topics = {p.topic for own in _walk(plugin) for p in own.__dict__.values() if isinstance(p, Publisher)}
+    restore = [_holder(own, idle) for own in plugin.walk()]
+    topics = {p.topic for own in plugin.walk() for p in own.__dict__.values() if isinstance(p, Publisher)}
     sent = [(topic, len(topic.sent)) for topic in topics]
 
     def is_from_active(batch: Messages) -> np.ndarray:
@@ -32,7 +32,7 @@ def step_some(plugin: Any, view: Any, active: np.ndarray) -> None:
 
 def restart(plugin: Any, view: Any, rows: np.ndarray) -> None:
     """Set the states of a plugin to their defaults for some rows, (m,), and call `spawn` for them; handles and outputs stay."""
-    for own in _walk(plugin):
+    for own in plugin.walk():
         for name, column in type(own).columns.items():
             held = own.__dict__.get(name)
             if held is not None and isinstance(column, (State, EntityRef)):
@@ -41,14 +41,6 @@ def restart(plugin: Any, view: Any, rows: np.ndarray) -> None:
                 else:
                     held[..., rows] = np.reshape(column.default, (-1, 1))
         own.spawn(view, rows)
-
-
-def _walk(plugin: Any) -> Iterator[Any]:
-    """Yield a bound plugin and all plugins inside it."""
-    yield plugin
-    for name in type(plugin).children():
-        for child in plugin.__dict__[name]:
-            yield from _walk(child)
 
 
 def _holder(plugin: Any, rows: np.ndarray) -> Callable[[], None]:

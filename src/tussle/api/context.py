@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -13,9 +13,9 @@ import numpy as np
 
 from tussle.api.clock import Clock
 from tussle.api.draw import Draw
-from tussle.errors import MissionError, PluginError, TussleError, listed, nearest_name
+from tussle.errors import PluginError, TussleError, listed, nearest_name
 from tussle.rng import stream_key
-from tussle.scene import Scene, TeamRegion
+from tussle.scene import Scene, TeamRegion, find_region
 
 PARTS_PER_THREAD = 4
 """Parts that `Context.split` makes for each thread: a slow thread then delays the others less."""
@@ -95,13 +95,7 @@ class Context:
         Raises:
             MissionError: No region, or more than one, has the id.
         """
-        found = [region for region in self.regions if region.boundary == boundary]
-        if len(found) == 1:
-            return found[0]
-        ids = sorted({region.boundary for region in self.regions})
-        raise MissionError(
-            f"{len(found) or 'no'} boundaries of the mission have the id {boundary:g}; {listed(map(str, ids))}"
-        )
+        return find_region(self.regions, boundary)
 
     def find_service(self, name: str, own: dict[str, Callable[..., Any]]) -> Callable[..., Any]:
         """The service `name` of the entity's plugins, else of the world plugins.
@@ -111,11 +105,14 @@ class Context:
         """
         found = own.get(name) or self.services.get(name)
         if found is None:
-            allowed = sorted({*own, *self.services})
-            raise TussleError(
-                f"no plugin offers a service {name!r}{nearest_name(name, allowed)}; {listed(allowed)}"
-            )
+            raise TussleError(missing_service(name, {*own, *self.services}))
         return found
+
+
+def missing_service(name: str, offered: Iterable[str]) -> str:
+    """Message that no plugin offers a service."""
+    allowed = sorted(offered)
+    return f"no plugin offers a service {name!r}{nearest_name(name, allowed)}; {listed(allowed)}"
 
 
 @lru_cache(maxsize=4096)

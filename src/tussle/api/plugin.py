@@ -80,6 +80,9 @@ class Plugin:
     historic_attributes: ClassVar[HistoricAttributes] = HistoricAttributes()
     """Attributes of SCRIMMAGE mission files that differ from the parameters."""
 
+    needed_services: ClassVar[tuple[str, ...]] = ()
+    """Services that the plugin calls; a mission in which none offers them is refused."""
+
     columns: ClassVar[dict[str, Column]] = {}
     services: ClassVar[tuple[str, ...]] = ()
     row_laws: ClassVar[dict[str, RowLaw]] = {}
@@ -221,6 +224,17 @@ class Plugin:
             **values,
         }
         return type(self)(**merged)
+
+    def walk(self) -> Iterator[Plugin]:
+        """Yield the plugin and all plugins inside it; of a bound plugin, the bound ones."""
+        yield self
+        for name in self.children():
+            for inner in self.__dict__.get(name, self.values[name]):
+                yield from inner.walk()
+
+    def named_regions(self) -> Iterable[float]:
+        """Ids of the regions that the plugin asks for with `g.region` or `w.region`; a mission without them is refused."""
+        return ()
 
     def structure(self) -> tuple[Any, ...]:
         """Key that is equal for plugins that can share a group: class, name, rate, states, structural parameters and children."""

@@ -15,8 +15,7 @@ class StateFollower(Autonomy):
     """An autonomy with plugins inside that act in some states of the entity; abstract.
 
     The state is the last text that the entity received on the topic `state_topic_name` of the network that the subclass names in its
-    parameter `network_name`. Inner plugins with `states` act in these,
-    the others always. Before the first text only the latter act.
+    parameter `network_name`. Inner plugins with `states` act in these, the others always. Before the first text only the latter act.
     """
 
     state_topic_name = Param("State", doc="Topic of the entity's state.")

@@ -13,11 +13,12 @@ import numpy as np
 
 from tussle import stock
 from tussle.api import Autonomy, Controller, Interaction, Metric, MotionModel, Network, Sensor
+from tussle.api.context import missing_service
 from tussle.columns import Param
-from tussle.errors import MissionError, ParameterError, listed, nearest_name
+from tussle.errors import MissionError, ParameterError, TussleError, listed, nearest_name
 from tussle.mission.cadence import Cadence
 from tussle.mission.limits import Limits
-from tussle.scene import Scene
+from tussle.scene import Scene, find_region
 
 T = TypeVar("T")
 
@@ -306,6 +307,7 @@ class Mission:
                     f"mission: {plugin.instance_name!r} is the name of a block and of a plugin; paths need unique names"
                 )
         self._check_rates()
+        self._check_needs()
         if not isinstance(self.scene, Scene):
             raise MissionError(f"mission: scene = {self.scene!r} is not a Scene")
         if not isinstance(self.limits, Limits):
@@ -320,6 +322,24 @@ class Mission:
                 Cadence.of(plugin, m / self.dt, m, f"block {block.name!r}")
         for plugin in (*self.interactions, *self.metrics):
             Cadence.of(plugin, 1.0 / self.dt, 1, "mission")
+
+    def _check_needs(self) -> None:
+        """Check that there are the regions that plugins name and the services that they call."""
+        regions = [region for plugin in self.world_plugins for region in plugin.regions()]
+        of_world = {service for plugin in self.world_plugins for service in plugin.services}
+        owners = [("mission", self.world_plugins), *((f"block {b.name!r}", b.plugins) for b in self.blocks)]
+        for where, outer in owners:
+            plugins = [each for plugin in outer for each in plugin.walk()]
+            services = of_world.union(*(plugin.services for plugin in plugins))
+            for plugin in plugins:
+                try:
+                    for boundary in plugin.named_regions():
+                        find_region(regions, boundary)
+                    for service in plugin.needed_services:
+                        if service not in services:
+                            raise MissionError(missing_service(service, services))
+                except TussleError as error:
+                    raise MissionError(f"{where}: {plugin.instance_name}: {error}") from error
 
     @property
     def steps(self) -> int:

@@ -18,7 +18,7 @@ from tussle.errors import ConformanceError, TussleError, listed
 
 RULE = "declarations"
 HOOKS_NAMES = """
-    spawn spawn_one step step_one start start_one result result_one route regions walls rejects from_body
+    spawn spawn_one step step_one start start_one result result_one route regions named_regions needed_services walls rejects from_body
     to_body derivative advance active_inputs reads_all grade passthrough abstract kind historic_attributes transmit
     losses unused_states check_values
 """

@@ -166,10 +166,20 @@ def draw(seed: int) -> Mission:
     blocks = [f"b{i}" for i in range(chance.randint(1, 3))]
     rest = teams, blocks
     world = {"interactions": (Interaction, 3), "metrics": (Metric, 2)}
+    crowds = [block(chance, name, *rest) for name in blocks]
+    drawn = {name: some(chance, kind, most, *rest) for name, (kind, most) in world.items()}
+    every = [*drawn["interactions"], *(plugin for crowd in crowds for plugin in crowd.plugins)]
+    named = {i for plugin in every for inner in plugin.walk() for i in inner.named_regions()}
+    named -= {region.boundary for plugin in drawn["interactions"] for region in plugin.regions()}
+    values = {"lengths": (90.0, 90.0, 90.0), "center": (0.0, 0.0, 30.0)}
+    drawn["interactions"] += [
+        stock.load("Boundary")(name=f"region {i:g}", boundary_id=int(i), team=chance.choice(teams), **values)
+        for i in sorted(named)
+    ]
     return Mission(
-        blocks=[block(chance, name, *rest) for name in blocks], dt=chance.choice([0.1, 0.1, 0.05, 0.25]),
+        blocks=crowds, dt=chance.choice([0.1, 0.1, 0.05, 0.25]),
         motion_multiplier=chance.choice([1, 1, 2, 5]), update=chance.choice(["synchronous", "sequential"]), end=10.0,
         end_conditions=chance.choice(["time", "time, one_team", "time, all_dead"]),
         networks=[stock.load("SphereNetwork")(range=chance.choice([30.0, 100.0]), comm_delay=chance.choice([0.0, 0.0, 0.3]))],
-        **{name: some(chance, kind, most, *rest) for name, (kind, most) in world.items()},
+        **drawn,
     )  # fmt: skip

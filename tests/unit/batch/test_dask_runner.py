@@ -105,19 +105,24 @@ def test_rows_are_those_of_one_process(client):
 
 
 def test_each_worker_has_one_chunk_and_no_more_chunks_exist_than_workers(cluster, client):
+    from distributed.diagnostics.plugin import SchedulerPlugin
+
+    class ChunksWithWorkers(SchedulerPlugin):
+        now, most = frozenset(), 0
+
+        def transition(self, key, start, finish, *args, **kwargs):
+            if str(key).startswith("play_chunk"):
+                self.now = self.now | {key} if finish == "processing" else self.now - {key}
+                self.most = max(self.most, len(self.now))
+
     batch = short_batch(40)
-    n_there, sizes = [], []
+    chunks = ChunksWithWorkers()
+    cluster.scheduler.add_plugin(chunks, name="chunks")
     with closing(OnDask(client, stack=5).play(batch.package, [batch.run(i) for i in range(160)])) as messages:
-        for message in messages:
-            if isinstance(message, Heartbeat):
-                tasks = [
-                    t for t in list(cluster.scheduler.tasks.values()) if str(t.key).startswith("play_chunk")
-                ]
-                n_there.append(sum(task.state == "processing" for task in tasks))
-            else:
-                sizes.append(message.number)
-    assert max(n_there) == 2
-    assert sorted(sizes) == list(range(160))
+        played = [message.number for message in messages if not isinstance(message, Heartbeat)]
+    cluster.scheduler.remove_plugin("chunks")
+    assert chunks.most == 2
+    assert sorted(played) == list(range(160))
 
 
 # -- workers that are lost --------------------------------------------------------------------------------------------------

@@ -10,7 +10,7 @@ from six_degrees import Pilot, flight, seen
 
 from tussle import Block, Mission, Simulation, stock
 from tussle.api import Autonomy, Output
-from tussle.errors import PluginError, WiringError
+from tussle.errors import MissionError, PluginError, WiringError
 from tussle.stock import (
     UUV6DOF,
     AircraftPIDController,
@@ -124,7 +124,7 @@ def test_rotors_without_commands_are_an_error():
 
 
 def test_a_controller_of_rotors_needs_a_multirotor():
-    with pytest.raises(PluginError, match="airframe"):
+    with pytest.raises(MissionError, match="MultirotorControllerPID: no plugin offers a service 'airframe'"):
         flight(Still(), [MultirotorControllerPID()], Pilot(), 0.01, 0.1)
 
 

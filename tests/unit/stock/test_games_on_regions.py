@@ -8,9 +8,10 @@ from small_worlds import Drift, block, mission
 
 from tussle import Simulation
 from tussle.api import Autonomy, Metric, Output, Param, State
-from tussle.errors import TussleError
+from tussle.errors import MissionError, TussleError
 from tussle.messages import EntityCaptured, FlagCaptured, FlagTaken
 from tussle.stock import (
+    AutonomyExecutor,
     Boundary,
     BoundaryDefense,
     CaptureInBoundaryInteraction,
@@ -86,9 +87,17 @@ def test_outside_all_boundaries_and_inside_a_no_fly_region():
     ],
 )
 def test_an_id_belongs_to_one_boundary(rules, text):
-    game = mission(interactions=[*rules, EnforceBoundaryInteraction(active_boundary_ids=(1,))])
-    with pytest.raises(TussleError, match=text):
-        Simulation(game).run()
+    with pytest.raises(MissionError, match=text):
+        mission(interactions=[*rules, EnforceBoundaryInteraction(active_boundary_ids=(1,))])
+
+
+@pytest.mark.parametrize("autonomy", [TakeFlag(), AutonomyExecutor(autonomies=[TakeFlag()])])
+def test_a_region_that_entities_born_later_need_is_missed_before_the_game(autonomy):
+    late = block("late", autonomy=autonomy, rate=1.0, first_birth=5.0)
+    with pytest.raises(
+        MissionError, match="block 'late': TakeFlag: no boundaries of the mission have the id 1"
+    ):
+        mission(late, interactions=[])
 
 
 def test_a_concave_no_fly_region_and_a_polyhedron():

@@ -9,7 +9,7 @@ import pytest
 
 from tussle import Block, Mission, Scene, Simulation
 from tussle.api import Autonomy, Output, Param, State, Subscribe
-from tussle.errors import PluginError
+from tussle.errors import MissionError
 from tussle.messages import GPSStatus
 from tussle.mission import read_mission
 from tussle.scene import Cuboid, FlatGround
@@ -209,11 +209,11 @@ def test_gps_errs_and_names_a_region_that_is_not_there():
     mission = Mission(blocks=[crowd])
     found = mission.scene.origin.from_geodetic(after(mission).read("crowd.GPS.coordinates")[0][0].T)
     assert all(is_spread(found[i], sd) for i, sd in enumerate((3.0, 5.0, 10.0)))
-    lost = Mission(
-        blocks=[still("a", sensor=GPS(gps_denied_ids="7"))], interactions=[Boundary(boundary_id=3)]
-    )
-    with pytest.raises(PluginError, match=r"GPS.*no boundaries of the mission have the id 7.*3"):
-        after(lost)
+    for denied, said in (("7", "no boundaries of the mission have the id 7.*3"), ("3, x", "'x'")):
+        with pytest.raises(MissionError, match=f"block 'a': GPS: .*{said}"):
+            Mission(
+                blocks=[still("a", sensor=GPS(gps_denied_ids=denied))], interactions=[Boundary(boundary_id=3)]
+            )
 
 
 QUIET = {f"{name}_{i}": (0.0, 0.0) for name in ("vel_noise", "orient_noise") for i in range(3)}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import chain
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
@@ -93,6 +94,9 @@ def mission_text(kind: str, name: str, plugin: Plugin) -> str:
     world = "".join(
         f"\n  <network name={quoteattr(each)}>SphereNetwork</network>\n" for each in _networks(plugin)
     )
+    for boundary in plugin.named_regions():
+        name_of = quoteattr(f"region {boundary:g}")
+        world += f"\n  <entity_interaction name={name_of} boundary_id='{boundary:g}'>Boundary</entity_interaction>\n"
     world += f"\n  <{tags[kind]}>{name}</{tags[kind]}>\n" if kind in tags else ""
     sensor = f"    <sensor>{name}</sensor>\n" if kind == "sensor" else ""
     pitching = ' use_pitch="true"' if motion == "Unicycle" else ""
@@ -105,7 +109,7 @@ def mission_text(kind: str, name: str, plugin: Plugin) -> str:
 def _lineup(kind: str, plugin: Plugin) -> tuple[str, str, str]:
     """Return the first lineup that can be built."""
     why = ""
-    for lineup in [*LINEUPS.get(kind, USUAL), *_to_points(kind, plugin)]:
+    for lineup in chain(LINEUPS.get(kind, USUAL), _to_points(kind, plugin)):
         try:
             with Simulation(_mission(kind, plugin, lineup)):
                 return lineup
@@ -158,5 +162,9 @@ def _networks(plugin: Plugin) -> list[str]:
 def _world(kind: str, plugin: Plugin) -> Iterator[tuple[str, Any]]:
     if networks := [stock.load("SphereNetwork")(name=name) for name in _networks(plugin)]:
         yield "networks", networks
-    if kind in ("interaction", "metric", "network"):
+    regions = [
+        stock.load("Boundary")(name=f"region {i:g}", boundary_id=int(i)) for i in plugin.named_regions()
+    ]
+    if kind in ("metric", "network"):
         yield f"{kind}s", plugin
+    yield "interactions", [*regions, *([plugin] if kind == "interaction" else [])]

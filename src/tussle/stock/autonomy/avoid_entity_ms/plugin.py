@@ -19,6 +19,7 @@ class AvoidEntityMS(Behavior):
     """
 
     grade = "portable"
+    needed_services = ("max_desired_speed",)
 
     sphere_of_influence = Param(10.0, unit="m", ge=0.0, doc="S: distance below which other entities repel.")
     minimum_range = Param(

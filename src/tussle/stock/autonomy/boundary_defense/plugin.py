@@ -23,6 +23,10 @@ class BoundaryDefense(Autonomy):
     boundary_id = Param(1, structural=True, doc="Boundary that is defended.")
     velocity = Output("velocity_x velocity_y velocity_z", unit="m/s", doc="Desired velocity, world frame.")
 
+    def named_regions(self) -> tuple[int, ...]:
+        """Return the defended boundary."""
+        return (self.values["boundary_id"],)
+
     def step(self, g: GroupView) -> None:
         region, bodies = g.region(self.boundary_id), g.bodies
         intrudes = (bodies.team != region.team) & region.shape.contains(bodies.pos)

@@ -26,6 +26,10 @@ class TakeFlag(Autonomy):
     taken = Subscribe(FlagTaken)
     velocity = Output("velocity_x velocity_y velocity_z", unit="m/s", doc="Desired velocity, world frame.")
 
+    def named_regions(self) -> tuple[int, ...]:
+        """Return both boundaries."""
+        return self.values["flag_boundary_id"], self.values["capture_boundary_id"]
+
     def step(self, g: GroupView) -> None:
         if self.taken:
             rows, told = self.taken.pairs()

@@ -19,6 +19,7 @@ class MultirotorControllerOmega(Controller):
     """
 
     grade = "portable"
+    needed_services = ("airframe",)
 
     pwm_min = Param(1000.0, doc="Pulse width of omega_min [us].")
     pwm_max = Param(2000.0, doc="Pulse width of omega_max [us].")

@@ -61,6 +61,7 @@ class MultirotorControllerPID(Controller):
     """
 
     grade = "portable"
+    needed_services = ("airframe",)
 
     yaw_pid = Param(
         (0.2, 0.01, 0.001, math.radians(9.0)), fields=GAINS, unit="1/s 1/s^2 1 rad", text_unit="1/s 1/s^2 1 deg",

@@ -26,6 +26,10 @@ class CaptureInBoundaryInteraction(Interaction):
     cool_down_period = Param(0.0, unit="s", ge=0.0, doc="Time from a capture to the defender's next one.")
     ready_at = State(unit="s", default=-np.inf, per="entity", doc="Time of the entity's next capture.")
 
+    def named_regions(self) -> tuple[int, ...]:
+        """Return the defended boundary."""
+        return (self.values["boundary_id"],)
+
     def step(self, w: WorldView) -> None:
         region = w.region(self.boundary_id)
         is_inside = region.shape.contains(w.pos)

@@ -21,6 +21,10 @@ class EnforceBoundaryInteraction(Interaction):
     )
     no_fly_boundary_ids = Param((), ragged=True, doc="Boundaries in which entities must not be.")
 
+    def named_regions(self) -> tuple[int, ...]:
+        """Return the boundaries of both kinds."""
+        return *self.values["active_boundary_ids"], *self.values["no_fly_boundary_ids"]
+
     def step(self, w: WorldView) -> None:
         allowed, forbidden = (
             [w.region(i).shape for i in self.values[name]]

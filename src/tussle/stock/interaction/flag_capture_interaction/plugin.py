@@ -27,6 +27,10 @@ class FlagCaptureInteraction(Interaction):
     carrier = State(dtype=int, per="world", doc="Id of the entity that has the flag; 0 if it is free.")
     is_captured = State(dtype=bool, per="world", doc="Whether the flag has been captured.")
 
+    def named_regions(self) -> tuple[int, ...]:
+        """Return both boundaries."""
+        return self.values["flag_boundary_id"], self.values["capture_boundary_id"]
+
     def step(self, w: WorldView) -> None:
         flag, home = w.region(self.flag_boundary_id), w.region(self.capture_boundary_id)
         self.carrier[w.rows_at(np.arange(w.n_worlds), self.carrier) < 0] = 0

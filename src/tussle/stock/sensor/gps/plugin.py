@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from tussle import units
 from tussle.api import GroupView, HistoricAttributes, Output, Param, Publish, Sensor
 from tussle.messages import GPSStatus
 
@@ -30,18 +31,24 @@ class GPS(Sensor):
     gps_time = Output(unit="s", doc="Time of the last fix.")
     status = Publish(GPSStatus, network="LocalNetwork")
 
+    def named_regions(self) -> tuple[float, ...]:
+        """Return the boundaries without reception.
+
+        Raises:
+            ParameterError: `gps_denied_ids` has something other than numbers.
+        """
+        return tuple(
+            units.parse(text, "") for text in self.values["gps_denied_ids"].replace(",", " ").split()
+        )
+
     def spawn(self, g: GroupView, rows: np.ndarray) -> None:
         self.coordinates[:, rows] = g.scene.origin.to_geodetic(g.pos[:, rows])
 
     def step(self, g: GroupView) -> None:
-        """Measure where there is a fix.
-
-        Raises:
-            MissionError: There is no boundary with an id of `gps_denied_ids`.
-        """
+        """Measure where there is a fix."""
         has_fix = np.ones(g.n, bool)
-        for text in self.gps_denied_ids.replace(",", " ").split():
-            has_fix &= ~g.region(float(text)).shape.contains(g.pos)
+        for boundary in self.named_regions():
+            has_fix &= ~g.region(boundary).shape.contains(g.pos)
         rows = np.flatnonzero(has_fix)
         error = self.noise * g.normal("error", 3)
         self.coordinates[:, rows] = g.scene.origin.to_geodetic((g.pos + error)[:, rows])
