@@ -174,6 +174,13 @@ def rates(wanted, quat, max_speed, speed, turn_rate, pitch_rate, part):
         speed[i] = max_speed[i]
 
 
+@kernel("(F F F) (F F F F) F2 F2 (F F F F F F) F2w (Fw Fw Fw) (i8 i8)")
+def law_and_rates(pos, quat, goal, seen, weights, wanted, commands, part):
+    """Compute the desired velocity as `law`, and the commands speed, turn_rate, pitch_rate as `rates`, in one call."""
+    law(pos, goal, seen, weights, wanted, part)
+    rates(wanted, quat, weights[0], commands[0], commands[1], commands[2], part)
+
+
 @kernel("F2 F F Fw Fw Fw")
 def desired(wanted, z, max_speed, heading, speed, altitude):
     """Heading of the desired velocity [rad], max_speed [m/s], and the altitude [m] after one second at the desired climb speed."""

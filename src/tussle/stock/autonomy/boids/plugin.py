@@ -153,11 +153,12 @@ class Boids(Autonomy):
             self.max_speed, self.goal_weight, self.avoid_team_weight, self.avoid_nonteam_weight, self.centroid_weight,
             self.align_weight,
         )  # fmt: skip
-        g.split(kernels.law, pos, self.target, seen, weights, wanted)
         wired = self.wired
         if "turn_rate" in wired or "pitch_rate" in wired or "speed" in wired:
-            commands = self.speed, self.turn_rate, self.pitch_rate
-            g.split(kernels.rates, wanted, g.components("quat"), self.max_speed, *commands)
+            commands, quat = (self.speed, self.turn_rate, self.pitch_rate), g.components("quat")
+            g.split(kernels.law_and_rates, pos, quat, self.target, seen, weights, wanted, commands)
+        else:
+            g.split(kernels.law, pos, self.target, seen, weights, wanted)
         if "velocity" in wired:
             kernels.velocity(wanted, self.max_speed, self.velocity)
         if "desired_heading" in wired or "desired_altitude" in wired or "desired_speed" in wired:
