@@ -136,14 +136,14 @@ def longest_reach(radius, world, reach):
     return common
 
 
-@kernel("F2 F2 F Bw -> i8")
-def check(pos, quat, health, faulty):
-    """Count rows that are faulty or have no health, and mark faulty rows: position or attitude not finite, or health NaN.
+@kernel("F2 F2 F Bw (i8 i8) -> i8")
+def check(pos, quat, health, faulty, part):
+    """Count rows in [begin, end) that are faulty or have no health, and mark faulty rows: position or attitude not finite, or health NaN.
 
     The sum of the seven numbers minus itself is 0 only if all are finite: one test per row, which vectorises.
     """
     count = 0
-    for i in range(health.shape[0]):
+    for i in range(part[0], part[1]):
         total = pos[0, i] + pos[1, i] + pos[2, i] + quat[0, i] + quat[1, i] + quat[2, i] + quat[3, i]
         bad = not (total - total == 0.0) or health[i] != health[i]
         faulty[i] = bad

@@ -18,9 +18,19 @@ from tussle.engine.state import Parked, SimulationState
 
 def end_step(state: SimulationState) -> None:
     """Check all states, advance the clocks, remove dead entities, end worlds."""
-    if kernels.check(*state.checked):
+    context, clock = state.context, state.context.clock
+    if context.threads == 1:
+        found = kernels.check(*state.checked, (0, state.population.bodies.n))
+    else:
+        counts: list[int] = []
+        context.split(
+            len(state.checked[-1]),
+            lambda *part: counts.append(kernels.check(*state.checked, part)),
+            least=4096,
+        )
+        found = sum(counts)
+    if found:
         _record_faults(state)
-    clock = state.context.clock
     if state.n_running == state.n_worlds:
         clock.step += 1
     else:

@@ -158,7 +158,7 @@ class Index:
         if blocks is None:
             blocks = self._blocks[first, last] = Blocks.of(last - first)
         elif self._fixed:
-            kernels.query_positions(blocks.cuts[0, :-1], self.points, blocks.points)
+            kernels.query_positions(blocks.cuts[0], self.points, blocks.points, (0, last - first))
             return blocks
         elif blocks.built == self.built:
             return blocks

@@ -210,10 +210,10 @@ def gather(column, order, out):
         out[p] = column[order[p]]
 
 
-@kernel("I F2 F2w")
-def query_positions(queries, points, out):
-    """Positions [m] by query, (3, n), from those by place."""
-    for k in range(queries.shape[0]):
+@kernel("I F2 F2w (i8 i8)")
+def query_positions(queries, points, out, part):
+    """Positions [m] of the queries [begin, end), the columns of out (3, n), from those by place."""
+    for k in range(part[0], part[1]):
         p = queries[k]
         out[0, k] = points[0, p]
         out[1, k] = points[1, p]
@@ -377,8 +377,8 @@ def cut_blocks(index, rows, points, cells, arrays, out, part):
         first, last = rows
         queries = cuts[0, : last - first]
         b1 = group_queries(order, strips[0], world_strip, first, last, queries, cuts[1], cuts[2])
-        query_positions(queries, points, out)
     used, most = s0, 0
     if phases & SPANS:
+        query_positions(cuts[0], points, out, (cuts[1, b0], cuts[1, b1]))
         used, most = find_spans(cells, index, out, arrays, (b0, b1, s0, s1))
     return b1, used, most
