@@ -330,12 +330,12 @@ class GroupView:
 
     def uniform(self, label: str, k: int | None = None) -> np.ndarray:
         """Uniform draws in [0, 1), (n,) or (k, n); an entity's draws do not depend on other entities."""
-        out = self.draw_lines("uniform", label, k or 1)
+        out = self.draw_lines("uniform", label, 1 if k is None else k)
         return out if k is not None else out[0]
 
     def normal(self, label: str, k: int | None = None) -> np.ndarray:
         """Standard normal draws, (n,) or (k, n)."""
-        out = self.draw_lines("normal", label, k or 1)
+        out = self.draw_lines("normal", label, 1 if k is None else k)
         return out if k is not None else out[0]
 
     def draw_lines(self, law: str, label: str, k: int) -> np.ndarray:
@@ -357,7 +357,7 @@ class GroupView:
         row, clock = near.row, self.context.clock
         seeds = self._seeds[row] ^ (self.bodies.id[near.other].astype(np.uint64) * GOLDEN)
         step = clock.step[self.world[row]]
-        out = law(seeds, self._stream(label), self.block_index[row], step, self.substep, k or 1)
+        out = law(seeds, self._stream(label), self.block_index[row], step, self.substep, 1 if k is None else k)
         return out if k is not None else out[0]
 
     def call(self, service: str, *args: Any, **kwargs: Any) -> Any:

@@ -159,6 +159,7 @@ def test_boxes_are_missed_err_and_are_invented():
     assert is_spread(height[real], 4.0)
     assert is_spread(u[~real], 800.0 / math.sqrt(12.0))
     assert 0.2 <= height[~real].min() < 2.0 < 38.0 < height[~real].max() <= 40.0
+    assert boxes(still("o", (-50.0, 0.0, 0.0)), max_false_positives_per_frame=0).shape == (5, 0)
 
 
 # Navigation ------------------------------------------------------------------------------------------------------
