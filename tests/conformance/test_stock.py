@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import hawk
 import pytest
 
 from tussle import stock
@@ -73,6 +74,10 @@ def test_plugin_meets_the_contract(name: str, tmp_path: Path, monkeypatch: pytes
     device = tmp_path / "js0"  # a joystick on which nothing happens
     device.touch()
     params = {"device": str(device)} if name in HELD else {}
+    if name in ("JSBSimControl", "JSBSimModel"):
+        pytest.importorskip("jsbsim")
+        aircraft = {"aircraft": "hawk"} if name == "JSBSimControl" else {"script_name": "patrol.xml"}
+        params = {**aircraft, "jsbsim_root": hawk.write(tmp_path / "root")}
     companions = [stock.load(other)() for other in NEEDED.get(name, ())]
     check_plugin(stock.load(name), companions=BOUNDARIES if name in ON_REGIONS else companions, **params)
 

@@ -357,7 +357,9 @@ class GroupView:
         row, clock = near.row, self.context.clock
         seeds = self._seeds[row] ^ (self.bodies.id[near.other].astype(np.uint64) * GOLDEN)
         step = clock.step[self.world[row]]
-        out = law(seeds, self._stream(label), self.block_index[row], step, self.substep, 1 if k is None else k)
+        out = law(
+            seeds, self._stream(label), self.block_index[row], step, self.substep, 1 if k is None else k
+        )
         return out if k is not None else out[0]
 
     def call(self, service: str, *args: Any, **kwargs: Any) -> Any:

@@ -211,8 +211,12 @@ class MotionModel(EntityPlugin):
             (T + 1, m) or (T + 1, m, n), x0 first.
 
         Raises:
-            ParameterError: A shape does not fit, or a parameter is unknown.
+            ParameterError: A shape does not fit, a parameter is unknown, or the model's dynamics are outside: it has handles.
         """
+        if self.handles():
+            raise ParameterError(
+                f"{type(self).__name__} has no rollout: its dynamics are in {', '.join(self.handles())}"
+            )
         own = self.__dict__["_values"]
         x = np.array(x0, float)
         is_single = x.ndim == 1

@@ -389,7 +389,7 @@ class Group:
         u = self.u
         if self.stacks_inputs:
             u = self._stacked_inputs()
-        if self.moving.context.threads == 1:
+        if self.moving.context.threads == 1 or self.motion.handles:
             self.integrate(self.x, u, self.p, dt, substeps)
         else:
             self.moving.split(self._integrate_part, u, dt, substeps)

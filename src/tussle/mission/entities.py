@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -239,10 +240,6 @@ class EntityReader:
             self.problems.note(
                 fields.place("id"), "<id> is ignored: ids count up from 1 in the order of the file"
             )
-        if fields.has("script_name"):
-            self.problems.note(
-                fields.place("script_name"), "<script_name> is ignored: it belongs to JSBSim models"
-            )
         if fields.has("connect_entity") and fields.found["connect_entity"].text.lower() in FALSE:
             self.problems.note(
                 fields.place("connect_entity"), "<connect_entity> is ignored: wiring is always checked"
@@ -311,9 +308,21 @@ class EntityReader:
 
     def _motion(self, fields: Fields, taken: set[str]) -> Any:
         if fields.has("motion_model"):
-            return self.plugins.make(PluginTag.of(fields.found["motion_model"]), taken)
+            written = PluginTag.of(fields.found["motion_model"])
+            if fields.has("script_name"):
+                self._add_script(fields, written)
+            return self.plugins.make(written, taken)
         default = PluginTag("motion_model", ENTITY["motion_model"].default, {}, lambda _: fields.node.place)
         return self.plugins.make(default, taken)
+
+    def _add_script(self, fields: Fields, written: PluginTag) -> None:
+        """Make <script_name> an attribute of the motion model, if that reads it."""
+        with suppress(TussleError):  # `make` reports what is wrong with the name
+            if "script_name" in self.plugins.catalogue.load(written.plugin).params():
+                written.attributes.setdefault("script_name", fields.found["script_name"].text)
+                return
+        text = f"<script_name> is ignored: {written.plugin} does not read it"
+        self.problems.note(fields.place("script_name"), text)
 
     def _base(self, node: Node, team: int) -> None:
         fields = Fields(node, BASE, self.problems)

@@ -169,9 +169,7 @@ ENTITY = {
     "visual_model": _viewer("Name of the model that is drawn."),
     "visual_scale": _viewer("Scale of that model."),
     "visual_rpy": _viewer("Attitude of that model."),
-    "script_name": TagSpec(
-        "Flight script of JSBSim models, which are not in tussle yet.", "none", reads="text"
-    ),
+    "script_name": TagSpec("Flight script of a JSBSimModel or JSBSimControl.", "none", reads="text"),
 }
 """Tags of <entity> and <entity_common>."""
 

@@ -29,7 +29,7 @@ from tussle.api import (
 )
 
 KINDS = (Behavior, Autonomy, Controller, MotionModel, Sensor, Interaction, Metric, Network)
-ON_FILES = ("GraphInteraction", "MapGen2D", "TrajectoryRecordPlayback")
+ON_FILES = ("GraphInteraction", "JSBSimControl", "JSBSimModel", "MapGen2D", "TrajectoryRecordPlayback")
 """Plugins that read a file, which random missions do not have."""
 RATES = (1.0, 2.5, 3.0, 4.0, 9.0)
 

@@ -122,8 +122,8 @@ def test_what_a_mission_of_the_existing_system_lacks_is_named_in_one_line_each(e
 
 
 def test_missing_plugins_have_an_error_of_their_own():
-    with pytest.raises(catalogue.AbsentPluginError, match="JSBSimModel is not in tussle yet"):
-        catalogue.Catalogue().load("JSBSimModel")
+    with pytest.raises(catalogue.AbsentPluginError, match="BulletCollision is not in tussle yet"):
+        catalogue.Catalogue().load("BulletCollision")
 
 
 def test_only_plugins_that_do_not_ship_are_named_as_missing():

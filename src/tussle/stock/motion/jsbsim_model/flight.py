@@ -1,0 +1,241 @@
+"""An aircraft in JSBSim."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from array import array
+from collections import deque
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from tussle.errors import ParameterError, nearest_name
+from tussle.geodesy import Origin
+from tussle.stock.motion.jsbsim_model.units import FOOT
+
+STATE = (
+    "position/lat-geod-rad", "position/long-gc-rad", "position/geod-alt-ft",
+    "attitude/phi-rad", "attitude/theta-rad", "attitude/psi-rad",
+    "velocities/v-north-fps", "velocities/v-east-fps", "velocities/v-down-fps",
+    "velocities/p-rad_sec", "velocities/q-rad_sec", "velocities/r-rad_sec",
+)  # fmt: skip
+PLACE = (
+    "ic/lat-geod-rad", "ic/long-gc-rad", "ic/h-sl-ft", "ic/phi-rad", "ic/theta-rad", "ic/psi-true-rad",
+)  # fmt: skip
+MOTION = "ic/vn-fps", "ic/ve-fps", "ic/vd-fps", "ic/p-rad_sec", "ic/q-rad_sec", "ic/r-rad_sec"
+THROTTLES = "fcs/throttle-cmd-norm"
+"""Stands for those of all engines."""
+WIND = "atmosphere/wind-north-fps", "atmosphere/wind-east-fps", "atmosphere/wind-down-fps"
+TRIMS = {"none": -1, "longitudinal": 0, "full": 1, "ground": 2}
+
+
+Placing = tuple[Sequence[float], Sequence[float], Origin]
+
+
+class Aircraft(NamedTuple):
+    """What is loaded, and how it starts.
+
+    Attributes:
+        root: Folder of aircraft, engine, systems and scripts; empty for that of the package.
+        aircraft: Name of the aircraft, or empty.
+        script: File name of the script, or empty.
+        trim: A key of TRIMS.
+        flightgear: Address, port and protocol of a FlightGear that shows the aircraft, if any.
+        commanded: Properties that are set before each step; THROTTLES stands for those of all engines.
+        needed: Properties that the aircraft must have.
+    """
+
+    root: str
+    aircraft: str
+    script: str
+    trim: str
+    flightgear: tuple[str, int, str] | None
+    commanded: tuple[str, ...]
+    needed: tuple[str, ...]
+
+
+class Flight:
+    """An aircraft of JSBSim, with all that was done to it: JSBSim cannot save its state, but repeats a flight bit for bit.
+
+    Args:
+        aircraft: What to load.
+        dt: Length of a step [s].
+
+    Raises:
+        ParameterError: JSBSim is not installed, or cannot load the aircraft.
+    """
+
+    def __init__(self, aircraft: Aircraft, dt: float) -> None:
+        self.aircraft, self.dt, self.is_placed = aircraft, dt, False
+        self.fdm = load(aircraft, dt)
+        n_engines = self.fdm.get_propulsion().get_num_engines()
+        throttles = tuple(f"{THROTTLES}[{i}]" for i in range(n_engines))
+        self.commanded = [throttles if name == THROTTLES else (name,) for name in aircraft.commanded]
+        self.history: list[tuple[Placing, array[float]]] = []
+
+    def place(self, place: Sequence[float], motion: Sequence[float], origin: Origin) -> None:
+        """Set the state.
+
+        Args:
+            place: Values of the properties PLACE.
+            motion: Values of the properties MOTION and WIND. Without a velocity, an aircraft starts with that of its script.
+            origin: Of the world frame; the ground is level with it.
+
+        Raises:
+            ParameterError: The aircraft cannot be trimmed.
+        """
+        self.history.append(((place, motion, origin), array("d")))
+        self.origin = origin
+        fdm, start = self.fdm, self.aircraft
+        fdm["ic/terrain-elevation-ft"] = origin.altitude / FOOT
+        for name, value in zip(PLACE, place, strict=True):
+            fdm[name] = value
+        if self.is_placed or any(motion[:3]):
+            for name, value in zip(MOTION, motion[:6], strict=True):
+                fdm[name] = value
+        fdm.run_ic()
+        for name, value in zip(WIND, motion[6:], strict=True):
+            fdm[name] = value
+        if not self.is_placed:
+            self.is_placed = True
+            fdm["propulsion/set-running"] = -1
+            if start.trim != "none":
+                self._trim()
+
+    def _trim(self) -> None:
+        import jsbsim
+
+        try:
+            self.fdm.do_trim(TRIMS[self.aircraft.trim])
+        except jsbsim.TrimFailureError as error:
+            name = self.fdm.get_model_name()
+            raise ParameterError(
+                f"trim = {self.aircraft.trim!r}: JSBSim cannot trim {name} at this altitude and speed: {str(error).strip()}"
+            ) from None
+
+    def fly(self, values: Sequence[float], n_steps: int) -> None:
+        """Set the commands and make some steps."""
+        self.history[-1][1].extend((*values, n_steps))
+        fdm = self.fdm
+        for names, value in zip(self.commanded, values, strict=True):
+            for name in names:
+                fdm[name] = value
+        for _ in range(n_steps):
+            fdm.run()
+
+    def state(self) -> list[float]:
+        """Values of the properties STATE."""
+        return [self.fdm[name] for name in STATE]
+
+    def __getstate__(self) -> Any:
+        return self.aircraft, self.dt, self.history
+
+    def __setstate__(self, saved: Any) -> None:
+        aircraft, dt, history = saved
+        Flight.__init__(self, aircraft, dt)
+        width = len(self.commanded) + 1
+        for placing, flown in history:
+            self.place(*placing)
+            for k in range(0, len(flown), width):
+                *values, n_steps = flown[k : k + width]
+                self.fly(values, int(n_steps))
+
+
+def load(wanted: Aircraft, dt: float) -> Any:
+    """Return an executive of JSBSim with the aircraft, without outputs except for FlightGear.
+
+    Raises:
+        ParameterError: JSBSim is not installed, or the aircraft cannot be loaded or lacks a needed property.
+    """
+    try:
+        import jsbsim
+    except ImportError:
+        raise ParameterError("JSBSim is not installed: pip install 'tussle[jsbsim]'") from None
+    root = Path(wanted.root or jsbsim.get_default_root_dir())
+    key, name, folder = (
+        ("script_name", wanted.script, "scripts")
+        if wanted.script
+        else ("aircraft", wanted.aircraft, "aircraft")
+    )
+    file = root / folder / name / f"{name}.xml" if folder == "aircraft" else root / folder / name
+    if not file.is_file():
+        there = sorted(p.name for p in (root / folder).glob("*" if folder == "aircraft" else "*.xml"))
+        raise ParameterError(
+            f"{key} = {name!r}: {root / folder} has no such file{nearest_name(name, there)}; jsbsim_root names the folder with "
+            "aircraft, engine, systems and scripts"
+        )
+    log = messages()
+    log.lines.clear()
+    fdm = jsbsim.FGFDMExec(str(root))
+    fdm.set_debug_level(0)
+    fdm.set_dt(dt)
+    try:
+        is_loaded = fdm.load_script(f"scripts/{name}", dt, "") if wanted.script else fdm.load_model(name)
+    except (OSError, RuntimeError) as error:
+        log.lines.append(str(error))
+        is_loaded = False
+    if not is_loaded:
+        raise ParameterError(
+            f"{key} = {name!r}: JSBSim cannot load {file}: {' '.join(' '.join(log.lines).split())}"
+        )
+    for each in wanted.needed:
+        if "No matches" in fdm.query_property_catalog(each):
+            raise ParameterError(
+                f"{key} = {name!r}: {fdm.get_model_name()} has no property {each}, which JSBSimModel sets; "
+                "take an aircraft with such an autopilot, or JSBSimControl"
+            )
+    # Aircraft and scripts may ask for files of their own; nothing is written where the user did not ask for it.
+    n_outputs = 0
+    while fdm.set_output_filename(n_outputs, os.devnull):
+        n_outputs += 1
+    fdm.disable_output()
+    fdm.disable_input()
+    if wanted.flightgear:
+        _show(fdm, wanted.flightgear, dt)
+    return fdm
+
+
+def _show(fdm: Any, flightgear: tuple[str, int, str], dt: float) -> None:
+    """Send the states to a FlightGear, 30 times a second."""
+    address, port, protocol = flightgear
+    rate = min(30.0, 1.0 / dt)
+    text = f'<output name="{address}" type="FLIGHTGEAR" port="{port}" protocol="{protocol.lower()}" rate="{rate:g}"/>'
+    with tempfile.NamedTemporaryFile("w", suffix=".xml") as file:
+        file.write(text)
+        file.flush()
+        if not fdm.set_output_directive(file.name):
+            raise ParameterError(
+                f"flightgear_ip = {address!r}, port {port}: JSBSim cannot open the connection"
+            )
+    fdm.enable_output()
+
+
+@cache
+def messages() -> Any:
+    """The log of JSBSim in this process; it keeps errors and prints nothing."""
+    import jsbsim
+
+    class Log(jsbsim.FGLogger):
+        def __init__(self) -> None:
+            super().__init__()
+            self.lines: deque[str] = deque(maxlen=50)
+            self.level = jsbsim.LogLevel.DEBUG
+
+        def set_level(self, level: Any) -> None:
+            self.level = level
+
+        def message(self, text: str) -> None:
+            if self.level >= jsbsim.LogLevel.ERROR:
+                self.lines.append(text)
+
+        def file_location(self, file: str, line: int) -> None: ...
+
+        def format(self, hint: Any) -> None: ...
+
+        def flush(self) -> None: ...
+
+    log = Log()
+    jsbsim.set_logger(log)
+    return log

@@ -1,0 +1,201 @@
+"""Aircraft flown by JSBSim."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, ClassVar
+
+import numpy as np
+
+from tussle.api import Handle, HistoricAttributes, Input, MotionBody, Param, RigidBodyModel
+from tussle.errors import ParameterError, listed, nearest_name
+from tussle.numeric.quaternion import (
+    quat_conjugate,
+    quat_multiply,
+    quat_rotate_inverse,
+    quat_to_pitch,
+    quat_to_roll,
+    quat_to_yaw,
+)
+from tussle.stock.motion.jsbsim_model import kernels
+from tussle.stock.motion.jsbsim_model.earth import FORWARD_RIGHT_DOWN, above_sea_level, to_world
+from tussle.stock.motion.jsbsim_model.flight import THROTTLES, TRIMS, Aircraft, Flight
+from tussle.stock.motion.jsbsim_model.units import FOOT, KNOT
+
+MIRRORED = np.array([[1.0], [-1.0], [-1.0]])
+"""From axes forward, right, down to forward, left, up, and back."""
+
+
+class TrimParam(Param):
+    """A trim of JSBSim. The conformance kit does not try all, as it tries `choices`: in its games no aircraft is in trim."""
+
+    def convert(self, value: Any, where: str = "", from_geodetic: Callable[..., Any] | None = None) -> Any:
+        """Check the name.
+
+        Raises:
+            ParameterError: JSBSim has no such trim.
+        """
+        name = super().convert(value, where, from_geodetic)
+        if name not in TRIMS:
+            raise ParameterError(
+                f"{self._place(where)} = {name!r} is not allowed{nearest_name(name, TRIMS)}; {listed(TRIMS)}"
+            )
+        return name
+
+
+class JSBSimAircraft(RigidBodyModel):
+    """An aircraft of JSBSim (J. S. Berndt 2004, "JSBSim: an open source flight dynamics model in C++"); abstract.
+
+    JSBSim makes one step per substep of the mission; 1/120 s is usual. Its Earth is the ellipsoid WGS 84, which the scene's origin
+    touches; the ground is level with the origin.
+    """
+
+    grade = "machine"
+    historic_attributes = HistoricAttributes(unread=("use_pitch",))
+    needed_properties: ClassVar[tuple[str, ...]] = ()
+    commanded: ClassVar[tuple[str, ...]] = ()
+
+    script_name = Param(
+        doc="File below `scripts` that names an aircraft, its start and its events.", default=""
+    )
+    aircraft = Param("", doc="Folder below `aircraft`, in place of a script.")
+    jsbsim_root = Param(
+        "", doc="Folder of aircraft, engine, systems and scripts; empty for those of the package."
+    )
+    trim = TrimParam(
+        "none", doc="Trim at the start: none, longitudinal, full, or ground for one that stands there."
+    )
+    wind = Param((0.0, 0.0, 0.0), fields="east north up", unit="m/s", doc="Velocity of the air, world frame.")
+    flightgear_output_enable = Param(False, structural=True, doc="Send the states to a FlightGear.")
+    flightgear_ip = Param("localhost", doc="Its address.")
+    flightgear_port = Param(5600, structural=True, ge=1, le=65535, doc="Its port.")
+    flightgear_protocol = Param("UDP", choices=["UDP", "TCP"], doc="Protocol.")
+    flight = Handle(doc="The aircraft in JSBSim.")
+
+    def open_one(self, row: Any) -> Flight:
+        """Load the aircraft.
+
+        Raises:
+            ParameterError: JSBSim is not installed, or cannot load it.
+        """
+        own = row.plugin.values
+        if bool(own["script_name"]) == bool(own["aircraft"]):
+            raise ParameterError(f"{type(self).__name__} takes script_name or aircraft, one of them")
+        flightgear = own["flightgear_ip"], own["flightgear_port"], own["flightgear_protocol"]
+        loaded = Aircraft(
+            own["jsbsim_root"], own["aircraft"], own["script_name"], own["trim"],
+            flightgear if own["flightgear_output_enable"] else None, self.commanded, self.needed_properties,
+        )  # fmt: skip
+        return Flight(loaded, row.dt)
+
+    def save_one(self, flight: Flight) -> Flight:
+        """Return the flight, which is saved as what was done to it."""
+        return flight
+
+    def load_one(self, row: Any, flight: Flight) -> Flight:
+        """Return the flight, which was flown again when it was read."""
+        return flight
+
+    def from_body(self, body: MotionBody, rows: np.ndarray) -> None:
+        """Place aircraft that were moved; newborn ones are loaded later."""
+        super().from_body(body, rows)
+        rows = np.array([row for row in rows if self.flight[row] is not None], np.int64)
+        if len(rows):
+            self.spawn(body, rows)
+
+    def spawn(self, body: Any, rows: np.ndarray) -> None:
+        """Place the aircraft of some rows. Without a velocity at its birth, an aircraft has that of its script."""
+        origin = body.scene.origin
+        latitude, longitude, altitude = origin.to_geodetic(body.pos[:, rows])
+        frames = to_world(origin, latitude, longitude)
+        attitude = quat_multiply(
+            quat_conjugate(frames), quat_multiply(body.quat[:, rows], FORWARD_RIGHT_DOWN)
+        )
+        angles = quat_to_roll(attitude), quat_to_pitch(attitude), quat_to_yaw(attitude)
+        velocity = quat_rotate_inverse(frames, body.vel[:, rows]) / FOOT
+        wind = quat_rotate_inverse(frames, self.wind[:, rows]) / FOOT
+        place = np.stack([latitude, longitude, above_sea_level(latitude, altitude) / FOOT, *angles])
+        motion = np.concatenate([velocity, MIRRORED * self.rigid_body[10:, rows], wind])
+        for k, row in enumerate(rows):
+            try:
+                self.flight[row].place(place[:, k].tolist(), motion[:, k].tolist(), origin)
+            except ParameterError as error:
+                body.fail(row, str(error))
+        self.read(rows)
+
+    @property
+    def advance(self) -> Any:
+        """The function that makes steps of all aircraft."""
+        return self.fly
+
+    def fly(self, x: np.ndarray, u: np.ndarray, p: np.ndarray, dt: float, substeps: int) -> None:
+        """Make `substeps` steps of all aircraft with the inputs (k, n); x is the state of all rows."""
+        flown = np.array([row for row, flight in enumerate(self.flight) if flight is not None], np.int64)
+        values = self.commands(u).T.tolist() if len(flown) else []
+        for row in flown:
+            self.flight[row].fly(values[row], substeps)
+        self.read(flown)
+
+    def commands(self, u: np.ndarray) -> np.ndarray:
+        """Return the values of the properties `commanded`, (m, n), from the inputs, (k, n)."""
+        raise NotImplementedError
+
+    def read(self, rows: np.ndarray) -> None:
+        """Set the state of some rows from JSBSim."""
+        if not len(rows):
+            return
+        origin, read = self.flight[rows[0]].origin, np.array([self.flight[row].state() for row in rows])
+        kernels.to_rigid_bodies(
+            read, (origin.latitude, origin.longitude, origin.altitude), rows, self.rigid_body
+        )
+
+
+class JSBSimControl(JSBSimAircraft):
+    """An aircraft of JSBSim, flown by its surfaces: commands in [-1, 1], the throttle of all engines in [0, 1].
+
+    Positive elevator lowers the nose, positive aileron the right wing; positive rudder turns the nose to the left in most aircraft.
+
+    Differences from the existing system: the attitude and velocity of the entity count at the start; an aircraft can be named without
+    a script and trimmed; the throttle counts from the start on (there, after 0.05 s); latitudes are geodetic.
+
+    Raises:
+        ParameterError: JSBSim is not installed, or cannot load or trim the aircraft.
+    """
+
+    commanded = (THROTTLES, "fcs/elevator-cmd-norm", "fcs/aileron-cmd-norm", "fcs/rudder-cmd-norm")
+    throttle = Input(doc="Throttle.")
+    elevator = Input(doc="Elevator, nose down positive.")
+    aileron = Input(doc="Aileron, right wing down positive.")
+    rudder = Input(doc="Rudder.")
+
+    def commands(self, u: np.ndarray) -> np.ndarray:
+        """Return the inputs, within their limits."""
+        return np.stack([np.clip(u[0], 0.0, 1.0), *np.clip(u[1:], -1.0, 1.0)])
+
+
+class JSBSimModel(JSBSimAircraft):
+    """An aircraft of JSBSim under its own autopilot, which holds bank, altitude and airspeed.
+
+    It sets the properties ap/bank_setpoint [rad], ap/altitude_setpoint [ft] and ap/airspeed_setpoint [knot]; the script switches the
+    autopilot on. None of the aircraft of the package has a bank setpoint: `jsbsim_root` names the folder with yours.
+
+    Differences from the existing system: latitudes are geodetic, positions are not rounded, the entity has not flown a step when it
+    is born, and it starts with its own velocity, if it has one.
+
+    Raises:
+        ParameterError: JSBSim is not installed, or cannot load the aircraft, or the aircraft has no such autopilot.
+    """
+
+    needed_properties = ("ap/bank_setpoint", "ap/altitude_setpoint", "ap/airspeed_setpoint")
+    commanded = needed_properties
+    desired_roll = Input(unit="rad", doc="Desired bank, right wing down.")
+    desired_altitude = Input(unit="m", doc="Desired height above the origin's tangent plane.")
+    desired_speed = Input(unit="m/s", doc="Desired airspeed.")
+
+    def commands(self, u: np.ndarray) -> np.ndarray:
+        """Return bank [rad], altitude above the ellipsoid [ft], and airspeed [knot]."""
+        roll, height, speed = u
+        place = next(f for f in self.flight if f is not None).origin.to_geodetic(
+            np.stack([*self.rigid_body[:2], height])
+        )
+        return np.stack([roll, place[2] / FOOT, speed / KNOT])
