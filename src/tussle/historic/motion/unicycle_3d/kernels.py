@@ -1,4 +1,4 @@
-"""Kernel of the existing system's Unicycle3D: RK4 on the turn since the start; see `variants.RelativeUnicycle3D`."""
+"""Kernel of SCRIMMAGE's Unicycle3D: RK4 on the turn since the start."""
 
 from __future__ import annotations
 
