@@ -58,24 +58,19 @@ def test_capture_the_flag_is_played_as_recorded() -> None:
     for team, row in recording.summary.items():
         metrics = (flight.result.metrics[name] for name in flight.result.metrics if name.endswith("Metrics"))
         counted = {name: by_team[team] for metric in metrics for name, by_team in metric.items()}
-        for column in ("entity_count", "team_coll", "NonTeamCapture", "flags_taken", "flags_captured"):
-            assert counted[column] == row[column], (team, column)
+        for column in set(row) & set(counted) - {"score"}:
+            assert counted[column] == pytest.approx(row[column], abs=1e-6), (team, column)
         assert flight.result.scores[team] == row["score"]
 
 
 def counts_alike(flight: Flight, recording: Recording) -> None:
-    """Collisions and time in the air."""
+    """Collisions and times in the air."""
     assert flight.result is not None
     counted = flight.result.metrics["SimpleCollisionMetrics"]
     for team, row in recording.summary.items():
-        for column in ("score", "entity_count", "non_team_coll", "team_coll", "ground_coll"):
-            assert counted[column][team] == row[column], (team, column)
-    # There, nobody's time counted beyond the last death, and everybody's ended a step early; so from the frames, which both have.
-    dt, n_steps = 0.1, flight.result.steps
-    team_of = dict(zip(recording.id.tolist(), recording.team.tolist(), strict=True))
-    for team in recording.summary:
-        steps = [min(last + 1, n_steps) for i, last in recording.last_frame.items() if team_of[i] == team]
-        assert counted["flight_time"][team] == pytest.approx(dt * sum(steps), rel=1e-12)
+        for column, number in row.items():
+            if column != "team_id":
+                assert counted[column][team] == pytest.approx(number, abs=1e-6), (team, column)
 
 
 @pytest.mark.parametrize("name", AS_THE_PRODUCT_FLIES)

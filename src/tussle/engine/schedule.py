@@ -44,6 +44,8 @@ def compose(state: SimulationState) -> list[Call]:
     """
     calls: list[Call] = []
     groups = state.population.groups
+    if any(r.plugin.reads_start_positions for r in state.world_bindings):
+        calls.append(Call("keep positions", partial(_keep_positions, state)))
     if state.mission.update == "sequential":
         for group in groups:
             calls += [_entity_call(state, "autonomy", group, b) for b in group.autonomies]
@@ -67,6 +69,10 @@ def compose(state: SimulationState) -> list[Call]:
     calls.append(Call("deliver messages", partial(deliver, state)))
     calls.append(Call("check, remove, end", partial(end_step, state)))
     return calls
+
+
+def _keep_positions(state: SimulationState) -> None:
+    state.world_view.start_pos = state.population.bodies.pos.copy()
 
 
 def _motion(state: SimulationState, groups: list[Group]) -> list[Call]:
