@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from tussle.api import MotionModel
-from tussle.numeric.quaternion import quat_normalize, quat_rotate, quat_rotate_inverse
 
 Derivative = Callable[[np.ndarray], np.ndarray]
 Step = Callable[[np.ndarray, dict[str, np.ndarray], dict[str, Any], float], None]
@@ -71,14 +70,24 @@ def quat_rates(quat: np.ndarray, rates: Any) -> np.ndarray:
     )
 
 
+def normalized(quat: np.ndarray) -> np.ndarray:
+    """Quaternions, (4, n), scaled to length 1."""
+    w, x, y, z = quat
+    return np.asarray(quat / np.sqrt(w * w + x * x + y * y + z * z))
+
+
 def rotated(quat: np.ndarray, vector: Any) -> np.ndarray:
-    """Vectors, (3, n), turned by quaternions of any length, (4, n)."""
-    return np.asarray(quat_rotate(quat_normalize(quat), np.asarray(vector)))
+    """Vectors, (3, n), turned by quaternions of any length, (4, n): v + 2 (w u x v + u x (u x v))."""
+    w, x, y, z = normalized(quat)
+    a, b, c = vector
+    p, q, r = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
+    return np.array([a + w * p + (y * r - z * q), b + w * q + (z * p - x * r), c + w * r + (x * q - y * p)])
 
 
 def unrotated(quat: np.ndarray, vector: Any) -> np.ndarray:
     """Vectors, (3, n), turned back by quaternions of any length, (4, n)."""
-    return np.asarray(quat_rotate_inverse(quat_normalize(quat), np.asarray(vector)))
+    w, x, y, z = quat
+    return rotated(np.array([w, -x, -y, -z]), vector)
 
 
 def multiplied(matrix: np.ndarray, vector: Any) -> np.ndarray:

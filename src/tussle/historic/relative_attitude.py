@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from tussle.api import MotionBody, State
-from tussle.historic.integration import quat_rates, rk4_step, rotated, unrotated
-from tussle.numeric.quaternion import quat_conjugate, quat_multiply, quat_normalize
+from tussle.historic.integration import normalized, quat_rates, rk4_step, rotated, unrotated
+from tussle.numeric.quaternion import quat_conjugate, quat_multiply
 
 LOADS = ("force_x", "force_y", "force_z", "torque_x", "torque_y", "torque_z")
 
@@ -55,9 +55,9 @@ def turn(x: np.ndarray, u: dict[str, np.ndarray], commands: Any, h: float) -> No
     spin = np.array(rates) + np.array([u[name] for name in LOADS[3:]])
 
     def f(s: np.ndarray) -> np.ndarray:
-        moved = rotated(np.asarray(quat_multiply(quat_normalize(s[3:7]), start)), s[7:])
+        moved = rotated(np.asarray(quat_multiply(normalized(s[3:7]), start)), s[7:])
         return np.concatenate([moved, quat_rates(s[3:7], spin), [acceleration], 0.0 * s[8:]])
 
     s = rk4_step(f, np.concatenate([x[:3], local, x[7:10]]), h)
     x[:3], x[7:10] = s[:3], s[7:]
-    x[3:7] = quat_normalize(quat_multiply(quat_normalize(s[3:7]), start))
+    x[3:7] = normalized(quat_multiply(normalized(s[3:7]), start))

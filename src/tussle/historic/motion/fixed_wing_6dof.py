@@ -11,6 +11,7 @@ import numpy as np
 from tussle.historic.integration import (
     advance_by,
     multiplied,
+    normalized,
     quat_rates,
     rk4_step,
     rotated,
@@ -18,7 +19,7 @@ from tussle.historic.integration import (
     unrotated,
 )
 from tussle.numeric import atan2, sincos
-from tussle.numeric.quaternion import quat_from_euler, quat_multiply, quat_normalize
+from tussle.numeric.quaternion import quat_from_euler, quat_multiply
 from tussle.stock.motion import fixed_wing_6dof
 from tussle.stock.motion.fixed_wing_6dof.plugin import SLUG_FT_SQ
 
@@ -96,7 +97,7 @@ def _step(
         )
 
     s = rk4_step(f, np.concatenate([velocity, rates, quat, x[:3], x[3:6]]), h)
-    x[:6], x[6:10], x[10:13] = s[10:], _flipped(quat_normalize(s[6:10])), FLIP * s[3:6]
+    x[:6], x[6:10], x[10:13] = s[10:], _flipped(normalized(s[6:10])), FLIP * s[3:6]
 
 
 def _loads(

@@ -11,6 +11,7 @@ from tussle.api import MotionBody, State
 from tussle.historic.integration import (
     advance_by,
     multiplied,
+    normalized,
     quat_rates,
     rk4_step,
     rotated,
@@ -18,7 +19,6 @@ from tussle.historic.integration import (
     unrotated,
 )
 from tussle.numeric import atan2, sincos
-from tussle.numeric.quaternion import quat_normalize
 from tussle.stock.motion import multirotor
 
 
@@ -81,7 +81,7 @@ def _step(x: np.ndarray, u: dict[str, np.ndarray], p: dict[str, Any], h: float, 
         beyond = push[2] - lift  # the stored force is modified at every stage
         push[2] = np.where(beyond > 0.0, -weight[2] - lift, np.where(beyond < 0.0, 0.0, push[2]))
         acceleration = (held + push) / mass
-        attitude = np.asarray(quat_normalize(s[6:10]))
+        attitude = normalized(s[6:10])
         return np.concatenate(
             [
                 rotated(attitude, s[13:]),
@@ -93,4 +93,4 @@ def _step(x: np.ndarray, u: dict[str, np.ndarray], p: dict[str, Any], h: float, 
         )
 
     x[:] = rk4_step(f, x, h)
-    x[6:10] = quat_normalize(x[6:10])
+    x[6:10] = normalized(x[6:10])

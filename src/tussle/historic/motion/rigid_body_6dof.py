@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from tussle.api import MotionBody, State
-from tussle.historic.integration import advance_by, quat_rates, rk4_step, rotated
-from tussle.numeric.quaternion import quat_conjugate, quat_multiply, quat_normalize
+from tussle.historic.integration import advance_by, normalized, quat_rates, rk4_step, rotated
+from tussle.numeric.quaternion import quat_conjugate, quat_multiply
 from tussle.stock.motion import rigid_body_6dof
 
 MOST_TURN = 0.001
@@ -64,4 +64,4 @@ def _step(x: np.ndarray, u: dict[str, np.ndarray], p: dict[str, Any], h: float) 
     local = np.asarray(quat_multiply(quat_conjugate(start), x[6:10]))
     s = rk4_step(f, np.concatenate([x[:6], [turn, turn, turn], local]), h)
     x[:6] = s[:6]
-    x[6:10] = quat_normalize(quat_multiply(start, quat_normalize(s[9:])))
+    x[6:10] = normalized(quat_multiply(start, normalized(s[9:])))

@@ -8,8 +8,15 @@ from typing import Any
 import numpy as np
 
 from tussle.api import MotionBody, State
-from tussle.historic.integration import advance_by, quat_rates, rk4_step, rotated, solved, unrotated
-from tussle.numeric.quaternion import quat_normalize
+from tussle.historic.integration import (
+    advance_by,
+    normalized,
+    quat_rates,
+    rk4_step,
+    rotated,
+    solved,
+    unrotated,
+)
 from tussle.stock.motion import uuv_6dof
 
 THRUST = (-2.0, 3.6936)
@@ -60,7 +67,7 @@ class UUV6DOF(uuv_6dof.UUV6DOF):
         """Write position, velocity, attitude and angular velocity."""
         x = self.rigid_body
         body.pos[:], body.vel[:] = x[:3], x[3:6]
-        body.quat[:] = quat_normalize(x[6:10])
+        body.quat[:] = normalized(x[6:10])
         body.omega[:] = rotated(x[6:10], FLIP * x[13:16])
 
 
