@@ -314,3 +314,29 @@ def test_a_sphere_network_loses_messages_to_the_sender_itself():
         sim = Simulation(mission(said, end=40.0, networks=[law.SphereNetwork(prob_transmit=0.25)]), seeds=1)
         sim.run()
         assert low <= sim.read("a.Listener.n_heard")[0].item() <= high
+
+
+# -- motion ---------------------------------------------------------------------------------------------------------------
+
+
+def test_a_unicycle_that_should_climb_to_its_prey_dives_and_loops():
+    """A pursuer 200 m below its prey: 35 m/s, a pitch rate of 1.5 rad/s; the nose runs away from the prey, through -90 degrees."""
+    chase = block(
+        "a", team=2, autonomy=stock.Predator(max_speed=35), motion=stock.Unicycle(vel_max=35, turn_rate_max=2, pitch_rate_max=1.5)
+    )  # fmt: skip
+    prey = block("prey", team=1, position=(500, 0, 200))
+    lowest, roll = {}, {}
+    for compat in ("scrimmage", ""):
+        sim = Simulation(mission(chase, prey, end=10.0, compat=compat), seeds=1)
+        heights = []
+        while not sim.is_over:
+            sim.step()
+            heights.append(sim.read("a.pos")[0].ravel()[2])
+        lowest[compat] = min(heights)
+        w, x, y, z = sim.read("a.quat")[0].ravel()
+        roll[compat] = abs(math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)))
+    assert lowest[""] >= 0.0
+    assert lowest["scrimmage"] < -30.0
+    assert roll[""] == pytest.approx(0.0, abs=1e-9)
+    assert roll["scrimmage"] == pytest.approx(math.pi, abs=1e-9)
+    assert historic.Unicycle().use_pitch is False
