@@ -57,7 +57,9 @@ class HistoricBirths(Births):
         yaw = _in_degrees(heading)
         for i in np.flatnonzero(variance > 0.0):
             seeds = np.full(places[i] + 1, self.seeds[worlds[i]] ^ self.keys[block])
-            steps = rng.normal(seeds, HEADING, np.arange(places[i] + 1), np.zeros(places[i] + 1, np.int64))[0]
+            steps = rng.normal(
+                seeds, int(HEADING), np.arange(places[i] + 1), np.zeros(places[i] + 1, np.int64)
+            )[0]
             at = heading[i]
             for step in steps:  # each number of the walk is rounded
                 at = _in_degrees(at + math.sqrt(variance[i]) * step)
@@ -67,8 +69,10 @@ class HistoricBirths(Births):
     def due(self, t: np.ndarray, running: np.ndarray) -> dict[int, np.ndarray]:
         found: dict[int, np.ndarray] = {}
         for i, block in enumerate(self.overrides.mission.blocks):
+            if block.rate is None:
+                continue
             parts = []
-            for slot in range(block.slots if block.rate else 0):
+            for slot in range(block.slots):
                 is_due = running & (self.next_time[i][:, slot] <= t + 1e-9) & (self.n_left[i] > 0)
                 worlds = np.flatnonzero(is_due)
                 self.n_left[i, worlds] -= 1

@@ -45,9 +45,10 @@ def test_headings_walk_along_a_block_and_are_those_of_texts():
 
 
 def test_the_initial_speed_points_east():
-    north = block("a", heading="90 deg", speed=5.0, autonomy=STILL)
+    moving = {"autonomy": (), "motion": stock.Ballistic()}
+    north = block("a", heading="90 deg", speed=5.0, **moving)
     assert placed(north)[2].ravel().tolist() == [5.0, 0.0, 0.0]
-    given = block("a", heading="90 deg", velocity=(0.0, 2.0, 1.0), autonomy=STILL)
+    given = block("a", heading="90 deg", velocity=(0.0, 2.0, 1.0), **moving)
     assert placed(given)[2].ravel().tolist() == [0.0, 2.0, 1.0]
 
 

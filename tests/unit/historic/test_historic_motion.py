@@ -134,6 +134,13 @@ def test_uuv_has_thrust_without_throttle_and_stops_at_the_surface():
     assert -1e-12 < after(model, x0, 0.0, 0.0, 0.0)[2] < 0.0
 
 
+def test_an_oscillator_diverges_at_long_steps():
+    model = historic.HarmonicOscillator(natural_frequency=100, damping_ratio=0)
+    assert abs(after(model, [1, 0], 0.0, steps=9)[0]) > 1e6
+    slow = after(historic.HarmonicOscillator(damping_ratio=0), [1, 0], 0.0, steps=10)
+    assert slow == pytest.approx([math.cos(1.0), -math.sin(1.0)], abs=1e-5)
+
+
 def test_aircraft_with_surfaces_falls_over_with_the_wind():
     rest = [0, 0, 100, 50, 0, 0, *LEVEL, 0, 0, 0]
     ahead, behind = (
