@@ -2,10 +2,12 @@
 
     python benchmarks/validity.py [--update sequential|synchronous] [--law historic|corrected] [--seeds 1000] [--processes 2]
                                   [--csv FILE] [--reference FILE] [--json FILE]
+    python benchmarks/validity.py --compat [--seeds 200] [--reference FILE]
 
 `--law historic` uses Boids with the means of the paper's code and credits each valid claim; `corrected` uses the default Boids
-with the scoring of the paper. A reference is a table of (seed, score of team 2, score of team 3, prey left, ...), one run per
+with the scoring of the paper. A reference is a table of (seed, score of team 2, score of team 3, prey left, end time ...), one run per
 line, from the original code; with it, every distance is printed next to its two-sample limit at the 1 % level.
+`--compat` plays the game by the laws of SCRIMMAGE of 2025 (`Mission(compat="scrimmage")`), for comparison with its runs.
 Published: of 1,000 games team 2 (follows one prey) wins 593, team 3 (switches) wins 361, and 46 are ties.
 """
 
@@ -23,7 +25,7 @@ import game
 import numpy as np
 
 from tussle import Mission, Simulation
-from tussle.stock import Boids, SimpleCapture
+from tussle.stock import Boids, SimpleCapture, SimpleCollision
 
 Z_99 = 2.5758
 """Two-sided 1 % point of the normal distribution."""
@@ -34,8 +36,18 @@ STACK = 125
 GOAL_AHEAD = 1e4  # [m], in the paper's mission
 
 
+def mission_2025() -> Mission:
+    """The same by the laws of SCRIMMAGE of 2025, which places entities normally distributed, and apart."""
+    base = game.mission(motion_multiplier=1)
+    blocks = [b.replace(placement="normal", variance=b.half_width) for b in base.blocks]
+    rules = [SimpleCapture(), SimpleCollision(startup_collisions_only=True)]
+    return base.replace(blocks=blocks, interactions=rules, compat="scrimmage")
+
+
 def mission(update: str, law: str) -> Mission:
     """The mission of section 6.5 of the paper, one motion step per decision."""
+    if law == "scrimmage":
+        return mission_2025()
     means = "historic" if law == "historic" else "team"
     base = game.mission(motion_multiplier=1)
     prey, *predators = base.blocks
@@ -80,6 +92,8 @@ def compare(ours: np.ndarray, theirs: np.ndarray) -> list[dict[str, Any]]:
         )
     columns = {"score of team 2": (ours[:, 1], theirs[:, 1]), "score of team 3": (ours[:, 2], theirs[:, 2])}
     columns["prey lost"] = (100 - ours[:, 3], 100 - theirs[:, 3])
+    if theirs.shape[1] > 4:
+        columns["end time [s]"] = (np.round(ours[:, 4]), np.round(theirs[:, 4]))
     for name, (x, y) in columns.items():
         limit = Z_99 * math.sqrt(x.var(ddof=1) / n + y.var(ddof=1) / m)
         rows.append(
@@ -109,11 +123,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--update", choices=("sequential", "synchronous"), default="sequential")
     parser.add_argument("--law", choices=("historic", "corrected"), default="historic")
+    parser.add_argument("--compat", action="store_true", help="play by the laws of SCRIMMAGE of 2025")
     parser.add_argument("--seeds", type=int, default=1000)
     parser.add_argument("--processes", type=int, default=multiprocessing.cpu_count())
     for option in ("--csv", "--reference", "--json"):
         parser.add_argument(option, type=Path)
     args = parser.parse_args()
+    if args.compat:
+        args.update, args.law = "synchronous", "scrimmage"
     seeds = list(range(1, args.seeds + 1))
     jobs = [(args.update, args.law, seeds[i : i + STACK]) for i in range(0, len(seeds), STACK)]
     begin = time.perf_counter()
@@ -145,7 +162,7 @@ def main() -> None:
         )
     report: list[dict[str, Any]] = []
     if args.reference:
-        report = compare(ours, np.genfromtxt(args.reference, delimiter=",", skip_header=1)[:, :4])
+        report = compare(ours, np.genfromtxt(args.reference, delimiter=",", skip_header=1)[:, :5])
         print(f"{'measure':<30} {'ours':>9} {'theirs':>9} {'distance':>9} {'1 % limit':>9}")
         for row in report:
             mark = "" if row["difference"] <= row["limit"] else "   DIFFERENT"

@@ -7,7 +7,7 @@ from pathlib import Path
 import hawk
 import pytest
 
-from tussle import stock
+from tussle import historic, stock
 from tussle.stock import Boundary
 from tussle.testing import check_plugin
 
@@ -80,6 +80,13 @@ def test_plugin_meets_the_contract(name: str, tmp_path: Path, monkeypatch: pytes
         params = {**aircraft, "jsbsim_root": hawk.write(tmp_path / "root")}
     companions = [stock.load(other)() for other in NEEDED.get(name, ())]
     check_plugin(stock.load(name), companions=BOUNDARIES if name in ON_REGIONS else companions, **params)
+
+
+@pytest.mark.parametrize(
+    "name", [name for name, path in historic.manifest().items() if ".motion." not in path]
+)
+def test_plugin_with_the_law_of_scrimmage_meets_the_contract(name: str) -> None:
+    check_plugin(historic.load(name), companions=BOUNDARIES if name in ON_REGIONS else ())
 
 
 @pytest.mark.parametrize("name", COMPANIONS)

@@ -13,6 +13,8 @@ import sys
 import tempfile
 
 from pages import OUTPUT, PAGES, examples, namespace, printed_by
+from parity_page import PAGE as PARITY
+from parity_page import parity_page
 from reference import PAGE, reference
 
 
@@ -44,6 +46,7 @@ def main() -> None:
         text = OUTPUT.sub(lambda shown: f"{shown[1]}{game()}```", text)
         page.write_text(text)
     PAGE.write_text(reference())
+    PARITY.write_text(parity_page())
 
 
 if __name__ == "__main__":

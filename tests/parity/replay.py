@@ -18,6 +18,7 @@ class Flight:
     Attributes:
         error: Largest distance from the recorded position in each frame [m].
         turn: Largest difference of a quaternion's components in each frame.
+        slip: Largest difference of a velocity's components in each frame [m/s].
         worst: (frame, id) where the position differs most.
         strangers: First frame in which others were there than recorded; None if there is none.
         last_frame: Entity -> last frame in which it was there.
@@ -26,6 +27,7 @@ class Flight:
 
     error: dict[int, float] = field(default_factory=dict)
     turn: dict[int, float] = field(default_factory=dict)
+    slip: dict[int, float] = field(default_factory=dict)
     worst: tuple[int, int] = (0, 0)
     strangers: int | None = None
     last_frame: dict[int, int] = field(default_factory=dict)
@@ -73,6 +75,7 @@ def _compare(flight: Flight, recording: Recording, frame: int, bodies: object) -
     offset = bodies.pos[:, order] - recording.pos[:, rows]
     distance = np.sqrt((offset * offset).sum(axis=0))
     q, r = bodies.quat[:, order], recording.quat[:, rows]
+    flight.slip[frame] = float(np.abs(bodies.vel[:, order] - recording.vel[:, rows]).max(initial=0.0))
     flight.turn[frame] = float(np.minimum(np.abs(q - r), np.abs(q + r)).max(initial=0.0))
     if len(distance) and distance.max() > max(flight.error.values(), default=0.0):
         flight.worst = (frame, int(bodies.id[order][distance.argmax()]))

@@ -81,6 +81,8 @@ class WorldPlugin(Plugin):
     """A plugin of the world; abstract. Parameters have one value per world."""
 
     kind: ClassVar[str] = "world plugin"
+    reads_start_positions: ClassVar[bool] = False
+    """Whether `step` reads `w.start_pos`."""
 
     def regions(self) -> tuple[TeamRegion, ...]:
         """Regions that this plugin defines, for `w.region` and pictures; its structural parameters are known."""
@@ -135,6 +137,8 @@ class Network(WorldPlugin):
     kind = "network"
     losses: ClassVar[tuple[str, ...]] = ()
     """Reasons for which a message to an entity within reach may be lost; see `Links`."""
+    waits_for_traffic: ClassVar[bool] = False
+    """Whether a delayed message also waits until another one is published on its topic."""
     historic_attributes = HistoricAttributes(least_zero=("comm_delay",))
     comm_delay = Param(0.0, unit="s", ge=0.0, doc="Time from sending to the earliest delivery.")
     monitor_publisher_topics = Param(

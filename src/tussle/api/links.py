@@ -15,7 +15,7 @@ from tussle.numeric.segments import order_by_row
 class Links:
     """Each message of a step with each other entity within reach of its sender, as `Network.transmit` returns them.
 
-    Messages of the world and of removed entities have no links. The sender itself receives its messages always.
+    Messages of the world and of removed entities have no links. The sender itself receives its messages, unless the network says otherwise.
 
     Args:
         w: The view of the network.
@@ -31,6 +31,7 @@ class Links:
         distance: Distance of sender and candidate [m], (m,).
         outcome: 0 if the message is received, 1 + i if it is lost for reason number i of the network's `losses`, (m,).
         delay: Delay beyond `comm_delay` [s], (m,); None for none.
+        reaches_sender: Whether the sender itself receives each message, (k,).
     """
 
     def __init__(self, w: WorldView, outboxes: Sequence[Messages], reach: np.ndarray) -> None:
@@ -45,6 +46,12 @@ class Links:
         self.receiver, self.distance = pairs.other[pair], pairs.distance[pair]
         self.outcome = np.zeros(len(self.message), np.int64)
         self.delay: np.ndarray | None = None
+        self.reaches_sender = np.ones(len(self.world), bool)
+
+    def keep(self, where: np.ndarray) -> None:
+        """Keep the links where `where`, (m,), is true; the others are not within reach."""
+        self.message, self.receiver = self.message[where], self.receiver[where]
+        self.distance, self.outcome = self.distance[where], self.outcome[where]
 
     def lose(self, reason: int, where: np.ndarray) -> None:
         """Mark the links where `where`, (m,), is true as lost for a reason, unless they are lost already."""

@@ -44,6 +44,7 @@ class WorldView(GroupView):
         bodies: The body table; health, force and torque are writable.
         teams: Team numbers of the mission, ascending, (n_teams,).
         seeds: Seed of each world, (n_worlds,).
+        start_pos: Positions at the start of the step [m], (3, n), for plugins with `reads_start_positions`.
     """
 
     def __init__(self, bodies: Bodies, context: Context) -> None:
@@ -54,6 +55,7 @@ class WorldView(GroupView):
         self.moved: list[np.ndarray] = []
         self.births: list[dict[str, Any]] = []
         self.templates: list[str] = []
+        self.start_pos = np.empty((3, 0))
         self.by_type: dict[type[Message], list[TopicBuffer]] = {}
         self.publish_to: Callable[[type[Message], str], TopicBuffer]
 

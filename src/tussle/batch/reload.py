@@ -16,6 +16,9 @@ from tussle.batch.trust import DirectoryCode
 from tussle.errors import BatchError
 from tussle.mission import Loaded, Mission, PluginFile, read_mission
 
+OWN_OPTIONS = ("strict", "compat")
+"""Options of `read_mission` that `batch.json` may set."""
+
 
 def load_batch(path: str | Path) -> Results:
     """Read the results of a batch directory, complete or not.
@@ -76,7 +79,7 @@ def planned_run(
         raise BatchError(
             f"{path}: there is no run {number}; the batch has runs 0 to {results.design.num_rows - 1}"
         )
-    is_strict = _is_strict(path, about["options"], {"allow_large": allow_large, "search": bool(search)})
+    options = _options(path, about["options"], {"allow_large": allow_large, "search": bool(search)})
     file = _inside(path, about["file"])
     plugins = [_inside(path, f"{store.PLUGINS}/{name}") for name in about["plugin_files"]]
     code = DirectoryCode(path, tuple(map(PluginFile.of, plugins)))
@@ -91,7 +94,7 @@ def planned_run(
     point = {v.name: planned[v.name] for v in results.variables}
     settings = {**about["settings"], **settings_of(point, results.variables)}
     loaded = read_mission(
-        file, settings, strict=is_strict, plugin_files=code.files, search=search, allow_large=allow_large
+        file, settings, plugin_files=code.files, search=search, allow_large=allow_large, **options
     )
     mission = loaded.mission.ending_by_time() if about["ends_by_time"] else loaded.mission
     found = results.table.filter(pc.equal(results.table["run"], number))["state_hash"]
@@ -114,14 +117,14 @@ def _inside(path: Path, name: str) -> Path:
     return file
 
 
-def _is_strict(path: Path, options: Mapping[str, Any], granted: Mapping[str, bool]) -> bool:
-    """Whether the mission is read with `strict`, the only option that `batch.json` may set.
+def _options(path: Path, options: Mapping[str, Any], granted: Mapping[str, bool]) -> dict[str, Any]:
+    """The options of `read_mission` that `batch.json` may set: `strict` and `compat`.
 
     Raises:
         BatchError: It sets another option.
     """
     for name, value in options.items():
-        if name != "strict" and value and not granted.get(name):
+        if name not in OWN_OPTIONS and value and not granted.get(name):
             known = "as this batch was made with it, give it again" if name in granted else "it is unknown"
             raise BatchError(f"{path}: a batch directory cannot set the option {name!r}; {known}")
-    return bool(options.get("strict"))
+    return {name: options[name] for name in OWN_OPTIONS if options.get(name) is not None}

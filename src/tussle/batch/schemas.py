@@ -12,7 +12,7 @@ from tussle.record.table_values import COUNT, INT32, NUMBER, TEXT, Bounds, Rules
 
 FORMAT = 1
 SEED = Whole(0, 2**64 - 1)
-OPTIONS = {"strict": Maybe(bool), "allow_large": Maybe(bool), "search": Maybe([str])}
+OPTIONS = {"strict": Maybe(bool), "allow_large": Maybe(bool), "search": Maybe([str]), "compat": Maybe(str)}
 FILE = {
     "file": Inside,
     "settings": Map(str),

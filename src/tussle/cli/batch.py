@@ -119,6 +119,7 @@ def batch_of(options: BatchOptions) -> Batch:
         run_timeout=options.run_timeout,
         strict=options.strict,
         allow_large=options.allow_large,
+        compat=options.compat,
     )
     if options.end is not None:
         ending_by_time(made.mission)

@@ -51,6 +51,7 @@ def optimize(options: OptimizeOptions) -> int:
         ends_by_time=options.end is not None,
         strict=options.strict,
         allow_large=options.allow_large,
+        compat=options.compat,
     )
     show_notes(optimization.evaluator.corners.loaded)
     directory = options.directory or optimization.default_directory()
@@ -133,6 +134,7 @@ def play_again(options: OptimizeOptions, study: Study) -> str:
     words += ["--strict"] if options.strict else []
     words += [word for path in options.plugin_files for word in ("--plugin-path", str(path))]
     words += ["--allow-large"] if options.allow_large else []
+    words += ["--compat", options.compat] if options.compat is not None else []
     words += ["--seed", str(study.info["first_seed"] + study.info["runs"]), "-n", str(RUNS_AGAIN)]
     return shlex.join(words)
 

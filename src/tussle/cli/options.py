@@ -181,6 +181,10 @@ class MissionOptions(PluginOptions):
         bool, flag("--strict", "Treat unknown tags and attributes of the mission as errors.")
     ] = False
     allow_large: Annotated[bool, flag("--allow-large", "Lift the limits on the size of a mission.")] = False
+    compat: Annotated[
+        str | None,
+        option("LAWS", "Play by other laws than tussle's: scrimmage, for SCRIMMAGE's own where they differ."),
+    ] = None
 
     def __post_init__(self) -> None:
         read_settings([*self.settings, *self.more])
@@ -209,6 +213,7 @@ class MissionOptions(PluginOptions):
             strict=self.strict,
             plugin_files=tuple(self.plugin_files),
             allow_large=self.allow_large,
+            compat=self.compat,
         )
         show_notes(loaded, shows_viewer_notes)
         seed = self.seed if self.seed is not None else loaded.seed if loaded.seed is not None else 1

@@ -35,7 +35,7 @@ def describe(options: DescribeOptions) -> None:
     Raises:
         MissionError: No plugin or mission has this name.
     """
-    found = plugin_named(options.mission, options.plugin_files)
+    found = plugin_named(options.mission, options.plugin_files, options.compat or "")
     if found is not None:
         show_plugin(options.mission, found)
         return
@@ -84,13 +84,13 @@ def missions(_: MissionsOptions) -> None:
     )
 
 
-def plugin_named(name: str, files: Iterable[Path]) -> type[Plugin] | None:
+def plugin_named(name: str, files: Iterable[Path], compat: str = "") -> type[Plugin] | None:
     """Return the plugin of this name, or None if the name is that of a mission.
 
     Raises:
         MissionError: No plugin or mission has this name.
     """
-    catalogue = Catalogue(files)
+    catalogue = Catalogue(files, compat)
     if name in catalogue.names:
         if hides := catalogue.hides(name):
             say_note(hides)

@@ -56,9 +56,9 @@ class RunOptions(MissionOptions):
             )
         check_positive(pace=self.pace, log_period=self.log_period)
         is_changed = self.mission or self.more or self.settings or self.plugin_files
-        if self.from_batch is not None and (is_changed or (self.seed, self.end) != (None, None)):
+        if self.from_batch is not None and (is_changed or (self.seed, self.end, self.compat) != (None,) * 3):
             raise typer.BadParameter(
-                "--from BATCH:RUN determines the game, so a mission, settings, --seed, --end and --plugin-path"
+                "--from BATCH:RUN determines the game, so a mission, settings, --seed, --end, --compat and --plugin-path"
                 " are not allowed with it"
             )
         if self.from_batch is None and self.trust:

@@ -178,12 +178,16 @@ class Births:
         kernels.place_newborn(
             (self.seeds, worlds), keys, *self._placing[block], values, counts, out, mine.start
         )
+        self._first_places(block, new.pos[:, mine])
         if "pos" not in where and occupancy is not None:
             self._separate(block, worlds, new.block_index[mine], new.pos[:, mine], occupancy)
         if spec.velocity is not None:
             new.vel[:, mine] = np.array(spec.velocity)[:, None]
         for name, asked in where.items():
             getattr(new, name)[..., mine] = asked
+
+    def _first_places(self, block: int, pos: np.ndarray) -> None:
+        """A hook that may change the positions drawn first [m], (3, m), of entities of a block."""
 
     def _separate(
         self, block: int, worlds: np.ndarray, places: np.ndarray, pos: np.ndarray, occupancy: Occupancy

@@ -31,9 +31,13 @@ def deliver(state: SimulationState) -> None:
     for name, of_network in sent.items():
         _send(state, state.networks[name], of_network)
     for topic in topics:
+        until = step
+        if topic.queue and state.networks[topic.network].plugin.waits_for_traffic:
+            has_traffic = np.isin(np.arange(state.n_worlds), topic.outbox().world)
+            until = np.where(has_traffic, step, -1)
         topic.clear_outbox()
         if topic.queue:
-            state.events.received(topic, topic.deliver(step))
+            state.events.received(topic, topic.deliver(until))
     state.events.delivered(state.running)
 
 
@@ -100,7 +104,8 @@ def _post_links(
 ) -> None:
     """Count the links of a network, and queue the messages that are received."""
     _count_links(state, network, topics, links)
-    own, heard = np.flatnonzero(links.sender >= 0), np.flatnonzero(links.outcome == 0)
+    own = np.flatnonzero((links.sender >= 0) & links.reaches_sender)
+    heard = np.flatnonzero(links.outcome == 0)
     number = np.concatenate([own, links.message[heard]])
     ids = state.population.bodies.id[np.concatenate([links.sender[own], links.receiver[heard]])]
     delay = network.plugin.comm_delay[links.world[number]]

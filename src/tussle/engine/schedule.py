@@ -22,7 +22,7 @@ from tussle.engine.step_end import end_step
 from tussle.engine.subset import call_group, call_world_plugin
 from tussle.engine.world_bindings import WorldBinding
 from tussle.errors import PluginError
-from tussle.mission.cadence import Cadence
+from tussle.mission.cadence import Cadence, TimerCadence
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +44,8 @@ def compose(state: SimulationState) -> list[Call]:
     """
     calls: list[Call] = []
     groups = state.population.groups
+    if any(r.plugin.reads_start_positions for r in state.world_bindings):
+        calls.append(Call("keep positions", partial(_keep_positions, state)))
     if state.mission.update == "sequential":
         for group in groups:
             calls += [_entity_call(state, "autonomy", group, b) for b in group.autonomies]
@@ -69,11 +71,16 @@ def compose(state: SimulationState) -> list[Call]:
     return calls
 
 
+def _keep_positions(state: SimulationState) -> None:
+    state.world_view.start_pos = state.population.bodies.pos.copy()
+
+
 def _motion(state: SimulationState, groups: list[Group]) -> list[Call]:
     dt, m = state.mission.dt, state.mission.motion_multiplier
     calls = [_advance_call(state, g, dt, m, 0.0) for g in groups if not g.controllers]
     steered = [g for g in groups if g.controllers]
-    steerings = [None if state.by_substep else steering_of(g) for g in steered]
+    apart = state.by_substep or (m > 1 and state.mission.compat)  # see `_entity_call`
+    steerings = [None if apart else steering_of(g) for g in steered]
     if None not in steerings:  # otherwise a controller may read other entities, which move in each substep
         return calls + [_steering_call(state, steering, dt / m, m) for steering in steerings if steering]
     for s in range(m if steered else 0):
@@ -84,7 +91,7 @@ def _motion(state: SimulationState, groups: list[Group]) -> list[Call]:
 
 
 def _due(
-    state: SimulationState, cadence: Cadence, substep: int = 0
+    state: SimulationState, cadence: Cadence | TimerCadence, substep: int = 0
 ) -> Iterator[tuple[int, np.ndarray | None]]:
     """Yield the number of grid points since the last call and the worlds, (n_worlds,), in which a plugin is due; None for all."""
     clock, running = state.context.clock, state.running
@@ -137,9 +144,14 @@ def _steering_call(state: SimulationState, steering: Steering, dt: float, subste
 def _entity_call(state: SimulationState, kind: str, group: Group, binding: Binding, substep: int = 0) -> Call:
     mission, path = state.mission, binding.path
     m = mission.motion_multiplier if kind == "controller" else 1
-    grid_dt = mission.dt / m
+    # SCRIMMAGE's calls all get the dt of a step, controllers in each substep.
+    grid_dt = mission.dt if mission.compat else mission.dt / m
     phase = substep / m if kind == "controller" else float(kind == "sensor")
-    cadence = Cadence.of(binding.spec, m / mission.dt, m, f"block {group.names[0]!r}")
+    cadence: Cadence | TimerCadence | None = Cadence.of(
+        binding.spec, m / mission.dt, m, f"block {group.names[0]!r}"
+    )
+    if cadence is not None and mission.compat:
+        cadence = TimerCadence(binding.spec.rate, mission.dt, m)
     inboxes = [
         b.plugin.__dict__[k]
         for b in binding.walk()

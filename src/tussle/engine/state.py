@@ -42,6 +42,15 @@ class Parked:
     tables: dict[Any, tuple[np.ndarray, Stored]]
 
 
+def _births(mission: Mission, given: tuple[Overrides, np.ndarray, float]) -> Births:
+    """Births by the laws of a mission."""
+    if not mission.compat:
+        return Births(*given)
+    from tussle.engine.historic_births import HistoricBirths  # not loaded otherwise
+
+    return HistoricBirths(*given)
+
+
 class SimulationState:
     """All data of a stack of worlds, initially without entities. Arguments and errors are those of `Simulation`.
 
@@ -93,7 +102,7 @@ class SimulationState:
         self.overrides = Overrides(mission, n)
         self.overrides.set(params, np.arange(n))
         given = self.overrides, keys, mission.start
-        self.births = Births(*given) if start_from is None else RecordedBirths(*given, start_from)
+        self.births = _births(mission, given) if start_from is None else RecordedBirths(*given, start_from)
         message_bus = self.message_bus = MessageBus([p.instance_name for p in mission.networks])
         context.topic, context.fail = message_bus.topic, self.record_failure
         self.events = Listeners(context)

@@ -96,12 +96,15 @@ def _lost_teams(state: SimulationState) -> Iterable[tuple[int, str]]:
     there = np.zeros((state.n_worlds, len(teams)), bool)
     mark_teams(bodies.world, bodies.team, teams, there)
     left = there.sum(axis=1)
+    is_historic = bool(
+        state.mission.compat
+    )  # SCRIMMAGE looks at the living only, not at births to come, nor at who began
     for world in np.flatnonzero(state.running & (left <= 1)):
-        if not state.births.is_over(int(world)):
+        if not (is_historic or state.births.is_over(int(world))):
             continue
         if left[world] == 0:
             yield int(world), "all_dead"
-        elif "one_team" in conditions and len(teams) > 1:
+        elif "one_team" in conditions and (is_historic or len(teams) > 1):
             yield int(world), "one_team"
 
 

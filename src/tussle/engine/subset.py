@@ -113,6 +113,8 @@ def call_world_plugin(
     sub_view.own_cache()
     sub_view.deaths, sub_view.moved, sub_view.births = [], [], []
     sub_view.only = worlds
+    if view.start_pos.shape[1] == bodies.n:
+        sub_view.start_pos = view.start_pos[:, rows]
     sub_view.reset(sub_bodies, 0, len(rows))
     sub = copy.copy(world_binding)
     sub.plugin = _sub_plugin(world_binding.plugin, sub_view)

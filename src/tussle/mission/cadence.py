@@ -58,3 +58,26 @@ class Cadence:
         if k and number == (k - 1) * p // q:
             return 0
         return k + (1 - number) * q // p
+
+
+class TimerCadence:
+    """SCRIMMAGE's schedule: a timer from which dt is subtracted at each point, and to which the period is added in each call.
+
+    Args:
+        rate: Calls per second [Hz], by the dt of each point.
+        dt: Subtracted at each point [s].
+        n_substeps: Points of the grid per step.
+    """
+
+    def __init__(self, rate: float, dt: float, n_substeps: int) -> None:
+        self._period, self._dt, self._n_substeps = 1.0 / rate, dt, n_substeps
+        self._timer, self._is_due = 0.0, list[bool]()
+
+    def since(self, step: int, substep: int = 0) -> int:
+        """1 if a call is due, else 0."""
+        k = step * self._n_substeps + substep
+        while len(self._is_due) <= k:
+            self._timer -= self._dt
+            self._is_due.append(self._timer <= 0.0)
+            self._timer += self._period if self._is_due[-1] else 0.0
+        return int(self._is_due[k])

@@ -15,6 +15,7 @@ from tussle import stock
 from tussle.api import Autonomy, Behavior, Controller, Interaction, Metric, MotionModel, Network, Sensor
 from tussle.api.plugin import Plugin
 from tussle.errors import MissionError, nearest_name
+from tussle.mission.laws import shipped
 from tussle.mission.plugin_files import PluginFile
 
 KINDS: dict[str, type] = {
@@ -58,17 +59,18 @@ class Catalogue:
 
     Args:
         plugin_files: Python files with further plugins; later files take precedence.
+        compat: Laws of the shipped plugins: "" for tussle's, "scrimmage" for SCRIMMAGE's where they differ.
 
     Attributes:
         names: Names of all plugins, sorted.
 
     Raises:
-        MissionError: A file cannot be imported, or defines no plugin.
+        MissionError: A file cannot be imported, or defines no plugin; or there are no such laws.
     """
 
-    def __init__(self, plugin_files: Iterable[str | Path | PluginFile] = ()) -> None:
+    def __init__(self, plugin_files: Iterable[str | Path | PluginFile] = (), compat: str = "") -> None:
         self._sources: dict[str, list[PluginSource]] = {
-            name: [PluginSource("that ships", partial(stock.load, name))] for name in stock.manifest()
+            name: [PluginSource("that ships", load)] for name, load in shipped(compat).items()
         }
         for point in installed():
             place = f"of the package {point.dist.name if point.dist else '?'} ({point.value})"

@@ -17,6 +17,7 @@ from tussle.api.context import missing_service
 from tussle.columns import Param
 from tussle.errors import MissionError, ParameterError, TussleError, listed, nearest_name
 from tussle.mission.cadence import Cadence
+from tussle.mission.laws import check_compat, with_laws
 from tussle.mission.limits import Limits
 from tussle.scene import Scene, find_region
 
@@ -26,6 +27,9 @@ END_CONDITIONS = ("time", "one_team", "all_dead", "none")
 END = Param("time", choices=END_CONDITIONS)
 RUN = "run"
 """First name of paths to the mission's times and steps."""
+OF_BLOCK = ("autonomy", "controller", "motion", "sensor")
+OF_WORLD = ("interactions", "metrics", "networks")
+"""Names of the plugins of a block, and of a mission."""
 UPDATES = ("synchronous", "sequential")
 PLACEMENTS = ("normal", "uniform")
 
@@ -254,6 +258,8 @@ class Mission:
         networks: Networks; GlobalNetwork and LocalNetwork are added if they are missing.
         scene: Origin, ground, walls, boundaries, bases.
         name: Title.
+        compat: Laws by which it is played: "" for tussle's, "scrimmage" for SCRIMMAGE's where they differ: stock plugins are replaced by
+            those of `tussle.historic`, with the same parameters.
         limits: Limits on the entities that a world may hold, and on the positions drawn for them. The blocks' own entities are
             always accepted; `Limits.large()` is for plugins that spawn very many more.
     """
@@ -270,6 +276,7 @@ class Mission:
     networks: Any = ()
     scene: Scene = field(default_factory=Scene)
     name: str = ""
+    compat: str = ""
     limits: Limits = field(default=Limits(), repr=False)  # not part of the game, so not of its repr
 
     def __post_init__(self) -> None:
@@ -296,6 +303,7 @@ class Mission:
         given = [p.instance_name for p in self.networks]
         missing = tuple(stock.load(n)() for n in stock.ALWAYS_THERE if n not in given)
         _set(self, "networks", (*missing, *self.networks))
+        self._take_laws()
         _plugins("mission", self.world_plugins, object)
         if RUN in [*names, *(p.instance_name for p in self.world_plugins)]:
             raise MissionError(
@@ -312,6 +320,15 @@ class Mission:
             raise MissionError(f"mission: scene = {self.scene!r} is not a Scene")
         if not isinstance(self.limits, Limits):
             raise MissionError(f"mission: limits = {self.limits!r} is not a Limits")
+
+    def _take_laws(self) -> None:
+        """Replace the plugins whose laws differ."""
+        check_compat(self.compat)
+        if not self.compat:
+            return
+        _set(self, "blocks", tuple(block.replace(**with_laws(block, OF_BLOCK)) for block in self.blocks))
+        for name, plugins in with_laws(self, OF_WORLD).items():
+            _set(self, name, plugins)
 
     def _check_rates(self) -> None:
         for network in self.networks:
@@ -354,6 +371,11 @@ class Mission:
     @property
     def world_plugins(self) -> tuple[Any, ...]:
         return (*self.interactions, *self.metrics, *self.networks)
+
+    @property
+    def plugins(self) -> tuple[Any, ...]:
+        """All plugins: those of the blocks, then those of the world."""
+        return (*(plugin for block in self.blocks for plugin in block.plugins), *self.world_plugins)
 
     def replace(self, **changes: Any) -> Mission:
         """A copy with changed values."""

@@ -35,6 +35,16 @@ def _log(doc: str, default: str = "", reads: str = "text") -> TagSpec:
     return TagSpec(doc, default, "", "log", reads)
 
 
+RUNSCRIPT = {
+    "name": TagSpec("Title.", "", reads="text"),
+    "compat": TagSpec(
+        "`scrimmage` plays the mission by SCRIMMAGE's own laws where tussle's differ (addition to the format).",
+        "",
+        reads="text",
+    ),
+}
+"""Attributes of <runscript>."""
+
 RUN = {
     "start": TagSpec("Time of the first step.", "0", "s"),
     "end": TagSpec("Time at which the condition `time` ends the mission.", "50", "s"),

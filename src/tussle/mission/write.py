@@ -21,6 +21,8 @@ from tussle.scene import Base, Scene
 from tussle.texts import shown
 
 NOWHERE = Place("", 0)
+SHIPPED = ("tussle.stock", "tussle.historic")
+"""Modules that have the plugins of their folders."""
 COMPONENTS = {
     "position": ("x", "y", "z"),
     "velocity": ("vx", "vy", "vz"),
@@ -62,7 +64,8 @@ def to_xml(mission: Mission, seed: int | None = None) -> str:
             raise MissionError(
                 f"mission: scene.{name} has no tag in mission files; write the mission as Python instead"
             )
-    root = _node("runscript", {"name": mission.name} if mission.name else {})
+    titles = {"name": mission.name, "compat": mission.compat}
+    root = _node("runscript", {name: text for name, text in titles.items() if text})
     run = {
         name: codecs.written(getattr(mission, name)) for name in ("start", "end", "dt", "motion_multiplier")
     }
@@ -74,6 +77,11 @@ def to_xml(mission: Mission, seed: int | None = None) -> str:
     origin = mission.scene.origin
     for name in ("latitude", "longitude", "altitude"):
         root.children.append(_value(f"{name}_origin", getattr(origin, name), WORLD))
+    for plugin in () if mission.compat else (p for outer in mission.plugins for p in outer.walk()):
+        if type(plugin).__module__.startswith(f"{SHIPPED[1]}."):
+            raise MissionError(
+                f"mission: {plugin.instance_name} has the law of SCRIMMAGE, but the mission does not; give it compat='scrimmage'"
+            )
     plugins = (
         ("network", mission.networks),
         ("entity_interaction", mission.interactions),
@@ -233,7 +241,7 @@ def _code(value: Any, imports: dict[str, str]) -> list[str]:
         return [repr(value)]
     name = type(value).__name__
     module = "tussle" if isinstance(value, (Block, Mission)) else type(value).__module__
-    module = "tussle.stock" if module.startswith("tussle.stock.") else module
+    module = next((shipped for shipped in SHIPPED if module.startswith(f"{shipped}.")), module)
     if imports.setdefault(name, module) != module:
         raise MissionError(
             f"two classes are called {name}, in {imports[name]} and {module}; rename one of them"

@@ -14,6 +14,7 @@ from tussle.geodesy import Origin
 from tussle.mission import codecs
 from tussle.mission.catalogue import KINDS, Catalogue
 from tussle.mission.entities import EntityReader, Fields, block_names, expand_entity_common
+from tussle.mission.laws import check_compat
 from tussle.mission.limits import Limits
 from tussle.mission.node import Budget, Node
 from tussle.mission.overrides import TreeEditor, as_texts
@@ -22,7 +23,7 @@ from tussle.mission.plugin_tags import PluginReader
 from tussle.mission.problems import Place, Problems
 from tussle.mission.source import MissionSource, SourceReader, find_mission
 from tussle.mission.spec import MISSION_VALUES, Mission, end_conditions
-from tussle.mission.tags import RUN, SEED_ATTRIBUTES, WORLD, TagSpec
+from tussle.mission.tags import RUN, RUNSCRIPT, SEED_ATTRIBUTES, WORLD, TagSpec
 from tussle.scene import Scene
 from tussle.texts import shown, truth
 
@@ -71,6 +72,7 @@ def read_mission(
     plugin_files: Sequence[str | Path | PluginFile] = (),
     search: Sequence[str | Path] = (),
     allow_large: bool = False,
+    compat: str | None = None,
 ) -> Loaded:
     """Read a mission.
 
@@ -83,6 +85,7 @@ def read_mission(
         plugin_files: Python files with further plugins for the mission.
         search: Folders that are searched for missions and included files, besides the mission's own.
         allow_large: Raise the limits that keep a hostile file from taking all memory, for reading and for running.
+        compat: Laws by which it is played, as of `Mission`; None for those that the file names.
 
     Raises:
         MissionError: The mission cannot be read or is invalid. The message has one line for each error, with file and line.
@@ -90,7 +93,6 @@ def read_mission(
     budget = Budget(Limits.large() if allow_large else Limits())
     given = {str(name): value for name, value in (overrides or {}).items()}
     settings = as_texts(given)
-    catalogue = Catalogue(plugin_files)
     problems = Problems(strict=strict)
     path = find_mission(source, search)
     read = SourceReader(settings, problems, budget, search).read(path)
@@ -98,12 +100,31 @@ def read_mission(
         raise MissionError(
             f"{read.root.place}: the root tag is <{read.root.tag[:80]}>; it must be <runscript>"
         )
+    catalogue = _catalogue(read, compat, plugin_files)
     expand_entity_common(read.root, problems, budget)
     tree = TreeEditor(read.root, catalogue, read.placeholders)
     paths = {name: tree.set(name, value) for name, value in given.items() if name not in read.placeholders}
     if paths:
         read.text = read.root.to_text()
     return replace(_WorldReader(read, catalogue, problems, budget).loaded(), settings=settings | paths)
+
+
+def _catalogue(read: MissionSource, compat: str | None, plugin_files: Sequence[Any]) -> Catalogue:
+    """The catalogue for the laws that are asked for, or that the file names; the text of the mission names them from then on.
+
+    Raises:
+        MissionError: There are no such laws, or a plugin file cannot be imported.
+    """
+    root = read.root
+    place = None if compat is not None else root.where("compat")
+    if compat is not None and compat != root.attributes.get("compat", ""):
+        root.attributes["compat"] = compat
+        read.text = root.to_text()
+    try:
+        check_compat(root.attributes.get("compat", ""))
+    except MissionError as error:
+        raise MissionError(f"{place}: {error}" if place else str(error)) from None
+    return Catalogue(plugin_files, root.attributes.get("compat", ""))
 
 
 class _WorldReader:
@@ -124,8 +145,8 @@ class _WorldReader:
     def loaded(self) -> Loaded:
         root, problems = self.root, self.problems
         for attribute in root.attributes:
-            if attribute != "name" and "}" not in attribute:
-                problems.unknown(root.where(attribute), "attribute of <runscript>", attribute, ["name"])
+            if attribute not in RUNSCRIPT and "}" not in attribute:
+                problems.unknown(root.where(attribute), "attribute of <runscript>", attribute, RUNSCRIPT)
         if root.text:
             problems.note(root.place, f"text between the tags of <runscript> is ignored: {shown(root.text)}")
         if not any(True for _ in root.find_all("entity")):
@@ -154,6 +175,7 @@ class _WorldReader:
                 end_conditions=conditions,
                 scene=Scene(origin=origin, bases=tuple(entities.bases)),
                 name=name,
+                compat=root.attributes.get("compat", ""),
                 limits=self.limits,
                 **settings,
             )

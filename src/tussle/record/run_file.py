@@ -78,6 +78,7 @@ def write(
         **about,
         "mission": _mission(mission),
         "grade": sim.grade,
+        "laws": mission.compat or "tussle",
         "versions": versions(),
         "platform": platform.platform(),
         "command": sys.argv,

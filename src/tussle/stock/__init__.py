@@ -20,8 +20,18 @@ UNMOVED = "Still"
 @cache
 def manifest() -> dict[str, str]:
     """Map the name of each stock plugin to "module:class"."""
-    text = (Path(__file__).parent / "manifest.toml").read_text(encoding="utf-8")
-    return dict(tomllib.loads(text)["plugins"])
+    return read_manifest(Path(__file__).parent)
+
+
+def read_manifest(folder: Path) -> dict[str, str]:
+    """Map the name of each plugin of a folder's `manifest.toml` to "module:class"."""
+    return dict(tomllib.loads((folder / "manifest.toml").read_text(encoding="utf-8"))["plugins"])
+
+
+def import_class(path: str) -> Any:
+    """Return the class of "module:class"."""
+    module, _, attribute = path.partition(":")
+    return getattr(importlib.import_module(module), attribute)
 
 
 def load(name: str) -> Any:
@@ -34,8 +44,7 @@ def load(name: str) -> Any:
         raise ParameterError(
             f"there is no plugin {name!r}{nearest_name(name, manifest())}; {listed(manifest())}"
         )
-    module, _, attribute = manifest()[name].partition(":")
-    return getattr(importlib.import_module(module), attribute)
+    return import_class(manifest()[name])
 
 
 def advise_controllers(offered: Iterable[str], needed: Iterable[str]) -> list[str]:

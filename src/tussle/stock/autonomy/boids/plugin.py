@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
 from tussle.api import Autonomy, GroupView, Output, Param, State, neighbors, together
+from tussle.api.laws import Contributions
 from tussle.numeric import cos
 from tussle.stock.autonomy.boids import kernels
 from tussle.stock.autonomy.boids.kernels import push
@@ -140,15 +142,23 @@ class Boids(Autonomy):
         ahead = g.pos[:, rows] + self.goal_distance[rows] * g.column("forward", rows)
         self.target[:, rows] = np.where(self.use_initial_heading[rows], ahead, self.goal[:, rows])
 
+    def _neighbor_sums(self, g: GroupView) -> np.ndarray:
+        """Sums over the neighbours as `kernels.law` takes them, (13, n)."""
+        sees_all = g.once(kernels.sees_all, self.fov_az, self.fov_el)
+        if self.means == "historic":
+            return self._with_historic_means(g, self.historic if sees_all else self.historic_in_view)
+        return np.asarray((self.seen if sees_all else self.seen_in_view)(g).values)
+
+    def _with_historic_means(self, g: GroupView, law: Callable[[GroupView], Contributions]) -> np.ndarray:
+        """Sums of a law of yaw and others, (13, n), with the means of the paper's code."""
+        seen = law(g).values
+        kernels.historic_means(g.components("pos"), seen)
+        return seen
+
     def step(self, g: GroupView) -> None:
         wanted = np.empty((3, g.n))
         pos = g.components("pos")
-        sees_all = g.once(kernels.sees_all, self.fov_az, self.fov_el)
-        if self.means == "historic":
-            seen = (self.historic if sees_all else self.historic_in_view)(g).values
-            kernels.historic_means(pos, seen)
-        else:
-            seen = (self.seen if sees_all else self.seen_in_view)(g).values
+        seen = self._neighbor_sums(g)
         weights = (
             self.max_speed, self.goal_weight, self.avoid_team_weight, self.avoid_nonteam_weight, self.centroid_weight,
             self.align_weight,

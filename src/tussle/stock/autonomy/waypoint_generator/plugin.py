@@ -40,8 +40,12 @@ class WaypointGenerator(Autonomy):
     told = State(unit="s", default=NEVER, doc="Time up to which waypoints have been published.")
     lists = Publish(WaypointList, network_param="network_name", topic_param="topic_name")
 
+    def _now(self, g: GroupView) -> np.ndarray:
+        """Time up to which waypoints are due [s], (n,)."""
+        return g.t + 1e-6 * g.dt  # a time written as a decimal number may lie just above that of the step
+
     def step(self, g: GroupView) -> None:
-        now = g.t + 1e-6 * g.dt  # a time written as a decimal number may lie just above that of the step
+        now = self._now(g)
         start, data = self.waypoints.start, self.waypoints.data
         owner = np.repeat(np.arange(g.n), np.diff(start))
         is_due = (data[0] > self.told[owner]) & (data[0] <= now[owner])

@@ -35,21 +35,26 @@ class CaptureInBoundaryInteraction(Interaction):
         is_inside = region.shape.contains(w.pos)
         now = w.t[w.world] + 1e-6 * w.dt
         defends = is_inside & (w.team == region.team) & (now >= self.ready_at)
-        near = w.near(np.where(defends, self.capture_range[w.world], 0.0), teams="other")
-        near = near[is_inside[near.other]]
-        if not len(near):
+        row, other, distance = self._near(w, np.where(defends, self.capture_range[w.world], 0.0))
+        order = np.lexsort((w.id[row], distance))
+        order = order[is_inside[other[order]]]
+        order = order[_first_of(other[order])]
+        if not len(order):
             return
-        order = np.lexsort((w.id[near.row], near.distance))
-        order = order[_first_of(near.other[order])]
-        cools = self.cool_down_period[w.world[near.row[order]]] > 0.0
-        order = order[~cools | _first_of(near.row[order])]
-        source, target = near.row[order], near.other[order]
+        cools = self.cool_down_period[w.world[row[order]]] > 0.0
+        order = order[~cools | _first_of(row[order])]
+        source, target = row[order], other[order]
         self.ready_at[source] = w.t[w.world[source]] + self.cool_down_period[w.world[source]]
         w.publish(
             EntityCaptured, w.world[source], source=w.id[source], target=w.id[target],
             source_team=w.team[source], target_team=w.team[target],
         )  # fmt: skip
         w.kill(target, "captured")
+
+    def _near(self, w: WorldView, reach: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Rows of defenders and of others nearer than `reach` [m], (n,), and their distances [m], (m,) each."""
+        near = w.near(reach, teams="other")
+        return near.row, near.other, near.distance
 
 
 def _first_of(values: np.ndarray) -> np.ndarray:

@@ -37,15 +37,20 @@ class FlagCaptureInteraction(Interaction):
         is_free = (self.carrier == 0) & ~self.is_captured
         rows = np.flatnonzero(is_free[w.world] & (w.team != flag.team) & flag.shape.contains(w.pos))
         if len(rows):
-            x, y, z = w.pos[:, rows] - np.array(flag.center)[:, None]
-            rows = rows[np.lexsort((w.id[rows], x * x + y * y + z * z))]
-            world, first = np.unique(w.world[rows], return_index=True)
-            self.carrier[world] = w.id[rows[first]]
-            self._publish(w, FlagTaken, rows[first])
+            carriers, takers = self._takers(w, rows)
+            self.carrier[w.world[carriers]] = w.id[carriers]
+            self._publish(w, FlagTaken, takers)
         carries = (self.carrier[w.world] == w.id) & ~self.is_captured[w.world]
         rows = np.flatnonzero(carries & home.shape.contains(w.pos))
         self.is_captured[w.world[rows]] = True
         self._publish(w, FlagCaptured, rows)
+
+    def _takers(self, w: WorldView, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Of those that enter, (m,), the rows of those that carry the flag, and of those that tell that they took it."""
+        x, y, z = w.pos[:, rows] - np.array(w.region(self.flag_boundary_id).center)[:, None]
+        rows = rows[np.lexsort((w.id[rows], x * x + y * y + z * z))]
+        _, first = np.unique(w.world[rows], return_index=True)
+        return rows[first], rows[first]
 
     def _publish(self, w: WorldView, event: type[FlagTaken | FlagCaptured], rows: np.ndarray) -> None:
         w.publish(event, w.world[rows], entity=w.id[rows], team=w.team[rows], boundary=self.flag_boundary_id)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 
 from tussle.api import Interaction, Param, State, WorldView
@@ -15,6 +17,7 @@ class RandomAttrit(Interaction):
     """
 
     grade = "portable"
+    most_per_step: ClassVar[int] = 2**62
 
     decay_method = Param("linear", choices=("linear",), doc="How the number decreases.")
     start_after = Param(5.0, unit="s", doc="Time at which the losses begin.")
@@ -28,14 +31,18 @@ class RandomAttrit(Interaction):
         doc="Size of the team at start_after, or when it appears; -1 before.",
     )
 
+    def _elapsed(self, w: WorldView) -> np.ndarray:
+        """Time since the losses began [s], (n_worlds,)."""
+        return np.asarray(w.t + 1e-6 * w.dt - self.start_after)
+
     def step(self, w: WorldView) -> None:
         is_team = w.team == self.team[w.world]
         count = np.bincount(w.world[is_team], minlength=w.n_worlds)
-        elapsed = w.t + 1e-6 * w.dt - self.start_after
+        elapsed = self._elapsed(w)
         begins = (self.n_start < 0) & (elapsed >= 0.0) & (count > 0)
         self.n_start[begins] = count[begins]
         left = np.ceil(self.n_start * np.maximum(0.0, 1.0 - elapsed / self.duration))
-        n_lost = np.where(self.n_start < 0, 0, count - left.astype(np.int64))
+        n_lost = np.where(self.n_start < 0, 0, np.minimum(count - left.astype(np.int64), self.most_per_step))
         rows = np.flatnonzero(is_team & (n_lost > 0)[w.world] & ~np.isin(w.id, self.values["leave_alive"]))
         lot = w.uniform_by("lot", w.world[rows], w.id[rows], np.zeros(len(rows), np.int64))
         rows = rows[np.lexsort((lot, w.world[rows]))]

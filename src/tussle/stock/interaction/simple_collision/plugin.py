@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from tussle.api import Interaction, Param, WorldView, neighbors
+from tussle.api.laws import Listed
 from tussle.messages import EntityCollided
 
 
@@ -47,15 +50,20 @@ class SimpleCollision(Interaction):
         met = self.meet(w)
         if not len(met):
             return
+        k = self._colliding(w, met)
         w.publish(
             EntityCollided,
-            w.world[met.row],
-            first=met.first,
-            second=met.second,
-            first_team=met.first_team,
-            second_team=met.second_team,
+            w.world[met.row[k]],
+            first=met.first[k],
+            second=met.second[k],
+            first_team=met.first_team[k],
+            second_team=met.second_team[k],
         )
-        w.kill(np.unique(np.concatenate([met.row, met.other])), "collision")
+        w.kill(np.unique(np.concatenate([met.row[k], met.other[k]])), "collision")
+
+    def _colliding(self, w: WorldView, met: Listed) -> Any:
+        """Index of the pairs that collide, of those within the range."""
+        return slice(None)
 
     def rejects(self, w: WorldView, world: int, pos: np.ndarray, taken: np.ndarray) -> bool:
         dx, dy, dz = taken - pos[:, None]

@@ -32,7 +32,7 @@ class CPA(Metric):
     when = State(unit="s", per="entity", doc="Time of `closest`.")
 
     def step(self, w: WorldView) -> None:
-        t = w.t
+        t = self._now(w)
         slack = 1e-6 * w.dt
         is_due = (t >= self.min_time_s - slack) & ((self.max_time_s <= 0.0) | (t <= self.max_time_s + slack))
         if not is_due.any():
@@ -48,6 +48,10 @@ class CPA(Metric):
             self.other[rows] = w.id[other[rows]]
             self.when[rows] = t[w.world[rows]]
             self._compare(w, rows)
+
+    def _now(self, w: WorldView) -> np.ndarray:
+        """Time of the distances [s], (n_worlds,)."""
+        return w.t
 
     def _compare(self, w: WorldView, rows: np.ndarray) -> None:
         """Update the teams' columns with new smallest distances; on ties the smaller id is taken."""

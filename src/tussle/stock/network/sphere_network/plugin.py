@@ -27,8 +27,12 @@ class SphereNetwork(Network):
     losses = ("plane", "chance")
 
     def transmit(self, w: WorldView, outboxes: Sequence[Messages]) -> Links:
-        links = Links(w, outboxes, self.range[w.world])
+        links = self._links(w, outboxes)
         plane = self.filter_comms_plane, self.comms_boundary_altitude, self.comms_boundary_epsilon
         links.lose_across(w, 0, *plane)
         links.lose_by_chance(w, 1, "loss", self.prob_transmit)
         return links
+
+    def _links(self, w: WorldView, outboxes: Sequence[Messages]) -> Links:
+        """Links within the range."""
+        return Links(w, outboxes, self.range[w.world])

@@ -60,12 +60,8 @@ class SimpleINS(Sensor):
     def step(self, g: GroupView) -> None:
         """Update the belief of all rows."""
         self._correct(g)
-        accel = np.minimum(1.0, np.abs(g.vel - self.last_vel) / g.dt)
+        self._drift(g)
         self.last_vel[:] = g.vel
-        mean, sd = np.stack([self.pos_noise_0, self.pos_noise_1, self.pos_noise_2], axis=1)
-        root = np.sqrt(g.dt)
-        self.error[:] += accel * (mean * g.dt + sd * root * g.normal("pos", 3))
-        self.variance[:] += (accel * sd * root)[:2] ** 2
         self.belief_pos[:] = g.pos + self.error
         mean, sd = np.stack([self.vel_noise_0, self.vel_noise_1, self.vel_noise_2], axis=1)
         self.belief_vel[:] = g.vel + mean + sd * g.normal("vel", 3)
@@ -77,6 +73,14 @@ class SimpleINS(Sensor):
         small, large = np.sqrt(np.sort(self.variance, axis=0))
         ratio = small / large
         self.ins_cep[:] = large * np.where(ratio < 0.5, 0.67 + 0.8 * ratio * ratio, 0.59 * (1.0 + ratio))
+
+    def _drift(self, g: GroupView) -> None:
+        """Let the position error and its variance grow."""
+        accel = np.minimum(1.0, np.abs(g.vel - self.last_vel) / g.dt)
+        mean, sd = np.stack([self.pos_noise_0, self.pos_noise_1, self.pos_noise_2], axis=1)
+        root = np.sqrt(g.dt)
+        self.error[:] += accel * (mean * g.dt + sd * root * g.normal("pos", 3))
+        self.variance[:] += (accel * sd * root)[:2] ** 2
 
     def _correct(self, g: GroupView) -> None:
         """Start the error again where GPS has had a fix for long enough."""

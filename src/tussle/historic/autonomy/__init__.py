@@ -1,0 +1,1 @@
+"""Autonomies with the laws of SCRIMMAGE."""

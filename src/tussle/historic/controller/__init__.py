@@ -1,0 +1,1 @@
+"""Controllers with the laws of SCRIMMAGE."""

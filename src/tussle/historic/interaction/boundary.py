@@ -1,0 +1,25 @@
+"""Boundary as in SCRIMMAGE."""
+
+from __future__ import annotations
+
+from tussle.api import WorldView
+from tussle.scene import Cuboid, Volume
+from tussle.stock.interaction import boundary
+
+
+class Boundary(boundary.Boundary):
+    """Boundary that ignores the rotation of a cuboid, and tells of its shape in the first step only, even if nobody is there.
+
+    Entities that are born later never learn of it; in tussle it waits for the first entity. Planes and polyhedra are those of tussle:
+    a plane has sides in SCRIMMAGE, and a polyhedron ends it.
+    """
+
+    def region(self) -> Volume:
+        """Return the region as a shape of the scene."""
+        if self.values["shape"] == "cuboid":
+            return Cuboid(center=self.values["center"], lengths=self.values["lengths"])
+        return super().region()
+
+    def step(self, w: WorldView) -> None:
+        self.is_told[:] |= w.step_count > 0
+        super().step(w)

@@ -1,0 +1,14 @@
+"""GroundCollision as in SCRIMMAGE."""
+
+from __future__ import annotations
+
+from tussle.api import WorldView
+from tussle.stock.interaction import ground_collision
+
+
+class GroundCollision(ground_collision.GroundCollision):
+    """GroundCollision that tells in every step which entities are on the ground, so that a metric counts each step."""
+
+    def step(self, w: WorldView) -> None:
+        self.is_down[:] = False
+        super().step(w)

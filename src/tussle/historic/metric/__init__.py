@@ -1,0 +1,1 @@
+"""Metrics with the laws of SCRIMMAGE."""

@@ -1,0 +1,1 @@
+"""Motion models with the laws of SCRIMMAGE."""

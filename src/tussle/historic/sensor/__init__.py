@@ -1,0 +1,1 @@
+"""Sensors with the laws of SCRIMMAGE."""

@@ -1,0 +1,62 @@
+"""The laws by which a mission is played: tussle's own, or on request those of SCRIMMAGE where they differ."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from functools import partial
+from typing import Any
+
+from tussle import stock
+from tussle.api.plugin import Plugin
+from tussle.errors import MissionError, nearest_name
+
+COMPAT = ("scrimmage",)
+"""Names of laws other than tussle's."""
+
+
+def check_compat(compat: Any) -> None:
+    """Check a name of laws; "" is that of tussle's.
+
+    Raises:
+        MissionError: There are no such laws.
+    """
+    if compat != "" and compat not in COMPAT:
+        hint = nearest_name(compat, COMPAT) if isinstance(compat, str) else ""
+        raise MissionError(f"compat = {compat!r} is not allowed{hint}; allowed is {COMPAT[0]!r}, or nothing")
+
+
+def shipped(compat: str) -> dict[str, Callable[[], Any]]:
+    """Map the name of each shipped plugin to the function that returns its class.
+
+    Raises:
+        MissionError: There are no such laws.
+    """
+    check_compat(compat)
+    if not compat:
+        return {name: partial(stock.load, name) for name in stock.manifest()}
+    from tussle import historic  # nothing of it is loaded otherwise
+
+    return {name: partial(historic.load, name) for name in {**stock.manifest(), **historic.manifest()}}
+
+
+def with_laws(owner: Any, names: Iterable[str]) -> dict[str, Any]:
+    """The plugins of a block or mission by the names of its fields, those of tussle replaced where SCRIMMAGE's law differs."""
+    found = {}
+    for name in names:
+        plugins = getattr(owner, name)
+        found[name] = tuple(map(with_law, plugins)) if isinstance(plugins, tuple) else with_law(plugins)
+    return found
+
+
+def with_law(plugin: Plugin) -> Plugin:
+    """The plugin, with SCRIMMAGE's law if it is a stock plugin whose law differs; and so the plugins inside it."""
+    from tussle import historic
+
+    cls, values = type(plugin), plugin.values
+    values |= {name: tuple(map(with_law, values[name])) for name in plugin.children()}
+    name = cls.__name__
+    if name in historic.manifest() and name in stock.manifest() and cls is stock.load(name):
+        cls = historic.load(name)
+    if cls is type(plugin) and values == plugin.values:
+        return plugin
+    return cls(name=plugin.instance_name, rate=plugin.rate, states=plugin.active_in, **values)
