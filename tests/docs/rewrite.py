@@ -13,6 +13,7 @@ import sys
 import tempfile
 
 from pages import OUTPUT, PAGES, examples, namespace, printed_by
+from plugin_pages import FOLDER, plugin_pages
 from reference import PAGE, reference
 
 
@@ -44,6 +45,9 @@ def main() -> None:
         text = OUTPUT.sub(lambda shown: f"{shown[1]}{game()}```", text)
         page.write_text(text)
     PAGE.write_text(reference())
+    FOLDER.mkdir(exist_ok=True)
+    for page, text in plugin_pages().items():
+        page.write_text(text)
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import PurePath
+from pathlib import Path
 
 import numpy as np
 
@@ -11,6 +11,9 @@ from tussle.errors import ParameterError, listed
 from tussle.messages import RemoveEntity
 from tussle.numeric.quaternion import quat_to_yaw
 from tussle.stock.autonomy.trajectory_record_playback.table import read_recorded
+
+SHIPPED = Path(__file__).parents[2]
+"""Folder of the files that ship."""
 
 
 class TrajectoryRecordPlayback(Autonomy):
@@ -40,9 +43,9 @@ class TrajectoryRecordPlayback(Autonomy):
     velocity = Output("velocity_x velocity_y velocity_z", unit="m/s")
 
     def check_values(self) -> None:
-        """Check that the file is below the current directory, since a mission may come from others."""
-        path = PurePath(self.trajectory_filename)
-        if path.is_absolute() or ".." in path.parts:
+        """Check that the file is below the current directory or ships, since a mission may come from others."""
+        path = Path(self.trajectory_filename)
+        if (path.is_absolute() and not path.is_relative_to(SHIPPED)) or ".." in path.parts:
             raise ParameterError(
                 f"TrajectoryRecordPlayback.trajectory_filename = {self.trajectory_filename!r} is not allowed; it takes the name of a file "
                 "below the current directory"
