@@ -6,14 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
+from tussle import stock
 from tussle.api import Autonomy, GroupView, HistoricAttributes, Output, Param, Publish
 from tussle.errors import ParameterError, listed
 from tussle.messages import RemoveEntity
 from tussle.numeric.quaternion import quat_to_yaw
 from tussle.stock.autonomy.trajectory_record_playback.table import read_recorded
-
-SHIPPED = Path(__file__).parents[2]
-"""Folder of the files that ship."""
 
 
 class TrajectoryRecordPlayback(Autonomy):
@@ -45,7 +43,9 @@ class TrajectoryRecordPlayback(Autonomy):
     def check_values(self) -> None:
         """Check that the file is below the current directory or ships, since a mission may come from others."""
         path = Path(self.trajectory_filename)
-        if (path.is_absolute() and not path.is_relative_to(SHIPPED)) or ".." in path.parts:
+        if (
+            path.is_absolute() and not path.is_relative_to(Path(stock.__file__).parent)
+        ) or ".." in path.parts:
             raise ParameterError(
                 f"TrajectoryRecordPlayback.trajectory_filename = {self.trajectory_filename!r} is not allowed; it takes the name of a file "
                 "below the current directory"
