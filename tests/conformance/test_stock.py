@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import hawk
 import pytest
 
 from tussle import historic, stock
@@ -29,26 +28,20 @@ COMPANIONS = {
 }
 NEEDED = {"MultirotorControllerPID": ["Multirotor"], "MultirotorControllerOmega": ["Multirotor"]}
 """Companions without which a plugin cannot be played."""
-HELD = ("JoystickAutonomy", "JoystickController")
-"""Plugins that open a device."""
 LIGHT = ("FixedWing6DOFRascal",)
 """Variants of a plugin that is checked, too light for the kit's steps with a tenth or ten times of its parameters."""
 
-GRAPHML = """<graphml xmlns="http://graphml.graphdrawing.org/xmlns"><key id="x" for="node" attr.name="x" attr.type="double"/>
-<key id="y" for="node" attr.name="y" attr.type="double"/><graph edgedefault="directed">
-<node id="a"><data key="x">1</data><data key="y">2</data></node></graph></graphml>"""
-RECORD = "id,t,x,y,z,qw,qx,qy,qz,vx,vy,vz\n"
 FILES = {
-    "TrajectoryRecordPlayback": (
-        "trajectory.txt",
-        RECORD
-        + "".join(f"{i},{k / 10},{i},{k},5,1,0,0,0,{k / 3},1,0\n" for i in range(1, 80) for k in range(12)),
-    ),
-    "MapGen2D": ("maze_2d_1", "P2 3 2 255  0 9 255  255 255 0"),
-    "GraphInteraction": ("default", GRAPHML),
+    "MapGen2D": ("map", "rooms.pgm"),
+    "GraphInteraction": ("graph_file", "town.graphml"),
+    "JoystickAutonomy": ("device", "stick.js0"),
+    "JoystickController": ("device", "stick.js0"),
 }
-"""Files that a plugin reads, by plugin."""
-
+"""Parameter, and file of the example, of plugins that read a file."""
+RECORD = "id,t,x,y,z,qw,qx,qy,qz,vx,vy,vz\n" + "".join(
+    f"{i},{k / 10},{i},{k},5,1,0,0,0,{k / 3},1,0\n" for i in range(1, 80) for k in range(12)
+)
+"""Trajectories of the entities of the kit's game."""
 
 BOUNDARIES = [
     Boundary(name="west", boundary_id=1, team=1, shape="sphere", center=(-4.0, 0.0, 4.0), radius=8.0),
@@ -65,19 +58,16 @@ ON_REGIONS = (
 def test_plugin_meets_the_contract(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     if name == "GraphInteraction":
         pytest.importorskip("networkx")
-    if name in FILES:
+    if name == "TrajectoryRecordPlayback":
         monkeypatch.chdir(tmp_path)
-        file, text = FILES[name]
-        Path(file).write_text(text)
+        Path("trajectory.txt").write_text(RECORD)
     if name in LIGHT:
         monkeypatch.setattr("tussle.testing.check.check_limits", lambda game: None)
-    device = tmp_path / "js0"  # a joystick on which nothing happens
-    device.touch()
-    params = {"device": str(device)} if name in HELD else {}
+    params = {FILES[name][0]: str(stock.examples()[name].with_name(FILES[name][1]))} if name in FILES else {}
     if name in ("JSBSimControl", "JSBSimModel"):
         pytest.importorskip("jsbsim")
         aircraft = {"aircraft": "hawk"} if name == "JSBSimControl" else {"script_name": "patrol.xml"}
-        params = {**aircraft, "jsbsim_root": hawk.write(tmp_path / "root")}
+        params = {**aircraft, "jsbsim_root": str(stock.examples()["JSBSimModel"].with_name("hawk"))}
     companions = [stock.load(other)() for other in NEEDED.get(name, ())]
     check_plugin(stock.load(name), companions=BOUNDARIES if name in ON_REGIONS else companions, **params)
 

@@ -76,6 +76,9 @@ def reference() -> str:
     parts = [HEAD]
     for module, title in PARTS.items():
         parts.append(f"## {title}: `{module}`\n\n")
+        if module == "tussle.stock":
+            parts.append("Each has [a page of its own](plugins/index.md).\n\n")
+            continue
         parts += [entry(name, value) for name, value in public(module).items()]
     return "".join(parts).rstrip() + "\n"
 

@@ -15,6 +15,7 @@ import tempfile
 from pages import OUTPUT, PAGES, examples, namespace, printed_by
 from parity_page import PAGE as PARITY
 from parity_page import parity_page
+from plugin_pages import FOLDER, plugin_pages
 from reference import PAGE, reference
 
 
@@ -47,6 +48,9 @@ def main() -> None:
         page.write_text(text)
     PAGE.write_text(reference())
     PARITY.write_text(parity_page())
+    FOLDER.mkdir(exist_ok=True)
+    for page, text in plugin_pages().items():
+        page.write_text(text)
 
 
 if __name__ == "__main__":

@@ -75,27 +75,6 @@ class Car(MotionModel):
         body.vel[0], body.vel[1], body.vel[2] = v * cos(yaw), v * sin(yaw), 0.0
 
 
-class Balloon(MotionModel):
-    """A point with mass and linear drag that is moved by forces; integrated by the shared driver."""
-
-    grade = "portable"
-    drag = Param(0.5, unit="N s/m", ge=0.0)
-    x = State("east north up v_east v_north v_up", unit="m m m m/s m/s m/s")
-
-    @staticmethod
-    def derivative(v_east, v_north, v_up, force_x, force_y, force_z, drag, mass):
-        pull = drag / mass
-        return (
-            v_east, v_north, v_up, force_x / mass - pull * v_east, force_y / mass - pull * v_north, force_z / mass - pull * v_up,
-        )  # fmt: skip
-
-    def from_body(self, body, rows):
-        self.x[:3, rows], self.x[3:, rows] = body.pos[:, rows], body.vel[:, rows]
-
-    def to_body(self, body):
-        body.pos[:], body.vel[:] = self.x[:3], self.x[3:]
-
-
 class Wanderer(Autonomy):
     """Steer by a walk at random, away from the two nearest and from the mean of those within sight."""
 

@@ -1,16 +1,52 @@
-"""Plays golden missions and knows the hashes that are kept."""
+"""Plays golden missions and examples of plugins, and knows the hashes that are kept."""
 
 from __future__ import annotations
 
 import json
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 
 from missions import NAMES, SEEDS, STEPS, mission
 
-from tussle import Simulation
+from tussle import Simulation, stock
+from tussle.mission import read_mission
 
 FILE = Path(__file__).with_name("golden.json")
+STOCK = Path(stock.__file__).parent
+EXAMPLE_STEPS = 100
+"""Steps of an example that are played."""
+EXTRAS = {"interaction/graph_interaction": "networkx", "interaction/map_gen_2d": "PIL"}
+"""Package that an example needs, of those that `import tussle` does not."""
+JSBSIM = ("controller/jsbsim_controllers", "motion/jsbsim_model")
+"""Folders whose examples are flown by JSBSim, so that their hashes depend on the machine; tests/unit/jsbsim plays them."""
+
+
+@cache
+def examples() -> tuple[str, ...]:
+    """Folders of the plugins whose examples can be played with the installed packages."""
+    names = sorted({path.parent.relative_to(STOCK).as_posix() for path in stock.examples().values()})
+    return tuple(n for n in names if n not in JSBSIM and (n not in EXTRAS or find_spec(EXTRAS[n])))
+
+
+def play_example(name: str, seeds=1) -> list[str]:
+    """State hash of each world after the first steps of an example, which is read without notes."""
+    loaded = read_mission(STOCK / name / "example.xml")
+    assert loaded.notes == ()
+    with Simulation(loaded.mission, seeds=seeds, on_error="raise") as sim:
+        sim.step(EXAMPLE_STEPS)
+        return hashes_now(sim)
+
+
+def play_examples() -> dict[str, str]:
+    """State hash of each example that can be played."""
+    return {name: play_example(name)[0] for name in examples()}
+
+
+@cache
+def kept_examples() -> dict[str, str]:
+    """Folder of a plugin -> hash of its example."""
+    return json.loads(FILE.read_text(encoding="utf-8"))["examples"]
 
 
 @cache

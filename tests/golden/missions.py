@@ -5,79 +5,33 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cache
 
-from golden_plugins import Balloon, Beacon, Car, Nursery, Wanderer
+from golden_plugins import Beacon, Car, Nursery, Wanderer
 
 from tussle import Block, Mission
 from tussle.stock import (
-    GPS,
-    UUV6DOF,
-    AircraftToSingleIntegratorController,
-    AuctionAssign,
-    AutonomyExecutor,
     AvoidEntityMS,
-    Ballistic,
     Boids,
     Boundary,
-    BoundaryDefense,
-    CaptureInBoundaryInteraction,
-    ContactBlobCamera,
-    Control3D,
     DirectController,
-    DoubleIntegrator,
-    DoubleIntegratorControllerVelYaw,
-    DoubleIntegratorControllerWaypoint,
-    DubinsAirplane,
-    DubinsAirplane3D,
-    DubinsAirplaneController,
-    EnforceBoundaryInteraction,
-    ExternalForceField,
-    FieldOfView,
-    FixedWing6DOF,
-    FixedWing6DOFControllerPID,
-    FlagCaptureInteraction,
-    FlagCaptureMetrics,
-    GoTo,
-    GoToWaypoint,
-    GraphvizFSM,
-    GroundCollision,
     LocalNetwork,
-    LOSSensor,
-    MotionBattery,
     MotorSchemas,
     MoveToGoalMS,
-    Multirotor,
-    MultirotorControllerPID,
     NoisyContacts,
     NoisyState,
     Predator,
     RadioNetwork,
-    RandomAttrit,
-    RigidBody6DOF,
-    RigidBody6DOFControllerPID,
-    RigidBody6DOFStateSensor,
     SimpleAircraft,
     SimpleAircraftControllerPID,
     SimpleCapture,
     SimpleCaptureMetrics,
-    SimpleCar,
-    SimpleCarControllerHeading,
     SimpleCollision,
-    SimpleINS,
-    SimpleQuadrotor,
-    SimpleQuadrotorControllerLQR,
     SingleIntegrator,
     SingleIntegratorControllerSimple,
-    SingleIntegratorControllerWaypoint,
     SphereNetwork,
     Still,
     Straight,
-    TakeFlag,
-    TrailMS,
     Unicycle,
-    UnicycleControllerPoint,
     UnicyclePID,
-    UUV6DOFLinearEnergy,
-    UUV6DOFPIDController,
     WaypointDispatcher,
     WaypointGenerator,
 )
@@ -198,22 +152,6 @@ def radio() -> Mission:
     )  # fmt: skip
 
 
-def sensors() -> Mission:
-    """Navigation that drifts and is denied, cameras and a range finder; the belief steers."""
-    swarm = Block(
-        name="swarm", team=1, count=8, position=(0.0, 0.0, 20.0), variance=(400.0, 400.0, 25.0), heading_variance=1.0, speed=10.0,
-        autonomy=Straight(speed=10.0), controller=UnicyclePID(), motion=Unicycle(vel_max=15.0, turn_rate_max=1.0, pitch_rate_max=1.0),
-        sensor=[
-            GPS(gps_denied_ids="1", noise=(2.0, 2.0, 4.0)), SimpleINS(orient_noise_0=(0.0, 0.01), orient_noise_1=(0.0, 0.01)),
-            FieldOfView(bearing_noise=0.01, elevation_noise=0.01, range_noise=0.05, false_negative_probability=0.1),
-            ContactBlobCamera(azimuth_fov="120 deg", size_noise_0=(0.0, 1.0)), LOSSensor(rpy="0 60 0"),
-        ],
-    )  # fmt: skip
-    return Mission(
-        blocks=[swarm], motion_multiplier=2, end=3.0, interactions=[Boundary(boundary_id=1, shape="sphere", radius=15.0)],
-    )  # fmt: skip
-
-
 def narrow_view() -> Mission:
     """Flocking with a limited field of view, next to a flock without."""
     flock = lambda name, **view: Block(  # noqa: E731
@@ -310,158 +248,6 @@ def births_sequential() -> Mission:
     return _nursery("sequential")
 
 
-def flags() -> Mission:
-    """Runners fetch a flag from a region that others defend, and are removed outside the field."""
-    ball = lambda number, east, radius: Boundary(  # noqa: E731
-        name=f"ball {number}", boundary_id=number, team=number, shape="sphere", center=(east, 0.0, 0.0), radius=radius,
-    )  # fmt: skip
-    runner = Block(
-        name="runner", team=2, count=12, position=(40.0, 0.0, 0.0), variance=(64.0, 64.0, 64.0),
-        autonomy=TakeFlag(), motion=SingleIntegrator(max_speed=20.0),
-    )  # fmt: skip
-    defender = Block(
-        name="defender", team=1, count=4, position=(-10.0, 0.0, 0.0), variance=(100.0, 100.0, 9.0),
-        autonomy=BoundaryDefense(), motion=SingleIntegrator(max_speed=12.0),
-    )  # fmt: skip
-    rules = [
-        ball(1, 0.0, 25.0), ball(2, 50.0, 20.0), Boundary(name="field", boundary_id=3, lengths=(120.0, 60.0, 40.0), rpy=(0.0, 0.0, 0.1)),
-        EnforceBoundaryInteraction(active_boundary_ids=(3,)), CaptureInBoundaryInteraction(cool_down_period=0.8),
-        FlagCaptureInteraction(flag_boundary_id=1, capture_boundary_id=2),
-    ]  # fmt: skip
-    return Mission(
-        blocks=[runner, defender],
-        interactions=rules,
-        metrics=[SimpleCaptureMetrics(), FlagCaptureMetrics()],
-        end=5.0,
-    )
-
-
-def winds() -> Mission:
-    """Balloons in gusts and in a force that changes, and with losses at random."""
-    balloon = Block(
-        name="balloon",
-        count=12,
-        team=1,
-        position=(0.0, 0.0, 40.0),
-        variance=(100.0, 100.0, 100.0),
-        motion=Balloon(),
-    )
-    winds = [
-        ExternalForceField(force_type="dryden", wind_heading="30 deg"),
-        ExternalForceField(name="squall", force_type="variable", force_change_period=(0.5, 0.2)),
-    ]
-    return Mission(
-        blocks=[balloon], interactions=[*winds, RandomAttrit(start_after=1.0, duration=4.0)], end=5.0
-    )
-
-
-def vehicles() -> Mission:
-    """Each kinematic vehicle goes to points with a controller of its own; a ball falls."""
-    cars = {"tolerance_in_2d": True, "mode": "reverse"}
-    pairs = {
-        "quadrotor": (SimpleQuadrotorControllerLQR(), SimpleQuadrotor(), {}),
-        "car": (SimpleCarControllerHeading(), SimpleCar(enable_gravity=True), cars),
-        "drone": (DoubleIntegratorControllerVelYaw(), DoubleIntegrator(max_vel=9.0, max_acc=4.0, motion_model_sets_yaw=False), {}),
-        "puck": (DoubleIntegratorControllerWaypoint(), DoubleIntegrator(max_vel=9.0, max_acc=4.0), {}),
-        "glider": (DubinsAirplaneController(), DubinsAirplane(speed_min=12.0), {"mode": "loop"}),
-        "jet": (DubinsAirplaneController(), DubinsAirplane3D(), {"speed": 60.0}),
-        "point": (SingleIntegratorControllerWaypoint(), SingleIntegrator(), {}),
-        "ahead": (UnicycleControllerPoint(), Unicycle(vel_max=20.0), {}),
-        "kite": (AircraftToSingleIntegratorController(), SingleIntegrator(), {}),
-    }  # fmt: skip
-    blocks = [
-        Block(
-            name=name, team=1, count=3, position=(0.0, 0.0, 50.0), variance=(25.0, 25.0, 9.0), heading_variance=1.0, speed=3.0,
-            autonomy=GoTo(waypoints=((12.0, 0.0, 52.0), (12.0, 15.0, 47.0)), tolerance=8.0, **values), controller=controller, motion=motion,
-        )
-        for name, (controller, motion, values) in pairs.items()
-    ]  # fmt: skip
-    ball = Block(
-        name="ball", team=2, count=2, position=(0.0, 0.0, 9.0), velocity=(3.0, 1.0, 2.0), motion=Ballistic()
-    )
-    ground = GroundCollision(remove_on_collision=False)
-    return Mission(blocks=[*blocks, ball], motion_multiplier=3, end=4.0, interactions=[ground])
-
-
-def machines() -> Mission:
-    """State machines, behaviours and autonomies by state, one of which claims, and followers of one another."""
-    fsm = GraphvizFSM(graphviz_fsm="digraph { qi -> a -> b -> c -> a }")
-    schemas = MotorSchemas(
-        max_speed=12.0,
-        behaviors=[
-            AvoidEntityMS(sphere_of_influence=30.0),
-            MoveToGoalMS(goal=(100.0, 20.0, 60.0), distance_pid=(0.2, 0.1, 0.1, 1e3), states="a, c"),
-            TrailMS(trail_id=1, states="b"),
-        ],
-    )
-    executor = AutonomyExecutor(
-        autonomies=[
-            Straight(states="a"),
-            Boids(states="b", comms_range=50.0),
-            Predator(states="c", capture_range=30.0),
-        ]
-    )
-    common = {"variance": (400.0, 400.0, 0.0), "heading_variance": 1.0}
-    return Mission(
-        blocks=[
-            Block(name="robot", team=1, count=5, autonomy=[fsm, schemas], motion=SingleIntegrator(), **common),
-            Block(
-                name="switch", team=2, count=4, autonomy=[fsm, executor], controller=UnicyclePID(), motion=Unicycle(), **common
-            ),
-        ],
-        end=5.0, interactions=[SimpleCapture(capture_range=10.0)],
-    )  # fmt: skip
-
-
-def errands() -> Mission:
-    """Auctions over a radio, waypoints of the entities' own, circles around them, and points that a user may click."""
-    bidder = lambda name, **values: Block(  # noqa: E731
-        name=name, team=1, count=3, variance=(900.0, 900.0, 0.0), autonomy=AuctionAssign(duration=0.5, **values),
-        motion=SingleIntegrator(),
-    )  # fmt: skip
-    circler = Block(
-        name="circler", team=2, count=4, position=(0.0, 0.0, 50.0), variance=(400.0, 400.0, 25.0), heading_variance=1.0,
-        autonomy=[
-            GoToWaypoint(waypoint="XYZ 0.2 X 5 60 0 0 0 40 -1"),
-            WaypointDispatcher(waypointlist_network="LocalNetwork", loiter_radius=30.0),
-            MotorSchemas(behaviors=[MoveToGoalMS()]),
-        ],
-        controller=UnicyclePID(), motion=Unicycle(),
-    )  # fmt: skip
-    tower = Block(
-        name="tower", autonomy=[WaypointGenerator(mode="loiter", network_name="LocalNetwork"), Control3D()], motion=SingleIntegrator()
-    )  # fmt: skip
-    return Mission(
-        blocks=[bidder("head"), bidder("others", auctioneer=False), circler, tower],
-        networks=[SphereNetwork(name="CommsNetwork", range=60.0, prob_transmit=0.8)], end=5.0,
-    )  # fmt: skip
-
-
-def six_degrees() -> Mission:
-    """A rigid body, a multirotor, an aircraft and an underwater vehicle, each with its controller."""
-    fleet = {
-        "body": (
-            20.0,
-            100.0,
-            RigidBody6DOF(),
-            [MotionBattery(charge_max=10.0), RigidBody6DOFControllerPID()],
-        ),
-        "copter": (0.0, 50.0, Multirotor(), [MultirotorControllerPID()]),
-        "jet": (222.0, 200.0, FixedWing6DOF(wind=(5.0, 2.0, 0.0)), [FixedWing6DOFControllerPID()]),
-        "remus": (1.0, -20.0, UUV6DOF(), [UUV6DOFPIDController(), UUV6DOFLinearEnergy()]),
-    }
-    return Mission(
-        blocks=[
-            Block(
-                name=name, team=1, count=4, position=(0.0, 0.0, z), variance=(100.0, 100.0, 1.0), heading_variance=1.0, speed=speed,
-                autonomy=Straight(speed=speed), controller=controllers, motion=motion, sensor=RigidBody6DOFStateSensor(),
-            )
-            for name, (speed, z, motion, controllers) in fleet.items()
-        ],
-        dt=0.05, motion_multiplier=2, end=2.0,
-    )  # fmt: skip
-
-
 STEPS: dict[str, int] = {
     "chase_synchronous": 24,
     "chase_sequential": 24,
@@ -470,7 +256,6 @@ STEPS: dict[str, int] = {
     "schemas": 24,
     "births_and_radio": 24,
     "radio": 24,
-    "sensors": 24,
     "narrow_view": 24,
     "slow_clocks": 24,
     "cars": 24,
@@ -478,12 +263,6 @@ STEPS: dict[str, int] = {
     "last_captured_first": 24,
     "births_synchronous": 40,
     "births_sequential": 40,
-    "flags": 50,
-    "winds": 40,
-    "vehicles": 30,
-    "machines": 24,
-    "errands": 24,
-    "six_degrees": 24,
 }
 """Steps after which a mission's hashes are taken."""
 

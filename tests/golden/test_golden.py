@@ -10,10 +10,22 @@ import threading
 
 import numpy as np
 import pytest
-from golden_runs import final_hashes, golden, hashes_now, kept, play, simulation
+from golden_runs import (
+    JSBSIM,
+    STOCK,
+    examples,
+    final_hashes,
+    golden,
+    hashes_now,
+    kept,
+    kept_examples,
+    play,
+    play_example,
+    simulation,
+)
 from missions import NAMES, SEEDS, STEPS, mission
 
-from tussle import Simulation
+from tussle import Simulation, stock
 
 STACK = (11, 2, 12, 13, 1, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 3)
 """Sixteen seeds; those that are kept stand at places 4, 1 and 15."""
@@ -32,6 +44,9 @@ def test_all_missions_are_kept():
     assert list(golden()) == list(NAMES)
     every = [one for mission_ in golden().values() for hashes in mission_.values() for one in hashes]
     assert len(set(every)) == len(every) == 2 * len(SEEDS) * len(NAMES)
+    assert {STOCK / name / "example.xml" for name in (*kept_examples(), *JSBSIM)} == {
+        *stock.examples().values()
+    }
 
 
 @every_mission
@@ -46,6 +61,13 @@ def test_world_alone_and_a_pickled_mission_in_a_stack_of_sixteen(name):
         assert sim.grade == "portable"
         sim.step(STEPS[name])
         agree(name, STACK, hashes_now(sim))
+
+
+@pytest.mark.parametrize("kind", sorted({name.partition("/")[0] for name in examples()}))
+def test_examples_alone_and_second_in_a_stack_of_two(kind):
+    names = [name for name in examples() if name.startswith(f"{kind}/")]
+    assert {name: play_example(name) for name in names} == {name: [kept_examples()[name]] for name in names}
+    assert [name for name in names if play_example(name, [2, 1])[1] != kept_examples()[name]] == []
 
 
 @pytest.mark.parametrize("name", ["chase_synchronous", "two_flocks", "narrow_view"])

@@ -13,7 +13,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from golden_runs import golden
+from golden_runs import golden, kept_examples
 from numba.core.registry import cpu_target
 from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
 
@@ -47,3 +47,4 @@ def test_an_old_processor_gives_the_golden_hashes():
     assert not OLD["NPY_DISABLE_CPU_FEATURES"] or n_features < sum(__cpu_features__.values())
     assert target != list(cpu_target.target_context.codegen().magic_tuple())
     assert [name for name, hashes in golden().items() if played["hashes"][name] != hashes] == []
+    assert [name for name, one in played["examples"].items() if one != kept_examples()[name]] == []

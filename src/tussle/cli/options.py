@@ -160,7 +160,7 @@ class MissionOptions(PluginOptions):
     """Check a mission: read it, build its game, and report all errors."""
 
     mission: Annotated[
-        str, argument("MISSION", "A mission file, or the name of a built-in mission (tussle missions).")
+        str, argument("MISSION", "A mission file, a built-in mission, or a plugin, for its example.")
     ]
     more: Annotated[list[str], argument("NAME=VALUE", "Same as --set.")] = field(default_factory=list)
     seed: Annotated[

@@ -13,13 +13,14 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from tussle import stock
 from tussle.api import Plugin
 from tussle.cli.options import PluginOptions
 from tussle.cli.play import simulate
 from tussle.cli.play_options import DescribeOptions, MissionsOptions
 from tussle.cli.progress import compiling
 from tussle.cli.tables import indented, text_table, title
-from tussle.cli.terminal import WRONG_INPUT, put, say_error, say_note
+from tussle.cli.terminal import WRONG_INPUT, out, put, say_error, say_note
 from tussle.columns import Channel, Param, Publish
 from tussle.engine.simulation import Simulation
 from tussle.errors import MissionError, nearest_name
@@ -33,9 +34,15 @@ def describe(options: DescribeOptions) -> None:
     """Show a plugin or a mission.
 
     Raises:
-        MissionError: No plugin or mission has this name.
+        MissionError: No plugin or mission has this name, or it has no example.
     """
     found = plugin_named(options.mission, options.plugin_files, options.compat or "")
+    if options.example:
+        if options.mission not in stock.examples():
+            raise MissionError(f"{options.mission} has no example; the plugins that ship have one each")
+        text = stock.examples()[options.mission].read_text(encoding="utf-8")
+        out().print(Text(text), soft_wrap=True, end="")
+        return
     if found is not None:
         show_plugin(options.mission, found)
         return
@@ -80,7 +87,11 @@ def missions(_: MissionsOptions) -> None:
         page.add_row(name, about)
     show(
         indented(page),
-        Text("tussle run NAME plays a mission; tussle describe NAME shows what it contains.", "dim"),
+        Text(
+            "tussle run NAME plays a mission; tussle describe NAME shows what it contains.\n"
+            "The name of a plugin that ships plays its example.",
+            "dim",
+        ),
     )
 
 
@@ -157,6 +168,9 @@ def show_plugin(name: str, cls: type[Plugin]) -> None:
             kind = "sends" if isinstance(topic, Publish) else "receives"
             messages.add_row(kind, _about(topic.message.__name__, topic.doc.rstrip(".")))
         parts.append(indented(messages))
+    if name in stock.manifest() and cls is stock.load(name):
+        text = f"example: tussle run {name} plays it, tussle describe {name} --example prints it"
+        parts.append(Text(text, "dim"))
     show(*parts)
 
 

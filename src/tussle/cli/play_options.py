@@ -24,7 +24,7 @@ class RunOptions(MissionOptions):
     """Play one game, record it, and show its result."""
 
     mission: Annotated[
-        str, argument("MISSION", "A mission file, or the name of a built-in mission (tussle missions).")
+        str, argument("MISSION", "A mission file, a built-in mission, or a plugin, for its example.")
     ] = ""
     from_batch: Annotated[
         str | None, option("BATCH:RUN", "Play a run of a batch again instead of a mission.", "--from")
@@ -73,6 +73,9 @@ class DescribeOptions(MissionOptions):
     """Show the parameters and channels of a plugin, or the entities and the step schedule of a mission."""
 
     mission: Annotated[str, argument("MISSION|PLUGIN", "A mission file, a built-in mission, or a plugin.")]
+    example: Annotated[bool, flag("--example", "Print the mission file that shows what a plugin does.")] = (
+        False
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

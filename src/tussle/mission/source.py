@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from tussle import stock
 from tussle.errors import MissionError, listed, nearest_name
 from tussle.mission.node import Budget, Node, parse
 from tussle.mission.placeholders import replace_placeholders
@@ -34,7 +35,7 @@ def shipped_missions() -> dict[str, tuple[Path, str]]:
 
 
 def find_mission(source: str | Path, search: Sequence[str | Path] = ()) -> Path:
-    """Find a mission's file by the name of a shipped mission, by path, or by path relative to one of the search paths.
+    """Find a mission's file: by the name of a shipped mission or of a stock plugin (its example), or by path, also below a search path.
 
     Raises:
         MissionError: There is no such file.
@@ -42,6 +43,8 @@ def find_mission(source: str | Path, search: Sequence[str | Path] = ()) -> Path:
     shipped = shipped_missions()
     if isinstance(source, str) and source in shipped:
         return shipped[source][0]
+    if isinstance(source, str) and source in stock.examples():
+        return stock.examples()[source]
     if "\0" in str(source):
         raise MissionError(f"{shown(str(source))} is not a file name")
     path = _expanded(source)
@@ -52,7 +55,7 @@ def find_mission(source: str | Path, search: Sequence[str | Path] = ()) -> Path:
     is_folder = os.path.isdir(path)  # noqa: PTH112  it is False where Path.is_dir raises, as for a name too long
     why = "is a folder, not a mission file" if is_folder else "is neither a file nor a shipped mission"
     raise MissionError(
-        f"{shown(str(source))} {why}{nearest_name(path.stem[:80], shipped)}; of shipped missions {listed(shipped)}"
+        f"{shown(str(source))} {why}{nearest_name(path.stem[:80], [*shipped, *stock.examples()])}; of shipped missions {listed(shipped)}"
     )
 
 
@@ -163,7 +166,8 @@ class SourceReader:
 
     def _file(self, path: Path, text: str | None = None) -> tuple[Node, str]:
         text = read_text(path, self.budget) if text is None else text
-        replaced = replace_placeholders(text, str(path), self.overrides, self.problems, self.budget)
+        overrides = {"folder": str(path.parent.resolve()), **self.overrides}
+        replaced = replace_placeholders(text, str(path), overrides, self.problems, self.budget)
         for name, default in replaced.names.items():
             self.placeholders.setdefault(name, default)
         self.files.append(path)

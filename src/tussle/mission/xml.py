@@ -77,7 +77,7 @@ def read_mission(
     """Read a mission.
 
     Args:
-        source: A file, or the name of a shipped mission, such as "predator_prey".
+        source: A file, or the name of a shipped mission ("predator_prey") or of a stock plugin ("Boids"), for its example.
         overrides: Values of the file's placeholders, `${name=default}`, and of anything in it by path: "run.dt", "prey.count",
             "prey.Boids.max_speed", "SimpleCapture.capture_range", "prey.motion_model" ("Unicycle vel_max='30'"). By path, a number
             is SI and a text is read as in the file; the value of a placeholder is inserted into the file as it is.

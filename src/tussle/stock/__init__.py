@@ -34,6 +34,14 @@ def import_class(path: str) -> Any:
     return getattr(importlib.import_module(module), attribute)
 
 
+@cache
+def examples() -> dict[str, Path]:
+    """Map the name of each stock plugin to its example: a short mission file that shows what the plugin does."""
+    folder = Path(__file__).parent
+    modules = ((name, path.partition(":")[0]) for name, path in manifest().items())
+    return {name: folder.joinpath(*module.split(".")[2:], "example.xml") for name, module in modules}
+
+
 def load(name: str) -> Any:
     """Return a stock plugin class.
 

@@ -43,15 +43,14 @@ def test_each_begins_with_a_plugin_that_plays_and_a_test_that_passes(tussle, fol
 def test_every_plugin_that_ships_can_be_begun_with(tmp_path):
     for cls in dict.fromkeys(map(stock.load, stock.manifest())):
         name = cls.__name__
-        if (
-            cls.kind not in KINDS or cls.grade == "external" or name == "MapGen2D"
-        ):  # without a joystick and a map
+        if cls.kind not in KINDS:
             continue
         written = list(write_plugin(cls.kind, f"My{name}", name, tmp_path)[0])
         copy = load_plugin_file(written[0])[f"My{name}"]
         assert list(copy.params()) == list(cls.params())
         assert copy.__doc__ == re.sub(rf"\b{name}\b", f"My{name}", cls.__doc__)
         loaded = read_mission(written[2], plugin_files=[written[0]])
+        assert all("it hides the one that ships" in note for note in loaded.notes)
         Simulation(loaded.mission).close()
 
 

@@ -86,6 +86,23 @@ def test_a_plugin_page_has_parameters_channels_and_units(tussle):
     assert ["turn_rate", "rad/s"] in [line[:2] for line in lines]
 
 
+def test_the_example_of_a_plugin_is_printed_and_played_by_its_name(tussle, folder):
+    assert "example: tussle run Straight plays it, tussle describe" in tussle("describe", "Straight").stdout
+    text = tussle("describe", "Straight", "--example").stdout
+    assert text == stock.examples()["Straight"].read_text()
+    (folder / "copy.xml").write_text(text)
+    played, copied = (tussle("run", name, "--no-log", "--end", "1") for name in ("Straight", "copy.xml"))
+    for line in (" Straight: planes fly straight on", " hash "):
+        (shown,) = (each for each in played.stdout.splitlines() if each.startswith(line))
+        assert shown in copied.stdout
+    (folder / "mine.py").write_text(
+        'from tussle.stock import Boids\n\n\nclass Mine(Boids):\n    """Sheep."""\n'
+    )
+    assert "example:" not in tussle("describe", "Mine", "--plugin-path", "mine.py").stdout
+    done = tussle("describe", "Mine", "--plugin-path", "mine.py", "--example", code=1)
+    assert done.stderr == "error: Mine has no example; the plugins that ship have one each\n"
+
+
 def test_a_plugin_page_has_the_fields_of_lists(tussle):
     lines = [line.split() for line in tussle("describe", "NoisyContacts").stdout.splitlines()]
     first = next(i for i, line in enumerate(lines) if line[:2] == ["contacts", "list"])

@@ -38,6 +38,16 @@ def test_placeholders_are_set(files):
     assert (loaded.mission.end, loaded.mission.blocks[0].count, loaded.name) == (9.0, 3, "<b> & 'c' \"d\"")
 
 
+def test_folder_is_that_of_the_file(files, tmp_path):
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts/title.xml").write_text('<p><entity name="${folder}"><name>a</name></entity></p>')
+    include = '<xi:include xmlns:xi="http://www.w3.org/2001/XInclude" href="parts/title.xml" xpointer="xpointer(/p/*)"/>'
+    loaded = files.read(f'<runscript name="${{folder}}">{include}</runscript>')
+    assert loaded.name == str(tmp_path.resolve())
+    assert f'name="{tmp_path.resolve() / "parts"}"' in loaded.text
+    assert files.read('<runscript name="${folder}"><entity/></runscript>', {"folder": "x"}).name == "x"
+
+
 def test_an_unknown_setting_is_refused_with_the_nearest_name(files):
     with pytest.raises(MissionError, match=r"the mission has no setting 'edn' \(did you mean 'end'\?\)"):
         files.read(PLAIN, {"edn": "9"})

@@ -96,6 +96,15 @@ def test_shipped_missions_have_titles_and_are_packaged():
     assert read_mission("predator_prey").mission.end == 500.0
 
 
+def test_the_example_of_each_plugin_is_short_and_uses_it():
+    for name, path in stock.examples().items():
+        text = path.read_text(encoding="utf-8")
+        its_names = [other for other in stock.manifest() if stock.load(other) is stock.load(name)]
+        assert any(f">{one}<" in text or f"[ {one} " in text for one in its_names), name
+        assert len(text.splitlines()) <= 25, name
+        assert text.startswith("<runscript name="), name
+
+
 @pytest.mark.parametrize("name", RUN_AS_THEY_ARE)
 def test_missions_of_the_existing_system_run(existing, name):
     loaded = read_mission(existing(name))

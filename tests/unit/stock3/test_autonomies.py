@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from small_worlds import Drift, block, mission
 
-from tussle import Scene, Simulation
+from tussle import Scene, Simulation, stock
 from tussle.api import Autonomy, Publish, State, Subscribe
 from tussle.errors import ParameterError, PluginError, UnitError
 from tussle.geodesy import Origin
@@ -261,6 +261,8 @@ def test_records_that_are_none(tmp_path, monkeypatch, text, error):
 def test_a_record_lies_below_the_current_directory(name):
     with pytest.raises(ParameterError, match=r"it takes the name of a file below the current directory"):
         TrajectoryRecordPlayback(trajectory_filename=name)
+    shipped = stock.examples()["TrajectoryRecordPlayback"].with_name("eight.csv")
+    TrajectoryRecordPlayback(trajectory_filename=str(shipped))
 
 
 class Undertaker(Autonomy):

@@ -11,11 +11,10 @@ from typing import Any
 from rich.text import Text
 
 from tussle import stock
-from tussle.api import Plugin
 from tussle.cli.play_options import NewOptions
 from tussle.cli.progress import compiling
 from tussle.cli.scaffold.copied import class_renamed, merged
-from tussle.cli.scaffold.played import mission_text
+from tussle.cli.scaffold.played import example_text, mission_text
 from tussle.cli.tables import fact_list, indented
 from tussle.cli.terminal import put
 from tussle.errors import MissionError, ParameterError, listed, nearest_name
@@ -82,14 +81,14 @@ def write_plugin(
     if is_easy and (kind not in EASY_KINDS or origin):
         other = f"--from {origin}" if origin else f"the kind {kind}; allowed kinds: {', '.join(EASY_KINDS)}"
         raise ParameterError(f"--easy is not allowed with {other}")
-    source, plugin = (
+    source, mission = (
         _from_template(kind, name, is_easy) if origin is None else _from_stock(kind, name, origin)
     )
     module = re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", name).lower()
     texts = {
         directory / f"{module}.py": (source, f"the {kind}"),
         directory / f"test_{module}.py": (TEST.format(name=name, module=module), "its test"),
-        directory / f"{module}.xml": (mission_text(kind, name, plugin), "a mission that uses it"),
+        directory / f"{module}.xml": (mission, "a mission that uses it"),
     }
     _write({path: text for path, (text, _) in texts.items()})
     at = directory / module
@@ -112,20 +111,17 @@ def _check_names(kind: str, name: str) -> None:
         raise ParameterError(f"a stock plugin is named {name!r}; choose another name, such as My{name}")
 
 
-def _from_template(kind: str, name: str, is_easy: bool) -> tuple[str, Plugin]:
-    from importlib import import_module
-
+def _from_template(kind: str, name: str, is_easy: bool) -> tuple[str, str]:
     template = f"easy_{kind}" if is_easy and kind != "autonomy" else kind
     text = (TEMPLATES / f"{template}.py").read_text(encoding="utf-8")
-    plugin: Plugin = import_module(f"tussle.cli.scaffold.templates.{template}").New()
-    return class_renamed(text, "New", name), plugin
+    return class_renamed(text, "New", name), mission_text(kind, name)
 
 
-def _from_stock(kind: str, name: str, origin: str) -> tuple[str, Plugin]:
+def _from_stock(kind: str, name: str, origin: str) -> tuple[str, str]:
     cls: Any = stock.load(origin)
     if cls.kind != kind:
         raise ParameterError(f"--from {origin}: the kind of this plugin is {cls.kind}, not {kind}")
-    return class_renamed(merged(cls), origin, name), cls()
+    return class_renamed(merged(cls), cls.__name__, name), example_text(origin, cls.__name__, name)
 
 
 def _write(texts: dict[Path, str]) -> None:

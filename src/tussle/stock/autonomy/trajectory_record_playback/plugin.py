@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import PurePath
+from pathlib import Path
 
 import numpy as np
 
+from tussle import stock
 from tussle.api import Autonomy, GroupView, HistoricAttributes, Output, Param, Publish
 from tussle.errors import ParameterError, listed
 from tussle.messages import RemoveEntity
@@ -40,9 +41,11 @@ class TrajectoryRecordPlayback(Autonomy):
     velocity = Output("velocity_x velocity_y velocity_z", unit="m/s")
 
     def check_values(self) -> None:
-        """Check that the file is below the current directory, since a mission may come from others."""
-        path = PurePath(self.trajectory_filename)
-        if path.is_absolute() or ".." in path.parts:
+        """Check that the file is below the current directory or ships, since a mission may come from others."""
+        path = Path(self.trajectory_filename)
+        if (
+            path.is_absolute() and not path.is_relative_to(Path(stock.__file__).parent)
+        ) or ".." in path.parts:
             raise ParameterError(
                 f"TrajectoryRecordPlayback.trajectory_filename = {self.trajectory_filename!r} is not allowed; it takes the name of a file "
                 "below the current directory"
