@@ -56,7 +56,7 @@ class Aircraft(NamedTuple):
     needed: tuple[str, ...]
 
 
-class Flight:
+class JSBSimFlight:
     """An aircraft of JSBSim, with all that was done to it: JSBSim cannot save its state, but repeats a flight bit for bit.
 
     Args:
@@ -134,7 +134,7 @@ class Flight:
 
     def __setstate__(self, saved: Any) -> None:
         aircraft, dt, history = saved
-        Flight.__init__(self, aircraft, dt)
+        JSBSimFlight.__init__(self, aircraft, dt)
         width = len(self.commanded) + 1
         for placing, flown in history:
             self.place(*placing)

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import math
 
-from tussle.geodesy import ECCENTRICITY_SQUARED, SEMI_MAJOR
 from tussle.numeric import cos, sin
 from tussle.numeric.kernel import device, kernel
 from tussle.numeric.quaternion import quat_multiply, quat_rotate, quat_rotate_inverse
-from tussle.stock.motion.jsbsim_model.units import FOOT
 
 
 @device
@@ -18,12 +16,12 @@ def turn(angle):
 
 
 @device
-def earth_centred(latitude, longitude, altitude):
-    """Earth-centred position [m] of a geodetic place [rad, m]."""
+def earth_centred(latitude, longitude, altitude, ellipsoid):
+    """Earth-centred position [m] of a geodetic place [rad, m]; ellipsoid: semi-major axis [m] and squared eccentricity."""
     s, c = sin(latitude), cos(latitude)
-    normal = SEMI_MAJOR / math.sqrt(1.0 - ECCENTRICITY_SQUARED * s * s)
+    normal = ellipsoid[0] / math.sqrt(1.0 - ellipsoid[1] * s * s)
     out = (normal + altitude) * c
-    return out * cos(longitude), out * sin(longitude), (normal * (1.0 - ECCENTRICITY_SQUARED) + altitude) * s
+    return out * cos(longitude), out * sin(longitude), (normal * (1.0 - ellipsoid[1]) + altitude) * s
 
 
 @device
@@ -42,35 +40,35 @@ def from_world(latitude, longitude):
     return quat_multiply(w, x, y, z, 0.0, half, half, 0.0)
 
 
-@kernel("F2 (f8 f8 f8) I F2w")
-def to_rigid_bodies(read, origin, rows, out):
+@kernel("F2 (f8 f8 f8) (f8 f8) f8 F2w")
+def to_rigid_bodies(read, origin, ellipsoid, foot, out):
     """Write the states of some rigid bodies.
 
     Args:
         read: Latitude, longitude [rad], altitude [ft], roll, pitch, yaw [rad], velocity north, east, down [ft/s], angular velocity
             forward, right, down [rad/s], (m, 12).
         origin: Latitude, longitude [rad] and altitude [m] of the world frame.
-        rows: Their rows, (m,).
-        out: Position, velocity, quaternion, angular velocity in the body frame, world frame, SI, (13, n); written.
+        ellipsoid: Semi-major axis [m] and squared eccentricity of the Earth.
+        foot: [m].
+        out: Position, velocity, quaternion, angular velocity in the body frame, world frame, SI, (13, m); written.
     """
-    ox, oy, oz = earth_centred(origin[0], origin[1], origin[2])
+    ox, oy, oz = earth_centred(origin[0], origin[1], origin[2], ellipsoid)
     w, x, y, z = from_world(origin[0], origin[1])
-    for k in range(rows.shape[0]):
-        row = rows[k]
-        latitude, longitude = read[k, 0], read[k, 1]
-        px, py, pz = earth_centred(latitude, longitude, FOOT * read[k, 2])
+    for row in range(read.shape[0]):
+        latitude, longitude = read[row, 0], read[row, 1]
+        px, py, pz = earth_centred(latitude, longitude, foot * read[row, 2], ellipsoid)
         out[0, row], out[1, row], out[2, row] = quat_rotate_inverse(w, x, y, z, px - ox, py - oy, pz - oz)
         lw, lx, ly, lz = local_frame(latitude, longitude)
         lw, lx, ly, lz = quat_multiply(w, -x, -y, -z, lw, lx, ly, lz)
         out[3, row], out[4, row], out[5, row] = quat_rotate(
-            lw, lx, ly, lz, FOOT * read[k, 6], FOOT * read[k, 7], FOOT * read[k, 8]
+            lw, lx, ly, lz, foot * read[row, 6], foot * read[row, 7], foot * read[row, 8]
         )
-        s, c = turn(read[k, 5])
+        s, c = turn(read[row, 5])
         lw, lx, ly, lz = quat_multiply(lw, lx, ly, lz, c, 0.0, 0.0, s)
-        s, c = turn(read[k, 4])
+        s, c = turn(read[row, 4])
         lw, lx, ly, lz = quat_multiply(lw, lx, ly, lz, c, 0.0, s, 0.0)
-        s, c = turn(read[k, 3])
+        s, c = turn(read[row, 3])
         lw, lx, ly, lz = quat_multiply(lw, lx, ly, lz, c, s, 0.0, 0.0)
         # From axes forward, right, down to forward, left, up: half a turn about the first.
         out[6, row], out[7, row], out[8, row], out[9, row] = -lx, lw, lz, -ly
-        out[10, row], out[11, row], out[12, row] = read[k, 9], -read[k, 10], -read[k, 11]
+        out[10, row], out[11, row], out[12, row] = read[row, 9], -read[row, 10], -read[row, 11]

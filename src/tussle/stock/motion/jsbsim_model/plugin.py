@@ -9,6 +9,7 @@ import numpy as np
 
 from tussle.api import Handle, HistoricAttributes, Input, MotionBody, Param, RigidBodyModel
 from tussle.errors import ParameterError, listed, nearest_name
+from tussle.geodesy import ECCENTRICITY_SQUARED, SEMI_MAJOR
 from tussle.numeric.quaternion import (
     quat_conjugate,
     quat_multiply,
@@ -19,7 +20,7 @@ from tussle.numeric.quaternion import (
 )
 from tussle.stock.motion.jsbsim_model import kernels
 from tussle.stock.motion.jsbsim_model.earth import FORWARD_RIGHT_DOWN, above_sea_level, to_world
-from tussle.stock.motion.jsbsim_model.flight import THROTTLES, TRIMS, Aircraft, Flight
+from tussle.stock.motion.jsbsim_model.flight import THROTTLES, TRIMS, Aircraft, JSBSimFlight
 from tussle.stock.motion.jsbsim_model.units import FOOT, KNOT
 
 MIRRORED = np.array([[1.0], [-1.0], [-1.0]])
@@ -72,7 +73,7 @@ class JSBSimAircraft(RigidBodyModel):
     flightgear_protocol = Param("UDP", choices=["UDP", "TCP"], doc="Protocol.")
     flight = Handle(doc="The aircraft in JSBSim.")
 
-    def open_one(self, row: Any) -> Flight:
+    def open_one(self, row: Any) -> JSBSimFlight:
         """Load the aircraft.
 
         Raises:
@@ -86,13 +87,13 @@ class JSBSimAircraft(RigidBodyModel):
             own["jsbsim_root"], own["aircraft"], own["script_name"], own["trim"],
             flightgear if own["flightgear_output_enable"] else None, self.commanded, self.needed_properties,
         )  # fmt: skip
-        return Flight(loaded, row.dt)
+        return JSBSimFlight(loaded, row.dt)
 
-    def save_one(self, flight: Flight) -> Flight:
+    def save_one(self, flight: JSBSimFlight) -> JSBSimFlight:
         """Return the flight, which is saved as what was done to it."""
         return flight
 
-    def load_one(self, row: Any, flight: Flight) -> Flight:
+    def load_one(self, row: Any, flight: JSBSimFlight) -> JSBSimFlight:
         """Return the flight, which was flown again when it was read."""
         return flight
 
@@ -137,17 +138,17 @@ class JSBSimAircraft(RigidBodyModel):
         self.read(flown)
 
     def commands(self, u: np.ndarray) -> np.ndarray:
-        """Return the values of the properties `commanded`, (m, n), from the inputs, (k, n)."""
-        raise NotImplementedError
+        """Return the values of the properties `commanded`, (m, n), from the inputs, (k, n); by default these."""
+        return u
 
     def read(self, rows: np.ndarray) -> None:
         """Set the state of some rows from JSBSim."""
         if not len(rows):
             return
         origin, read = self.flight[rows[0]].origin, np.array([self.flight[row].state() for row in rows])
-        kernels.to_rigid_bodies(
-            read, (origin.latitude, origin.longitude, origin.altitude), rows, self.rigid_body
-        )
+        states, place = np.empty((13, len(rows))), (origin.latitude, origin.longitude, origin.altitude)
+        kernels.to_rigid_bodies(read, place, (SEMI_MAJOR, ECCENTRICITY_SQUARED), FOOT, states)
+        self.rigid_body[:, rows] = states
 
 
 class JSBSimControl(JSBSimAircraft):
