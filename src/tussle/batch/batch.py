@@ -151,6 +151,8 @@ class Batch:
         return settings_of(point, self.variables, is_argument=callable(self.source))
 
     def _ended(self, mission: Mission) -> Mission:
+        compat = self._options.get("compat")  # a mission made in Python does not have it yet
+        mission = mission if compat in (None, mission.compat) else mission.replace(compat=compat)
         return mission.ending_by_time() if self._ends_by_time else mission
 
     # -- runs -----------------------------------------------------------------------------------------------------------------

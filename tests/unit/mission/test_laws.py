@@ -9,6 +9,7 @@ import pytest
 
 import tussle.stock as stock
 from tussle import Block, Mission, Simulation, historic
+from tussle.batch import Batch
 from tussle.errors import MissionError
 from tussle.mission import Catalogue, read_mission, to_python, to_xml
 
@@ -69,6 +70,14 @@ def test_without_compat_nothing_historic_is_loaded(file):
     ]
     assert printed[0].stdout.split() == []
     assert "tussle.historic.motion.simple_aircraft" in printed[1].stdout.split()
+
+
+def test_batches_of_files_and_of_missions_made_in_python(file):
+    for source in (file, read_mission(file).mission):
+        batch = Batch(source, runs=1, compat="scrimmage")
+        assert type(batch.mission.blocks[0].motion) is historic.load("SimpleAircraft")
+        assert batch.mission.compat == "scrimmage"
+        assert batch.fingerprint != Batch(source, runs=1).fingerprint
 
 
 def test_own_classes_are_kept():
