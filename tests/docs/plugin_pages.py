@@ -38,7 +38,7 @@ PARTS: dict[str, type | tuple[type, ...]] = {
     "Memory": (State, EntityRef, Handle),
 }
 """Kinds of declarations, by the title under which they stand."""
-BESIDE = re.compile(r"\$\{folder\}/([\w.]+)")
+BESIDE = re.compile(r"\$\{folder\}/(\w[\w.]*)\"")
 """File that an example reads."""
 
 
