@@ -13,6 +13,7 @@ from tussle.api.plugin import GRADES
 from tussle.columns import Handle
 from tussle.engine import access
 from tussle.engine.arrivals import reset, spawn_due
+from tussle.engine.reseed import renew_keys
 from tussle.engine.result import WorldResult
 from tussle.engine.schedule import Call, compose
 from tussle.engine.snapshot import Snapshot, restore, snapshot, state_hash
@@ -140,6 +141,7 @@ class Simulation:
     def _step(self) -> None:
         state = self.state
         try:
+            renew_keys(state)
             if state.births.has_rates or state.world_view.births:
                 spawn_due(state)
             if self.observers and not self.events.is_replaying:
