@@ -91,6 +91,8 @@ class Simulation:
         if not seeds:
             raise MissionError("seeds is empty; it takes one or more numbers")
         _check_seeds(seeds)
+        if mission.reseed is not None and mission.reseed_time is None:
+            raise MissionError(f"mission: reseed = {mission.reseed!r} needs a reseed_time")
         if on_error not in (None, "raise", "record"):
             raise ParameterError(f"on_error = {on_error!r} is not allowed; it is 'raise' or 'record'")
         for plugin in [*mission.world_plugins, *(p for b in mission.blocks for p in b.plugins)]:

@@ -301,8 +301,6 @@ class Mission:
             raise MissionError(
                 f"mission: end = {self.end!r} with dt = {self.dt!r} is not allowed; the number of steps must be finite"
             )
-        if self.reseed is not None and self.reseed_time is None:
-            raise MissionError(f"mission: reseed = {self.reseed!r} needs a reseed_time")
         _set(self, "end_conditions", end_conditions(self.end_conditions, "mission: end_conditions"))
         for name, kind in (("interactions", Interaction), ("metrics", Metric), ("networks", Network)):
             _set(self, name, _plugins(f"mission: {name}", getattr(self, name), kind))

@@ -7,6 +7,7 @@ from small_worlds import block, mission
 
 from tussle import Simulation
 from tussle.api import Autonomy, Interaction, Output, State
+from tussle.batch import Batch, InProcess
 from tussle.errors import MissionError
 from tussle.mission import read_mission, to_python, to_xml
 
@@ -121,4 +122,7 @@ def test_bad_values_name_their_place(tmp_path, attributes, error):
 
 def test_a_second_seed_needs_a_time():
     with pytest.raises(MissionError, match=r"reseed = 7 needs a reseed_time"):
-        mission(reseed=7)
+        Simulation(mission(reseed=7))
+    points = Batch(mission(), vary={"run.reseed": [7, 8], "run.reseed_time": [0.5]}, runs=1)
+    results = points.play(executor=InProcess())
+    assert results.runs.column("end").to_pylist() == ["time", "time"]
