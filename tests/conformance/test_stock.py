@@ -19,6 +19,8 @@ COMPANIONS = {
     "WaypointDispatcher": ["WaypointGenerator"],
     "MoveToGoalMS": ["WaypointDispatcher"],
     "GoToWaypoint": ["WaypointDispatcher"],
+    "Convoy": ["Escort"],
+    "Escort": ["Convoy"],
     # Those that are flown by a controller, which works between the substeps.
     "SimpleAircraft": ["SimpleAircraftControllerPID"],
     "Unicycle": ["UnicyclePID"],

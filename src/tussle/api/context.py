@@ -28,6 +28,7 @@ class Context:
     Attributes:
         clock: Time of each world.
         seeds: Seed of each world, (n_worlds,), uint64.
+        keys: Random key of each world: its seed, or the one with which draws go on, (n_worlds,), uint64.
         block_names: Names of the entity blocks; the body column `block` is an index into them.
         scene: Origin, ground, boundaries and bases.
         teams: Team numbers of the mission, ascending.
@@ -51,15 +52,17 @@ class Context:
     topic: Callable[..., Any] = field(init=False)
     threads: int = 1
     draw: Draw = field(default_factory=Draw)
+    keys: np.ndarray = field(init=False)
     fail: Callable[[int, PluginError], None] = field(init=False)
     _pool: ThreadPoolExecutor | None = None
 
     def __post_init__(self) -> None:
+        self.keys = self.seeds.copy()
         self.block_keys = np.array([stream_key("block", name) for name in self.block_names], np.uint64)
 
     def row_seeds(self, world: np.ndarray, block: np.ndarray) -> np.ndarray:
-        """Random key of each row, (n,), uint64: the seed of its world combined with the name of its block."""
-        return np.asarray(self.seeds[world] ^ self.block_keys[block])
+        """Random key of each row, (n,), uint64: that of its world combined with the name of its block."""
+        return np.asarray(self.keys[world] ^ self.block_keys[block])
 
     def split(self, n: int, run: Callable[[int, int], Any], least: int = 64) -> None:
         """Call run(first, last) on consecutive parts of [0, n): in parallel if `threads` > 1 and n >= 2 * least, else in one call."""

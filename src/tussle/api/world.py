@@ -206,7 +206,7 @@ class WorldView(GroupView):
 
     def draw_lines(self, law: str, label: str, k: int) -> np.ndarray:
         clock, index = self.context.clock, np.zeros(self.n_worlds, np.int64)
-        return LAWS[law](self.context.seeds, self._stream(label), index, clock.step, 0, k)
+        return LAWS[law](self.context.keys, self._stream(label), index, clock.step, 0, k)
 
     def uniform_by(self, label: str, world: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
         """Uniform draws in [0, 1), (m,), keyed by (world, first, second) and not by position in the arrays."""
@@ -227,7 +227,7 @@ class WorldView(GroupView):
         second: np.ndarray,
         k: int,
     ) -> np.ndarray:
-        seeds = self.context.seeds[world] ^ (first.astype(np.uint64) * GOLDEN)
+        seeds = self.context.keys[world] ^ (first.astype(np.uint64) * GOLDEN)
         return law(seeds, self._stream(label), second, self.context.clock.step[world], 0, k)
 
     def call(self, service: str, *args: Any, **kwargs: Any) -> Any:

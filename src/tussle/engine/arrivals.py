@@ -34,6 +34,7 @@ def reset(
         state.overrides.set(params, numbers)
     if seeds is not None:
         state.context.seeds[numbers] = [s % 2**64 for s in seeds]
+    state.context.keys[chosen] = state.context.seeds[chosen]
     clock, view = state.context.clock, state.world_view
     clock.step[chosen] = 0
     state.running[chosen], state.failed[chosen] = True, False

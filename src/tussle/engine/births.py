@@ -75,7 +75,7 @@ class Births:
 
     def __init__(self, overrides: Overrides, seeds: np.ndarray, start: float) -> None:
         self.overrides = overrides
-        self.seeds = seeds
+        self.seeds = seeds  # keys of the context, which may change
         self.start = start
         n_blocks, n_worlds = len(overrides.mission.blocks), overrides.n_worlds
         self.keys = [np.uint64(stream_key("block", b.name)) for b in overrides.mission.blocks]

@@ -13,6 +13,7 @@ from tussle.api.plugin import GRADES
 from tussle.columns import Handle
 from tussle.engine import access
 from tussle.engine.arrivals import reset, spawn_due
+from tussle.engine.reseed import renew_keys
 from tussle.engine.result import WorldResult
 from tussle.engine.schedule import Call, compose
 from tussle.engine.snapshot import Snapshot, restore, snapshot, state_hash
@@ -90,6 +91,8 @@ class Simulation:
         if not seeds:
             raise MissionError("seeds is empty; it takes one or more numbers")
         _check_seeds(seeds)
+        if mission.reseed is not None and mission.reseed_time is None:
+            raise MissionError(f"mission: reseed = {mission.reseed!r} needs a reseed_time")
         if on_error not in (None, "raise", "record"):
             raise ParameterError(f"on_error = {on_error!r} is not allowed; it is 'raise' or 'record'")
         for plugin in [*mission.world_plugins, *(p for b in mission.blocks for p in b.plugins)]:
@@ -140,6 +143,7 @@ class Simulation:
     def _step(self) -> None:
         state = self.state
         try:
+            renew_keys(state)
             if state.births.has_rates or state.world_view.births:
                 spawn_due(state)
             if self.observers and not self.events.is_replaying:

@@ -101,7 +101,7 @@ class SimulationState:
         self.context = context
         self.overrides = Overrides(mission, n)
         self.overrides.set(params, np.arange(n))
-        given = self.overrides, keys, mission.start
+        given = self.overrides, context.keys, mission.start
         self.births = _births(mission, given) if start_from is None else RecordedBirths(*given, start_from)
         message_bus = self.message_bus = MessageBus([p.instance_name for p in mission.networks])
         context.topic, context.fail = message_bus.topic, self.record_failure

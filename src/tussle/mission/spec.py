@@ -260,6 +260,8 @@ class Mission:
         name: Title.
         compat: Laws by which it is played: "" for tussle's, "scrimmage" for SCRIMMAGE's where they differ: stock plugins are replaced by
             those of `tussle.historic`, with the same parameters.
+        reseed_time: From the first step at or after this time on [s], random numbers are drawn with another seed; None for never.
+        reseed: That seed, of all worlds; None for a seed that depends on that of the world.
         limits: Limits on the entities that a world may hold, and on the positions drawn for them. The blocks' own entities are
             always accepted; `Limits.large()` is for plugins that spawn very many more.
     """
@@ -277,6 +279,8 @@ class Mission:
     scene: Scene = field(default_factory=Scene)
     name: str = ""
     compat: str = ""
+    reseed_time: float | None = None
+    reseed: int | None = None
     limits: Limits = field(default=Limits(), repr=False)  # not part of the game, so not of its repr
 
     def __post_init__(self) -> None:
@@ -395,5 +399,7 @@ MISSION_VALUES = _declared(
     start={"unit": "s"},
     motion_multiplier={"ge": 1},
     update={"choices": UPDATES},
+    reseed_time={"unit": "s", "default": 0.0},
+    reseed={"ge": 0, "default": 0},
 )
 """Declarations of a mission's values; their paths begin with "run"."""

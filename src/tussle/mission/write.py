@@ -16,7 +16,7 @@ from tussle.mission.node import Node
 from tussle.mission.plugin_tags import RATED
 from tussle.mission.problems import Place
 from tussle.mission.spec import Block, Mission
-from tussle.mission.tags import BASE, ENTITY, RUN, WORLD, TagSpec
+from tussle.mission.tags import BASE, ENTITY, RUN, SEED_ATTRIBUTES, WORLD, TagSpec
 from tussle.scene import Base, Scene
 from tussle.texts import shown
 
@@ -72,8 +72,10 @@ def to_xml(mission: Mission, seed: int | None = None) -> str:
     if mission.update != RUN["update"].default:
         run["update"] = mission.update
     root.children = [_node("run", run), _node("end_condition", text=", ".join(mission.end_conditions))]
-    if seed is not None:
-        root.children.append(_node("seed", text=str(seed)))
+    again = {name: getattr(mission, name) for name in SEED_ATTRIBUTES}
+    again = {name: codecs.written(value) for name, value in again.items() if value is not None}
+    if seed is not None or again:
+        root.children.append(_node("seed", again, "" if seed is None else str(seed)))
     origin = mission.scene.origin
     for name in ("latitude", "longitude", "altitude"):
         root.children.append(_value(f"{name}_origin", getattr(origin, name), WORLD))

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from tussle.errors import MissionError, TussleError
+from tussle.errors import MissionError, ParameterError, TussleError
 from tussle.geodesy import Origin
 from tussle.mission import codecs
 from tussle.mission.catalogue import KINDS, Catalogue
@@ -159,7 +159,7 @@ class _WorldReader:
         nodes = list(root.find_all("entity"))
         self._count_tags(nodes)
         blocks = [entities.block(node, name) for node, name in zip(nodes, block_names(nodes), strict=True)]
-        conditions, seed = self._end_conditions(), self._seed()
+        conditions, seed, reseed = self._end_conditions(), self._seed(), self._reseed()
         self._settings()
         if entities.viewer:
             self.viewer["entities"] = entities.viewer
@@ -168,7 +168,7 @@ class _WorldReader:
         self._note_viewer_settings(plugins.viewer)
         problems.check()
         name = root.attributes.get("name", "").strip()
-        settings: dict[str, Any] = {**times, **world}
+        settings: dict[str, Any] = {**times, **world, **reseed}
         try:
             mission = Mission(
                 blocks=[block for block in blocks if block is not None],
@@ -269,17 +269,36 @@ class _WorldReader:
             self.problems.note(node.place, "<end_condition> is empty; the mission ends by time")
         return found or ("time",)
 
+    def _reseed(self) -> dict[str, Any]:
+        """Read the time from which another seed is used, and that seed."""
+        node = self._last("seed")
+        found: dict[str, Any] = {}
+        if node is None:
+            return found
+        for attribute, text in node.attributes.items():
+            if attribute not in SEED_ATTRIBUTES:
+                self.problems.unknown(
+                    node.where(attribute), "attribute of <seed>", attribute, SEED_ATTRIBUTES
+                )
+                continue
+            try:
+                found[attribute] = MISSION_VALUES[attribute].convert(text, f"seed@{attribute}")
+            except ParameterError as error:
+                self.problems.error(node.where(attribute), str(error))
+        if "reseed_time" in found and "reseed" not in node.attributes:
+            self.problems.note(
+                node.where("reseed_time"),
+                "without seed@reseed the second seed depends on the first, not on the clock",
+            )
+        if "reseed" in found and "reseed_time" not in found:
+            self.problems.note(node.where("reseed"), "seed@reseed is ignored without reseed_time")
+            del found["reseed"]
+        return found
+
     def _seed(self) -> int | None:
         node = self._last("seed")
         if node is None or not node.text:
             return None
-        for attribute in node.attributes:
-            if attribute in SEED_ATTRIBUTES:
-                self.problems.note(node.where(attribute), f"seed@{attribute} is ignored: a run has one seed")
-            else:
-                self.problems.unknown(
-                    node.where(attribute), "attribute of <seed>", attribute, SEED_ATTRIBUTES
-                )
         if SEED.fullmatch(node.text) is None or int(node.text) >= 2**64:
             text = f"seed {shown(node.text)} is not allowed; it takes a whole number from 0 to 2^64 - 1"
             self.problems.error(node.place, text)

@@ -15,7 +15,7 @@ from cli_process import COMMAND, environment
 from mcap.reader import make_reader
 from test_terminal import ESCAPE, seen
 
-from tussle import Recorder, Simulation
+from tussle import Recorder, Simulation, load_run
 from tussle.mission import read_mission
 
 SMALL = ("--size", "96x64", "--fps", "5", "--speed", "1")
@@ -175,3 +175,22 @@ def test_a_terminal_sees_how_far_it_is(played, folder):
         assert re.search(r"film \S.* \d+/181 pictures +\d+:\d\d left", bar)
         assert len(bar.rstrip()) <= 80
     assert "181 pictures, 3.0 s at 1 × real time" in ESCAPE.sub("", text)
+
+
+FLIGHT = """<runscript name="A flock"><run end="3" dt="0.1"/><seed>7</seed><entity><name>flock</name> <team_id>1</team_id>
+  <count>5</count> <variance_x>400</variance_x> <variance_y>400</variance_y>
+  AUTONOMY <motion_model max_speed="-1">SingleIntegrator</motion_model></entity></runscript>"""
+PLAYBACK = '<autonomy enable_playback="1" trajectory_filename="states.csv" remove_at_end="0">TrajectoryRecordPlayback</autonomy>'
+
+
+def test_a_run_that_plays_a_record_back_flies_as_the_recorded_one(tussle, folder):
+    runs = []
+    for name, autonomy in (("one", "<autonomy>Boids</autonomy>"), ("two", PLAYBACK)):
+        (folder / f"{name}.xml").write_text(FLIGHT.replace("AUTONOMY", autonomy))
+        tussle("run", f"{name}.xml", "--out", name)
+        runs.append(load_run(folder / name).trajectory.set_index(["id", "t"])[["x", "y", "z"]])
+        tussle("export", name, "--csv", "states.csv" if name == "one" else "again.csv")
+    one, two = runs
+    assert len(one) == len(two) > 5 * 25
+    assert abs(one - two).to_numpy().max() < 1e-9
+    assert (one.groupby("id").last() - one.groupby("id").first()).abs().to_numpy().max() > 10.0

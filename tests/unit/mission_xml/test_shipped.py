@@ -74,6 +74,39 @@ def test_the_games_on_regions_are_contested(name):
     assert sum(result.metrics["FlagCaptureMetrics"]["flags_taken"].values()) > 0
 
 
+def test_a_jammer_costs_a_convoy_vehicles():
+    """Without a jammer the escorts hear of all raiders in time; with one the convoy halts in its range, and raiders get through."""
+    mission = read_mission("convoy", {"end": "240"}, strict=True).mission
+    far = {"radio.jammer_range": [0.0] * 3 + [8000.0] * 3}
+    results = Simulation(mission, seeds=[1, 2, 3] * 2, params=far).run()
+    left = [[sum(r.alive[team] for r in half) for team in (1, 3)] for half in (results[:3], results[3:])]
+    (trucks, raiders), (jammed_trucks, jammed_raiders) = left
+    assert trucks >= jammed_trucks + 3
+    assert raiders + 5 <= jammed_raiders
+
+
+def test_searchers_who_bid_their_whole_way_find_all_first():
+    """Bids of the way to the area alone give most areas to one searcher."""
+    left = {}
+    for rule in ("path", "nearest"):
+        mission = read_mission("auction_search", {"rule": rule, "end": "180"}, strict=True).mission
+        left[rule] = Simulation(mission, seeds=1).run()[0].alive[2]
+    assert left["path"] == 0 < 3 < left["nearest"]
+
+
+def test_a_survey_has_a_best_speed():
+    """Slower finds less in the time, faster on the battery; energy over distance grows with the square of the speed."""
+    mission = read_mission(
+        "underwater_survey", {"end": "450", "energy": "200", "mines": "300"}, strict=True
+    ).mission
+    speeds = {f"{name}.GoTo.speed": [0.6, 1.0, 1.5] for name in ("south", "north")}
+    simulation = Simulation(mission, seeds=[3] * 3, params=speeds)
+    found = [300 - result.alive[2] for result in simulation.run()]
+    assert found[1] > 1.1 * max(found[0], found[2])
+    energy = simulation.read("south.UUV6DOFLinearEnergy.energy")[0][:, 0]
+    assert energy[0] > energy[1] > energy[2] == 0.0
+
+
 @pytest.mark.parametrize("name", GAMES)
 def test_the_games_are_those_built_in_python(name):
     loaded = read_mission(name, {"end": "20"}, strict=True)
@@ -86,9 +119,12 @@ def test_the_games_are_those_built_in_python(name):
     assert read.scores == built.scores
 
 
+OTHERS = ("convoy", "auction_search", "underwater_survey")
+
+
 def test_shipped_missions_have_titles_and_are_packaged():
     shipped = shipped_missions()
-    assert set(shipped) == {*GAMES, *ON_REGIONS}
+    assert set(shipped) == {*GAMES, *ON_REGIONS, *OTHERS}
     for path, title in shipped.values():
         assert title
         assert read_mission(path, strict=True).name == title

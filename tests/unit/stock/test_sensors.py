@@ -17,6 +17,7 @@ from tussle.stock import (
     GPS,
     Boundary,
     ContactBlobCamera,
+    ContactBlobCameraNoNoise,
     FieldOfView,
     LOSSensor,
     SimpleINS,
@@ -112,6 +113,14 @@ def boxes(*others, **values):
     camera = still("c", sensor=ContactBlobCamera(**{**SHARP, **values}))
     sim = after(Mission(blocks=[camera, *others]))
     return sim.read("c.ContactBlobCamera.blobs")[0][0, 0]
+
+
+def test_the_camera_without_noise_puts_boxes_on_true_centres():
+    sure = {"false_negative_probability": 0.0, "false_positive_probability": 0.0}
+    camera = still("c", sensor=ContactBlobCameraNoNoise(**sure))
+    sim = after(Mission(blocks=[camera, still("o", (60.0, 0.0, 0.0))]))
+    _, u, v, _, _ = sim.read("c.ContactBlobCameraNoNoise.blobs")[0][0, 0][:, 0]
+    assert (u, v) == pytest.approx((400.0, 300.0))
 
 
 def test_a_box_bounds_the_image_of_a_sphere():

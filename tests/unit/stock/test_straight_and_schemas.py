@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from small_worlds import Drift, block, mission
 
-from tussle import Simulation
+from tussle import Simulation, stock
 from tussle.api import Autonomy, Behavior, Children, Interaction, Output, Param, Publish, State
 from tussle.errors import PluginError
 from tussle.messages import Waypoint
@@ -49,6 +49,14 @@ def test_straight_holds_heading_altitude_and_speed():
         [10 + 1e6 * np.cos(np.radians(40)) * np.cos(np.pi / 6), 20 + 1e6 * np.cos(np.radians(40)) * 0.5, 30.0]
     )
     assert sim.read("a.Straight.goal")[0][0, 0] == pytest.approx(goal)
+
+
+def test_what_missions_call_follow_is_straight():
+    """There it holds the initial heading and altitude at 21 m/s, since its body is commented out."""
+    assert stock.load("follow") is Straight
+    sim = Simulation(mission(straight()))
+    sim.step()
+    assert wants(sim) == pytest.approx([np.pi / 6, 30.0, 21.0])
 
 
 def test_straight_flies_by_its_belief():

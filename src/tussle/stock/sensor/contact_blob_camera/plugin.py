@@ -140,3 +140,10 @@ def _turned(slope: np.ndarray, tangent: np.ndarray, beyond: float) -> np.ndarray
     """Tangent of the sum of two angles, given by their tangents; `beyond` where the sum reaches a right angle."""
     rest = 1.0 - slope * tangent
     return np.where(rest > 0.0, (slope + tangent) / np.where(rest > 0.0, rest, 1.0), beyond)
+
+
+class ContactBlobCameraNoNoise(ContactBlobCamera):
+    """ContactBlobCamera with exact centres of the boxes; it misses entities and has false positives as that one does."""
+
+    pos_noise_0 = Param((0.0, 0.0), fields=PAIR, doc="Error of u: mean and standard deviation [pixel].")
+    pos_noise_1 = Param((0.0, 0.0), fields=PAIR, doc="Error of v [pixel].")

@@ -1,0 +1,25 @@
+"""Another seed from a time on."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tussle.engine.state import SimulationState
+from tussle.rng import stream_key
+
+DERIVED = np.uint64(stream_key("reseed"))
+
+
+def renew_keys(state: SimulationState) -> None:
+    """Set the random keys of all worlds for the step that begins; they depend on its time only."""
+    mission, context = state.mission, state.context
+    if mission.reseed_time is None:
+        return
+    other = context.seeds ^ DERIVED if mission.reseed is None else np.uint64(mission.reseed)
+    is_due = context.clock.t >= mission.reseed_time - 1e-6 * mission.dt
+    keys = np.where(is_due, other, context.seeds)
+    if (keys != context.keys).any():
+        context.keys[:] = keys
+        for group in state.population.groups:
+            for view in group.views:
+                view.renew()

@@ -1,0 +1,5 @@
+"""AuctionSearch: shares out places to search by auctions."""
+
+from tussle.stock.autonomy.auction_search.plugin import AreaAward, AreaBid, AreaOffer, AuctionSearch
+
+__all__ = ["AreaAward", "AreaBid", "AreaOffer", "AuctionSearch"]

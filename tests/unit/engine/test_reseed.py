@@ -1,0 +1,128 @@
+"""Draws that go on with another seed from a time on."""
+
+from __future__ import annotations
+
+import pytest
+from small_worlds import block, mission
+
+from tussle import Simulation
+from tussle.api import Autonomy, Interaction, Output, State
+from tussle.batch import Batch, InProcess
+from tussle.errors import MissionError
+from tussle.mission import read_mission, to_python, to_xml
+
+
+class Draws(Autonomy):
+    """Keeps its draw of the step."""
+
+    grade = "portable"
+    drawn = State()
+    velocity = Output("velocity_x velocity_y velocity_z", unit="m/s")
+
+    def step(self, g):
+        self.drawn[:] = g.uniform("draw")
+
+
+class WorldDraws(Interaction):
+    """Keeps the draw of the world."""
+
+    grade = "portable"
+    drawn = State(per="world")
+
+    def step(self, w):
+        self.drawn[:] = w.uniform("draw")
+
+
+def played(seeds, **values):
+    """Draws of the entity and of the world, of each of ten steps; the first births are at the start, the last after 0.65 s."""
+    late = block(
+        "late",
+        count=3,
+        autonomy=Draws(),
+        variance=(100.0, 100.0, 0.0),
+        scatter_first=True,
+        rate=5.0,
+        slots=1,
+        first_birth=0.25,
+    )
+    game = mission(block(autonomy=Draws()), late, interactions=[WorldDraws()], **values)
+    sim, drawn = Simulation(game, seeds), []
+    saved = None
+    for k in range(10):
+        if k == 3:
+            saved = sim.snapshot()
+        sim.step()
+        drawn.append((sim.read("a.Draws.drawn")[0][:, 0].tolist(), sim.read("WorldDraws.drawn")[0].tolist()))
+    last = sim.read("late.pos")[0]
+    hashes = [result.state_hash for result in sim.run()]
+    sim.restore(saved)
+    assert [result.state_hash for result in sim.run()] == hashes
+    sim.reset(range(len(seeds)))
+    assert [result.state_hash for result in sim.run()] == hashes
+    return drawn, last, hashes
+
+
+def test_draws_go_on_with_the_other_seed_at_the_same_place():
+    """A draw depends on seed and step, so after the change they are those of a game that had that seed all along."""
+    values = {"reseed_time": 0.5, "reseed": 7}
+    drawn, last, hashes = played([1, 2], **values)
+    of_1_and_2, _, _ = played([1, 2])
+    of_7, last_7, _ = played([7, 7])
+    assert drawn[:5] == of_1_and_2[:5]
+    assert drawn[5:] == of_7[5:]
+    assert (last[:, 2] == last_7[:, 2]).all()  # born at 0.65 s
+    assert (last[:, 0] != last_7[:, 0]).any()  # born at 0.25 s
+    for seed, alone in zip([1, 2], hashes, strict=True):
+        assert played([seed], **values)[2] == [alone]
+        assert played([9, 8, seed], **values)[2][2] == alone
+
+
+def test_without_a_second_seed_worlds_still_differ():
+    drawn, _, _ = played([1, 2], reseed_time=0.5)
+    before, _, _ = played([1, 2])
+    assert drawn[:5] == before[:5]
+    assert all(new != old and new[0][0] != new[0][1] for new, old in zip(drawn[5:], before[5:], strict=True))
+
+
+FILE = '<runscript><run end="5" dt="0.1"/><seed{}>3</seed><entity><team_id>1</team_id></entity></runscript>'
+
+
+def read(tmp_path, attributes):
+    path = tmp_path / "game.xml"
+    path.write_text(FILE.format(attributes))
+    return read_mission(path)
+
+
+def test_mission_files_take_and_keep_it(tmp_path):
+    loaded = read(tmp_path, ' reseed_time="2" reseed="11"')
+    game = loaded.mission
+    assert (loaded.seed, game.reseed_time, game.reseed, loaded.notes) == (3, 2.0, 11, ())
+    path = tmp_path / "again.xml"
+    for seed in (3, None):
+        path.write_text(to_xml(game, seed))
+        again = read_mission(path)
+        assert (again.mission.reseed_time, again.mission.reseed, again.seed) == (2.0, 11, seed)
+    assert "reseed_time=2.0" in to_python(game)
+    loaded = read(tmp_path, ' reseed_time="2 min"')
+    assert (loaded.mission.reseed_time, loaded.mission.reseed) == (120.0, None)
+    assert "depends on the first" in str(loaded.notes[0])
+    loaded = read(tmp_path, ' reseed="4"')
+    assert loaded.mission.reseed is None
+    assert "ignored without reseed_time" in str(loaded.notes[0])
+
+
+@pytest.mark.parametrize(
+    ("attributes", "error"),
+    [(' reseed_time="soon"', r"game.xml:1: seed@reseed_time.*'soon'"), (' reseed_time="1" reseed="-4"', r"seed@reseed.*-4.*>= 0")],
+)  # fmt: skip
+def test_bad_values_name_their_place(tmp_path, attributes, error):
+    with pytest.raises(MissionError, match=error):
+        read(tmp_path, attributes)
+
+
+def test_a_second_seed_needs_a_time():
+    with pytest.raises(MissionError, match=r"reseed = 7 needs a reseed_time"):
+        Simulation(mission(reseed=7))
+    points = Batch(mission(), vary={"run.reseed": [7, 8], "run.reseed_time": [0.5]}, runs=1)
+    results = points.play(executor=InProcess())
+    assert results.runs.column("end").to_pylist() == ["time", "time"]
