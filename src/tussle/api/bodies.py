@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from tussle.api import kernels
+from tussle.api.casting import BodyTree
 from tussle.errors import listed, nearest_name
 from tussle.neighbors.index import Index, Split, padded
 
@@ -119,6 +120,7 @@ class Bodies:
         self._newest: CachedArrays | None = None
         self._by_place: dict[tuple[int, str], CachedArrays] = {}
         self._layout: tuple[np.ndarray, ...] | None = None
+        self._tree: tuple[int, BodyTree] | None = None
         self._read_only: BodyView | None = None
 
     def __getattr__(self, name: str) -> np.ndarray:
@@ -227,6 +229,12 @@ class Bodies:
             kept.version = self.version
         self._newest = kept
         return kept.columns[0]  # type: ignore[no-any-return]
+
+    def tree(self, boxes: np.ndarray) -> BodyTree:
+        """Tree over the current bodies, for rays; `boxes` as for `BodyTree`."""
+        if self._tree is None or self._tree[0] != self.version:
+            self._tree = self.version, BodyTree(self, boxes)
+        return self._tree[1]
 
     def _forget(self, key: Any) -> None:
         """Discard the index of a reach and the columns in its order."""

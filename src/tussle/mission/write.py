@@ -28,6 +28,7 @@ COMPONENTS = {
     "velocity": ("vx", "vy", "vz"),
     "variance": ("variance_x", "variance_y", "variance_z"),
     "half_width": ("half_width_x", "half_width_y", "half_width_z"),
+    "box": ("box_x", "box_y", "box_z"),
 }
 """Values of a block that are three tags each."""
 TAGS = {
