@@ -103,7 +103,7 @@ class Prism(Volume):
         return distance
 
     def triangles(self) -> np.ndarray:
-        found = []
+        found: list[tuple[tuple[float, ...], ...]] = []
         for i, (x, y) in enumerate(self.corners):
             u, v = self.corners[i - 1]
             a, b, c, d = (u, v, self.low), (x, y, self.low), (x, y, self.high), (u, v, self.high)
@@ -134,12 +134,16 @@ def _ears(corners: tuple[Corner, ...]) -> list[tuple[Corner, Corner, Corner]]:
         for i in range(len(left)):
             a, b, c = left[i - 1], left[i], left[(i + 1) % len(left)]
             if _turn(a, b, c) > 0.0 and not any(
-                _turn(a, b, p) >= 0.0 and _turn(b, c, p) >= 0.0 and _turn(c, a, p) >= 0.0 for p in left if p not in (a, b, c)
+                _turn(a, b, p) >= 0.0 and _turn(b, c, p) >= 0.0 and _turn(c, a, p) >= 0.0
+                for p in left
+                if p not in (a, b, c)
             ):
                 found.append((a, b, c))
                 break
         else:
-            i = min(range(len(left)), key=lambda k: abs(_turn(left[k - 1], left[k], left[(k + 1) % len(left)])))
+            i = min(
+                range(len(left)), key=lambda k: abs(_turn(left[k - 1], left[k], left[(k + 1) % len(left)]))
+            )
             # Corners on a line, or sides that cross: the flattest corner is dropped.
         del left[i]
     return [*found, (left[0], left[1], left[2])]

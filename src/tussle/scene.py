@@ -143,9 +143,19 @@ class Scene:
     def __getstate__(self) -> dict[str, Any]:
         return {name: value for name, value in self.__dict__.items() if name != "caster"}
 
-    def with_walls(self, walls: tuple[Volume, ...]) -> Scene:
-        """The scene with further walls."""
-        return replace(self, walls=(*self.walls, *walls)) if walls else self
+    def with_parts(self, walls: tuple[Volume, ...], terrain: HeightField | None) -> Scene:
+        """The scene with further walls, and with a terrain.
+
+        Raises:
+            MissionError: It has a terrain already.
+        """
+        if terrain is not None and self.terrain is not None:
+            raise MissionError(
+                "the scene has two terrains, of <terrain> or of plugins such as TerrainGenerator; it takes one"
+            )
+        if not walls and terrain is None:
+            return self
+        return replace(self, walls=(*self.walls, *walls), terrain=terrain or self.terrain)
 
     def boundary(self, name: int | str) -> Volume:
         """The region with this id or name.

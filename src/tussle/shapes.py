@@ -200,10 +200,14 @@ class Cuboid(Convex):
         return way
 
     def triangles(self) -> np.ndarray:
-        halves = [0.5 * length * np.array(axis) for length, axis in zip(self.lengths, _axes(self.rpy), strict=True)]
+        halves = [
+            0.5 * length * np.array(axis) for length, axis in zip(self.lengths, _axes(self.rpy), strict=True)
+        ]
         # Each corner is computed once, so that faces meet without gaps: corner 4 i + 2 j + k is at the ends i, j, k of the axes.
         signs = list(itertools.product((-1.0, 1.0), repeat=3))
-        corners = np.array([np.array(self.center) + i * halves[0] + j * halves[1] + k * halves[2] for i, j, k in signs])
+        corners = np.array(
+            [np.array(self.center) + i * halves[0] + j * halves[1] + k * halves[2] for i, j, k in signs]
+        )
         squares = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
         return corners[[three for a, b, c, d in squares for three in ((a, b, c), (a, c, d))]]
 

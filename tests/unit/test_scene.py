@@ -314,7 +314,10 @@ def test_scene_answers_for_its_parts() -> None:
 
 
 def test_empty_scene_stops_no_ray() -> None:
-    assert Scene().cast(np.zeros((3, 2)), columns((0, 0, -1), (1, 0, 0))).distance.tolist() == [math.inf, math.inf]
+    assert Scene().cast(np.zeros((3, 2)), columns((0, 0, -1), (1, 0, 0))).distance.tolist() == [
+        math.inf,
+        math.inf,
+    ]
 
 
 def test_unknown_boundary_names_the_nearest() -> None:

@@ -37,9 +37,10 @@ class BodyTree:
     def normal(self, rows: np.ndarray, points: np.ndarray) -> np.ndarray:
         """Outward unit normals of bodies at points of their surfaces, (3, m)."""
         items = self.items[rows].T
-        x, y, z = offset = points - items[:3]
+        offset = points - items[:3]
+        x, y, z = offset
         length = np.sqrt(x * x + y * y + z * z)
-        normal = offset / np.where(length > 0.0, length, 1.0)
+        normal: np.ndarray = offset / np.where(length > 0.0, length, 1.0)
         boxed = np.flatnonzero(items[3] == 0.0)
         axes = items[7:, boxed].reshape(3, 3, -1)
         x, y, z = offset[:, boxed]
@@ -51,7 +52,12 @@ class BodyTree:
 
 
 def cast(
-    context: Context, bodies: Bodies, rays: tuple[Any, Any, Any], world: np.ndarray, own: np.ndarray, entities: bool
+    context: Context,
+    bodies: Bodies,
+    rays: tuple[Any, Any, Any],
+    world: np.ndarray,
+    own: np.ndarray,
+    entities: bool,
 ) -> Hits:
     """The first hits of rays.
 
@@ -70,7 +76,9 @@ def cast(
     start, way, distance, code = new_rays(*rays)
     n = start.shape[1]
     if world.shape != (n,):
-        raise ParameterError(f"there are {n} rays and {len(world)} rows or worlds; their numbers must be equal")
+        raise ParameterError(
+            f"there are {n} rays and {len(world)} rows or worlds; their numbers must be equal"
+        )
     wrong = world[(world < 0) | (world >= bodies.n_worlds)]
     if len(wrong):
         raise ParameterError(f"world {wrong[0]} is not allowed; there are worlds 0 to {bodies.n_worlds - 1}")

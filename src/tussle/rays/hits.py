@@ -71,11 +71,15 @@ def checked_numbers(name: str, values: object, n: int) -> np.ndarray:
     if numbers.shape not in ((), (n,)):
         raise ParameterError(f"{name} has shape {numbers.shape}; it takes one number or ({n},)")
     if not (numbers >= 0.0).all():
-        raise ParameterError(f"{name} has the value {numbers[~(numbers >= 0.0)].flat[0]!r}; it takes lengths >= 0 m")
+        raise ParameterError(
+            f"{name} has the value {numbers[~(numbers >= 0.0)].flat[0]!r}; it takes lengths >= 0 m"
+        )
     return np.ascontiguousarray(np.broadcast_to(numbers, n))
 
 
-def new_rays(origins: object, directions: object, max_range: object) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def new_rays(
+    origins: object, directions: object, max_range: object
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Origins [m] and unit directions, (3, n), range as the distance so far [m], and codes without a hit, (n,).
 
     Raises:
@@ -83,7 +87,9 @@ def new_rays(origins: object, directions: object, max_range: object) -> tuple[np
     """
     start, way = checked_vectors("origins", origins), checked_vectors("directions", directions)
     if start.shape != way.shape:
-        raise ParameterError(f"there are {start.shape[1]} origins and {way.shape[1]} directions; their numbers must be equal")
+        raise ParameterError(
+            f"there are {start.shape[1]} origins and {way.shape[1]} directions; their numbers must be equal"
+        )
     n = start.shape[1]
     limit = np.minimum(checked_numbers("max_range", max_range, n), FARTHEST_RAY)
     way = unit(way)

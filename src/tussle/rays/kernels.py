@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from tussle.neighbors.lane_count import LANES
-from tussle.neighbors.lanes import below, bits, choose, lane_of, lanes_sqrt, load_some, splat, store_some
+from tussle.neighbors.lanes import below, bits, choose, lanes_sqrt, load_some, splat, store_some
 from tussle.numeric.kernel import device, kernel
 
 LEAF = 4
@@ -75,7 +75,11 @@ def split_place(boxes, order, start, end, bins, cuts):
         for a in range(3):
             grown[a], grown[3 + a] = min(grown[a], bins[b, a]), max(grown[3 + a], bins[b, 3 + a])
         count += bins[b, 6]
-        cuts[b] = count * area(grown[0], grown[1], grown[2], grown[3], grown[4], grown[5]) if count > 0.0 else np.inf
+        cuts[b] = (
+            count * area(grown[0], grown[1], grown[2], grown[3], grown[4], grown[5])
+            if count > 0.0
+            else np.inf
+        )
     grown[0:3], grown[3:6] = np.inf, -np.inf
     count, best, cut = 0.0, np.inf, 0
     for b in range(N_BINS - 1):
@@ -103,8 +107,8 @@ def build_tree(boxes, world_start, order, tree):
     """Build one tree for each world; returns the number of nodes.
 
     boxes: lower and upper corner of each item, (n, 6). world_start (n_worlds + 1,): the items of world w are order[world_start[w]] to
-    order[world_start[w + 1] - 1]; they are rearranged within it. Written: bounds (2 n, 6); links (2 n, 2): first of two adjacent children and
-    -1 - axis, or the first place and the number of the items of a leaf; roots (n_worlds,), -1 for a world without items.
+    order[world_start[w + 1] - 1]; they are rearranged within it. Written: bounds (2 n, 6); links (2 n, 2): first of two adjacent
+    children and -1 - axis, or the first place and the number of the items of a leaf; roots (n_worlds,), -1 for a world without items.
     """
     bounds, links, roots = tree
     bins, cuts = np.empty((N_BINS, 7)), np.empty(N_BINS)
@@ -134,9 +138,19 @@ def build_tree(boxes, world_start, order, tree):
             if level < DEEP:
                 middle, axis = split_place(boxes, order, start, end, bins, cuts)
             links[node, 0], links[node, 1] = n_nodes, -1 - axis
-            stack[depth, 0], stack[depth, 1], stack[depth, 2], stack[depth, 3] = n_nodes, start, middle, level + 1
+            stack[depth, 0], stack[depth, 1], stack[depth, 2], stack[depth, 3] = (
+                n_nodes,
+                start,
+                middle,
+                level + 1,
+            )
             depth += 1
-            stack[depth, 0], stack[depth, 1], stack[depth, 2], stack[depth, 3] = n_nodes + 1, middle, end, level + 1
+            stack[depth, 0], stack[depth, 1], stack[depth, 2], stack[depth, 3] = (
+                n_nodes + 1,
+                middle,
+                end,
+                level + 1,
+            )
             depth += 1
             n_nodes += 2
     return n_nodes
@@ -229,8 +243,8 @@ def cast(tree, items, rays, found, part):
     """Find the first item that each ray meets, if it is nearer than what has been found.
 
     tree: bounds, links, roots, and item code of each place. items: numbers of each place, (n, TRIANGLE) or (n, BODY). rays: origins [m] and
-    unit directions, (3, m), world (m,), and code of the item that a ray does not meet, (m,). Read and written: distance [m] and code of the hit, (m,);
-    codes are counted from `base`, and of two hits at the same distance the lower code counts. part: first and last ray.
+    unit directions, (3, m), world (m,), and code of the item that a ray does not meet, (m,). Read and written: distance [m] and code of
+    the hit, (m,); codes are counted from `base`, and of two hits at the same distance the lower code counts. part: first and last ray.
     """
     bounds, links, roots, codes = tree
     origin, direction, world, own = rays
@@ -244,8 +258,16 @@ def cast(tree, items, rays, found, part):
         while count < LANES and i + count < last and world[i + count] == world[i]:
             count += 1
         node = roots[world[i] if roots.shape[0] > 1 else 0]
-        x, y, z = load_some(origin[0], i, count), load_some(origin[1], i, count), load_some(origin[2], i, count)
-        dx, dy, dz = load_some(direction[0], i, count), load_some(direction[1], i, count), load_some(direction[2], i, count)
+        x, y, z = (
+            load_some(origin[0], i, count),
+            load_some(origin[1], i, count),
+            load_some(origin[2], i, count),
+        )
+        dx, dy, dz = (
+            load_some(direction[0], i, count),
+            load_some(direction[1], i, count),
+            load_some(direction[2], i, count),
+        )
         mine = load_some(own, i, count) + base
         ray, way = (x, y, z, inverse(dx), inverse(dy), inverse(dz)), (dx, dy, dz)
         best = choose(below(count), load_some(distance, i, count), splat(-1.0))
@@ -258,7 +280,13 @@ def cast(tree, items, rays, found, part):
             depth -= 1
             node = stack[depth]
             near, far = interval(
-                bounds[node, 0], bounds[node, 1], bounds[node, 2], bounds[node, 3], bounds[node, 4], bounds[node, 5], ray
+                bounds[node, 0],
+                bounds[node, 1],
+                bounds[node, 2],
+                bounds[node, 3],
+                bounds[node, 4],
+                bounds[node, 5],
+                ray,
             )
             near, far = greater(near * (1.0 - SLACK), splat(0.0)), far * (1.0 + SLACK)
             inside = (near <= far) & (near <= best)
@@ -291,8 +319,8 @@ def cast(tree, items, rays, found, part):
 def place_bodies(bodies, boxed, out):
     """Set the items and their boxes of all bodies.
 
-    bodies: positions [m] (3, n), attitudes (4, n), radii [m] (n,). boxed: block of each body (n,), and lengths of the boxes of each block [m],
-    (n_blocks, 3), 0 for spheres. Written: items (n, BODY) and boxes (n, 6).
+    bodies: positions [m] (3, n), attitudes (4, n), radii [m] (n,). boxed: block of each body (n,), and lengths of the boxes of each
+    block [m], (n_blocks, 3), 0 for spheres. Written: items (n, BODY) and boxes (n, 6).
     """
     pos, quat, radius = bodies
     block, lengths = boxed
@@ -302,9 +330,21 @@ def place_bodies(bodies, boxed, out):
         is_box = lengths[b, 0] > 0.0
         items[row, 3] = 0.0 if is_box else radius[row]
         w, x, y, z = quat[0, row], quat[1, row], quat[2, row], quat[3, row]
-        items[row, 7], items[row, 8], items[row, 9] = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)
-        items[row, 10], items[row, 11], items[row, 12] = 2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x)
-        items[row, 13], items[row, 14], items[row, 15] = 2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)
+        items[row, 7], items[row, 8], items[row, 9] = (
+            1.0 - 2.0 * (y * y + z * z),
+            2.0 * (x * y + w * z),
+            2.0 * (x * z - w * y),
+        )
+        items[row, 10], items[row, 11], items[row, 12] = (
+            2.0 * (x * y - w * z),
+            1.0 - 2.0 * (x * x + z * z),
+            2.0 * (y * z + w * x),
+        )
+        items[row, 13], items[row, 14], items[row, 15] = (
+            2.0 * (x * z + w * y),
+            2.0 * (y * z - w * x),
+            1.0 - 2.0 * (x * x + y * y),
+        )
         for a in range(3):
             items[row, a] = pos[a, row]
             items[row, 4 + a] = 0.5 * lengths[b, a]
@@ -328,7 +368,7 @@ def clipped(start, end, place, rate, low, high):
 
 @device
 def height_plane(height, i, j, is_above):
-    """Height at corner (i, j) [m], and its change along the columns and the rows of the cell, in the triangle above or below the diagonal."""
+    """Height at corner (i, j) [m], and its change along columns and rows, in the triangle above or below the diagonal."""
     h, far = height[j, i], height[j + 1, i + 1]
     if is_above:
         return h, far - height[j + 1, i], height[j + 1, i] - h
@@ -359,18 +399,24 @@ def cast_field(height, grid, rays, found, part):
         start, end = clipped(start, end, z, dz, lowest - margin, highest + margin)
         if not start <= end or not (du != 0.0 or dv != 0.0 or dz != 0.0):
             continue
-        i = min(max(int(math.floor(u + start * du)), 0), nx - 2)
-        j = min(max(int(math.floor(v + start * dv)), 0), ny - 2)
+        i = min(max(math.floor(u + start * du), 0), nx - 2)
+        j = min(max(math.floor(v + start * dv), 0), ny - 2)
         above_start = np.nan
         while True:
             leave_u = ((i + (1.0 if du > 0.0 else 0.0)) - u) / du if du != 0.0 else np.inf
             leave_v = ((j + (1.0 if dv > 0.0 else 0.0)) - v) / dv if dv != 0.0 else np.inf
             stop = min(max(min(leave_u, leave_v), start), end)
+            least = min(height[j, i], height[j, i + 1], height[j + 1, i], height[j + 1, i + 1])
+            most = max(height[j, i], height[j, i + 1], height[j + 1, i], height[j + 1, i + 1])
+            z_start, z_stop = z + start * dz, z + stop * dz
+            is_over, is_under = min(z_start, z_stop) > most, max(z_start, z_stop) < least
             # The diagonal is where u - i = v - j; of the two triangles, the first is the one in which the interval begins.
             across = du - dv
             offset = (u - i) - (v - j)
             middle = -offset / across if across != 0.0 else -1.0
             parts = 2 if start < middle < stop else 1
+            if is_over or is_under:  # of the whole cell
+                parts, start, above_start = 0, stop, 1.0 if is_over else -1.0
             for k in range(parts):
                 to = middle if parts == 2 and k == 0 else stop
                 half = 0.5 * (start + to) if to < np.inf else start
@@ -448,7 +494,7 @@ def touch(tree, items, points, radius, touches):
             away = 0.0
             for a in range(3):
                 p = points[a, i]
-                out = max(max(bounds[node, a] - p, p - bounds[node, 3 + a]), 0.0)
+                out = max(bounds[node, a] - p, p - bounds[node, 3 + a], 0.0)
                 away += out * out
             if not away <= square:
                 continue
@@ -474,7 +520,9 @@ def touch_field(height, grid, points, radius, touches):
     for n in range(touches.shape[0]):
         x, y, z, r = points[0, n], points[1, n], points[2, n], radius[n]
         u, v, reach_u, reach_v = (x - west) / wide, (y - south) / deep, r / wide, r / deep
-        is_near = u + reach_u >= 0.0 and u - reach_u <= nx - 1.0 and v + reach_v >= 0.0 and v - reach_v <= ny - 1.0
+        is_near = (
+            u + reach_u >= 0.0 and u - reach_u <= nx - 1.0 and v + reach_v >= 0.0 and v - reach_v <= ny - 1.0
+        )
         if touches[n] or not (is_near and z - r <= highest):
             continue
         i0, i1 = int(max(math.floor(u - reach_u), 0.0)), int(min(math.floor(u + reach_u), nx - 2.0))

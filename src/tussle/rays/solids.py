@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from tussle.errors import ParameterError
 from tussle.rays import kernels
 from tussle.rays.hits import Hits, checked_numbers, checked_vectors, new_rays
 from tussle.rays.surfaces import HeightField, TriangleMesh
@@ -51,7 +50,9 @@ class Solids:
         self.n_codes = self.n_triangles + len(self.parts)
         low, high = triangles.min(axis=1), triangles.max(axis=1)
         starts = np.array([0, self.n_triangles])
-        bounds, links, roots, self._order = grow(np.concatenate([low, high], axis=1), starts, np.arange(self.n_triangles))
+        bounds, links, roots, self._order = grow(
+            np.concatenate([low, high], axis=1), starts, np.arange(self.n_triangles)
+        )
         self._tree = bounds, links, roots
         self._normals = _normals(triangles)
         numbers = np.concatenate([triangles.reshape(-1, 9), self._normals], axis=1)
@@ -60,19 +61,34 @@ class Solids:
         self.top = max([0.0, float(triangles[:, :, 2].max(initial=0.0)), *tops])
 
     def first_hits(
-        self, start: np.ndarray, way: np.ndarray, distance: np.ndarray, code: np.ndarray, split: Split = in_one_call
+        self,
+        start: np.ndarray,
+        way: np.ndarray,
+        distance: np.ndarray,
+        code: np.ndarray,
+        split: Split = in_one_call,
     ) -> None:
         """Update distance [m] and code, (n,), of rays with unit directions. `split` calls a function for parts of the rows, in threads."""
         n = start.shape[1]
         if self.n_triangles:
             rays = start, way, np.zeros(n, np.int64), np.full(n, -1.0)
-            split(n, lambda *part: kernels.cast((*self._tree, self._order), self._items, rays, (distance, code, 0.0), part))
+            split(
+                n,
+                lambda *part: kernels.cast(
+                    (*self._tree, self._order), self._items, rays, (distance, code, 0.0), part
+                ),
+            )
         for i in self._rest:
             solid, own = self.parts[i], float(self.n_triangles + i)
             if isinstance(solid, HeightField):
                 height, grid = solid.height, solid.grid
-                split(n, lambda *part, h=height, g=grid, c=own: kernels.cast_field(h, g, (start, way), (distance, code, c), part))
-            else:
+                split(
+                    n,
+                    lambda *part, h=height, g=grid, c=own: kernels.cast_field(
+                        h, g, (start, way), (distance, code, c), part
+                    ),
+                )
+            elif isinstance(solid, Volume):
                 found = solid.ray(start, way)
                 is_first = (found < distance) | ((found == distance) & (own < code))
                 distance[is_first], code[is_first] = found[is_first], own
@@ -87,7 +103,15 @@ class Solids:
         """Hits on the static part; those of other codes count as of nobody."""
         is_hit = code < np.inf
         solid = self.solid_of(code)
-        return Hits(np.where(is_hit, distance, np.inf), np.zeros(len(code), np.int64), solid, start, way, self.normal, code)
+        return Hits(
+            np.where(is_hit, distance, np.inf),
+            np.zeros(len(code), np.int64),
+            solid,
+            start,
+            way,
+            self.normal,
+            code,
+        )
 
     def solid_of(self, code: np.ndarray) -> np.ndarray:
         """Number of the part with each code, (n,); -1 for others."""

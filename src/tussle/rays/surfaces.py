@@ -27,7 +27,7 @@ class HeightField:
         west: x of the first column [m].
         south: y of the first row [m].
         cell: Distance between columns and between rows [m].
-        source: File that it was read from, as a mission names it; "" for none.
+        tag: Text and attributes of the mission's tag that it was read from; () for none.
 
     Raises:
         ParameterError: A value is not finite or too large, the cell is not positive, or there are fewer than 2 x 2 or more than
@@ -38,7 +38,7 @@ class HeightField:
     west: float = 0.0
     south: float = 0.0
     cell: float = 1.0
-    source: str = ""
+    tag: tuple[tuple[str, str], ...] = ()
 
     def __post_init__(self) -> None:
         height = np.ascontiguousarray(self.height, np.float64)
@@ -48,7 +48,12 @@ class HeightField:
             )
         for name in ("west", "south", "cell"):
             object.__setattr__(self, name, float(getattr(self, name)))
-        edges = [self.west, self.south, self.west + self.cell * height.shape[1], self.south + self.cell * height.shape[0]]
+        edges = [
+            self.west,
+            self.south,
+            self.west + self.cell * height.shape[1],
+            self.south + self.cell * height.shape[0],
+        ]
         _check_coordinates("HeightField", np.array(edges))
         if not self.cell > 0.0:
             raise ParameterError(f"HeightField.cell = {self.cell!r} is not allowed; it takes a length > 0 m")
@@ -66,8 +71,8 @@ class HeightField:
         Args:
             length: Extent along x and y [m].
             cell: Distance between heights [m].
-            technique: "RANDOM_WALK": each height is the mean of its neighbours to the west, south and south-west plus a normal draw; "LINEAR":
-                an inclined plane whose slopes along x and y are drawn once; "LINEAR_WALK": both added.
+            technique: "RANDOM_WALK": each height is the mean of its neighbours to the west, south and south-west plus a normal draw;
+                "LINEAR": an inclined plane whose slopes along x and y are drawn once; "LINEAR_WALK": both added.
             z_std: Standard deviation of a draw [m], per cell.
             center: Centre of the field; its z is the mean height [m].
             seed: Seed of the draws.
@@ -80,11 +85,18 @@ class HeightField:
                 f"technique = {technique!r} is not allowed{nearest_name(technique, TECHNIQUES)}; {listed(TECHNIQUES)}"
             )
         if not (0.0 < cell < np.inf and all(0.0 < side < np.inf for side in length)):
-            raise ParameterError(f"length = {length!r} with cell = {cell!r} is not allowed; they take lengths > 0 m")
+            raise ParameterError(
+                f"length = {length!r} with cell = {cell!r} is not allowed; they take lengths > 0 m"
+            )
         nx, ny = (max(2, round(side / cell) + 1) for side in length)
         if nx * ny > MOST_HEIGHTS:
             raise ParameterError(f"{nx:,} x {ny:,} heights are not allowed; at most {MOST_HEIGHTS:,} are")
-        return cls(_hills((ny, nx), technique, z_std, seed) + center[2], center[0] - 0.5 * cell * (nx - 1), center[1] - 0.5 * cell * (ny - 1), cell)
+        return cls(
+            _hills((ny, nx), technique, z_std, seed) + center[2],
+            center[0] - 0.5 * cell * (nx - 1),
+            center[1] - 0.5 * cell * (ny - 1),
+            cell,
+        )
 
     @property
     def grid(self) -> np.ndarray:
@@ -131,7 +143,7 @@ class TriangleMesh:
     Args:
         vertices: Corners [m], (n, 3), world frame.
         faces: Three corners of each triangle, by number, (m, 3).
-        source: File that it was read from, as a mission names it; "" for none.
+        tag: Text and attributes of the mission's tag that it was read from; () for none.
 
     Raises:
         ParameterError: A coordinate is not finite or too large, a corner does not exist, or there are no triangles, or more than 2,000,000.
@@ -139,7 +151,7 @@ class TriangleMesh:
 
     vertices: np.ndarray
     faces: np.ndarray
-    source: str = ""
+    tag: tuple[tuple[str, str], ...] = ()
     normals: np.ndarray = field(init=False)
 
     def __post_init__(self) -> None:
@@ -151,7 +163,9 @@ class TriangleMesh:
         if not 0 < len(faces) <= MOST_FACES:
             raise ParameterError(f"TriangleMesh has {len(faces):,} triangles; it takes 1 to {MOST_FACES:,}")
         if not np.issubdtype(faces.dtype, np.integer) or faces.min() < 0 or faces.max() >= len(vertices):
-            raise ParameterError(f"TriangleMesh.faces refer to other than the {len(vertices):,} vertices; they take numbers from 0")
+            raise ParameterError(
+                f"TriangleMesh.faces refer to other than the {len(vertices):,} vertices; they take numbers from 0"
+            )
         _check_coordinates("TriangleMesh.vertices", vertices)
         a, b, c = (vertices[faces[:, k]] for k in range(3))
         normals = np.stack(_cross((b - a).T, (c - a).T), axis=1)
@@ -159,14 +173,19 @@ class TriangleMesh:
         has_area = length > 0.0
         if not has_area.any():
             raise ParameterError("TriangleMesh has no triangle with an area")
-        found = {"vertices": vertices, "faces": faces[has_area].astype(np.int64), "normals": normals[has_area] / length[has_area, None]}
+        found = {
+            "vertices": vertices,
+            "faces": faces[has_area].astype(np.int64),
+            "normals": normals[has_area] / length[has_area, None],
+        }
         for name, array in found.items():
             array.flags.writeable = False
             object.__setattr__(self, name, array)
 
     def triangles(self) -> np.ndarray:
         """Corners of the triangles [m], (m, 3, 3)."""
-        return self.vertices[self.faces]
+        corners: np.ndarray = self.vertices[self.faces]
+        return corners
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, TriangleMesh):
@@ -183,7 +202,9 @@ class TriangleMesh:
 def _check_coordinates(name: str, values: np.ndarray) -> None:
     wrong = ~(np.abs(values) <= FARTHEST)
     if wrong.any():
-        raise ParameterError(f"{name} has the coordinate {values[wrong].flat[0]!r}; coordinates are numbers within +-{FARTHEST:g} m")
+        raise ParameterError(
+            f"{name} has the coordinate {values[wrong].flat[0]!r}; coordinates are numbers within +-{FARTHEST:g} m"
+        )
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -216,4 +237,5 @@ def _hills(shape: tuple[int, int], technique: str, z_std: float, seed: int) -> n
 def _normal(seed: int, label: str, n: int) -> np.ndarray:
     """Standard normal draws, (n,)."""
     key = np.full(n, seed % 2**64, np.uint64)
-    return rng.normal(key, rng.stream_key("HeightField", label), np.arange(n), np.zeros(n, np.int64), 0, 1)[0]
+    stream = rng.stream_key("HeightField", label)
+    return np.asarray(rng.normal(key, stream, np.arange(n), np.zeros(n, np.int64), 0, 1)[0])

@@ -12,8 +12,8 @@ from tussle import Block, Simulation
 from tussle.api import Metric, Output, Sensor, State
 from tussle.errors import ParameterError
 from tussle.numeric.quaternion import quat_rotate_inverse
-from tussle.stock import SingleIntegrator
 from tussle.scene import Cuboid, FlatGround, HeightField, Plane, Prism, Scene, Sphere, TriangleMesh
+from tussle.stock import SingleIntegrator
 
 
 def brute(triangles, origin, direction):
@@ -65,7 +65,9 @@ def test_height_fields_against_brute_force(seed):
     hits = Scene(terrain=field).cast(origin, direction)
     np.testing.assert_allclose(hits.distance, expected, rtol=1e-9)
     assert np.isfinite(expected).sum() > 60
-    as_mesh = TriangleMesh(field.triangles().reshape(-1, 3), np.arange(3 * len(field.triangles())).reshape(-1, 3))
+    as_mesh = TriangleMesh(
+        field.triangles().reshape(-1, 3), np.arange(3 * len(field.triangles())).reshape(-1, 3)
+    )
     meshed = Scene(meshes=[as_mesh]).cast(origin, direction)
     np.testing.assert_allclose(hits.distance, meshed.distance, rtol=1e-9)
     np.testing.assert_allclose(hits.normal, meshed.normal, atol=1e-9)
@@ -74,7 +76,9 @@ def test_height_fields_against_brute_force(seed):
 def test_no_ray_slips_between_triangles():
     # Rays through corners, edges and diagonals of a closed box and of a field, whose coordinates are no round numbers.
     box = Cuboid((0.1, 0.2, 0.3), (0.7, 1.1, 1.3), (0.1, 0.2, 0.3))
-    corners = np.concatenate([box.triangles().reshape(-1, 3), box.triangles().mean(axis=1), box.triangles()[:, :2].mean(axis=1)])
+    corners = np.concatenate(
+        [box.triangles().reshape(-1, 3), box.triangles().mean(axis=1), box.triangles()[:, :2].mean(axis=1)]
+    )
     middle = np.array([[0.1], [0.2], [0.3]]) + 0.01
     inside = np.repeat(middle, len(corners), axis=1)
     assert np.isfinite(Scene(walls=[box]).cast(inside, corners.T - inside).distance).all()
@@ -83,15 +87,26 @@ def test_no_ray_slips_between_triangles():
     inner = points[:, (np.abs(points[0] - 1.0) < 4.0) & (np.abs(points[1] - 3.6) < 5.5)]
     above = inner + np.array([[0.37], [-0.11], [30.0]])
     assert (Scene(terrain=field).cast(above, inner - above).distance < 40.0).all()
-    straight = inner + [[0.0], [0.0], [9.0]]
+    straight = [*inner, [0.0], [0.0], [9.0]]
     found = Scene(terrain=field).cast(straight, np.repeat([[0.0], [0.0], [-1.0]], inner.shape[1], axis=1))
     np.testing.assert_allclose(found.points, inner, atol=1e-12)
 
 
 def test_all_parts_of_a_scene_and_their_normals():
-    walls = (Cuboid((5, 0, 0), (2, 2, 2), (0.3, 0.2, 0.9)), Sphere((0, 6, 0), 1.5), Plane((-4, 0, 0), (1, 0, 0)), Prism(((-1, -6), (1, -6), (1, -4), (0, -5), (-1, -4)), -1, 1))  # fmt: skip
+    building = Prism(((-1, -6), (1, -6), (1, -4), (0, -5), (-1, -4)), -1, 1)
+    walls = (
+        Cuboid((5, 0, 0), (2, 2, 2), (0.3, 0.2, 0.9)),
+        Sphere((0, 6, 0), 1.5),
+        Plane((-4, 0, 0), (1, 0, 0)),
+        building,
+    )
     rng = np.random.default_rng(7)
-    scene = Scene(walls=walls, ground=FlatGround(-3.0), terrain=HeightField.generate((6.0, 6.0), 0.5, center=(0, 0, -2)), meshes=[soup(rng, 20)])
+    scene = Scene(
+        walls=walls,
+        ground=FlatGround(-3.0),
+        terrain=HeightField.generate((6.0, 6.0), 0.5, center=(0, 0, -2)),
+        meshes=[soup(rng, 20)],
+    )
     origin, direction = rays(rng, 500, 3.0)
     distance = [wall.ray(origin, direction) for wall in (*walls, scene.ground)]
     distance += [brute(part.triangles(), origin, direction) for part in (*scene.meshes, scene.terrain)]
@@ -105,7 +120,10 @@ def test_all_parts_of_a_scene_and_their_normals():
     # Each normal is of length 1, faces the origin, and is that of the finite difference between rays beside one another.
     assert np.linalg.norm(hits.normal[:, is_hit], axis=0) == pytest.approx(1.0)
     assert ((hits.normal * direction).sum(axis=0) <= 0.0).all()
-    beside = [scene.cast(origin, direction / np.linalg.norm(direction, axis=0) + 1e-6 * rng.normal(size=(3, 1))) for _ in range(2)]
+    beside = [
+        scene.cast(origin, direction / np.linalg.norm(direction, axis=0) + 1e-6 * rng.normal(size=(3, 1)))
+        for _ in range(2)
+    ]
     smooth = is_hit & (beside[0].solid == hits.solid) & (beside[1].solid == hits.solid)
     for other in beside:
         between = other.points[:, smooth] - hits.points[:, smooth]
@@ -119,7 +137,9 @@ def test_height_free_and_line_of_sight():
     scene = Scene(terrain=field, walls=[house])
     assert scene.height([0.0, 5.0, 30.0, 99.0], [0.0, 0.0, 1.0, 0.0]).tolist() == [4.0, 2.0, 5.0, -np.inf]
     assert Scene(ground=FlatGround(7.0)).height(3.0, 4.0) == 7.0
-    points = np.array([[0, 0, 4.5], [0, 0, 3.0], [30, 0, 2], [30, 6, 2], [30, 6, 2], [36, 6, 2], [200, 0, -5]], float).T
+    points = np.array(
+        [[0, 0, 4.5], [0, 0, 3.0], [30, 0, 2], [30, 6, 2], [30, 6, 2], [36, 6, 2], [200, 0, -5]], float
+    ).T
     radius = [0.4, 0.1, 0.1, 1.1, 0.9, 1.4, 1.0]
     assert scene.free(points, radius).tolist() == [True, False, False, False, True, True, True]
     rng = np.random.default_rng(2)
@@ -128,7 +148,11 @@ def test_height_free_and_line_of_sight():
     corners = mesh.triangles()
     samples = np.stack(np.meshgrid(*[np.linspace(0, 1, 31)] * 2)).reshape(2, -1)
     u, v = samples[:, samples.sum(axis=0) <= 1.0]
-    cloud = corners[:, :1] + u[None, :, None] * (corners[:, 1:2] - corners[:, :1]) + v[None, :, None] * (corners[:, 2:] - corners[:, :1])
+    cloud = (
+        corners[:, :1]
+        + u[None, :, None] * (corners[:, 1:2] - corners[:, :1])
+        + v[None, :, None] * (corners[:, 2:] - corners[:, :1])
+    )
     gap = np.sqrt(((at.T[:, None] - cloud.reshape(-1, 3)[None]) ** 2).sum(axis=2).min(axis=1))
     free = Scene(meshes=[mesh]).free(at, 2.0)
     assert not free[gap < 2.0].any()
@@ -236,7 +260,10 @@ def looking(rows=None, world=None):
         (lambda s: s.cast(np.zeros((3, 1)), np.zeros((3, 1)), -1.0), "max_range has the value .*-1.0"),
         (lambda s: s.cast(np.zeros((3, 1)), np.zeros((3, 1)), [1.0, 2.0]), r"max_range has shape \(2,\)"),
         (lambda s: s.free(np.zeros((3, 1)), np.nan), "radius has the value .*nan"),
-        (lambda s: s.line_of_sight(np.zeros((3, 1)), np.zeros((3, 2))), r"a has shape \(3, 1\) and b \(3, 2\)"),
+        (
+            lambda s: s.line_of_sight(np.zeros((3, 1)), np.zeros((3, 2))),
+            r"a has shape \(3, 1\) and b \(3, 2\)",
+        ),
         (lambda s: looking(rows=np.zeros(3, int)), "there are 1 rays and 3 rows or worlds"),
         (lambda s: looking(world=np.ones(1, int)), "world 1 is not allowed; there are worlds 0 to 0"),
         (lambda s: Scene(walls=[3]), "Scene.walls has 3; it takes Volume"),
@@ -250,7 +277,10 @@ def looking(rows=None, world=None):
         (lambda s: TriangleMesh(np.zeros((3, 2)), [[0, 1, 2]]), r"vertices have shape \(3, 2\)"),
         (lambda s: TriangleMesh(np.eye(3), np.zeros((0, 3), int)), "TriangleMesh has 0 triangles"),
         (lambda s: TriangleMesh(np.eye(3), [[0, 1, 3]]), "refer to other than the 3 vertices"),
-        (lambda s: TriangleMesh(np.full((3, 3), np.inf), [[0, 1, 2]]), "TriangleMesh.vertices has the coordinate"),
+        (
+            lambda s: TriangleMesh(np.full((3, 3), np.inf), [[0, 1, 2]]),
+            "TriangleMesh.vertices has the coordinate",
+        ),
         (lambda s: TriangleMesh(np.zeros((3, 3)), [[0, 1, 2]]), "no triangle with an area"),
     ],
 )
