@@ -91,8 +91,8 @@ WORLD = {
     "entity": TagSpec("A block of entities with the same plugins; its tags are below.", reads="text"),
     "terrain": TagSpec(
         "Hills or a mesh that rays meet: a file beside the mission (.asc, .png, .tif, .vtk, .obj, .ply, .stl, .glb, .gltf, .off), or a "
-        "terrain .xml of the existing system. Attributes: `position` (x, y, z of its origin) [m]; of an image `cell`, a pixel's width [m], and "
-        "`height` of white [m]; of a mesh `scale`.",
+        "terrain .xml of the existing system. Attributes: `position` (x, y, z of its origin) [m]; of an image `cell`, a pixel's width [m], "
+        "and `height` of white [m]; of a mesh `scale`.",
         reads="text",
     ),
     "ground": TagSpec("Flat ground at this height, which rays meet (addition to the format).", "none", "m"),

@@ -102,8 +102,7 @@ def scenery_of(
             corners += [c for block in mission.blocks for c in _start(block)]
         corners += [np.add(b.position, s * b.radius) for b in mission.scene.bases for s in (-1.0, 1.0)]
         corners += [c for _, _, shape, _ in shapes for c in _corners(shape)]
-        fields = [mission.scene.terrain, *(plugin.terrain() for plugin in mission.interactions)]
-        hills = next((each for each in fields if each is not None), None)
+        hills = mission.scene.terrain or _generated(mission, notes)
         corners += [] if hills is None else _corners_of_field(hills)
     low, high = _at_least(np.array(corners).reshape(-1, 3))
     scene = None if mission is None else mission.scene
@@ -163,6 +162,17 @@ def _corners(shape: Volume | TriangleMesh) -> list[np.ndarray]:
         return [vertices.min(axis=0), vertices.max(axis=0)]
     assert not isinstance(shape, Plane) or shape.normal
     return []
+
+
+def _generated(mission: Mission, notes: list[str]) -> HeightField | None:
+    """The terrain of a plugin."""
+    for plugin in mission.interactions:
+        try:
+            if (found := plugin.terrain()) is not None:
+                return found  # type: ignore[no-any-return]
+        except TussleError as error:
+            notes.append(f"{error}; its terrain is not shown")
+    return None
 
 
 def _corners_of_field(field: HeightField) -> list[np.ndarray]:

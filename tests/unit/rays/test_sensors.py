@@ -193,6 +193,8 @@ def test_altimeters():
     ):
         with pytest.raises(TussleError, match=message):
             Simulation(game.replace(interactions=[wrong]))
+    (note,) = scenery_of(game.replace(interactions=[hills.replace(y_resolution=1)])).notes
+    assert note.endswith("must be equal; its terrain is not shown")
     with pytest.raises(TussleError, match="the scene has two terrains"):
         Simulation(game.replace(interactions=[hills, hills.replace(name="more")]))
 
