@@ -39,7 +39,8 @@ def main() -> None:
         dropout=0.01,
     )
     cars = Block(
-        name="car", count=3, position=(0, 0, 1), heading="40 deg", heading_variance=4.0, sensor=lidar, autonomy=AvoidWalls(initial_speed=15.0),
+        name="car", count=3, position=(0, 0, 1), heading="40 deg", heading_variance=4.0, sensor=lidar,
+        autonomy=AvoidWalls(initial_speed=15.0),
         controller=SimpleCarControllerHeading(p_gain=1.5), motion=SimpleCar(),
     )  # fmt: skip
     simulation = Simulation(

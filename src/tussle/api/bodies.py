@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from tussle.api import kernels
-from tussle.api.casting import BodyTree
 from tussle.errors import listed, nearest_name
 from tussle.neighbors.index import Index, Split, padded
+from tussle.rays.bodies import BodyTree
 
 FLOATS = {
     "pos": 3,
@@ -231,9 +231,11 @@ class Bodies:
         return kept.columns[0]  # type: ignore[no-any-return]
 
     def tree(self, boxes: np.ndarray) -> BodyTree:
-        """Tree over the current bodies, for rays; `boxes` as for `BodyTree`."""
+        """Tree over the current bodies, for rays; boxes: lengths by block [m], (n_blocks, 3), 0 for spheres."""
         if self._tree is None or self._tree[0] != self.version:
-            self._tree = self.version, BodyTree(self, boxes)
+            members, world_start, _, _ = self.layout()
+            states = self.pos, self.quat, self.radius
+            self._tree = self.version, BodyTree(states, (self.block, boxes), members, world_start)
         return self._tree[1]
 
     def _forget(self, key: Any) -> None:

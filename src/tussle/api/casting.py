@@ -2,53 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from tussle.api.bodies import Bodies
+from tussle.api.context import Context
 from tussle.errors import ParameterError
 from tussle.rays import kernels
 from tussle.rays.hits import Hits, new_rays
-from tussle.rays.solids import grow
-
-if TYPE_CHECKING:
-    from tussle.api.bodies import Bodies
-    from tussle.api.context import Context
 
 RAYS_PER_THREAD = 1024
-
-
-class BodyTree:
-    """A tree over the bodies of each world, at one instant.
-
-    Args:
-        bodies: The body table.
-        boxes: Lengths of the boxes of each block [m], (n_blocks, 3); 0 for spheres.
-    """
-
-    def __init__(self, bodies: Bodies, boxes: np.ndarray) -> None:
-        self.items, around = np.empty((bodies.n, kernels.BODY)), np.empty((bodies.n, 6))
-        states = bodies.pos, bodies.quat, bodies.radius
-        kernels.place_bodies(states, (bodies.block, boxes), (self.items, around))
-        members, world_start, _, _ = bodies.layout()
-        bounds, links, roots, order = grow(around, world_start, members.copy())
-        self.tree, self.places = (bounds, links, roots, order), self.items[order]
-
-    def normal(self, rows: np.ndarray, points: np.ndarray) -> np.ndarray:
-        """Outward unit normals of bodies at points of their surfaces, (3, m)."""
-        items = self.items[rows].T
-        offset = points - items[:3]
-        x, y, z = offset
-        length = np.sqrt(x * x + y * y + z * z)
-        normal: np.ndarray = offset / np.where(length > 0.0, length, 1.0)
-        boxed = np.flatnonzero(items[3] == 0.0)
-        axes = items[7:, boxed].reshape(3, 3, -1)
-        x, y, z = offset[:, boxed]
-        local = axes[:, 0] * x + axes[:, 1] * y + axes[:, 2] * z
-        depth = np.abs(local) - items[4:7, boxed]
-        face, column = depth.argmax(axis=0), np.arange(len(boxed))
-        normal[:, boxed] = axes[face, :, column].T * np.sign(local[face, column])
-        return normal
 
 
 def cast(

@@ -525,8 +525,8 @@ def touch_field(height, grid, points, radius, touches):
         )
         if touches[n] or not (is_near and z - r <= highest):
             continue
-        i0, i1 = int(max(math.floor(u - reach_u), 0.0)), int(min(math.floor(u + reach_u), nx - 2.0))
-        j0, j1 = int(max(math.floor(v - reach_v), 0.0)), int(min(math.floor(v + reach_v), ny - 2.0))
+        i0, i1 = math.floor(max(u - reach_u, 0.0)), math.floor(min(u + reach_u, nx - 2.0))
+        j0, j1 = math.floor(max(v - reach_v, 0.0)), math.floor(min(v + reach_v, ny - 2.0))
         for j in range(j0, j1 + 1):
             for i in range(i0, i1 + 1):
                 for k in range(2):

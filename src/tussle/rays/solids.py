@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tussle.rays import kernels
-from tussle.rays.hits import Hits, checked_numbers, checked_vectors, new_rays
+from tussle.rays.hits import FARTHEST_RAY, Hits, checked_numbers, checked_vectors, new_rays
 from tussle.rays.surfaces import HeightField, TriangleMesh
 from tussle.shapes import FlatGround, Polyhedron, Sphere, Volume
 
@@ -136,7 +136,7 @@ class Solids:
     def touches(self, points: object, radius: object) -> np.ndarray:
         """Whether spheres round points [m], (3, n), touch a part or lie inside one, (n,)."""
         center = checked_vectors("points", points)
-        reach = checked_numbers("radius", radius, center.shape[1])
+        reach = np.minimum(checked_numbers("radius", radius, center.shape[1]), FARTHEST_RAY)
         touches = np.zeros(center.shape[1], np.bool_)
         if self.n_triangles:
             kernels.touch(self._tree, self._items, center, reach, touches)

@@ -87,7 +87,7 @@ def test_no_ray_slips_between_triangles():
     inner = points[:, (np.abs(points[0] - 1.0) < 4.0) & (np.abs(points[1] - 3.6) < 5.5)]
     above = inner + np.array([[0.37], [-0.11], [30.0]])
     assert (Scene(terrain=field).cast(above, inner - above).distance < 40.0).all()
-    straight = [*inner, [0.0], [0.0], [9.0]]
+    straight = inner + np.array([[0.0], [0.0], [9.0]])
     found = Scene(terrain=field).cast(straight, np.repeat([[0.0], [0.0], [-1.0]], inner.shape[1], axis=1))
     np.testing.assert_allclose(found.points, inner, atol=1e-12)
 
@@ -142,6 +142,7 @@ def test_height_free_and_line_of_sight():
     ).T
     radius = [0.4, 0.1, 0.1, 1.1, 0.9, 1.4, 1.0]
     assert scene.free(points, radius).tolist() == [True, False, False, False, True, True, True]
+    assert not scene.free(points, np.inf).any()
     rng = np.random.default_rng(2)
     mesh = soup(rng, 60)
     at = rng.uniform(-20, 20, (3, 80))
