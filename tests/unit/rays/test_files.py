@@ -17,6 +17,7 @@ from tussle.mission import read_mission, to_python, to_xml
 from tussle.mission.terrain_xml import utm
 from tussle.rays.files import read_surface
 from tussle.scene import Cuboid, FlatGround, HeightField, Origin, Prism
+from tussle.view import scenery_of
 
 GRID = """ncols 3
 nrows 2
@@ -293,7 +294,7 @@ def read(folder, tags):
     return read_mission(path)
 
 
-def test_tags_of_the_scene(folder):
+def test_tags_of_the_scene(folder, monkeypatch):
     loaded = read(folder, TAGS)
     scene = loaded.mission.scene
     assert loaded.notes == ()
@@ -311,6 +312,16 @@ def test_tags_of_the_scene(folder):
     (folder / "back.xml").write_text(to_xml(loaded.mission))
     again = read_mission(folder / "back.xml").mission
     assert (again.scene, again.blocks) == (scene, loaded.mission.blocks)
+    monkeypatch.setattr("tussle.view.scenery.MOST_FACES", 5)
+    monkeypatch.setattr("tussle.view.solids.MOST_FACES", 5)
+    shown = scenery_of(loaded.mission)
+    assert [(region.name, len(region.mesh.faces)) for region in shown.boundaries] == [
+        ("mesh 1", 5),
+        ("wall 1", 12),
+        ("wall 2", 6),
+    ]
+    assert shown.notes == ("mesh 1 has 6 triangles; 5 of them are shown",)
+    assert shown.terrain.height.max() == 6.0
     with pytest.raises(MissionError, match=r"HeightField\(3 x 2.*cannot be written as code"):
         to_python(loaded.mission)
 
