@@ -263,6 +263,17 @@ class RoadGraph(Message):
     roads = Handle(doc="A `networkx` graph; each node has the attribute pos [m], (3,), world frame.")
 
 
+class PointCloud(Message):
+    """A scan of a lidar."""
+
+    points = Field(
+        "x y z range in_range",
+        unit="m m m m 1",
+        ragged=True,
+        doc="Ends of the rays, body frame, and their ranges.",
+    )
+
+
 class RewardGiven(Message):
     """An entity earned a reward."""
 

@@ -101,3 +101,49 @@ class Prism(Volume):
             is_hit = (uz != 0.0) & (t >= 0.0) & self._over(x + t * ux, y + t * uy)
             distance = np.minimum(distance, np.where(is_hit, t, np.inf))
         return distance
+
+    def triangles(self) -> np.ndarray:
+        found: list[tuple[tuple[float, ...], ...]] = []
+        for i, (x, y) in enumerate(self.corners):
+            u, v = self.corners[i - 1]
+            a, b, c, d = (u, v, self.low), (x, y, self.low), (x, y, self.high), (u, v, self.high)
+            found += [(a, b, c), (a, c, d)]
+        for three in _ears(self.corners):
+            found += [tuple((*corner, z) for corner in three) for z in (self.low, self.high)]
+        return np.array(found)
+
+
+Corner = tuple[float, float]
+
+
+def _turn(a: Corner, b: Corner, c: Corner) -> float:
+    """Twice the area of a triangle, positive if it is counter-clockwise."""
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
+
+def _ears(corners: tuple[Corner, ...]) -> list[tuple[Corner, Corner, Corner]]:
+    """Divide a simple polygon into triangles by cutting off corners in which no other corner lies.
+
+    G. H. Meisters, Polygons have ears, The American Mathematical Monthly 82 (1975).
+    """
+    left = list(corners)
+    if sum(_turn((0.0, 0.0), a, b) for a, b in zip(left, left[1:] + left[:1], strict=True)) < 0.0:
+        left.reverse()
+    found = []
+    while len(left) > 3:
+        for i in range(len(left)):
+            a, b, c = left[i - 1], left[i], left[(i + 1) % len(left)]
+            if _turn(a, b, c) > 0.0 and not any(
+                _turn(a, b, p) >= 0.0 and _turn(b, c, p) >= 0.0 and _turn(c, a, p) >= 0.0
+                for p in left
+                if p not in (a, b, c)
+            ):
+                found.append((a, b, c))
+                break
+        else:
+            i = min(
+                range(len(left)), key=lambda k: abs(_turn(left[k - 1], left[k], left[(k + 1) % len(left)]))
+            )
+            # Corners on a line, or sides that cross: the flattest corner is dropped.
+        del left[i]
+    return [*found, (left[0], left[1], left[2])]

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from tussle.errors import MissionError, ParameterError, listed, nearest_name
 from tussle.geodesy import Origin
 from tussle.prism import Prism
+from tussle.rays.hits import Hits, checked_vectors
+from tussle.rays.solids import Solids
+from tussle.rays.surfaces import HeightField, TriangleMesh
 from tussle.shapes import (
     Convex,
     Cuboid,
@@ -28,6 +33,8 @@ __all__ = [
     "Convex",
     "Cuboid",
     "FlatGround",
+    "HeightField",
+    "Hits",
     "Origin",
     "Plane",
     "Polyhedron",
@@ -35,6 +42,7 @@ __all__ = [
     "Scene",
     "Sphere",
     "TeamRegion",
+    "TriangleMesh",
     "Volume",
 ]
 
@@ -108,9 +116,11 @@ class Scene:
     Args:
         origin: Point on Earth at which the world frame is tangent.
         ground: The ground; None for a world without ground.
-        walls: Solid shapes that stop rays.
+        walls: Solid shapes that stop rays, such as buildings.
         boundaries: Named regions; they have no effect by themselves.
         bases: The teams' bases, in the mission's order.
+        terrain: Hills; None for none.
+        meshes: Surfaces of triangles.
     """
 
     origin: Origin = field(default_factory=Origin)
@@ -118,15 +128,34 @@ class Scene:
     walls: tuple[Volume, ...] = ()
     boundaries: Mapping[int | str, Volume] = field(default_factory=dict)
     bases: tuple[Base, ...] = ()
+    terrain: HeightField | None = None
+    meshes: tuple[TriangleMesh, ...] = ()
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "walls", tuple(self.walls))
+        for name, kind in (("walls", Volume), ("bases", Base), ("meshes", TriangleMesh)):
+            parts = tuple(getattr(self, name))
+            _check_kinds(name, parts, kind)
+            object.__setattr__(self, name, parts)
         object.__setattr__(self, "boundaries", dict(self.boundaries))
-        object.__setattr__(self, "bases", tuple(self.bases))
+        _check_kinds("ground", [self.ground] if self.ground is not None else [], FlatGround)
+        _check_kinds("terrain", [self.terrain] if self.terrain is not None else [], HeightField)
 
-    def with_walls(self, walls: tuple[Volume, ...]) -> Scene:
-        """The scene with further walls."""
-        return replace(self, walls=(*self.walls, *walls)) if walls else self
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if name != "caster"}
+
+    def with_parts(self, walls: tuple[Volume, ...], terrain: HeightField | None) -> Scene:
+        """The scene with further walls, and with a terrain.
+
+        Raises:
+            MissionError: It has a terrain already.
+        """
+        if terrain is not None and self.terrain is not None:
+            raise MissionError(
+                "the scene has two terrains, of <terrain> or of plugins such as TerrainGenerator; it takes one"
+            )
+        if not walls and terrain is None:
+            return self
+        return replace(self, walls=(*self.walls, *walls), terrain=terrain or self.terrain)
 
     def boundary(self, name: int | str) -> Volume:
         """The region with this id or name.
@@ -154,17 +183,68 @@ class Scene:
         """
         return self.boundary(boundary).contains(pos)
 
-    def ray(self, origin: np.ndarray, direction: np.ndarray) -> np.ndarray:
-        """Distance along rays to the ground or the first wall.
+    @property
+    def solids(self) -> tuple[Volume | HeightField | TriangleMesh, ...]:
+        """Everything that stops rays: walls, meshes, terrain and ground."""
+        last = (self.terrain, self.ground)
+        return (*self.walls, *self.meshes, *(part for part in last if part is not None))
+
+    @cached_property
+    def caster(self) -> Solids:
+        """The solids, ready for rays; made on first access."""
+        return Solids(self.solids)
+
+    def cast(self, origins: Any, directions: Any, max_range: Any = np.inf) -> Hits:
+        """The first hits of rays on the scene; `g.cast` also finds entities.
+
+        A ray meets a surface from either side, also one on which it begins.
 
         Args:
-            origin: Starts of the rays [m], (3, n).
-            direction: Directions of any length, (3, n).
+            origins: Where the rays begin [m], (3, n), world frame.
+            directions: Where they go, of any length, (3, n); a zero vector hits nothing.
+            max_range: Hits further away do not count [m], one number or (n,).
 
-        Returns:
-            Distance [m], (n,); inf where a ray hits nothing.
+        Raises:
+            ParameterError: A shape does not fit, or a value is not allowed.
         """
-        distance = np.full(np.shape(origin)[1:], np.inf)
-        for solid in (*self.walls, *((self.ground,) if self.ground else ())):
-            distance = np.minimum(distance, solid.ray(origin, direction))
-        return distance
+        return self.caster.cast(origins, directions, max_range)
+
+    def height(self, x: Any, y: Any) -> np.ndarray:
+        """Height of the highest surface at places x, y [m], (n,): roofs, meshes, terrain and ground; -inf where there is none.
+
+        Raises:
+            ParameterError: A shape does not fit, or a value is not finite.
+        """
+        east, north = np.broadcast_arrays(np.asarray(x, float), np.asarray(y, float))
+        top = self.caster.top + 1.0
+        start = np.stack([east.ravel(), north.ravel(), np.full(east.size, top)])
+        down = np.repeat([[0.0], [0.0], [-1.0]], east.size, axis=1)
+        return np.asarray((top - self.cast(start, down).distance).reshape(east.shape))
+
+    def free(self, points: Any, radius: Any) -> np.ndarray:
+        """Whether spheres round points [m], (3, n), with a radius [m], one or (n,), neither touch nor lie inside a solid, (n,).
+
+        A mesh is a surface: a point that it surrounds is free.
+
+        Raises:
+            ParameterError: A shape does not fit, or a value is not allowed.
+        """
+        return ~self.caster.touches(points, radius)
+
+    def line_of_sight(self, a: Any, b: Any) -> np.ndarray:
+        """Whether nothing of the scene lies between points a and b [m], (3, n) each; (n,).
+
+        Raises:
+            ParameterError: A shape does not fit, or a value is not finite.
+        """
+        start, end = checked_vectors("a", a), checked_vectors("b", b)
+        if start.shape != end.shape:
+            raise ParameterError(f"a has shape {start.shape} and b {end.shape}; they must be equal")
+        x, y, z = end - start
+        return ~(self.cast(start, end - start, np.sqrt(x * x + y * y + z * z)).distance < np.inf)
+
+
+def _check_kinds(name: str, parts: Iterable[Any], kind: type) -> None:
+    for part in parts:
+        if not isinstance(part, kind):
+            raise ParameterError(f"Scene.{name} has {part!r}; it takes {kind.__name__}")

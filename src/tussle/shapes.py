@@ -49,6 +49,18 @@ class Volume(ABC):
             Distance [m], (n,); inf where the ray hits nothing.
         """
 
+    def triangles(self) -> np.ndarray | None:
+        """Corners of triangles that make up the surface [m], (m, 3, 3); None for a shape whose `ray` is called instead."""
+        return None
+
+    def outward(self, pos: np.ndarray) -> np.ndarray:
+        """Outward unit normals at points of the surface [m], (3, n)."""
+        return -_unit(self.inward(pos))
+
+    def touches(self, center: np.ndarray, radius: np.ndarray) -> np.ndarray:
+        """Whether spheres with centres outside [m], (3, n), and radii [m], (n,), reach the inside, (n,)."""
+        return self.contains(center + radius * _unit(self.inward(center)))
+
 
 class Convex(Volume):
     """An intersection of half-spaces; abstract."""
@@ -77,6 +89,12 @@ class Convex(Volume):
         for normal, offset in self._faces:
             way -= np.array(normal)[:, None] * (_along(normal, pos) >= offset)
         return way
+
+    def outward(self, pos: np.ndarray) -> np.ndarray:
+        """Of the face whose plane is nearest."""
+        east, north, up, offset = self._face_columns
+        face = (east * pos[0] + north * pos[1] + up * pos[2] - offset).argmax(axis=0)
+        return np.asarray(self._face_columns[:3, face, 0])
 
     def ray(self, origin: np.ndarray, direction: np.ndarray) -> np.ndarray:
         # T. L. Kay and J. T. Kajiya, Ray tracing complex scenes, SIGGRAPH 1986: a line is inside between its last entry through
@@ -180,6 +198,18 @@ class Cuboid(Convex):
         """Towards the centre."""
         way: np.ndarray = np.array(self.center)[:, None] - pos
         return way
+
+    def triangles(self) -> np.ndarray:
+        halves = [
+            0.5 * length * np.array(axis) for length, axis in zip(self.lengths, _axes(self.rpy), strict=True)
+        ]
+        # Each corner is computed once, so that faces meet without gaps: corner 4 i + 2 j + k is at the ends i, j, k of the axes.
+        signs = list(itertools.product((-1.0, 1.0), repeat=3))
+        corners = np.array(
+            [np.array(self.center) + i * halves[0] + j * halves[1] + k * halves[2] for i, j, k in signs]
+        )
+        squares = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+        return corners[[three for a, b, c, d in squares for three in ((a, b, c), (a, c, d))]]
 
 
 @dataclass(frozen=True)

@@ -305,7 +305,7 @@ def test_scene_answers_for_its_parts() -> None:
         bases=[Base(1, (0.0, 0.0, 0.0)), Base(2, (9.0, 0.0, 0.0), radius=5.0), Base(1, (3.0, 0.0, 0.0))],
     )
     start, direction = columns((0, 0, 5), (0, 0, 5), (0, 0, 5)), columns((1, 0, 0), (0, 0, -1), (-1, 0, 0))
-    assert scene.ray(start, direction).tolist() == [9.0, 5.0, math.inf]
+    assert scene.cast(start, direction).distance.tolist() == [9.0, 5.0, math.inf]
     assert scene.contains(1, columns((2, 0, 0), (4, 0, 0))).tolist() == [True, False]
     assert scene.contains("field", columns((2, 0, 0), (60, 0, 0))).tolist() == [True, False]
     assert [base.position[0] for base in scene.bases_of(1)] == [0.0, 3.0]
@@ -314,7 +314,10 @@ def test_scene_answers_for_its_parts() -> None:
 
 
 def test_empty_scene_stops_no_ray() -> None:
-    assert Scene().ray(np.zeros((3, 2)), columns((0, 0, -1), (1, 0, 0))).tolist() == [math.inf, math.inf]
+    assert Scene().cast(np.zeros((3, 2)), columns((0, 0, -1), (1, 0, 0))).distance.tolist() == [
+        math.inf,
+        math.inf,
+    ]
 
 
 def test_unknown_boundary_names_the_nearest() -> None:

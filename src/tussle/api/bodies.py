@@ -10,6 +10,7 @@ import numpy as np
 from tussle.api import kernels
 from tussle.errors import listed, nearest_name
 from tussle.neighbors.index import Index, Split, padded
+from tussle.rays.bodies import BodyTree
 
 FLOATS = {
     "pos": 3,
@@ -119,6 +120,7 @@ class Bodies:
         self._newest: CachedArrays | None = None
         self._by_place: dict[tuple[int, str], CachedArrays] = {}
         self._layout: tuple[np.ndarray, ...] | None = None
+        self._tree: tuple[int, BodyTree] | None = None
         self._read_only: BodyView | None = None
 
     def __getattr__(self, name: str) -> np.ndarray:
@@ -227,6 +229,14 @@ class Bodies:
             kept.version = self.version
         self._newest = kept
         return kept.columns[0]  # type: ignore[no-any-return]
+
+    def tree(self, boxes: np.ndarray) -> BodyTree:
+        """Tree over the current bodies, for rays; boxes: lengths by block [m], (n_blocks, 3), 0 for spheres."""
+        if self._tree is None or self._tree[0] != self.version:
+            members, world_start, _, _ = self.layout()
+            states = self.pos, self.quat, self.radius
+            self._tree = self.version, BodyTree(states, (self.block, boxes), members, world_start)
+        return self._tree[1]
 
     def _forget(self, key: Any) -> None:
         """Discard the index of a reach and the columns in its order."""

@@ -39,6 +39,7 @@ class Context:
         threads: Number of threads that `split` may use.
         draw: Receives the shapes that plugins draw.
         fail: Ends one world with an error; the others continue.
+        boxes: Lengths of the boxes of each block for rays [m], (n_blocks, 3); 0 for spheres.
     """
 
     clock: Clock
@@ -54,11 +55,13 @@ class Context:
     draw: Draw = field(default_factory=Draw)
     keys: np.ndarray = field(init=False)
     fail: Callable[[int, PluginError], None] = field(init=False)
+    boxes: np.ndarray = field(init=False)
     _pool: ThreadPoolExecutor | None = None
 
     def __post_init__(self) -> None:
         self.keys = self.seeds.copy()
         self.block_keys = np.array([stream_key("block", name) for name in self.block_names], np.uint64)
+        self.boxes = np.zeros((len(self.block_names), 3))
 
     def row_seeds(self, world: np.ndarray, block: np.ndarray) -> np.ndarray:
         """Random key of each row, (n,), uint64: that of its world combined with the name of its block."""

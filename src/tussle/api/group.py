@@ -22,12 +22,13 @@ from tussle.api.bodies import (
     derived_from,
     read_only,
 )
+from tussle.api.casting import cast
 from tussle.api.context import Context, stream
 from tussle.api.draw import Draw
 from tussle.api.pairs import Nearest, Pairs, find_nearest, find_pairs
 from tussle.errors import PluginError, listed, nearest_name
 from tussle.neighbors.index import Index
-from tussle.scene import Scene, TeamRegion
+from tussle.scene import Hits, Scene, TeamRegion
 
 ROWS_PER_THREAD = 4096
 """Minimum number of rows per thread: a kernel takes about 20 ns per row, starting a thread 50 us."""
@@ -322,6 +323,31 @@ class GroupView:
             ParameterError: Both `teams` and `among` are given, or a value is not allowed.
         """
         return find_nearest(self._bodies, (self.first, self.last), self.pos, k, teams, among)
+
+    def cast(
+        self, origins: Any, directions: Any, max_range: Any = np.inf, *, row: np.ndarray | None = None,
+        world: np.ndarray | None = None, entities: bool = True,
+    ) -> Hits:  # fmt: skip
+        """The first hits of rays on the scene and on the other entities: spheres of their radius, or boxes where the block has one.
+
+        Args:
+            origins: Where the rays begin [m], (3, m), world frame.
+            directions: Where they go, of any length, (3, m).
+            max_range: Hits further away do not count [m], one number or (m,).
+            row: Row of the entity that casts each ray, (m,), which the ray does not meet; by default one ray for each row.
+            world: Instead of `row`: world of each ray, (m,), which may meet all entities.
+            entities: Whether rays meet entities.
+
+        Raises:
+            ParameterError: A shape does not fit, or a value is not allowed.
+        """
+        if world is None:
+            rows = np.arange(self.n) if row is None else np.asarray(row)
+            world, own = self.world[rows], self.first + rows
+        else:
+            world = np.asarray(world)
+            own = np.full(len(world), -1)
+        return cast(self.context, self._bodies, (origins, directions, max_range), world, own, entities)
 
     # -- random numbers and services ------------------------------------------------------------------------------------------------
 

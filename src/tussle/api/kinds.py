@@ -13,7 +13,7 @@ from tussle.api.row_laws import step_rows
 from tussle.api.world import WorldView
 from tussle.columns import Output, Param
 from tussle.messages import Messages
-from tussle.scene import TeamRegion, Volume
+from tussle.scene import HeightField, TeamRegion, Volume
 
 
 class EntityPlugin(Plugin):
@@ -91,6 +91,10 @@ class WorldPlugin(Plugin):
     def walls(self) -> tuple[Volume, ...]:
         """Walls that this plugin adds to the scene; its structural parameters are known."""
         return ()
+
+    def terrain(self) -> HeightField | None:
+        """Terrain that this plugin gives to the scene; its structural parameters are known."""
+        return None
 
     def start(self, w: WorldView) -> None:
         """Called at the start of worlds, after their initial entities are placed."""

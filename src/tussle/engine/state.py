@@ -99,6 +99,7 @@ class SimulationState:
         blocks = [b.name for b in mission.blocks]
         context = Context(clock, keys, blocks, mission.scene, mission.teams, self.running, threads=threads)
         self.context = context
+        context.boxes = np.array([block.box or (0.0, 0.0, 0.0) for block in mission.blocks]).reshape(-1, 3)
         self.overrides = Overrides(mission, n)
         self.overrides.set(params, np.arange(n))
         given = self.overrides, context.keys, mission.start

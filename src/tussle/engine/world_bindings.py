@@ -82,7 +82,7 @@ class WorldBinding:
         world_binding.tables["entity"].allocate(view.n)
         world_binding.fill_params(overrides, np.arange(n_worlds))
         view.context.regions += spec.regions()
-        view.context.scene = view.context.scene.with_walls(spec.walls())
+        view.context.scene = view.context.scene.with_parts(spec.walls(), spec.terrain())
         for service in type(spec).services:
             view.context.services[service] = getattr(world_binding.plugin, service)
         world_binding.attach()

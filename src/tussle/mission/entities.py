@@ -265,6 +265,7 @@ class EntityReader:
     def _body(self, fields: Fields) -> dict[str, Any]:
         """Initial states, and the values of the body."""
         velocity = fields.vector("vx", "vy", "vz")
+        box = fields.vector("box_x", "box_y", "box_z")
         return {
             "health": fields.number("health"),
             "radius": fields.number("radius"),
@@ -274,6 +275,7 @@ class EntityReader:
             "roll": fields.number("roll", "rad"),
             "climb": 0.0 - fields.number("pitch", "rad"),
             "velocity": velocity if any(velocity) else None,
+            "box": box if any(box) else None,
             "speed": fields.number("speed"),
             "placement": fields.read(
                 "placement", lambda text: BLOCK_VALUES["placement"].convert(text, "placement")

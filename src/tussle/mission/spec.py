@@ -145,6 +145,7 @@ class Block:
         health: Initial health; an entity is removed when it reaches 0.
         radius: Body radius [m].
         mass: Mass [kg].
+        box: Lengths along the body's x, y and z axes of the box that rays meet [m], (3,); None for a sphere of `radius`.
         rate: Births per second in each slot [1/s]; None if all entities exist from the start.
         slots: With a rate: number of birth sequences that run in parallel.
         first_birth: With a rate: time of the first birth [s].
@@ -172,6 +173,7 @@ class Block:
     health: float = 1.0
     radius: float = 1.0
     mass: float = 1.0
+    box: tuple[float, ...] | None = None
     rate: float | None = None
     slots: int = 1
     first_birth: float = 0.0
@@ -229,6 +231,7 @@ BLOCK_VALUES = _declared(
     health={"gt": 0.0},
     radius={"unit": "m", "gt": 0.0},
     mass={"unit": "kg", "gt": 0.0},
+    box={"default": (1.0, 1.0, 1.0), "unit": "m", "fields": "x y z", "gt": 0.0},
     rate={"default": 1.0, "unit": "1/s", "gt": 0.0},
     slots={"gt": 0},
     first_birth={"unit": "s"},

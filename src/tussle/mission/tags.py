@@ -89,6 +89,22 @@ WORLD = {
         reads="text",
     ),
     "entity": TagSpec("A block of entities with the same plugins; its tags are below.", reads="text"),
+    "terrain": TagSpec(
+        "Hills or a mesh that rays meet: a file beside the mission (.asc, .png, .tif, .vtk, .obj, .ply, .stl, .glb, .gltf, .off), or a "
+        "terrain .xml of the existing system. Attributes: `position` (x, y, z of its origin) [m]; of an image `cell`, a pixel's width [m], "
+        "and `height` of white [m]; of a mesh `scale`.",
+        reads="text",
+    ),
+    "ground": TagSpec("Flat ground at this height, which rays meet (addition to the format).", "none", "m"),
+    "wall": TagSpec(
+        "A box that rays meet (addition to the format). Attributes: `center` and `lengths` [m], `rpy` [deg], three numbers each.",
+        reads="text",
+    ),
+    "building": TagSpec(
+        "A polygon extruded upwards that rays meet (addition to the format). Attributes: `corners`, such as '[0 0] [9 0] [9 5]' [m], "
+        "`low` and `high`, the heights of its ends [m].",
+        reads="text",
+    ),
     "multi_threaded": _log("Threads; results do not depend on them."),
     "output_type": _log("Kinds of output of the existing system; a run directory has all of them."),
     "no_bin_logging": _log("Whether to leave out the trajectory.", "false", "truth"),
@@ -111,7 +127,6 @@ WORLD = {
     "enable_screenshots": _viewer("Attributes `min_period`, `start`, `end`.", "false", "truth"),
     "stream_ip": _viewer("Address of a remote viewer.", "localhost"),
     "stream_port": _viewer("Port of a remote viewer.", "50051"),
-    "terrain": _viewer("Heights of the ground: an .asc grid beside the mission file."),
 }
 """Tags of <runscript>."""
 
@@ -125,6 +140,14 @@ ENTITY = {
     "health": TagSpec("Initial health; an entity is removed at 0.", "1", bound="> 0"),
     "radius": TagSpec("Body radius.", "1", "m", bound="> 0"),
     "mass": TagSpec("Mass (addition to the format).", "1", "kg", bound="> 0"),
+    "box_x": TagSpec(
+        "Length of the box that rays meet instead of the sphere of `radius` (addition).",
+        "0",
+        "m",
+        bound=">= 0",
+    ),
+    "box_y": TagSpec("Its width.", "0", "m", bound=">= 0"),
+    "box_z": TagSpec("Its height.", "0", "m", bound=">= 0"),
     "x": TagSpec("Start position of the first entity, East.", "0", "m"),
     "y": TagSpec("North.", "0", "m"),
     "z": TagSpec("Up.", "0", "m"),

@@ -17,7 +17,7 @@ from tussle.mission.plugin_tags import RATED
 from tussle.mission.problems import Place
 from tussle.mission.spec import Block, Mission
 from tussle.mission.tags import BASE, ENTITY, RUN, SEED_ATTRIBUTES, WORLD, TagSpec
-from tussle.scene import Base, Scene
+from tussle.scene import Base, Cuboid, HeightField, Prism, Scene, TriangleMesh
 from tussle.texts import shown
 
 NOWHERE = Place("", 0)
@@ -28,6 +28,7 @@ COMPONENTS = {
     "velocity": ("vx", "vy", "vz"),
     "variance": ("variance_x", "variance_y", "variance_z"),
     "half_width": ("half_width_x", "half_width_y", "half_width_z"),
+    "box": ("box_x", "box_y", "box_z"),
 }
 """Values of a block that are three tags each."""
 TAGS = {
@@ -59,11 +60,6 @@ def to_xml(mission: Mission, seed: int | None = None) -> str:
     Raises:
         MissionError: A value of the mission cannot be written in a mission file.
     """
-    for name in ("ground", "walls", "boundaries"):
-        if getattr(mission.scene, name) != getattr(Scene(), name):
-            raise MissionError(
-                f"mission: scene.{name} has no tag in mission files; write the mission as Python instead"
-            )
     titles = {"name": mission.name, "compat": mission.compat}
     root = _node("runscript", {name: text for name, text in titles.items() if text})
     run = {
@@ -84,6 +80,7 @@ def to_xml(mission: Mission, seed: int | None = None) -> str:
             raise MissionError(
                 f"mission: {plugin.instance_name} has the law of SCRIMMAGE, but the mission does not; give it compat='scrimmage'"
             )
+    root.children += _scene(mission.scene)
     plugins = (
         ("network", mission.networks),
         ("entity_interaction", mission.interactions),
@@ -100,6 +97,37 @@ def to_xml(mission: Mission, seed: int | None = None) -> str:
     for base in mission.scene.bases:
         _add_base(base, mission.blocks, entities)
     return f'<?xml version="1.0"?>\n{root.to_text()}'
+
+
+def _scene(scene: Scene) -> Iterator[Node]:
+    """Tags of ground, walls and surfaces.
+
+    Raises:
+        MissionError: A part has no tag.
+    """
+    if scene.ground is not None:
+        yield _node("ground", text=codecs.written(scene.ground.height))
+    for wall in scene.walls:
+        if isinstance(wall, Cuboid):
+            place = {"center": codecs.written(wall.center), "lengths": codecs.written(wall.lengths)}
+            yield _node("wall", place | {"rpy": codecs.written(wall.rpy, ("rad",) * 3, ("deg",) * 3)})
+        elif isinstance(wall, Prism):
+            ends = {"low": codecs.written(wall.low), "high": codecs.written(wall.high)}
+            yield _node("building", {"corners": codecs.written(wall.corners), **ends})
+        else:
+            raise _no_tag(f"wall {wall!r}")
+    surfaces: list[HeightField | TriangleMesh] = [*scene.meshes]
+    surfaces += [] if scene.terrain is None else [scene.terrain]
+    for surface in surfaces:
+        if not surface.tag:
+            raise _no_tag(repr(surface))
+        yield _node("terrain", dict(surface.tag[1:]), surface.tag[0][1])
+    if scene.boundaries:
+        raise _no_tag("scene.boundaries")
+
+
+def _no_tag(part: str) -> MissionError:
+    return MissionError(f"mission: {part} has no tag in mission files; write the mission as Python instead")
 
 
 def _node(tag: str, attributes: dict[str, str] | None = None, text: str = "") -> Node:
@@ -208,7 +236,7 @@ def to_python(mission: Mission, seed: int | None = None) -> str:
         seed: Seed of the game; 1 if it is None.
 
     Raises:
-        MissionError: Two classes have the same name.
+        MissionError: Two classes have the same name, or the mission has a height field or a mesh.
     """
     imports: dict[str, str] = {"Mission": "tussle", "Simulation": "tussle"}
     made = "\n".join(_code(mission, imports))
@@ -241,6 +269,10 @@ def _code(value: Any, imports: dict[str, str]) -> list[str]:
         return ["[", *(f"    {line}" for each in value for line in _comma(_code(each, imports))), "]"]
     if not _is_made(value):
         return [repr(value)]
+    if isinstance(value, (HeightField, TriangleMesh)):
+        raise MissionError(
+            f"mission: {value!r} cannot be written as code; write the mission without it, and read it with tussle.rays.files.read_surface"
+        )
     name = type(value).__name__
     module = "tussle" if isinstance(value, (Block, Mission)) else type(value).__module__
     module = next((shipped for shipped in SHIPPED if module.startswith(f"{shipped}.")), module)

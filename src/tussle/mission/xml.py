@@ -21,6 +21,7 @@ from tussle.mission.overrides import TreeEditor, as_texts
 from tussle.mission.plugin_files import PluginFile
 from tussle.mission.plugin_tags import PluginReader
 from tussle.mission.problems import Place, Problems
+from tussle.mission.scene_tags import SCENE_TAGS, SceneReader
 from tussle.mission.source import MissionSource, SourceReader, find_mission
 from tussle.mission.spec import MISSION_VALUES, Mission, end_conditions
 from tussle.mission.tags import RUN, RUNSCRIPT, SEED_ATTRIBUTES, WORLD, TagSpec
@@ -106,7 +107,8 @@ def read_mission(
     paths = {name: tree.set(name, value) for name, value in given.items() if name not in read.placeholders}
     if paths:
         read.text = read.root.to_text()
-    return replace(_WorldReader(read, catalogue, problems, budget).loaded(), settings=settings | paths)
+    reader = _WorldReader(read, catalogue, problems, budget, [path.parent, *map(Path, search)])
+    return replace(reader.loaded(), settings=settings | paths)
 
 
 def _catalogue(read: MissionSource, compat: str | None, plugin_files: Sequence[Any]) -> Catalogue:
@@ -131,9 +133,14 @@ class _WorldReader:
     """Reads the tags of <runscript>."""
 
     def __init__(
-        self, source: MissionSource, catalogue: Catalogue, problems: Problems, budget: Budget
+        self,
+        source: MissionSource,
+        catalogue: Catalogue,
+        problems: Problems,
+        budget: Budget,
+        folders: list[Path],
     ) -> None:
-        self.source = source
+        self.source, self.folders = source, folders
         self.catalogue = catalogue
         self.problems = problems
         self.budget, self.limits = budget, budget.limits
@@ -160,6 +167,8 @@ class _WorldReader:
         self._count_tags(nodes)
         blocks = [entities.block(node, name) for node, name in zip(nodes, block_names(nodes), strict=True)]
         conditions, seed, reseed = self._end_conditions(), self._seed(), self._reseed()
+        scene = SceneReader(root, self.folders, origin, problems)
+        parts = scene.parts()
         self._settings()
         if entities.viewer:
             self.viewer["entities"] = entities.viewer
@@ -173,7 +182,7 @@ class _WorldReader:
             mission = Mission(
                 blocks=[block for block in blocks if block is not None],
                 end_conditions=conditions,
-                scene=Scene(origin=origin, bases=tuple(entities.bases)),
+                scene=Scene(origin=origin, bases=tuple(entities.bases), **parts),
                 name=name,
                 compat=root.attributes.get("compat", ""),
                 limits=self.limits,
@@ -184,7 +193,7 @@ class _WorldReader:
         places = {block: str(place) for block, place in entities.places.items()}
         return Loaded(
             mission, seed, name or self.source.path.stem, self.source.path, self.source.text, problems.notes, self.viewer, self.log,
-            self.source.placeholders, places, tuple(self.source.files),
+            self.source.placeholders, places, (*self.source.files, *scene.files),
         )  # fmt: skip
 
     def _count_tags(self, entities: list[Node]) -> None:
@@ -315,7 +324,7 @@ class _WorldReader:
                 self._keep(
                     self.viewer if known.kept_for == "viewer" else self.log, node.tag, node, known, node.tag
                 )
-            elif node.tag not in ("run", "seed", "entity", "param_common", *PLUGIN_TAGS):
+            elif node.tag not in ("run", "seed", "entity", "param_common", *PLUGIN_TAGS, *SCENE_TAGS):
                 for attribute in node.attributes:
                     self.problems.unknown(node.where(attribute), f"attribute of <{node.tag}>", attribute, ())
 

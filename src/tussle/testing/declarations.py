@@ -18,8 +18,8 @@ from tussle.errors import ConformanceError, TussleError, listed
 
 RULE = "declarations"
 HOOKS_NAMES = """
-    spawn spawn_one step step_one start start_one result result_one route regions named_regions needed_services walls rejects from_body
-    to_body derivative advance active_inputs reads_all grade passthrough abstract kind historic_attributes transmit
+    spawn spawn_one step step_one start start_one result result_one route regions named_regions needed_services walls terrain rejects
+    from_body to_body derivative advance active_inputs reads_all grade passthrough abstract kind historic_attributes transmit
     losses unused_states check_values reads_start_positions waits_for_traffic
 """
 HOOKS = frozenset(HOOKS_NAMES.split())
@@ -86,9 +86,19 @@ def _hooks(cls: type[Plugin]) -> Iterator[str]:
             yield "it has neither derivative nor row laws nor advance"
     elif issubclass(cls, (Interaction, Metric)) and all(
         getattr(cls, k, cls.step).__module__.startswith("tussle.api.")
-        for k in ("start", "step", "result", "start_one", "step_one", "result_one", "regions", "walls")
+        for k in (
+            "start",
+            "step",
+            "result",
+            "start_one",
+            "step_one",
+            "result_one",
+            "regions",
+            "walls",
+            "terrain",
+        )
     ):
-        yield "it has neither start nor step nor result, and defines no regions or walls"
+        yield "it has neither start nor step nor result, and defines no regions, walls or terrain"
 
 
 def _column(name: str, column: Column) -> Iterator[str]:

@@ -6,7 +6,6 @@ import math
 import threading
 from collections.abc import Callable, Mapping
 from functools import cached_property
-from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
@@ -56,7 +55,6 @@ class Live:
         snapshot_every: Least simulated time between snapshots [s]; they are also limited to 1 % of the CPU time.
         memory: Memory for snapshots and past frames [MB], half of it for each.
         viewer: Viewer tags of the mission file, see `tussle.mission.Loaded`.
-        folder: Folder of the mission file, with its terrain.
 
     Raises:
         ParameterError: A value is not allowed.
@@ -73,7 +71,6 @@ class Live:
         snapshot_every: float = 1.0,
         memory: float = 256.0,
         viewer: Mapping[str, Any] | None = None,
-        folder: Path | None = None,
     ) -> None:
         for name, value in (("snapshot_every", snapshot_every), ("memory", memory)):
             if not 0.0 < value < math.inf:
@@ -83,7 +80,6 @@ class Live:
                 f"world = {world!r} is not allowed; there are worlds 0 to {simulation.n_worlds - 1}"
             )
         self.simulation, self.world, self.viewer = simulation, world, dict(viewer or {})
-        self._folder = folder
         self._clock = simulation.state.context.clock
         self._collector = DrawCollector(simulation, world)
         self._pace = Pace(checked_warp(pace))
@@ -403,4 +399,4 @@ class Live:
     @cached_property
     def scenery(self) -> Scenery:
         """Ground, bases, boundaries and terrain."""
-        return scenery_of(self.simulation.mission, self.viewer, folder=self._folder)
+        return scenery_of(self.simulation.mission, self.viewer)

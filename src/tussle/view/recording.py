@@ -388,7 +388,9 @@ class Recording:
             )
             return None
         try:
-            return read_mission(path.resolve(), plugin_files=self._plugin_files)
+            loaded = read_mission(path.resolve(), plugin_files=self._plugin_files)
+            self.notes.extend(note for note in loaded.notes if "<terrain>" in note)
+            return loaded
         except TussleError as error:
             first = str(error).splitlines()[0]
             self.notes.append(
@@ -419,7 +421,7 @@ class Recording:
     @cached_property
     def scenery(self) -> Scenery:
         """Ground, bases, boundaries and terrain."""
-        return scenery_of(self.mission, self.viewer, self.extent, self.path)
+        return scenery_of(self.mission, self.viewer, self.extent)
 
     def __len__(self) -> int:
         return self.n_frames

@@ -5,18 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from tussle.errors import TussleError, ViewError
+from tussle.errors import TussleError
 from tussle.geodesy import Origin
 from tussle.mission import Block, Mission
-from tussle.scene import Base, Cuboid, Plane, Polyhedron, Prism, Sphere, Volume
+from tussle.scene import Base, Cuboid, HeightField, Plane, Polyhedron, Prism, Sphere, TriangleMesh, Volume
 from tussle.view.shapes import Mesh
-from tussle.view.solids import mesh_of, outline_of
-from tussle.view.terrain import Terrain, find_terrain
+from tussle.view.solids import MOST_FACES, mesh_of, outline_of
+from tussle.view.terrain import Terrain
 
 LEAST_EXTENT = 50.0
 """Least width of the visible box [m]."""
@@ -39,7 +38,7 @@ class Region:
 
     name: str
     team: int | None
-    shape: Volume
+    shape: Volume | TriangleMesh
     is_wall: bool
     mesh: Mesh
     outline: np.ndarray
@@ -85,7 +84,6 @@ def scenery_of(
     mission: Mission | None,
     viewer: Mapping[str, Any] | None = None,
     extent: tuple[np.ndarray, np.ndarray] | None = None,
-    folder: Path | None = None,
 ) -> Scenery:
     """The scenery of a mission.
 
@@ -93,17 +91,19 @@ def scenery_of(
         mission: The mission; None if it is unknown, which leaves ground and grid.
         viewer: Viewer tags of the mission file, see `tussle.mission.Loaded`.
         extent: Lower and upper corner of all positions of a game [m], each (3,); by default of the initial positions.
-        folder: Folder of the mission file, with its terrain.
     """
     viewer = viewer or {}
     corners = [np.asarray(c, float) for c in extent or ()]
     notes: list[str] = []
+    hills: HeightField | None = None
     shapes = _shapes(mission, notes) if mission is not None else []
     if mission is not None:
         if not corners:
             corners += [c for block in mission.blocks for c in _start(block)]
         corners += [np.add(b.position, s * b.radius) for b in mission.scene.bases for s in (-1.0, 1.0)]
         corners += [c for _, _, shape, _ in shapes for c in _corners(shape)]
+        hills = mission.scene.terrain or _generated(mission, notes)
+        corners += [] if hills is None else _corners_of_field(hills)
     low, high = _at_least(np.array(corners).reshape(-1, 3))
     scene = None if mission is None else mission.scene
     spacing = viewer.get("grid_spacing", 0.0)
@@ -119,7 +119,7 @@ def scenery_of(
             Region(name, team, shape, is_wall, mesh_of(shape, low, high), outline_of(shape, low, high))
             for name, team, shape, is_wall in shapes
         ],
-        terrain=_terrain(viewer, folder, notes),
+        terrain=None if hills is None else Terrain.of(hills),
         background=_background(viewer, notes),
         notes=tuple(notes),
     )
@@ -133,11 +133,15 @@ def _start(block: Block) -> list[np.ndarray]:
     return [np.array(block.position) - spread, np.array(block.position) + spread]
 
 
-def _shapes(mission: Mission, notes: list[str]) -> list[tuple[str, int | None, Volume, bool]]:
+def _shapes(mission: Mission, notes: list[str]) -> list[tuple[str, int | None, Volume | TriangleMesh, bool]]:
     """Name, team, shape and whether it is a wall, of all regions of a mission; walls of plugins have no names."""
-    found: list[tuple[str, int | None, Volume, bool]] = []
+    found: list[tuple[str, int | None, Volume | TriangleMesh, bool]] = []
     scene = mission.scene
     found += [(str(name), None, shape, False) for name, shape in scene.boundaries.items()]
+    for i, mesh in enumerate(scene.meshes, 1):
+        found.append((f"mesh {i}", None, mesh, True))
+        if len(mesh.faces) > MOST_FACES:
+            notes.append(f"mesh {i} has {len(mesh.faces):,} triangles; {MOST_FACES:,} of them are shown")
     found += [(f"wall {i + 1}", None, shape, True) for i, shape in enumerate(scene.walls)]
     found += [(p.instance_name, r.team, r.shape, False) for p in mission.interactions for r in p.regions()]
     for plugin in mission.interactions:
@@ -148,16 +152,33 @@ def _shapes(mission: Mission, notes: list[str]) -> list[tuple[str, int | None, V
     return found
 
 
-def _corners(shape: Volume) -> list[np.ndarray]:
+def _corners(shape: Volume | TriangleMesh) -> list[np.ndarray]:
     """Corners of a box around a shape; none for an infinite one."""
     if isinstance(shape, Sphere):
         return [np.array(shape.center) - shape.radius, np.array(shape.center) + shape.radius]
-    if isinstance(shape, (Cuboid, Polyhedron, Prism)):
+    if isinstance(shape, (Cuboid, Polyhedron, Prism, TriangleMesh)):
         nothing = np.zeros(3)
         vertices = mesh_of(shape, nothing, nothing).vertices.astype(float)
         return [vertices.min(axis=0), vertices.max(axis=0)]
     assert not isinstance(shape, Plane) or shape.normal
     return []
+
+
+def _generated(mission: Mission, notes: list[str]) -> HeightField | None:
+    """The terrain of a plugin."""
+    for plugin in mission.interactions:
+        try:
+            if (found := plugin.terrain()) is not None:
+                return found  # type: ignore[no-any-return]
+        except TussleError as error:
+            notes.append(f"{error}; its terrain is not shown")
+    return None
+
+
+def _corners_of_field(field: HeightField) -> list[np.ndarray]:
+    west, south, cell, _, low, high = field.grid
+    ny, nx = field.height.shape
+    return [np.array([west, south, low]), np.array([west + cell * (nx - 1), south + cell * (ny - 1), high])]
 
 
 def _at_least(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -186,18 +207,6 @@ def _origin_length(viewer: Mapping[str, Any], low: np.ndarray, high: np.ndarray)
         return 0.0
     said = viewer.get("origin_length", 0.0)
     return float(said) if said > 0.0 else _grid_step(low, high)
-
-
-def _terrain(viewer: Mapping[str, Any], folder: Path | None, notes: list[str]) -> Terrain | None:
-    named = viewer.get("terrain")
-    name = str(named.get("value", "") if isinstance(named, dict) else named or "").strip()
-    if not name:
-        return None
-    try:
-        return find_terrain(name, folder)
-    except ViewError as error:
-        notes.append(f"{error}; a flat ground is shown")
-        return None
 
 
 def _background(viewer: Mapping[str, Any], notes: list[str]) -> tuple[int, int, int] | None:

@@ -6,14 +6,16 @@ from itertools import combinations
 
 import numpy as np
 
-from tussle.scene import Convex, FlatGround, Plane, Prism, Sphere, Volume
+from tussle.scene import Convex, FlatGround, Plane, Prism, Sphere, TriangleMesh, Volume
 from tussle.view.shapes import Mesh, ball
 
+MOST_FACES = 100_000
+"""Triangles of a mesh that are drawn."""
 N_CIRCLE = 48
 """Lines of each circle that outlines a sphere."""
 
 
-def mesh_of(shape: Volume, low: np.ndarray, high: np.ndarray) -> Mesh:
+def mesh_of(shape: Volume | TriangleMesh, low: np.ndarray, high: np.ndarray) -> Mesh:
     """The surface of a shape.
 
     Args:
@@ -21,13 +23,17 @@ def mesh_of(shape: Volume, low: np.ndarray, high: np.ndarray) -> Mesh:
         low: Lower corner of the visible box [m], (3,), to which infinite shapes are cut.
         high: Upper corner [m], (3,).
     """
+    if isinstance(shape, TriangleMesh):
+        return Mesh(shape.vertices, shape.faces[:MOST_FACES])
     if isinstance(shape, Sphere):
         return ball(3).placed(2.0 * shape.radius, shape.center)
     return _polygons(_rings(shape, low, high))
 
 
-def outline_of(shape: Volume, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+def outline_of(shape: Volume | TriangleMesh, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     """Edges of a shape, or three circles of a sphere: ends of lines [m], (k, 2, 3), float32."""
+    if isinstance(shape, TriangleMesh):
+        return np.zeros((0, 2, 3), np.float32)
     if isinstance(shape, Sphere):
         angle = 2.0 * np.pi * np.arange(N_CIRCLE + 1) / N_CIRCLE
         wave = np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], 1) * shape.radius

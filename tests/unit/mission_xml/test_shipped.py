@@ -107,6 +107,19 @@ def test_a_survey_has_a_best_speed():
     assert energy[0] > energy[1] > energy[2] == 0.0
 
 
+def test_cars_find_their_way_through_the_maze():
+    """No car passes through a wall, and some leave the corridor in which they begin."""
+    loaded = read_mission("car_maze", {"end": "40"}, strict=True)
+    sim = Simulation(loaded.mission, seeds=loaded.seed)
+    last, farthest = sim.read("cars.pos")[0][0], -100.0
+    while not sim.is_over:
+        sim.step(5)
+        pos = sim.read("cars.pos")[0][0]
+        assert loaded.mission.scene.line_of_sight(last.T, pos.T).all()
+        last, farthest = pos, max(farthest, pos[:, 0].max())
+    assert farthest > -30.0
+
+
 @pytest.mark.parametrize("name", GAMES)
 def test_the_games_are_those_built_in_python(name):
     loaded = read_mission(name, {"end": "20"}, strict=True)
@@ -124,7 +137,7 @@ OTHERS = ("convoy", "auction_search", "underwater_survey")
 
 def test_shipped_missions_have_titles_and_are_packaged():
     shipped = shipped_missions()
-    assert set(shipped) == {*GAMES, *ON_REGIONS, *OTHERS}
+    assert set(shipped) == {*GAMES, *ON_REGIONS, *OTHERS, "car_maze"}
     for path, title in shipped.values():
         assert title
         assert read_mission(path, strict=True).name == title

@@ -17,7 +17,7 @@ from tussle import Block, Mission
 from tussle.api import Interaction
 from tussle.errors import MissionError
 from tussle.mission import Loaded, read_mission, shipped_missions, to_python, to_xml
-from tussle.scene import Base, FlatGround, Scene
+from tussle.scene import Base, Scene, Sphere
 from tussle.stock import Boids, MotorSchemas, MoveToGoalMS, SimpleCollision, SphereNetwork, Still
 
 OWN = [sys.modules[name].__file__ for name in ("random_missions", "golden_plugins")]
@@ -94,7 +94,7 @@ class Collision:
 @pytest.mark.parametrize(
     ("mission", "words"),
     [
-        (Mission(blocks=[a()], scene=Scene(ground=FlatGround())), "scene.ground"),
+        (Mission(blocks=[a()], scene=Scene(walls=(Sphere(),))), "wall Sphere.*has no tag"),
         (Mission(blocks=[a(name="my block")]), "'my_block'"),
         (Mission(blocks=[a()], interactions=[SimpleCollision(rate=5.0)]), "SimpleCollision: .*loop_rate"),
         (Mission(blocks=[a(team=1)], scene=Scene(bases=(Base(2, (0, 0, 0)),))), "base of team 2"),

@@ -40,7 +40,7 @@ class Looks(Metric):
     def step(self, w):
         origin = np.array([[105.0], [23.0], [5.0]])
         ways = np.array([(1, 0, 0), (0, 1, 0), (-1, 0, 0), (0, -1, 0), (0, 0, -1)], float).T
-        self.seen[:] = w.scene.ray(np.repeat(origin, 5, axis=1), ways)[:, None]
+        self.seen[:] = w.scene.cast(np.repeat(origin, 5, axis=1), ways).distance[:, None]
 
 
 def test_dark_pixels_are_walls(maze):

@@ -1,0 +1,70 @@
+"""Rays of entities: they meet the scene, and the other entities of their world."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from tussle.api.bodies import Bodies
+from tussle.api.context import Context
+from tussle.errors import ParameterError
+from tussle.rays import kernels
+from tussle.rays.hits import Hits, new_rays
+
+RAYS_PER_THREAD = 1024
+
+
+def cast(
+    context: Context,
+    bodies: Bodies,
+    rays: tuple[Any, Any, Any],
+    world: np.ndarray,
+    own: np.ndarray,
+    entities: bool,
+) -> Hits:
+    """The first hits of rays.
+
+    Args:
+        context: Scene and threads.
+        bodies: The body table.
+        rays: Origins [m] and directions, (3, n), and the maximum range [m].
+        world: World of each ray, (n,).
+        own: Row of the entity that a ray does not meet, (n,); -1 for none.
+        entities: Whether rays meet entities.
+
+    Raises:
+        ParameterError: A shape does not fit, or a value is not allowed.
+    """
+    solids = context.scene.caster
+    start, way, distance, code = new_rays(*rays)
+    n = start.shape[1]
+    if world.shape != (n,):
+        raise ParameterError(
+            f"there are {n} rays and {len(world)} rows or worlds; their numbers must be equal"
+        )
+    wrong = world[(world < 0) | (world >= bodies.n_worlds)]
+    if len(wrong):
+        raise ParameterError(f"world {wrong[0]} is not allowed; there are worlds 0 to {bodies.n_worlds - 1}")
+
+    def split(m: int, run: Any) -> None:
+        context.split(m, run, RAYS_PER_THREAD)
+
+    solids.first_hits(start, way, distance, code, split)
+    if not (entities and bodies.n):
+        return solids.hits(start, way, distance, code)
+    tree = bodies.tree(context.boxes)
+    around = start, way, np.ascontiguousarray(world, np.int64), np.asarray(own, np.float64)
+    found = distance, code, float(solids.n_codes)
+    split(n, lambda *part: kernels.cast(tree.tree, tree.places, around, found, part))
+    hits = solids.hits(start, way, distance, code)
+    is_body = (code >= solids.n_codes) & (code < np.inf)
+    rows = code[is_body].astype(np.int64) - solids.n_codes
+    hits.id[is_body] = bodies.id[rows]
+
+    def normal(hits: Hits) -> np.ndarray:
+        found = solids.normal(hits)
+        found[:, is_body] = tree.normal(rows, hits.points[:, is_body])
+        return found
+
+    return Hits(hits.distance, hits.id, hits.solid, start, way, normal, code)

@@ -1,0 +1,161 @@
+"""Tags of the scene: <terrain>, <ground>, <wall>, <building>."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from tussle.errors import MissionError, TussleError
+from tussle.mission import codecs
+from tussle.mission.node import Node
+from tussle.mission.problems import Problems
+from tussle.mission.terrain_xml import read_terrain_xml
+from tussle.rays.files import SUFFIXES, read_surface
+from tussle.scene import Cuboid, FlatGround, HeightField, Origin, Prism, TriangleMesh, Volume
+from tussle.texts import shown
+
+SCENE_TAGS = ("terrain", "ground", "wall", "building")
+MOST_WALLS = 20_000
+TERRAIN = {"position": "m", "scale": "", "cell": "m", "height": "m"}
+WALL = {"center": "m", "lengths": "m", "rpy": "rad"}
+BUILDING = {"corners": "m", "low": "m", "high": "m"}
+
+
+class SceneReader:
+    """Reads the tags of the scene.
+
+    Args:
+        root: The mission's root tag.
+        folders: Folders in which files of surfaces may lie: the mission's own first.
+        origin: Origin of the world frame.
+        problems: Receives errors and notes.
+    """
+
+    def __init__(self, root: Node, folders: Sequence[Path], origin: Origin, problems: Problems) -> None:
+        self.root, self.folders, self.origin, self.problems = root, list(folders), origin, problems
+        self.files: list[Path] = []
+
+    def parts(self) -> dict[str, Any]:
+        """Return ground, walls, terrain and meshes, as arguments of `Scene`."""
+        grounds = self._each("ground", (), lambda node, _: FlatGround(codecs.number(node.text, "m")))
+        walls: list[Volume] = [*self._each("wall", WALL, _wall), *self._each("building", BUILDING, _building)]
+        if len(walls) > MOST_WALLS:
+            self.problems.error(
+                self.root.place, f"there are {len(walls):,} walls and buildings; the limit is {MOST_WALLS:,}"
+            )
+        surfaces = self._each("terrain", TERRAIN, self._surface)
+        fields = [each for each in surfaces if isinstance(each, HeightField)]
+        if len(fields) > 1:
+            self.problems.error(
+                self.root.place, "there are several <terrain> with a height field; a mission has at most one"
+            )
+        meshes = tuple(each for each in surfaces if isinstance(each, TriangleMesh))
+        return {
+            "ground": grounds[-1] if grounds else None,
+            "walls": tuple(walls),
+            "terrain": fields[0] if fields else None,
+            "meshes": meshes,
+        }
+
+    def _each(self, tag: str, attributes: Any, make: Callable[[Node, dict[str, str]], Any]) -> list[Any]:
+        """What is made of the tags of a name; errors are reported with their places."""
+        found = []
+        for node in self.root.find_all(tag):
+            for name in node.attributes:
+                if name not in attributes:
+                    self.problems.unknown(node.where(name), f"attribute of <{tag}>", name, attributes)
+            try:
+                made = make(node, dict(node.attributes))
+            except TussleError as error:
+                self.problems.error(node.place, f"<{tag}>: {error}")
+                continue
+            if made is not None:
+                found.append(made)
+        return found
+
+    def _surface(self, node: Node, given: dict[str, str]) -> HeightField | TriangleMesh | None:
+        name = node.text.strip()
+        if not name:
+            return None
+        path = self._find(name)
+        if path is None:
+            self.problems.note(
+                node.place,
+                f"<terrain>: there is no {shown(name)} beside the mission, so the mission has no terrain; it takes a file of "
+                f"{', '.join(SUFFIXES)} or a terrain .xml",
+            )
+            return None
+        numbers: dict[str, Any] = {
+            key: codecs.number(given[key], TERRAIN[key])
+            for key in ("scale", "cell", "height")
+            if key in given
+        }
+        if "position" in given:
+            numbers["position"] = _numbers(given["position"], 3, "position", "m")
+        self.files.append(path)
+        if path.suffix.lower() == ".xml":
+            surface, inner = read_terrain_xml(path, self._inside, self.origin, numbers)
+            self.files.append(inner)
+        else:
+            surface = read_surface(path, **numbers)
+        return replace(surface, tag=(("", name), *given.items()))
+
+    def _find(self, name: str) -> Path | None:
+        """The file of a name in one of the folders; None if there is none.
+
+        Raises:
+            MissionError: It lies outside of them.
+        """
+        for folder in self.folders:
+            for candidate in (name, f"{name}.xml"):
+                path = folder / candidate
+                try:
+                    is_file = path.is_file()
+                except (OSError, ValueError):
+                    is_file = False
+                if is_file:
+                    self._inside(path)
+                    return path
+        return None
+
+    def _inside(self, path: Path) -> None:
+        """Check that a path, links followed, is inside a folder of the mission.
+
+        Raises:
+            MissionError: It is not.
+        """
+        if not any(path.resolve().is_relative_to(folder.resolve()) for folder in self.folders):
+            raise MissionError(f"{path}: only files in the mission's folder or below it are read")
+
+
+def _wall(_: Node, given: dict[str, str]) -> Cuboid:
+    values: dict[str, Any] = {
+        key: _numbers(text, 3, key, WALL[key]) for key, text in given.items() if key in WALL
+    }
+    return Cuboid(**values)
+
+
+def _building(_: Node, given: dict[str, str]) -> Prism:
+    corners = [
+        _numbers(text, 2, "corners", "m")
+        for text in given.get("corners", "").replace("]", "[").split("[")
+        if text.strip(" ,")
+    ]
+    low, high = (
+        codecs.number(given.get(name, default), "m") for name, default in (("low", "0"), ("high", "10"))
+    )
+    return Prism(tuple(corners), low, high)  # type: ignore[arg-type]
+
+
+def _numbers(text: str, n: int, name: str, unit: str) -> tuple[float, ...]:
+    """Numbers separated by commas, or by blanks; bare angles are in degrees.
+
+    Raises:
+        MissionError: There are not n numbers.
+    """
+    words = text.split(",") if "," in text else text.split()
+    if len(words) != n:
+        raise MissionError(f"{name} = {shown(text)} has {len(words)} numbers; it takes {n}")
+    return tuple(codecs.number(word, unit, "deg" if unit == "rad" else "") for word in words)

@@ -1,0 +1,1 @@
+"""Rays: surfaces, trees over them, and the first hits of rays."""

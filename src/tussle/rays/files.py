@@ -1,0 +1,132 @@
+"""Surfaces from files, which are untrusted: what a file announces is checked before memory is taken for it."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import stat
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tussle.errors import MissingExtraError, ParameterError, listed, nearest_name
+from tussle.rays.grids import read_ascii_grid, read_image
+from tussle.rays.surfaces import MOST_FACES, HeightField, TriangleMesh
+from tussle.rays.vtk import read_vtk
+
+MOST_BYTES = 64_000_000
+IMAGES = (".png", ".tif", ".tiff")
+BY_TRIMESH = (".obj", ".ply", ".stl", ".glb", ".gltf", ".off")
+SUFFIXES = (".asc", *IMAGES, ".vtk", *BY_TRIMESH)
+ELEMENT = re.compile(rb"^element\s+\w+\s+(\d+)", re.MULTILINE)
+
+
+def read_surface(
+    path: Path | str, *, cell: float | None = None, height: float | None = None, scale: float = 1.0,
+    position: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> HeightField | TriangleMesh:  # fmt: skip
+    """Read a height field or a mesh from a file.
+
+    Args:
+        path: An ASCII grid (.asc), an image (.png, .tif; needs Pillow), legacy VTK poly data (.vtk), or a mesh that trimesh reads (.obj,
+            .ply, .stl, .glb, .gltf, .off).
+        cell: Of an image: width of a pixel [m]; a GeoTIFF in metres has its own.
+        height: Of an image: height of white above black [m]; not needed for a TIFF of heights.
+        scale: Of a mesh: length of its unit [m].
+        position: Where the file's origin is in the world [m]; of an image, its south-western pixel.
+
+    Raises:
+        MissingExtraError: The package that reads the format is not installed.
+        ParameterError: The file cannot be read, is too large, or holds something else.
+    """
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise ParameterError(
+            f"{path}: {suffix!r} is no format of surfaces{nearest_name(suffix, SUFFIXES)}; {listed(SUFFIXES)}"
+        )
+    if not (0.0 < scale < np.inf and np.isfinite(position).all()):
+        raise ParameterError(
+            f"{path}: scale = {scale!r} at {position!r} is not allowed; it takes a scale > 0 and finite numbers"
+        )
+    data = _bytes(path)
+    try:
+        if suffix == ".asc":
+            found: HeightField | TriangleMesh = read_ascii_grid(path, data)
+        elif suffix in IMAGES:
+            found = read_image(path, cell, height)
+        else:
+            vertices, faces = read_vtk(data) if suffix == ".vtk" else _by_trimesh(path, data)
+            found = TriangleMesh(vertices * scale + np.array(position), faces)
+    except ParameterError as error:
+        raise ParameterError(str(error) if str(error).startswith(str(path)) else f"{path}: {error}") from None
+    if isinstance(found, HeightField):
+        x, y, z = position
+        return HeightField(found.height + z, found.west + x, found.south + y, found.cell)
+    return found
+
+
+def _bytes(path: Path) -> bytes:
+    try:
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode):  # opening a pipe or a device can block forever
+            raise ParameterError(f"{path}: it is not a regular file")
+        if status.st_size > MOST_BYTES:
+            raise ParameterError(f"{path}: the file has more than {MOST_BYTES // 1_000_000} MB")
+        return path.read_bytes()
+    except (OSError, ValueError) as error:
+        if isinstance(error, ParameterError):
+            raise
+        raise ParameterError(
+            f"{path}: the file cannot be read: {getattr(error, 'strerror', None) or error}"
+        ) from None
+
+
+def _announced(suffix: str, data: bytes) -> int:
+    """The largest number of elements that a file announces, for which a reader may take memory at once."""
+    if suffix == ".ply":
+        return max((int(n) for n in ELEMENT.findall(data[: data.find(b"end_header")])), default=0)
+    if suffix in (".glb", ".gltf"):
+        text = data
+        if data[:4] == b"glTF":
+            text = data[20 : 20 + int.from_bytes(data[12:16], "little")]
+        content = json.loads(text)
+        counts = [each.get("count", 0) for each in content.get("accessors", ())]
+        # Instances of one mesh count each time.
+        return int(
+            max(
+                [
+                    *counts,
+                    sum(counts)
+                    * max(1, len(content.get("nodes", ())) // max(1, len(content.get("meshes", (0,))))),
+                ]
+            )
+        )
+    if suffix == ".stl" and data[:5] != b"solid":
+        return int.from_bytes(data[80:84], "little")
+    return 0
+
+
+def _by_trimesh(path: Path, data: bytes) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (n, 3) and faces (m, 3)."""
+    try:
+        import trimesh
+    except ImportError:
+        raise MissingExtraError(f"{path}: meshes need trimesh: pip install 'tussle[scene]'") from None
+    suffix = path.suffix.lower()
+    try:
+        if _announced(suffix, data) > 3 * MOST_FACES:
+            raise ParameterError(f"{path}: the mesh announces more than {MOST_FACES:,} triangles")
+        # Without a path and a resolver, the file cannot make trimesh read other files.
+        made: Any = trimesh.load(
+            io.BytesIO(data), file_type=suffix[1:], force="mesh", process=False, skip_materials=True
+        )
+        return np.asarray(made.vertices, float), np.asarray(made.faces)
+    except ParameterError:
+        raise
+    except Exception as error:
+        raise ParameterError(
+            f"{path}: it cannot be read as {suffix}: {type(error).__name__}: {str(error)[:200]}"
+        ) from error
