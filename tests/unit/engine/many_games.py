@@ -11,6 +11,12 @@ from tussle import Block, Mission, Simulation, stock
 from tussle.api import Autonomy, Input, MotionModel, Output, Param, State
 
 N_WARM = 40
+ROOT = str(stock.examples()["JSBSimModel"].with_name("hawk"))
+GIVEN = {
+    "JSBSimControl": {"aircraft": "hawk", "jsbsim_root": ROOT},
+    "JSBSimModel": {"script_name": "patrol.xml", "jsbsim_root": ROOT},
+}
+"""Parameters without which a model cannot be played."""
 
 
 def own_model():
@@ -36,11 +42,11 @@ def own_model():
     return Lagging
 
 
-def mission(model):
+def mission(model, **params):
     """A mission of two robots that are told nothing."""
     told = {name: Output(" ".join(c.channels), unit=" ".join(c.units)) for name, c in model.inputs().items()}
     silent = type("Silent", (Autonomy,), {**told, "step": lambda self, g: None, "__doc__": "Say nothing."})
-    return Mission(blocks=[Block(name="a", count=2, autonomy=silent(), motion=model())])
+    return Mission(blocks=[Block(name="a", count=2, autonomy=silent(), motion=model(**params))])
 
 
 def resident():
@@ -55,7 +61,7 @@ def grown(name, n_games):
         games = (mission(own_model()) for _ in range(N_WARM + n_games))
     else:
         model = own_model() if name == "an author's own" else getattr(stock, name)
-        games = (game for game in [mission(model)] for _ in range(N_WARM + n_games))
+        games = (game for game in [mission(model, **GIVEN.get(name, {}))] for _ in range(N_WARM + n_games))
     before = 0.0
     for number, game in enumerate(games):
         if number == N_WARM:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 from tussle import Block, Mission, Simulation
@@ -17,7 +18,11 @@ N_GAMES = int(os.environ.get("TUSSLE_MEMORY_GAMES", "120"))
 MOST_GROWTH = (
     1.0 + 0.002 * N_GAMES
 )  # [MB]; allocators settle for some thousand games. What was kept took 20 kB a game and more
-SHIPPED = [name for name, path in manifest().items() if ".motion." in path]
+SHIPPED = [
+    name
+    for name, path in manifest().items()
+    if ".motion." in path and ("JSBSim" not in name or find_spec("jsbsim"))
+]
 MODELS = [*SHIPPED, "an author's own", "classes made on the fly"]
 
 
