@@ -11,6 +11,7 @@ from typing import Any
 from pages import ROOT
 from reference import about, described, members
 
+import tussle
 from tussle import stock
 from tussle.api import Plugin
 from tussle.cli.pages import KINDS, first_sentence
@@ -64,9 +65,14 @@ def index(found: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
+def in_sources(path: str | Path) -> Path:
+    """Path of an installed file of the package in the repository."""
+    return Path("src") / Path(path).relative_to(Path(tussle.__file__).parents[1])
+
+
 def plugin_page(name: str, cls: Any) -> str:
     """The page of one plugin."""
-    source = Path(inspect.getfile(cls)).relative_to(ROOT)
+    source = in_sources(inspect.getfile(cls))
     lines = [
         f"# {name}",
         "",
@@ -84,8 +90,7 @@ def plugin_page(name: str, cls: Any) -> str:
     example = stock.examples()[name]
     text = example.read_text(encoding="utf-8")
     files = (
-        f"[{file}](../../{example.parent.relative_to(ROOT)}/{file})"
-        for file in sorted({*BESIDE.findall(text)})
+        f"[{file}](../../{in_sources(example.parent)}/{file})" for file in sorted({*BESIDE.findall(text)})
     )
     beside = "".join(f" It reads {file}." for file in files)
     lines += [

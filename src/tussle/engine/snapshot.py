@@ -80,7 +80,7 @@ def restore(state: SimulationState, saved: Snapshot) -> None:
         raise SnapshotError(
             "the snapshot has entities of a block that has had none in this simulation; restore it into the simulation it was taken from"
         )
-    state.context.seeds[:] = saved.seeds
+    state.context.seeds[:] = state.context.keys[:] = saved.seeds
     population.close_handles()
     population.bodies.replace(world["floats"].copy(), world["ints"].copy())
     for group in population.groups:

@@ -29,15 +29,17 @@ from tussle.api import (
 )
 
 KINDS = (Behavior, Autonomy, Controller, MotionModel, Sensor, Interaction, Metric, Network)
-ON_FILES = ("GraphInteraction", "JSBSimControl", "JSBSimModel", "MapGen2D", "TrajectoryRecordPlayback")
+ON_FILES = ("GraphInteraction", "MapGen2D", "TrajectoryRecordPlayback")
 """Plugins that read a file, which random missions do not have."""
+UNFIT = ("AvoidWalls", "TerrainGenerator", *(name for name in stock.manifest() if "JSBSim" in name))
+"""Plugins that random companions and parameters hardly ever suit: a list to read, two equal resolutions, an aircraft's files."""
 RATES = (1.0, 2.5, 3.0, 4.0, 9.0)
 
 
 def plugins(kind: type) -> list[type[Plugin]]:
     """All classes of a kind: those that ship and the golden missions' own."""
     every = dict.fromkeys(map(stock.load, stock.manifest()))
-    shipped = [c for c in every if c.grade != "external" and c.__name__ not in ON_FILES]
+    shipped = [c for c in every if c.grade != "external" and c.__name__ not in (*ON_FILES, *UNFIT)]
     known = [*shipped, Beacon, Wanderer, Car, Nursery]
     return [c for c in known if next(k for k in KINDS if issubclass(c, k)) is kind]
 
