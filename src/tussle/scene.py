@@ -210,16 +210,21 @@ class Scene:
         return self.caster.cast(origins, directions, max_range)
 
     def height(self, x: Any, y: Any) -> np.ndarray:
-        """Height of the highest surface at places x, y [m], (n,): roofs, meshes, terrain and ground; -inf where there is none.
+        """Height of the highest surface at places x, y [m], (n,): roofs, meshes, terrain and ground.
+
+        -inf where there is none, and at places that are not finite.
 
         Raises:
-            ParameterError: A shape does not fit, or a value is not finite.
+            ParameterError: A shape does not fit.
         """
         east, north = np.broadcast_arrays(np.asarray(x, float), np.asarray(y, float))
+        is_place = np.isfinite(east) & np.isfinite(north)
+        east, north = np.where(is_place, east, 0.0), np.where(is_place, north, 0.0)
         top = self.caster.top + 1.0
         start = np.stack([east.ravel(), north.ravel(), np.full(east.size, top)])
         down = np.repeat([[0.0], [0.0], [-1.0]], east.size, axis=1)
-        return np.asarray((top - self.cast(start, down).distance).reshape(east.shape))
+        surface = (top - self.cast(start, down).distance).reshape(east.shape)
+        return np.asarray(np.where(is_place, surface, -np.inf))
 
     def free(self, points: Any, radius: Any) -> np.ndarray:
         """Whether spheres round points [m], (3, n), with a radius [m], one or (n,), neither touch nor lie inside a solid, (n,).

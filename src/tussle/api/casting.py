@@ -37,7 +37,7 @@ def cast(
         ParameterError: A shape does not fit, or a value is not allowed.
     """
     solids = context.scene.caster
-    start, way, distance, code = new_rays(*rays)
+    start, way, distance, code = new_rays(*_of_finite(*rays))
     n = start.shape[1]
     if world.shape != (n,):
         raise ParameterError(
@@ -68,3 +68,17 @@ def cast(
         return found
 
     return Hits(hits.distance, hits.id, hits.solid, start, way, normal, code)
+
+
+def _of_finite(origins: Any, directions: Any, max_range: Any) -> tuple[Any, Any, Any]:
+    """The rays; those from or to a state that is not finite, whose world ends at the end of the step, hit nothing."""
+    sums = np.sum(origins, axis=0) + np.sum(directions, axis=0)
+    is_sane = np.isfinite(sums)
+    if is_sane.all():
+        return origins, directions, max_range
+    ahead = np.array([[1.0], [0.0], [0.0]])
+    return (
+        np.where(is_sane, origins, 0.0),
+        np.where(is_sane, directions, ahead),
+        np.where(is_sane, max_range, 0.0),
+    )

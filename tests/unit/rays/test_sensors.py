@@ -259,3 +259,24 @@ def test_a_car_stays_in_its_corridor(tmp_path):
         assert np.abs(pos[..., :2]).max() < 59.0
         travelled, last = travelled + np.linalg.norm(pos - last, axis=-1).min(), pos
     assert travelled > 150.0
+
+
+class Burst(Autonomy):
+    """Flies on, in the second world to nowhere: its velocity overflows."""
+
+    velocity = Output("velocity_x velocity_y velocity_z", unit="m/s")
+
+    def step(self, g):
+        self.velocity[:] = np.where(g.world == 1, 1e308, 1.0)
+        if (g.step_count > 1).any():
+            self.velocity[:] *= np.where(g.world == 1, -1e308, 1.0)
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_a_world_that_is_not_finite_ends_alone():
+    sensors = RayTrace(), AltitudeAboveTerrain(), LOSSensor()
+    block = Block(name="r", count=2, sensor=sensors, autonomy=Burst(), motion=SingleIntegrator())
+    sim = Simulation(mission(block, scene=ROOM), seeds=[1, 2, 3], on_error="record")
+    sim.step(8)
+    assert sim.state.failed.tolist() == [False, True, False]
+    assert "not a finite number" in str(sim.result()[1].error) or "not finite" in str(sim.result()[1].error)

@@ -78,6 +78,6 @@ class LOSSensor(Sensor):
         quat = quat_multiply(g.quat, quat_from_euler(*self.rpy))
         way = quat_rotate(quat, np.stack([np.ones(g.n), np.zeros(g.n), np.zeros(g.n)]))
         if not self.use_flat_earth:
-            return g.scene.cast(origin, way).distance
+            return g.cast(origin, way, entities=False).distance
         sinks = (way[2] < 0.0) & (origin[2] >= 0.0)
         return np.where(sinks, origin[2] / np.where(sinks, -way[2], 1.0), math.inf)
