@@ -96,9 +96,8 @@ def _lost_teams(state: SimulationState) -> Iterable[tuple[int, str]]:
     there = np.zeros((state.n_worlds, len(teams)), bool)
     mark_teams(bodies.world, bodies.team, teams, there)
     left = there.sum(axis=1)
-    is_historic = bool(
-        state.mission.compat
-    )  # SCRIMMAGE looks at the living only, not at births to come, nor at who began
+    # SCRIMMAGE looks at the living only, not at births to come, nor at who began.
+    is_historic = bool(state.mission.compat)
     for world in np.flatnonzero(state.running & (left <= 1)):
         if not (is_historic or state.births.is_over(int(world))):
             continue

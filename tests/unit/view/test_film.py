@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import math
+import signal
 import subprocess
 
 import imageio_ffmpeg
@@ -25,7 +26,7 @@ from tussle.view.export.film.film import default_speed
 from tussle.view.export.film.ground import Tints
 from tussle.view.export.film.moments import Moments, interpolated
 from tussle.view.export.film.prescan import crowd_of
-from tussle.view.export.film.renderer import Renderer, find_window
+from tussle.view.export.film.renderer import Renderer, _delayed_interrupt, find_window
 from tussle.view.export.film.trails import Trails
 from tussle.view.frame import Frame
 from tussle.view.scenery import Region, Scenery
@@ -584,3 +585,18 @@ def test_nobody_moves(tmp_path):
         )
         assert report.n_pictures == 6
         assert len(pictures(tmp_path / f"{name}.mp4")) == 6
+
+
+def test_ctrl_c_waits_until_the_renderer_is_loaded():
+    steps = []
+    with pytest.raises(KeyboardInterrupt):
+        _interrupted(steps)
+    assert steps == ["loaded"]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def _interrupted(steps):
+    with _delayed_interrupt():
+        signal.raise_signal(signal.SIGINT)
+        steps.append("loaded")
+    steps.append("drawn")

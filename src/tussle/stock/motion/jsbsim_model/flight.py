@@ -11,10 +11,11 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from tussle import units
 from tussle.errors import ParameterError, nearest_name
 from tussle.geodesy import Origin
-from tussle.stock.motion.jsbsim_model.units import FOOT
 
+FOOT = float(units.FOOT)  # [m]
 STATE = (
     "position/lat-geod-rad", "position/long-gc-rad", "position/geod-alt-ft",
     "attitude/phi-rad", "attitude/theta-rad", "attitude/psi-rad",
@@ -29,9 +30,8 @@ THROTTLES = "fcs/throttle-cmd-norm"
 """Stands for those of all engines."""
 WIND = "atmosphere/wind-north-fps", "atmosphere/wind-east-fps", "atmosphere/wind-down-fps"
 TRIMS = {"none": -1, "longitudinal": 0, "full": 1, "ground": 2}
-
-
 Placing = tuple[Sequence[float], Sequence[float], Origin]
+"""Arguments of `JSBSimFlight.place`."""
 
 
 class Aircraft(NamedTuple):

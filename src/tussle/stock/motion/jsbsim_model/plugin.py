@@ -7,9 +7,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from tussle import units
 from tussle.api import Handle, HistoricAttributes, Input, MotionBody, Param, RigidBodyModel
 from tussle.errors import ParameterError, listed, nearest_name
-from tussle.geodesy import ECCENTRICITY_SQUARED, SEMI_MAJOR
+from tussle.geodesy import ECCENTRICITY_SQUARED, SEMI_MAJOR, SEMI_MINOR
 from tussle.numeric.quaternion import (
     quat_conjugate,
     quat_multiply,
@@ -19,10 +20,11 @@ from tussle.numeric.quaternion import (
     quat_to_yaw,
 )
 from tussle.stock.motion.jsbsim_model import kernels
-from tussle.stock.motion.jsbsim_model.earth import FORWARD_RIGHT_DOWN, above_sea_level, to_world
-from tussle.stock.motion.jsbsim_model.flight import THROTTLES, TRIMS, Aircraft, JSBSimFlight
-from tussle.stock.motion.jsbsim_model.units import FOOT, KNOT
+from tussle.stock.motion.jsbsim_model.flight import FOOT, THROTTLES, TRIMS, Aircraft, JSBSimFlight
 
+KNOT = float(units.NAUTICAL_MILE / 3600)  # [m/s]
+FORWARD_RIGHT_DOWN = np.array([[0.0], [1.0], [0.0], [0.0]])
+"""Rotation between body axes forward, left, up and forward, right, down."""
 MIRRORED = np.array([[1.0], [-1.0], [-1.0]])
 """From axes forward, right, down to forward, left, up, and back."""
 
@@ -108,7 +110,8 @@ class JSBSimAircraft(RigidBodyModel):
         """Place the aircraft of some rows. Without a velocity at its birth, an aircraft has that of its script."""
         origin = body.scene.origin
         latitude, longitude, altitude = origin.to_geodetic(body.pos[:, rows])
-        frames = to_world(origin, latitude, longitude)
+        frames = np.empty((4, len(rows)))
+        kernels.local_frames(latitude, longitude, (origin.latitude, origin.longitude), frames)
         attitude = quat_multiply(
             quat_conjugate(frames), quat_multiply(body.quat[:, rows], FORWARD_RIGHT_DOWN)
         )
@@ -146,9 +149,23 @@ class JSBSimAircraft(RigidBodyModel):
         if not len(rows):
             return
         origin, read = self.flight[rows[0]].origin, np.array([self.flight[row].state() for row in rows])
-        states, place = np.empty((13, len(rows))), (origin.latitude, origin.longitude, origin.altitude)
-        kernels.to_rigid_bodies(read, place, (SEMI_MAJOR, ECCENTRICITY_SQUARED), FOOT, states)
-        self.rigid_body[:, rows] = states
+        moving, state = np.empty((10, len(rows))), self.rigid_body
+        kernels.to_rigid_bodies(read, (origin.latitude, origin.longitude), FOOT, moving)
+        state[:3, rows] = origin.from_geodetic(np.stack([read[:, 0], read[:, 1], FOOT * read[:, 2]]))
+        state[3:, rows] = moving
+
+
+def above_sea_level(latitude: np.ndarray, altitude: np.ndarray) -> np.ndarray:
+    """JSBSim's altitude [m]: radius less that of the ellipsoid at the same geocentric latitude.
+
+    latitude: geodetic [rad], (n,); altitude: above the ellipsoid [m], (n,).
+    """
+    sine, cosine = np.sin(latitude), np.cos(latitude)
+    normal = SEMI_MAJOR / np.sqrt(1.0 - ECCENTRICITY_SQUARED * sine * sine)
+    across, along = (normal + altitude) * cosine, ((1.0 - ECCENTRICITY_SQUARED) * normal + altitude) * sine
+    radius = np.hypot(across, along)
+    surface = SEMI_MAJOR * SEMI_MINOR * radius / np.hypot(SEMI_MINOR * across, SEMI_MAJOR * along)
+    return np.asarray(radius - surface)
 
 
 class JSBSimControl(JSBSimAircraft):
@@ -196,7 +213,6 @@ class JSBSimModel(JSBSimAircraft):
     def commands(self, u: np.ndarray) -> np.ndarray:
         """Return bank [rad], altitude above the ellipsoid [ft], and airspeed [knot]."""
         roll, height, speed = u
-        place = next(f for f in self.flight if f is not None).origin.to_geodetic(
-            np.stack([*self.rigid_body[:2], height])
-        )
+        origin = next(flight.origin for flight in self.flight if flight is not None)
+        place = origin.to_geodetic(np.stack([*self.rigid_body[:2], height]))
         return np.stack([roll, place[2] / FOOT, speed / KNOT])

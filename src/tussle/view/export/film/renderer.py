@@ -5,6 +5,8 @@ from __future__ import annotations
 import ctypes
 import math
 import os
+import signal
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -73,6 +75,25 @@ def is_installed(library: str) -> bool:
 
 
 @contextmanager
+def _delayed_interrupt() -> Iterator[None]:
+    """A context in which Ctrl-C takes effect at its end: VTK crashes if it is interrupted while it is loaded.
+
+    Only the main thread receives Ctrl-C; in others, nothing changes.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    pressed: list[int] = []
+    previous = signal.signal(signal.SIGINT, lambda number, _: pressed.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, previous)
+        if pressed:
+            signal.raise_signal(signal.SIGINT)
+
+
+@contextmanager
 def _offscreen_window() -> Iterator[Any]:
     """PyVista, whose windows that are made inside need no display."""
     try:
@@ -113,7 +134,7 @@ class Renderer:
     def __init__(
         self, style: Style, scenery: Scenery, size: tuple[int, int], line_width: float = 1.5
     ) -> None:
-        with _offscreen_window() as pv:
+        with _delayed_interrupt(), _offscreen_window() as pv:
             self.plotter = pv.Plotter(off_screen=True, window_size=list(size), lighting="none", border=False)
         self.style, self.scenery, self.size = style, scenery, size
         self.tints = Tints.on(scenery.background)
