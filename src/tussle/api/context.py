@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Hashable, Iterable
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -39,6 +39,7 @@ class Context:
         threads: Number of threads that `split` may use.
         draw: Receives the shapes that plugins draw.
         fail: Ends one world with an error; the others continue.
+        shared: Objects that handles of several entities use; their method `end` is called when the simulation is closed.
         boxes: Lengths of the boxes of each block for rays [m], (n_blocks, 3); 0 for spheres.
     """
 
@@ -56,6 +57,7 @@ class Context:
     keys: np.ndarray = field(init=False)
     fail: Callable[[int, PluginError], None] = field(init=False)
     boxes: np.ndarray = field(init=False)
+    shared: dict[Hashable, Any] = field(default_factory=dict)
     _pool: ThreadPoolExecutor | None = None
 
     def __post_init__(self) -> None:
@@ -94,6 +96,14 @@ class Context:
         if self._pool is not None:
             self._pool.shutdown()
             self._pool = None
+        while self.shared:
+            self.shared.popitem()[1].end()
+
+    def share(self, key: Hashable, make: Callable[[], Any]) -> Any:
+        """The shared object with this key, which make() makes where there is none yet."""
+        if key not in self.shared:
+            self.shared[key] = make()
+        return self.shared[key]
 
     def region(self, boundary: float) -> TeamRegion:
         """The region with this id.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from bisect import insort
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,6 +21,7 @@ from tussle.engine.table import span
 from tussle.errors import PluginError
 from tussle.lists import RaggedColumn
 from tussle.mission import Block
+from tussle.scene import Scene
 
 Params = list[tuple[int, Binding, str, Any]]
 """Block number, plugin, parameter name, and its value."""
@@ -31,7 +32,20 @@ NOBODY = Bodies.empty(0, 1)
 
 @dataclass(frozen=True)
 class HandleRow:
-    """Argument of `open_one`: world, id, team, seed of the world, position [m], (3,), step length [s], and the plugin as data."""
+    """Argument of `open_one` and `load_one`.
+
+    Attributes:
+        world: Number of the world.
+        id: Of the entity.
+        team: Of the entity.
+        seed: Of the world.
+        pos: Position [m], (3,).
+        dt: Length of a step of the plugin [s].
+        plugin: The plugin as data.
+        scene: Origin, ground, boundaries and bases.
+        shared: shared(key, make) returns the object of the simulation with this key. make() is called where there is none yet, and
+            the object's method `end` when the simulation is closed, after `close_one` for all handles.
+    """
 
     world: int
     id: int
@@ -40,6 +54,8 @@ class HandleRow:
     pos: np.ndarray
     dt: float
     plugin: Any
+    scene: Scene
+    shared: Callable[[Hashable, Callable[[], Any]], Any]
 
 
 class Population:
@@ -282,7 +298,10 @@ class Population:
         b, i = self.bodies, group.first + row
         world = int(b.world[i])
         seed, pos = int(self.context.seeds[world]), b.pos[:, i].copy()
-        return HandleRow(world, int(b.id[i]), int(b.team[i]), seed, pos, binding.view.dt, binding.spec)
+        c, spec = self.context, binding.spec
+        return HandleRow(
+            world, int(b.id[i]), int(b.team[i]), seed, pos, binding.view.dt, spec, c.scene, c.share
+        )
 
     def _open_handles(self, group: Group, binding: Binding, rows: np.ndarray) -> np.ndarray:
         """Open the handles of newborn rows. Returns the rows without errors."""

@@ -64,13 +64,15 @@ def test_a_flight_is_that_of_jsbsim():
     sim = Simulation(
         mission(JSBSimControl(aircraft="c172p", trim="longitudinal", wind=(3.0, -2.0, 0.0)), end=11.0)
     )
-    ((placing, _),) = sim.state.population.groups[0].motion.handles["flight"][0].history
+    handle = sim.state.population.groups[0].motion.handles["flight"][0]
+    ((placing, _),) = handle.fleet.flights[handle.number].history
     sim.step(1200)
     fdm = jsbsim.FGFDMExec(None)
     fdm.set_debug_level(0)
     fdm.set_dt(1 / 120)
     fdm.load_model("c172p")
-    place, motion, origin = placing
+    values, origin = placing
+    place, motion = values[:6], values[6:]
     fdm["ic/terrain-elevation-ft"] = 100.0 / FOOT
     names = "lat-geod-rad long-gc-rad h-sl-ft phi-rad theta-rad psi-true-rad vn-fps ve-fps vd-fps"
     for name, value in zip(names.split(), [*place, *motion[:3]], strict=True):

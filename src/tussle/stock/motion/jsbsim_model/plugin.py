@@ -9,8 +9,8 @@ import numpy as np
 
 from tussle import units
 from tussle.api import Handle, HistoricAttributes, Input, MotionBody, Param, RigidBodyModel
-from tussle.errors import ParameterError, listed, nearest_name
-from tussle.geodesy import ECCENTRICITY_SQUARED, SEMI_MAJOR, SEMI_MINOR
+from tussle.errors import ParameterError, SnapshotError, listed, nearest_name
+from tussle.geodesy import ECCENTRICITY_SQUARED, SEMI_MAJOR, SEMI_MINOR, Origin
 from tussle.numeric.quaternion import (
     quat_conjugate,
     quat_multiply,
@@ -20,7 +20,9 @@ from tussle.numeric.quaternion import (
     quat_to_yaw,
 )
 from tussle.stock.motion.jsbsim_model import kernels
-from tussle.stock.motion.jsbsim_model.flight import FOOT, THROTTLES, TRIMS, Aircraft, JSBSimFlight
+from tussle.stock.motion.jsbsim_model.fleet import Fleet, Flown
+from tussle.stock.motion.jsbsim_model.flight import FOOT, THROTTLES, TRIMS, Aircraft, SavedFlight
+from tussle.stock.motion.jsbsim_model.processes import LOST, FleetProcesses, n_cores
 
 KNOT = float(units.NAUTICAL_MILE / 3600)  # [m/s]
 FORWARD_RIGHT_DOWN = np.array([[0.0], [1.0], [0.0], [0.0]])
@@ -44,6 +46,20 @@ class TrimParam(Param):
                 f"{self._place(where)} = {name!r} is not allowed{nearest_name(name, TRIMS)}; {listed(TRIMS)}"
             )
         return name
+
+
+class Flight:
+    """The handle of an entity: an aircraft of a fleet.
+
+    Attributes:
+        fleet: The aircraft of all entities.
+        number: In the fleet.
+        origin: Of the world frame.
+        failure: Why it flies no more, or empty.
+    """
+
+    def __init__(self, fleet: Fleet | FleetProcesses, origin: Origin) -> None:
+        self.fleet, self.origin, self.number, self.failure = fleet, origin, next(fleet.numbers), ""
 
 
 class JSBSimAircraft(RigidBodyModel):
@@ -73,13 +89,20 @@ class JSBSimAircraft(RigidBodyModel):
     flightgear_ip = Param("localhost", doc="Its address.")
     flightgear_port = Param(5600, structural=True, ge=1, le=65535, doc="Its port.")
     flightgear_protocol = Param("UDP", choices=["UDP", "TCP"], doc="Protocol.")
+    processes = Param(
+        1,
+        structural=True,
+        ge=0,
+        le=256,
+        doc="Processes that fly the aircraft; 1 is that of the simulation, 0 is one for each core. Results do not depend on it.",
+    )
     flight = Handle(doc="The aircraft in JSBSim.")
 
-    def open_one(self, row: Any) -> JSBSimFlight:
-        """Load the aircraft.
+    def open_one(self, row: Any) -> Flight:
+        """Load the aircraft; `spawn` reports its errors.
 
         Raises:
-            ParameterError: JSBSim is not installed, or cannot load it.
+            ParameterError: Not one of script_name and aircraft is given.
         """
         own = row.plugin.values
         if bool(own["script_name"]) == bool(own["aircraft"]):
@@ -89,15 +112,37 @@ class JSBSimAircraft(RigidBodyModel):
             own["jsbsim_root"], own["aircraft"], own["script_name"], own["trim"],
             flightgear if own["flightgear_output_enable"] else None, self.commanded, self.needed_properties,
         )  # fmt: skip
-        return JSBSimFlight(loaded, row.dt)
-
-    def save_one(self, flight: JSBSimFlight) -> JSBSimFlight:
-        """Return the flight, which is saved as what was done to it."""
+        flight = Flight(self._fleet(row), row.scene.origin)
+        flight.fleet.open(flight.number, loaded, row.dt)
         return flight
 
-    def load_one(self, row: Any, flight: JSBSimFlight) -> JSBSimFlight:
-        """Return the flight, which was flown again when it was read."""
+    def save_one(self, flight: Flight) -> SavedFlight:
+        """Return all that was done to the aircraft.
+
+        Raises:
+            SnapshotError: It has failed.
+        """
+        saved = flight.fleet.save(flight.number)
+        if not saved:
+            raise SnapshotError(f"an aircraft of {type(self).__name__} has failed, or {LOST}")
+        return saved
+
+    def load_one(self, row: Any, saved: SavedFlight) -> Flight:
+        """Repeat the flight."""
+        flight = Flight(self._fleet(row), row.scene.origin)
+        flight.fleet.load(flight.number, saved)
         return flight
+
+    def close_one(self, flight: Flight) -> None:
+        """Release the aircraft."""
+        flight.fleet.close(flight.number)
+
+    def _fleet(self, row: Any) -> Fleet | FleetProcesses:
+        n = row.plugin.values["processes"] or n_cores()
+        fleet: Fleet | FleetProcesses = row.shared(
+            ("JSBSim", n), lambda: Fleet() if n == 1 else FleetProcesses(n)
+        )
+        return fleet
 
     def from_body(self, body: MotionBody, rows: np.ndarray) -> None:
         """Place aircraft that were moved; newborn ones are loaded later."""
@@ -108,7 +153,7 @@ class JSBSimAircraft(RigidBodyModel):
 
     def spawn(self, body: Any, rows: np.ndarray) -> None:
         """Place the aircraft of some rows. Without a velocity at its birth, an aircraft has that of its script."""
-        origin = body.scene.origin
+        origin = self.flight[rows[0]].origin
         latitude, longitude, altitude = origin.to_geodetic(body.pos[:, rows])
         frames = np.empty((4, len(rows)))
         kernels.local_frames(latitude, longitude, (origin.latitude, origin.longitude), frames)
@@ -120,12 +165,9 @@ class JSBSimAircraft(RigidBodyModel):
         wind = quat_rotate_inverse(frames, self.wind[:, rows]) / FOOT
         place = np.stack([latitude, longitude, above_sea_level(latitude, altitude) / FOOT, *angles])
         motion = np.concatenate([velocity, MIRRORED * self.rigid_body[10:, rows], wind])
-        for k, row in enumerate(rows):
-            try:
-                self.flight[row].place(place[:, k].tolist(), motion[:, k].tolist(), origin)
-            except ParameterError as error:
-                body.fail(row, str(error))
-        self.read(rows)
+        values = np.concatenate([place, motion]).T
+        self._apply(rows, lambda fleet, numbers: fleet.place(numbers, values, origin))
+        self._report(body)
 
     @property
     def advance(self) -> Any:
@@ -134,25 +176,39 @@ class JSBSimAircraft(RigidBodyModel):
 
     def fly(self, x: np.ndarray, u: np.ndarray, p: np.ndarray, dt: float, substeps: int) -> None:
         """Make `substeps` steps of all aircraft with the inputs (k, n); x is the state of all rows."""
-        flown = np.array([row for row, flight in enumerate(self.flight) if flight is not None], np.int64)
-        values = self.commands(u).T.tolist() if len(flown) else []
-        for row in flown:
-            self.flight[row].fly(values[row], substeps)
-        self.read(flown)
+        rows = np.array([row for row, flight in enumerate(self.flight) if flight is not None], np.int64)
+        if len(rows):
+            commands = self.commands(u).T[rows]
+            self._apply(rows, lambda fleet, numbers: fleet.fly(numbers, commands, substeps))
+
+    def to_body(self, body: MotionBody) -> None:
+        """Write the states, and end the worlds of aircraft that have failed."""
+        super().to_body(body)
+        self._report(body)
 
     def commands(self, u: np.ndarray) -> np.ndarray:
         """Return the values of the properties `commanded`, (m, n), from the inputs, (k, n); by default these."""
         return u
 
-    def read(self, rows: np.ndarray) -> None:
-        """Set the state of some rows from JSBSim."""
-        if not len(rows):
-            return
-        origin, read = self.flight[rows[0]].origin, np.array([self.flight[row].state() for row in rows])
-        moving, state = np.empty((10, len(rows))), self.rigid_body
+    def _apply(self, rows: np.ndarray, act: Callable[[Fleet | FleetProcesses, list[int]], Flown]) -> None:
+        """Let act(fleet, numbers) move some aircraft, and set their states. Those that have failed keep theirs."""
+        flights = [self.flight[row] for row in rows]
+        read, failed = act(flights[0].fleet, [flight.number for flight in flights])
+        if failed:
+            for flight in flights:
+                flight.failure = failed.get(flight.number, "")
+            is_sound = np.array([not flight.failure for flight in flights])
+            read, rows = read[is_sound], rows[is_sound]
+        moving, state, origin = np.empty((10, len(rows))), self.rigid_body, flights[0].origin
         kernels.to_rigid_bodies(read, (origin.latitude, origin.longitude), FOOT, moving)
         state[:3, rows] = origin.from_geodetic(np.stack([read[:, 0], read[:, 1], FOOT * read[:, 2]]))
         state[3:, rows] = moving
+
+    def _report(self, body: Any) -> None:
+        """End the worlds of aircraft that have failed."""
+        for row, flight in enumerate(self.flight):
+            if flight is not None and flight.failure:
+                body.fail(row, flight.failure)
 
 
 def above_sea_level(latitude: np.ndarray, altitude: np.ndarray) -> np.ndarray:
