@@ -60,14 +60,14 @@ def cast(
     hits = solids.hits(start, way, distance, code)
     is_body = (code >= solids.n_codes) & (code < np.inf)
     rows = code[is_body].astype(np.int64) - solids.n_codes
-    hits.id[is_body] = bodies.id[rows]
+    hits.id[is_body], hits.team[is_body] = bodies.id[rows], bodies.team[rows]
 
     def normal(hits: Hits) -> np.ndarray:
         found = solids.normal(hits)
         found[:, is_body] = tree.normal(rows, hits.points[:, is_body])
         return found
 
-    return Hits(hits.distance, hits.id, hits.solid, start, way, normal, code)
+    return Hits(hits.distance, hits.id, hits.solid, start, way, normal, code, hits.team)
 
 
 def _of_finite(origins: Any, directions: Any, max_range: Any) -> tuple[Any, Any, Any]:

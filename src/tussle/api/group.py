@@ -349,6 +349,28 @@ class GroupView:
             own = np.full(len(world), -1)
         return cast(self.context, self._bodies, (origins, directions, max_range), world, own, entities)
 
+    def line_of_sight(self, row: np.ndarray, other: np.ndarray, entities: bool = True) -> np.ndarray:
+        """Whether nothing lies between entities: on the line between their centres, outside of their spheres of `radius`.
+
+        Args:
+            row: Rows of the view, (m,), as `near.row`.
+            other: Rows of the body table, (m,), as `near.other`.
+            entities: Whether entities hide others, and not only the scene.
+
+        Returns:
+            (m,)
+        """
+        bodies = self._bodies
+        offset = bodies.pos[:, other] - self.pos[:, row]
+        x, y, z = offset
+        distance, own = np.sqrt(x * x + y * y + z * z), self.radius[row]
+        gap = distance - own - bodies.radius[other]
+        is_apart = gap > 0.0
+        way = np.where(is_apart, offset, 0.0)
+        start = self.pos[:, row] + way * np.where(is_apart, own / np.where(is_apart, distance, 1.0), 0.0)
+        hits = self.cast(start, way, np.where(is_apart, gap, 0.0), row=row, entities=entities)
+        return np.asarray((hits.distance == np.inf) | (hits.id == bodies.id[other]))
+
     # -- random numbers and services ------------------------------------------------------------------------------------------------
 
     def _stream(self, label: str) -> int:

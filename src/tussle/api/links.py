@@ -11,6 +11,9 @@ from tussle.api.world import WorldView
 from tussle.messages import Messages
 from tussle.numeric.segments import order_by_row
 
+BLOCKS = ("nothing", "scene", "scene and entities")
+"""What may stand between a sender and a receiver."""
+
 
 class Links:
     """Each message of a step with each other entity within reach of its sender, as `Network.transmit` returns them.
@@ -79,6 +82,20 @@ class Links:
             a, b = w.pos[2][self.sender[self.message]], w.pos[2][self.receiver]
             above = (a > level - slack) & (b > level - slack)
             self.lose(reason, is_on[world] & ~(above | ((a < level + slack) & (b < level + slack))))
+
+    def lose_hidden(self, w: WorldView, reason: int, blocked_by: str) -> None:
+        """Mark the links without a line of sight as lost for a reason.
+
+        Args:
+            w: The view of the network.
+            reason: Number of the reason.
+            blocked_by: One of BLOCKS.
+        """
+        if blocked_by != BLOCKS[0]:
+            left = np.flatnonzero(self.outcome == 0)
+            sender, receiver = self.sender[self.message[left]], self.receiver[left]
+            is_seen = w.line_of_sight(sender, receiver, entities=blocked_by == BLOCKS[2])
+            self.outcome[left[~is_seen]] = 1 + reason
 
     def lose_by_chance(self, w: WorldView, reason: int, label: str, share: np.ndarray) -> None:
         """Mark links as lost for a reason, so that only a share of the messages in each world, (n_worlds,), is not."""

@@ -21,6 +21,7 @@ class Hits:
     Attributes:
         distance: From the origin along the ray [m], (n,); inf where nothing is hit within range.
         id: Id of the entity that is hit, (n,); 0 for the scene and for no hit.
+        team: Team of the entity that is hit, (n,); -1 for the scene and for no hit.
         solid: Number of the part of the scene that is hit, (n,), as in `Scene.solids`; -1 for an entity and for no hit.
         points: Where the rays hit [m], (3, n), world frame; inf where they hit nothing.
         normal: Unit normals at the hits, towards the origin of the ray, (3, n); zero where nothing is hit.
@@ -33,6 +34,7 @@ class Hits:
     directions: np.ndarray = field(repr=False)
     find_normal: Callable[[Hits], np.ndarray] = field(repr=False)
     code: np.ndarray = field(repr=False)
+    team: np.ndarray
 
     @property
     def points(self) -> np.ndarray:

@@ -12,6 +12,8 @@ from tussle.rays.hits import FARTHEST_RAY, Hits, checked_numbers, checked_vector
 from tussle.rays.surfaces import HeightField, TriangleMesh
 from tussle.shapes import FlatGround, Polyhedron, Sphere, Volume
 
+KINDS = ("nothing", "ground", "wall", "mesh", "entity")
+"""What a ray may hit, by number: ground and hills are ground, walls and buildings walls."""
 Split = Callable[[int, Callable[[int, int], Any]], Any]
 
 
@@ -29,12 +31,14 @@ class Solids:
         parts: Meshes, height fields and shapes; a hit's `solid` is a number of this list.
 
     Attributes:
+        kinds: Number in KINDS of each part, and of nothing at the end, (len(parts) + 1,).
         n_codes: Codes of entities begin here.
         top: Height of the highest point of all parts that end above [m]; at least 0.
     """
 
     def __init__(self, parts: Sequence[Volume | HeightField | TriangleMesh]) -> None:
         self.parts = tuple(parts)
+        self.kinds = np.array([*map(_kind, self.parts), 0])
         corners, owner = [], []
         self._rest: list[int] = []
         for i, part in enumerate(self.parts):
@@ -111,6 +115,7 @@ class Solids:
             way,
             self.normal,
             code,
+            np.full(len(code), -1),
         )
 
     def solid_of(self, code: np.ndarray) -> np.ndarray:
@@ -146,6 +151,11 @@ class Solids:
             elif isinstance(part, Volume):
                 touches |= part.contains(center) | part.touches(center, reach)
         return touches
+
+
+def _kind(part: Volume | HeightField | TriangleMesh) -> int:
+    is_ground = isinstance(part, (FlatGround, HeightField))
+    return KINDS.index("ground" if is_ground else "mesh" if isinstance(part, TriangleMesh) else "wall")
 
 
 def _top(part: Volume | HeightField | TriangleMesh) -> float:

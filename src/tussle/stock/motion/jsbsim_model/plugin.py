@@ -48,7 +48,7 @@ class TrimParam(Param):
         return name
 
 
-class Flight:
+class FlightHandle:
     """The handle of an entity: an aircraft of a fleet.
 
     Attributes:
@@ -98,7 +98,7 @@ class JSBSimAircraft(RigidBodyModel):
     )
     flight = Handle(doc="The aircraft in JSBSim.")
 
-    def open_one(self, row: Any) -> Flight:
+    def open_one(self, row: Any) -> FlightHandle:
         """Load the aircraft; `spawn` reports its errors.
 
         Raises:
@@ -112,11 +112,11 @@ class JSBSimAircraft(RigidBodyModel):
             own["jsbsim_root"], own["aircraft"], own["script_name"], own["trim"],
             flightgear if own["flightgear_output_enable"] else None, self.commanded, self.needed_properties,
         )  # fmt: skip
-        flight = Flight(self._fleet(row), row.scene.origin)
+        flight = FlightHandle(self._fleet(row), row.scene.origin)
         flight.fleet.open(flight.number, loaded, row.dt)
         return flight
 
-    def save_one(self, flight: Flight) -> SavedFlight:
+    def save_one(self, flight: FlightHandle) -> SavedFlight:
         """Return all that was done to the aircraft.
 
         Raises:
@@ -127,13 +127,13 @@ class JSBSimAircraft(RigidBodyModel):
             raise SnapshotError(f"an aircraft of {type(self).__name__} has failed, or {LOST}")
         return saved
 
-    def load_one(self, row: Any, saved: SavedFlight) -> Flight:
+    def load_one(self, row: Any, saved: SavedFlight) -> FlightHandle:
         """Repeat the flight."""
-        flight = Flight(self._fleet(row), row.scene.origin)
+        flight = FlightHandle(self._fleet(row), row.scene.origin)
         flight.fleet.load(flight.number, saved)
         return flight
 
-    def close_one(self, flight: Flight) -> None:
+    def close_one(self, flight: FlightHandle) -> None:
         """Release the aircraft."""
         flight.fleet.close(flight.number)
 

@@ -94,11 +94,12 @@ class FleetProcesses:
             process.send(call, number, *values)
 
     def _ask(self, call: str, numbers: Sequence[int], values: np.ndarray, *more: Any) -> Flown:
-        parts: dict[FleetProcess | None, list[int]] = {}
+        parts: dict[FleetProcess, list[int]] = {}
+        lost: list[int] = []
         for k, number in enumerate(numbers):
-            parts.setdefault(self.process_of.get(number), []).append(k)
+            process = self.process_of.get(number)
+            (lost if process is None else parts.setdefault(process, [])).append(k)
         read, errors = np.empty((len(numbers), len(NOWHERE))), dict[int, str]()
-        lost = parts.pop(None, [])
         with self._whole():
             for process, mine in parts.items():
                 process.send(call, [numbers[k] for k in mine], values[mine], *more)

@@ -8,10 +8,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from tussle.api import Links, Messages, Network, Param, State, WorldView
+from tussle.api.links import BLOCKS
 from tussle.numeric import exp, log
 from tussle.stock.network.radio_network import kernels
 
-QUEUE, PLANE, _, _, HALF_DUPLEX, CHANCE = range(6)
+QUEUE, PLANE, _, _, HALF_DUPLEX, CHANCE, BLOCKED = range(7)
 NOBODY = -1
 LEAST = 0.01
 """Rayleigh fading: receivers that would receive a smaller share of the messages are out of reach."""
@@ -31,13 +32,16 @@ class RadioNetwork(Network):
     """
 
     grade = "portable"
-    losses = ("queue", "plane", "fading", "jammed", "half_duplex", "chance")
+    losses = ("queue", "plane", "fading", "jammed", "half_duplex", "chance", "blocked")
 
     range = Param(
         100.0, unit="m", gt=0.0, doc="Distance below which messages are received; with fading, 37 % of them."
     )
     prob_transmit = Param(
         1.0, ge=0.0, le=1.0, doc="Probability that a receiver gets a message, besides all other losses."
+    )
+    blocked_by = Param(
+        "nothing", choices=BLOCKS, doc="What blocks a message where it stands between sender and receiver."
     )
     filter_comms_plane = Param(
         False, doc="Block messages across a horizontal plane, such as the water surface."
@@ -72,6 +76,7 @@ class RadioNetwork(Network):
             links.lose(QUEUE, ~is_sent[message])
         plane = self.filter_comms_plane, self.comms_boundary_altitude, self.comms_boundary_epsilon
         links.lose_across(w, PLANE, *plane)
+        links.lose_hidden(w, BLOCKED, self.blocked_by)
         self._fade(w, links, world)
         if self.half_duplex.any():
             first, last = on_air[0][links.receiver], on_air[1][links.receiver]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from tussle.api import Links, Messages, Network, Param, WorldView
+from tussle.api.links import BLOCKS
 
 
 class SphereNetwork(Network):
@@ -24,12 +25,17 @@ class SphereNetwork(Network):
     comms_boundary_altitude = Param(0.0, unit="m", doc="Altitude of the plane.")
     comms_boundary_epsilon = Param(0.0, unit="m", ge=0.0, doc="Distance by which both sides overlap.")
 
-    losses = ("plane", "chance")
+    blocked_by = Param(
+        "nothing", choices=BLOCKS, doc="What blocks a message where it stands between sender and receiver."
+    )
+
+    losses = ("plane", "chance", "blocked")
 
     def transmit(self, w: WorldView, outboxes: Sequence[Messages]) -> Links:
         links = self._links(w, outboxes)
         plane = self.filter_comms_plane, self.comms_boundary_altitude, self.comms_boundary_epsilon
         links.lose_across(w, 0, *plane)
+        links.lose_hidden(w, 2, self.blocked_by)
         links.lose_by_chance(w, 1, "loss", self.prob_transmit)
         return links
 

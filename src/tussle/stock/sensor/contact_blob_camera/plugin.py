@@ -20,8 +20,8 @@ class ContactBlobCamera(Sensor):
 
     A box is that of the entity's sphere of `radius`: an axis is bounded by the tangents of its angle plus and minus
     asin(radius / distance). Pixels count from the upper left corner of the image, u to the right and v down; boxes end at its edges. A
-    false positive has id 0; the other ids are true, for scoring. The camera looks along the body's x axis, turned by `rpy`. Set
-    `rate` for a lower frame rate than that of the steps.
+    false positive has id 0; the other ids are true, for scoring. The camera looks along the body's x axis, turned by `rpy`. With
+    `occlusion`, an entity whose centre is hidden is not seen. Set `rate` for a lower frame rate than that of the steps.
 
     In the existing system the size is the widest chord's, and each detected entity brings its own false positives of its own size,
     one more than `max_false_positives_per_frame`, and none come without one. Its focal length cancels.
@@ -66,6 +66,9 @@ class ContactBlobCamera(Sensor):
     max_false_positives_per_frame = Param(
         10, ge=0, le=1000, structural=True, doc="Number of possible false positives."
     )
+    occlusion = Param(
+        False, structural=True, doc="Whether the scene and other entities hide the entities behind them."
+    )
     pos_noise_0 = Param((0.0, 1.0), fields=PAIR, doc="Error of u: mean and standard deviation [pixel].")
     pos_noise_1 = Param((0.0, 1.0), fields=PAIR, doc="Error of v [pixel].")
     size_noise_0 = Param((0.0, 0.0), fields=PAIR, doc="Error of the width [pixel].")
@@ -92,6 +95,8 @@ class ContactBlobCamera(Sensor):
         is_seen = (abs(atan2(y, x)) <= side[row]) & (abs(atan2(z, np.sqrt(x * x + y * y))) <= up[row])
         is_seen &= (x > 0.0) & ~self.ignore_real_entities[row]
         is_seen &= g.uniform_pairs("missed", near) >= self.false_negative_probability[row]
+        if self.occlusion:
+            is_seen[is_seen] = g.line_of_sight(row[is_seen], near.other[is_seen])
         near, row, x, y, z = near[is_seen], row[is_seen], x[is_seen], y[is_seen], z[is_seen]
         noise = g.normal_pairs("noise", near, 4)
         across = self.img_width, tan(side), -y, (self.pos_noise_0, self.size_noise_0), noise[0::2]

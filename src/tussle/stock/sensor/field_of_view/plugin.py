@@ -14,8 +14,8 @@ from tussle.numeric.quaternion import quat_from_euler, quat_multiply, quat_rotat
 class FieldOfView(Sensor):
     """Measures bearing, elevation and range of every other entity in a field of view, with normal noise.
 
-    Angles are those of the camera, which is mounted on the body by `rpy`: bearing is positive to the left, elevation up. Nothing
-    hides an entity. Draws are keyed by the measuring entity and the id of the other.
+    Angles are those of the camera, which is mounted on the body by `rpy`: bearing is positive to the left, elevation up.
+    With `occlusion`, an entity whose centre is hidden is not seen. Draws are keyed by the measuring entity and the id of the other.
     """
 
     grade = "portable"
@@ -32,6 +32,9 @@ class FieldOfView(Sensor):
     )  # fmt: skip
     false_negative_probability = Param(
         0.0, ge=0.0, le=1.0, doc="Probability that an entity in view is not seen."
+    )
+    occlusion = Param(
+        False, structural=True, doc="Whether the scene and other entities hide the entities behind them."
     )
     bearing_noise = Param(0.0, unit="rad", text_unit="deg", ge=0.0, doc="Standard deviation of the bearing.")
     elevation_noise = Param(
@@ -54,6 +57,8 @@ class FieldOfView(Sensor):
             abs(elevation) <= 0.5 * self.elevation_fov[row]
         )
         is_seen &= g.uniform_pairs("missed", near) >= self.false_negative_probability[row]
+        if self.occlusion:
+            is_seen[is_seen] = g.line_of_sight(row[is_seen], near.other[is_seen])
         near, row = near[is_seen], row[is_seen]
         noise = g.normal_pairs("noise", near, 3)
         bearing = bearing[is_seen] + self.bearing_noise[row] * noise[0]

@@ -9,7 +9,8 @@ import numpy as np
 from tussle.api import GroupView, HistoricAttributes, Output, Param, Publish, Sensor, State
 from tussle.messages import PointCloud
 from tussle.numeric import cos, sin
-from tussle.numeric.quaternion import quat_from_euler, quat_multiply, quat_rotate
+from tussle.numeric.quaternion import quat_from_euler, quat_rotate
+from tussle.rays.patterns import aimed
 from tussle.stock.sensor.ray_trace import kernels
 
 FIELDS, UNITS = "x y z range in_range", "m m m m 1"
@@ -112,10 +113,9 @@ class RayTrace(Sensor):
         """Points of the scans of some rows, (5, m k)."""
         m, k = len(rows), pattern.shape[1]
         turn = np.ascontiguousarray(quat_from_euler(*self.rpy[:, rows]))
-        quat = np.ascontiguousarray(quat_multiply(g.quat[:, rows], turn))
-        origin = np.ascontiguousarray(g.pos[:, rows] + quat_rotate(g.quat[:, rows], self.xyz[:, rows]))
-        origins, directions = np.empty((3, m * k)), np.empty((3, m * k))
-        kernels.aim(quat, origin, pattern, origins, directions, (0, m))
+        origins, directions = aimed(
+            g.pos[:, rows], g.quat[:, rows], self.xyz[:, rows], self.rpy[:, rows], pattern
+        )
         limit = np.repeat(self.max_range[rows], k)
         hits = g.cast(origins, directions, limit, row=np.repeat(rows, k), entities=self.sees_entities)
         distance = hits.distance
