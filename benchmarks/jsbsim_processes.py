@@ -4,8 +4,8 @@
 
 The aircraft, c172p, are trimmed at 50 m/s; their step is 1/120 s, and they get commands every 12 steps, or every step. `loop` writes the
 four commands, calls `fdm.run()` and reads the twelve numbers of a state, for one aircraft after another; `run` only calls `fdm.run()`.
-`relative` is the speed relative to `loop` in as many processes. Times are those of a clock, the shortest of the repeats, which take
-turns: leave the machine alone."""
+`cpu` is CPU time, of all processes together, and `relative` the speed by it relative to `loop`; `wall` is time of a clock. All are the
+shortest of the repeats, which take turns."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from typing import Any
 import jsbsim
 import measuring
 import numpy as np
+import psutil
 
 from tussle import Block, Mission, Simulation
 from tussle.api import Autonomy, Output
@@ -28,7 +29,7 @@ STEP = 1 / 120  # [s]
 COMMANDS = {
     "fcs/throttle-cmd-norm": 0.7, "fcs/elevator-cmd-norm": 0.0, "fcs/aileron-cmd-norm": 0.001, "fcs/rudder-cmd-norm": 0.0,
 }  # fmt: skip
-STEPS = 240
+STEPS = 480
 """Steps of each aircraft in a measurement."""
 
 
@@ -127,10 +128,18 @@ def simulation(n: int, substeps: int, processes: int) -> Simulation:
     return sim
 
 
-def seconds(call: Callable[[], Any]) -> float:
-    begin = time.perf_counter()
+def seconds(call: Callable[[], Any]) -> tuple[float, float]:
+    """CPU time of this process and its children, and time of a clock [s]."""
+    here = psutil.Process()
+    everyone = [here, *here.children(recursive=True)]
+
+    def cpu() -> float:
+        return sum(sum(each.cpu_times()[:2]) for each in everyone)
+
+    begin, start = cpu(), time.perf_counter()
     call()
-    return time.perf_counter() - begin
+    took = time.perf_counter() - start
+    return cpu() - begin, took
 
 
 def rows(n: int, repeats: int) -> Iterator[dict[str, Any]]:
@@ -144,20 +153,21 @@ def rows(n: int, repeats: int) -> Iterator[dict[str, Any]]:
             ("loop", 2): lambda k=substeps: loops(k),
             ("JSBSimControl", 2): lambda k=substeps, sim=sims[2]: sim.step(STEPS // k),
         }
-        times: dict[tuple[str, int], list[float]] = {key: [] for key in calls}
+        times: dict[tuple[str, int], list[tuple[float, float]]] = {key: [] for key in calls}
         for _ in range(repeats):
             for key, call in calls.items():
                 times[key].append(seconds(call))
         assert all(np.isfinite(sim.state.population.bodies.pos).all() for sim in sims.values())
         for (what, processes), each in times.items():
-            base = times["loop", processes]
+            (cpu, wall), base = map(min, zip(*each, strict=True)), min(times["loop", processes])[0]
             yield {
                 "aircraft": n,
                 "substeps": substeps,
                 "what": what,
                 "processes": processes,
-                "microseconds_per_step": 1e6 * min(each) / (n * STEPS),
-                "relative": min(base) / min(each),
+                "cpu_us_per_step": 1e6 * cpu / (n * STEPS),
+                "wall_us_per_step": 1e6 * wall / (n * STEPS),
+                "relative": base / cpu,
             }
         for sim in sims.values():
             sim.close()
