@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from small_worlds import VELOCITY, Drift, Wander, mission
 
-from tussle import Block, Simulation
+from tussle import Block, Scene, Simulation
 from tussle.api import Autonomy, Handle, Input, MotionModel, Output, Param, State
 from tussle.errors import MissionError, PluginError, SnapshotError
 from tussle.stock import SingleIntegrator
@@ -218,6 +218,38 @@ def test_a_plugin_that_cannot_save_says_so():
         pytest.raises(SnapshotError, match=r"Mute .* has no method save_one"),
     ):
         sim.snapshot()
+
+
+def test_handles_share_an_object_that_ends_with_the_simulation():
+    events = []
+
+    class Server:
+        def __init__(self):
+            events.append("begin")
+
+        def end(self):
+            events.append("end")
+
+    class Client(Autonomy):
+        link = Handle()
+
+        def open_one(self, row):
+            assert row.scene == Scene()
+            return row.shared("server", Server), row.id
+
+        def close_one(self, link):
+            events.append(link[1])
+
+        def step(self, g):
+            assert len({id(server) for server, _ in self.link}) == 1
+
+    block = Block(name="a", count=2, autonomy=[Drift(), Client()], motion=SingleIntegrator())
+    with Simulation(mission(block), seeds=[1, 2]) as sim:
+        sim.step(3)
+        sim.reset([0])
+        sim.step(3)
+    assert (events.count("begin"), events[-1], events.count("end")) == (1, "end", 1)
+    assert sorted(events[1:-1]) == [1, 1, 1, 2, 2, 2]
 
 
 def test_largest_stack():
