@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -119,12 +120,18 @@ def learned(block: Block, acts: Sequence[Act]) -> Block:
     keeps = any("." in name for name in names)
     if not keeps:
         names = list(channels)
-    outputs: dict[str, Any] = {n: Output(unit=channels[n]) for n in names if "." not in n}
-    if not outputs:
+    if all("." in name for name in names):
         return block
-    constants = {act.target: act.value for act in acts if act.value is not None and "." not in act.target}
-    actor = type("Learner", (Actor,), {**outputs, "constants": constants, "__doc__": Actor.__doc__})
+    constants = tuple((act.target, act.value) for act in acts if act.value is not None and "." not in act.target)
+    actor = _actor(tuple((n, channels[n]) for n in names if "." not in n), constants)
     return block.replace(autonomy=(*(block.autonomy if keeps else ()), actor()))
+
+
+@cache
+def _actor(channels: tuple[tuple[str, str], ...], constants: tuple[tuple[str, float], ...]) -> type[Actor]:
+    """The autonomy that holds these channels; one class for all tasks with these, so that their missions are equal."""
+    outputs = {name: Output(unit=unit) for name, unit in channels}
+    return type("Learner", (Actor,), {**outputs, "constants": dict(constants), "__doc__": Actor.__doc__})
 
 
 class Decoder:

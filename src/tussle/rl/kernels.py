@@ -11,7 +11,8 @@ import math
 
 import numpy as np
 
-from tussle.neighbors.search import TABLE, in_range, nearest_places, table_of
+from tussle.neighbors.few import nearest_few, scratch_of
+from tussle.neighbors.search import TABLE, in_range, table_of
 from tussle.numeric import atan2
 from tussle.numeric.kernel import device, kernel
 
@@ -112,15 +113,16 @@ def nearest(floats, who, wanted, places, arrays, spec, numbers, radius, out):
     k, mode, frame, column, width = numbers
     table = table_of(arrays)
     team = table[8]
-    best, ranks, found = np.empty(k), np.empty(k, np.int64), np.empty(k, np.int64)
+    scratch = scratch_of(k, order.shape[0])
+    found = scratch[2]
     for i in range(rows.shape[0]):
         row, a = rows[i], agents[i]
         me, x, y, z = place[row], floats[0, row], floats[1, row], floats[2, row]
-        nearest_places(row_world[row], me, x, y, z, mode, wanted[i], table, best, ranks, found, k)
+        nearest_few(row_world[row], me, x, y, z, radius, mode, wanted[i], table, scratch, k)
         turn = frame_of(floats, row, frame)
         for j in range(k):
             at = column + j * width
-            if found[j] >= 0 and best[j] < radius * radius:
+            if found[j] >= 0:
                 q = found[j]
                 put_other(floats, row, order[q], team[q] == team[me], spec, turn, a, at, out)
             else:

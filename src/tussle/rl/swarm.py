@@ -48,7 +48,7 @@ class Swarm:
         obs: Observations, (W, A, n), as returned.
         final_obs: Observations at the end of the last episode, (W, A, n), with "same_step".
         alive: Living agents, (W, A).
-        over: Worlds whose episode ended in the last step, (W,).
+        over: Worlds whose episode ended in the last step, (W,); `late` those by the time limit.
         terms: Terms of the last reward, weighted, by name, (W, A) each.
         returns: Sum of rewards of the present episode, (W, A); of the ended one in worlds that are `over`, until the next step.
         lengths: Decisions of that episode, (W,).
@@ -71,7 +71,7 @@ class Swarm:
         self.rewards, self.returns = np.zeros(shape, dtype), np.zeros(shape)
         self.terms = {name: np.zeros(shape, dtype) for name in task.reward}
         self.terminations, self.truncations, self.alive = np.zeros((3, *shape), bool)
-        self.lengths, self.over = np.zeros(worlds, np.int64), np.zeros(worlds, bool)
+        self.lengths, (self.over, self.late) = np.zeros(worlds, np.int64), np.zeros((2, worlds), bool)
         self.seeds = np.zeros(worlds, np.uint64)
         self._first, self._episode = self.seeds.copy(), np.zeros(worlds, np.int64)
         self._params: dict[str, Any] = {}
@@ -261,7 +261,7 @@ class Swarm:
         """Nothing has happened in worlds whose episode has just begun."""
         for array in (self.rewards, self.terminations, self.truncations, *self.terms.values()):
             array[worlds] = 0
-        self.over[worlds] = False
+        self.over[worlds] = self.late[worlds] = False
 
     def _act(self, actions: Any) -> None:
         given = np.asarray(actions)
@@ -304,18 +304,16 @@ class Swarm:
         if self._check_ends:
             over |= self._are_decided()
         ends = np.asarray(task.ends(now))
-        if ends.ndim == 2:
-            self.terminations |= ends & self.alive
-            over |= ~(self.alive & ~self.terminations).any(axis=1)
-        else:
-            over |= ends
+        if ends.shape not in ((), over.shape):
+            raise ParameterError(f"{type(task).__name__}.ends returns shape {ends.shape}; it returns {over.shape}, one per world")
+        over |= ends
         self.terminations |= over[:, None] & self.alive
-        self.truncations[:] = False
+        self.truncations[:] = self.late[:] = False
         if task.n_steps:
-            late = (state.context.clock.step >= task.n_steps) & ~over
-            if late.any():
-                self.truncations |= late[:, None] & self.alive
-                over |= late
+            np.greater(state.context.clock.step >= task.n_steps, over, out=self.late)
+            if self.late.any():
+                self.truncations |= self.late[:, None] & self.alive
+                over |= self.late
         np.copyto(self.over, over)
 
     def _are_decided(self) -> np.ndarray:
@@ -334,7 +332,7 @@ class Swarm:
 
     # -- snapshots ---------------------------------------------------------------------------------------------------------
 
-    KEPT = ("obs", "alive", "over", "returns", "lengths", "seeds", "_first", "_episode", "rewards", "terminations", "truncations")
+    KEPT = ("obs", "alive", "over", "late", "returns", "lengths", "seeds", "_first", "_episode", "rewards", "terminations", "truncations")
 
     def state(self) -> dict[str, Any]:
         """A copy of everything; after `restore`, the same actions give the same bits."""
@@ -351,6 +349,10 @@ class Swarm:
             getattr(self, name)[...] = state[name]
         self.is_fresh = False
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A pickle makes a new swarm, before its first reset."""
+        return make_swarm_of, (self.task, self.n_worlds, self.autoreset, self.simulation.state.context.threads)
+
     def close(self) -> None:
         """Free everything that lies outside the arrays."""
         self.simulation.close()
@@ -360,6 +362,11 @@ class Swarm:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def make_swarm_of(task: Task, num_envs: int, autoreset: str, threads: int) -> Swarm:
+    """A swarm from a pickle."""
+    return Swarm(task, num_envs, autoreset=autoreset, threads=threads)
 
 
 def make_swarm(task: Any, num_envs: int = 1, *, autoreset: str = "same_step", threads: int = 1) -> Swarm:

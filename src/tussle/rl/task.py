@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any, ClassVar
@@ -57,10 +58,18 @@ class Task:
             if name not in known:
                 raise ParameterError(f"{type(self).__name__} has no {name!r}{nearest_name(name, known)}; {listed(known)}")
             self.__dict__[name] = value
+        self._given = values
         self._check()
 
+    def replace(self, **values: Any) -> Task:
+        """A copy with other attributes."""
+        return type(self)(**{**self._given, **values})
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _made, (type(self), self._given)
+
     def ends(self, now: Situation) -> Any:
-        """Worlds, (W,), or agents, (W, A), whose episode terminates, besides those without agents; by default none."""
+        """Worlds, (W,), whose episode terminates, besides those without agents; by default none."""
         return False
 
     def _check(self) -> None:
@@ -167,8 +176,13 @@ class Task:
         return spaces.Box(-np.inf, np.inf, (width,), self.dtype)
 
     def action_space(self, agent: int) -> spaces.Space[Any]:
-        """Actions of an agent."""
-        return self.decoders[self.agent_block[agent]].space
+        """Actions of an agent; a space of its own, as each has a random generator."""
+        return copy.deepcopy(self.decoders[self.agent_block[agent]].space)
+
+
+def _made(kind: type[Task], values: dict[str, Any]) -> Task:
+    """A task from a pickle."""
+    return kind(**values)
 
 
 __all__ = ["Task"]
