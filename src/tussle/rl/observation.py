@@ -37,6 +37,7 @@ class Part:
         rows: Rows of the body table, (m,).
         agents: Number of each agent: world * agents per world + place in its world, (m,).
         team: Team of each as a float, (m,).
+        kept: What components keep until rows change.
     """
 
     block: str
@@ -44,6 +45,7 @@ class Part:
     rows: np.ndarray
     agents: np.ndarray
     team: np.ndarray
+    kept: dict[Any, Any]
 
 
 class Component(ABC):
@@ -294,7 +296,11 @@ class Means(_Search):
 
 @dataclass(frozen=True)
 class Each(Component):
-    """All entities of a block by their place in it, without the agent itself; zeros for those that are gone. Names as in `Nearest`."""
+    """All entities of some blocks by their place in them, without the agent itself; zeros for those that are gone. Names as in `Nearest`.
+
+    Attributes:
+        of: Names of the blocks, separated by spaces.
+    """
 
     of: str
     columns: str = "offset"
@@ -305,22 +311,34 @@ class Each(Component):
     def width(self, mission: Mission, block: str) -> int:
         names, blocks = self.columns.split(), {b.name: b.count for b in mission.blocks}
         _check("Each", self.frame, names, (*RELATIVE, *OTHERS, *FLOATS), self.scale)
-        if self.of not in blocks:
-            raise ParameterError(f"Each: there is no block {self.of!r}{nearest_name(self.of, blocks)}; {listed(blocks)}")
-        return (blocks[self.of] - (self.of == block)) * _lines(names, self.scale, self.planar)[1]
+        for name in self.of.split():
+            if name not in blocks:
+                raise ParameterError(f"Each: there is no block {name!r}{nearest_name(name, blocks)}; {listed(blocks)}")
+        n_others = sum(blocks[name] for name in self.of.split()) - (block in self.of.split())
+        return n_others * _lines(names, self.scale, self.planar)[1]
 
     def write(self, simulation: Simulation, part: Part, column: int, out: np.ndarray) -> None:
         spec, width = _lines(self.columns.split(), self.scale, self.planar)
-        bodies, mission = simulation.state.population.bodies, simulation.mission
-        number = next(i for i, b in enumerate(mission.blocks) if b.name == self.of)
-        count = mission.blocks[number].count
-        rows = np.flatnonzero((bodies.block == number) & (bodies.block_index < count))
-        of = np.full((simulation.n_worlds, count), -1)
-        of[bodies.world[rows], bodies.block_index[rows]] = rows
-        numbers = FRAMES[self.frame], column, width, count - (self.of == part.block)
+        bodies = simulation.state.population.bodies
+        if self.of not in part.kept:
+            part.kept[self.of] = self._places(simulation)
+        of = part.kept[self.of]
+        numbers = FRAMES[self.frame], column, width, of.shape[1] - (part.block in self.of.split())
         members = of, bodies.world, bodies.team
         who = part.rows, part.agents
         kernels.WRITERS[out.dtype]["each"](bodies.floats, who, part.team, members, spec, numbers, out)
+
+    def _places(self, simulation: Simulation) -> np.ndarray:
+        """Body row of each (world, place in the blocks), or -1."""
+        bodies, blocks = simulation.state.population.bodies, simulation.mission.blocks
+        parts = []
+        for name in self.of.split():
+            number = next(i for i, b in enumerate(blocks) if b.name == name)
+            rows = np.flatnonzero((bodies.block == number) & (bodies.block_index < blocks[number].count))
+            places = np.full((simulation.n_worlds, blocks[number].count), -1)
+            places[bodies.world[rows], bodies.block_index[rows]] = rows
+            parts.append(places)
+        return np.concatenate(parts, axis=1)
 
 
 @dataclass(frozen=True)

@@ -171,7 +171,7 @@ class Swarm:
             return
         self._ints, self._parts = bodies.ints, []
         alive, ids = self.alive.reshape(-1), self.now.id.reshape(-1)
-        alive[:] = False
+        alive[:], kept = False, {}  # type: ignore[var-annotated]
         for group in self.simulation.state.population.groups:
             block = bodies.block[group.first : group.last]
             for number, (name, first, room) in self._blocks.items():
@@ -183,7 +183,7 @@ class Swarm:
                     raise ParameterError(f"{name} has more than {room} entities; set room = {{{name!r}: ...}} in the task")
                 agents = bodies.world[rows] * self.n_agents + (first + place)
                 alive[agents], ids[agents] = True, bodies.id[rows]
-                self._parts.append(Part(name, group, rows, agents, bodies.team[rows].astype(float)))
+                self._parts.append(Part(name, group, rows, agents, bodies.team[rows].astype(float), kept))
         none = [np.zeros(0, np.int64)]
         self.now.rows = np.concatenate([*none, *(p.rows for p in self._parts)])
         self.now.agents = np.concatenate([*none, *(p.agents for p in self._parts)])
@@ -203,7 +203,7 @@ class Swarm:
                 mask = np.zeros(self.n_worlds, bool)
                 mask[worlds] = True
                 kept = mask[part.agents // self.n_agents]
-                some = Part(part.block, part.group, part.rows[kept], part.agents[kept], part.team[kept])
+                some = Part(part.block, part.group, part.rows[kept], part.agents[kept], part.team[kept], part.kept)
             column = 0
             if len(some.rows):
                 for component, width in zip(self.task.components(part.block), self.task.widths[part.block], strict=True):
