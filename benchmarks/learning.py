@@ -9,20 +9,32 @@ from __future__ import annotations
 
 import argparse
 import json
-import runpy
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from tag import Tag
 
 from tussle import Block, Mission
 from tussle.api import Interaction, Param, neighbors
-from tussle.rl import Act, Nearest, Own, PredatorPrey, Swarm, Task, Term, alive, died, make_swarm, make_vec, parallel_env
+from tussle.rl import (
+    Act,
+    Nearest,
+    Own,
+    PredatorPrey,
+    Swarm,
+    Task,
+    Term,
+    alive,
+    died,
+    make_swarm,
+    make_vec,
+    parallel_env,
+)
 from tussle.stock import Unicycle
 
-EXAMPLE = Path(__file__).parents[1] / "examples" / "07_tag_as_a_task.py"
 EPISODE = 100
 
 
@@ -104,7 +116,13 @@ def swarm_case(task: Any, n_worlds: int, seconds: float) -> dict[str, Any]:
     cpu, alone = timed(lambda: swarm.step(actions), seconds), engine_alone(task, n_worlds, seconds)
     n = swarm.n_worlds * swarm.n_agents
     width = swarm.obs.shape[-1]
-    return {"agents": swarm.n_agents, "worlds": n_worlds, "floats": width, "M/s": n / cpu / 1e6, "engine M/s": n / alone / 1e6}
+    return {
+        "agents": swarm.n_agents,
+        "worlds": n_worlds,
+        "floats": width,
+        "M/s": n / cpu / 1e6,
+        "engine M/s": n / alone / 1e6,
+    }
 
 
 def vector_case(task: Any, n_worlds: int, seconds: float) -> dict[str, Any]:
@@ -112,7 +130,12 @@ def vector_case(task: Any, n_worlds: int, seconds: float) -> dict[str, Any]:
     env.reset(seed=1)
     actions, n = actions_of(env.swarm), n_worlds * env.swarm.n_agents
     cpu = timed(lambda: env.step(actions), seconds)
-    return {"agents": env.swarm.n_agents, "worlds": n_worlds, "floats": env.swarm.obs.shape[-1], "M/s": n / cpu / 1e6}
+    return {
+        "agents": env.swarm.n_agents,
+        "worlds": n_worlds,
+        "floats": env.swarm.obs.shape[-1],
+        "M/s": n / cpu / 1e6,
+    }
 
 
 def parallel_case(task: Any, seconds: float) -> dict[str, Any]:
@@ -148,7 +171,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=3.0)
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
-    tag, s = runpy.run_path(str(EXAMPLE))["Tag"](time_limit=10.0), options.seconds
+    tag, s = Tag(time_limit=10.0), options.seconds
     rows = {
         "prey, make_swarm": swarm_case(Prey, 64, s),
         "battle, make_swarm": swarm_case(Battle, 1, s),
@@ -159,7 +182,9 @@ def main() -> None:
     print(f"{'':20} agents worlds floats  M agent-steps/CPU s  engine alone")
     for name, row in rows.items():
         alone = f"{row['engine M/s']:.2f}" if "engine M/s" in row else ""
-        print(f"{name:20} {row['agents']:6} {row['worlds']:6} {row['floats']:6} {row['M/s']:20.2f} {alone:>13}")
+        print(
+            f"{name:20} {row['agents']:6} {row['worlds']:6} {row['floats']:6} {row['M/s']:20.2f} {alone:>13}"
+        )
     ratio = resets(s)
     print(f"speed with resets every 50 steps over that without: {ratio:.2f}")
     if options.json:

@@ -78,7 +78,9 @@ def select(near, n, listed, first, k, few, order, few_places, best, places):
         places[j] = -1
     bound, m = bound_of(near, n, k, order), 0
     bound = min(bound, FINITE)
-    for base in range(0, n, 64):  # the hits of 64 candidates as one number: one loop whose length the CPU mispredicts
+    for base in range(
+        0, n, 64
+    ):  # the hits of 64 candidates as one number: one loop whose length the CPU mispredicts
         hits = 0
         for p in range(base, min(base + 64, n), LANES):
             hits |= bits(load(near, p) <= bound) << (p - base)
@@ -134,5 +136,19 @@ def nearest_few(w, me, x, y, z, radius, mode, wanted, table, scratch, k):
 @device
 def scratch_of(k, n):
     """Scratch of `nearest_few` for worlds of up to n entities."""
-    near, listed, few, order = np.empty(n + LANES), np.empty(n, np.int64), np.empty(MOST + LANES), np.empty(MOST + LANES)
-    return np.empty(k), np.empty(k, np.int64), np.empty(k, np.int64), near, listed, few, order, np.empty(MOST, np.int64)
+    near, listed, few, order = (
+        np.empty(n + LANES),
+        np.empty(n, np.int64),
+        np.empty(MOST + LANES),
+        np.empty(MOST + LANES),
+    )
+    return (
+        np.empty(k),
+        np.empty(k, np.int64),
+        np.empty(k, np.int64),
+        near,
+        listed,
+        few,
+        order,
+        np.empty(MOST, np.int64),
+    )

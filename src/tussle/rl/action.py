@@ -55,9 +55,15 @@ class Act:
         is_range = self.low is not None and self.high is not None and np.isfinite([self.low, self.high]).all()
         given = [is_range and self.low != self.high, self.levels is not None, self.value is not None]
         if sum(given) != 1 or (not is_range and (self.low, self.high) != (None, None)):
-            raise ParameterError(f"Act({self.target!r}): give finite low and high that differ, or levels, or value")
-        if self.levels is not None and (len(self.levels) < 2 or np.size(self.levels) != len(self.levels) * len(self.names)):
-            raise ParameterError(f"Act({self.target!r}): levels are two or more rows of {len(self.names)} number(s)")
+            raise ParameterError(
+                f"Act({self.target!r}): give finite low and high that differ, or levels, or value"
+            )
+        if self.levels is not None and (
+            len(self.levels) < 2 or np.size(self.levels) != len(self.levels) * len(self.names)
+        ):
+            raise ParameterError(
+                f"Act({self.target!r}): levels are two or more rows of {len(self.names)} number(s)"
+            )
         channels = channels_of(block)
         for name in self.names:
             if "." in name:
@@ -87,7 +93,9 @@ def _parameter(block: Block, path: str) -> EntityPlugin:
     found = plugins[plugin]
     params = [k for k, c in type(found).declared(Param).items() if c.is_row_data and not c.fields]
     if name not in params:
-        raise ParameterError(f"Act: {plugin} has no parameter {name!r}{nearest_name(name, params)}; {listed(params)}")
+        raise ParameterError(
+            f"Act: {plugin} has no parameter {name!r}{nearest_name(name, params)}; {listed(params)}"
+        )
     return found  # type: ignore[no-any-return]
 
 
@@ -122,7 +130,9 @@ def learned(block: Block, acts: Sequence[Act]) -> Block:
         names = list(channels)
     if all("." in name for name in names):
         return block
-    constants = tuple((act.target, act.value) for act in acts if act.value is not None and "." not in act.target)
+    constants = tuple(
+        (act.target, act.value) for act in acts if act.value is not None and "." not in act.target
+    )
     actor = _actor(tuple((n, channels[n]) for n in names if "." not in n), constants)
     return block.replace(autonomy=(*(block.autonomy if keeps else ()), actor()))
 
@@ -147,7 +157,9 @@ class Decoder:
         self.constants = [act for act in acts if act.value is not None and "." in act.target]
         kinds = {act.levels is None for act in self.free}
         if len(kinds) != 1:
-            raise ParameterError(f"action of {block}: all are ranges, or all have levels; at least one is needed")
+            raise ParameterError(
+                f"action of {block}: all are ranges, or all have levels; at least one is needed"
+            )
         self.is_continuous = kinds.pop()
         sizes = [len(act.levels or ()) for act in self.free]
         self.space: spaces.Space[Any]
@@ -184,5 +196,9 @@ class Decoder:
 
     def _column(self, group: Any, target: str) -> np.ndarray:
         plugin, _, name = target.rpartition(".")
-        binding = next(b for b in group.autonomies if (b.spec.instance_name == plugin if plugin else isinstance(b.spec, Actor)))
+        binding = next(
+            b
+            for b in group.autonomies
+            if (b.spec.instance_name == plugin if plugin else isinstance(b.spec, Actor))
+        )
         return group.table.array(binding.places[name])  # type: ignore[no-any-return]

@@ -15,7 +15,11 @@ from tussle.errors import ParameterError, listed, nearest_name
 from tussle.rl.swarm import Swarm, task_of
 from tussle.rl.task import Task
 
-MODES = {"next_step": AutoresetMode.NEXT_STEP, "same_step": AutoresetMode.SAME_STEP, "disabled": AutoresetMode.DISABLED}
+MODES = {
+    "next_step": AutoresetMode.NEXT_STEP,
+    "same_step": AutoresetMode.SAME_STEP,
+    "disabled": AutoresetMode.DISABLED,
+}
 RENDER_MODES = ("rgb_array",)
 OPTIONS = ("params", "reset_mask")
 
@@ -37,7 +41,10 @@ def check_options(options: Any) -> dict[str, Any]:
     given = dict(options or {})
     for name in given:
         if name not in OPTIONS:
-            warnings.warn(f"reset ignores the option {name!r}{nearest_name(name, OPTIONS)}; {listed(OPTIONS)}", stacklevel=3)
+            warnings.warn(
+                f"reset ignores the option {name!r}{nearest_name(name, OPTIONS)}; {listed(OPTIONS)}",
+                stacklevel=3,
+            )
     return given
 
 
@@ -99,7 +106,12 @@ class TaskVectorEnv(VectorEnv[Any, Any, Any]):
         return shown.copy() if self.copy else shown
 
     def _info(self, worlds: np.ndarray) -> dict[str, Any]:
-        return {"alive": self.swarm.alive.copy(), "_alive": worlds.copy(), "seed": self.swarm.seeds.copy(), "_seed": worlds.copy()}
+        return {
+            "alive": self.swarm.alive.copy(),
+            "_alive": worlds.copy(),
+            "seed": self.swarm.seeds.copy(),
+            "_seed": worlds.copy(),
+        }
 
     def reset(self, *, seed: Any = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Start new episodes; `options` may have "reset_mask", worlds (W,), and "params", parameters by path."""
@@ -123,7 +135,9 @@ class TaskVectorEnv(VectorEnv[Any, Any, Any]):
         given = np.asarray(actions)
         if swarm.n_agents == 1:
             if given.shape != self.action_space.shape:
-                raise ParameterError(f"actions have shape {given.shape}; the shape must be {self.action_space.shape}")
+                raise ParameterError(
+                    f"actions have shape {given.shape}; the shape must be {self.action_space.shape}"
+                )
             given = given.reshape(self.num_envs, 1, -1)
         obs, rewards, _, _, _ = swarm.step(given)
         info = self._info(np.ones(self.num_envs, bool))
@@ -163,7 +177,9 @@ class TaskEnv(gymnasium.Env[Any, Any]):
     def _seen(self, array: np.ndarray) -> np.ndarray:
         return array[0, 0].copy() if self.swarm.n_agents == 1 else array[0].copy()
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
         """Start a new episode; `options` may have "params", parameters by path."""
         super().reset(seed=seed)
         self.swarm.reset(seed, None, check_options(options).get("params"))
@@ -176,7 +192,9 @@ class TaskEnv(gymnasium.Env[Any, Any]):
         """Play one decision; the reward is the sum over agents."""
         given = np.asarray(action)
         if given.shape != self.action_space.shape:
-            raise ParameterError(f"the action has shape {given.shape}; the shape must be {self.action_space.shape}")
+            raise ParameterError(
+                f"the action has shape {given.shape}; the shape must be {self.action_space.shape}"
+            )
         swarm = self.swarm
         obs, rewards, _, _, _ = swarm.step(given.reshape(1, swarm.n_agents, -1))
         info = {**self._info(), **{name: float(term.sum()) for name, term in swarm.terms.items()}}
@@ -214,7 +232,9 @@ def make_vec(
         render_mode: "rgb_array" or None.
         copy: Return copies of the observations; otherwise the next step overwrites them.
     """
-    return TaskVectorEnv(task, num_envs, autoreset=autoreset, threads=threads, render_mode=render_mode, copy=copy)
+    return TaskVectorEnv(
+        task, num_envs, autoreset=autoreset, threads=threads, render_mode=render_mode, copy=copy
+    )
 
 
 def make(task: Any, *, render_mode: str | None = None, threads: int = 1) -> TaskEnv:

@@ -98,7 +98,11 @@ def own(floats, source, shift, who, spec, mode, column, out):
                 nose = frame_of(floats, row, BODY)
                 at = put_vector(SPACE, scale, nose[0], nose[1], nose[2], turn, a, at, out)
             else:
-                x, y, z = source[k, j] - spec[f, 3], source[k + 1, j] - spec[f, 4], source[k + 2, j] - spec[f, 5]
+                x, y, z = (
+                    source[k, j] - spec[f, 3],
+                    source[k + 1, j] - spec[f, 4],
+                    source[k + 2, j] - spec[f, 5],
+                )
                 at = put_vector(kind, scale, x, y, z, turn, a, at, out)
 
 
@@ -149,7 +153,7 @@ def sectors(floats, who, wanted, places, arrays, numbers, radius, out):
             dx, dy, dz = table[5][found[j]] - x, table[6][found[j]] - y, table[7][found[j]] - z
             ahead = turn[0] * dx + turn[1] * dy + turn[2] * dz
             left = turn[3] * dx + turn[4] * dy + turn[5] * dz
-            s = int(math.floor(atan2(left, ahead) * (n / (2.0 * math.pi)) + 0.5)) % n
+            s = math.floor(atan2(left, ahead) * (n / (2.0 * math.pi)) + 0.5) % n
             near = 1.0 - math.sqrt(dx * dx + dy * dy + dz * dz) / radius
             out[a, column + s] = max(out[a, column + s], near)
 
@@ -215,7 +219,9 @@ SIGNATURES = {
     each: f"{ROWS} F (I2 I I) F2 (i8 i8 i8 i8)",
 }
 WRITERS = {
-    np.dtype(dtype): {law.__name__: kernel(f"{signature} {out}")(law) for law, signature in SIGNATURES.items()}
+    np.dtype(dtype): {
+        law.__name__: kernel(f"{signature} {out}")(law) for law, signature in SIGNATURES.items()
+    }
     for dtype, out in ((np.float32, "S2w"), (np.float64, "F2w"))
 }
 """The kernels of observations by type of the numbers and by name."""

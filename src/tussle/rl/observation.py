@@ -11,6 +11,7 @@ import numpy as np
 
 from tussle.api.bodies import FLOATS, OFFSETS
 from tussle.errors import ParameterError, listed, nearest_name
+from tussle.neighbors.few import WHOLE_WORLD
 from tussle.neighbors.search import ANY, DIFFERENT, SAME
 from tussle.rl import kernels
 
@@ -159,11 +160,18 @@ def _column_of(block: Any, path: str) -> int:
     plugin, _, name = path.partition(".")
     plugins = {p.instance_name: p for p in block.plugins}
     if plugin not in plugins:
-        raise ParameterError(f"Own: {path!r}: {block.name} has no {plugin!r}{nearest_name(plugin, plugins)}; {listed(plugins)}")
+        raise ParameterError(
+            f"Own: {path!r}: {block.name} has no {plugin!r}{nearest_name(plugin, plugins)}; {listed(plugins)}"
+        )
     columns = {k: c for k, c in type(plugins[plugin]).declared(Numbers).items() if not c.ragged}
     if name not in columns:
         raise ParameterError(f"Own: {plugin} has no {name!r}{nearest_name(name, columns)}; {listed(columns)}")
-    return max(1, len(getattr(columns[name], "channels", ())) if hasattr(columns[name], "channels") else len(columns[name].fields))
+    return max(
+        1,
+        len(getattr(columns[name], "channels", ()))
+        if hasattr(columns[name], "channels")
+        else len(columns[name].fields),
+    )
 
 
 def _plugin_column(group: Group, path: str) -> tuple[np.ndarray, int, int, int]:
@@ -193,11 +201,17 @@ class _Search(Component):
 
     def _check_of(self, of: Any, radius: float, needs_radius: bool) -> None:
         if of not in (None, "own", "other") and not isinstance(of, int):
-            raise ParameterError(f"{type(self).__name__}: of = {of!r} is not allowed; it takes 'own', 'other', a team number or None")
+            raise ParameterError(
+                f"{type(self).__name__}: of = {of!r} is not allowed; it takes 'own', 'other', a team number or None"
+            )
         if not radius > 0.0 or (needs_radius and radius == np.inf):
-            raise ParameterError(f"{type(self).__name__}: radius = {radius!r} is not allowed; it takes a number > 0")
+            raise ParameterError(
+                f"{type(self).__name__}: radius = {radius!r} is not allowed; it takes a number > 0"
+            )
 
-    def _index(self, simulation: Simulation, reach: float) -> tuple[Any, tuple[np.ndarray, ...], tuple[np.ndarray, ...]]:
+    def _index(
+        self, simulation: Simulation, reach: float
+    ) -> tuple[Any, tuple[np.ndarray, ...], tuple[np.ndarray, ...]]:
         bodies, threads = simulation.state.population.bodies, simulation.state.context
         split = None if threads.threads == 1 else simulation.state.world_view.split_rows
         index = bodies.any_index() if reach == np.inf else bodies.index(reach, split)
@@ -237,10 +251,15 @@ class Nearest(_Search):
     def write(self, simulation: Simulation, part: Part, column: int, out: np.ndarray) -> None:
         spec, width = _lines(self.columns.split(), self.scale, self.planar)
         mode, wanted = self._wanted(part, self.of)
-        floats, places, arrays = self._index(simulation, np.inf)
+        is_small = (
+            simulation.state.population.bodies.n <= WHOLE_WORLD * simulation.n_worlds
+        )  # then all are looked at
+        floats, places, arrays = self._index(simulation, np.inf if is_small else self.radius)
         numbers = self.k, mode, FRAMES[self.frame], column, width
         who = part.rows, part.agents
-        kernels.WRITERS[out.dtype]["nearest"](floats, who, wanted, places, arrays, spec, numbers, self.radius, out)
+        kernels.WRITERS[out.dtype]["nearest"](
+            floats, who, wanted, places, arrays, spec, numbers, self.radius, out
+        )
 
 
 @dataclass(frozen=True)
@@ -291,7 +310,9 @@ class Means(_Search):
         floats, places, arrays = self._index(simulation, self.radius)
         numbers = mode, FRAMES[self.frame], column, width, self.count_scale
         who = part.rows, part.agents
-        kernels.WRITERS[out.dtype]["sums"](floats, who, wanted, places, arrays, spec, numbers, self.radius, out)
+        kernels.WRITERS[out.dtype]["sums"](
+            floats, who, wanted, places, arrays, spec, numbers, self.radius, out
+        )
 
 
 @dataclass(frozen=True)
@@ -313,7 +334,9 @@ class Each(Component):
         _check("Each", self.frame, names, (*RELATIVE, *OTHERS, *FLOATS), self.scale)
         for name in self.of.split():
             if name not in blocks:
-                raise ParameterError(f"Each: there is no block {name!r}{nearest_name(name, blocks)}; {listed(blocks)}")
+                raise ParameterError(
+                    f"Each: there is no block {name!r}{nearest_name(name, blocks)}; {listed(blocks)}"
+                )
         n_others = sum(blocks[name] for name in self.of.split()) - (block in self.of.split())
         return n_others * _lines(names, self.scale, self.planar)[1]
 

@@ -78,7 +78,11 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):
         self._take(actions)
         swarm = self.swarm
         swarm.step(self._actions[None])
-        rewards, dead, late = swarm.rewards[0].tolist(), swarm.terminations[0].tolist(), swarm.truncations[0].tolist()
+        rewards, dead, late = (
+            swarm.rewards[0].tolist(),
+            swarm.terminations[0].tolist(),
+            swarm.truncations[0].tolist(),
+        )
         self.agents = [] if swarm.over[0] else self._living()
         if self.agents == before:
             told, numbers = before, [self._number[name] for name in before]
@@ -87,7 +91,9 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):
             numbers = [self._number[name] for name in told]
             self.agents = [name for name in self.agents if not dead[self._number[name]]]
         terms = {name: term[0].tolist() for name, term in swarm.terms.items()}
-        infos = {name: {key: term[a] for key, term in terms.items()} for name, a in zip(told, numbers, strict=True)}
+        infos = {
+            name: {key: term[a] for key, term in terms.items()} for name, a in zip(told, numbers, strict=True)
+        }
         return (
             self._observed(told),
             {name: rewards[a] for name, a in zip(told, numbers, strict=True)},
@@ -102,7 +108,11 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):
             for name in actions:
                 if name not in self.agents:
                     known = name in self._number
-                    text = "is not alive" if known else f"is no agent{nearest_name(str(name), self.possible_agents)}"
+                    text = (
+                        "is not alive"
+                        if known
+                        else f"is no agent{nearest_name(str(name), self.possible_agents)}"
+                    )
                     raise ParameterError(f"there is an action for {name!r}, which {text}")
             missing = next(name for name in self.agents if name not in actions)
             raise ParameterError(f"the action of {missing!r} is missing")
@@ -123,7 +133,9 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):
             space, given = self.action_spaces[name], np.asarray(value)
             kinds = "f" if self.swarm.is_continuous else "iu"
             if given.shape != space.shape or given.dtype.kind not in kinds:
-                raise ParameterError(f"the action of {name!r} is {given.dtype} of shape {given.shape}; it must be in {space}")
+                raise ParameterError(
+                    f"the action of {name!r} is {given.dtype} of shape {given.shape}; it must be in {space}"
+                )
             self._actions[self._number[name], : given.size] = given.reshape(-1)
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -8,7 +8,16 @@ from typing import Any
 import numpy as np
 
 from tussle.engine.simulation import Simulation
-from tussle.view.export.film.cameras import AZIMUTH, ELEVATION, LARGEST, MARGIN, SMALLEST, UP, VIEW_ANGLE, View
+from tussle.view.export.film.cameras import (
+    AZIMUTH,
+    ELEVATION,
+    LARGEST,
+    MARGIN,
+    SMALLEST,
+    UP,
+    VIEW_ANGLE,
+    View,
+)
 from tussle.view.export.film.renderer import Renderer
 from tussle.view.frame import Lens
 from tussle.view.scenery import scenery_of

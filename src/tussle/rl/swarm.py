@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -58,7 +58,9 @@ class Swarm:
         ParameterError: A value is not allowed.
     """
 
-    def __init__(self, task: Any, num_envs: int = 1, *, autoreset: str = "same_step", threads: int = 1) -> None:
+    def __init__(
+        self, task: Any, num_envs: int = 1, *, autoreset: str = "same_step", threads: int = 1
+    ) -> None:
         self.task = task = task_of(task)
         if autoreset not in AUTORESET:
             raise ParameterError(f"autoreset = {autoreset!r} is not allowed; {listed(AUTORESET)}")
@@ -75,9 +77,15 @@ class Swarm:
         self.seeds = np.zeros(worlds, np.uint64)
         self._first, self._episode = self.seeds.copy(), np.zeros(worlds, np.int64)
         self._params: dict[str, Any] = {}
-        self._reset(np.arange(worlds), np.random.SeedSequence().generate_state(worlds, np.uint64) >> np.uint64(1))
+        self._reset(
+            np.arange(worlds), np.random.SeedSequence().generate_state(worlds, np.uint64) >> np.uint64(1)
+        )
         self.simulation = Simulation(
-            task.played, self.seeds.tolist(), self._drawn(np.arange(worlds)), threads=threads, on_error="raise"
+            task.played,
+            self.seeds.tolist(),
+            self._drawn(np.arange(worlds)),
+            threads=threads,
+            on_error="raise",
         )
         self.is_fresh = True
         team = np.array([b.team for b in task.blocks])[task.agent_block]
@@ -86,7 +94,10 @@ class Swarm:
             self.simulation.events.listen(self.now.listen)
         first = np.cumsum([0, *task.capacities])
         names = [b.name for b in task.given.blocks]
-        self._blocks = {names.index(b.name): (b.name, int(first[i]), task.capacities[i]) for i, b in enumerate(task.blocks)}
+        self._blocks = {
+            names.index(b.name): (b.name, int(first[i]), task.capacities[i])
+            for i, b in enumerate(task.blocks)
+        }
         self._decoders = {d.block: d for d in task.decoders}
         self.is_continuous = task.decoders[0].is_continuous
         if any(d.is_continuous != self.is_continuous for d in task.decoders):
@@ -120,14 +131,21 @@ class Swarm:
         if seed is None:
             return None
         many = [seed + int(w) for w in worlds] if isinstance(seed, (int, np.integer)) else list(seed)
-        if len(many) != len(worlds) or any(isinstance(s, bool) or not isinstance(s, (int, np.integer)) or s < 0 for s in many):
-            raise ParameterError(f"seed = {seed!r} is not allowed; it takes a whole number >= 0, or one for each of {len(worlds)} worlds")
+        if len(many) != len(worlds) or any(
+            isinstance(s, bool) or not isinstance(s, (int, np.integer)) or s < 0 for s in many
+        ):
+            raise ParameterError(
+                f"seed = {seed!r} is not allowed; it takes a whole number >= 0, or one for each of {len(worlds)} worlds"
+            )
         return np.array([int(s) % 2**64 for s in many], np.uint64)
 
     # -- episodes ----------------------------------------------------------------------------------------------------------
 
     def reset(
-        self, seed: int | Iterable[int] | None = None, worlds: Any = None, params: Mapping[str, Any] | None = None
+        self,
+        seed: int | Iterable[int] | None = None,
+        worlds: Any = None,
+        params: Mapping[str, Any] | None = None,
     ) -> np.ndarray:
         """Start new episodes.
 
@@ -144,6 +162,10 @@ class Swarm:
         """
         chosen = np.arange(self.n_worlds) if worlds is None else np.atleast_1d(np.asarray(worlds))
         chosen = np.flatnonzero(chosen) if chosen.dtype == bool else chosen
+        if len(np.unique(chosen)) < len(chosen) or not set(chosen.tolist()) <= set(range(self.n_worlds)):
+            raise ParameterError(
+                f"worlds = {chosen.tolist()} is not allowed; it takes numbers from 0 to {self.n_worlds - 1}, each once"
+            )
         seeds = self._checked_seeds(seed, chosen)
         if seeds is not None or not self.is_fresh:
             self._reset(chosen, seeds)
@@ -180,7 +202,9 @@ class Swarm:
                     continue
                 place = bodies.block_index[rows]
                 if place.max() >= room:
-                    raise ParameterError(f"{name} has more than {room} entities; set room = {{{name!r}: ...}} in the task")
+                    raise ParameterError(
+                        f"{name} has more than {room} entities; set room = {{{name!r}: ...}} in the task"
+                    )
                 agents = bodies.world[rows] * self.n_agents + (first + place)
                 alive[agents], ids[agents] = True, bodies.id[rows]
                 self._parts.append(Part(name, group, rows, agents, bodies.team[rows].astype(float), kept))
@@ -203,10 +227,14 @@ class Swarm:
                 mask = np.zeros(self.n_worlds, bool)
                 mask[worlds] = True
                 kept = mask[part.agents // self.n_agents]
-                some = Part(part.block, part.group, part.rows[kept], part.agents[kept], part.team[kept], part.kept)
+                some = Part(
+                    part.block, part.group, part.rows[kept], part.agents[kept], part.team[kept], part.kept
+                )
             column = 0
             if len(some.rows):
-                for component, width in zip(self.task.components(part.block), self.task.widths[part.block], strict=True):
+                for component, width in zip(
+                    self.task.components(part.block), self.task.widths[part.block], strict=True
+                ):
                     component.write(self.simulation, some, column, out)
                     column += width
 
@@ -276,7 +304,9 @@ class Swarm:
         if self._ints is not self.simulation.state.population.bodies.ints:
             self._look()
         self.now.actions = given
-        flat = np.ascontiguousarray(given.reshape(-1, self.action_width), float if self.is_continuous else np.int64)
+        flat = np.ascontiguousarray(
+            given.reshape(-1, self.action_width), float if self.is_continuous else np.int64
+        )
         for part in self._parts:
             wrong = self._decoders[part.block].write(part, flat)
             if wrong >= 0:
@@ -305,7 +335,9 @@ class Swarm:
             over |= self._are_decided()
         ends = np.asarray(task.ends(now))
         if ends.shape not in ((), over.shape):
-            raise ParameterError(f"{type(task).__name__}.ends returns shape {ends.shape}; it returns {over.shape}, one per world")
+            raise ParameterError(
+                f"{type(task).__name__}.ends returns shape {ends.shape}; it returns {over.shape}, one per world"
+            )
         over |= ends
         self.terminations |= over[:, None] & self.alive
         self.truncations[:] = self.late[:] = False
@@ -332,7 +364,20 @@ class Swarm:
 
     # -- snapshots ---------------------------------------------------------------------------------------------------------
 
-    KEPT = ("obs", "alive", "over", "late", "returns", "lengths", "seeds", "_first", "_episode", "rewards", "terminations", "truncations")
+    KEPT = (
+        "obs",
+        "alive",
+        "over",
+        "late",
+        "returns",
+        "lengths",
+        "seeds",
+        "_first",
+        "_episode",
+        "rewards",
+        "terminations",
+        "truncations",
+    )
 
     def state(self) -> dict[str, Any]:
         """A copy of everything; after `restore`, the same actions give the same bits."""
@@ -351,13 +396,18 @@ class Swarm:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A pickle makes a new swarm, before its first reset."""
-        return make_swarm_of, (self.task, self.n_worlds, self.autoreset, self.simulation.state.context.threads)
+        return make_swarm_of, (
+            self.task,
+            self.n_worlds,
+            self.autoreset,
+            self.simulation.state.context.threads,
+        )
 
     def close(self) -> None:
         """Free everything that lies outside the arrays."""
         self.simulation.close()
 
-    def __enter__(self) -> Swarm:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -56,7 +56,9 @@ class Task:
         known = [k for k in Task.__annotations__ if not k.startswith("_")]
         for name, value in values.items():
             if name not in known:
-                raise ParameterError(f"{type(self).__name__} has no {name!r}{nearest_name(name, known)}; {listed(known)}")
+                raise ParameterError(
+                    f"{type(self).__name__} has no {name!r}{nearest_name(name, known)}; {listed(known)}"
+                )
             self.__dict__[name] = value
         self._given = values
         self._check()
@@ -75,9 +77,13 @@ class Task:
     def _check(self) -> None:
         where = type(self).__name__
         if self.decide_every < 1 or int(self.decide_every) != self.decide_every:
-            raise ParameterError(f"{where}: decide_every = {self.decide_every!r} is not allowed; it takes a whole number >= 1")
+            raise ParameterError(
+                f"{where}: decide_every = {self.decide_every!r} is not allowed; it takes a whole number >= 1"
+            )
         if self.time_limit is not None and not self.time_limit > 0.0:
-            raise ParameterError(f"{where}: time_limit = {self.time_limit!r} is not allowed; it takes a number of seconds > 0")
+            raise ParameterError(
+                f"{where}: time_limit = {self.time_limit!r} is not allowed; it takes a number of seconds > 0"
+            )
         if np.dtype(self.dtype) not in (np.float32, np.float64):
             raise ParameterError(f"{where}: dtype = {self.dtype!r} is not allowed; it is float32 or float64")
         for name, term in self.reward.items():
@@ -93,7 +99,9 @@ class Task:
         if isinstance(self.mission, Mission):
             return self.mission
         if self.mission is None:
-            raise ParameterError(f"{type(self).__name__} has no mission; set mission = a Mission, or the name of one")
+            raise ParameterError(
+                f"{type(self).__name__} has no mission; set mission = a Mission, or the name of one"
+            )
         return read_mission(self.mission).mission
 
     @cached_property
@@ -102,7 +110,9 @@ class Task:
         names, have = self.learners.split(), [b.name for b in self.given.blocks]
         for name in names:
             if name not in have:
-                raise ParameterError(f"{type(self).__name__}: learners: there is no block {name!r}{nearest_name(name, have)}; {listed(have)}")
+                raise ParameterError(
+                    f"{type(self).__name__}: learners: there is no block {name!r}{nearest_name(name, have)}; {listed(have)}"
+                )
         if not names:
             raise ParameterError(f"{type(self).__name__}: learners is empty; {listed(have)}")
         return [b for b in self.given.blocks if b.name in names]
@@ -112,7 +122,9 @@ class Task:
         given = getattr(self, what)
         if isinstance(given, Mapping):
             if block not in given:
-                raise ParameterError(f"{type(self).__name__}: {what} has nothing for {block!r}; {listed(given)}")
+                raise ParameterError(
+                    f"{type(self).__name__}: {what} has nothing for {block!r}; {listed(given)}"
+                )
             given = given[block]
         items = list(given) if isinstance(given, Sequence) else [given]
         for item in items:

@@ -30,7 +30,12 @@ def mission(prey: int = 6, **changes):
         autonomy=Predator(max_speed=40, capture_range=12),
         motion=Unicycle(vel_max=40, turn_rate_max=3, pitch_rate_max=2),
     )
-    values = {"blocks": [flock, hunters], "dt": 0.1, "end": 6, "interactions": [SimpleCapture(capture_range=12)]}
+    values = {
+        "blocks": [flock, hunters],
+        "dt": 0.1,
+        "end": 6,
+        "interactions": [SimpleCapture(capture_range=12)],
+    }
     return Mission(**{**values, "end_conditions": "time, one_team, all_dead", **changes})
 
 
@@ -39,7 +44,7 @@ class Flee(Task):
     learners = "prey"
     observation = (Own("vel", scale=20.0), Nearest(3, scale={"offset": 50.0, "relative_vel": 20.0}))
     action = (Act("speed", 0.0, 20.0), Act("turn_rate", -2.0, 2.0), Act("pitch_rate", value=0.0))
-    reward = {"alive": Term(alive, 0.1), "captured": Term(captured, -1.0)}
+    reward = {"alive": Term(alive, 0.1), "captured": Term(captured, -1.0)}  # noqa: RUF012
 
 
 @pytest.fixture

@@ -9,6 +9,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 from pettingzoo.utils import parallel_to_aec
+
 from tussle.errors import ParameterError
 from tussle.rl import TaskParallelEnv, make, make_vec, parallel_env
 
@@ -17,7 +18,9 @@ from tussle.rl import TaskParallelEnv, make, make_vec, parallel_env
 def test_gymnasium_accepts_one_world(which, request):
     env = make(request.getfixturevalue(which))
     with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message=".*(Box observation space (minimum|maximum)|unconventional).*")
+        warnings.filterwarnings(
+            "ignore", message=".*(Box observation space (minimum|maximum)|unconventional).*"
+        )
         check_env(env, skip_render_check=True)
     env.close()
 
@@ -92,7 +95,7 @@ def test_supersuit_makes_a_vector_environment(task):
         obs, _ = vec.reset(seed=1)
         assert obs.shape == (12, 2 * 27)
         for _ in range(70):
-            obs, rewards, _, _, _ = vec.step(np.zeros((12, 2), np.float32))
+            obs, *_ = vec.step(np.zeros((12, 2), np.float32))
         assert np.isfinite(obs).all()
 
 

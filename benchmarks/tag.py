@@ -4,8 +4,10 @@ Three adversaries chase a faster agent between two round landmarks. With the sam
 same trajectories, observations and rewards.
 """
 
+from __future__ import annotations
+
 import math
-import sys
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +15,7 @@ from tussle import Block, Mission
 from tussle.api import Controller, Input, MotionModel, Output, Param, State
 from tussle.numeric import exp, log
 from tussle.numeric.kernel import kernel
-from tussle.rl import Act, Each, Own, Task, Term, make_swarm
+from tussle.rl import Act, Each, Own, Situation, Task, Term
 from tussle.stock import Still
 
 CONTACT_FORCE, MARGIN, DAMPING = 100.0, 1e-3, 0.25
@@ -50,7 +52,7 @@ class Contact(Controller):
     total_x = Output(unit="N")
     total_y = Output(unit="N")
 
-    def step(self, g):
+    def step(self, g: Any) -> None:
         index = g.index(np.inf)
         rows = slice(g.first, g.last)
         places = index.row_world[rows], index.place[rows], index.world_start
@@ -82,28 +84,37 @@ class Particle(MotionModel):
     total_y = Input(unit="N")
     advance = slide
 
-    def from_body(self, body, rows):
+    def from_body(self, body: Any, rows: np.ndarray) -> None:
         self.x[:2, rows], self.x[2:, rows] = body.pos[:2, rows], body.vel[:2, rows]
 
-    def to_body(self, body):
+    def to_body(self, body: Any) -> None:
         body.pos[:2], body.vel[:2] = self.x[:2], self.x[2:]
 
 
-def block(name, count, radius, half_width, **plugins):
+def block(name: str, count: int, radius: float, half_width: float, **plugins: Any) -> Block:
     width = (half_width, half_width, 0)
     team = int(name == "agent")
     return Block(
-        name=name, team=team, count=count, radius=radius, placement="uniform", half_width=width, scatter_first=True, **plugins
+        name=name,
+        team=team,
+        count=count,
+        radius=radius,
+        placement="uniform",
+        half_width=width,
+        scatter_first=True,
+        **plugins,
     )
 
 
-def rewards(now):
+def rewards(now: Situation) -> np.ndarray:
     """10 per contact for all adversaries, minus 10 for the agent, which must also stay in the field; agents are the last in a world."""
     pos = now.pos[..., :2]
     offset = pos[:, :3] - pos[:, 3:]
     n_contacts = (np.sqrt((offset * offset).sum(axis=-1)) < 0.075 + 0.05).sum(axis=1)
     side = np.abs(pos[:, 3])
-    outside = np.where(side < 0.9, 0.0, np.where(side < 1.0, (side - 0.9) * 10.0, np.minimum(np.exp(2.0 * side - 2.0), 10.0)))
+    outside = np.where(
+        side < 0.9, 0.0, np.where(side < 1.0, (side - 0.9) * 10.0, np.minimum(np.exp(2.0 * side - 2.0), 10.0))
+    )
     agent = -10.0 * n_contacts - outside[:, 0] - outside[:, 1]
     return np.stack([10.0 * n_contacts] * 3 + [agent], axis=1)
 
@@ -125,22 +136,14 @@ class Tag(Task):
         ],
     )
     learners = "adversary agent"
-    observation = {
-        "adversary": [OWN, LANDMARKS, Each("adversary agent", planar=True), Each("agent", "vel", planar=True)],
+    observation = {  # noqa: RUF012
+        "adversary": [
+            OWN,
+            LANDMARKS,
+            Each("adversary agent", planar=True),
+            Each("agent", "vel", planar=True),
+        ],
         "agent": [OWN, LANDMARKS, Each("adversary", planar=True)],
     }
     action = MOVES
-    reward = {"tag": Term(rewards)}
-
-
-if __name__ == "__main__":
-    n_worlds = int(sys.argv[1]) if len(sys.argv) > 1 else 64
-    swarm = make_swarm(Tag, n_worlds)
-    swarm.reset(seed=1)
-    chance = np.random.default_rng(1)
-    total = np.zeros((n_worlds, 4))
-    for _ in range(100):
-        obs, reward, *_ = swarm.step(chance.integers(0, 5, (n_worlds, 4)))
-        total += reward
-    print(f"{n_worlds} worlds, observations {obs.shape}")
-    print("mean reward of an episode at random: adversary %.1f, agent %.1f" % (total[:, 0].mean() / 4, total[:, 3].mean() / 4))
+    reward = {"tag": Term(rewards)}  # noqa: RUF012
