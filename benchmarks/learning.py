@@ -21,7 +21,7 @@ from tussle import Block, Mission
 from tussle.api import Interaction, Param, neighbors
 from tussle.rl import (
     Act,
-    Nearest,
+    NearestOthers,
     Own,
     PredatorPrey,
     Swarm,
@@ -76,7 +76,9 @@ class Battle(Task):
     observation = (
         Own("vel", scale=10.0, planar=True, frame="heading"),
         Own("health"),
-        Nearest(8, radius=25.0, planar=True, columns="offset same_team present", scale={"offset": 25.0}),
+        NearestOthers(
+            8, radius=25.0, planar=True, columns="offset same_team present", scale={"offset": 25.0}
+        ),
     )
     action = (Act("turn_rate", -2.0, 2.0), Act("speed", 0.0, 10.0))
     reward = {"alive": Term(alive, 0.01), "died": Term(died, -1.0)}  # noqa: RUF012

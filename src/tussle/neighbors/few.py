@@ -97,13 +97,17 @@ def select(near, n, listed, first, k, few, order, few_places, best, places):
         for j in range(m):
             n_nearer += number(splat(few[j]) < square)
         store(order, p, n_nearer)
-    n_selected = 0
+    n_selected, total = 0, 0
     for i in range(m):
         at = int(order[i])
         if at < k:
             best[at], places[at] = few[i], few_places[i]
             n_selected += 1
-    return n_selected == min(m, k)
+            total += at
+    wanted = min(m, k)
+    return n_selected == wanted and 2 * total == wanted * (
+        wanted - 1
+    )  # equal distances have equal, smaller counts
 
 
 @device

@@ -11,7 +11,7 @@ except ImportError:
 from tussle.rl.action import Act
 from tussle.rl.environments import TaskEnv, TaskVectorEnv, make, make_vec, register
 from tussle.rl.games import PredatorPrey
-from tussle.rl.observation import Component, Computed, Each, Means, Nearest, Own, Sectors
+from tussle.rl.observation import Component, Computed, Each, Means, NearestOthers, Own, Sectors
 from tussle.rl.parallel import TaskParallelEnv, parallel_env
 from tussle.rl.reward import Situation, Term, alive, captured, captures, collisions, died
 from tussle.rl.swarm import Swarm, make_swarm
@@ -23,7 +23,7 @@ __all__ = [
     "Computed",
     "Each",
     "Means",
-    "Nearest",
+    "NearestOthers",
     "Own",
     "PredatorPrey",
     "Sectors",

@@ -16,7 +16,7 @@ from tussle.columns import Param
 from tussle.errors import ParameterError, listed, nearest_name
 from tussle.mission import Block
 from tussle.rl import kernels
-from tussle.rl.observation import Part
+from tussle.rl.observation import AgentRows
 
 
 @dataclass(frozen=True)
@@ -169,7 +169,7 @@ class Decoder:
             self.space = spaces.Discrete(sizes[0]) if len(sizes) == 1 else spaces.MultiDiscrete(sizes)
         self.sizes = np.array(sizes)
 
-    def write(self, part: Part, actions: np.ndarray) -> int:
+    def write(self, part: AgentRows, actions: np.ndarray) -> int:
         """Set the columns of a part's agents from actions, (agents, numbers). Returns the first agent with a wrong action, or -1."""
         group, who = part.group, (part.rows, part.agents)
         for act in self.constants:

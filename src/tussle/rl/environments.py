@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -63,14 +63,15 @@ class Pictures:
     """Pictures of world 0 of a swarm; the renderer is made for the first one."""
 
     def __init__(self, swarm: Swarm) -> None:
-        self._swarm, self._camera = swarm, None
+        self._swarm = swarm
+        self._camera: Any = None
 
     def picture(self) -> Any:
         if self._camera is None:
-            from tussle.rl.picture import Camera  # needs the packages of tussle[view]
+            from tussle.rl.picture import WorldCamera  # needs the packages of tussle[view]
 
-            self._camera = Camera(self._swarm.simulation)  # type: ignore[assignment]
-        return self._camera.picture()  # type: ignore[attr-defined]
+            self._camera = WorldCamera(self._swarm.simulation)
+        return self._camera.picture()
 
     def close(self) -> None:
         if self._camera is not None:
@@ -85,7 +86,7 @@ def metadata_of(task: Task) -> dict[str, Any]:
 class TaskVectorEnv(VectorEnv[Any, Any, Any]):
     """The worlds of a task as a Gymnasium `VectorEnv`; see `make_vec`."""
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": list(RENDER_MODES), "render_fps": 10.0}
+    metadata = {"render_modes": list(RENDER_MODES), "render_fps": 10.0}  # noqa: RUF012 - as in the base class
 
     def __init__(
         self, task: Any, num_envs: int = 1, *, autoreset: Any = "next_step", threads: int = 1,
@@ -164,7 +165,7 @@ class TaskVectorEnv(VectorEnv[Any, Any, Any]):
 class TaskEnv(gymnasium.Env[Any, Any]):
     """One world of a task as a Gymnasium `Env`; see `make`."""
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": list(RENDER_MODES), "render_fps": 10.0}
+    metadata = {"render_modes": list(RENDER_MODES), "render_fps": 10.0}  # noqa: RUF012 - as in the base class
 
     def __init__(self, task: Any, *, render_mode: str | None = None, threads: int = 1) -> None:
         self.swarm = Swarm(task, 1, autoreset="disabled", threads=threads)
@@ -175,7 +176,7 @@ class TaskEnv(gymnasium.Env[Any, Any]):
         self._pictures = Pictures(self.swarm)
 
     def _seen(self, array: np.ndarray) -> np.ndarray:
-        return array[0, 0].copy() if self.swarm.n_agents == 1 else array[0].copy()
+        return np.array(array[0, 0]) if self.swarm.n_agents == 1 else np.array(array[0])
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -244,7 +245,13 @@ def make(task: Any, *, render_mode: str | None = None, threads: int = 1) -> Task
 
 def register(name: str, task: Any) -> None:
     """Register a task with Gymnasium, for `gymnasium.make(name)` and `gymnasium.make_vec(name)`."""
-    gymnasium.register(id=name, entry_point=TaskEnv, vector_entry_point=TaskVectorEnv, kwargs={"task": task})
+    entries = (f"{__name__}:{kind.__name__}" for kind in (TaskEnv, TaskVectorEnv))
+    gymnasium.register(name, next(entries), vector_entry_point=next(entries), kwargs={"task": task})
+        id=name,
+        entry_point="tussle.rl.environments:TaskEnv",
+        vector_entry_point="tussle.rl.environments:TaskVectorEnv",
+        kwargs={"task": task},
+    )
 
 
 __all__ = ["TaskEnv", "TaskVectorEnv", "make", "make_vec", "register", "task_of"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tussle.rl.action import Act
-from tussle.rl.observation import Nearest, Own
+from tussle.rl.observation import NearestOthers, Own
 from tussle.rl.reward import Term, alive, captured
 from tussle.rl.task import Task
 
@@ -16,7 +16,7 @@ class PredatorPrey(Task):
     observation = (
         Own("pos", scale=1000.0, origin=(0.0, 0.0, 200.0), frame="heading"),
         Own("vel forward", scale={"vel": 30.0}, frame="heading"),
-        Nearest(8, scale={"offset": 200.0, "relative_vel": 30.0}),
+        NearestOthers(8, scale={"offset": 200.0, "relative_vel": 30.0}),
     )
     action = (
         Act("speed", 0.0, 30.0),

@@ -8,6 +8,7 @@ one. Lines are written side by side from a column on.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -211,20 +212,14 @@ def each(floats, who, wanted, members, spec, numbers, out):
 
 ROWS = "F2 (I I)"
 SEARCH = f"{ROWS} F (I I I) {TABLE}"
-SIGNATURES = {
+# Those of observations are compiled for float32 and float64.
+SIGNATURES: dict[Any, str] = {
     own: "F2 F2 i8 (I I) F2 i8 i8",
     nearest: f"{SEARCH} F2 (i8 i8 i8 i8 i8) f8",
     sectors: f"{SEARCH} (i8 i8 i8 i8) f8",
     sums: f"{SEARCH} F2 (i8 i8 i8 i8 i8) f8",
     each: f"{ROWS} F (I2 I I) F2 (i8 i8 i8 i8)",
 }
-WRITERS = {
-    np.dtype(dtype): {
-        law.__name__: kernel(f"{signature} {out}")(law) for law, signature in SIGNATURES.items()
-    }
-    for dtype, out in ((np.float32, "S2w"), (np.float64, "F2w"))
-}
-"""The kernels of observations by type of the numbers and by name."""
 
 
 @kernel("F2 (I I) i8 i8 f8 f8 Fw -> i8")

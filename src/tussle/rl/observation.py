@@ -13,6 +13,7 @@ from tussle.api.bodies import FLOATS, OFFSETS
 from tussle.errors import ParameterError, listed, nearest_name
 from tussle.neighbors.few import WHOLE_WORLD
 from tussle.neighbors.search import ANY, DIFFERENT, SAME
+from tussle.numeric.kernel import kernel
 from tussle.rl import kernels
 
 if TYPE_CHECKING:
@@ -26,10 +27,17 @@ OWN = ("forward", *FLOATS)
 OTHERS = {"distance": kernels.DISTANCE, "same_team": kernels.SAME_TEAM, "present": kernels.PRESENT}
 RELATIVE = {"offset": "pos", "relative_vel": "vel"}
 Scale = float | Mapping[str, float]
+WRITERS = {
+    np.dtype(dtype): {
+        law.__name__: kernel(f"{signature} {out}")(law) for law, signature in kernels.SIGNATURES.items()
+    }
+    for dtype, out in ((np.float32, "S2w"), (np.float64, "F2w"))
+}
+"""The kernels of observations by type of the numbers and by name."""
 
 
 @dataclass(frozen=True)
-class Part:
+class AgentRows:
     """Agents of one block in one group.
 
     Attributes:
@@ -61,7 +69,7 @@ class Component(ABC):
         """
 
     @abstractmethod
-    def write(self, simulation: Simulation, part: Part, column: int, out: np.ndarray) -> None:
+    def write(self, simulation: Simulation, part: AgentRows, column: int, out: np.ndarray) -> None:
         """Write the numbers of a part's agents to out, (agents, numbers), from `column` on."""
 
 
@@ -132,8 +140,8 @@ class Own(Component):
                 total += 2 if k == 3 and self.planar and name != "forward" else k
         return total
 
-    def write(self, simulation: Simulation, part: Part, column: int, out: np.ndarray) -> None:
-        floats, own = simulation.state.population.bodies.floats, kernels.WRITERS[out.dtype]["own"]
+    def write(self, simulation: Simulation, part: AgentRows, column: int, out: np.ndarray) -> None:
+        floats, own = simulation.state.population.bodies.floats, WRITERS[out.dtype]["own"]
         who = part.rows, part.agents
         for name in self.columns.split():
             factor, source, shift, point = _factor(self.scale, name), floats, 0, (0.0, 0.0, 0.0)
@@ -192,7 +200,7 @@ class _Search(Component):
         radius: Those further away do not count [m].
     """
 
-    def _wanted(self, part: Part, of: str | int | None) -> tuple[int, np.ndarray]:
+    def _wanted(self, part: AgentRows, of: str | int | None) -> tuple[int, np.ndarray]:
         if of is None:
             return ANY, part.team
         if isinstance(of, int):
@@ -220,7 +228,7 @@ class _Search(Component):
 
 
 @dataclass(frozen=True)
-class Nearest(_Search):
+class NearestOthers(_Search):
     """The k nearest others, nearest first; zeros where there are fewer.
 
     Attributes:
@@ -242,13 +250,15 @@ class Nearest(_Search):
 
     def width(self, mission: Mission, block: str) -> int:
         names = self.columns.split()
-        _check("Nearest", self.frame, names, (*RELATIVE, *OTHERS, *FLOATS), self.scale)
+        _check("NearestOthers", self.frame, names, (*RELATIVE, *OTHERS, *FLOATS), self.scale)
         self._check_of(self.of, self.radius, False)
         if self.k < 1:
-            raise ParameterError(f"Nearest: k = {self.k!r} is not allowed; it takes a whole number >= 1")
+            raise ParameterError(
+                f"NearestOthers: k = {self.k!r} is not allowed; it takes a whole number >= 1"
+            )
         return self.k * _lines(names, self.scale, self.planar)[1]
 
-    def write(self, simulation: Simulation, part: Part, column: int, out: np.ndarray) -> None:
+    def write(self, simulation: Simulation, part: AgentRows, column: int, out: np.ndarray) -> None:
         spec, width = _lines(self.columns.split(), self.scale, self.planar)
         mode, wanted = self._wanted(part, self.of)
         is_small = (
@@ -257,9 +267,7 @@ class Nearest(_Search):
         floats, places, arrays = self._index(simulation, np.inf if is_small else self.radius)
         numbers = self.k, mode, FRAMES[self.frame], column, width
         who = part.rows, part.agents
-        kernels.WRITERS[out.dtype]["nearest"](
-            floats, who, wanted, places, arrays, spec, numbers, self.radius, out
-        )
+        WRITERS[out.dtype]["nearest"](floats, who, wanted, places, arrays, spec, numbers, self.radius, out)
 
 
 @dataclass(frozen=True)
@@ -278,17 +286,17 @@ class Sectors(_Search):
             raise ParameterError(f"Sectors: n = {self.n!r} is not allowed; it takes a whole number >= 1")
         return self.n
 
-    def write(self, simulation: Simulation, part: Part, column: int, out: np.ndarray) -> None:
+    def write(self, simulation: Simulation, part: AgentRows, column: int, out: np.ndarray) -> None:
         mode, wanted = self._wanted(part, self.of)
         floats, places, arrays = self._index(simulation, self.radius)
         numbers = self.n, mode, FRAMES[self.frame], column
         who = part.rows, part.agents
-        kernels.WRITERS[out.dtype]["sectors"](floats, who, wanted, places, arrays, numbers, self.radius, out)
+        WRITERS[out.dtype]["sectors"](floats, who, wanted, places, arrays, numbers, self.radius, out)
 
 
 @dataclass(frozen=True)
 class Means(_Search):
-    """Number of others within a radius, divided by `count_scale`, and the means of their columns; the names are those of `Nearest`."""
+    """Number of others within a radius, divided by `count_scale`, and the means of their columns, as named in `NearestOthers`."""
 
     radius: float
     columns: str = "offset relative_vel"
@@ -304,20 +312,20 @@ class Means(_Search):
         self._check_of(self.of, self.radius, True)
         return 1 + _lines(names, self.scale, self.planar)[1]
 
-    def write(self, simulation: Simulation, part: Part, column: int, out: np.ndarray) -> None:
+    def write(self, simulation: Simulation, part: AgentRows, column: int, out: np.ndarray) -> None:
         spec, width = _lines(self.columns.split(), self.scale, self.planar)
         mode, wanted = self._wanted(part, self.of)
         floats, places, arrays = self._index(simulation, self.radius)
         numbers = mode, FRAMES[self.frame], column, width, self.count_scale
         who = part.rows, part.agents
-        kernels.WRITERS[out.dtype]["sums"](
-            floats, who, wanted, places, arrays, spec, numbers, self.radius, out
-        )
+        WRITERS[out.dtype]["sums"](floats, who, wanted, places, arrays, spec, numbers, self.radius, out)
 
 
 @dataclass(frozen=True)
 class Each(Component):
-    """All entities of some blocks by their place in them, without the agent itself; zeros for those that are gone. Names as in `Nearest`.
+    """All entities of some blocks by their place in them, without the agent itself; zeros for those that are gone.
+
+    The columns are those of `NearestOthers`.
 
     Attributes:
         of: Names of the blocks, separated by spaces.
@@ -340,7 +348,7 @@ class Each(Component):
         n_others = sum(blocks[name] for name in self.of.split()) - (block in self.of.split())
         return n_others * _lines(names, self.scale, self.planar)[1]
 
-    def write(self, simulation: Simulation, part: Part, column: int, out: np.ndarray) -> None:
+    def write(self, simulation: Simulation, part: AgentRows, column: int, out: np.ndarray) -> None:
         spec, width = _lines(self.columns.split(), self.scale, self.planar)
         bodies = simulation.state.population.bodies
         if self.of not in part.kept:
@@ -349,7 +357,7 @@ class Each(Component):
         numbers = FRAMES[self.frame], column, width, of.shape[1] - (part.block in self.of.split())
         members = of, bodies.world, bodies.team
         who = part.rows, part.agents
-        kernels.WRITERS[out.dtype]["each"](bodies.floats, who, part.team, members, spec, numbers, out)
+        WRITERS[out.dtype]["each"](bodies.floats, who, part.team, members, spec, numbers, out)
 
     def _places(self, simulation: Simulation) -> np.ndarray:
         """Body row of each (world, place in the blocks), or -1."""
@@ -374,9 +382,9 @@ class Computed(Component):
     def width(self, mission: Mission, block: str) -> int:
         return self.n
 
-    def write(self, simulation: Simulation, part: Part, column: int, out: np.ndarray) -> None:
+    def write(self, simulation: Simulation, part: AgentRows, column: int, out: np.ndarray) -> None:
         values = np.asarray(self.function(simulation)).reshape(-1, self.n)
         out[part.agents, column : column + self.n] = values[part.agents]
 
 
-__all__ = ["Component", "Computed", "Each", "Means", "Nearest", "Own", "Part", "Sectors"]
+__all__ = ["AgentRows", "Component", "Computed", "Each", "Means", "NearestOthers", "Own", "Sectors"]

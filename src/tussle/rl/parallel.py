@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from pettingzoo import ParallelEnv
@@ -13,10 +13,10 @@ from tussle.rl.environments import Pictures, check_options, check_render_mode, m
 from tussle.rl.swarm import Swarm
 
 
-class TaskParallelEnv(ParallelEnv[str, Any, Any]):
+class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # PettingZoo has no types
     """One world of a task as a PettingZoo `ParallelEnv`; see `parallel_env`."""
 
-    metadata: ClassVar[dict[str, Any]] = {}
+    metadata: dict[str, Any] = {}  # noqa: RUF012 - as in the base class
 
     def __init__(self, task: Any, *, render_mode: str | None = None, threads: int = 1) -> None:
         self.swarm = Swarm(task, 1, autoreset="disabled", threads=threads)
@@ -66,7 +66,7 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):
             return list(self.possible_agents)
         return [self.possible_agents[a] for a in np.flatnonzero(alive)]
 
-    def step(self, actions: Mapping[str, Any]) -> tuple[dict[str, Any], ...]:  # type: ignore[override]
+    def step(self, actions: Mapping[str, Any]) -> tuple[dict[str, Any], ...]:
         """Play one decision.
 
         Raises:
@@ -147,7 +147,7 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):
 
     def state(self) -> np.ndarray:
         """Observations of all agents side by side."""
-        return self.swarm.obs[0].reshape(-1).copy()
+        return np.array(self.swarm.obs[0]).reshape(-1)
 
     def close(self) -> None:
         self._pictures.close()

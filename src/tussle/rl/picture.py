@@ -28,7 +28,7 @@ LEAST_HALF = 1.0
 """Least half of the height that a picture shows [m]."""
 
 
-class Camera:
+class WorldCamera:
     """Draws one world of a simulation from the south and above, with all its entities in the picture.
 
     Args:

@@ -108,7 +108,7 @@ def captured(now: Situation) -> np.ndarray:
 
 def collisions(now: Situation) -> np.ndarray:
     """Collisions of an agent with others."""
-    return now.count("collision") + now.count("collision", "other")
+    return np.asarray(now.count("collision") + now.count("collision", "other"))
 
 
 USES_EVENTS = (captures, captured, collisions)

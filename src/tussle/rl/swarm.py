@@ -11,7 +11,7 @@ import numpy as np
 from tussle import rng
 from tussle.engine.simulation import Simulation
 from tussle.errors import ParameterError, listed
-from tussle.rl.observation import Part
+from tussle.rl.observation import AgentRows
 from tussle.rl.reward import Situation
 from tussle.rl.task import Task
 
@@ -104,7 +104,7 @@ class Swarm:
             raise ParameterError(f"{type(task).__name__}: action: all blocks have ranges, or all have levels")
         self.action_width = max(len(d.free) for d in task.decoders)
         self._ints: np.ndarray | None = None
-        self._parts: list[Part] = []
+        self._parts: list[AgentRows] = []
         self._check_ends = True
 
     # -- seeds -------------------------------------------------------------------------------------------------------------
@@ -207,7 +207,9 @@ class Swarm:
                     )
                 agents = bodies.world[rows] * self.n_agents + (first + place)
                 alive[agents], ids[agents] = True, bodies.id[rows]
-                self._parts.append(Part(name, group, rows, agents, bodies.team[rows].astype(float), kept))
+                self._parts.append(
+                    AgentRows(name, group, rows, agents, bodies.team[rows].astype(float), kept)
+                )
         none = [np.zeros(0, np.int64)]
         self.now.rows = np.concatenate([*none, *(p.rows for p in self._parts)])
         self.now.agents = np.concatenate([*none, *(p.agents for p in self._parts)])
@@ -227,7 +229,7 @@ class Swarm:
                 mask = np.zeros(self.n_worlds, bool)
                 mask[worlds] = True
                 kept = mask[part.agents // self.n_agents]
-                some = Part(
+                some = AgentRows(
                     part.block, part.group, part.rows[kept], part.agents[kept], part.team[kept], part.kept
                 )
             column = 0
@@ -351,7 +353,7 @@ class Swarm:
     def _are_decided(self) -> np.ndarray:
         """Worlds without agents, or in which one team is left and the mission ends then."""
         state = self.simulation.state
-        over = ~self.alive.any(axis=1)
+        over = np.logical_not(self.alive.any(axis=1))
         if "one_team" in self.task.given.end_conditions:
             bodies, teams = state.population.bodies, state.context.teams
             there = np.zeros((self.n_worlds, len(teams)), bool)

@@ -6,7 +6,7 @@ pytest.importorskip("gymnasium")
 pytest.importorskip("pettingzoo")
 
 from tussle import Block, Mission
-from tussle.rl import Act, Nearest, Own, Task, Term, alive, captured
+from tussle.rl import Act, NearestOthers, Own, Task, Term, alive, captured
 from tussle.stock import Boids, Predator, SimpleCapture, Unicycle
 
 
@@ -42,7 +42,7 @@ def mission(prey: int = 6, **changes):
 class Flee(Task):
     mission = mission()
     learners = "prey"
-    observation = (Own("vel", scale=20.0), Nearest(3, scale={"offset": 50.0, "relative_vel": 20.0}))
+    observation = (Own("vel", scale=20.0), NearestOthers(3, scale={"offset": 50.0, "relative_vel": 20.0}))
     action = (Act("speed", 0.0, 20.0), Act("turn_rate", -2.0, 2.0), Act("pitch_rate", value=0.0))
     reward = {"alive": Term(alive, 0.1), "captured": Term(captured, -1.0)}  # noqa: RUF012
 

@@ -7,7 +7,7 @@ import pytest
 
 from tussle import Simulation
 from tussle.errors import ParameterError
-from tussle.rl import Act, Computed, Each, Means, Nearest, Own, Sectors, Term, make_swarm
+from tussle.rl import Act, Computed, Each, Means, NearestOthers, Own, Sectors, Term, make_swarm
 
 
 def play(swarm, actions, n):
@@ -81,8 +81,8 @@ def test_observations_are_what_they_say(task):
     components = (
         Own("vel", scale=2.0, frame="heading"),
         Own("pos forward Unicycle.x", origin=(5.0, 0.0, 1.0)),
-        Nearest(3, "offset relative_vel vel distance same_team present", radius=50.0),
-        Nearest(2, "offset health", of="other", frame="world", planar=True),
+        NearestOthers(3, "offset relative_vel vel distance same_team present", radius=50.0),
+        NearestOthers(2, "offset health", of="other", frame="world", planar=True),
         Sectors(8, 80.0),
         Means(60.0, "offset", of="own", frame="world", count_scale=4),
         Each("hunters prey", "offset", frame="body"),
@@ -208,7 +208,7 @@ def test_memory_is_flat_over_many_resets(task):
             "all are ranges, or all have levels",
         ),
         ({"observation": [Own("velocity")]}, "Own has no 'velocity'"),
-        ({"observation": [Nearest(0)]}, "k = 0"),
+        ({"observation": [NearestOthers(0)]}, "k = 0"),
         ({"observation": [Sectors(4, np.inf)]}, "radius = inf"),
         ({"observation": ["vel"]}, "is no Component"),
         ({"reward": {"alive": 1.0}}, "not a Term"),
