@@ -245,8 +245,7 @@ def make(task: Any, *, render_mode: str | None = None, threads: int = 1) -> Task
 
 def register(name: str, task: Any) -> None:
     """Register a task with Gymnasium, for `gymnasium.make(name)` and `gymnasium.make_vec(name)`."""
-    entries = (f"{__name__}:{kind.__name__}" for kind in (TaskEnv, TaskVectorEnv))
-    gymnasium.register(name, next(entries), vector_entry_point=next(entries), kwargs={"task": task})
+    gymnasium.register(
         id=name,
         entry_point="tussle.rl.environments:TaskEnv",
         vector_entry_point="tussle.rl.environments:TaskVectorEnv",
