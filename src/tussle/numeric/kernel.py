@@ -1,7 +1,7 @@
 """Kernel decorators: one explicit signature, strict IEEE arithmetic, compiled on the first call, cached on disk by content.
 
-Signature codes: f8 i8 b1 u8 are numbers; F I B U are read-only 1-D contiguous arrays of float64, int64, bool, uint64, and Fw Iw
-Bw Uw writable ones; F2 F2w ... are 2-D C-contiguous. (F F I) is one argument, a tuple, for arrays that belong together; it costs
+Signature codes: f8 i8 b1 u8 are numbers; F I B U S are read-only 1-D contiguous arrays of float64, int64, bool, uint64, float32, and
+Fw Iw Bw Uw Sw writable ones; F2 F2w ... are 2-D C-contiguous. (F F I) is one argument, a tuple, for arrays that belong together; it costs
 0.03 us per array more than separate arguments. Results follow "->"; several results are returned as a tuple.
 """
 
@@ -27,7 +27,7 @@ from tussle.numeric.fingerprint import Fingerprint, package
 
 Code = str | tuple[str, ...]
 FORMAT = 1  # version of the file format, part of every key
-LETTERS = {"F": np.float64, "I": np.int64, "B": np.bool_, "U": np.uint64}
+LETTERS = {"F": np.float64, "I": np.int64, "B": np.bool_, "U": np.uint64, "S": np.float32}
 NUMBERS: dict[str, tuple[type, ...]] = {
     "f8": (float, int, np.floating, np.integer),
     "i8": (int, np.integer),
@@ -59,11 +59,11 @@ _lock = threading.RLock()
 @cache
 def codes() -> dict[str, Any]:
     """Signature code -> Numba type."""
-    from numba import boolean, float64, int64, uint64
+    from numba import boolean, float32, float64, int64, uint64
     from numba.core.types import Array
 
     table: dict[str, Any] = {"f8": float64, "i8": int64, "b1": boolean, "u8": uint64}
-    for letter, dtype in {"F": float64, "I": int64, "B": boolean, "U": uint64}.items():
+    for letter, dtype in {"F": float64, "I": int64, "B": boolean, "U": uint64, "S": float32}.items():
         for ndim, digit in ((1, ""), (2, "2")):
             table[letter + digit] = Array(dtype, ndim, "C", readonly=True)
             table[letter + digit + "w"] = Array(dtype, ndim, "C")

@@ -1,0 +1,256 @@
+"""Gymnasium's interfaces: a stack of worlds as a `VectorEnv`, one world as an `Env`."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+
+from tussle.errors import ParameterError, listed, nearest_name
+from tussle.rl.swarm import Swarm, task_of
+from tussle.rl.task import Task
+
+MODES = {
+    "next_step": AutoresetMode.NEXT_STEP,
+    "same_step": AutoresetMode.SAME_STEP,
+    "disabled": AutoresetMode.DISABLED,
+}
+RENDER_MODES = ("rgb_array",)
+OPTIONS = ("params", "reset_mask")
+
+
+def world_spaces(task: Task) -> tuple[spaces.Box, spaces.Space[Any]]:
+    """Observations and actions of all agents of a world; without the axis of agents if there is one agent."""
+    n = len(task.agent_names)
+    agents = range(n)
+    observation = max((task.observation_space(a) for a in agents), key=lambda space: space.shape[0])
+    action = max((task.action_space(a) for a in agents), key=spaces.flatdim)
+    if n == 1:
+        return observation, action
+    box = spaces.Box(-np.inf, np.inf, (n, *observation.shape), task.dtype)
+    return box, batch_space(action, n)
+
+
+def check_options(options: Any) -> dict[str, Any]:
+    """Options of a reset; warns of those that have no effect."""
+    given = dict(options or {})
+    for name in given:
+        if name not in OPTIONS:
+            warnings.warn(
+                f"reset ignores the option {name!r}{nearest_name(name, OPTIONS)}; {listed(OPTIONS)}",
+                stacklevel=3,
+            )
+    return given
+
+
+def check_render_mode(render_mode: str | None) -> str | None:
+    """The render mode.
+
+    Raises:
+        ParameterError: It is not known.
+    """
+    if render_mode is not None and render_mode not in RENDER_MODES:
+        raise ParameterError(f"render_mode = {render_mode!r} is not allowed; {listed(RENDER_MODES)}")
+    return render_mode
+
+
+class Pictures:
+    """Pictures of world 0 of a swarm; the renderer is made for the first one."""
+
+    def __init__(self, swarm: Swarm) -> None:
+        self._swarm = swarm
+        self._camera: Any = None
+
+    def picture(self) -> Any:
+        if self._camera is None:
+            from tussle.rl.picture import WorldCamera  # needs the packages of tussle[view]
+
+            self._camera = WorldCamera(self._swarm.simulation)
+        return self._camera.picture()
+
+    def close(self) -> None:
+        if self._camera is not None:
+            self._camera.close()
+            self._camera = None
+
+
+def metadata_of(task: Task) -> dict[str, Any]:
+    return {"render_modes": list(RENDER_MODES), "render_fps": 1.0 / (task.given.dt * task.decide_every)}
+
+
+class TaskVectorEnv(VectorEnv[Any, Any, Any]):
+    """The worlds of a task as a Gymnasium `VectorEnv`; see `make_vec`."""
+
+    metadata = {"render_modes": list(RENDER_MODES), "render_fps": 10.0}  # noqa: RUF012 - as in the base class
+
+    def __init__(
+        self, task: Any, num_envs: int = 1, *, autoreset: Any = "next_step", threads: int = 1,
+        render_mode: str | None = None, copy: bool = True,
+    ) -> None:  # fmt: skip
+        mode = next((name for name, known in MODES.items() if known == autoreset), autoreset)
+        self.swarm = Swarm(task, num_envs, autoreset=mode, threads=threads)
+        self.task, self.num_envs, self.copy = self.swarm.task, self.swarm.n_worlds, copy
+        self.render_mode = check_render_mode(render_mode)
+        self.metadata = {**metadata_of(self.task), "autoreset_mode": MODES[mode]}
+        self.single_observation_space, self.single_action_space = world_spaces(self.task)
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self._pictures = Pictures(self.swarm)
+
+    def _seen(self, array: np.ndarray) -> np.ndarray:
+        shown = array[:, 0] if self.swarm.n_agents == 1 else array
+        return shown.copy() if self.copy else shown
+
+    def _info(self, worlds: np.ndarray) -> dict[str, Any]:
+        return {
+            "alive": self.swarm.alive.copy(),
+            "_alive": worlds.copy(),
+            "seed": self.swarm.seeds.copy(),
+            "_seed": worlds.copy(),
+        }
+
+    def reset(self, *, seed: Any = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """Start new episodes; `options` may have "reset_mask", worlds (W,), and "params", parameters by path."""
+        given = check_options(options)
+        mask = given.get("reset_mask")
+        if isinstance(seed, (list, tuple)):  # a missing seed continues the sequence of its world
+            known = [w for w, s in enumerate(seed) if s is not None and (mask is None or mask[w])]
+            others = [w for w, s in enumerate(seed) if s is None and (mask is None or mask[w])]
+            if others:
+                self.swarm.reset(None, others)
+            if known:
+                self.swarm.reset([seed[w] for w in known], known, given.get("params"))
+        else:
+            super().reset(seed=seed)
+            self.swarm.reset(seed, None if mask is None else np.asarray(mask, bool), given.get("params"))
+        return self._seen(self.swarm.obs), self._info(np.ones(self.num_envs, bool))
+
+    def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
+        """Play one decision in all worlds; rewards are sums over agents."""
+        swarm = self.swarm
+        given = np.asarray(actions)
+        if swarm.n_agents == 1:
+            if given.shape != self.action_space.shape:
+                raise ParameterError(
+                    f"actions have shape {given.shape}; the shape must be {self.action_space.shape}"
+                )
+            given = given.reshape(self.num_envs, 1, -1)
+        obs, rewards, _, _, _ = swarm.step(given)
+        info = self._info(np.ones(self.num_envs, bool))
+        for name, term in swarm.terms.items():
+            info[name], info[f"_{name}"] = term.sum(axis=1), np.ones(self.num_envs, bool)
+        over = swarm.over.copy()
+        if over.any():
+            info["episode"] = {"r": swarm.returns.sum(axis=1), "l": swarm.lengths.copy()}
+            info["_episode"] = over
+            if swarm.autoreset == "same_step":
+                info["final_obs"], info["_final_obs"] = self._seen(swarm.final_obs), over
+        late = swarm.late & over
+        return self._seen(obs), rewards.sum(axis=1, dtype=float), over & ~late, late, info
+
+    def render(self) -> Any:
+        """A picture of each world is too dear: that of world 0, as a tuple of one."""
+        return (self._pictures.picture(),) if self.render_mode else None
+
+    def close_extras(self, **kwargs: Any) -> None:
+        self._pictures.close()
+        self.swarm.close()
+
+
+class TaskEnv(gymnasium.Env[Any, Any]):
+    """One world of a task as a Gymnasium `Env`; see `make`."""
+
+    metadata = {"render_modes": list(RENDER_MODES), "render_fps": 10.0}  # noqa: RUF012 - as in the base class
+
+    def __init__(self, task: Any, *, render_mode: str | None = None, threads: int = 1) -> None:
+        self.swarm = Swarm(task, 1, autoreset="disabled", threads=threads)
+        self.task = self.swarm.task
+        self.render_mode = check_render_mode(render_mode)
+        self.metadata = metadata_of(self.task)
+        self.observation_space, self.action_space = world_spaces(self.task)
+        self._pictures = Pictures(self.swarm)
+
+    def _seen(self, array: np.ndarray) -> np.ndarray:
+        return np.array(array[0, 0]) if self.swarm.n_agents == 1 else np.array(array[0])
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Start a new episode; `options` may have "params", parameters by path."""
+        super().reset(seed=seed)
+        self.swarm.reset(seed, None, check_options(options).get("params"))
+        return self._seen(self.swarm.obs), self._info()
+
+    def _info(self) -> dict[str, Any]:
+        return {"alive": self.swarm.alive[0].copy(), "seed": int(self.swarm.seeds[0])}
+
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Play one decision; the reward is the sum over agents."""
+        given = np.asarray(action)
+        if given.shape != self.action_space.shape:
+            raise ParameterError(
+                f"the action has shape {given.shape}; the shape must be {self.action_space.shape}"
+            )
+        swarm = self.swarm
+        obs, rewards, _, _, _ = swarm.step(given.reshape(1, swarm.n_agents, -1))
+        info = {**self._info(), **{name: float(term.sum()) for name, term in swarm.terms.items()}}
+        over, late = bool(swarm.over[0]), bool(swarm.late[0])
+        return self._seen(obs), float(rewards.sum(dtype=float)), over and not late, over and late, info
+
+    def render(self) -> Any:
+        """A picture, (height, width, 3)."""
+        return self._pictures.picture() if self.render_mode else None
+
+    def state(self) -> dict[str, Any]:
+        """A copy of everything, for `restore`."""
+        return self.swarm.state()
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Return to a state."""
+        self.swarm.restore(state)
+
+    def close(self) -> None:
+        self._pictures.close()
+        self.swarm.close()
+
+
+def make_vec(
+    task: Any, num_envs: int = 1, *, autoreset: Any = "next_step", threads: int = 1, render_mode: str | None = None,
+    copy: bool = True,
+) -> TaskVectorEnv:  # fmt: skip
+    """The worlds of a task as a Gymnasium `VectorEnv`; of several agents, observations and actions have an axis more.
+
+    Args:
+        task: A Task, or a class of one.
+        num_envs: Number of worlds.
+        autoreset: "next_step", "same_step", "disabled", or Gymnasium's `AutoresetMode`.
+        threads: Number of threads a step may use.
+        render_mode: "rgb_array" or None.
+        copy: Return copies of the observations; otherwise the next step overwrites them.
+    """
+    return TaskVectorEnv(
+        task, num_envs, autoreset=autoreset, threads=threads, render_mode=render_mode, copy=copy
+    )
+
+
+def make(task: Any, *, render_mode: str | None = None, threads: int = 1) -> TaskEnv:
+    """One world of a task as a Gymnasium `Env`, for one agent or for a team with one learner."""
+    return TaskEnv(task, render_mode=render_mode, threads=threads)
+
+
+def register(name: str, task: Any) -> None:
+    """Register a task with Gymnasium, for `gymnasium.make(name)` and `gymnasium.make_vec(name)`."""
+    gymnasium.register(
+        id=name,
+        entry_point="tussle.rl.environments:TaskEnv",
+        vector_entry_point="tussle.rl.environments:TaskVectorEnv",
+        kwargs={"task": task},
+    )
+
+
+__all__ = ["TaskEnv", "TaskVectorEnv", "make", "make_vec", "register", "task_of"]

@@ -1,0 +1,238 @@
+"""Kernels of actions and observations: from rows of the body table to arrays (agents, numbers), and back.
+
+An agent's number is world * agents per world + place in its world. A `spec` has one line per feature: kind, row of the source table,
+scale, then for the own features the point (x, y, z) [m] that is subtracted, for those of others 1 where a vector is relative to the own
+one. Lines are written side by side from a column on.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from tussle.neighbors.few import nearest_few, scratch_of
+from tussle.neighbors.search import TABLE, in_range, table_of
+from tussle.numeric import atan2
+from tussle.numeric.kernel import device, kernel
+
+SCALAR, PLANE, SPACE, DISTANCE, SAME_TEAM, PRESENT, FORWARD = range(7)
+"""Kinds of features: a number, a vector of two or three numbers, and what is known of a neighbour; the direction of the nose."""
+WORLD, HEADING, BODY = range(3)
+"""Frames of vectors: the world's, turned by the heading, turned by the whole attitude."""
+QUAT = 6
+"""Row of the quaternion in the body table, behind position and velocity."""
+
+
+@device
+def frame_of(floats, row, mode):
+    """Rotation from the world to an entity's frame, its nine numbers by rows."""
+    if mode == WORLD:
+        return 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0
+    w, x, y, z = floats[QUAT, row], floats[QUAT + 1, row], floats[QUAT + 2, row], floats[QUAT + 3, row]
+    east, north = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z)
+    if mode == BODY:
+        left = 2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x)
+        top = 2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)
+        return east, north, 2.0 * (x * z - w * y), left[0], left[1], left[2], top[0], top[1], top[2]
+    length = math.sqrt(east * east + north * north)
+    if length > 0.0:
+        east, north = east / length, north / length
+    else:
+        east, north = 1.0, 0.0
+    return east, north, 0.0, -north, east, 0.0, 0.0, 0.0, 1.0
+
+
+@device
+def put_vector(kind, scale, x, y, z, turn, a, column, out):
+    """Write a vector of the world in the frame `turn`. Returns the next column."""
+    out[a, column] = scale * (turn[0] * x + turn[1] * y + turn[2] * z)
+    out[a, column + 1] = scale * (turn[3] * x + turn[4] * y + turn[5] * z)
+    if kind == PLANE:
+        return column + 2
+    out[a, column + 2] = scale * (turn[6] * x + turn[7] * y + turn[8] * z)
+    return column + 3
+
+
+@device
+def put_other(floats, row, other, is_mate, spec, turn, a, column, out):
+    """Write the features of another entity for that of `row`. Returns the next column."""
+    for f in range(spec.shape[0]):
+        kind, source, scale = int(spec[f, 0]), int(spec[f, 1]), spec[f, 2]
+        if kind == PLANE or kind == SPACE:
+            x, y, z = floats[source, other], floats[source + 1, other], floats[source + 2, other]
+            if spec[f, 3] != 0.0:
+                x, y, z = x - floats[source, row], y - floats[source + 1, row], z - floats[source + 2, row]
+            column = put_vector(kind, scale, x, y, z, turn, a, column, out)
+            continue
+        value = 1.0
+        if kind == SCALAR:
+            value = floats[source, other]
+        elif kind == DISTANCE:
+            x, y = floats[0, other] - floats[0, row], floats[1, other] - floats[1, row]
+            z = floats[2, other] - floats[2, row]
+            value = math.sqrt(x * x + y * y + z * z)
+        elif kind == SAME_TEAM:
+            value = 1.0 if is_mate else 0.0
+        out[a, column] = scale * value
+        column += 1
+    return column
+
+
+def own(floats, source, shift, who, spec, mode, column, out):
+    """Write features of the entities themselves.
+
+    floats: body table (22, N). source: table of the features; row r of the body table is its column r - shift. who: rows of the body
+    table, and agents, (m,) each. mode: frame of vectors. out: (agents, numbers), written from `column` on.
+    """
+    rows, agents = who
+    for i in range(rows.shape[0]):
+        row, a, at = rows[i], agents[i], column
+        turn = frame_of(floats, row, mode)
+        for f in range(spec.shape[0]):
+            kind, k, scale, j = int(spec[f, 0]), int(spec[f, 1]), spec[f, 2], row - shift
+            if kind == SCALAR:
+                out[a, at] = scale * (source[k, j] - spec[f, 3])
+                at += 1
+            elif kind == FORWARD:
+                nose = frame_of(floats, row, BODY)
+                at = put_vector(SPACE, scale, nose[0], nose[1], nose[2], turn, a, at, out)
+            else:
+                x, y, z = (
+                    source[k, j] - spec[f, 3],
+                    source[k + 1, j] - spec[f, 4],
+                    source[k + 2, j] - spec[f, 5],
+                )
+                at = put_vector(kind, scale, x, y, z, turn, a, at, out)
+
+
+def nearest(floats, who, wanted, places, arrays, spec, numbers, radius, out):
+    """Write features of the k nearest others within `radius` [m], nearest first; zeros for those that are missing.
+
+    wanted: team that is looked for, (m,). places: row_world, place, order of the index. arrays: its table. numbers: k, mode of the
+    teams, frame, first column, columns per neighbour.
+    """
+    rows, agents = who
+    row_world, place, order = places
+    k, mode, frame, column, width = numbers
+    table = table_of(arrays)
+    team = table[8]
+    scratch = scratch_of(k, order.shape[0])
+    found = scratch[2]
+    for i in range(rows.shape[0]):
+        row, a = rows[i], agents[i]
+        me, x, y, z = place[row], floats[0, row], floats[1, row], floats[2, row]
+        nearest_few(row_world[row], me, x, y, z, radius, mode, wanted[i], table, scratch, k)
+        turn = frame_of(floats, row, frame)
+        for j in range(k):
+            at = column + j * width
+            if found[j] >= 0:
+                q = found[j]
+                put_other(floats, row, order[q], team[q] == team[me], spec, turn, a, at, out)
+            else:
+                out[a, at : at + width] = 0.0
+
+
+def sectors(floats, who, wanted, places, arrays, numbers, radius, out):
+    """Write 1 - distance / radius of the nearest other in each of n sectors of the horizontal plane, from the front to the left; else 0.
+
+    numbers: n, mode of the teams, frame, first column. The others are those of `nearest`.
+    """
+    rows, agents = who
+    row_world, place, order = places
+    n, mode, frame, column = numbers
+    table = table_of(arrays)
+    found = np.empty(order.shape[0], np.int64)
+    for i in range(rows.shape[0]):
+        row, a = rows[i], agents[i]
+        me, x, y, z = place[row], floats[0, row], floats[1, row], floats[2, row]
+        m = in_range(row_world[row], me, x, y, z, radius, mode, wanted[i], table, found, 0)
+        turn = frame_of(floats, row, frame)
+        out[a, column : column + n] = 0.0
+        for j in range(m):
+            dx, dy, dz = table[5][found[j]] - x, table[6][found[j]] - y, table[7][found[j]] - z
+            ahead = turn[0] * dx + turn[1] * dy + turn[2] * dz
+            left = turn[3] * dx + turn[4] * dy + turn[5] * dz
+            s = math.floor(atan2(left, ahead) * (n / (2.0 * math.pi)) + 0.5) % n
+            near = 1.0 - math.sqrt(dx * dx + dy * dy + dz * dz) / radius
+            out[a, column + s] = max(out[a, column + s], near)
+
+
+def sums(floats, who, wanted, places, arrays, spec, numbers, radius, out):
+    """Write the number of others within `radius` [m], divided by `unit`, and the means of their features; zeros without others.
+
+    numbers: mode of the teams, frame, first column, columns of the features, `unit`. The rest is as in `nearest`.
+    """
+    rows, agents = who
+    row_world, place, order = places
+    mode, frame, column, width, unit = numbers
+    table = table_of(arrays)
+    team = table[8]
+    found = np.empty(order.shape[0], np.int64)
+    one, total = np.empty((1, width)), np.empty(width)
+    for i in range(rows.shape[0]):
+        row, a = rows[i], agents[i]
+        me, x, y, z = place[row], floats[0, row], floats[1, row], floats[2, row]
+        m = in_range(row_world[row], me, x, y, z, radius, mode, wanted[i], table, found, 0)
+        turn = frame_of(floats, row, frame)
+        total[:] = 0.0
+        for j in range(m):
+            q = found[j]
+            put_other(floats, row, order[q], team[q] == team[me], spec, turn, 0, 0, one)
+            total += one[0]
+        out[a, column] = m / unit
+        for c in range(width):
+            out[a, column + 1 + c] = total[c] / max(m, 1)
+
+
+def each(floats, who, wanted, members, spec, numbers, out):
+    """Write features of all entities of a block in order of their place in it, without the entity itself; zeros for those that are gone.
+
+    wanted: team of the entity, (m,). members: body row of each (world, place in the block), or -1; world and team of all rows, (N,).
+    numbers: frame, first column, columns per entity, most entities.
+    """
+    rows, agents = who
+    of, world, team = members
+    frame, column, width, most = numbers
+    for i in range(rows.shape[0]):
+        row, a, slot = rows[i], agents[i], 0
+        turn = frame_of(floats, row, frame)
+        for j in range(of.shape[1]):
+            other = of[world[row], j]
+            if other == row or slot == most:
+                continue
+            at = column + slot * width
+            slot += 1
+            if other >= 0:
+                put_other(floats, row, other, team[other] == wanted[i], spec, turn, a, at, out)
+            else:
+                out[a, at : at + width] = 0.0
+
+
+ROWS = "F2 (I I)"
+SEARCH = f"{ROWS} F (I I I) {TABLE}"
+# Those of observations are compiled for float32 and float64.
+SIGNATURES: dict[Any, str] = {
+    own: "F2 F2 i8 (I I) F2 i8 i8",
+    nearest: f"{SEARCH} F2 (i8 i8 i8 i8 i8) f8",
+    sectors: f"{SEARCH} (i8 i8 i8 i8) f8",
+    sums: f"{SEARCH} F2 (i8 i8 i8 i8 i8) f8",
+    each: f"{ROWS} F (I2 I I) F2 (i8 i8 i8 i8)",
+}
+
+
+@kernel("F2 (I I) i8 i8 f8 f8 Fw -> i8")
+def act(actions, who, first, column, low, high, channel):
+    """Write a channel from actions, -1 to 1, clamped, to the range low to high. Returns the first agent whose action is NaN, or -1.
+
+    actions: (agents, numbers). who: rows of the body table, and agents, (m,) each. first: row of the table that is channel[0].
+    """
+    rows, agents = who
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    for i in range(rows.shape[0]):
+        value = actions[agents[i], column]
+        if math.isnan(value):
+            return agents[i]
+        channel[rows[i] - first] = middle + half * min(max(value, -1.0), 1.0)
+    return -1

@@ -1,0 +1,390 @@
+"""What an agent observes: components of an observation, each a few numbers side by side."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tussle.api.bodies import FLOATS, OFFSETS
+from tussle.errors import ParameterError, listed, nearest_name
+from tussle.neighbors.few import WHOLE_WORLD
+from tussle.neighbors.search import ANY, DIFFERENT, SAME
+from tussle.numeric.kernel import kernel
+from tussle.rl import kernels
+
+if TYPE_CHECKING:
+    from tussle.engine.group import Group
+    from tussle.engine.simulation import Simulation
+    from tussle.mission import Mission
+
+FRAMES = {"world": kernels.WORLD, "heading": kernels.HEADING, "body": kernels.BODY}
+VECTORS = ("pos", "vel", "omega", "force", "torque")
+OWN = ("forward", *FLOATS)
+OTHERS = {"distance": kernels.DISTANCE, "same_team": kernels.SAME_TEAM, "present": kernels.PRESENT}
+RELATIVE = {"offset": "pos", "relative_vel": "vel"}
+Scale = float | Mapping[str, float]
+WRITERS = {
+    np.dtype(dtype): {
+        law.__name__: kernel(f"{signature} {out}")(law) for law, signature in kernels.SIGNATURES.items()
+    }
+    for dtype, out in ((np.float32, "S2w"), (np.float64, "F2w"))
+}
+"""The kernels of observations by type of the numbers and by name."""
+
+
+@dataclass(frozen=True)
+class AgentRows:
+    """Agents of one block in one group.
+
+    Attributes:
+        block: Name of the block.
+        group: The group that holds their rows.
+        rows: Rows of the body table, (m,).
+        agents: Number of each agent: world * agents per world + place in its world, (m,).
+        team: Team of each as a float, (m,).
+        kept: What components keep until rows change.
+    """
+
+    block: str
+    group: Group
+    rows: np.ndarray
+    agents: np.ndarray
+    team: np.ndarray
+    kept: dict[Any, Any]
+
+
+class Component(ABC):
+    """A part of an observation; abstract."""
+
+    @abstractmethod
+    def width(self, mission: Mission, block: str) -> int:
+        """How many numbers agents of a block observe; checks the declaration.
+
+        Raises:
+            ParameterError: A name or value is not allowed.
+        """
+
+    @abstractmethod
+    def write(self, simulation: Simulation, part: AgentRows, column: int, out: np.ndarray) -> None:
+        """Write the numbers of a part's agents to out, (agents, numbers), from `column` on."""
+
+
+def _check(where: str, frame: str, names: Sequence[str], allowed: Sequence[str], scale: Scale) -> None:
+    if frame not in FRAMES:
+        raise ParameterError(f"{where}: frame = {frame!r} is not allowed; {listed(FRAMES)}")
+    for name in names:
+        if name not in allowed and not ("." in name and where == "Own"):
+            raise ParameterError(f"{where} has no {name!r}{nearest_name(name, allowed)}; {listed(allowed)}")
+    for name, value in scale.items() if isinstance(scale, Mapping) else [("", scale)]:
+        if name and name not in names:
+            raise ParameterError(f"{where}: scale of {name!r}{nearest_name(name, names)}; {listed(names)}")
+        if not value > 0.0:
+            raise ParameterError(f"{where}: scale = {value!r} is not allowed; it takes numbers > 0")
+
+
+def _factor(scale: Scale, name: str) -> float:
+    return 1.0 / (scale.get(name, 1.0) if isinstance(scale, Mapping) else scale)
+
+
+def _lines(names: Sequence[str], scale: Scale, planar: bool) -> tuple[np.ndarray, int]:
+    """The spec of features of others, and its number of columns."""
+    lines, width = [], 0
+    for name in names:
+        source = RELATIVE.get(name, name)
+        factor = _factor(scale, name)
+        if name in OTHERS:
+            lines.append((OTHERS[name], 0, factor, 0, 0, 0))
+            width += 1
+        elif source in VECTORS:
+            kind, k = (kernels.PLANE, 2) if planar else (kernels.SPACE, 3)
+            lines.append((kind, OFFSETS[source], factor, name in RELATIVE, 0, 0))
+            width += k
+        else:
+            lines += [(kernels.SCALAR, OFFSETS[source] + k, factor, 0, 0, 0) for k in range(FLOATS[source])]
+            width += FLOATS[source]
+    return np.array(lines, float).reshape(-1, 6), width
+
+
+@dataclass(frozen=True)
+class Own(Component):
+    """Columns of the agent itself.
+
+    Attributes:
+        columns: Names, separated by spaces: body columns, "forward", or columns of its plugins, "Unicycle.x".
+        scale: Values are divided by it; one number, or one per name.
+        frame: Frame of vectors: "world", "heading" (turned by the heading) or "body".
+        origin: Point that `pos` is relative to [m].
+        planar: Vectors have two components.
+    """
+
+    columns: str
+    scale: Scale = 1.0
+    frame: str = "world"
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    planar: bool = False
+
+    def width(self, mission: Mission, block: str) -> int:
+        names = self.columns.split()
+        _check("Own", self.frame, names, OWN, self.scale)
+        owner = next(b for b in mission.blocks if b.name == block)
+        total = 0
+        for name in names:
+            if "." in name:
+                total += _column_of(owner, name)
+            else:
+                k = 3 if name == "forward" else FLOATS[name]
+                total += 2 if k == 3 and self.planar and name != "forward" else k
+        return total
+
+    def write(self, simulation: Simulation, part: AgentRows, column: int, out: np.ndarray) -> None:
+        floats, own = simulation.state.population.bodies.floats, WRITERS[out.dtype]["own"]
+        who = part.rows, part.agents
+        for name in self.columns.split():
+            factor, source, shift, point = _factor(self.scale, name), floats, 0, (0.0, 0.0, 0.0)
+            if name == "forward":
+                lines = [(kernels.FORWARD, 0, factor, *point)]
+                width = 3
+            elif name in VECTORS:
+                kind = kernels.PLANE if self.planar else kernels.SPACE
+                lines = [(kind, OFFSETS[name], factor, *(self.origin if name == "pos" else point))]
+                width = 2 if self.planar else 3
+            else:
+                first, width = OFFSETS.get(name, 0), FLOATS.get(name, 0)
+                if "." in name:
+                    source, shift, first, width = _plugin_column(part.group, name)
+                lines = [(kernels.SCALAR, first + k, factor, *point) for k in range(width)]
+            own(floats, source, shift, who, np.array(lines), FRAMES[self.frame], column, out)
+            column += width
+
+
+def _column_of(block: Any, path: str) -> int:
+    """Number of components of a plugin's column."""
+    from tussle.columns import Numbers
+
+    plugin, _, name = path.partition(".")
+    plugins = {p.instance_name: p for p in block.plugins}
+    if plugin not in plugins:
+        raise ParameterError(
+            f"Own: {path!r}: {block.name} has no {plugin!r}{nearest_name(plugin, plugins)}; {listed(plugins)}"
+        )
+    columns = {k: c for k, c in type(plugins[plugin]).declared(Numbers).items() if not c.ragged}
+    if name not in columns:
+        raise ParameterError(f"Own: {plugin} has no {name!r}{nearest_name(name, columns)}; {listed(columns)}")
+    return max(
+        1,
+        len(getattr(columns[name], "channels", ()))
+        if hasattr(columns[name], "channels")
+        else len(columns[name].fields),
+    )
+
+
+def _plugin_column(group: Group, path: str) -> tuple[np.ndarray, int, int, int]:
+    """Table of a plugin's column, body row of its first column, row in the table, and number of rows."""
+    plugin, _, name = path.partition(".")
+    binding = next(b for b in group.walk() if b.path == (plugin,))
+    place = binding.places[name]
+    table = np.ascontiguousarray(group.table.arrays[place.dtype], float)
+    return table, group.first, place.first, max(1, place.k)
+
+
+@dataclass(frozen=True)
+class _Search(Component):
+    """Others that are looked for; abstract.
+
+    Attributes:
+        of: Whom: "own" or "other" team, a team number, or None for all.
+        radius: Those further away do not count [m].
+    """
+
+    def _wanted(self, part: AgentRows, of: str | int | None) -> tuple[int, np.ndarray]:
+        if of is None:
+            return ANY, part.team
+        if isinstance(of, int):
+            return SAME, np.full(len(part.team), float(of))
+        return (SAME if of == "own" else DIFFERENT), part.team
+
+    def _check_of(self, of: Any, radius: float, needs_radius: bool) -> None:
+        if of not in (None, "own", "other") and not isinstance(of, int):
+            raise ParameterError(
+                f"{type(self).__name__}: of = {of!r} is not allowed; it takes 'own', 'other', a team number or None"
+            )
+        if not radius > 0.0 or (needs_radius and radius == np.inf):
+            raise ParameterError(
+                f"{type(self).__name__}: radius = {radius!r} is not allowed; it takes a number > 0"
+            )
+
+    def _index(
+        self, simulation: Simulation, reach: float
+    ) -> tuple[Any, tuple[np.ndarray, ...], tuple[np.ndarray, ...]]:
+        bodies, threads = simulation.state.population.bodies, simulation.state.context
+        split = None if threads.threads == 1 else simulation.state.world_view.split_rows
+        index = bodies.any_index() if reach == np.inf else bodies.index(reach, split)
+        places = index.row_world, index.place, index.order
+        return bodies.floats, places, (*index.table, bodies.by_place(index, "team", split)[0])
+
+
+@dataclass(frozen=True)
+class NearestOthers(_Search):
+    """The k nearest others, nearest first; zeros where there are fewer.
+
+    Attributes:
+        k: How many.
+        columns: Names, separated by spaces: "offset" and "relative_vel", relative to the agent; "distance"; "same_team" and
+            "present", 1 or 0; body columns.
+        of: Whom: "own" or "other" team, a team number, or None for all.
+        radius: Those further away do not count [m].
+        scale: As in `Own`, like frame and planar.
+    """
+
+    k: int
+    columns: str = "offset relative_vel same_team present"
+    of: str | int | None = None
+    radius: float = np.inf
+    scale: Scale = 1.0
+    frame: str = "heading"
+    planar: bool = False
+
+    def width(self, mission: Mission, block: str) -> int:
+        names = self.columns.split()
+        _check("NearestOthers", self.frame, names, (*RELATIVE, *OTHERS, *FLOATS), self.scale)
+        self._check_of(self.of, self.radius, False)
+        if self.k < 1:
+            raise ParameterError(
+                f"NearestOthers: k = {self.k!r} is not allowed; it takes a whole number >= 1"
+            )
+        return self.k * _lines(names, self.scale, self.planar)[1]
+
+    def write(self, simulation: Simulation, part: AgentRows, column: int, out: np.ndarray) -> None:
+        spec, width = _lines(self.columns.split(), self.scale, self.planar)
+        mode, wanted = self._wanted(part, self.of)
+        is_small = (
+            simulation.state.population.bodies.n <= WHOLE_WORLD * simulation.n_worlds
+        )  # then all are looked at
+        floats, places, arrays = self._index(simulation, np.inf if is_small else self.radius)
+        numbers = self.k, mode, FRAMES[self.frame], column, width
+        who = part.rows, part.agents
+        WRITERS[out.dtype]["nearest"](floats, who, wanted, places, arrays, spec, numbers, self.radius, out)
+
+
+@dataclass(frozen=True)
+class Sectors(_Search):
+    """A ring of n sectors around the agent, the first one ahead, counter-clockwise: 1 - distance / radius of the nearest other, else 0."""
+
+    n: int
+    radius: float
+    of: str | int | None = None
+    frame: str = "heading"
+
+    def width(self, mission: Mission, block: str) -> int:
+        _check("Sectors", self.frame, (), (), 1.0)
+        self._check_of(self.of, self.radius, True)
+        if self.n < 1:
+            raise ParameterError(f"Sectors: n = {self.n!r} is not allowed; it takes a whole number >= 1")
+        return self.n
+
+    def write(self, simulation: Simulation, part: AgentRows, column: int, out: np.ndarray) -> None:
+        mode, wanted = self._wanted(part, self.of)
+        floats, places, arrays = self._index(simulation, self.radius)
+        numbers = self.n, mode, FRAMES[self.frame], column
+        who = part.rows, part.agents
+        WRITERS[out.dtype]["sectors"](floats, who, wanted, places, arrays, numbers, self.radius, out)
+
+
+@dataclass(frozen=True)
+class Means(_Search):
+    """Number of others within a radius, divided by `count_scale`, and the means of their columns, as named in `NearestOthers`."""
+
+    radius: float
+    columns: str = "offset relative_vel"
+    of: str | int | None = None
+    scale: Scale = 1.0
+    frame: str = "heading"
+    planar: bool = False
+    count_scale: int = 1
+
+    def width(self, mission: Mission, block: str) -> int:
+        names = self.columns.split()
+        _check("Means", self.frame, names, (*RELATIVE, *OTHERS, *FLOATS), self.scale)
+        self._check_of(self.of, self.radius, True)
+        return 1 + _lines(names, self.scale, self.planar)[1]
+
+    def write(self, simulation: Simulation, part: AgentRows, column: int, out: np.ndarray) -> None:
+        spec, width = _lines(self.columns.split(), self.scale, self.planar)
+        mode, wanted = self._wanted(part, self.of)
+        floats, places, arrays = self._index(simulation, self.radius)
+        numbers = mode, FRAMES[self.frame], column, width, self.count_scale
+        who = part.rows, part.agents
+        WRITERS[out.dtype]["sums"](floats, who, wanted, places, arrays, spec, numbers, self.radius, out)
+
+
+@dataclass(frozen=True)
+class Each(Component):
+    """All entities of some blocks by their place in them, without the agent itself; zeros for those that are gone.
+
+    The columns are those of `NearestOthers`.
+
+    Attributes:
+        of: Names of the blocks, separated by spaces.
+    """
+
+    of: str
+    columns: str = "offset"
+    scale: Scale = 1.0
+    frame: str = "world"
+    planar: bool = False
+
+    def width(self, mission: Mission, block: str) -> int:
+        names, blocks = self.columns.split(), {b.name: b.count for b in mission.blocks}
+        _check("Each", self.frame, names, (*RELATIVE, *OTHERS, *FLOATS), self.scale)
+        for name in self.of.split():
+            if name not in blocks:
+                raise ParameterError(
+                    f"Each: there is no block {name!r}{nearest_name(name, blocks)}; {listed(blocks)}"
+                )
+        n_others = sum(blocks[name] for name in self.of.split()) - (block in self.of.split())
+        return n_others * _lines(names, self.scale, self.planar)[1]
+
+    def write(self, simulation: Simulation, part: AgentRows, column: int, out: np.ndarray) -> None:
+        spec, width = _lines(self.columns.split(), self.scale, self.planar)
+        bodies = simulation.state.population.bodies
+        if self.of not in part.kept:
+            part.kept[self.of] = self._places(simulation)
+        of = part.kept[self.of]
+        numbers = FRAMES[self.frame], column, width, of.shape[1] - (part.block in self.of.split())
+        members = of, bodies.world, bodies.team
+        who = part.rows, part.agents
+        WRITERS[out.dtype]["each"](bodies.floats, who, part.team, members, spec, numbers, out)
+
+    def _places(self, simulation: Simulation) -> np.ndarray:
+        """Body row of each (world, place in the blocks), or -1."""
+        bodies, blocks = simulation.state.population.bodies, simulation.mission.blocks
+        parts = []
+        for name in self.of.split():
+            number = next(i for i, b in enumerate(blocks) if b.name == name)
+            rows = np.flatnonzero((bodies.block == number) & (bodies.block_index < blocks[number].count))
+            places = np.full((simulation.n_worlds, blocks[number].count), -1)
+            places[bodies.world[rows], bodies.block_index[rows]] = rows
+            parts.append(places)
+        return np.concatenate(parts, axis=1)
+
+
+@dataclass(frozen=True)
+class Computed(Component):
+    """Numbers from a function of the simulation: function(simulation) -> (worlds, agents, n), for the agents of all worlds."""
+
+    n: int
+    function: Callable[[Any], np.ndarray]
+
+    def width(self, mission: Mission, block: str) -> int:
+        return self.n
+
+    def write(self, simulation: Simulation, part: AgentRows, column: int, out: np.ndarray) -> None:
+        values = np.asarray(self.function(simulation)).reshape(-1, self.n)
+        out[part.agents, column : column + self.n] = values[part.agents]
+
+
+__all__ = ["AgentRows", "Component", "Computed", "Each", "Means", "NearestOthers", "Own", "Sectors"]

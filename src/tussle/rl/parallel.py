@@ -1,0 +1,167 @@
+"""PettingZoo's interface: one world whose agents act at the same time, die and are born."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from pettingzoo import ParallelEnv
+
+from tussle.errors import ParameterError, nearest_name
+from tussle.rl.environments import Pictures, check_options, check_render_mode, metadata_of
+from tussle.rl.swarm import Swarm
+
+
+class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # PettingZoo has no types
+    """One world of a task as a PettingZoo `ParallelEnv`; see `parallel_env`."""
+
+    metadata: dict[str, Any] = {}  # noqa: RUF012 - as in the base class
+
+    def __init__(self, task: Any, *, render_mode: str | None = None, threads: int = 1) -> None:
+        self.swarm = Swarm(task, 1, autoreset="disabled", threads=threads)
+        self.task = self.swarm.task
+        self.render_mode = check_render_mode(render_mode)
+        name = type(self.task).__name__
+        self.metadata = {**metadata_of(self.task), "name": name, "is_parallelizable": True}
+        self.possible_agents = list(self.task.agent_names)
+        self.agents: list[str] = []
+        self._number = {name: a for a, name in enumerate(self.possible_agents)}
+        self.observation_spaces = {name: self.task.observation_space(a) for name, a in self._number.items()}
+        self.action_spaces = {name: self.task.action_space(a) for name, a in self._number.items()}
+        self._widths = [self.observation_spaces[name].shape[0] for name in self.possible_agents]
+        self._is_same_width = len(set(self._widths)) == 1
+        swarm = self.swarm
+        kind = self.task.dtype if swarm.is_continuous else np.int64
+        self._actions = np.zeros((swarm.n_agents, swarm.action_width), kind)
+        shapes = {space.shape for space in self.action_spaces.values()}
+        self._shape = shapes.pop() if len(shapes) == 1 else None
+        self._pictures = Pictures(swarm)
+
+    def observation_space(self, agent: str) -> Any:
+        return self.observation_spaces[agent]
+
+    def action_space(self, agent: str) -> Any:
+        return self.action_spaces[agent]
+
+    def _observed(self, agents: list[str]) -> dict[str, np.ndarray]:
+        obs = self.swarm.obs[0].copy()
+        if self._is_same_width:
+            if len(agents) == len(obs):
+                return dict(zip(agents, obs, strict=True))
+            return {name: obs[self._number[name]] for name in agents}
+        return {name: obs[a, : self._widths[a]] for name in agents for a in [self._number[name]]}
+
+    def reset(
+        self, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
+        """Start a new episode; `options` may have "params", parameters by path."""
+        self.swarm.reset(seed, None, check_options(options).get("params"))
+        self.agents = self._living()
+        return self._observed(self.agents), {name: {} for name in self.agents}
+
+    def _living(self) -> list[str]:
+        alive = self.swarm.alive[0]
+        if alive.all():
+            return list(self.possible_agents)
+        return [self.possible_agents[a] for a in np.flatnonzero(alive)]
+
+    def step(self, actions: Mapping[str, Any]) -> tuple[dict[str, Any], ...]:
+        """Play one decision.
+
+        Raises:
+            ParameterError: An agent's action is missing, is not allowed, or belongs to an agent that is not there.
+        """
+        if not self.agents:
+            return {}, {}, {}, {}, {}
+        before = self.agents
+        self._take(actions)
+        swarm = self.swarm
+        swarm.step(self._actions[None])
+        rewards, dead, late = (
+            swarm.rewards[0].tolist(),
+            swarm.terminations[0].tolist(),
+            swarm.truncations[0].tolist(),
+        )
+        self.agents = [] if swarm.over[0] else self._living()
+        if self.agents == before:
+            told, numbers = before, [self._number[name] for name in before]
+        else:
+            told = before + [name for name in self.agents if name not in set(before)]
+            numbers = [self._number[name] for name in told]
+            self.agents = [name for name in self.agents if not dead[self._number[name]]]
+        terms = {name: term[0].tolist() for name, term in swarm.terms.items()}
+        infos = {
+            name: {key: term[a] for key, term in terms.items()} for name, a in zip(told, numbers, strict=True)
+        }
+        return (
+            self._observed(told),
+            {name: rewards[a] for name, a in zip(told, numbers, strict=True)},
+            {name: dead[a] for name, a in zip(told, numbers, strict=True)},
+            {name: late[a] for name, a in zip(told, numbers, strict=True)},
+            infos,
+        )
+
+    def _take(self, actions: Mapping[str, Any]) -> None:
+        """Write the actions to one array."""
+        if actions.keys() != set(self.agents):
+            for name in actions:
+                if name not in self.agents:
+                    known = name in self._number
+                    text = (
+                        "is not alive"
+                        if known
+                        else f"is no agent{nearest_name(str(name), self.possible_agents)}"
+                    )
+                    raise ParameterError(f"there is an action for {name!r}, which {text}")
+            missing = next(name for name in self.agents if name not in actions)
+            raise ParameterError(f"the action of {missing!r} is missing")
+        many = [actions[name] for name in self.agents]
+        numbers: Any = slice(None)
+        if len(many) < len(self._actions):
+            numbers = [self._number[name] for name in self.agents]
+        kinds = {(getattr(value, "dtype", None), getattr(value, "shape", None)) for value in many}
+        dtype, shape = kinds.pop()
+        if kinds or dtype is None or dtype.kind != self._actions.dtype.kind or shape != self._shape:
+            self._take_each(many)
+        else:
+            self._actions[numbers] = np.array(many).reshape(len(many), -1)
+
+    def _take_each(self, many: list[Any]) -> None:
+        """Write actions that differ in shape or type, and say which is wrong."""
+        for name, value in zip(self.agents, many, strict=True):
+            space, given = self.action_spaces[name], np.asarray(value)
+            kinds = "f" if self.swarm.is_continuous else "iu"
+            if given.shape != space.shape or given.dtype.kind not in kinds:
+                raise ParameterError(
+                    f"the action of {name!r} is {given.dtype} of shape {given.shape}; it must be in {space}"
+                )
+            self._actions[self._number[name], : given.size] = given.reshape(-1)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return parallel_env_of, (self.task, self.render_mode, self.swarm.simulation.state.context.threads)
+
+    def render(self) -> Any:
+        """A picture, (height, width, 3)."""
+        return self._pictures.picture() if self.render_mode else None
+
+    def state(self) -> np.ndarray:
+        """Observations of all agents side by side."""
+        return np.array(self.swarm.obs[0]).reshape(-1)
+
+    def close(self) -> None:
+        self._pictures.close()
+        self.swarm.close()
+
+
+def parallel_env_of(task: Any, render_mode: str | None, threads: int) -> TaskParallelEnv:
+    """An environment from a pickle, before its first reset."""
+    return TaskParallelEnv(task, render_mode=render_mode, threads=threads)
+
+
+def parallel_env(task: Any, *, render_mode: str | None = None, threads: int = 1) -> TaskParallelEnv:
+    """One world of a task as a PettingZoo `ParallelEnv`; `pettingzoo.utils.parallel_to_aec` makes an AEC environment of it."""
+    return TaskParallelEnv(task, render_mode=render_mode, threads=threads)
+
+
+__all__ = ["TaskParallelEnv", "parallel_env"]

@@ -1,0 +1,157 @@
+"""Rewards: terms that are functions of the situation after a decision."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tussle.api.bodies import FLOATS
+from tussle.errors import ParameterError, listed, nearest_name
+from tussle.record.events import CAPTURE, COLLISION, DEATH
+
+if TYPE_CHECKING:
+    from tussle.engine.simulation import Simulation
+
+SHARES = ("agent", "team", "world")
+
+
+class Situation:
+    """The agents of all worlds after a decision, for rewards and ends; W worlds, A agents in each. Arrays are valid until the next step.
+
+    Attributes:
+        simulation: The simulation, e.g. for `simulation.read("hunters.pos")`.
+        alive: Who is alive, (W, A).
+        was_alive: Who was alive before the decision, (W, A); rewards go to these.
+        died: Who died, (W, A).
+        actions: The actions, as given to `step`.
+        team: Team of each agent's block, (A,).
+        t: Time of each world [s], (W,).
+    """
+
+    def __init__(self, simulation: Simulation, team: np.ndarray, alive: np.ndarray) -> None:
+        self.simulation = simulation
+        self.team = team
+        self.alive, self.was_alive, self.died = alive, alive.copy(), np.zeros_like(alive)
+        self.actions: Any = None
+        self.id = np.zeros(alive.shape, np.int64)
+        self.rows = self.agents = np.zeros(0, np.int64)
+        self._events: list[Any] = []
+        self._columns: dict[str, np.ndarray] = {}
+
+    @property
+    def t(self) -> np.ndarray:
+        return self.simulation.t
+
+    def __getattr__(self, name: str) -> np.ndarray:
+        """A body column of the agents, (W, A) or (W, A, k); 0 for the dead."""
+        if name not in FLOATS:
+            raise AttributeError(f"a situation has no {name!r}{nearest_name(name, FLOATS)}; {listed(FLOATS)}")
+        if name not in self._columns:
+            source = getattr(self.simulation.state.population.bodies, name)
+            out = np.zeros((self.alive.size, *source.shape[:-1]))
+            out[self.agents] = source[..., self.rows].T
+            self._columns[name] = out.reshape(*self.alive.shape, *source.shape[:-1])
+        return self._columns[name]
+
+    def forget(self) -> None:
+        """Discard what has been computed from the last states."""
+        self._columns.clear()
+
+    def listen(self, events: Any) -> None:
+        """Keep the events of a step."""
+        if events.kind in (CAPTURE, COLLISION, DEATH):
+            self._events.append(events)
+
+    def count(self, kind: str, ids: str = "id", text: str | None = None) -> np.ndarray:
+        """How many events of a kind concern each agent in this decision, (W, A).
+
+        Args:
+            kind: "capture", "collision" or "death".
+            ids: Which of an event's entities counts, "id" or "other", as in `events.arrow`.
+            text: Only events with this text, such as the cause of a death.
+        """
+        out = np.zeros(self.alive.shape)
+        for events in self._events:
+            if events.kind == kind:
+                found = self.id[events.world] == np.asarray(getattr(events, ids))[:, None]
+                if text is not None:
+                    found &= (np.asarray(events.text, object) == text)[:, None]
+                np.add.at(out, events.world, found)
+        return out
+
+    def clear_events(self) -> None:
+        self._events.clear()
+
+
+def alive(now: Situation) -> np.ndarray:
+    """1 for the living."""
+    return now.alive
+
+
+def died(now: Situation) -> np.ndarray:
+    """1 for those that died."""
+    return now.died
+
+
+def captures(now: Situation) -> np.ndarray:
+    """Captures that an agent was credited with."""
+    return now.count("capture")
+
+
+def captured(now: Situation) -> np.ndarray:
+    """1 for those that were captured and died of it."""
+    return now.count("death", text="captured")
+
+
+def collisions(now: Situation) -> np.ndarray:
+    """Collisions of an agent with others."""
+    return np.asarray(now.count("collision") + now.count("collision", "other"))
+
+
+USES_EVENTS = (captures, captured, collisions)
+
+
+@dataclass(frozen=True)
+class Term:
+    """One term of the reward.
+
+    Attributes:
+        function: Function of a `Situation`: values that broadcast to (W, A).
+        weight: Factor.
+        per: Who receives it: "agent", or the sum over the agents of the "team" or "world".
+        uses_events: Whether `function` calls `Situation.count`; known for the functions of this module.
+    """
+
+    function: Callable[[Situation], Any]
+    weight: float = 1.0
+    per: str = "agent"
+    uses_events: bool = False
+
+    def __post_init__(self) -> None:
+        if self.per not in SHARES:
+            raise ParameterError(f"Term: per = {self.per!r} is not allowed; {listed(SHARES)}")
+        if not np.isfinite(self.weight):
+            raise ParameterError(f"Term: weight = {self.weight!r} is not allowed; it takes a finite number")
+
+    @property
+    def reads_events(self) -> bool:
+        return self.uses_events or self.function in USES_EVENTS
+
+    def write(self, now: Situation, out: np.ndarray) -> None:
+        """Write the weighted values to out, (W, A); 0 for agents that were dead before."""
+        np.multiply(self.function(now), self.weight, out=out, casting="same_kind")
+        out *= now.was_alive
+        if self.per == "world":
+            out[:] = out.sum(axis=1, keepdims=True)
+        elif self.per == "team":
+            for team in np.unique(now.team):
+                mine = now.team == team
+                out[:, mine] = out[:, mine].sum(axis=1, keepdims=True)
+        if self.per != "agent":
+            out *= now.was_alive
+
+
+__all__ = ["Situation", "Term", "alive", "captured", "captures", "collisions", "died"]

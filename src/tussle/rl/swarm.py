@@ -1,0 +1,429 @@
+"""Agents of many worlds as arrays: the engine under all interfaces of `tussle.rl`."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterable, Mapping
+from typing import Any, Self
+
+import numpy as np
+
+from tussle import rng
+from tussle.engine.simulation import Simulation
+from tussle.errors import ParameterError, listed
+from tussle.rl.observation import AgentRows
+from tussle.rl.reward import Situation
+from tussle.rl.task import Task
+
+AUTORESET = ("next_step", "same_step", "disabled")
+EPISODE = rng.stream_key("tussle.rl", "episode")
+
+
+def task_of(task: Any) -> Task:
+    """A task, from an instance or a class.
+
+    Raises:
+        ParameterError: It is neither.
+    """
+    made = task() if isinstance(task, type) and issubclass(task, Task) else task
+    if not isinstance(made, Task):
+        raise ParameterError(f"{task!r} is not a Task")
+    return made
+
+
+class Swarm:
+    """The agents of a task in W worlds, A in each, as arrays (W, A, ...), which the next `step` or `reset` overwrites.
+
+    Dead and unborn agents have zeros, and their actions are ignored. World k is bit for bit the same for any number of worlds and
+    threads. All arrays are NumPy's, with `__dlpack__`: `torch.from_dlpack(obs)` shares their memory.
+
+    Args:
+        task: A Task, or a class of one.
+        num_envs: Number of worlds.
+        autoreset: When a world starts its next episode: "same_step", in the step that ended the last one (whose last observation is in
+            `final_obs`); "next_step", in the step after, which ignores its actions; "disabled", by `reset` only.
+        threads: Number of threads a step may use; results do not depend on it.
+
+    Attributes:
+        obs: Observations, (W, A, n), as returned.
+        final_obs: Observations at the end of the last episode, (W, A, n), with "same_step".
+        alive: Living agents, (W, A).
+        over: Worlds whose episode ended in the last step, (W,); `late` those by the time limit.
+        terms: Terms of the last reward, weighted, by name, (W, A) each.
+        returns: Sum of rewards of the present episode, (W, A); of the ended one in worlds that are `over`, until the next step.
+        lengths: Decisions of that episode, (W,).
+        seeds: Seed of each world's episode, (W,): `Simulation(task.played, seed)` begins it.
+
+    Raises:
+        ParameterError: A value is not allowed.
+    """
+
+    def __init__(
+        self, task: Any, num_envs: int = 1, *, autoreset: str = "same_step", threads: int = 1
+    ) -> None:
+        self.task = task = task_of(task)
+        if autoreset not in AUTORESET:
+            raise ParameterError(f"autoreset = {autoreset!r} is not allowed; {listed(AUTORESET)}")
+        if isinstance(num_envs, bool) or int(num_envs) != num_envs or num_envs < 1:
+            raise ParameterError(f"num_envs = {num_envs!r} is not allowed; it takes a whole number >= 1")
+        self.autoreset, self.n_worlds, self.n_agents = autoreset, int(num_envs), len(task.agent_names)
+        worlds, shape, dtype = self.n_worlds, (self.n_worlds, self.n_agents), task.dtype
+        width = max(sum(widths) for widths in task.widths.values())
+        self.obs, self.final_obs = np.zeros((*shape, width), dtype), np.zeros((*shape, width), dtype)
+        self.rewards, self.returns = np.zeros(shape, dtype), np.zeros(shape)
+        self.terms = {name: np.zeros(shape, dtype) for name in task.reward}
+        self.terminations, self.truncations, self.alive = np.zeros((3, *shape), bool)
+        self.lengths, (self.over, self.late) = np.zeros(worlds, np.int64), np.zeros((2, worlds), bool)
+        self.seeds = np.zeros(worlds, np.uint64)
+        self._first, self._episode = self.seeds.copy(), np.zeros(worlds, np.int64)
+        self._params: dict[str, Any] = {}
+        self._reset(
+            np.arange(worlds), np.random.SeedSequence().generate_state(worlds, np.uint64) >> np.uint64(1)
+        )
+        self.simulation = Simulation(
+            task.played,
+            self.seeds.tolist(),
+            self._drawn(np.arange(worlds)),
+            threads=threads,
+            on_error="raise",
+        )
+        self.is_fresh = True
+        team = np.array([b.team for b in task.blocks])[task.agent_block]
+        self.now = Situation(self.simulation, team, self.alive)
+        if any(term.reads_events for term in task.reward.values()):
+            self.simulation.events.listen(self.now.listen)
+        first = np.cumsum([0, *task.capacities])
+        names = [b.name for b in task.given.blocks]
+        self._blocks = {
+            names.index(b.name): (b.name, int(first[i]), task.capacities[i])
+            for i, b in enumerate(task.blocks)
+        }
+        self._decoders = {d.block: d for d in task.decoders}
+        self.is_continuous = task.decoders[0].is_continuous
+        if any(d.is_continuous != self.is_continuous for d in task.decoders):
+            raise ParameterError(f"{type(task).__name__}: action: all blocks have ranges, or all have levels")
+        self.action_width = max(len(d.free) for d in task.decoders)
+        self._ints: np.ndarray | None = None
+        self._parts: list[AgentRows] = []
+        self._check_ends = True
+
+    # -- seeds -------------------------------------------------------------------------------------------------------------
+
+    def _reset(self, worlds: np.ndarray, seeds: np.ndarray | None = None) -> None:
+        """Set the seeds of the next episodes: given ones, or those that follow."""
+        if seeds is not None:
+            self._first[worlds], self._episode[worlds] = seeds, 0
+        else:
+            self._episode[worlds] += 1
+        shares = rng.uniform(self._first[worlds], EPISODE, 0, self._episode[worlds])[0]
+        follows = (shares * 2.0**53).astype(np.uint64)
+        self.seeds[worlds] = np.where(self._episode[worlds] == 0, self._first[worlds], follows)
+
+    def _drawn(self, worlds: np.ndarray) -> dict[str, Any]:
+        """Parameters of the next episodes: variables of the task, and those given to `reset`."""
+        drawn: dict[str, Any] = {}
+        for variable in self.task.variables:
+            share = rng.uniform(self.seeds[worlds], rng.stream_key("tussle.rl", variable.name), 0, 0)[0]
+            drawn[variable.name] = [variable.setting(variable.value_at(float(s))) for s in share]
+        return {**drawn, **self._params}
+
+    def _checked_seeds(self, seed: Any, worlds: np.ndarray) -> np.ndarray | None:
+        if seed is None:
+            return None
+        many = [seed + int(w) for w in worlds] if isinstance(seed, (int, np.integer)) else list(seed)
+        if len(many) != len(worlds) or any(
+            isinstance(s, bool) or not isinstance(s, (int, np.integer)) or s < 0 for s in many
+        ):
+            raise ParameterError(
+                f"seed = {seed!r} is not allowed; it takes a whole number >= 0, or one for each of {len(worlds)} worlds"
+            )
+        return np.array([int(s) % 2**64 for s in many], np.uint64)
+
+    # -- episodes ----------------------------------------------------------------------------------------------------------
+
+    def reset(
+        self,
+        seed: int | Iterable[int] | None = None,
+        worlds: Any = None,
+        params: Mapping[str, Any] | None = None,
+    ) -> np.ndarray:
+        """Start new episodes.
+
+        Args:
+            seed: Seed of world 0, world k has seed + k; or one for each of `worlds`; None continues the sequence of each world.
+            worlds: Numbers of the worlds, or a mask (W,); by default all.
+            params: Parameters by path, as for `Simulation`; they stay for later episodes.
+
+        Returns:
+            Observations, (W, A, n).
+
+        Raises:
+            ParameterError: A world, a seed or a parameter is not allowed.
+        """
+        chosen = np.arange(self.n_worlds) if worlds is None else np.atleast_1d(np.asarray(worlds))
+        chosen = np.flatnonzero(chosen) if chosen.dtype == bool else chosen
+        if len(np.unique(chosen)) < len(chosen) or not set(chosen.tolist()) <= set(range(self.n_worlds)):
+            raise ParameterError(
+                f"worlds = {chosen.tolist()} is not allowed; it takes numbers from 0 to {self.n_worlds - 1}, each once"
+            )
+        seeds = self._checked_seeds(seed, chosen)
+        if seeds is not None or not self.is_fresh:
+            self._reset(chosen, seeds)
+        if params:
+            self._params = {**self._params, **params}
+        self._begin(chosen)
+        self.over[chosen] = False
+        self.is_fresh = False
+        self._observe(chosen)
+        return self.obs
+
+    def _begin(self, worlds: np.ndarray) -> None:
+        """Restart worlds with their seeds."""
+        self.simulation.reset(worlds, self.seeds[worlds].tolist(), self._drawn(worlds))
+        self.now.clear_events()
+        self.returns[worlds], self.lengths[worlds] = 0.0, 0
+        self._look()
+        self.now.was_alive[worlds], self.now.died[worlds] = self.alive[worlds], False
+
+    def _look(self) -> None:
+        """Find the agents' rows, if entities were born or removed."""
+        bodies = self.simulation.state.population.bodies
+        self.now.forget()
+        if bodies.ints is self._ints:
+            return
+        self._ints, self._parts = bodies.ints, []
+        alive, ids = self.alive.reshape(-1), self.now.id.reshape(-1)
+        alive[:], kept = False, {}  # type: ignore[var-annotated]
+        for group in self.simulation.state.population.groups:
+            block = bodies.block[group.first : group.last]
+            for number, (name, first, room) in self._blocks.items():
+                rows = group.first + np.flatnonzero(block == number)
+                if not len(rows):
+                    continue
+                place = bodies.block_index[rows]
+                if place.max() >= room:
+                    raise ParameterError(
+                        f"{name} has more than {room} entities; set room = {{{name!r}: ...}} in the task"
+                    )
+                agents = bodies.world[rows] * self.n_agents + (first + place)
+                alive[agents], ids[agents] = True, bodies.id[rows]
+                self._parts.append(
+                    AgentRows(name, group, rows, agents, bodies.team[rows].astype(float), kept)
+                )
+        none = [np.zeros(0, np.int64)]
+        self.now.rows = np.concatenate([*none, *(p.rows for p in self._parts)])
+        self.now.agents = np.concatenate([*none, *(p.agents for p in self._parts)])
+        self._check_ends = True
+
+    def _observe(self, worlds: np.ndarray | None = None) -> None:
+        """Compute the observations of all worlds, or of some."""
+        out = self.obs.reshape(-1, self.obs.shape[-1])
+        if worlds is None:
+            if len(self.now.agents) < len(out):
+                self.obs[~self.alive] = 0.0
+        else:
+            self.obs[worlds] = 0.0
+        for part in self._parts:
+            some = part
+            if worlds is not None and len(worlds) < self.n_worlds:
+                mask = np.zeros(self.n_worlds, bool)
+                mask[worlds] = True
+                kept = mask[part.agents // self.n_agents]
+                some = AgentRows(
+                    part.block, part.group, part.rows[kept], part.agents[kept], part.team[kept], part.kept
+                )
+            column = 0
+            if len(some.rows):
+                for component, width in zip(
+                    self.task.components(part.block), self.task.widths[part.block], strict=True
+                ):
+                    component.write(self.simulation, some, column, out)
+                    column += width
+
+    # -- steps -------------------------------------------------------------------------------------------------------------
+
+    def step(self, actions: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+        """Play one decision in all worlds.
+
+        Args:
+            actions: (W, A, n) of floats for ranges, clamped to [-1, 1]; of whole numbers for levels, or (W, A) for one.
+
+        Returns:
+            Observations (W, A, n), rewards (W, A), terminations (W, A), truncations (W, A), and a dict with `alive`, `over`, `terms`,
+            and with "same_step" `final_obs`.
+
+        Raises:
+            ParameterError: The actions have a wrong shape or type, or a living agent's action is not allowed.
+        """
+        if self.is_fresh:
+            raise ParameterError("step was called before reset")
+        self._act(actions)
+        simulation, now = self.simulation, self.now
+        due = self.over.copy() if self.autoreset == "next_step" else None
+        np.copyto(now.was_alive, self.alive)
+        now.clear_events()
+        simulation.step(self.task.decide_every)
+        self._look()
+        np.greater(now.was_alive, self.alive, out=now.died)
+        self._reward()
+        self._end(due)
+        if due is not None and due.any():
+            self._restart(np.flatnonzero(due))
+            self._clear(due)
+        self._observe()
+        if self.autoreset == "same_step" and self.over.any():
+            ended = np.flatnonzero(self.over)
+            self.final_obs[ended] = self.obs[ended]
+            returns, lengths = self.returns[ended], self.lengths[ended]
+            self._restart(ended)
+            self._observe(ended)
+            self.returns[ended], self.lengths[ended] = returns, lengths
+        info = {"alive": self.alive, "over": self.over, "terms": self.terms}
+        if self.autoreset == "same_step":
+            info["final_obs"] = self.final_obs
+        return self.obs, self.rewards, self.terminations, self.truncations, info
+
+    def _restart(self, worlds: np.ndarray) -> None:
+        self._reset(worlds)
+        self._begin(worlds)
+
+    def _clear(self, worlds: np.ndarray) -> None:
+        """Nothing has happened in worlds whose episode has just begun."""
+        for array in (self.rewards, self.terminations, self.truncations, *self.terms.values()):
+            array[worlds] = 0
+        self.over[worlds] = self.late[worlds] = False
+
+    def _act(self, actions: Any) -> None:
+        given = np.asarray(actions)
+        shape = (self.n_worlds, self.n_agents, self.action_width)
+        if given.shape == shape[:2] and self.action_width == 1:
+            given = given[..., None]
+        if given.shape != shape:
+            raise ParameterError(f"actions have shape {given.shape}; the shape must be {shape}")
+        if given.dtype.kind not in ("f" if self.is_continuous else "iu"):
+            kind = "floating-point" if self.is_continuous else "whole"
+            raise ParameterError(f"actions are {given.dtype}; they must be {kind} numbers")
+        if self._ints is not self.simulation.state.population.bodies.ints:
+            self._look()
+        self.now.actions = given
+        flat = np.ascontiguousarray(
+            given.reshape(-1, self.action_width), float if self.is_continuous else np.int64
+        )
+        for part in self._parts:
+            wrong = self._decoders[part.block].write(part, flat)
+            if wrong >= 0:
+                world, agent = divmod(wrong, self.n_agents)
+                raise ParameterError(
+                    f"action of {self.task.agent_names[agent]} in world {world} is {given[world, agent].tolist()}; it must be in "
+                    f"{self._decoders[part.block].space}"
+                )
+
+    def _reward(self) -> None:
+        self.rewards[:] = 0.0
+        for name, term in self.task.reward.items():
+            term.write(self.now, self.terms[name])
+            self.rewards += self.terms[name]
+        if self.autoreset != "disabled" and self.over.any():  # these belong to the last episode
+            self.returns[self.over], self.lengths[self.over] = 0.0, 0
+        self.returns += self.rewards
+        self.lengths += 1
+
+    def _end(self, due: np.ndarray | None) -> None:
+        """Find the agents and worlds whose episode ends."""
+        task, now, state = self.task, self.now, self.simulation.state
+        np.copyto(self.terminations, now.died)
+        over = np.zeros(self.n_worlds, bool)
+        if self._check_ends:
+            over |= self._are_decided()
+        ends = np.asarray(task.ends(now))
+        if ends.shape not in ((), over.shape):
+            raise ParameterError(
+                f"{type(task).__name__}.ends returns shape {ends.shape}; it returns {over.shape}, one per world"
+            )
+        over |= ends
+        self.terminations |= over[:, None] & self.alive
+        self.truncations[:] = self.late[:] = False
+        if task.n_steps:
+            np.greater(state.context.clock.step >= task.n_steps, over, out=self.late)
+            if self.late.any():
+                self.truncations |= self.late[:, None] & self.alive
+                over |= self.late
+        np.copyto(self.over, over)
+
+    def _are_decided(self) -> np.ndarray:
+        """Worlds without agents, or in which one team is left and the mission ends then."""
+        state = self.simulation.state
+        over = np.logical_not(self.alive.any(axis=1))
+        if "one_team" in self.task.given.end_conditions:
+            bodies, teams = state.population.bodies, state.context.teams
+            there = np.zeros((self.n_worlds, len(teams)), bool)
+            there[bodies.world, np.searchsorted(teams, bodies.team)] = True
+            over |= (there.sum(axis=1) <= 1) & (len(teams) > 1)
+        for world in np.flatnonzero(over):
+            over[world] = state.births.is_over(int(world))
+        self._check_ends = bool(over.any()) or state.births.has_rates
+        return over
+
+    # -- snapshots ---------------------------------------------------------------------------------------------------------
+
+    KEPT = (
+        "obs",
+        "alive",
+        "over",
+        "late",
+        "returns",
+        "lengths",
+        "seeds",
+        "_first",
+        "_episode",
+        "rewards",
+        "terminations",
+        "truncations",
+    )
+
+    def state(self) -> dict[str, Any]:
+        """A copy of everything; after `restore`, the same actions give the same bits."""
+        saved = {name: getattr(self, name).copy() for name in self.KEPT}
+        return {"simulation": self.simulation.snapshot(), "params": copy.deepcopy(self._params), **saved}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Return to a state of this swarm, or of another one with the same task and number of worlds."""
+        self.simulation.restore(state["simulation"])
+        self._params = copy.deepcopy(state["params"])
+        self._ints = None
+        self._look()
+        for name in self.KEPT:
+            getattr(self, name)[...] = state[name]
+        self.is_fresh = False
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A pickle makes a new swarm, before its first reset."""
+        return make_swarm_of, (
+            self.task,
+            self.n_worlds,
+            self.autoreset,
+            self.simulation.state.context.threads,
+        )
+
+    def close(self) -> None:
+        """Free everything that lies outside the arrays."""
+        self.simulation.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def make_swarm_of(task: Task, num_envs: int, autoreset: str, threads: int) -> Swarm:
+    """A swarm from a pickle."""
+    return Swarm(task, num_envs, autoreset=autoreset, threads=threads)
+
+
+def make_swarm(task: Any, num_envs: int = 1, *, autoreset: str = "same_step", threads: int = 1) -> Swarm:
+    """The agents of a task in many worlds as arrays; see `Swarm`."""
+    return Swarm(task, num_envs, autoreset=autoreset, threads=threads)
+
+
+__all__ = ["Swarm", "make_swarm", "task_of"]

@@ -1,0 +1,200 @@
+"""A task: a mission, and what is observed, decided, rewarded, and what ends an episode."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+from gymnasium import spaces
+
+from tussle.batch.variables import parse_variable
+from tussle.errors import ParameterError, listed, nearest_name
+from tussle.mission import Block, Mission, read_mission
+from tussle.rl.action import Act, Decoder, learned
+from tussle.rl.observation import Component
+from tussle.rl.reward import Situation, Term
+
+TIMELESS = 1e9
+"""End of the mission that is simulated [s]; episodes are ended by the task."""
+
+
+class Task:
+    """What a learner plays. Subclasses set the attributes; arguments of the same names set them for one instance.
+
+    Attributes:
+        mission: A Mission, or the file or name of one.
+        learners: Names of the blocks whose entities are agents, separated by spaces; the others play by their autonomies.
+        observation: Components, in order; or one list per block.
+        action: What actions set; or one list per block.
+        reward: Terms by name.
+        decide_every: Steps of the mission per decision. Terms are evaluated once per decision, on the last state; events of all its
+            steps count.
+        time_limit: Length of an episode, after which it is truncated [s]; by default the mission's.
+        vary: Variables that each episode draws anew, by path as in a batch: "prey.Unicycle.vel_max=20:30".
+        room: Agents per block, for blocks that gain entities by births of plugins; by default the block's count.
+        dtype: Type of observations, rewards and actions.
+
+    Raises:
+        ParameterError: An attribute is unknown, or a value is not allowed.
+    """
+
+    mission: ClassVar[Any] = None
+    learners: str = ""
+    observation: ClassVar[Any] = ()
+    action: ClassVar[Any] = ()
+    reward: ClassVar[Mapping[str, Term]] = {}
+    decide_every: int = 1
+    time_limit: float | None = None
+    vary: Sequence[str] = ()
+    room: ClassVar[Mapping[str, int]] = {}
+    dtype: Any = np.float32
+
+    def __init__(self, **values: Any) -> None:
+        known = [k for k in Task.__annotations__ if not k.startswith("_")]
+        for name, value in values.items():
+            if name not in known:
+                raise ParameterError(
+                    f"{type(self).__name__} has no {name!r}{nearest_name(name, known)}; {listed(known)}"
+                )
+            self.__dict__[name] = value
+        self._given = values
+        self._check()
+
+    def replace(self, **values: Any) -> Task:
+        """A copy with other attributes."""
+        return type(self)(**{**self._given, **values})
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _made, (type(self), self._given)
+
+    def ends(self, now: Situation) -> Any:
+        """Worlds, (W,), whose episode terminates, besides those without agents; by default none."""
+        return False
+
+    def _check(self) -> None:
+        where = type(self).__name__
+        if self.decide_every < 1 or int(self.decide_every) != self.decide_every:
+            raise ParameterError(
+                f"{where}: decide_every = {self.decide_every!r} is not allowed; it takes a whole number >= 1"
+            )
+        if self.time_limit is not None and not self.time_limit > 0.0:
+            raise ParameterError(
+                f"{where}: time_limit = {self.time_limit!r} is not allowed; it takes a number of seconds > 0"
+            )
+        if np.dtype(self.dtype) not in (np.float32, np.float64):
+            raise ParameterError(f"{where}: dtype = {self.dtype!r} is not allowed; it is float32 or float64")
+        for name, term in self.reward.items():
+            if not isinstance(term, Term):
+                raise ParameterError(f"{where}: reward {name!r} is {term!r}, not a Term")
+        _ = self.widths
+
+    # -- what follows ------------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def given(self) -> Mission:
+        """The mission as given."""
+        if isinstance(self.mission, Mission):
+            return self.mission
+        if self.mission is None:
+            raise ParameterError(
+                f"{type(self).__name__} has no mission; set mission = a Mission, or the name of one"
+            )
+        return read_mission(self.mission).mission
+
+    @cached_property
+    def blocks(self) -> list[Block]:
+        """The given blocks of the agents, in order of the mission."""
+        names, have = self.learners.split(), [b.name for b in self.given.blocks]
+        for name in names:
+            if name not in have:
+                raise ParameterError(
+                    f"{type(self).__name__}: learners: there is no block {name!r}{nearest_name(name, have)}; {listed(have)}"
+                )
+        if not names:
+            raise ParameterError(f"{type(self).__name__}: learners is empty; {listed(have)}")
+        return [b for b in self.given.blocks if b.name in names]
+
+    def _of(self, what: str, block: str, kind: type) -> list[Any]:
+        """Observation or action of a block."""
+        given = getattr(self, what)
+        if isinstance(given, Mapping):
+            if block not in given:
+                raise ParameterError(
+                    f"{type(self).__name__}: {what} has nothing for {block!r}; {listed(given)}"
+                )
+            given = given[block]
+        items = list(given) if isinstance(given, Sequence) else [given]
+        for item in items:
+            if not isinstance(item, kind):
+                raise ParameterError(f"{type(self).__name__}: {what}: {item!r} is no {kind.__name__}")
+        if not items:
+            raise ParameterError(f"{type(self).__name__}: {what} of {block!r} is empty")
+        return items
+
+    def components(self, block: str) -> list[Component]:
+        return self._of("observation", block, Component)
+
+    def acts(self, block: str) -> list[Act]:
+        return self._of("action", block, Act)
+
+    @cached_property
+    def widths(self) -> dict[str, list[int]]:
+        """Numbers of each component, by block."""
+        return {b.name: [c.width(self.played, b.name) for c in self.components(b.name)] for b in self.blocks}
+
+    @cached_property
+    def played(self) -> Mission:
+        """The mission that is simulated: blocks of agents get their actions from the learner, and worlds never end by themselves."""
+        names = [b.name for b in self.blocks]
+        blocks = [learned(b, self.acts(b.name)) if b.name in names else b for b in self.given.blocks]
+        return self.given.replace(blocks=blocks, end=self.given.start + TIMELESS, end_conditions=("none",))
+
+    @cached_property
+    def decoders(self) -> list[Decoder]:
+        return [Decoder(b.name, self.acts(b.name), self.dtype) for b in self.blocks]
+
+    @cached_property
+    def n_steps(self) -> int:
+        """Steps of an episode, a whole number of decisions; 0 for no limit."""
+        limit = self.time_limit
+        if limit is None:
+            limit = self.given.end - self.given.start if "time" in self.given.end_conditions else 0.0
+        return int(np.ceil(limit / self.given.dt / self.decide_every - 1e-9)) * self.decide_every
+
+    @cached_property
+    def variables(self) -> list[Any]:
+        return [parse_variable(text) for text in self.vary]
+
+    @cached_property
+    def capacities(self) -> list[int]:
+        """Most agents of each block."""
+        return [self.room.get(b.name, b.count) for b in self.blocks]
+
+    @cached_property
+    def agent_names(self) -> list[str]:
+        return [f"{b.name}_{i}" for b, n in zip(self.blocks, self.capacities, strict=True) for i in range(n)]
+
+    @cached_property
+    def agent_block(self) -> np.ndarray:
+        """Number of the block of each agent, (A,), in `blocks`."""
+        return np.repeat(np.arange(len(self.blocks)), self.capacities)
+
+    def observation_space(self, agent: int) -> spaces.Box:
+        """Observations of an agent."""
+        width = sum(self.widths[self.blocks[self.agent_block[agent]].name])
+        return spaces.Box(-np.inf, np.inf, (width,), self.dtype)
+
+    def action_space(self, agent: int) -> spaces.Space[Any]:
+        """Actions of an agent; a space of its own, as each has a random generator."""
+        return copy.deepcopy(self.decoders[self.agent_block[agent]].space)
+
+
+def _made(kind: type[Task], values: dict[str, Any]) -> Task:
+    """A task from a pickle."""
+    return kind(**values)
+
+
+__all__ = ["Task"]

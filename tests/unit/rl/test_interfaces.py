@@ -1,0 +1,154 @@
+"""The checkers of Gymnasium, PettingZoo and SuperSuit hold for tasks."""
+
+import types
+import warnings
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AutoresetMode
+from pettingzoo.utils import parallel_to_aec
+
+from tussle.errors import ParameterError
+from tussle.rl import TaskParallelEnv, make, make_vec, parallel_env
+
+
+@pytest.mark.parametrize("which", ["task", "solo"])
+def test_gymnasium_accepts_one_world(which, request):
+    env = make(request.getfixturevalue(which))
+    with warnings.catch_warnings():
+        warnings.filterwarnings(
+            "ignore", message=".*(Box observation space (minimum|maximum)|unconventional).*"
+        )
+        check_env(env, skip_render_check=True)
+    env.close()
+
+
+def test_pettingzoo_accepts_agents_that_die(task):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of PettingZoo itself
+        from pettingzoo.test import api_test, max_cycles_test, parallel_api_test, parallel_seed_test
+
+        parallel_api_test(parallel_env(task), num_cycles=200)
+        parallel_seed_test(lambda: parallel_env(task), num_cycles=30)
+        api_test(parallel_to_aec(parallel_env(task)), num_cycles=60)
+    make = types.SimpleNamespace(
+        parallel_env=lambda max_cycles: parallel_env(task.replace(time_limit=max_cycles * 0.1)),
+        env=lambda max_cycles: parallel_to_aec(parallel_env(task.replace(time_limit=max_cycles * 0.1))),
+    )
+    max_cycles_test(make)
+
+
+def test_agents_leave_when_they_die(task):
+    env = parallel_env(task)
+    obs, _ = env.reset(seed=3)
+    assert list(obs) == env.agents == env.possible_agents
+    n_dead = 0
+    while env.agents:
+        before = list(env.agents)
+        obs, rewards, dead, late, infos = env.step({a: np.zeros(2, np.float32) for a in before})
+        assert list(obs) == list(rewards) == list(dead) == list(late) == list(infos) == before
+        n_dead += sum(dead.values())
+        assert set(env.agents) == {a for a in before if not dead[a] and not late[a]}
+        assert all((rewards[a] < 0) == dead[a] for a in before)
+    assert n_dead > 0
+
+
+def test_actions_that_do_not_fit_are_refused(task):
+    env = parallel_env(task)
+    env.reset(seed=3)
+    good = {a: np.zeros(2, np.float32) for a in env.agents}
+    wrong = {
+        "missing": {a: v for a, v in good.items() if a != "prey_2"},
+        "no agent .did you mean 'prey_2'": {**good, "pray_2": good["prey_2"]},
+        "float32 of shape \\(3,\\)": {**good, "prey_2": np.zeros(3, np.float32)},
+        "int64 of shape": {**good, "prey_2": np.zeros(2, np.int64)},
+        "prey_2 in world 0 is \\[nan": {**good, "prey_2": np.array([np.nan, 0.0], np.float32)},
+    }
+    for message, actions in wrong.items():
+        with pytest.raises(ParameterError, match=message):
+            env.step(actions)
+    while "prey_0" in env.agents:
+        env.step({a: np.zeros(2, np.float32) for a in env.agents})
+    if env.agents:
+        with pytest.raises(ParameterError, match="'prey_0', which is not alive"):
+            env.step({a: np.zeros(2, np.float32) for a in [*env.agents, "prey_0"]})
+    vec = make_vec(task, 2)
+    vec.reset(seed=1)
+    for actions, message in [
+        (np.zeros((2, 5, 2), np.float32), "shape"),
+        (np.zeros((2, 6, 2), np.int64), "floating-point"),
+        (np.full((2, 6, 2), np.nan, np.float32), "prey_0 in world 0"),
+    ]:
+        with pytest.raises(ParameterError, match=message):
+            vec.step(actions)
+
+
+def test_supersuit_makes_a_vector_environment(task):
+    supersuit = pytest.importorskip("supersuit")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        env = supersuit.black_death_v3(parallel_env(task))
+        env = supersuit.frame_stack_v1(env, 2)
+        vec = supersuit.concat_vec_envs_v1(supersuit.pettingzoo_env_to_vec_env_v1(env), 2, num_cpus=0)
+        obs, _ = vec.reset(seed=1)
+        assert obs.shape == (12, 2 * 27)
+        for _ in range(70):
+            obs, *_ = vec.step(np.zeros((12, 2), np.float32))
+        assert np.isfinite(obs).all()
+
+
+@pytest.mark.parametrize("mode", list(AutoresetMode))
+def test_vector_environments_reset_as_gymnasium_says(solo, mode):
+    vec, alone = make_vec(solo, 3, autoreset=mode), make(solo)
+    assert vec.metadata["autoreset_mode"] == mode
+    first, _ = vec.reset(seed=[5, 6, 7])
+    assert vec.observation_space.contains(first)
+    seen, _ = alone.reset(seed=6)
+    np.testing.assert_array_equal(seen, first[1])
+    is_over, n_ends = False, 0
+    for k in range(150):
+        actions = np.full((3, 2), np.sin(k), np.float32)
+        obs, rewards, terminated, truncated, info = vec.step(actions)
+        if mode == AutoresetMode.NEXT_STEP and is_over:
+            seen, _ = alone.reset()
+            assert rewards[1] == 0.0
+            assert not terminated[1]
+            is_over = False
+        else:
+            seen, reward, dead, late, _ = alone.step(actions[1])
+            assert (reward, dead, late) == (rewards[1], terminated[1], truncated[1])
+            is_over = dead or late
+            n_ends += is_over
+        if mode == AutoresetMode.SAME_STEP and is_over:
+            np.testing.assert_array_equal(info["final_obs"][1], seen)
+            assert info["_final_obs"][1]
+            seen, _ = alone.reset()
+        if mode == AutoresetMode.DISABLED and (terminated | truncated).any():
+            mask = terminated | truncated
+            obs, _ = vec.reset(options={"reset_mask": mask})
+            if mask[1]:
+                seen, _ = alone.reset()
+        np.testing.assert_array_equal(obs[1], seen)
+    assert n_ends > 1
+
+
+def test_tasks_are_registered():
+    env = gymnasium.make("tussle/PredatorPrey-v0", disable_env_checker=True)
+    obs, _ = env.reset(seed=1)
+    assert obs.shape == (100, 73)
+    env.close()
+
+
+def test_pictures_show_the_world(task):
+    pytest.importorskip("pyvista")
+    env = TaskParallelEnv(task, render_mode="rgb_array")
+    env.reset(seed=1)
+    picture = env.render()
+    assert picture.dtype == np.uint8
+    assert picture.shape == (480, 640, 3)
+    assert picture.std() > 1.0
+    env.close()
+    with pytest.raises(ParameterError, match="render_mode"):
+        make(task, render_mode="ascii")
