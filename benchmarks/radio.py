@@ -3,7 +3,8 @@
     python benchmarks/radio.py [--sizes 2000] [--repeats 3] [--json FILE]
 
 Nodes drift in a plane, with 16 others within the range of 100 m. One world, one thread. `copies` is the number of copies of messages
-that are received in a step, `wall_ms` and `cpu_ms` are per step, `to_real_time` is simulated time over wall time.
+that are received in a step, `wall_ms` and `cpu_ms` are per step, `to_real_time` is simulated time over CPU time: 10 is wanted of 2,000 nodes with
+SphereNetwork, on one core.
 """
 
 from __future__ import annotations
@@ -86,14 +87,14 @@ def measure(name: str, n: int, is_recorded: bool) -> dict[str, Any]:
         copies = sim.result()[0].metrics["radio"]["delivered"] / (3 + STEPS)
     return {
         "network": name, "nodes": n, "recorded": is_recorded, "copies": copies, "wall_ms": 1e3 * wall / STEPS,
-        "cpu_ms": 1e3 * cpu / STEPS, "to_real_time": 0.1 * STEPS / wall,
+        "cpu_ms": 1e3 * cpu / STEPS, "to_real_time": 0.1 * STEPS / cpu,
     }  # fmt: skip
 
 
 def main() -> None:
     args = measuring.arguments(__doc__.splitlines()[0], SIZES)
     rows = [
-        measuring.median_of(args.repeats, lambda n=n, name=name, kept=kept: measure(name, n, kept), "wall_ms")
+        measuring.median_of(args.repeats, lambda n=n, name=name, kept=kept: measure(name, n, kept), "cpu_ms")
         for name in RADIOS
         for n in args.sizes
         for kept in (False, True)

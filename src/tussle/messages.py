@@ -340,6 +340,14 @@ class GPSStatus(Message):
     t = Field(unit="s", doc="Time of the last fix.")
 
 
+class GoalReached(Message):
+    """An entity came to its goal for the first time."""
+
+    entity = EntityRef(doc="Who came there.")
+    team = Field(dtype=int, doc="Its team.")
+    t = Field(unit="s", doc="Time of arrival.")
+
+
 class BoundaryShape(Message):
     """The shape of a boundary, sent once at the start."""
 

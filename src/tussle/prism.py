@@ -102,6 +102,14 @@ class Prism(Volume):
             distance = np.minimum(distance, np.where(is_hit, t, np.inf))
         return distance
 
+    def ends(self) -> list[np.ndarray]:
+        """Triangles of the roof and of the floor [m], (3, 3) each, counter-clockwise seen from outside."""
+        found = []
+        for three in _ears(self.corners):
+            for corners, z in ((three, self.high), (three[::-1], self.low)):
+                found.append(np.array([(*corner, z) for corner in corners]))
+        return found
+
     def triangles(self) -> np.ndarray:
         found: list[tuple[tuple[float, ...], ...]] = []
         for i, (x, y) in enumerate(self.corners):

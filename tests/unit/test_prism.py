@@ -66,3 +66,14 @@ def test_pictures_show_its_walls_from_outside():
 def test_values_are_checked(values, text):
     with pytest.raises(ParameterError, match=text):
         Prism(**values)
+
+
+@pytest.mark.parametrize("way", [1, -1])
+def test_roof_and_floor_cover_a_concave_prism_and_face_outwards(way):
+    corners = [(0, 0), (20, 0), (20, 10), (10, 10), (10, 20), (0, 20)][::way]
+    area = {}
+    for a, b, c in Prism(corners, low=1.0, high=5.0).ends():
+        _, _, up = np.cross(b - a, c - a)
+        assert a[2] == b[2] == c[2]
+        area[a[2]] = area.get(a[2], 0.0) + 0.5 * up
+    assert area == pytest.approx({5.0: 300.0, 1.0: -300.0})

@@ -27,7 +27,8 @@ def mesh_of(shape: Volume | TriangleMesh, low: np.ndarray, high: np.ndarray) -> 
         return Mesh(shape.vertices, shape.faces[:MOST_FACES])
     if isinstance(shape, Sphere):
         return ball(3).placed(2.0 * shape.radius, shape.center)
-    return _polygons(_rings(shape, low, high))
+    rings = _rings(shape, low, high)
+    return _polygons([*rings, *shape.ends()] if isinstance(shape, Prism) else rings)
 
 
 def outline_of(shape: Volume | TriangleMesh, low: np.ndarray, high: np.ndarray) -> np.ndarray:
@@ -80,7 +81,7 @@ def _rings(shape: Volume, low: np.ndarray, high: np.ndarray) -> list[np.ndarray]
 
 
 def _walls(prism: Prism) -> list[np.ndarray]:
-    """Corners of the vertical faces of a prism, each (4, 3); its ends, which may be concave, are left open."""
+    """Corners of the vertical faces of a prism, each (4, 3)."""
     first = np.array(prism.corners)
     second = np.roll(first, -1, axis=0)
     x, y = first.T

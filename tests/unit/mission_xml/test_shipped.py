@@ -120,6 +120,16 @@ def test_cars_find_their_way_through_the_maze():
     assert farthest > -30.0
 
 
+def test_quadrotors_that_see_far_enough_to_brake_arrive():
+    """At 8 m/s they need about 15 m to stop: who sees 5 m hits buildings."""
+    mission = read_mission("urban_quadrotors", {"end": "45", "quadrotors": "3"}, strict=True).mission
+    far = {f"{name}.RayTrace.max_range": [5.0, 40.0] for name in ("eastbound", "northbound")}
+    blind, seeing = Simulation(mission, seeds=[2, 2], params=far).run()
+    arrived = [sum(r.metrics["Arrivals"]["arrived"].values()) for r in (blind, seeing)]
+    assert arrived[0] <= 2 < 5 <= arrived[1]
+    assert sum(blind.alive.values()) <= 2
+
+
 @pytest.mark.parametrize("name", GAMES)
 def test_the_games_are_those_built_in_python(name):
     loaded = read_mission(name, {"end": "20"}, strict=True)

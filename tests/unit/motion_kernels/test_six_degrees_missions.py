@@ -27,7 +27,7 @@ def read(tmp_path, motion, values="", controller="AircraftPIDController"):
 
 
 def test_variants_are_chosen_by_name_and_coefficients_by_their_own_attributes(tmp_path):
-    values = 'C_L_alpha="4.5" C_MQ="-9" wind_N="3" use_launcher="false" inertia_matrix_slug_ft_sq="[1 0 0] [0 2 0] [0 0 3]"'
+    values = 'C_L_alpha="4.5" C_MQ="-9" wind_N="3" draw_vel="1" inertia_matrix_slug_ft_sq="[1 0 0] [0 2 0] [0 0 3]"'
     loaded = read(tmp_path, "FixedWing6DOF-Rascal", values)
     motion = loaded.mission.blocks[0].motion
     assert motion.values["mass"] == 5.91
@@ -35,7 +35,7 @@ def test_variants_are_chosen_by_name_and_coefficients_by_their_own_attributes(tm
     assert motion.values["pitch_moment"][2] == -9.0
     assert motion.values["wind"] == (0.0, 3.0, 0.0)
     assert motion.values["inertia_matrix_slug_ft_sq"][4] == pytest.approx(2.0 * 1.3558179)
-    assert any("use_launcher of FixedWing6DOF-Rascal has no effect" in note for note in loaded.notes)
+    assert any("draw_vel of FixedWing6DOF-Rascal has no effect" in note for note in loaded.notes)
     assert read(tmp_path, "FixedWing6DOF-A-4D").mission.blocks[0].motion.values["mass"] == 7973.2467
     sim = Simulation(
         loaded.mission.replace(

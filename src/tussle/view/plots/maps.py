@@ -31,7 +31,7 @@ LEAST_WIDTH = 10.0
 
 
 def trajectory(tracks: Trajectories) -> Figure:
-    """Trajectories from above in the teams' colours, with first and last positions, bases and boundaries."""
+    """Trajectories from above in the teams' colours, with first and last positions, bases, walls and boundaries."""
     shown = tracks.spread(MAX_TRAJECTORIES)
     pos = tracks.pos("xy")
     low, high, height = _framed(pos.min(axis=0), pos.max(axis=0))
@@ -226,8 +226,8 @@ def _map_axes(axes: Axes, low: np.ndarray, high: np.ndarray) -> None:
 
 
 def _draw_scenery(axes: Axes, tracks: Trajectories) -> list[Handle]:
-    """Draw bases and boundaries inside the map; return their legend."""
-    from matplotlib.collections import LineCollection
+    """Draw bases, walls and boundaries inside the map; return their legend."""
+    from matplotlib.collections import LineCollection, PolyCollection
     from matplotlib.patches import Circle
 
     scenery = tracks.recording.scenery
@@ -242,7 +242,12 @@ def _draw_scenery(axes: Axes, tracks: Trajectories) -> list[Handle]:
             signs["base"] = (mark_sign("o", MUTED, markersize=7.0, markerfacecolor="none"), "base")
     for region in scenery.boundaries:
         lines = region.outline[:, :, :2]
-        if _is_in_picture(lines.min(axis=(0, 1)), lines.max(axis=(0, 1)), corners):
+        if region.is_wall:
+            triangles = region.mesh.vertices[region.mesh.faces][:, :, :2]
+            grey = mixed(MUTED, PAPER, 0.6)
+            axes.add_collection(PolyCollection(triangles, facecolor=grey, edgecolor=grey, linewidth=0.3), autolim=False)
+            signs["wall"] = (mark_sign("s", grey, markersize=7.0), "wall")
+        elif _is_in_picture(lines.min(axis=(0, 1)), lines.max(axis=(0, 1)), corners):
             look: dict[str, Any] = {"linewidth": 0.8, "linestyle": "--"}
             axes.add_collection(LineCollection(list(lines), colors=MUTED, **look), autolim=False)
             signs["boundary"] = (line_sign(MUTED, **look), "boundary")

@@ -4,7 +4,19 @@ from __future__ import annotations
 
 from typing import Any
 
-from tussle.api import HistoricAttributes, InertiaParam, Input, Param, PositiveParam, RigidBodyModel
+import numpy as np
+
+from tussle.api import (
+    GroupView,
+    HistoricAttributes,
+    InertiaParam,
+    Input,
+    MotionBody,
+    Param,
+    PositiveParam,
+    RigidBodyModel,
+    State,
+)
 from tussle.numeric.rigid_body import newton_euler, to_body, to_world
 from tussle.stock.motion.fixed_wing_6dof import kernels
 
@@ -28,7 +40,10 @@ class FixedWing6DOF(RigidBodyModel):
     the aspect ratio is span^2 / area (there, span / chord); lift is limited (there, it grew up to backward flight); the side
     force acts along the body y axis; drag by the elevator is read; the throttle is clamped to its range (there, to [-1, 1], which
     gave three times the reverse thrust); the ground damps critically (there, hardly); the product of inertia turns a banking nose
-    to its side, as Nelson's positive I_xz does (there, the sign was that of the axes upside down). There is no launcher.
+    to its side, as Nelson's positive I_xz does (there, the sign was that of the axes upside down).
+
+    With `use_launcher` it rests on a launcher for `launch_time`; then a catapult accelerates it along its x axis by `launch_accel` from rest
+    to `launch_speed`, x = a t^2 / 2, and releases it at the end of that substep. Until then nothing else moves or turns it.
     """
 
     grade = "portable"
@@ -42,7 +57,7 @@ class FixedWing6DOF(RigidBodyModel):
             "pitch_moment": ("C_M0", "C_M_alpha", "C_MQ", "C_M_alpha_dot", "C_M_delta_elevator"),
             "yaw_moment": ("C_N_beta", "C_NP", "C_NR", "C_N_delta_aileron", "C_N_delta_rudder"),
         },
-        unread=("draw_vel", "draw_ang_vel", "use_launcher", "launch_accel", "launch_speed", "launch_time"),
+        unread=("draw_vel", "draw_ang_vel"),
     )
 
     gravity_magnitude = Param(9.81, unit="m/s^2", ge=0.0, doc="Acceleration of gravity.")
@@ -83,6 +98,12 @@ class FixedWing6DOF(RigidBodyModel):
     use_ground_model = Param(
         True, structural=True, doc="A spring and damper hold the aircraft above height 0."
     )
+    use_launcher = Param(False, structural=True, doc="It starts from a launcher.")
+    launch_accel = Param(200.0, unit="m/s^2", gt=0.0, doc="Acceleration by the launcher.")
+    launch_speed = Param(20.0, unit="m/s", ge=0.0, doc="Speed at which the launcher releases it.")
+    launch_time = Param(30.0, unit="s", ge=0.0, doc="Time from its birth to the launch.")
+    born = State(unit="s", doc="Time of its birth, with use_launcher.")
+    on_rail = State(unit="m", doc="Way on the launcher so far.")
     throttle = Input(doc="Throttle.")
     elevator = Input(doc="Elevator [rad], nose down positive.")
     aileron = Input(doc="Aileron [rad], right wing down positive.")
@@ -152,6 +173,28 @@ class FixedWing6DOF(RigidBodyModel):
         loads = px + fx, py + fy, pz + fz + ground
         moments = tx + roll, ty - pitch, tz - yaw
         return newton_euler(rigid_body, loads, moments, mass, inertia_matrix_slug_ft_sq, gravity_magnitude)
+
+    def spawn(self, g: GroupView, rows: np.ndarray) -> None:
+        """Put newborn aircraft on their launchers."""
+        self.born[rows] = g.t[rows]
+
+    def to_body(self, body: MotionBody) -> None:
+        """Write the state; that of an aircraft on its launcher is the launcher's."""
+        if self.use_launcher:
+            self._launch(body)
+        super().to_body(body)
+
+    def _launch(self, body: MotionBody) -> None:
+        """Move those on their launchers from where they were before this substep; `body.t` is the time of its start."""
+        pushed = body.t - self.born - self.launch_time
+        rows = np.flatnonzero(pushed * self.launch_accel < self.launch_speed)
+        since, push = np.maximum(pushed[rows], 0.0), self.launch_accel[rows]
+        way = 0.5 * push * since * since
+        forward, state = body.forward[:, rows], self.rigid_body
+        state[:3, rows] = body.pos[:, rows] + (way - self.on_rail[rows]) * forward
+        state[3:6, rows] = push * since * forward
+        state[6:10, rows], state[10:, rows] = body.quat[:, rows], 0.0
+        self.on_rail[rows] = way
 
 
 class FixedWing6DOFRascal(FixedWing6DOF):

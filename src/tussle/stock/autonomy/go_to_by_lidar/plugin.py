@@ -1,0 +1,90 @@
+"""Flight to a goal between obstacles that a lidar sees."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tussle.api import Autonomy, GroupView, Input, Output, Param, Publish, State
+from tussle.messages import GoalReached
+from tussle.numeric import atan2, cos, sin
+from tussle.numeric.quaternion import quat_rotate
+from tussle.stock.autonomy.go_to_by_lidar import kernels
+
+
+def length(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Lengths of vectors in the plane, (n,)."""
+    return np.asarray(np.sqrt(x * x + y * y))
+
+
+class GoToByLidar(Autonomy):
+    """Flies at one height to a goal, round all that `RayTrace` sees, and stays there.
+
+    Of 72 directions it takes the one of least cost: the angle to the goal, the turn against the last direction, and the part of the way,
+    of at most `look_ahead`, that is not free for a disc of radius `clearance` (VFH+: I. Ulrich and J. Borenstein, ICRA 1998, with the
+    scan in place of a grid). The speed is one from which it stops in the free way: v^2 / (2 `deceleration`) + v `reaction_time`. What
+    the scan does not show counts as free: so a lidar of short range is seen to be one by collisions. Points of the scan count if their
+    height differs by less than `half_height`, so that the ground is no obstacle to a tilted lidar.
+
+    `GoalReached` tells that it came within `tolerance` for the first time.
+    """
+
+    grade = "portable"
+
+    goal = Param((0.0, 0.0, 0.0), fields="x y z", unit="m", doc="Where to go, world frame.")
+    is_relative = Param(False, doc="Measure the goal from the initial position.")
+    speed = Param(10.0, unit="m/s", ge=0.0, doc="Largest speed.")
+    tolerance = Param(3.0, unit="m", gt=0.0, doc="Horizontal distance at which the goal is reached.")
+    clearance = Param(2.0, unit="m", gt=0.0, doc="Distance to keep from obstacles.")
+    look_ahead = Param(50.0, unit="m", gt=0.0, doc="Length of the way that should be free.")
+    half_height = Param(3.0, unit="m", gt=0.0, doc="Difference in height up to which a point is an obstacle.")
+    deceleration = Param(3.0, unit="m/s^2", gt=0.0, doc="With which it brakes.")
+    reaction_time = Param(0.5, unit="s", ge=0.0, doc="From a scan to the full deceleration.")
+    turn_weight = Param(0.3, ge=0.0, doc="Cost of a turn by one radian; that of the angle to the goal is 1.")
+    block_weight = Param(6.0, unit="rad", ge=0.0, doc="Cost of a way of which nothing is free.")
+    target = State("x y z", unit="m", doc="Where it goes.")
+    heading = State(unit="rad", doc="Direction of flight.")
+    is_there = State(dtype=bool, doc="Whether it reached the goal.")
+    reached = Publish(GoalReached)
+    points = Input("raytrace", fields="x y z range in_range", unit="m m m m 1", ragged=True)
+    velocity = Output("velocity_x velocity_y velocity_z", unit="m/s")
+    desired_heading = Output(unit="rad")
+    desired_altitude = Output(unit="m")
+    desired_speed = Output(unit="m/s")
+
+    def spawn(self, g: GroupView, rows: np.ndarray) -> None:
+        """Fix the goal."""
+        pos = g.pos[:, rows]
+        self.target[:, rows] = self.goal[:, rows] + np.where(self.is_relative[rows], pos, 0.0)
+        self.heading[rows] = self._bearing(g)[rows]
+
+    def _bearing(self, g: GroupView) -> np.ndarray:
+        """Direction of the goal [rad], (n,)."""
+        return np.asarray(atan2(self.target[1] - g.pos[1], self.target[0] - g.pos[0]))
+
+    def _obstacles(self, g: GroupView) -> tuple[np.ndarray, np.ndarray]:
+        """Points of the scans at the height of flight, from each entity, (2, m) [m], and the first one of each entity, (n + 1,)."""
+        x, y, z, _, in_range = self.points.data
+        row = self.points.row
+        east, north, up = quat_rotate(g.quat[:, row], np.stack([x, y, z]))
+        kept = np.flatnonzero((in_range > 0.0) & (np.abs(up) < self.half_height[row]))
+        start = np.searchsorted(row[kept], np.arange(g.n + 1))
+        return np.ascontiguousarray(np.stack([east[kept], north[kept]])), start.astype(np.int64)
+
+    def step(self, g: GroupView) -> None:
+        """Choose direction and speed."""
+        distance = length(self.target[0] - g.pos[0], self.target[1] - g.pos[1])
+        rows = np.flatnonzero(~self.is_there & (distance <= self.tolerance))
+        self.is_there[rows] = True
+        self.reached.publish(rows, entity=g.id[rows], team=g.team[rows], t=g.t[rows])
+        free = np.empty(g.n)
+        where = self._bearing(g), distance, self.turn_weight
+        limits = self.clearance, self.look_ahead, self.block_weight
+        kernels.choose(*self._obstacles(g), where, limits, self.heading, free)
+        # The root of v^2 / (2 a) + v t = d.
+        a, t = self.deceleration, self.reaction_time
+        stopping = a * (np.sqrt(t * t + 2.0 * np.minimum(free, distance) / a) - t)
+        speed = np.minimum(self.speed, stopping)
+        self.velocity[0], self.velocity[1] = speed * cos(self.heading), speed * sin(self.heading)
+        self.velocity[2] = np.clip(self.target[2] - g.pos[2], -0.2 * self.speed, 0.2 * self.speed)
+        self.desired_heading[:], self.desired_altitude[:] = self.heading, self.target[2]
+        self.desired_speed[:] = speed
