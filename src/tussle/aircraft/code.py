@@ -6,7 +6,6 @@ state, float64 [slot, row]; those that are always written before they are read a
 
 from __future__ import annotations
 
-import keyword
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -15,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tussle.aircraft.node import AircraftError, Node
-from tussle.errors import listed, nearest_name
+from tussle.errors import nearest_name
 
 MOST_LINES = 40_000
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\Z")
@@ -23,7 +22,8 @@ SURFACE = re.compile(
     r"fcs/(left-aileron|right-aileron|elevator|rudder|flap|speedbrake|spoiler)-pos-(rad|deg)\Z"
 )
 DEGREES, RADIANS = repr(180.0 / np.pi), repr(np.pi / 180.0)
-OPERATORS = frozenset("+-*/ (")
+STATE = "state/"
+"""Begins the names of state that is no property."""
 
 
 def normal(name: str) -> str:
@@ -143,13 +143,8 @@ class Code:
     def variable(self, name: str) -> str:
         """The variable of a property or of a piece of state."""
         if name not in self.names:
-            text = re.sub(r"\W+", "_", name, flags=re.ASCII).strip("_")[:60] or "property"
-            text = (
-                f"p_{text}"
-                if text[0].isdigit() or keyword.iskeyword(text) or len(text) < 4 or text in RESERVED
-                else text
-            )
-            text = f"p_{text}" if re.fullmatch(r"t\d+", text) else text
+            short = re.sub(r"\W+", "_", name.removeprefix(STATE), flags=re.ASCII).strip("_")[:60]
+            text = f"{'s' if name.startswith(STATE) else 'p'}_{short}"
             unique, k = text, 1
             while unique in self._variables:
                 k += 1
@@ -213,11 +208,11 @@ class Code:
 
     def state(self, label: str, initial: float = 0.0) -> str:
         """Return the variable of a new piece of state, to be read and assigned in lines at will."""
-        name = f"state/{label}"
+        name = f"{STATE}{label}"
         k = 1
         while name in self.names:
             k += 1
-            name = f"state/{label}-{k}"
+            name = f"{STATE}{label}-{k}"
         self.initial[name] = initial
         self.kept[name] = None
         return self.variable(name)
@@ -274,6 +269,3 @@ class Code:
             if not line.name or self.is_used(line.name):
                 yield "    " * (depth + line.depth) + line.text
 
-
-RESERVED = {"tables", "begin", "step", "range", "math", "time", "rows", "slots"}
-__all__ = ["Code", "Section", "listed", "normal"]

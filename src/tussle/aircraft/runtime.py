@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any, ClassVar
 
-from tussle.numeric import exp, log
+from tussle.numeric import atan2, exp, log
 from tussle.numeric.kernel import Device, device
 
 
@@ -176,3 +176,22 @@ def kinematic(wanted, position, dt, tables, at, n):
         position = reached
         dt -= needed
     return position
+
+
+@device
+def arctangent(x):
+    """Arctangent [rad]."""
+    return atan2(x, 1.0)
+
+
+@device
+def whole(x):
+    """The whole part of x."""
+    return float(math.trunc(x))
+
+
+@device
+def heading(y, x):
+    """Angle of a direction in [0, 2 pi)."""
+    angle = atan2(y, x)
+    return angle if angle >= 0.0 else angle + 2.0 * math.pi
