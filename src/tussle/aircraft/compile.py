@@ -15,7 +15,7 @@ from tussle import numeric
 from tussle.aircraft import air, runtime
 from tussle.aircraft.aerodynamics import emit_aerodynamics
 from tussle.aircraft.code import STATE, Code, normal
-from tussle.aircraft.control import emit_control, offer_commands
+from tussle.aircraft.control import declare, emit_control, offer_commands
 from tussle.aircraft.equations import CORE, FLOW_PROPERTIES, AIR_DATA, emit_accelerations, emit_propagate, flow_by_lengths, lever, offer
 from tussle.aircraft.external import emit_external
 from tussle.aircraft.files import Files
@@ -36,6 +36,7 @@ KNOWN = (
     "fileheader", "metrics", "mass_balance", "propulsion", "system", "autopilot", "flight_control", "ground_reactions",
     "external_reactions", "aerodynamics", "output", "input", "documentation", "description",
 )  # fmt: skip
+DECLARING = "metrics", "aerodynamics", "propulsion", "mass_balance", "ground_reactions"
 WIND = tuple(f"atmosphere/{kind}-{axis}-fps" for kind in ("wind", "gust") for axis in ("north", "east", "down"))
 BUILT_IN = (
     "aero/", "atmosphere/", "velocities/", "position/", "attitude/", "propulsion/", "inertia/", "forces/", "moments/",
@@ -106,6 +107,9 @@ def emit(root: Node, find: Callable[[Node, str, str], Node], keep: Sequence[str]
     metrics = read_metrics(root.need("metrics"))
     offer_metrics(code, metrics)
     offer_commands(code, n_engines)
+    for part in root:
+        for each in part.find_all("property") if part.tag in DECLARING else ():
+            declare(code, each)
     emit_propagate(code)
     emit_control(code, root, find, n_engines)
     emit_mass(code, read_mass(root.need("mass_balance")), propulsion.tanks if propulsion else ())

@@ -146,8 +146,8 @@ class Component:
         settings = self.node.need("traverse").find_all("setting")
         places = [each.need("position").number() for each in settings]
         times = [each.need("time").number() for each in settings]
-        if len(places) < 2 or any(not a < b for a, b in zip(places, places[1:], strict=False)):
-            raise self.node.error("a traverse needs two or more settings with rising positions")
+        if len(places) < 2 or any(not a <= b for a, b in zip(places, places[1:], strict=False)):
+            raise self.node.error("a traverse needs two or more settings with positions that do not fall")
         scale = "" if self.node.find("noscale") is not None else f" * {places[-1]!r}"
         outputs = self.node.find_all("output")
         now = self.code.read(outputs[0].text if outputs else self.name, self.node)

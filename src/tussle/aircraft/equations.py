@@ -170,6 +170,8 @@ if speed > 0.001:
         speed_dot = (ua * udot + va * vdot + wa * wdot) / speed
         alpha_dot = (ua * wdot - wa * udot) / uw2
         beta_dot = (vdot * speed - va * speed_dot) / (speed * math.sqrt(uw2))
+cos_pitch = max(math.sqrt(l23 * l23 + l33 * l33), 1e-30)
+psi_dot = (q * l23 + r * l33) / (cos_pitch * cos_pitch)
 dynamic = 0.5 * density * speed2
 mach = speed / sound
 total = total_pressure(pressure, mach)
@@ -267,6 +269,8 @@ FLOW_PROPERTIES = {
     "flight-path/gamma-rad": "atan2(-v_down, math.sqrt(v_north * v_north + v_east * v_east))",
     "flight-path/gamma-deg": f"atan2(-v_down, math.sqrt(v_north * v_north + v_east * v_east)) * {DEGREES}",
     "flight-path/psi-gt-rad": "0.0 if v_north == 0.0 and v_east == 0.0 else heading(v_east, v_north)",
+    "velocities/phidot-rad_sec": "p - l13 * psi_dot", "velocities/psidot-rad_sec": "psi_dot",
+    "velocities/thetadot-rad_sec": "(q * l33 - r * l23) / cos_pitch",
     "accelerations/Nx": f"bx / {GEES}", "accelerations/Ny": f"by / {GEES}", "accelerations/Nz": f"-bz / {GEES}",
     "accelerations/n-pilot-x-norm":
         f"(bx + qidot * eye_z - ridot * eye_y + qi * (pi * eye_y - qi * eye_x) - ri * (ri * eye_x - pi * eye_z)) / {GEES}",

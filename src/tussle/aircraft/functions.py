@@ -16,7 +16,7 @@ CALLS = {"sin": "sin", "cos": "cos", "tan": "tan", "asin": "asin", "acos": "acos
 PAIRS = {"quotient": "quotient", "pow": "power", "atan2": "atan2", "fmod": "remainder", "mod": "remainder"}
 COMPARISONS = {"lt": "<", "le": "<=", "gt": ">", "ge": ">=", "eq": "==", "nq": "!="}
 SUMS = {"product": " * ", "sum": " + ", "difference": " - "}
-KEYS = ("row", "column", "table", "fourth")
+KEYS = ("row", "column", "table", "axis4")
 OTHERS = ("avg", "ifthen", "and", "or", "not", "min", "max", "pi", "todegrees", "toradians", "log2", "log10", "fraction",
           "interpolate1d", "switch", "property", "value", "table", "function")  # fmt: skip
 MOST_CELLS = 200_000

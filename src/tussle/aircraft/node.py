@@ -15,6 +15,7 @@ from tussle.errors import ParameterError
 MOST_BYTES = 8 << 20
 MOST_NODES = 200_000
 DEEPEST = 60
+MOST_ENTITIES, LONGEST_ENTITY = 100, 100
 
 
 class AircraftError(ParameterError):
@@ -126,7 +127,7 @@ class Node:
 
 
 def read_file(path: Path) -> Node:
-    """Read an XML file. Declarations of entities are refused.
+    """Read an XML file. Declared entities may only be short texts.
 
     Raises:
         AircraftError: It cannot be read, is no XML, or exceeds a limit.
@@ -146,7 +147,7 @@ def read_text(data: bytes, name: str) -> Node:
         AircraftError: It is no XML, or exceeds a limit.
     """
     top = Node("", name, {})
-    stack, count = [top], 0
+    stack, count, entities = [top], 0, 0
     parser = expat.ParserCreate()
 
     def start(tag: str, attributes: dict[str, str]) -> None:
@@ -160,8 +161,14 @@ def read_text(data: bytes, name: str) -> Node:
         stack[-1].children.append(node)
         stack.append(node)
 
-    def entity(*_: object) -> None:
-        raise AircraftError(f"{name}:{parser.CurrentLineNumber}: declarations of entities are not allowed")
+    def entity(entity_name: str, is_parameter: int, value: str | None, *_: object) -> None:
+        nonlocal entities
+        entities += 1
+        if value is None or is_parameter or len(value) > LONGEST_ENTITY or "&" in value or entities > MOST_ENTITIES:
+            raise AircraftError(
+                f"{name}:{parser.CurrentLineNumber}: entity {entity_name[:40]!r}: only {MOST_ENTITIES} short texts without "
+                "references can be declared"
+            )
 
     parser.buffer_text = True
     parser.StartElementHandler = start

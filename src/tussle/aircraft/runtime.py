@@ -166,7 +166,7 @@ def kinematic(wanted, position, dt, tables, at, n):
         i = 1
         while i < n - 1 and (tables[at + i] < position if wanted < position else tables[at + i] <= position):
             i += 1
-        if tables[at + n + i] <= 0.0:
+        if tables[at + n + i] <= 0.0 or tables[at + i] == tables[at + i - 1]:
             return wanted
         rate = (tables[at + i] - tables[at + i - 1]) / tables[at + n + i]
         reached = min(max(wanted, tables[at + i - 1]), tables[at + i])
