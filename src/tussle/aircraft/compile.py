@@ -22,12 +22,7 @@ from tussle.aircraft.files import Files
 from tussle.aircraft.mass import emit_mass, read_mass
 from tussle.aircraft.metrics import offer_metrics, read_metrics
 from tussle.aircraft.node import Node
-RUNTIME={}; Propulsion=None
-class _P:
-    engines=tanks=()
-    def emit(self,c): c.line("prop_fx = prop_fy = prop_fz = prop_mx = prop_my = prop_mz = 0.0")
-    def emit_start(self,c): pass
-def read_propulsion(n,f): return _P()
+from tussle.aircraft.propulsion import RUNTIME, Propulsion, read_propulsion
 from tussle.errors import ParameterError, nearest_name
 from tussle.numeric import store
 from tussle.numeric.kernel import Device, kernel

@@ -321,6 +321,18 @@ class Component:
             code.line(f"{y} = math.floor((min(max({y}, {low!r}), {high!r}) - {low!r}) / {step!r}) * {step!r} + {low!r}")
         return y
 
+    def angle(self) -> str:
+        code, factors = self.code, []
+        for tag in ("source_angle", "target_angle"):
+            each = self.node.need(tag)
+            scale = math.pi / 180.0 if each.get("unit").upper() == "DEG" else 1.0
+            factors.append(code.temporary(f"{code.value(each.text, each)} * {scale!r}"))
+        source, target = factors
+        cosine = f"cos({source}) * cos({target}) + sin({source}) * sin({target})"
+        size = code.temporary(f"acos(min(max({cosine}, -1.0), 1.0))")
+        y = f"{size} if cos({source}) * sin({target}) >= cos({target}) * sin({source}) else -{size}"
+        return f"({y}) * {180.0 / math.pi!r}" if self.node.get("unit").upper() == "DEG" else f"({y})"
+
     def _places(self) -> tuple[str, str, str, str]:
         """Latitudes and longitudes of target and source [rad]."""
         found = []
@@ -381,5 +393,5 @@ COMPONENTS: dict[str, Callable[[Component], str]] = {
     "fcs_function": Component.fcs_function, "lag_filter": Component.lag_filter, "washout_filter": Component.washout_filter,
     "lead_lag_filter": Component.lead_lag_filter, "second_order_filter": Component.second_order_filter, "pid": Component.pid,
     "integrator": Component.pid, "deadband": Component.deadband, "switch": Component.switch, "actuator": Component.actuator,
-    "sensor": Component.sensor, "waypoint_heading": Component.waypoint_heading, "waypoint_distance": Component.waypoint_distance,
+    "sensor": Component.sensor, "angle": Component.angle, "waypoint_heading": Component.waypoint_heading, "waypoint_distance": Component.waypoint_distance,
 }  # fmt: skip

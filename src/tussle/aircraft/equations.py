@@ -198,6 +198,9 @@ i33 = scale * (jxx * jyy - jxy * jxy)
 pidot = i11 * nx + i12 * ny + i13 * nz
 qidot = i12 * nx + i22 * ny + i23 * nz
 ridot = i13 * nx + i23 * ny + i33 * nz
+pdot = pidot - {EARTH_RATE!r} * (qi * m33 - ri * m23)
+qdot = qidot - {EARTH_RATE!r} * (ri * m13 - pi * m33)
+rdot = ridot - {EARTH_RATE!r} * (pi * m23 - qi * m13)
 bx = force_x / mass
 by = force_y / mass
 bz = force_z / mass
@@ -282,7 +285,7 @@ FLOW_PROPERTIES = {
 }  # fmt: skip
 
 RATE_PROPERTIES = {
-    "accelerations/pdot-rad_sec2": "pidot", "accelerations/qdot-rad_sec2": "qidot", "accelerations/rdot-rad_sec2": "ridot",
+    "accelerations/pdot-rad_sec2": "pdot", "accelerations/qdot-rad_sec2": "qdot", "accelerations/rdot-rad_sec2": "rdot",
     "accelerations/pidot-rad_sec2": "pidot", "accelerations/qidot-rad_sec2": "qidot", "accelerations/ridot-rad_sec2": "ridot",
     "accelerations/udot-ft_sec2": "udot", "accelerations/vdot-ft_sec2": "vdot", "accelerations/wdot-ft_sec2": "wdot",
     "accelerations/uidot-ft_sec2": "ax", "accelerations/vidot-ft_sec2": "ay", "accelerations/widot-ft_sec2": "az",
