@@ -72,6 +72,7 @@ class Code:
         inputs: Properties that may be set from outside; they are slots that nobody needs to write.
         tables: Numbers of all tables, one after the other: `tables` of the generated function.
         section: The section that is being written.
+        arrays: Name -> shape of arrays in which a step works.
     """
 
     def __init__(self) -> None:
@@ -83,6 +84,7 @@ class Code:
         self._variables: set[str] = set()
         self.readers: dict[str, Node | None] = {}
         self.kept: dict[str, None] = {}
+        self.arrays: dict[str, tuple[int, int]] = {}
         self._numbers: list[float] = []
         self._placed: dict[tuple[float, ...], int] = {}
         self._depth = self._count = self._total = 0

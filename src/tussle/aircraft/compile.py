@@ -12,13 +12,15 @@ from typing import Any
 import numpy as np
 
 from tussle import numeric
-from tussle.aircraft import air, runtime
+from tussle.aircraft import air, contact, runtime
 from tussle.aircraft.aerodynamics import emit_aerodynamics
 from tussle.aircraft.code import STATE, Code, normal
 from tussle.aircraft.control import declare, emit_control, offer_commands
-from tussle.aircraft.equations import CORE, FLOW_PROPERTIES, AIR_DATA, emit_accelerations, emit_propagate, flow_by_lengths, lever, offer
+from tussle.aircraft.equations import AIR_DATA, CORE, FLOW_PROPERTIES, PROPULSION_PROPERTIES, emit_accelerations, emit_propagate, flow_by_lengths, lever, offer
 from tussle.aircraft.external import emit_external
 from tussle.aircraft.files import Files
+from tussle.aircraft.contact import WIDTH
+from tussle.aircraft.ground import emit_ground, offer_steering, read_ground
 from tussle.aircraft.mass import emit_mass, read_mass
 from tussle.aircraft.metrics import offer_metrics, read_metrics
 from tussle.aircraft.node import Node
@@ -38,8 +40,8 @@ BUILT_IN = (
     "accelerations/", "simulation/", "flight-path/", "inertial/", "metrics/", "ic/", "environment/",
 )  # fmt: skip
 """Beginnings of JSBSim's own properties. Others belong to the aircraft: what nobody writes is a command from outside, 0 at first."""
-SCOPE = {name: each for module in (runtime, air) for name, each in vars(module).items() if isinstance(each, Device)}
-SCOPE |= {name: getattr(numeric, name) for name in numeric.__all__} | RUNTIME | {"math": math}
+SCOPE = {name: each for module in (runtime, air, contact) for name, each in vars(module).items() if isinstance(each, Device)}
+SCOPE |= {name: getattr(numeric, name) for name in numeric.__all__} | RUNTIME | {"math": math, "np": np}
 
 
 @dataclass(frozen=True)
@@ -106,6 +108,8 @@ def emit(root: Node, find: Callable[[Node, str, str], Node], keep: Sequence[str]
         for each in part.find_all("property") if part.tag in DECLARING else ():
             declare(code, each)
     emit_propagate(code)
+    contacts = read_ground(root.find("ground_reactions"))
+    offer_steering(code, contacts)
     emit_control(code, root, find, n_engines)
     emit_mass(code, read_mass(root.need("mass_balance")), propulsion.tanks if propulsion else ())
     code.lines(AIR_DATA)
@@ -116,12 +120,15 @@ def emit(root: Node, find: Callable[[Node, str, str], Node], keep: Sequence[str]
         propulsion.emit(code)
     else:
         code.line("prop_fx = prop_fy = prop_fz = prop_mx = prop_my = prop_mz = 0.0")
+    offer(code, PROPULSION_PROPERTIES)
     emit_aerodynamics(code, root.find("aerodynamics"), metrics)
+    friction = emit_ground(code, contacts)
     emit_external(code, root.find("external_reactions"))
     for axis in "xyz":
-        code.line(f"force_{axis} = prop_f{axis} + aero_f{axis} + ext_f{axis}")
-        code.line(f"moment_{axis} = prop_m{axis} + aero_m{axis} + ext_m{axis}")
-    emit_accelerations(code)
+        code.line(f"force_{axis} = aero_f{axis} + prop_f{axis} + gear_f{axis} + ext_f{axis}")
+        code.line(f"moment_{axis} = aero_m{axis} + prop_m{axis} + gear_m{axis} + ext_m{axis}")
+    emit_accelerations(code, friction)
+    code.arrays = {"work": (2 * len(contacts), WIDTH), "matrix": (2 * len(contacts), 2 * len(contacts) + 1), "gear": (len(contacts), 10)} if contacts else {}
     code.begin("start")
     if propulsion:
         propulsion.emit_start(code)
@@ -168,6 +175,8 @@ def _module(code: Code, variables: dict[str, str]) -> Iterator[str]:
     """Source of the kernels."""
     for section in code.sections:
         yield f"def {section}(x, tables, begin, end, n_steps, dt, frozen_dt):"
+        for array, (rows, columns) in code.arrays.items() if section == "step" else ():
+            yield f"    {array} = np.zeros(({rows}, {columns}))"
         yield "    for row in range(begin, end):"
         for k, variable in enumerate(variables.values()):
             yield f"        {variable} = x[{k}, row]"

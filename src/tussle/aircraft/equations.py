@@ -204,19 +204,26 @@ rdot = ridot - {EARTH_RATE!r} * (pi * m23 - qi * m13)
 bx = force_x / mass
 by = force_y / mass
 bz = force_z / mass
-"""
-ACCELERATE_END = f"""
-ax = m11 * bx + m21 * by + m31 * bz + gx
-ay = m12 * bx + m22 * by + m32 * bz + gy
-az = m13 * bx + m23 * by + m33 * bz + gz
+# Rates of the velocity without friction.
 turn_x = p + {2.0 * EARTH_RATE!r} * m13
 turn_y = q + {2.0 * EARTH_RATE!r} * m23
 turn_z = r + {2.0 * EARTH_RATE!r} * m33
 fall_x = gx + {EARTH_RATE * EARTH_RATE!r} * rx
 fall_y = gy + {EARTH_RATE * EARTH_RATE!r} * ry
-udot = bx - (turn_y * w - turn_z * v) + m11 * fall_x + m12 * fall_y + m13 * gz
-vdot = by - (turn_z * u - turn_x * w) + m21 * fall_x + m22 * fall_y + m23 * gz
-wdot = bz - (turn_x * v - turn_y * u) + m31 * fall_x + m32 * fall_y + m33 * gz
+carry_x = -(turn_y * w - turn_z * v) + m11 * fall_x + m12 * fall_y + m13 * gz
+carry_y = -(turn_z * u - turn_x * w) + m21 * fall_x + m22 * fall_y + m23 * gz
+carry_z = -(turn_x * v - turn_y * u) + m31 * fall_x + m32 * fall_y + m33 * gz
+udot_free = bx + carry_x
+vdot_free = by + carry_y
+wdot_free = bz + carry_z
+"""
+ACCELERATE_END = """
+ax = m11 * bx + m21 * by + m31 * bz + gx
+ay = m12 * bx + m22 * by + m32 * bz + gy
+az = m13 * bx + m23 * by + m33 * bz + gz
+udot = bx + carry_x
+vdot = by + carry_y
+wdot = bz + carry_z
 """
 
 STATE_PROPERTIES = {
@@ -282,6 +289,11 @@ FLOW_PROPERTIES = {
     "accelerations/n-pilot-z-norm":
         f"(bz + pidot * eye_y - qidot * eye_x + pi * (ri * eye_x - pi * eye_z) - qi * (qi * eye_z - ri * eye_y)) / {GEES}",
     "accelerations/a-pilot-z-ft_sec2": "bz + pidot * eye_y - qidot * eye_x + pi * (ri * eye_x - pi * eye_z) - qi * (qi * eye_z - ri * eye_y)",
+}  # fmt: skip
+
+PROPULSION_PROPERTIES = {
+    "forces/fbx-prop-lbs": "prop_fx", "forces/fby-prop-lbs": "prop_fy", "forces/fbz-prop-lbs": "prop_fz",
+    "moments/l-prop-lbsft": "prop_mx", "moments/m-prop-lbsft": "prop_my", "moments/n-prop-lbsft": "prop_mz",
 }  # fmt: skip
 
 RATE_PROPERTIES = {
