@@ -98,9 +98,15 @@ def emit_mass(code: Code, mass: Mass, tanks: Any) -> None:
         weight = code.read(name)
         own = [f"{weight} * {each / POUND_PER_SLUG!r}" for each in point.own]
         parts.append((weight, list(map(repr, point.location)), own if any(point.own) else None))
+    fixed = len(parts)
     for tank in tanks:
         weight = code.read(tank.property)
         parts.append((weight, [code.short(each) for each in tank.place(weight)], tank.inertia(weight)))
+    # JSBSim takes the arms of tanks from the last centre of gravity.
+    last = [code.state(f"center of gravity {axis}") for axis in "xyz"]
+    for axis, name in zip("xyz", last, strict=True):
+        if tanks:
+            code.line(f"last_{axis} = {name}")
     code.line("# Mass, centre of gravity [in], inertia with its signs.")
     code.line(f"weight = {' + '.join(weight for weight, _, _ in parts)}")
     code.line(f"mass = weight / {POUND_PER_SLUG!r}")
@@ -109,12 +115,13 @@ def emit_mass(code: Code, mass: Mass, tanks: Any) -> None:
         code.line(f"cg_{axis} = ({' + '.join(moments)}) / weight")
     for axes, value in zip(("xx", "yy", "zz", "xy", "xz", "yz"), mass.inertia, strict=True):
         code.line(f"j{axes} = {value!r}")
-    for weight, (x, y, z), own in parts:
+    for k, (weight, (x, y, z), own) in enumerate(parts):
+        center = "cg" if k < fixed else "last"
         code.lines(f"""
 m = {weight} / {POUND_PER_SLUG!r}
-arm_x = (cg_x - ({x})) / 12.0
-arm_y = (({y}) - cg_y) / 12.0
-arm_z = (cg_z - ({z})) / 12.0
+arm_x = ({center}_x - ({x})) / 12.0
+arm_y = (({y}) - {center}_y) / 12.0
+arm_z = ({center}_z - ({z})) / 12.0
 jxx += m * (arm_y * arm_y + arm_z * arm_z)
 jyy += m * (arm_x * arm_x + arm_z * arm_z)
 jzz += m * (arm_x * arm_x + arm_y * arm_y)
@@ -124,6 +131,8 @@ jyz -= m * arm_y * arm_z
 """)
         for axes, value in zip(("xx", "yy", "zz"), own or (), strict=False):
             code.line(f"j{axes} += {value}")
+    for axis, name in zip("xyz", last, strict=True):
+        code.line(f"{name} = cg_{axis}")
     offer(code, {
         "inertia/weight-lbs": "weight", "inertia/mass-slugs": "mass", "inertia/cg-x-in": "cg_x", "inertia/cg-y-in": "cg_y",
         "inertia/cg-z-in": "cg_z", "inertia/ixx-slugs_ft2": "jxx", "inertia/iyy-slugs_ft2": "jyy", "inertia/izz-slugs_ft2": "jzz",

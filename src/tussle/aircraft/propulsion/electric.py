@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from tussle.aircraft.node import Node
 from tussle.aircraft.propulsion.bench import Bench
+from tussle.aircraft.propulsion.runtime import NEWTON_METRE
 from tussle.aircraft.propulsion.thruster import Propeller
 
 WATT_PER_HP = 745.7
@@ -39,10 +40,10 @@ class Electric:
 
 @dataclass(frozen=True)
 class Brushless:
-    """A brushless motor: speed constant [1/min/V], resistance [ohm], current without load [A], greatest voltage [V], braking factor."""
+    """A brushless motor: speed constant [1/min/V], resistance [ohm], current without load [A], greatest voltage [V]."""
 
     node: Node
-    constants: tuple[float, float, float, float, float]
+    constants: tuple[float, float, float, float]
     burns = False
 
     def emit_start(self, bench: Bench, thruster: Propeller) -> None:
@@ -50,13 +51,11 @@ class Brushless:
 
     def emit(self, bench: Bench, thruster: Propeller) -> tuple[str, str]:
         """Emit its step. Return the power [ft lbf/s] and the fuel that it needs [lb]."""
-        code, n = bench.code, bench.local
-        rpm, torque = thruster.rpm_of(bench), bench.slot("propeller-torque-ftlb")
-        at = code.constant(self.constants)
-        code.line(
-            f"{n('power')}, {n('current')} = brushless(tables, {at}, {bench.dt}, {bench.throttle}, {rpm}, abs({torque}), {thruster.inertia!r})"
+        n, (kv, resistance, idle, volts) = bench.local, self.constants
+        bench.code.line(
+            f"{n('power')}, {n('current')} = brushless({kv!r}, {resistance!r}, {idle!r}, {volts!r} * {bench.throttle}, {thruster.rpm_of(bench)})"
         )
-        bench.write("power-hp", f"{n('power')} / 550.0")
+        bench.write("power-hp", f"{n('power')} / {WATT_PER_HP / NEWTON_METRE!r}")
         bench.write("current-amperes", n("current"))
         return n("power"), "0.0"
 
@@ -83,4 +82,4 @@ def read_brushless(node: Node) -> Brushless:
     kv, resistance, idle, volts = (node.need(tag).number() for tag in tags)
     if not (kv > 0.0 and resistance > 0.0 and volts > 0.0):
         raise node.error(f"{', '.join(tags)} must be positive")
-    return Brushless(node, (kv, resistance, idle, volts, node.value("deceleration_factor", 0.01)))
+    return Brushless(node, (kv, resistance, idle, volts))

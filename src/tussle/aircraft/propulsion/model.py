@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from tussle.aircraft.code import Code
 from tussle.aircraft.functions import emit_function
@@ -180,7 +180,8 @@ def _unit(node: Node, index: int, n_tanks: int, find: Find) -> Unit:
     file = _content(node, find, tuple(ENGINES))
     if file.tag not in ENGINES:
         raise file.error(f"this engine is not supported; {listed(ENGINES)}")
-    engine = ENGINES[file.tag](numbered(file, index))
+    engine = ENGINES[file.tag](file)
+    engine = replace(engine, node=numbered(engine.node, index))
     mount = node.need("thruster")
     thruster = read_thruster(mount, numbered(_content(mount, find, ("direct", "nozzle", "propeller", "rotor")), index))
     if isinstance(engine, NEEDS_PROPELLER) and not isinstance(thruster, Propeller):

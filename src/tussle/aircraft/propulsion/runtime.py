@@ -9,7 +9,7 @@ from tussle.aircraft.runtime import device, outlined, power, table_1
 from tussle.numeric import exp
 
 PASCAL_PER_PSF = 47.88
-AIR_GAS = 287.3  # [J/kg/K]
+NEWTON_METRE = 1.3558  # per foot-pound
 OFF, RUN, SPIN_UP, START, STALL, SEIZE, TRIM = (float(k) for k in range(7))
 
 
@@ -31,12 +31,6 @@ def decay(value, target, up, down, dt):
     if value < target:
         return (target - value) * (1.0 - exp(-dt / up)) + value
     return value
-
-
-@device
-def rounded(x):
-    """The nearest whole number, away from 0 at a half."""
-    return math.floor(x + 0.5) if x >= 0.0 else math.ceil(x - 0.5)
 
 
 # -- piston -----------------------------------------------------------------------------------------------------------------------
@@ -214,37 +208,27 @@ def turboprop_phase(dt, phase, running, starter, cutoff, starved, n1):
 
 
 @outlined
-def brushless(tables, at, dt, throttle, rpm, torque, inertia):
-    """Power [ft lbf/s] and current [A] of a brushless motor by its three constants (Drela 2007, "First-Order DC Electric Motor Model").
+def brushless(kv, resistance, idle, volts, rpm):
+    """Power [ft lbf/s] and current [A] of a brushless motor (Drela 2007, "First-Order DC Electric Motor Model", equations 1 to 4).
 
     Args:
-        tables: From `at`: speed constant [1/min/V], resistance [ohm], current without load [A], greatest voltage [V], braking factor.
-        at: Place of the parameters.
-        dt: [s]
-        throttle: 0 to 1.
+        kv: Speed constant [1/min/V].
+        resistance: [ohm]
+        idle: Current without load [A].
+        volts: [V]
         rpm: [1/min]
-        torque: That the propeller took in the last step [ft lbf].
-        inertia: Of the propeller [slug ft^2].
     """
-    kv, resistance, idle, volts, brake = tables[at], tables[at + 1], tables[at + 2], tables[at + 3], tables[at + 4]
-    current = torque * kv / TORQUE_CONSTANT + idle
-    change = rounded((volts * throttle - current * resistance) * kv)
-    stall = (volts / resistance + idle) / kv * TORQUE_CONSTANT
-    available = stall * (1.0 - rpm / (volts * kv)) - torque
-    inertial = change / 60.0 * (2.0 * math.pi) / max(1e-5, dt) * inertia
-    if change >= 0.0:
-        target = min(inertial, available) + torque
-    else:
-        target = torque - min(abs(inertial) / (max(brake, 0.01) * 30.0), rpm * TORQUE_CONSTANT / kv / kv / resistance)
-    return 2.0 * math.pi * max(rpm, 0.0001) * target / 60.0, current
+    current = (volts - rpm / kv) / resistance
+    # friction opposes rotation; at rest it only resists
+    useful = current - idle if rpm > 0.0 else max(current - idle, 0.0) + min(current + idle, 0.0)
+    torque = useful / kv * (60.0 / (2.0 * math.pi * NEWTON_METRE))
+    return 2.0 * math.pi * max(rpm, 0.0001) * torque / 60.0, current
 
-
-TORQUE_CONSTANT = 60.0 / (2.0 * math.pi) / 1.3558179483314004  # [ft lbf/A] times the speed constant
 
 RUNTIME: dict[str, Any] = {
     each.__name__: each
     for each in (
-        approach, decay, rounded, manifold, gear_of_boost, boosted, boost_loss, air_flow, indicated_power,
+        approach, decay, manifold, gear_of_boost, boosted, boost_loss, air_flow, indicated_power,
         turbine_phase, spool_rate, spool_idle, turboprop_phase, brushless,
     )
 }  # fmt: skip

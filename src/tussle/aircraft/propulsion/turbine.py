@@ -127,7 +127,7 @@ else:
         own = [any(each.endswith(leaf) for each in given) for leaf in FUNCTIONS[4:]]
         rate = bench.local("rate")
         if not all(own):
-            sigma = bench.read("atmosphere/density-ratio")
+            sigma = bench.read("atmosphere/sigma")
             bench.code.line(f"{rate} = spool_rate({norm}, {self.bypass!r}, {sigma})")
         return [
             bench.read(name) if has else f"{rate} * {scale!r}"
