@@ -45,7 +45,7 @@ def ground_normal(rx, ry, rz):
 
 @outlined
 def strut_force(tables, at, length, speed):
-    """Force of a strut [lbf], at most 0, from its compression, at most 0, [ft] and the speed of the compression [ft/s]."""
+    """Force of a strut [lbf], at most 0, from its compression [ft] and the speed of the compression [ft/s]."""
     if speed >= 0.0:
         damping = -speed * tables[at + 5] * (speed if tables[at + 6] != 0.0 else 1.0)
     else:
@@ -117,7 +117,7 @@ def touch(tables, at, work, gear, k, center, place, m, up, motion, dt):
             gear[k, j] = 0.0
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     gx, gy, gz = m11 * nx + m12 * ny + m13 * nz, m21 * nx + m22 * ny + m23 * nz, m31 * nx + m32 * ny + m33 * nz
-    drop = -(nx * up[0] + ny * up[1] + nz * up[2])
+    drop = nx * up[0] + ny * up[1] + nz * up[2]
     is_wheel = tables[at + 3] != 0.0
     project = -gz
     if is_wheel:

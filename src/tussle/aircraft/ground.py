@@ -115,7 +115,7 @@ def emit_ground(code: Code, contacts: list[Contact]) -> str:
             code.line(f"{' = '.join(each)} = 0.0")
     for k, (_, _, _, slip, touches, length, speed) in enumerate(memory):
         unit = indexed("gear/unit", k)
-        offer(code, {f"{unit}/WOW": touches, f"{unit}/compression-ft": f"-{length}", f"{unit}/slip-angle-deg": slip,
+        offer(code, {f"{unit}/WOW": touches, f"{unit}/compression-ft": length, f"{unit}/slip-angle-deg": slip,
                      f"{unit}/compression-velocity-fps": speed})  # fmt: skip
     _offer_sums(code)
     return _friction(memory)
