@@ -73,6 +73,7 @@ class Code:
         tables: Numbers of all tables, one after the other: `tables` of the generated function.
         section: The section that is being written.
         arrays: Name -> shape of arrays in which a step works.
+        rings: Number of rows of each ring, after all slots.
     """
 
     def __init__(self) -> None:
@@ -85,6 +86,7 @@ class Code:
         self.readers: dict[str, Node | None] = {}
         self.kept: dict[str, None] = {}
         self.arrays: dict[str, tuple[int, int]] = {}
+        self.rings: list[int] = []
         self._numbers: list[float] = []
         self._placed: dict[tuple[float, ...], int] = {}
         self._depth = self._count = self._total = 0
@@ -218,6 +220,11 @@ class Code:
         self.initial[name] = initial
         self.kept[name] = None
         return self.variable(name)
+
+    def ring(self, capacity: int) -> str:
+        """Return the name of the first of new rows of the state, which code reads and writes as x[name + k, row]."""
+        self.rings.append(capacity)
+        return f"ring_{len(self.rings) - 1}"
 
     def keep(self, name: str) -> None:
         """Keep a property as a slot, for who looks at it from outside."""

@@ -128,7 +128,7 @@ def emit(root: Node, find: Callable[[Node, str, str], Node], keep: Sequence[str]
         code.line(f"force_{axis} = aero_f{axis} + prop_f{axis} + gear_f{axis} + ext_f{axis}")
         code.line(f"moment_{axis} = aero_m{axis} + prop_m{axis} + gear_m{axis} + ext_m{axis}")
     emit_accelerations(code, friction)
-    code.arrays = {"work": (2 * len(contacts), WIDTH), "matrix": (2 * len(contacts), 2 * len(contacts) + 1), "gear": (len(contacts), 10)} if contacts else {}
+    code.arrays = {"work": (2 * len(contacts), WIDTH), "matrix": (2 * len(contacts), 2 * len(contacts) + 1), "gear": (len(contacts), 11)} if contacts else {}
     code.begin("start")
     if propulsion:
         propulsion.emit_start(code)
@@ -153,8 +153,10 @@ def compile_aircraft(root: Path | None, name: str, keep: Sequence[str] = ()) -> 
     """
     files = Files(root, name)
     code, propulsion = emit(files.load(), files.find, keep)
-    names = [*CORE, *code.slots()]
+    slots = code.slots()
+    names = [*CORE, *slots]
     variables = {each: each if k < len(CORE) else code.variable(each) for k, each in enumerate(names)}
+    names += [f"{STATE}ring {k} {j}" for k, capacity in enumerate(code.rings) for j in range(capacity)]
     source = "\n".join(_module(code, variables)) + "\n"
     scope = dict(SCOPE)
     exec(compile(source, f"<aircraft {name}>", "exec"), scope)  # noqa: S102 - generated above; names in it are made of letters and digits
@@ -175,6 +177,10 @@ def _module(code: Code, variables: dict[str, str]) -> Iterator[str]:
     """Source of the kernels."""
     for section in code.sections:
         yield f"def {section}(x, tables, begin, end, n_steps, dt, frozen_dt):"
+        place = len(variables)
+        for k, capacity in enumerate(code.rings):
+            yield f"    ring_{k} = {place}"
+            place += capacity
         for array, (rows, columns) in code.arrays.items() if section == "step" else ():
             yield f"    {array} = np.zeros(({rows}, {columns}))"
         yield "    for row in range(begin, end):"

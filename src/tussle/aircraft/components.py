@@ -14,7 +14,7 @@ from tussle.errors import listed
 IGNORED = ("description", "documentation", "output")
 OPERATORS = {"eq": "==", "==": "==", "ne": "!=", "!=": "!=", "gt": ">", ">": ">", "ge": ">=", ">=": ">=", "lt": "<", "<": "<",
              "le": "<=", "<=": "<="}  # fmt: skip
-MOST_DELAY = 10_000
+MOST_DELAY, SHORTEST_STEP_RATE = 10_000, 240
 INTEGRALS = {
     "rect": "{x}", "trap": "0.5 * ({x} + {x1})", "ab2": "1.5 * {x} - 0.5 * {x1}", "ab3": "(23.0 * {x} - 16.0 * {x1} + 5.0 * {x2}) / 12.0",
 }  # fmt: skip
@@ -89,19 +89,18 @@ class Component:
         found = self.node.find("delay")
         if found is None:
             return
-        if found.get("type", "time") == "frames":
-            n = int(found.number())
-        else:
-            raise found.error("a delay in seconds is not supported, only type='frames'")
-        if not 0 <= n <= MOST_DELAY:
-            raise found.error(f"a delay of {n} frames is not allowed; it is from 0 to {MOST_DELAY}")
-        line = [self.state(f"delay {k}") for k in range(n)]
-        if n:
-            code, last = self.code, self.code.temporary(line[-1])
-            for k in reversed(range(1, n)):
-                code.line(f"{line[k]} = {line[k - 1]}")
-            code.line(f"{line[0]} = {out}")
-            code.line(f"{out} = {last}")
+        amount, code = found.number(), self.code
+        is_time = found.get("type", "time") != "frames"
+        most = amount * SHORTEST_STEP_RATE if is_time else amount
+        if not 0.0 <= most <= MOST_DELAY:
+            raise found.error(f"a delay of {amount:g} is not allowed; it is at most {MOST_DELAY} frames of 1/{SHORTEST_STEP_RATE} s")
+        # JSBSim's ring of n outputs delays by n - 1 frames.
+        ring, place = code.ring(int(most) + 2), self.state("delay")
+        n = code.temporary(f"min(math.floor({amount!r} / {self.dt}), {int(most)}.0)" if is_time else f"{float(int(amount))!r}")
+        with code.block(f"if {n} > 0.0"):
+            code.line(f"x[{ring} + int({place}), row] = {out}")
+            code.line(f"{place} = 0.0 if {place} >= {n} - 1.0 else {place} + 1.0")
+            code.line(f"{out} = x[{ring} + int({place}), row]")
 
     def clip(self, out: str) -> None:
         """Emit the limits."""
@@ -296,9 +295,6 @@ class Component:
 
     def sensor(self) -> str:
         code = self.code
-        for tag in ("noise", "drift_rate"):
-            if self.node.find(tag) is not None:
-                raise self.node.need(tag).error("a sensor's noise and drift are not supported")
         y = code.temporary(self.input)
         slow = self.node.find("lag")
         if slow is not None:
@@ -307,6 +303,18 @@ class Component:
             code.line(f"{y} = {lag(x, x1, y1, c, self.dt)}")
             code.line(f"{x1} = {x}")
             code.line(f"{y1} = {y}")
+        noise, drift = self.node.find("noise"), self.node.find("drift_rate")
+        if noise is not None:
+            draws = self.state("draws")
+            call = "noise_uniform" if noise.get("distribution") == "UNIFORM" else "noise_normal"
+            seed = code.read("simulation/randomseed")
+            value = code.temporary(f"{noise.number()!r} * {call}({seed}, {draws}, {len(code.names)})")
+            code.line(f"{draws} += 1.0")
+            code.line(f"{y} += {value}" if noise.get("variation") == "ABSOLUTE" else f"{y} *= 1.0 + {value}")
+        if drift is not None:
+            drifted = self.state("drift")
+            code.line(f"{drifted} += {drift.number()!r} * {self.dt}")
+            code.line(f"{y} += {drifted}")
         gain, bias, grain = self.node.find("gain"), self.node.find("bias"), self.node.find("quantization")
         if gain is not None:
             code.line(f"{y} *= {gain.number()!r}")

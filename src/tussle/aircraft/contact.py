@@ -15,7 +15,8 @@ WIDTH = 10
 """Numbers of a multiplier in the work array: direction (3), arm (3), least, most, value, used."""
 MEMORY = ("along", "side", "slide", "slip", "touches", "length", "speed")
 """Kept from step to step: multipliers along, sideways and against the movement; slip angle [deg], whether it touches, compression [ft]
-and its speed [ft/s]; steering angle [rad] (NaN: it casters), brake and altitude of the ground [ft] follow in the work array."""
+and its speed [ft/s]; steering angle [rad] (NaN: it casters), brake, altitude of the ground [ft] and force of the strut [lbf] (NaN: that of its spring) follow
+in the work array."""
 PARAMETERS = ("x", "y", "z", "is_wheel", "spring", "damping", "damping_is_square", "rebound", "rebound_is_square", "static", "dynamic",
               "rolling", "most")  # fmt: skip
 
@@ -68,7 +69,7 @@ def touch_all(tables, at, work, gear, center, place, m, up, motion, dt):
         tables: Holds PARAMETERS of each contact from `at` on.
         at: Their place.
         work: Two multipliers for each contact, (2 k, WIDTH); written.
-        gear: MEMORY of each contact, (k, 10); written.
+        gear: MEMORY of each contact, (k, 11); written.
         center: Centre of gravity in the structural frame [in].
         place: Inertial position of the centre [ft].
         m: Rotation from inertial to body axes, by rows.
@@ -141,7 +142,7 @@ def touch(tables, at, work, gear, k, center, place, m, up, motion, dt):
     forward, left = lx * vx + ly * vy + lz * vz, sx * vx + sy * vy + sz * vz
     rise = gx * vx + gy * vy + gz * vz
     speed = 0.0 if dt == 0.0 else -rise / project if is_wheel else -rise
-    strut = strut_force(tables, at, length, speed)
+    strut = gear[k, 10] if gear[k, 10] == gear[k, 10] else strut_force(tables, at, length, speed)
     load = strut / -project if is_wheel else -strut
     slide = math.sqrt(forward * forward + left * left)
     slip = gear[k, 3]

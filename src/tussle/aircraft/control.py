@@ -25,6 +25,7 @@ def offer_commands(code: Code, n_engines: int) -> None:
     """Declare the commands and stored positions that JSBSim itself has, with their first values."""
     for name in COMMANDS:
         code.inputs.add(f"fcs/{name}-cmd-norm")
+    code.inputs.add("simulation/randomseed")
     for side in ("left", "right", "center"):
         code.inputs.add(f"fcs/{side}-brake-cmd-norm")
     for name in SURFACES:

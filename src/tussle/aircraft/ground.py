@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from tussle.aircraft.code import Code
 from tussle.aircraft.contact import MEMORY
 from tussle.aircraft.equations import offer
+from tussle.aircraft.functions import emit_function
 from tussle.aircraft.mass import indexed
 from tussle.aircraft.node import Node
 
@@ -24,7 +25,7 @@ class Contact:
     steering: float
     brake: str
     retracts: bool
-    has_side_table: bool = False
+    strut: Node | None = None
 
     @property
     def is_wheel(self) -> bool:
@@ -49,7 +50,7 @@ def _contact(node: Node) -> Contact:
     kind = node.get("type")
     if kind not in ("BOGEY", "STRUCTURE"):
         raise node.error(f"contact type {kind[:40]!r} is not known; there are: BOGEY, STRUCTURE")
-    for tag in ("table", "strut_force", "orientation"):
+    for tag in ("table", "orientation"):
         if node.find(tag) is not None:
             raise node.need(tag).error("it is not supported in a contact")
     damping, rebound = node.find("damping_coeff"), node.find("damping_coeff_rebound")
@@ -65,7 +66,7 @@ def _contact(node: Node) -> Contact:
     steer = node.find("max_steer")
     return Contact(
         numbers, steer.number("DEG") if steer else 0.0, BRAKES.get(group.text.upper() if group else "", ""),
-        retracts is not None and retracts.number() > 0.0,
+        retracts is not None and retracts.number() > 0.0, node.find("strut_force"),
     )  # fmt: skip
 
 
@@ -102,11 +103,19 @@ def emit_ground(code: Code, contacts: list[Contact]) -> str:
             values = [*memory[k], *_settings(code, k, each)]
             for j, value in enumerate(values):
                 code.line(f"gear[{k}, {j}] = {value}")
+            code.line(f"gear[{k}, 10] = math.nan")
         code.line("motion = (u, v, w, p, q, r)")
-        code.line(
-            f"{', '.join(names)}, touching = touch_all(tables, {at}, work, gear, (cg_x, cg_y, cg_z), (rx, ry, rz), "
-            "(m11, m12, m13, m21, m22, m23, m31, m32, m33), (down_x, down_y, -sin_lat), motion, dt)"
-        )
+        call = (f"{', '.join(names)}, touching = touch_all(tables, {at}, work, gear, (cg_x, cg_y, cg_z), (rx, ry, rz), "
+                "(m11, m12, m13, m21, m22, m23, m31, m32, m33), (down_x, down_y, -sin_lat), motion, dt)")  # fmt: skip
+        functions = {k: each.strut for k, each in enumerate(contacts) if each.strut is not None}
+        if functions:
+            code.line(call)
+            for k, strut in functions.items():
+                unit = indexed("gear/unit", k)
+                code.write(f"{unit}/compression-ft", f"gear[{k}, 5]")
+                code.write(f"{unit}/compression-velocity-fps", f"gear[{k}, 6]")
+                code.line(f"gear[{k}, 10] = min({emit_function(code, strut.need('function'))}, 0.0)")
+        code.line(call)
         for k, each in enumerate(memory):
             for j in range(3, len(MEMORY)):
                 code.line(f"{each[j]} = gear[{k}, {j}]")

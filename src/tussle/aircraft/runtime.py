@@ -5,8 +5,11 @@ from __future__ import annotations
 import math
 from typing import Any, ClassVar
 
+import numpy as np
+
 from tussle.numeric import atan2, exp, log
 from tussle.numeric.kernel import Device, device
+from tussle.rng import normal2, uniform2
 
 
 class Outlined(Device):
@@ -195,3 +198,17 @@ def heading(y, x):
     """Angle of a direction in [0, 2 pi)."""
     angle = atan2(y, x)
     return angle if angle >= 0.0 else angle + 2.0 * math.pi
+
+
+@outlined
+def noise_normal(seed, count, stream):
+    """A standard normal number, the same for the same whole numbers."""
+    zero = np.uint64(0)
+    return normal2(np.uint64(seed), np.uint64(stream), zero, np.uint64(count), zero, zero)[0]
+
+
+@outlined
+def noise_uniform(seed, count, stream):
+    """A uniform number in [-1, 1), the same for the same whole numbers."""
+    zero = np.uint64(0)
+    return 2.0 * uniform2(np.uint64(seed), np.uint64(stream), zero, np.uint64(count), zero, zero)[0] - 1.0
