@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from tussle.aircraft.node import Node
 from tussle.aircraft.propulsion.bench import Bench
-from tussle.aircraft.propulsion.runtime import NEWTON_METRE
+from tussle.aircraft.propulsion.kernels import NEWTON_METRE
 from tussle.aircraft.propulsion.thruster import Propeller
 
 WATT_PER_HP = 745.7
@@ -52,8 +52,9 @@ class Brushless:
     def emit(self, bench: Bench, thruster: Propeller) -> tuple[str, str]:
         """Emit its step. Return the power [ft lbf/s] and the fuel that it needs [lb]."""
         n, (kv, resistance, idle, volts) = bench.local, self.constants
+        constants, voltage = f"{kv!r}, {resistance!r}, {idle!r}", f"{volts!r} * {bench.throttle}"
         bench.code.line(
-            f"{n('power')}, {n('current')} = brushless({kv!r}, {resistance!r}, {idle!r}, {volts!r} * {bench.throttle}, {thruster.rpm_of(bench)})"
+            f"{n('power')}, {n('current')} = brushless({constants}, {voltage}, {thruster.rpm_of(bench)})"
         )
         bench.write("power-hp", f"{n('power')} / {WATT_PER_HP / NEWTON_METRE!r}")
         bench.write("current-amperes", n("current"))

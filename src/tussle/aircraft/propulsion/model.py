@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from tussle.aircraft.code import Code
+from tussle.aircraft.code import Code, normal
 from tussle.aircraft.functions import emit_function
 from tussle.aircraft.node import Node
 from tussle.aircraft.propulsion.bench import Bench, numbered
@@ -28,7 +28,11 @@ ENGINES: dict[str, Callable[[Node], Engine]] = {
     "brushless_dc_motor": read_brushless,
     "rocket_engine": read_rocket,
 }
-COMMANDS = {"magnetos": "propulsion/magneto_cmd", "starter": "propulsion/starter_cmd", "cutoff": "propulsion/cutoff_cmd"}
+COMMANDS = {
+    "magnetos": "propulsion/magneto_cmd",
+    "starter": "propulsion/starter_cmd",
+    "cutoff": "propulsion/cutoff_cmd",
+}
 NEEDS_PROPELLER = (Piston, Turboprop, Electric, Brushless)
 SETTLING = 0.5  # [s], JSBSim's step when it lets an engine settle
 MOST_SETTLING, SETTLED = 6000, 120
@@ -67,6 +71,7 @@ class Propulsion:
         for tank in self.tanks:
             code.initial[tank.property] = tank.contents
             code.inputs.add(tank.property)
+            code.initial[normal(f"propulsion/tank[{tank.index}]/density-lbs_per_gal")] = tank.density
         self._emit_functions(code, "pre")
         code.line("prop_fx = prop_fy = prop_fz = prop_mx = prop_my = prop_mz = 0.0")
         for k, unit in enumerate(self.engines):
@@ -84,7 +89,10 @@ class Propulsion:
         code.line("settled_now = 0.0")
         code.line("prop_fx = prop_fy = prop_fz = prop_mx = prop_my = prop_mz = 0.0")
         for k, unit in enumerate(self.engines):
-            is_piston, is_turbine = isinstance(unit.engine, Piston), isinstance(unit.engine, Turbine | Turboprop)
+            is_piston, is_turbine = (
+                isinstance(unit.engine, Piston),
+                isinstance(unit.engine, Turbine | Turboprop),
+            )
             mixture = f"{code.read('atmosphere/P-psf')} / 2116.228 * 1.3" if is_piston else "1.0"
             bench = Bench(code, k, "settling", "1.0", f"({mixture})")
             unit.engine.emit_start(bench, unit.thruster)  # type: ignore[arg-type]
@@ -118,7 +126,10 @@ if k >= 0:
 
     def _emit_feed(self, bench: Bench, unit: Unit, fuel: str) -> None:
         code, n, starved, engine = bench.code, bench.local, bench.state("starved"), unit.engine
-        tanks = {kind: [self.tanks[k] for k in unit.feeds if self.tanks[k].kind == kind] for kind in ("FUEL", "OXIDIZER")}
+        tanks = {
+            kind: [self.tanks[k] for k in unit.feeds if self.tanks[k].kind == kind]
+            for kind in ("FUEL", "OXIDIZER")
+        }
         fed, tests = count_fed(code, tanks["FUEL"], len(self.tanks), n("fuel"))
         enough = f"{fed} > 0"
         if isinstance(engine, Rocket) and tanks["OXIDIZER"]:
@@ -183,7 +194,9 @@ def _unit(node: Node, index: int, n_tanks: int, find: Find) -> Unit:
     engine = ENGINES[file.tag](file)
     engine = replace(engine, node=numbered(engine.node, index))
     mount = node.need("thruster")
-    thruster = read_thruster(mount, numbered(_content(mount, find, ("direct", "nozzle", "propeller", "rotor")), index))
+    thruster = read_thruster(
+        mount, numbered(_content(mount, find, ("direct", "nozzle", "propeller", "rotor")), index)
+    )
     if isinstance(engine, NEEDS_PROPELLER) and not isinstance(thruster, Propeller):
         raise mount.error(f"<{file.tag}> needs a propeller")
     feeds = []

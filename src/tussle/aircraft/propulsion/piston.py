@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from tussle.aircraft.functions import table_of_pairs
 from tussle.aircraft.node import Node
 from tussle.aircraft.propulsion.bench import Bench
-from tussle.aircraft.propulsion.runtime import PASCAL_PER_PSF
+from tussle.aircraft.propulsion.kernels import PASCAL_PER_PSF
 from tussle.aircraft.propulsion.thruster import Propeller
 from tussle.aircraft.units import FOOT
 
@@ -24,7 +24,7 @@ MIXTURE = (
 
 @dataclass(frozen=True)
 class Gear:
-    """A gear of a supercharger: pressure ratio at its rated speed [1/min], rated and takeoff pressure, pressure above which it is used [Pa]."""
+    """A gear of a supercharger: pressure ratio at its rated speed [1/min]; rated, takeoff and shifting pressure [Pa]."""
 
     gain: float
     rpm: float
@@ -102,6 +102,7 @@ class Piston:
         at = code.constant(parameters)
         pressure = bench.state("manifold", STANDARD)
         efficiency = bench.given("volumetric-efficiency", self.efficiency)
+        total = bench.read("propulsion/pt-lbs_sqft")
         code.lines(f"""
 {n("speed")} = {rpm} * {self.stroke / 360.0!r}
 {n("can_burn")} = {magnetos} != 0.0 and {flow} > 0.0
@@ -110,7 +111,7 @@ if {running} != 0.0:
 elif {n("can_burn")} and {rpm} > {self.idle_rpm * 0.8!r}:
     {running} = 1.0
 {n("outside")} = {ambient} * {PASCAL_PER_PSF!r}
-{pressure} = manifold(tables, {at}, {bench.dt}, {bench.throttle}, {n("speed")}, {ambient}, {bench.read("propulsion/pt-lbs_sqft")}, {pressure})
+{pressure} = manifold(tables, {at}, {bench.dt}, {bench.throttle}, {n("speed")}, {ambient}, {total}, {pressure})
 """)
         intake = self._emit_boost(bench, rpm, pressure) if self.gears else pressure
         starved = bench.state("starved")
@@ -118,16 +119,17 @@ elif {n("can_burn")} and {rpm} > {self.idle_rpm * 0.8!r}:
         place, count = mixture.split(", ")[1:3]
         temperature = bench.read("atmosphere/T-R")
         starter = bench.state("starter")
-        gain = bench.given("starter-norm", 1.0)
+        torque = f"{self.starter[0]!r} * {bench.given('starter-norm', 1.0)}, {self.starter[1]!r}"
         consumption = bench.given("bsfc-lbs_hphr", self.consumption)
         magneto = f"({consumption} if {magnetos} == 3.0 else {consumption} / {self.one_magneto!r})"
+        cylinders = f"tables, {place}, {count}, {running}, {n('fuel')}, {n('air')}, {magneto}"
         code.lines(f"""
 {n("air")} = air_flow({self.compression!r}, {efficiency}, {self.displacement!r}, {rpm}, {n("outside")}, {intake})
 {n("volume")} = {n("air")}
 {n("air")} = {n("air")} * ({intake} / ({287.3!r} * ({temperature} / 1.8)))
 {n("fuel")} = 0.0 if {starved} != 0.0 else {n("air")} * (1.3 * {bench.mixture} * 101325.0 / {n("outside")}) / 14.7
 {flow} = {n("fuel")} * 2.2046
-{n("indicated")} = indicated_power(tables, {place}, {count}, {running}, {n("fuel")}, {n("air")}, {magneto}, {self.friction!r}, {starter}, {self.starter[0]!r} * {gain}, {self.starter[1]!r}, {rpm})
+{n("indicated")} = indicated_power({cylinders}, {self.friction!r}, {starter}, {torque}, {rpm})
 {n("pumping")} = ({pressure} - {n("outside")}) * {efficiency}
 if {running} != 0.0:
     {n("pumping")} -= {self.losses[0] * FOOT!r} * {n("speed")} + {self.losses[1]!r}
@@ -190,14 +192,23 @@ def read_piston(node: Node) -> Piston:
     rated_speed = max_rpm * stroke / 360.0
     peak = node.value("peak-piston-speed", 100.0)
     consumption = node.value("bsfc", -1.0, "LBS/HP*HR")
-    for tag, number in (("maxrpm", max_rpm), ("stroke", stroke), ("idlerpm", idle), ("minmp", low), ("maxmp", high), ("cycles", cycles)):
+    for tag, number in (
+        ("maxrpm", max_rpm),
+        ("stroke", stroke),
+        ("idlerpm", idle),
+        ("minmp", low),
+        ("maxmp", high),
+        ("cycles", cycles),
+    ):
         if not number > 0.0:
             raise node.error(f"<{tag}> must be positive")
     if consumption < 0.0:
         pumping = (29.92 - high) * PASCAL_PER_INHG * efficiency
         drag = losses[0] * rated_speed * FOOT + losses[1]
         lost = (pumping + drag) * displacement * max_rpm / (cycles * PUMPING)
-        consumption = 1.1 * size * max_rpm * efficiency * (high / 29.92) / (9411.0 * (max_hp + lost - friction))
+        consumption = (
+            1.1 * size * max_rpm * efficiency * (high / 29.92) / (9411.0 * (max_hp + lost - friction))
+        )
     high = min(high, 29.9)
     box = node.value("air-intake-impedance-factor", -999.0)
     if box < 0.0:
@@ -270,4 +281,6 @@ def _gears(node: Node) -> tuple[Gear, ...]:
 def _standard_pressure(height: float) -> float:
     """JSBSim's polynomial of the standard atmosphere [lbf/ft^2] over altitude [ft]."""
     h = min(height, 100000.0)
-    return 2116.217 + h * (-7.648932746e-2 + h * (1.0925498604e-6 + h * (-7.1135726027e-12 + h * 1.7470331356e-17)))
+    return 2116.217 + h * (
+        -7.648932746e-2 + h * (1.0925498604e-6 + h * (-7.1135726027e-12 + h * 1.7470331356e-17))
+    )

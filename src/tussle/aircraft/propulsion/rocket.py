@@ -51,7 +51,10 @@ class Rocket:
 {bench.state("power")} = {n("power")}
 """)
             else:
-                push, factor = table(code, node, keys=[total]), (self.variations[0] + 1.0) * (self.variations[1] + 1.0)
+                push, factor = (
+                    table(code, node, keys=[total]),
+                    (self.variations[0] + 1.0) * (self.variations[1] + 1.0),
+                )
                 with code.block(f"if ({bench.throttle} == 1.0 or {burnt} > 0.0) and {starved} == 0.0"):
                     code.line(f"{vacuum} = {push} * {factor!r}")
                     if self.build_up > 0.0:

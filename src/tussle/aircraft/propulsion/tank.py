@@ -14,6 +14,11 @@ from tussle.errors import listed, nearest_name
 
 Vector = tuple[float, float, float]
 KINDS = ("FUEL", "OXIDIZER")
+DENSITIES = {
+    "AVGAS": 6.02, "JET-A": 6.74, "JET-A1": 6.74, "JET-B": 6.48, "JP-1": 6.76, "JP-2": 6.38, "JP-3": 6.34, "JP-4": 6.48, "JP-5": 6.81,
+    "JP-6": 6.55, "JP-7": 6.61, "JP-8": 6.66, "JP-8+100": 6.66, "RP-1": 6.73, "T-1": 6.88, "ETHANOL": 6.58, "HYDRAZINE": 8.61,
+    "F-34": 6.66, "F-35": 6.74, "F-40": 6.48, "F-44": 6.81, "AVTAG": 6.48, "AVCAT": 6.81,
+}  # [lb/gal]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -38,6 +43,7 @@ class Tank:
         factor: Factor of the sphere's inertia.
         capacity: [lb]
         contents: At the start [lb].
+        density: Of its contents [lb/gal].
         priority: Engines drain tanks of priority 1 first; 0 is not drained.
         grain: Solid propellant, or None.
     """
@@ -50,6 +56,7 @@ class Tank:
     factor: float
     capacity: float
     contents: float
+    density: float
     priority: int
     grain: Grain | None
 
@@ -113,9 +120,16 @@ def read_tank(node: Node, index: int) -> Tank:
         factor=node.value("inertia_factor", 1.0),
         capacity=capacity,
         contents=contents,
+        density=_density(node),
         priority=int(node.value("priority", 1.0)),
         grain=grain,
     )
+
+
+def _density(node: Node) -> float:
+    """Density of the contents [lb/gal]: that of a named fuel, or the number given."""
+    kind = node.find("type")
+    return node.value("density", 6.6, "LBS/GAL") if kind is None else DENSITIES.get(kind.text, 6.6)
 
 
 def _grain(node: Node, radius: float, contents: float) -> Grain:

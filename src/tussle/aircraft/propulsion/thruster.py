@@ -173,7 +173,11 @@ class Propeller:
     def emit(self, bench: Bench, power: str) -> None:
         """Emit thrust, force, moment and the propeller's speed from the power that the engine gives it [ft lbf/s]."""
         code, n = bench.code, bench.local
-        rpm, thrust, torque = self.rpm_of(bench), bench.slot("thrust-lbs"), bench.slot("propeller-torque-ftlb")
+        rpm, thrust, torque = (
+            self.rpm_of(bench),
+            bench.slot("thrust-lbs"),
+            bench.slot("propeller-torque-ftlb"),
+        )
         rho = bench.read("atmosphere/rho-slugs_ft3")
         self._emit_flow(bench, rpm)
         if self.is_variable:
@@ -224,7 +228,7 @@ class Propeller:
         bench.write("propeller-power-ftlbps", n("required"))
 
     def _emit_flow(self, bench: Bench, rpm: str) -> None:
-        """Emit air velocity at the hub, in the propeller's frame (Stevens & Lewis 2003, equation 8.2-1), advance ratio, Mach of the tips."""
+        """Emit the air's velocity at the hub (Stevens & Lewis 2003, equation 8.2-1), the advance ratio and the Mach number of the tips."""
         code, n = bench.code, bench.local
         cg = [bench.read(f"inertia/cg-{each}-in") for each in "xyz"]
         x, y, z = self.mount.location
@@ -259,14 +263,20 @@ class Propeller:
             cp, sp, cy, sy = (n(each) for each in ("cp", "sp", "cy", "sy"))
             cr, sr = repr(math.cos(roll)), repr(math.sin(roll))
             m = [
-                [f"{cp} * {cy}", f"({sr} * {sp} * {cy} - {cr} * {sy})", f"({cr} * {sp} * {cy} + {sr} * {sy})"],
-                [f"{cp} * {sy}", f"({sr} * {sp} * {sy} + {cr} * {cy})", f"({cr} * {sp} * {sy} - {sr} * {cy})"],
+                [
+                    f"{cp} * {cy}",
+                    f"({sr} * {sp} * {cy} - {cr} * {sy})",
+                    f"({cr} * {sp} * {cy} + {sr} * {sy})",
+                ],
+                [
+                    f"{cp} * {sy}",
+                    f"({sr} * {sp} * {sy} + {cr} * {cy})",
+                    f"({cr} * {sp} * {sy} - {sr} * {cy})",
+                ],
                 [f"-{sp}", f"{sr} * {cp}", f"{cr} * {cp}"],
             ]
         names = [n("u"), n("v"), n("w")]
-        turned = [
-            code.temporary(" + ".join(f"{m[i][k]} * {names[i]}" for i in range(3))) for k in range(3)
-        ]
+        turned = [code.temporary(" + ".join(f"{m[i][k]} * {names[i]}" for i in range(3))) for k in range(3)]
         for name, value in zip(names, turned, strict=True):
             code.line(f"{name} = {value}")
 

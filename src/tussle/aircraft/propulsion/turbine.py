@@ -8,10 +8,19 @@ from dataclasses import dataclass
 from tussle.aircraft.functions import content, expression
 from tussle.aircraft.node import Node
 from tussle.aircraft.propulsion.bench import Bench
-from tussle.aircraft.propulsion.runtime import OFF, RUN, SEIZE, SPIN_UP, STALL, START, TRIM
+from tussle.aircraft.propulsion.kernels import OFF, RUN, SEIZE, SPIN_UP, STALL, START, TRIM
 from tussle.aircraft.propulsion.thruster import Thruster
 
-FUNCTIONS = ("IdleThrust", "MilThrust", "AugThrust", "Injection", "N1SpoolUp", "N1SpoolDown", "N2SpoolUp", "N2SpoolDown")
+FUNCTIONS = (
+    "IdleThrust",
+    "MilThrust",
+    "AugThrust",
+    "Injection",
+    "N1SpoolUp",
+    "N1SpoolDown",
+    "N2SpoolUp",
+    "N2SpoolDown",
+)
 
 
 @dataclass(frozen=True)
@@ -184,7 +193,10 @@ if {now} == {RUN!r}:
                 code.line(f"{flow} = approach({flow}, {thrust} * {rate}, 5000.0, 10000.0, {bench.dt})")
 
     def _emit_injection(self, bench: Bench, now: str, sprays: str) -> None:
-        timer, water = bench.slot("InjectionTimer"), bench.slot("InjWaterNorm", 1.0 if self.has_water else 0.0)
+        timer, water = (
+            bench.slot("InjectionTimer"),
+            bench.slot("InjWaterNorm", 1.0 if self.has_water else 0.0),
+        )
         command, thrust = bench.command("injection_cmd"), bench.local("thrust")
         seconds = self.injection[0]
         names = [each.get("name") for each in self.node.find_all("function")]
@@ -215,7 +227,11 @@ elif {sprays}:
     def _emit_others(self, bench: Bench, now: str) -> None:
         """Emit flow and flags of the phases in which it does not run, and what follows one."""
         flow, augments, phase = bench.state("flow"), bench.state("augments"), bench.state("phase")
-        running, starter, cutoff = bench.slot("set-running"), bench.state("starter"), bench.state("cutoff", 1.0)
+        running, starter, cutoff = (
+            bench.slot("set-running"),
+            bench.state("starter"),
+            bench.state("cutoff", 1.0),
+        )
         least, n2 = math.pow(self.thrust[0], 0.2) * 107.0, bench.slot("n2")
         stalled, before = bench.slot("stalled"), bench.local("n2_before")
         bench.code.lines(f"""
@@ -266,7 +282,11 @@ def read_turbine(node: Node) -> Turbine:
     """
     method, augmented = int(node.value("augmethod", 0.0)), int(node.value("augmented", 0.0)) == 1
     names = [each.get("name").split("/")[-1] for each in node.find_all("function")]
-    needed = ["IdleThrust", "MilThrust", *(["AugThrust"] if method == 2 or (method == 1 and augmented) else [])]
+    needed = [
+        "IdleThrust",
+        "MilThrust",
+        *(["AugThrust"] if method == 2 or (method == 1 and augmented) else []),
+    ]
     for name in needed:
         if name not in names:
             raise node.error(f"it needs a function {name!r}")
@@ -291,7 +311,9 @@ def read_turbine(node: Node) -> Turbine:
             node.value("n2startrate", 2.0),
         ),
         spin_down=(node.value("n1spindown", 2.0), node.value("n2spindown", 2.0)),
-        windmills=(node.find("disable-windmill") is None or node.need("disable-windmill").text not in ("1", "true")),
+        windmills=(
+            node.find("disable-windmill") is None or node.need("disable-windmill").text not in ("1", "true")
+        ),
         augmented=augmented,
         method=method,
         injected=int(node.value("injected", 0.0)) == 1,

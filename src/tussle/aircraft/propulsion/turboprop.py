@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from tussle.aircraft.functions import table, table_of_pairs
 from tussle.aircraft.node import Node
 from tussle.aircraft.propulsion.bench import Bench
-from tussle.aircraft.propulsion.runtime import OFF, RUN, SPIN_UP, START, TRIM
+from tussle.aircraft.propulsion.kernels import OFF, RUN, SPIN_UP, START, TRIM
 from tussle.aircraft.propulsion.thruster import Propeller
 
 # N1 [%], efficiency of the combustion.
@@ -166,7 +166,9 @@ elif {now} == {OFF!r}:
         with code.block(f"if {now} == {RUN!r} or {now} == {SPIN_UP!r} or {n('lights')}"):
             power = table(code, found["EnginePowerRPM_N1"], keys=[rpm, n("n1")])
             name = bench.name("EnginePowerVC")
-            has_function = any(each.get("name").endswith("/EnginePowerVC") for each in self.node.find_all("function"))
+            has_function = any(
+                each.get("name").endswith("/EnginePowerVC") for each in self.node.find_all("function")
+            )
             weather = bench.read(name) if has_function else table(code, found["EnginePowerVC"])
             code.line(f"{n('hp')} = min({power} * {weather}, {self.power!r})")
         with code.block(f"elif {now} == {OFF!r} and {rpm} > 5.0"):
@@ -215,9 +217,10 @@ def read_turboprop(node: Node) -> Turboprop:
             raise node.error(f"it needs a table {name!r}")
     children = []
     for each in node:
-        is_weather = each.tag == "function" and each.get("name") == TABLES[0]
-        name = {"name": f"propulsion/engine[#]/{TABLES[0]}"} if is_weather else {}
-        children.append(Node(each.tag, each.place, each.attributes | name, each.chunks, each.children))
+        attributes = dict(each.attributes)
+        if each.tag == "function" and each.get("name") == TABLES[0]:
+            attributes["name"] = f"propulsion/engine[#]/{TABLES[0]}"
+        children.append(Node(each.tag, each.place, attributes, each.chunks, each.children))
     return Turboprop(
         node=Node(node.tag, node.place, node.attributes, node.chunks, children),
         idle=node.value("idlen1", 30.0),

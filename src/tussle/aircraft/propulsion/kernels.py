@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from tussle.aircraft.runtime import device, outlined, power, table_1
+from tussle.aircraft.runtime import outlined, power, table_1
 from tussle.numeric import exp
+from tussle.numeric.kernel import device
 
 PASCAL_PER_PSF = 47.88
 NEWTON_METRE = 1.3558  # per foot-pound
@@ -85,7 +86,9 @@ def boosted(tables, at, gear, is_limited, is_takeoff, rpm, pressure):
 def boost_loss(low, high, flow, factor):
     """Power [hp] that compresses a flow [m^3/s] from one pressure to another [Pa], adiabatically."""
     gamma = 1.414
-    return low * flow * gamma / (gamma - 1.0) * (power(high / low, (gamma - 1.0) / gamma) - 1.0) * factor / 745.7
+    return (
+        low * flow * gamma / (gamma - 1.0) * (power(high / low, (gamma - 1.0) / gamma) - 1.0) * factor / 745.7
+    )
 
 
 @outlined
@@ -107,7 +110,9 @@ def air_flow(ratio, efficiency, displacement, rpm, ambient, pressure):
 
 
 @outlined
-def indicated_power(tables, at, n, is_running, fuel, air, efficiency, friction, is_cranking, torque, top, rpm):
+def indicated_power(
+    tables, at, n, is_running, fuel, air, efficiency, friction, is_cranking, torque, top, rpm
+):
     """Power [hp] before pumping losses: by fuel [kg/s] and air [kg/s], or by the starter.
 
     Args:
@@ -185,7 +190,9 @@ def spool_idle(tables, at, dt, phase, qbar, n1, n2):
     if phase == SEIZE:
         return approach(n1, qbar / 20.0, 0.0, n1 / 15.0, dt), 0.0
     if tables[at + 10] == 0.0:
-        return approach(n1, 0.0, n1 / 2.0, n1 / tables[at + 8], dt), approach(n2, 0.0, n2 / 2.0, n2 / tables[at + 9], dt)
+        return approach(n1, 0.0, n1 / 2.0, n1 / tables[at + 8], dt), approach(
+            n2, 0.0, n2 / 2.0, n2 / tables[at + 9], dt
+        )
     n1 = approach(n1, qbar / 10.0, n1 / 2.0 + 0.1, n1 / tables[at + 8], dt)
     return n1, approach(n2, qbar / 15.0, n2 / 2.0 + 0.1, n2 / tables[at + 9], dt)
 
