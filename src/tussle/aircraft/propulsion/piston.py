@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
+from tussle.aircraft.constants import SEA_LEVEL_PRESSURE
 from tussle.aircraft.functions import table_of_pairs
 from tussle.aircraft.node import Node
-from tussle.aircraft.propulsion.bench import Bench
+from tussle.aircraft.propulsion.bench import Bench, slot
 from tussle.aircraft.propulsion.kernels import PASCAL_PER_PSF
 from tussle.aircraft.propulsion.thruster import Propeller
 from tussle.aircraft.units import FOOT
@@ -85,8 +87,9 @@ class Piston:
     burns = True
 
     def emit_start(self, bench: Bench, thruster: Propeller) -> None:
-        """Emit that it runs at twice its idle speed."""
+        """Emit that it runs at twice its idle speed, and that its mixture is rich from now on."""
         bench.code.lines(f"""
+{slot(bench.code, f"fcs/mixture-cmd-norm[{bench.index}]", 0.0)} = 1.0
 {bench.state("magnetos")} = 3.0
 {bench.slot("set-running")} = 1.0
 {thruster.rpm_of(bench)} = {2.0 * self.idle_rpm / thruster.gear!r}
@@ -100,7 +103,7 @@ class Piston:
         flow, magnetos = bench.slot("fuel-flow-rate-pps"), bench.state("magnetos")
         parameters = (*self.impedance, self.peak_speed, self.ram, self.lag)
         at = code.constant(parameters)
-        pressure = bench.state("manifold", STANDARD)
+        pressure = bench.state("manifold", SEA_LEVEL_PRESSURE * PASCAL_PER_PSF)
         efficiency = bench.given("volumetric-efficiency", self.efficiency)
         total = bench.read("propulsion/pt-lbs_sqft")
         code.lines(f"""
@@ -254,9 +257,12 @@ def _mixture(node: Node) -> tuple[float, ...]:
         return MIXTURE
     data = found.need("tableData")
     try:
-        return tuple(float(word) for word in data.text.split())
+        numbers = tuple(float(word) for word in data.text.split())
     except ValueError as reason:
         raise data.error(str(reason)) from None
+    if not all(map(math.isfinite, numbers)):
+        raise data.error("a number is not finite")
+    return numbers
 
 
 def _gears(node: Node) -> tuple[Gear, ...]:

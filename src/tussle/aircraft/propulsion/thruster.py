@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from tussle.aircraft.functions import table
 from tussle.aircraft.node import Node
 from tussle.aircraft.propulsion.bench import Bench, given
-from tussle.errors import listed
 
 Vector = tuple[float, float, float]
 TABLES = ("C_THRUST", "C_POWER", "CT_MACH", "CP_MACH")
@@ -360,7 +359,7 @@ def _read_propeller(node: Node, file: Node, mount: Mount) -> Propeller:
     names = [each.get("name") for each in file.find_all("table")]
     missing = [name for name in TABLES[:2] if name not in names]
     if missing:
-        raise file.error(f"it needs a table {listed(missing)}")
+        raise file.error(f"it needs a table {missing[0]!r}")
     file.need("diameter")
     p_factor = node.value("p_factor", 0.0)
     if p_factor < 0.0:
