@@ -14,6 +14,7 @@ import numpy as np
 from tussle import numeric
 from tussle.aircraft import air, contact, runtime
 from tussle.aircraft.aerodynamics import emit_aerodynamics
+from tussle.aircraft.buoyancy import emit_buoyancy, read_buoyancy
 from tussle.aircraft.code import STATE, Code, normal
 from tussle.aircraft.control import declare, emit_control, offer_commands
 from tussle.aircraft.equations import AIR_DATA, CORE, FLOW_PROPERTIES, PROPULSION_PROPERTIES, emit_accelerations, emit_propagate, flow_by_lengths, lever, offer
@@ -31,9 +32,9 @@ from tussle.numeric.kernel import Device, kernel
 
 KNOWN = (
     "fileheader", "metrics", "mass_balance", "propulsion", "system", "autopilot", "flight_control", "ground_reactions",
-    "external_reactions", "aerodynamics", "output", "input", "documentation", "description",
+    "external_reactions", "buoyant_forces", "aerodynamics", "output", "input", "documentation", "description",
 )  # fmt: skip
-DECLARING = "metrics", "aerodynamics", "propulsion", "mass_balance", "ground_reactions"
+DECLARING = "metrics", "aerodynamics", "propulsion", "mass_balance", "ground_reactions", "buoyant_forces"
 WIND = tuple(f"atmosphere/{kind}-{axis}-fps" for kind in ("wind", "gust") for axis in ("north", "east", "down"))
 BUILT_IN = (
     "aero/", "atmosphere/", "velocities/", "position/", "attitude/", "propulsion/", "inertia/", "forces/", "moments/",
@@ -111,7 +112,9 @@ def emit(root: Node, find: Callable[[Node, str, str], Node], keep: Sequence[str]
     contacts = read_ground(root.find("ground_reactions"))
     offer_steering(code, contacts)
     emit_control(code, root, find, n_engines)
-    emit_mass(code, read_mass(root.need("mass_balance")), propulsion.tanks if propulsion else ())
+    buoyant = root.find("buoyant_forces")
+    cells = read_buoyancy(buoyant)
+    emit_mass(code, read_mass(root.need("mass_balance")), propulsion.tanks if propulsion else (), cells)
     code.lines(AIR_DATA)
     lever(code, "eye", *metrics.eye)
     lever(code, "ref", *metrics.reference)
@@ -124,15 +127,16 @@ def emit(root: Node, find: Callable[[Node, str, str], Node], keep: Sequence[str]
     emit_aerodynamics(code, root.find("aerodynamics"), metrics)
     friction = emit_ground(code, contacts)
     emit_external(code, root.find("external_reactions"))
+    emit_buoyancy(code, buoyant, cells)
     for axis in "xyz":
-        code.line(f"force_{axis} = aero_f{axis} + prop_f{axis} + gear_f{axis} + ext_f{axis}")
-        code.line(f"moment_{axis} = aero_m{axis} + prop_m{axis} + gear_m{axis} + ext_m{axis}")
+        code.line(f"force_{axis} = aero_f{axis} + prop_f{axis} + gear_f{axis} + ext_f{axis} + buoy_f{axis}")
+        code.line(f"moment_{axis} = aero_m{axis} + prop_m{axis} + gear_m{axis} + ext_m{axis} + buoy_m{axis}")
     emit_accelerations(code, friction)
     code.arrays = {"work": (2 * len(contacts), WIDTH), "matrix": (2 * len(contacts), 2 * len(contacts) + 1), "gear": (len(contacts), 11)} if contacts else {}
     code.begin("start")
     if propulsion:
         propulsion.emit_start(code)
-    for name in keep:
+    for name in ("position/geod-alt-ft", *keep):
         code.keep(name)
     # What the aircraft reads and nobody writes is a command from outside, unless JSBSim itself should write it.
     code.inputs.update(name for name in code.readers if not name.startswith(BUILT_IN))
