@@ -85,7 +85,9 @@ def start_of(name: str) -> dict[str, float]:
     return {**PLACE, "ic/h-sl-ft": altitude, "ic/vt-fps": speed}
 
 
-def match(name: str, end: float = 60.0, controls: Any = commands, start: dict[str, float] | None = None, low: float = LOW) -> dict[str, Any]:
+def match(
+    name: str, end: float = 60.0, controls: Any = commands, start: dict[str, float] | None = None, low: float = LOW
+) -> dict[str, Any]:
     """Fly an aircraft in JSBSim and compiled; the largest distance [m] and angle [deg] until the end, or until it is low."""
     fdm = loaded(name, start or start_of(name))
     aircraft = compile_aircraft(None, name)
@@ -202,8 +204,9 @@ def compile_times(name: str, folder: str) -> dict[str, float]:
     found = []
     for _ in range(2):
         made = subprocess.run(
-            [sys.executable, "-c", COMPILE, name], env={**os.environ, "TUSSLE_CACHE_DIR": folder}, capture_output=True, text=True, check=True
-        )
+            [sys.executable, "-c", COMPILE, name], env={**os.environ, "TUSSLE_CACHE_DIR": folder}, capture_output=True, text=True,
+            check=True,
+        )  # fmt: skip
         found.append(float(made.stdout))
     return {"cold_s": found[0], "warm_s": found[1]}
 

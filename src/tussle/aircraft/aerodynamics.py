@@ -71,7 +71,8 @@ def emit_aerodynamics(code: Code, node: Node | None, metrics: Metrics) -> None:
         code.line(f"{by_span} = {span!r} / (2.0 * speed)")
         code.line(f"{by_chord} = {chord!r} / (2.0 * speed)")
     offer(code, {
-        "forces/load-factor": f"{lift} / weight", "aero/cl-squared": squared, "aero/bi2vel": by_span, "aero/ci2vel": by_chord, "aero/qbar-area": f"dynamic * {area!r}",
+        "forces/load-factor": f"{lift} / weight",
+        "aero/cl-squared": squared, "aero/bi2vel": by_span, "aero/ci2vel": by_chord, "aero/qbar-area": f"dynamic * {area!r}",
         "aero/alpha-wing-rad": f"alpha + {metrics.incidence!r}",
     })  # fmt: skip
     sums = ["0.0"] * 6

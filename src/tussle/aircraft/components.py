@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
+from itertools import pairwise
 
 from tussle.aircraft.code import Code
 from tussle.aircraft.functions import expression, only, table
@@ -145,7 +146,7 @@ class Component:
         settings = self.node.need("traverse").find_all("setting")
         places = [each.need("position").number() for each in settings]
         times = [each.need("time").number() for each in settings]
-        if len(places) < 2 or any(not a <= b for a, b in zip(places, places[1:], strict=False)):
+        if len(places) < 2 or any(not a <= b for a, b in pairwise(places)):
             raise self.node.error("a traverse needs two or more settings with positions that do not fall")
         scale = "" if self.node.find("noscale") is not None else f" * {places[-1]!r}"
         outputs = self.node.find_all("output")
@@ -178,7 +179,9 @@ class Component:
 
     def washout_filter(self) -> str:
         c, dt = self.parameter("c1"), self.dt
-        return self._filter(lambda x, x1, y1: f"({x} - {x1}) * (2.0 / (2.0 + {dt} * {c})) + {y1} * ((2.0 - {dt} * {c}) / (2.0 + {dt} * {c}))")
+        return self._filter(
+            lambda x, x1, y1: f"({x} - {x1}) * (2.0 / (2.0 + {dt} * {c})) + {y1} * ((2.0 - {dt} * {c}) / (2.0 + {dt} * {c}))"
+        )
 
     def lead_lag_filter(self) -> str:
         a, b, c, d = (self.parameter(f"c{k}") for k in (1, 2, 3, 4))
@@ -401,5 +404,6 @@ COMPONENTS: dict[str, Callable[[Component], str]] = {
     "fcs_function": Component.fcs_function, "lag_filter": Component.lag_filter, "washout_filter": Component.washout_filter,
     "lead_lag_filter": Component.lead_lag_filter, "second_order_filter": Component.second_order_filter, "pid": Component.pid,
     "integrator": Component.pid, "deadband": Component.deadband, "switch": Component.switch, "actuator": Component.actuator,
-    "sensor": Component.sensor, "angle": Component.angle, "waypoint_heading": Component.waypoint_heading, "waypoint_distance": Component.waypoint_distance,
+    "sensor": Component.sensor, "angle": Component.angle, "waypoint_heading": Component.waypoint_heading,
+    "waypoint_distance": Component.waypoint_distance,
 }  # fmt: skip

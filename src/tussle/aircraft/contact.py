@@ -14,9 +14,9 @@ from tussle.numeric import atan2, cos, sin
 WIDTH = 10
 """Numbers of a multiplier in the work array: direction (3), arm (3), least, most, value, used."""
 MEMORY = ("along", "side", "slide", "slip", "touches", "length", "speed")
-"""Kept from step to step: multipliers along, sideways and against the movement; slip angle [deg], whether it touches, compression [ft]
-and its speed [ft/s]; steering angle [rad] (NaN: it casters), brake, altitude of the ground [ft] and force of the strut [lbf] (NaN: that of its spring) follow
-in the work array."""
+"""Kept from step to step: multipliers along, sideways and against the movement, slip angle [deg], whether it touches, compression [ft]
+and its speed [ft/s]. In the work array follow steering angle [rad] (NaN: it casters), brake, altitude of the ground [ft], and force of
+the strut [lbf] (NaN: that of its spring)."""
 PARAMETERS = ("x", "y", "z", "is_wheel", "spring", "damping", "damping_is_square", "rebound", "rebound_is_square", "static", "dynamic",
               "rolling", "most")  # fmt: skip
 

@@ -288,7 +288,8 @@ FLOW_PROPERTIES = {
         f"(by + ridot * eye_x - pidot * eye_z + ri * (qi * eye_z - ri * eye_y) - pi * (pi * eye_y - qi * eye_x)) / {GEES}",
     "accelerations/n-pilot-z-norm":
         f"(bz + pidot * eye_y - qidot * eye_x + pi * (ri * eye_x - pi * eye_z) - qi * (qi * eye_z - ri * eye_y)) / {GEES}",
-    "accelerations/a-pilot-z-ft_sec2": "bz + pidot * eye_y - qidot * eye_x + pi * (ri * eye_x - pi * eye_z) - qi * (qi * eye_z - ri * eye_y)",
+    "accelerations/a-pilot-z-ft_sec2":
+        "bz + pidot * eye_y - qidot * eye_x + pi * (ri * eye_x - pi * eye_z) - qi * (qi * eye_z - ri * eye_y)",
 }  # fmt: skip
 
 PROPULSION_PROPERTIES = {

@@ -22,7 +22,7 @@ def package_root() -> Path:
     """
     found = importlib.util.find_spec("jsbsim")
     if found is None or found.origin is None:
-        raise AircraftError("the package jsbsim, whose aircraft are meant, is not installed: pip install 'tussle[jsbsim]', or name a jsbsim_root")
+        raise AircraftError("the package jsbsim with its aircraft is not installed: pip install 'tussle[jsbsim]', or name a jsbsim_root")
     for folder in (Path(found.origin).parent / "jsbsim", Path(found.origin).parent):
         if (folder / "aircraft").is_dir():
             return folder

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 
 from tussle.aircraft.code import Code
 from tussle.aircraft.node import AircraftError, Node
@@ -170,7 +171,7 @@ def table_of_pairs(code: Code, numbers: list[float], key: str, node: Node) -> st
 
 
 def _rising(keys: list[float], node: Node) -> None:
-    if any(not a < b for a, b in zip(keys, keys[1:], strict=False)):
+    if any(not a < b for a, b in pairwise(keys)):
         raise node.error("the keys of a table must rise")
 
 

@@ -43,7 +43,8 @@ def place_by_quaternion(x: np.ndarray, latitude: np.ndarray, longitude: np.ndarr
     """Set the core of the state from a quaternion from body to Earth-centred axes, (4, n), and a velocity in those [ft/s], (3, n)."""
     normal = SEMI_MAJOR / np.sqrt(1.0 - ECCENTRICITY_SQUARED * sin(latitude) ** 2)
     across = (normal + altitude) * cos(latitude)
-    position = np.stack([across * cos(longitude), across * sin(longitude), ((1.0 - ECCENTRICITY_SQUARED) * normal + altitude) * sin(latitude)])
+    along = ((1.0 - ECCENTRICITY_SQUARED) * normal + altitude) * sin(latitude)
+    position = np.stack([across * cos(longitude), across * sin(longitude), along])
     spin = np.zeros_like(position)
     spin[2] = EARTH_RATE
     x[:4] = quat

@@ -161,6 +161,9 @@ def read_text(data: bytes, name: str) -> Node:
         stack[-1].children.append(node)
         stack.append(node)
 
+    def text(part: str) -> None:
+        stack[-1].chunks.append(part)
+
     def entity(entity_name: str, is_parameter: int, value: str | None, *_: object) -> None:
         nonlocal entities
         entities += 1
@@ -173,7 +176,7 @@ def read_text(data: bytes, name: str) -> Node:
     parser.buffer_text = True
     parser.StartElementHandler = start
     parser.EndElementHandler = lambda _: stack.pop()
-    parser.CharacterDataHandler = lambda text: stack[-1].chunks.append(text)
+    parser.CharacterDataHandler = text
     parser.EntityDeclHandler = entity
     try:
         parser.Parse(data, True)

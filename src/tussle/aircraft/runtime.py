@@ -120,13 +120,13 @@ def table_4(tables, at, n, row, column, key, last):
 
 @device
 def quotient(a, b):
-    """a / b, infinite where b is 0."""
+    """Quotient a / b, infinite where b is 0."""
     return a / b if b != 0.0 else math.inf
 
 
 @outlined
 def power(x, y):
-    """x ** y by the portable exponential and logarithm; of a negative x for whole y only."""
+    """Power x ** y by the portable exponential and logarithm; of a negative x for whole y only."""
     if y == 0.0 or x == 1.0:
         return 1.0
     if x == 0.0:
