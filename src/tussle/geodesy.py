@@ -117,6 +117,11 @@ class Origin:
         altitude = axis * cosine + z * sine - SEMI_MAJOR * np.sqrt(1.0 - ECCENTRICITY_SQUARED * sine * sine)
         return np.stack([atan2(rise, run), atan2(y, x), altitude])
 
+    @property
+    def earth_centred(self) -> tuple[float, float, float]:
+        """Its position in Earth-centred axes: equator at longitude 0, at 90 degrees east, north pole [m]."""
+        return self._frame[1]
+
     @cached_property
     def _frame(self) -> tuple[tuple[float, float, float, float], tuple[float, float, float]]:
         """Sine and cosine of latitude and longitude, and the Earth-centred position [m]."""

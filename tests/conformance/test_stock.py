@@ -70,6 +70,8 @@ def test_plugin_meets_the_contract(name: str, tmp_path: Path, monkeypatch: pytes
         pytest.importorskip("jsbsim")
         aircraft = {"aircraft": "hawk"} if name == "JSBSimControl" else {"script_name": "patrol.xml"}
         params = {**aircraft, "jsbsim_root": str(stock.examples()["JSBSimModel"].with_name("hawk"))}
+    if name == "JSBSimCompiled":
+        params = {"aircraft": "hawk", "jsbsim_root": str(stock.examples()["JSBSimModel"].with_name("hawk"))}
     companions = [stock.load(other)() for other in NEEDED.get(name, ())]
     check_plugin(stock.load(name), companions=BOUNDARIES if name in ON_REGIONS else companions, **params)
 

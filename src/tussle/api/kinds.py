@@ -27,6 +27,10 @@ class EntityPlugin(Plugin):
         """Return names of `State` columns that this instance leaves at their defaults; they are not part of the state hash."""
         return ()
 
+    def state_size(self, name: str) -> int:
+        """Return the number of components of a `State` column; a model whose structural parameters add some has more than fields."""
+        return len(type(self).states()[name].fields)
+
     def spawn(self, g: GroupView, rows: np.ndarray) -> None:
         """Initialise columns of newborn entities beyond the declared defaults; `rows` are row numbers in `g`, (m,)."""
 

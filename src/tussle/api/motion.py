@@ -225,14 +225,14 @@ class MotionModel(EntityPlugin):
         u = u[..., None] if u.ndim == 2 else u
         n, names = x.shape[1], [*self.input_channels(), *self.body_inputs()]
         if (
-            x.shape[0] != len(self.state().fields)
+            x.shape[0] != self.state_size(self.state().name)
             or u.ndim != 3
             or u.shape[1] != len(names)
             or u.shape[2] not in (1, n)
         ):
             raise ParameterError(
                 f"{type(self).__name__}.rollout: x0 is {np.shape(x0)} and inputs {np.shape(inputs)}; expected are "
-                f"({len(self.state().fields)}, n) for {', '.join(self.state().fields)} and (T, {len(names)}) for {', '.join(names)}"
+                f"({self.state_size(self.state().name)}, n) for {', '.join(self.state().fields)} and (T, {len(names)}) for {', '.join(names)}"
             )
         for key in params or {}:
             if key not in self.row_params():

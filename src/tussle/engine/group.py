@@ -234,8 +234,8 @@ class Group:
                 binding.ragged[name] = self.table.add_list(column)
                 binding.writable.add(name)
             elif isinstance(column, (State, EntityRef)):
-                default = column.default
-                binding.places[name] = self.table.add((key, name), column.dtype, len(column.fields), default)
+                k = spec.state_size(name) if isinstance(column, State) else 0
+                binding.places[name] = self.table.add((key, name), column.dtype, k, column.default)
                 binding.writable.add(name)
             elif isinstance(column, Channel):
                 self._bind_channel(binding, name, column, is_private)

@@ -1,0 +1,64 @@
+"""Initial conditions: place, attitude and velocity become the state, as JSBSim runs them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tussle.aircraft.compile import CompiledAircraft
+from tussle.aircraft.constants import EARTH_RATE, ECCENTRICITY_SQUARED, SEMI_MAJOR
+from tussle.aircraft.equations import CORE
+from tussle.numeric import cos, sin
+from tussle.numeric.quaternion import quat_multiply, quat_rotate, quat_rotate_inverse
+
+CORE_SLOT = {name: k for k, name in enumerate(CORE)}
+
+
+def rotation(axis: int, angle: np.ndarray) -> np.ndarray:
+    """Quaternions of rotations about an axis, (4, n)."""
+    out = np.zeros((4, len(angle)))
+    out[0], out[1 + axis] = cos(0.5 * angle), sin(0.5 * angle)
+    return out
+
+
+def place(x: np.ndarray, latitude: np.ndarray, longitude: np.ndarray, altitude: np.ndarray, euler: np.ndarray, velocity: np.ndarray,
+          rates: np.ndarray) -> None:  # fmt: skip
+    """Set the core of the state.
+
+    Args:
+        x: The state, (k, n); written.
+        latitude: Geodetic latitude [rad], (n,).
+        longitude: [rad], (n,).
+        altitude: Above the ellipsoid [ft], (n,).
+        euler: Roll, pitch, yaw from north [rad], (3, n).
+        velocity: North, east, down [ft/s], (3, n).
+        rates: Angular velocity relative to the Earth, forward, right, down [rad/s], (3, n).
+    """
+    frame = quat_multiply(rotation(2, longitude), rotation(1, -0.5 * np.pi - latitude))
+    attitude = quat_multiply(rotation(2, euler[2]), quat_multiply(rotation(1, euler[1]), rotation(0, euler[0])))
+    place_by_quaternion(x, latitude, longitude, altitude, quat_multiply(frame, attitude), quat_rotate(frame, velocity), rates)
+
+
+def place_by_quaternion(x: np.ndarray, latitude: np.ndarray, longitude: np.ndarray, altitude: np.ndarray, quat: np.ndarray,
+                        velocity: np.ndarray, rates: np.ndarray) -> None:  # fmt: skip
+    """Set the core of the state from a quaternion from body to Earth-centred axes, (4, n), and a velocity in those [ft/s], (3, n)."""
+    normal = SEMI_MAJOR / np.sqrt(1.0 - ECCENTRICITY_SQUARED * sin(latitude) ** 2)
+    across = (normal + altitude) * cos(latitude)
+    along = ((1.0 - ECCENTRICITY_SQUARED) * normal + altitude) * sin(latitude)
+    position = np.stack([across * cos(longitude), across * sin(longitude), along])
+    spin = np.zeros_like(position)
+    spin[2] = EARTH_RATE
+    x[:4] = quat
+    x[4:7] = rates + quat_rotate_inverse(quat, spin)
+    x[7:10] = position
+    x[10:13] = velocity + np.stack([-EARTH_RATE * position[1], EARTH_RATE * position[0], 0.0 * position[2]])
+
+
+def run_initial(aircraft: CompiledAircraft, x: np.ndarray, dt: float) -> None:
+    """Run the models twice without a step of time, as JSBSim does, and begin the integrators' histories; x is (k, n), contiguous."""
+    n = x.shape[1]
+    aircraft.advance(x, aircraft.tables, 0, n, 1, 0.0, dt)
+    at = CORE_SLOT
+    x[at["vx1"] : at["vz1"] + 1] = x[at["vx"] : at["vz"] + 1]
+    x[at["vx2"] : at["vz2"] + 1] = x[at["vx"] : at["vz"] + 1]
+    x[at["ax1"] : at["az1"] + 1] = x[at["ax"] : at["az"] + 1]
+    aircraft.advance(x, aircraft.tables, 0, n, 1, 0.0, dt)

@@ -1,0 +1,205 @@
+"""Aircraft of JSBSim's format, compiled to kernels."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from tussle import units
+from tussle.aircraft.compile import CompiledAircraft, compile_aircraft, save_source
+from tussle.aircraft.equations import CORE
+from tussle.aircraft.files import package_root
+from tussle.aircraft.initial import CORE_SLOT, place_by_quaternion, run_initial
+from tussle.aircraft.node import AircraftError
+from tussle.api import Input, MotionBody, Param, RigidBodyModel
+from tussle.errors import ParameterError
+from tussle.geodesy import Origin
+from tussle.numeric import cos, sin
+from tussle.numeric.quaternion import quat_multiply, quat_rotate, quat_rotate_inverse
+from tussle.stock.motion.jsbsim_compiled import kernels
+from tussle.stock.motion.jsbsim_compiled.script import Script, read_script
+
+FOOT = kernels.FOOT
+KNOT = float(units.NAUTICAL_MILE / 3600)  # [m/s]
+BODY = 13  # components of the rigid body, before the slots of the aircraft
+EARTH_ANGLE = CORE_SLOT["earth_angle"]
+SURFACES = "fcs/elevator-cmd-norm", "fcs/aileron-cmd-norm", "fcs/rudder-cmd-norm"
+SETPOINTS = "ap/bank_setpoint", "ap/altitude_setpoint", "ap/airspeed_setpoint"
+ALTITUDE = "position/geod-alt-ft"
+WIND = "atmosphere/wind-north-fps", "atmosphere/wind-east-fps", "atmosphere/wind-down-fps"
+GROUND = "position/terrain-elevation-asl-ft"
+FORWARD_RIGHT_DOWN = np.array([[0.0], [1.0], [0.0], [0.0]])
+"""Rotation between body axes forward, left, up and forward, right, down."""
+MIRRORED = np.array([[1.0], [-1.0], [-1.0]])
+
+
+class Flown:
+    """A compiled aircraft with the slots that the plugin sets and reads."""
+
+    def __init__(self, aircraft: CompiledAircraft, settings: tuple[tuple[str, float], ...], is_autopilot: bool) -> None:
+        self.aircraft, self.settings = aircraft, settings
+        self.is_autopilot = is_autopilot
+        n = max(1, aircraft.n_engines)
+        names = [f"fcs/throttle-cmd-norm[{k}]" if k else "fcs/throttle-cmd-norm" for k in range(n)]
+        at = aircraft.slots
+        self.throttles = [at[name] for name in names if name in at]
+        self.surfaces = [(k, at[name]) for k, name in enumerate(SURFACES) if name in at]
+        if is_autopilot:
+            self.setpoints = [aircraft.slot(name) for name in SETPOINTS]
+        self.altitude = at[ALTITUDE]
+
+
+@cache
+def compiled(root: str, aircraft: str, script: str, is_autopilot: bool) -> Flown:
+    """The aircraft of a plugin, compiled once a process.
+
+    Raises:
+        ParameterError: It cannot be read or compiled.
+    """
+    folder = Path(root) if root else None
+    chosen = read_script(folder or package_root(), script) if script else Script(aircraft, ())
+    keep = [ALTITUDE, *(name for name, _ in chosen.settings), *(SETPOINTS if is_autopilot else ())]
+    try:
+        made = compile_aircraft(folder, chosen.aircraft, keep)
+    except AircraftError as error:
+        raise ParameterError(f"JSBSimCompiled: {error}; --set motion=JSBSimControl flies it by JSBSim itself") from None
+    return Flown(made, chosen.settings, is_autopilot)
+
+
+class JSBSimCompiled(RigidBodyModel):
+    """An aircraft of JSBSim's file format, compiled to one kernel for all its entities.
+
+    Its equations, models and integrators are those of JSBSim (J. S. Berndt 2004, "JSBSim: an open source flight dynamics model in
+    C++") in their order, so that a flight is JSBSim's; one step per substep of the mission, 1/120 s is usual. Parameters and inputs
+    are those of JSBSimControl, and with commands="autopilot" those of JSBSimModel. Commands of surfaces are in [-1, 1], the throttle of
+    all engines in [0, 1]. Engines run from the start. What is not compiled is refused by name; JSBSimControl flies it.
+
+    Raises:
+        ParameterError: The aircraft cannot be read, or has something that is not compiled.
+    """
+
+    grade = "portable"
+    script_name = Param("", doc="File below `scripts` that names an aircraft and sets properties at the start.")
+    aircraft = Param("", doc="Folder below `aircraft`, in place of a script.")
+    jsbsim_root = Param(
+        "", doc="Folder of aircraft, engine, systems and scripts; empty for those of the package jsbsim."
+    )
+    commands = Param("surfaces", choices=["surfaces", "autopilot"], doc="What is commanded.")
+    wind = Param((0.0, 0.0, 0.0), fields="east north up", unit="m/s", doc="Velocity of the air, world frame.")
+    throttle = Input(doc="Throttle.")
+    elevator = Input(doc="Elevator, nose down positive.")
+    aileron = Input(doc="Aileron, right wing down positive.")
+    rudder = Input(doc="Rudder.")
+    desired_roll = Input(unit="rad", doc="Desired bank, right wing down.")
+    desired_altitude = Input(unit="m", doc="Desired height above the origin's tangent plane.")
+    desired_speed = Input(unit="m/s", doc="Desired airspeed.")
+    by_autopilot: ClassVar[tuple[str, ...]] = ("desired_roll", "desired_altitude", "desired_speed")
+
+    @property
+    def flown(self) -> Flown:
+        """The compiled aircraft.
+
+        Raises:
+            ParameterError: Neither or both of aircraft and script_name are given, or it cannot be compiled.
+        """
+        own = self.values
+        if bool(own["script_name"]) == bool(own["aircraft"]):
+            raise ParameterError("JSBSimCompiled takes script_name or aircraft, one of them")
+        return compiled(own["jsbsim_root"], own["aircraft"], own["script_name"], own["commands"] == "autopilot")
+
+    def source(self) -> Path:
+        """Write the generated Python of the aircraft's kernels to the cache folder, to be read; return its path."""
+        return save_source(self.flown.aircraft)
+
+    def active_inputs(self) -> list[str]:
+        """The inputs of surfaces, or of the autopilot."""
+        is_autopilot = self.values["commands"] == "autopilot"
+        return [name for name in type(self).inputs() if (name in self.by_autopilot) == is_autopilot]
+
+    def state_size(self, name: str) -> int:
+        """The rigid body, and all slots of the aircraft."""
+        return BODY + len(self.flown.aircraft.slots)
+
+    def from_body(self, body: MotionBody, rows: np.ndarray) -> None:
+        """Start the aircraft of some rows at their place, with their velocity and rates, engines running."""
+        flown, n = self.flown, len(rows)
+        aircraft, origin = flown.aircraft, body.scene.origin
+        frame, center = earth_frame(origin)
+        x = np.repeat(aircraft.first[:, None], n, axis=1)
+        latitude, longitude, altitude = origin.to_geodetic(body.pos[:, rows])
+        quat = quat_multiply(frame, quat_multiply(body.quat[:, rows], FORWARD_RIGHT_DOWN))
+        velocity = quat_rotate(frame, body.vel[:, rows]) / FOOT
+        rates = MIRRORED * quat_rotate_inverse(body.quat[:, rows], body.omega[:, rows])
+        place_by_quaternion(x, latitude, longitude, altitude / FOOT, quat, velocity, rates)
+        at = aircraft.slots
+        wind = quat_rotate_inverse(local_frame(latitude, longitude), quat_rotate(frame, self.wind[:, rows])) / FOOT
+        for name, value in zip(WIND, wind, strict=True):
+            x[at[name]] = value
+        if GROUND in at:
+            x[at[GROUND]] = origin.altitude / FOOT
+        for name, number in flown.settings:
+            x[aircraft.slot(name)] = number
+        run_initial(aircraft, x, body.dt)
+        aircraft.start(x, aircraft.tables, 0, n, 1, 0.0, body.dt)
+        state = self.rigid_body
+        state[BODY:, rows] = x
+        part = np.empty((BODY, n))
+        kernels.to_world(x, EARTH_ANGLE, tuple(frame[:, 0].tolist()), center, part)
+        state[:BODY, rows] = part
+
+    def to_body(self, body: MotionBody) -> None:
+        """Write position, velocity, attitude and angular velocity of all rows."""
+        frame, center = earth_frame(body.scene.origin)
+        kernels.to_world(self.rigid_body[BODY:], EARTH_ANGLE, tuple(frame[:, 0].tolist()), center, self.rigid_body[:BODY])
+        super().to_body(body)
+
+    @property
+    def advance(self) -> Any:
+        """The function that makes steps of all aircraft."""
+        flown = self.flown
+        aircraft = flown.aircraft
+        command = autopilot if flown.is_autopilot else surfaces
+
+        def fly(x: np.ndarray, u: np.ndarray, p: np.ndarray, dt: float, substeps: int) -> None:
+            """Make `substeps` steps of dt / substeps."""
+            slots = x[BODY:]
+            command(flown, x, slots, u)
+            step = dt / substeps
+            aircraft.advance(slots, aircraft.tables, 0, x.shape[1], substeps, step, step)
+
+        return fly
+
+
+def surfaces(flown: Flown, x: np.ndarray, slots: np.ndarray, u: np.ndarray) -> None:
+    """Set throttle and surfaces, within their limits."""
+    for slot in flown.throttles:
+        np.clip(u[0], 0.0, 1.0, out=slots[slot])
+    for k, slot in flown.surfaces:
+        np.clip(u[1 + k], -1.0, 1.0, out=slots[slot])
+
+
+def autopilot(flown: Flown, x: np.ndarray, slots: np.ndarray, u: np.ndarray) -> None:
+    """Set bank [rad], altitude above the ellipsoid [ft] and airspeed [knot] of the autopilot."""
+    roll, altitude, speed = flown.setpoints
+    slots[roll] = u[0]
+    slots[altitude] = slots[flown.altitude] + (u[1] - x[2]) / FOOT
+    slots[speed] = u[2] / KNOT
+
+
+def earth_frame(origin: Origin) -> tuple[np.ndarray, tuple[float, float, float]]:
+    """Quaternion from the world frame to Earth-centred axes, (4, 1), and the origin in these [m]."""
+    half = np.sqrt(0.5)
+    local = local_frame(np.array([origin.latitude]), np.array([origin.longitude]))
+    return quat_multiply(local, np.array([[0.0], [half], [half], [0.0]])), origin.earth_centred
+
+
+def local_frame(latitude: np.ndarray, longitude: np.ndarray) -> np.ndarray:
+    """Quaternions from axes north, east, down at geodetic places [rad] to Earth-centred ones, (4, n)."""
+    zero, a, b = np.zeros_like(latitude), 0.5 * longitude, 0.5 * (-0.5 * np.pi - latitude)
+    return np.asarray(quat_multiply(np.stack([cos(a), zero, zero, sin(a)]), np.stack([cos(b), zero, sin(b), zero])))
+
+
+assert CORE[EARTH_ANGLE] == "earth_angle"
