@@ -40,6 +40,7 @@ class Context:
         draw: Receives the shapes that plugins draw.
         fail: Ends one world with an error; the others continue.
         boxes: Lengths of the boxes of each block for rays [m], (n_blocks, 3); 0 for spheres.
+        mass_properties: Returns mass [kg], (n,), and inertia tensor [kg m^2], (9, n), of all rows of the body table.
     """
 
     clock: Clock
@@ -56,6 +57,7 @@ class Context:
     keys: np.ndarray = field(init=False)
     fail: Callable[[int, PluginError], None] = field(init=False)
     boxes: np.ndarray = field(init=False)
+    mass_properties: Callable[[], tuple[np.ndarray, np.ndarray]] = field(init=False)
     _pool: ThreadPoolExecutor | None = None
 
     def __post_init__(self) -> None:
