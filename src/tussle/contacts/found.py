@@ -163,7 +163,7 @@ def solve(
     bodies: tuple[np.ndarray, np.ndarray, np.ndarray],
     materials: tuple[np.ndarray, np.ndarray, np.ndarray],
     steps: tuple[float, int],
-    impulses: np.ndarray,
+    guess: tuple[np.ndarray, np.ndarray],
     split: Split,
 ) -> np.ndarray:
     """Change velocities so that bodies neither approach where they touch nor slide where friction holds them.
@@ -173,18 +173,18 @@ def solve(
         bodies: Velocity and angular velocity [m/s rad/s], (n, 6), changed; inverse masses (n, 10); sizes [m], (2, n).
         materials: Restitution, friction, and speed from which bodies bounce [m/s], by world.
         steps: Length of a step [s], and number of iterations.
-        impulses: First guess, and result [N s], (m, 3).
+        guess: First guess of the impulses [N s], (m, 3), replaced by the result, and which contacts are new, (m,).
         split: Calls a function for parts of the worlds, in threads.
 
     Returns:
         Shifts and small rotations [m rad] that undo overlaps, (n, 6).
     """
-    moves, inverse, sizes = bodies
+    (moves, inverse, sizes), (impulses, is_new) = bodies, guess
     shifts = np.zeros_like(moves)
     split(
         len(contacts.starts) - 1,
         lambda *part: impulses_kernels.solve_worlds(
-            (moves, shifts, inverse, sizes), contacts.arrays, materials, *steps, contacts.starts, impulses, part
+            (moves, shifts, inverse, sizes), (*contacts.arrays, is_new), materials, *steps, contacts.starts, impulses, part
         ),
     )
     return shifts

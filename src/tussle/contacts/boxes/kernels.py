@@ -6,7 +6,7 @@ contact points are those of one face that lie behind the other one.
 
 A body is a row of `items`: centre, radius, half lengths, and its axes in the world frame. A found contact is a row of `found`: unit
 normal from the second body to the first, point of contact seen from the centre of each, gap [m], negative where they overlap, and a
-number that tells the contacts of two bodies apart.
+number by which a contact is known again in the next step.
 """
 
 from __future__ import annotations
@@ -24,6 +24,11 @@ MOST_FOUND = 64
 """Largest number of contacts of one body with another, or with the scene."""
 PREFER_FACES = 0.02
 """Edges must separate by this much more than a face, relative to the smallest half length: faces give more points, and steadier ones."""
+
+
+SAME_CORNER = 0.1
+"""Points of two faces that are nearer than this, relative to the smallest half length, are one, the deeper: the faces of boxes that are
+nearly aligned have eight of them, in pairs, and redundant contacts take more iterations."""
 
 
 @device
@@ -170,9 +175,9 @@ def clipped_faces(bodies, way, reach, centers, is_first, found, n, scratch):
             own = minus(minus(point, scale(gap, normal)), center)
             other = minus(point, other_center)
             if is_first:
-                n = put(found, n, scale(-1.0, normal), own, other, gap, float(k))
+                n = put(found, n, scale(-1.0, normal), own, other, gap, 0.0)
             else:
-                n = put(found, n, normal, other, own, gap, float(k))
+                n = put(found, n, normal, other, own, gap, 0.0)
     return n
 
 
@@ -202,6 +207,22 @@ def crossed_edges(pair, way, edges, centers, gap, found, n):
     t = (a * e - b * c) / divisor if divisor > 0.0 else 0.0
     p, q = add(p, scale(s, u)), add(q, scale(t, v))
     return put(found, n, way, minus(p, centers[0]), minus(q, centers[1]), gap, 15.0)
+
+
+@routine
+def thinned(found, first, n, distance):
+    """Keep the deeper one of contacts nearer than a distance to each other; returns the number of contacts."""
+    kept = first
+    for i in range(first, n):
+        same = kept
+        for j in range(first, kept):
+            way = minus(vector(found, i, 3), vector(found, j, 3))
+            same = j if dot(way, way) < distance * distance else same
+        if same == kept or found[i, 9] < found[same, 9]:
+            for j in range(CONTACT):
+                found[same, j] = found[i, j]
+        kept += 1 if same == kept else 0
+    return kept
 
 
 @routine
@@ -249,11 +270,17 @@ def box_contacts(items, k, other, reach, found, n, scratch):
     if kind == 3:
         edges = vector(axes_a, edge_a, 0), vector(edges_b, edge_b, 0)
         return crossed_edges((first, 8, second, n_second), way, edges, (center_a, center_b), best, found, n)
-    polygons = reference, polygon, spare
+    polygons, before = (reference, polygon, spare), n
     if kind == 1:
         bodies = first, 8, axes_a, second, n_second, axes_b
-        return clipped_faces(
-            bodies, scale(-1.0, way), reach, (center_a, center_b), True, found, n, polygons
-        )
-    bodies = second, n_second, axes_b, first, 8, axes_a
-    return clipped_faces(bodies, way, reach, (center_b, center_a), False, found, n, polygons)
+        n = clipped_faces(bodies, scale(-1.0, way), reach, (center_a, center_b), True, found, n, polygons)
+    else:
+        bodies = second, n_second, axes_b, first, 8, axes_a
+        n = clipped_faces(bodies, way, reach, (center_b, center_a), False, found, n, polygons)
+    n = thinned(found, before, n, SAME_CORNER * min(items[k, 4], items[k, 5], items[k, 6]))
+    for i in range(before, n):  # the octant of the box: it stays the same when the polygon gets another corner
+        arm = vector(found, i, 3)
+        found[i, 10] = 0.0
+        for j in range(3):
+            found[i, 10] += float(1 << j) if dot(arm, vector(axes_a, j, 0)) > 0.0 else 0.0
+    return n

@@ -12,19 +12,23 @@ import math
 import numpy as np
 
 from tussle.contacts.bodies.kernels import SLACK
-from tussle.contacts.boxes.kernels import CONTACT, dot, minus, vector
+from tussle.contacts.boxes.kernels import dot, vector
 from tussle.numeric.kernel import device, kernel, routine
 from tussle.numeric.rigid_body import add, cross, scale, solve
 
 SLOTS = 12
 """Contacts that a body remembers, as the smaller of two: so many spheres of one size touch another one."""
 FEATURES = 64
-SETTLED = 1e-10
+SETTLED = 1e-9
 """Change of the velocities [m/s] below which a world is solved."""
 SHARE = 0.3
 """Share of an overlap that is undone in a step: with all of it, piles tremble."""
-ROW = 13
-"""Numbers of a contact for the solver: tangents, effective masses, goal of the normal speed, friction, allowed overlap, whether it turns."""
+WAY, MASS = 16, 15
+"""Numbers of a contact for each of its directions, the normal and two tangents: unit vector; how the angular velocities of both bodies
+change the speed along it, and how an impulse along it changes them; last, at MASS, the effective mass."""
+SOFT, GOAL, FRICTION, OVERLAP, TURNS, ROW = 48, 49, 50, 51, 52, 53
+"""Further numbers: inverse of the effective mass along the normal, goal of the normal speed, friction, allowed overlap, and 1 if a body
+turns."""
 
 
 @kernel("(F F2 F2) B F2w")
@@ -58,7 +62,7 @@ def invert_masses(bodies, moves, inverse):
                 inverse[row, 1 + 3 * i + j] = turned[i]
 
 
-@routine
+@device
 def turned_by(inverse, row, torque):
     """Change of the angular velocity by an angular impulse."""
     return (
@@ -66,47 +70,6 @@ def turned_by(inverse, row, torque):
         inverse[row, 4] * torque[0] + inverse[row, 5] * torque[1] + inverse[row, 6] * torque[2],
         inverse[row, 7] * torque[0] + inverse[row, 8] * torque[1] + inverse[row, 9] * torque[2],
     )
-
-
-@device
-def point_velocity(moves, row, arm):
-    """Velocity of a point of a body; moves (n, 6): velocity and angular velocity."""
-    return add(vector(moves, row, 0), cross(vector(moves, row, 3), arm))
-
-
-@device
-def difference(moves, a, b, arm_a, arm_b):
-    """Velocity of the first body at a contact relative to the second."""
-    return minus(point_velocity(moves, a, arm_a), point_velocity(moves, b, arm_b)) if b >= 0 else point_velocity(moves, a, arm_a)
-
-
-@device
-def push(moves, inverse, row, arm, impulse, turns):
-    """Change the velocities of a body by an impulse at a point."""
-    m = inverse[row, 0]
-    moves[row, 0] += m * impulse[0]
-    moves[row, 1] += m * impulse[1]
-    moves[row, 2] += m * impulse[2]
-    if turns:
-        spin = turned_by(inverse, row, cross(arm, impulse))
-        moves[row, 3] += spin[0]
-        moves[row, 4] += spin[1]
-        moves[row, 5] += spin[2]
-
-
-@routine
-def push_both(moves, inverse, pair, arms, impulse, turns):
-    """Change the velocities of the bodies of a contact by an impulse on the first."""
-    push(moves, inverse, pair[0], arms[0], impulse, turns)
-    if pair[1] >= 0:
-        push(moves, inverse, pair[1], arms[1], scale(-1.0, impulse), turns)
-
-
-@routine
-def softness(inverse, row, arm, way):
-    """Change of the speed along a direction by a unit impulse along it."""
-    lever = cross(arm, way)
-    return inverse[row, 0] + dot(turned_by(inverse, row, lever), lever)
 
 
 @device
@@ -121,124 +84,165 @@ def tangents(n):
     return t, cross(n, t)
 
 
-@routine
-def prepare(c, row, other, contacts, bodies, material, dt, rows):
-    """Write the numbers of a contact for the solver."""
-    moves, inverse, sizes = bodies
-    restitution, friction, bounce_speed = material
-    a, b = row[c], other[c]
-    normal, arm_a, arm_b = vector(contacts, c, 0), vector(contacts, c, 3), vector(contacts, c, 6)
-    t1, t2 = tangents(normal)
-    gap = contacts[c, 9]
-    turns = inverse[a, 1] > 0.0
-    for k in range(3):
-        way = normal if k == 0 else t1 if k == 1 else t2
-        soft = softness(inverse, a, arm_a, way)
+@device
+def speed_along(moves, pair, rows, c, first):
+    """Speed of the first body at a contact relative to the second, along the normal or a tangent; moves (n, 6)."""
+    a, b = pair
+    speed = rows[c, first] * moves[a, 0] + rows[c, first + 1] * moves[a, 1] + rows[c, first + 2] * moves[a, 2]
+    if b >= 0:
+        speed -= rows[c, first] * moves[b, 0] + rows[c, first + 1] * moves[b, 1] + rows[c, first + 2] * moves[b, 2]
+    if rows[c, TURNS] > 0.0:
+        speed += rows[c, first + 3] * moves[a, 3] + rows[c, first + 4] * moves[a, 4] + rows[c, first + 5] * moves[a, 5]
         if b >= 0:
-            soft += softness(inverse, b, arm_b, way)
-            turns = turns or inverse[b, 1] > 0.0
-        rows[c, 6 + k] = 1.0 / soft if soft > 0.0 else 0.0
-    speed = dot(difference(moves, a, b, arm_a, arm_b), normal)
-    # A bounce if they would touch in the step; else they may approach until they touch.
-    bounces = speed < -bounce_speed and restitution > 0.0 and gap + speed * dt <= 0.0
-    rows[c, 9] = -restitution * speed if bounces else -max(gap, 0.0) / dt
-    rows[c, 0], rows[c, 1], rows[c, 2] = t1
-    rows[c, 3], rows[c, 4], rows[c, 5] = t2
-    rows[c, 10] = friction
-    rows[c, 11] = SLACK * (min(sizes[1, a], sizes[1, b]) if b >= 0 else sizes[1, a])
-    rows[c, 12] = 1.0 if turns else 0.0
+            speed += rows[c, first + 6] * moves[b, 3] + rows[c, first + 7] * moves[b, 4] + rows[c, first + 8] * moves[b, 5]
+    return speed
 
 
 @device
-def solve_contact(c, pair, contacts, moves, inverse, rows, impulses):
-    """Change the velocities at one contact towards its goal; returns the square of the change of the velocity [m^2/s^2]."""
-    arms = vector(contacts, c, 3), vector(contacts, c, 6)
-    normal, turns = vector(contacts, c, 0), rows[c, 12] > 0.0
-    change = 0.0
-    limit = rows[c, 10] * impulses[c, 0]
-    if limit > 0.0 or impulses[c, 1] != 0.0 or impulses[c, 2] != 0.0:
-        t1, t2 = vector(rows, c, 0), vector(rows, c, 3)
-        slip = difference(moves, pair[0], pair[1], arms[0], arms[1])
-        p1 = impulses[c, 1] - rows[c, 7] * dot(slip, t1)
-        p2 = impulses[c, 2] - rows[c, 8] * dot(slip, t2)
-        length = math.sqrt(p1 * p1 + p2 * p2)
-        if length > limit:  # Coulomb's cone
-            p1, p2 = p1 * limit / length, p2 * limit / length
-        d1, d2 = p1 - impulses[c, 1], p2 - impulses[c, 2]
-        impulses[c, 1], impulses[c, 2] = p1, p2
-        push_both(moves, inverse, pair, arms, add(scale(d1, t1), scale(d2, t2)), turns)
-        change = d1 * d1 + d2 * d2
-    speed = dot(difference(moves, pair[0], pair[1], arms[0], arms[1]), normal)
-    p = max(0.0, impulses[c, 0] + rows[c, 6] * (rows[c, 9] - speed))
-    d = p - impulses[c, 0]
-    if d != 0.0:
-        impulses[c, 0] = p
-        push_both(moves, inverse, pair, arms, scale(d, normal), turns)
-    soft = 1.0 / rows[c, 6]
-    return (change + d * d) * soft * soft
+def push(moves, inverse, pair, rows, c, first, impulse):
+    """Change the velocities of the bodies of a contact by an impulse along the normal or a tangent on the first."""
+    a, b = pair
+    p = impulse * inverse[a, 0]
+    moves[a, 0] += p * rows[c, first]
+    moves[a, 1] += p * rows[c, first + 1]
+    moves[a, 2] += p * rows[c, first + 2]
+    if b >= 0:
+        p = impulse * inverse[b, 0]
+        moves[b, 0] -= p * rows[c, first]
+        moves[b, 1] -= p * rows[c, first + 1]
+        moves[b, 2] -= p * rows[c, first + 2]
+    if rows[c, TURNS] > 0.0:
+        moves[a, 3] += impulse * rows[c, first + 9]
+        moves[a, 4] += impulse * rows[c, first + 10]
+        moves[a, 5] += impulse * rows[c, first + 11]
+        if b >= 0:
+            moves[b, 3] += impulse * rows[c, first + 12]
+            moves[b, 4] += impulse * rows[c, first + 13]
+            moves[b, 5] += impulse * rows[c, first + 14]
 
 
 @routine
-def undo_overlap(c, pair, contacts, bodies, rows, pushes, dt):
+def prepare(c, pair, lasts, contacts, bodies, material, dt, rows):
+    """Write the numbers of a contact for the solver."""
+    moves, inverse, sizes = bodies
+    restitution, friction, bounce_speed = material
+    a, b = pair
+    normal, gap = vector(contacts, c, 0), contacts[c, 9]
+    t1, t2 = tangents(normal)
+    rows[c, TURNS] = 1.0 if inverse[a, 1] > 0.0 or (b >= 0 and inverse[b, 1] > 0.0) else 0.0
+    for k in range(3):
+        way = normal if k == 0 else t1 if k == 1 else t2
+        lever = cross(vector(contacts, c, 3), way)
+        turned = turned_by(inverse, a, lever)
+        soft = inverse[a, 0] + dot(turned, lever)
+        i = WAY * k
+        rows[c, i], rows[c, i + 1], rows[c, i + 2] = way
+        rows[c, i + 3], rows[c, i + 4], rows[c, i + 5] = lever
+        rows[c, i + 9], rows[c, i + 10], rows[c, i + 11] = turned
+        if b >= 0:
+            lever = cross(way, vector(contacts, c, 6))
+            turned = turned_by(inverse, b, lever)
+            soft += inverse[b, 0] + dot(turned, lever)
+            rows[c, i + 6], rows[c, i + 7], rows[c, i + 8] = lever
+            rows[c, i + 12], rows[c, i + 13], rows[c, i + 14] = turned
+        rows[c, i + 15] = 1.0 / soft if soft > 0.0 else 0.0
+    rows[c, SOFT] = 1.0 / rows[c, MASS] if rows[c, MASS] > 0.0 else 0.0
+    speed = speed_along(moves, pair, rows, c, 0)
+    # A bounce if they would touch in the step; else they may approach until they touch.
+    bounces = speed < -bounce_speed and restitution > 0.0 and gap + speed * dt <= 0.0
+    slack = SLACK * (min(sizes[1, a], sizes[1, b]) if b >= 0 else sizes[1, a])
+    # A contact that lasts holds within the slack: if it closed the gap in each step, a pile would tremble.
+    rests = gap <= 0.0 or (lasts and gap <= slack)
+    rows[c, GOAL] = -restitution * speed if bounces else 0.0 if rests else -gap / dt
+    rows[c, FRICTION], rows[c, OVERLAP] = friction, slack
+
+
+@device
+def solve_contact(c, pair, moves, inverse, rows, impulses):
+    """Change the velocities at one contact towards its goal; returns the square of the change of the velocity [m^2/s^2]."""
+    change = 0.0
+    limit = rows[c, FRICTION] * impulses[c, 0]
+    if limit > 0.0 or impulses[c, 1] != 0.0 or impulses[c, 2] != 0.0:
+        p1 = impulses[c, 1] - rows[c, MASS + WAY] * speed_along(moves, pair, rows, c, WAY)
+        p2 = impulses[c, 2] - rows[c, MASS + 2 * WAY] * speed_along(moves, pair, rows, c, 2 * WAY)
+        square = p1 * p1 + p2 * p2
+        if square > limit * limit:  # Coulomb's cone
+            p1, p2 = p1 * limit / math.sqrt(square), p2 * limit / math.sqrt(square)
+        d1, d2 = p1 - impulses[c, 1], p2 - impulses[c, 2]
+        impulses[c, 1], impulses[c, 2] = p1, p2
+        push(moves, inverse, pair, rows, c, WAY, d1)
+        push(moves, inverse, pair, rows, c, 2 * WAY, d2)
+        change = d1 * d1 + d2 * d2
+    p = max(0.0, impulses[c, 0] + rows[c, MASS] * (rows[c, GOAL] - speed_along(moves, pair, rows, c, 0)))
+    d = p - impulses[c, 0]
+    if d != 0.0:
+        impulses[c, 0] = p
+        push(moves, inverse, pair, rows, c, 0, d)
+    return (change + d * d) * rows[c, SOFT] * rows[c, SOFT]
+
+
+@device
+def undo_overlap(c, pair, gap, bodies, rows, pushes, dt):
     """Move the bodies of a contact apart, if their velocities do not do it in the next step."""
     moves, inverse, shifts = bodies
-    arms = vector(contacts, c, 3), vector(contacts, c, 6)
-    normal = vector(contacts, c, 0)
-    # -- what is left after the next step is undone in part
-    speed = dot(difference(moves, pair[0], pair[1], arms[0], arms[1]), normal)
-    deep = SHARE * max(0.0, -contacts[c, 9] - rows[c, 11] - max(0.0, speed) * dt)
-    done = dot(difference(shifts, pair[0], pair[1], arms[0], arms[1]), normal)
-    p = max(0.0, pushes[c] + rows[c, 6] * (deep - done))
+    speed = speed_along(moves, pair, rows, c, 0)
+    deep = SHARE * max(0.0, -gap - rows[c, OVERLAP] - max(0.0, speed) * dt)
+    p = max(0.0, pushes[c] + rows[c, MASS] * (deep - speed_along(shifts, pair, rows, c, 0)))
     d = p - pushes[c]
     if d != 0.0:
         pushes[c] = p
-        push_both(shifts, inverse, pair, arms, scale(d, normal), rows[c, 12] > 0.0)
+        push(shifts, inverse, pair, rows, c, 0, d)
 
 
-@kernel("(F2w F2w F2 F2) (I I F2) (F F F) f8 i8 I F2w (i8 i8)")
+@device
+def push_all(c, pair, inverse, rows, impulses, factor, moves):
+    """Change velocities, or shifts, by the impulses of a contact, times a factor."""
+    for k in range(3):
+        push(moves, inverse, pair, rows, c, WAY * k, factor * impulses[c, k])
+
+
+@kernel("(F2w F2w F2 F2) (I I F2 B) (F F F) f8 i8 I F2w (i8 i8)")
 def solve_worlds(bodies, found, materials, dt, iterations, starts, impulses, part):
     """Solve the contacts of worlds part[0] to part[1] - 1.
 
+    The impulses of a contact that lasts acted during the whole step, so that they also undo half of the path that their change of the
+    velocity makes in it: a body at rest, which its motion model lets fall in each step, stays where it is.
+
     bodies: velocity and angular velocity [m/s rad/s], (n, 6), changed; shifts [m rad], (n, 6), changed from 0; inverse masses (n, 10);
-    sizes [m] (2, n). found: row, other row (-1 for the scene), (m,), and contacts (m, CONTACT). materials: restitution, friction, and
-    speed from which bodies bounce [m/s], by world. dt: time until the next call [s]. starts: first contact of each world,
-    (n_worlds + 1,). impulses: along the normal and both tangents [N s], (m, 3), first guess and result.
+    sizes [m] (2, n). found: row, other row (-1 for the scene), (m,), contacts (m, CONTACT), and whether they are new, (m,). materials:
+    restitution, friction, and speed from which bodies bounce [m/s], by world. dt: length of a step [s]. starts: first contact of
+    each world, (n_worlds + 1,). impulses: along the normal and both tangents [N s], (m, 3), first guess and result.
     """
     moves, shifts, inverse, sizes = bodies
-    row, other, contacts = found
+    row, other, contacts, is_new = found
     restitution, friction, bounce_speed = materials
-    rows = np.empty((starts[part[1]] - starts[part[0]], ROW))
-    pushes = np.zeros(rows.shape[0])
-    base = starts[part[0]]
-    own, own_row, own_other = contacts[base:], row[base:], other[base:]
-    guess = impulses[base:]
+    rows = np.empty((contacts.shape[0], ROW))
+    pushes = np.zeros(contacts.shape[0])
     for w in range(part[0], part[1]):
-        first, last = starts[w] - base, starts[w + 1] - base
+        first, last = starts[w], starts[w + 1]
         material = restitution[w], friction[w], bounce_speed[w]
         for c in range(first, last):
-            prepare(c, own_row, own_other, own, (moves, inverse, sizes), material, dt, rows)
+            lasts = not is_new[c]
+            prepare(c, (row[c], other[c]), lasts, contacts, (moves, inverse, sizes), material, dt, rows)
         for c in range(first, last):
-            if guess[c, 0] > 0.0 and rows[c, 6] > 0.0:
-                ways = vector(own, c, 0), vector(rows, c, 0), vector(rows, c, 3)
-                start = add(
-                    add(scale(guess[c, 0], ways[0]), scale(guess[c, 1], ways[1])), scale(guess[c, 2], ways[2])
-                )
-                arms = vector(own, c, 3), vector(own, c, 6)
-                push_both(moves, inverse, (own_row[c], own_other[c]), arms, start, rows[c, 12] > 0.0)
+            if impulses[c, 0] > 0.0:
+                push_all(c, (row[c], other[c]), inverse, rows, impulses, 1.0, moves)
         for _ in range(iterations):
             change = 0.0
             for c in range(first, last):
-                if rows[c, 6] > 0.0:
-                    pair = own_row[c], own_other[c]
-                    change = max(change, solve_contact(c, pair, own, moves, inverse, rows, guess))
+                if rows[c, MASS] > 0.0:
+                    pair = row[c], other[c]
+                    change = max(change, solve_contact(c, pair, moves, inverse, rows, impulses))
             if change < SETTLED * SETTLED:
                 break
+        for c in range(first, last):
+            if not is_new[c]:
+                push_all(c, (row[c], other[c]), inverse, rows, impulses, 0.5 * dt, shifts)
         for _ in range((iterations + 1) // 2):
             for c in range(first, last):
-                if rows[c, 6] > 0.0 and own[c, 9] < -rows[c, 11]:
-                    undo_overlap(
-                        c, (own_row[c], own_other[c]), own, (moves, inverse, shifts), rows, pushes, dt
-                    )
+                if rows[c, MASS] > 0.0 and contacts[c, 9] < -rows[c, OVERLAP]:
+                    pair = row[c], other[c]
+                    undo_overlap(c, pair, contacts[c, 9], (moves, inverse, shifts), rows, pushes, dt)
 
 
 @device
@@ -256,6 +260,7 @@ def recall(found, bodies, memory, impulses, is_new):
     """
     row, other, contacts = found
     ids, sizes = bodies
+    is_taken = np.zeros((SLOTS, ids.shape[0]), np.bool_)
     for c in range(is_new.shape[0]):
         own, partner, sign = owner(c, row, other, sizes)
         partner_id = float(ids[partner]) if partner >= 0 else 0.0
@@ -266,7 +271,9 @@ def recall(found, bodies, memory, impulses, is_new):
             kept = memory[k, own]
             if kept > 0.0 and math.floor((kept - 1.0) / FEATURES) == partner_id:
                 is_new[c] = False
-                if kept == key:
+                if kept == key and not is_taken[k, own]:
+                    is_taken[k, own] = True
+                    key = -1.0
                     p = (
                         sign * memory[SLOTS + k, own], sign * memory[2 * SLOTS + k, own],
                         sign * memory[3 * SLOTS + k, own],

@@ -177,10 +177,9 @@ def plane_contacts(items, a, planes, k, motion, found, n):
 
 
 @routine
-def tree_contacts(items, a, box, surface, motion, found, n, scratch):
+def tree_contacts(items, a, box, surface, motion, found, n, stack):
     """Add the contacts of a body with the triangles of a tree that a box, lower and upper corner, meets."""
-    bounds, links, root, triangles, inner = surface
-    stack = scratch
+    bounds, links, root, triangles, t, inner = surface
     depth = 0
     if root >= 0:
         stack[0] = root
@@ -198,12 +197,14 @@ def tree_contacts(items, a, box, surface, motion, found, n, scratch):
             depth += 2
             continue
         for k in range(links[node, 0], links[node, 0] + links[node, 1]):
-            n = triangle_contacts(items, a, triangles, k, motion, found, n, inner)
+            for j in range(TRIANGLE):
+                t[0, j] = triangles[k, j]  # as for a field: one array type, so that the compiler makes one version
+            n = triangle_contacts(items, a, t, 0, motion, found, n, inner)
     return n
 
 
 @routine
-def field_contacts(items, a, box, field, motion, found, n, scratch):
+def field_contacts(items, a, box, field, motion, found, n):
     """Add the contacts of a body with the triangles of a height field below and above which a box lies."""
     height, grid, t, inner = field
     ny, nx = height.shape
@@ -270,9 +271,9 @@ def find_surfaces(bodies, motion, planes, tree, field, ints, contacts):
                 n = plane_contacts(items, a, planes, k, move, found, n)
         root = roots[world[a] if roots.shape[0] > 1 else 0]
         n = tree_contacts(
-            items, a, (low, high), (bounds, links, root, triangles, inner), move, found, n, stack
+            items, a, (low, high), (bounds, links, root, triangles, single, inner), move, found, n, stack
         )
-        n = field_contacts(items, a, (low, high), (height, grid, single, inner), move, found, n, stack)
+        n = field_contacts(items, a, (low, high), (height, grid, single, inner), move, found, n)
         for k in range(n):
             if not found[k, 9] < np.inf:  # replaced by another contact
                 continue

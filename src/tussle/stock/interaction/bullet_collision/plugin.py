@@ -92,7 +92,7 @@ class BulletCollision(Interaction):
         )
         impulses, is_new = found.recalled(contacts, w.id, sizes, self.memory)
         if len(contacts):
-            self._respond(w, contacts, sizes, impulses)
+            self._respond(w, contacts, sizes, (impulses, is_new))
         touches = found.remembered(contacts, w.id, sizes, impulses, self.memory)
         self._tell(w, contacts, touches, is_new)
 
@@ -146,7 +146,11 @@ class BulletCollision(Interaction):
         return solids
 
     def _respond(
-        self, w: WorldView, contacts: found.ContactList, sizes: np.ndarray, impulses: np.ndarray
+        self,
+        w: WorldView,
+        contacts: found.ContactList,
+        sizes: np.ndarray,
+        guess: tuple[np.ndarray, np.ndarray],
     ) -> None:
         """Change velocities and positions of the bodies in contact."""
         mass, inertia = w.mass_properties()
@@ -156,7 +160,7 @@ class BulletCollision(Interaction):
         before = state.copy()
         materials = self.restitution, self.friction, self.bounce_speed
         shifts = found.solve(
-            contacts, (state, inverse, sizes), materials, (w.dt, self.iterations), impulses,
+            contacts, (state, inverse, sizes), materials, (w.dt, self.iterations), guess,
             lambda n, run: w.context.split(n, run, 1),
         )  # fmt: skip
         rows = np.flatnonzero((state != before).any(axis=1) | (shifts != 0.0).any(axis=1))
