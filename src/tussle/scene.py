@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from tussle.contacts.solids import StaticSolids
 from tussle.errors import MissionError, ParameterError, listed, nearest_name
 from tussle.geodesy import Origin
 from tussle.prism import Prism
@@ -141,7 +142,8 @@ class Scene:
         _check_kinds("terrain", [self.terrain] if self.terrain is not None else [], HeightField)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {name: value for name, value in self.__dict__.items() if name != "caster"}
+        made = ("caster", "static_walls", "static_solids")
+        return {name: value for name, value in self.__dict__.items() if name not in made}
 
     def with_parts(self, walls: tuple[Volume, ...], terrain: HeightField | None) -> Scene:
         """The scene with further walls, and with a terrain.
@@ -193,6 +195,16 @@ class Scene:
     def caster(self) -> Solids:
         """The solids, ready for rays; made on first access."""
         return Solids(self.solids)
+
+    @cached_property
+    def static_solids(self) -> StaticSolids:
+        """The solids, ready for contacts; made on first access."""
+        return StaticSolids(self.solids)
+
+    @cached_property
+    def static_walls(self) -> StaticSolids:
+        """The walls alone, ready for contacts; made on first access."""
+        return StaticSolids(self.walls)
 
     def cast(self, origins: Any, directions: Any, max_range: Any = np.inf) -> Hits:
         """The first hits of rays on the scene; `g.cast` also finds entities.

@@ -41,6 +41,7 @@ class Context:
         fail: Ends one world with an error; the others continue.
         shared: Objects that handles of several entities use; their method `end` is called when the simulation is closed.
         boxes: Lengths of the boxes of each block for rays [m], (n_blocks, 3); 0 for spheres.
+        mass_properties: Returns mass [kg], (n,), and inertia tensor [kg m^2], (9, n), of all rows of the body table.
     """
 
     clock: Clock
@@ -57,6 +58,7 @@ class Context:
     keys: np.ndarray = field(init=False)
     fail: Callable[[int, PluginError], None] = field(init=False)
     boxes: np.ndarray = field(init=False)
+    mass_properties: Callable[[], tuple[np.ndarray, np.ndarray]] = field(init=False)
     shared: dict[Hashable, Any] = field(default_factory=dict)
     _pool: ThreadPoolExecutor | None = None
 

@@ -191,6 +191,13 @@ class MotionModel(EntityPlugin):
         """Write pos, quat, vel (and omega) of all rows from the state."""
         raise TypeError(f"{type(self).__name__} has no to_body")
 
+    def mass_properties(self) -> tuple[np.ndarray | None, np.ndarray] | None:
+        """Mass [kg], (n,), None for that of the body table, and inertia tensor about the center of mass [kg m^2], body frame, (9, n).
+
+        None for a model whose attitude does not follow from torques.
+        """
+        return None
+
     # -- planning -----------------------------------------------------------------------------------------------------------
 
     def rollout(

@@ -83,3 +83,9 @@ class RigidBodyModel(MotionModel):
     def to_body(self, body: MotionBody) -> None:
         """Write position, velocity, attitude and angular velocity."""
         kernels.write_rigid_bodies(self.rigid_body, body.table, body.first)
+
+    def mass_properties(self) -> tuple[np.ndarray | None, np.ndarray] | None:
+        """The parameters `mass` and the inertia tensor, if the model has one."""
+        tensors = [name for name, column in type(self).params().items() if isinstance(column, InertiaParam)]
+        mass = getattr(self, "mass", None)
+        return (mass, getattr(self, tensors[0])) if tensors else None

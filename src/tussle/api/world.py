@@ -50,6 +50,7 @@ class WorldView(GroupView):
     def __init__(self, bodies: Bodies, context: Context) -> None:
         super().__init__(bodies, 0, bodies.n, context, context.clock.dt)
         self.only: np.ndarray | None = None  # worlds this call acts on, (n_worlds,); None for all
+        self.table_rows: np.ndarray | None = None  # of a call for some worlds: rows of the whole table, (n,)
         self.failing_world: int | None = None
         self.deaths: list[tuple[np.ndarray, str]] = []
         self.moved: list[np.ndarray] = []
@@ -107,12 +108,16 @@ class WorldView(GroupView):
         pos: np.ndarray | None = None,
         vel: np.ndarray | None = None,
         quat: np.ndarray | None = None,
+        omega: np.ndarray | None = None,
     ) -> None:
-        """Set pos [m] (3, m), vel [m/s] (3, m) or quat (4, m) of entities. Their motion models continue from the new state."""
+        """Set pos [m] (3, m), vel [m/s] (3, m), quat (4, m) or omega [rad/s] (3, m) of entities.
+
+        Their motion models continue from the new state.
+        """
         rows = self._rows(rows)
         if not len(rows):
             return
-        for name, given, k in (("pos", pos, 3), ("vel", vel, 3), ("quat", quat, 4)):
+        for name, given, k in (("pos", pos, 3), ("vel", vel, 3), ("quat", quat, 4), ("omega", omega, 3)):
             if given is not None:
                 value = np.asarray(given, float)
                 value = value[:, None] if value.ndim == 1 else value
@@ -121,9 +126,17 @@ class WorldView(GroupView):
                         f"w.move: {name} has shape {value.shape}; it takes ({k}, {len(rows)})"
                     )
                 getattr(self._bodies, name)[:, rows] = value
-        for row in rows:
-            self._bodies.touch(int(row), int(row) + 1)
+        if self._bodies.scans:
+            for row in rows:
+                self._bodies.touch(int(row), int(row) + 1)
+        else:
+            self._bodies.touch(int(rows.min()), int(rows.max()) + 1)
         self.moved.append(rows)
+
+    def mass_properties(self) -> tuple[np.ndarray, np.ndarray]:
+        """Mass [kg], (n,), and inertia tensor [kg m^2], body frame, nine elements, (9, n); 0 for bodies that torques do not turn."""
+        mass, inertia = self.context.mass_properties()
+        return (mass, inertia) if self.table_rows is None else (mass[self.table_rows], inertia[:, self.table_rows])
 
     def spawn(self, block: str, world: Any, **where: Any) -> None:
         """Request new entities of a block, one per item of `world`. They are born at the beginning of the next step.

@@ -87,6 +87,17 @@ class Population:
         self._params: dict[Group, tuple[Params, Params]] = {}
         self.on_new_group: Callable[[], None] = lambda: None
 
+    def mass_properties(self) -> tuple[np.ndarray, np.ndarray]:
+        """Mass [kg], (n,), and inertia tensor [kg m^2], (9, n), of all rows; 0 for those that torques do not turn."""
+        mass, inertia = self.bodies.mass.copy(), np.zeros((9, self.bodies.n))
+        for group in self.groups:
+            found = group.motion.plugin.mass_properties() if group.n else None
+            if found is not None:
+                own, inertia[:, group.first : group.last] = found
+                if own is not None:
+                    mass[group.first : group.last] = own
+        return mass, inertia
+
     # -- groups -------------------------------------------------------------------------------------------------------------
 
     def group_of(self, blocks: tuple[Block, ...], number: int, place: int) -> Group:

@@ -108,6 +108,7 @@ class SimulationState:
         context.topic, context.fail = message_bus.topic, self.record_failure
         self.events = Listeners(context)
         self.population = Population(context, self.overrides, advise_controllers)
+        context.mass_properties = self.population.mass_properties
         nobody = self.population.bodies
         self.checked = nobody.pos, nobody.quat, nobody.health, np.empty(0, bool)
         view = self.world_view = WorldView(self.population.bodies, context)

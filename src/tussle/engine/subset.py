@@ -112,7 +112,7 @@ def call_world_plugin(
     sub_view = copy.copy(view)
     sub_view.own_cache()
     sub_view.deaths, sub_view.moved, sub_view.births = [], [], []
-    sub_view.only = worlds
+    sub_view.only, sub_view.table_rows = worlds, rows
     if view.start_pos.shape[1] == bodies.n:
         sub_view.start_pos = view.start_pos[:, rows]
     sub_view.reset(sub_bodies, 0, len(rows))

@@ -218,6 +218,21 @@ def device(function: Callable[..., Any]) -> Any:
     return Device(function)
 
 
+def routine(function: Callable[..., Any]) -> Any:
+    """Decorator for a larger function that kernels call; it is compiled once for each kernel, which takes less time to compile."""
+    return Routine(function)
+
+
+class Routine(Device):
+    """A larger function that kernels call; compiled once for each kernel, not into each of its callers.
+
+    Args:
+        function: The Python function, available as `py_func`.
+    """
+
+    options: ClassVar[dict[str, Any]] = {"error_model": "numpy"}
+
+
 class Kernel(Device):
     """A function over arrays with one explicit signature, compiled or loaded from disk on the first call.
 

@@ -1,0 +1,1 @@
+"""Contacts between bodies and with the scene: where they touch, and the impulses that keep them apart."""

@@ -1,0 +1,1 @@
+"""Contacts of spheres, capsules and boxes with each other."""

@@ -1,0 +1,190 @@
+"""All contacts of a step, found and solved."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tussle.contacts.bodies import kernels as bodies_kernels
+from tussle.contacts.boxes.kernels import CONTACT
+from tussle.contacts.impulses import kernels as impulses_kernels
+from tussle.contacts.solids import StaticSolids
+from tussle.contacts.surfaces import kernels as surfaces_kernels
+
+SLOTS = impulses_kernels.SLOTS
+Split = Callable[[int, Callable[[int, int], Any]], Any]
+
+
+@dataclass(frozen=True)
+class ContactList:
+    """Contacts, ordered by world.
+
+    Attributes:
+        row: Row of the first body, (m,).
+        other: Row of the second body, (m,); -1 for the scene.
+        numbers: Unit normal from the second to the first, arms [m], gap [m] and feature, (m, CONTACT).
+        starts: First contact of each world, and the end, (n_worlds + 1,).
+    """
+
+    row: np.ndarray
+    other: np.ndarray
+    numbers: np.ndarray
+    starts: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.row)
+
+    @property
+    def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """For kernels."""
+        return self.row, self.other, self.numbers
+
+
+def place(
+    pos: np.ndarray, quat: np.ndarray, radius: np.ndarray, block: np.ndarray, shapes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Items (n, ITEM), and distance of the furthest point from the centre and size of each body [m], (2, n); see `place_shapes`."""
+    items, sizes = np.empty((len(radius), bodies_kernels.ITEM)), np.empty((2, len(radius)))
+    bodies_kernels.place_shapes((pos, quat, radius), block, shapes, items, sizes)
+    return items, sizes
+
+
+def filled(guess: int, run: Callable[[np.ndarray, np.ndarray], int]) -> tuple[np.ndarray, np.ndarray]:
+    """Row and other row, (m, 3), and numbers of contacts, from a kernel that is called again where there was no place for all."""
+    size = guess
+    while True:
+        ints, numbers = np.empty((size, 3), np.int64), np.empty((size, CONTACT))
+        n = run(ints, numbers)
+        if n <= size:
+            return ints[:n], numbers[:n]
+        size = n
+
+
+def find(
+    shapes: tuple[np.ndarray, np.ndarray],
+    pairs: tuple[np.ndarray, np.ndarray],
+    motion: tuple[np.ndarray, float, np.ndarray],
+    scene: StaticSolids,
+    n_worlds: int,
+) -> ContactList:
+    """The contacts of all worlds.
+
+    Args:
+        shapes: Items and sizes of the bodies.
+        pairs: Rows of the pairs that may touch, in the order in which they are solved, (m,) each.
+        motion: Velocities [m/s], (3, n), length of a step [s], and world of each body, (n,).
+        scene: What does not move.
+        n_worlds: Number of worlds.
+    """
+    vel, dt, world = motion
+    (items, sizes), n = shapes, len(world)
+    if len(scene.balls):
+        shapes, pairs, vel = _with_balls(shapes, pairs, (vel, dt), scene.balls)
+    ints, numbers = filled(
+        2 * len(pairs[0]) + 16, lambda *out: bodies_kernels.find_pairs(shapes, pairs, (vel, dt), *out)
+    )
+    ints[:, 1] = np.where(ints[:, 1] < n, ints[:, 1], -1)
+    found = [(ints, numbers)]
+    if not scene.is_empty:
+        bodies, moving = (items, np.ascontiguousarray(sizes[0])), (vel[:, :n], dt, world)
+        found.append(
+            filled(
+                4 * n + 16,
+                lambda *out: surfaces_kernels.find_surfaces(
+                    bodies, moving, scene.planes, scene.tree, scene.field, *out
+                ),
+            )
+        )
+    ints, numbers = (np.concatenate(part) for part in zip(*found, strict=True))
+    own = world[ints[:, 0]]
+    if n_worlds > 1:
+        order = np.argsort(own, kind="stable")
+        ints, numbers, own = ints[order], numbers[order], own[order]
+    starts = np.searchsorted(own, np.arange(n_worlds + 1))
+    row, other = np.ascontiguousarray(ints[:, 0]), np.ascontiguousarray(ints[:, 1])
+    return ContactList(row, other, np.ascontiguousarray(numbers), starts)
+
+
+def _with_balls(
+    shapes: tuple[np.ndarray, np.ndarray],
+    pairs: tuple[np.ndarray, np.ndarray],
+    motion: tuple[np.ndarray, float],
+    balls: np.ndarray,
+) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray], np.ndarray]:
+    """Bodies, pairs and velocities with those of balls that do not move, as further rows."""
+    (items, sizes), (vel, dt), n = shapes, motion, len(shapes[0])
+    row, other = list(pairs[:1]), list(pairs[1:])
+    speed = np.sqrt(vel[0] * vel[0] + vel[1] * vel[1] + vel[2] * vel[2])
+    for k, ball in enumerate(balls):
+        x, y, z = items[:, :3].T - ball[:3, None]
+        near = np.flatnonzero(np.sqrt(x * x + y * y + z * z) <= 1.02 * (sizes[0] + ball[3]) + dt * speed)
+        row.append(near)
+        other.append(np.full(len(near), n + k))
+    ball_sizes = np.stack([balls[:, 3], balls[:, 3]])
+    return (
+        (np.concatenate([items, balls]), np.concatenate([sizes, ball_sizes], axis=1)),
+        (np.concatenate(row), np.concatenate(other)),
+        np.concatenate([vel, np.zeros((3, len(balls)))], axis=1),
+    )
+
+
+def inverse_masses(
+    mass: np.ndarray, inertia: np.ndarray, quat: np.ndarray, moves: np.ndarray
+) -> np.ndarray:
+    """Inverse mass and inertia of each body, world frame, (n, 10); see `invert_masses`."""
+    inverse = np.empty((len(mass), 10))
+    impulses_kernels.invert_masses((mass, inertia, quat), moves, inverse)
+    return inverse
+
+
+def recalled(
+    contacts: ContactList, ids: np.ndarray, sizes: np.ndarray, memory: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Impulses of the last step [N s], (m, 3), and which contacts are of bodies that did not touch in it, (m,)."""
+    impulses, is_new = np.empty((len(contacts), 3)), np.empty(len(contacts), bool)
+    impulses_kernels.recall(contacts.arrays, (ids, sizes), memory, impulses, is_new)
+    return impulses, is_new
+
+
+def remembered(
+    contacts: ContactList, ids: np.ndarray, sizes: np.ndarray, impulses: np.ndarray, memory: np.ndarray
+) -> np.ndarray:
+    """Which contacts touch, (m,); their impulses are written to the memory, (4 SLOTS, n)."""
+    touches = np.empty(len(contacts), bool)
+    impulses_kernels.remember(contacts.arrays, (ids, sizes), impulses, memory, touches)
+    return touches
+
+
+def solve(
+    contacts: ContactList,
+    bodies: tuple[np.ndarray, np.ndarray, np.ndarray],
+    materials: tuple[np.ndarray, np.ndarray, np.ndarray],
+    steps: tuple[float, int],
+    guess: tuple[np.ndarray, np.ndarray],
+    split: Split,
+) -> np.ndarray:
+    """Change velocities so that bodies neither approach where they touch nor slide where friction holds them.
+
+    Args:
+        contacts: The contacts.
+        bodies: Velocity and angular velocity [m/s rad/s], (n, 6), changed; inverse masses (n, 10); sizes [m], (2, n).
+        materials: Restitution, friction, and speed from which bodies bounce [m/s], by world.
+        steps: Length of a step [s], and number of iterations.
+        guess: First guess of the impulses [N s], (m, 3), replaced by the result, and which contacts are new, (m,).
+        split: Calls a function for parts of the worlds, in threads.
+
+    Returns:
+        Shifts and small rotations [m rad] that undo overlaps, (n, 6).
+    """
+    (moves, inverse, sizes), (impulses, is_new) = bodies, guess
+    shifts = np.zeros_like(moves)
+    split(
+        len(contacts.starts) - 1,
+        lambda *part: impulses_kernels.solve_worlds(
+            (moves, shifts, inverse, sizes), (*contacts.arrays, is_new), materials, *steps, contacts.starts, impulses, part
+        ),
+    )
+    return shifts

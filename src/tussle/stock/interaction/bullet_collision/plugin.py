@@ -1,0 +1,214 @@
+"""Contacts of bodies with each other and with the scene."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tussle.api import HistoricAttributes, Interaction, Param, State, WorldView, neighbors
+from tussle.contacts import found
+from tussle.contacts.solids import StaticSolids
+from tussle.errors import ParameterError, listed, nearest_name
+from tussle.messages import EntityCollided, EntityHitGround
+from tussle.numeric.quaternion import quat_multiply, quat_normalize
+
+MOST_FOLLOWED = 2.0
+"""Relative motion in a step up to which pairs are followed, in sizes of the largest body: beyond, all pairs would be near each other."""
+
+
+class BulletCollision(Interaction):
+    """Keeps bodies from passing into each other, into walls, meshes, terrain and ground: they bounce, slide, and rest on each other.
+
+    A body is a sphere of its block's radius, a box where the block has one, or a capsule inside that box for the blocks in `capsules`.
+    Sequential impulses (Catto 2005) at the contacts change the velocities; Coulomb friction, Newton's restitution. Bodies with an
+    inertia tensor turn (motion models such as FreeBody and Multirotor); all others move without turning. A motion model that sets
+    its velocity from commands in each step, such as SingleIntegrator, is only moved out of what it overlaps.
+
+    Fast spheres and capsules are followed within the step, so that they do not pass through others; a box that moves by more than
+    its own size in a step may. `EntityCollided` and `EntityHitGround` are published when a contact begins.
+
+    In the existing system all bodies are spheres; a contact sets the external force to 1 N along the normal, so that a SimpleCar stops.
+    """
+
+    grade = "portable"
+    historic_attributes = HistoricAttributes(
+        unread=(
+            "show_rays", "enable_ray_tracing", "publish_on_local_networks", "pcl_network_name", "pcl_topic_name",
+            "prepend_pcl_topic_with_id",
+        )
+    )  # fmt: skip
+
+    enable_collision_detection = Param(True, structural=True, doc="Whether the plugin does anything.")
+    restitution = Param(
+        0.0, ge=0.0, le=1.0, doc="Normal speed after a bounce over the speed before; 1 keeps the energy."
+    )
+    friction = Param(
+        0.5, ge=0.0, doc="Largest tangential force over the normal force, at rest and in motion."
+    )
+    bounce_speed = Param(
+        0.2, unit="m/s", ge=0.0, doc="Bodies that approach more slowly do not bounce, so that piles rest."
+    )
+    iterations = Param(
+        10, ge=1, le=1000, structural=True, doc="Passes over all contacts; tall piles need more."
+    )
+    capsules = Param(
+        "", doc="Names of the blocks whose entities are capsules along the body x axis, by commas."
+    )
+    fixed = Param("", doc="Names of the blocks whose entities push others and are not pushed, by commas.")
+    enable_team_collisions = Param(True, doc="Team mates collide.")
+    enable_non_team_collisions = Param(True, doc="Entities of different teams collide.")
+    remove_on_collision = Param(False, doc="Remove entities that touch something, instead of pushing them.")
+    enable_terrain = Param(
+        True, structural=True, doc="Ground, terrain and meshes of the mission are solid; walls always are."
+    )
+    enable_ground_plane = Param(False, structural=True, doc="A further ground plane is solid.")
+    ground_plane_height = Param(0.0, unit="m", structural=True, doc="Its height.")
+    show_collision_shapes = Param(False, structural=True, doc="Draw points of contact and their normals.")
+    reach = State(per="world", unit="m", doc="Distance of centres below which pairs are examined.")
+    on_ground = State(dtype=bool, per="entity", doc="Whether the entity touched the scene in the last step.")
+    memory = State(
+        " ".join(f"{name}_{k}" for name in ("key", "x", "y", "z") for k in range(found.SLOTS)),
+        per="entity",
+        doc="Contacts of the last step and their impulses [N s]: the first guess for the next step.",
+    )
+
+    @neighbors("reach", pair="each")
+    @staticmethod
+    def pairs(
+        id: int, other_id: int, team: int, other_team: int,  # noqa: A002 - a column
+        enable_team_collisions: bool, enable_non_team_collisions: bool,
+    ) -> int | None:  # fmt: skip
+        if id > other_id or not (
+            enable_team_collisions if team == other_team else enable_non_team_collisions
+        ):
+            return None
+        return other_id
+
+    def step(self, w: WorldView) -> None:
+        if not self.enable_collision_detection or not w.n:
+            return
+        items, sizes = found.place(w.pos, w.quat, w.radius, w.block, self._shapes(w))
+        contacts = found.find(
+            (items, sizes), self._near(w, sizes[0]), (w.vel, w.dt, w.world), self._scene(w), w.n_worlds
+        )
+        impulses, is_new = found.recalled(contacts, w.id, sizes, self.memory)
+        if len(contacts):
+            self._respond(w, contacts, sizes, (impulses, is_new))
+        touches = found.remembered(contacts, w.id, sizes, impulses, self.memory)
+        self._tell(w, contacts, touches, is_new)
+
+    def _near(self, w: WorldView, far: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Rows of the pairs that may touch, ordered by ids, (m,) each."""
+        is_sane = np.isfinite(w.vel[0] + w.vel[1] + w.vel[2])
+        size, low, high = (np.full((k, w.n_worlds), v) for k, v in ((1, 0.0), (3, np.inf), (3, -np.inf)))
+        vel = np.where(is_sane, w.vel, 0.0)
+        np.maximum.at(size[0], w.world, far)
+        for i in range(3):
+            np.minimum.at(low[i], w.world, vel[i])
+            np.maximum.at(high[i], w.world, vel[i])
+        x, y, z = np.where(high > low, high - low, 0.0)
+        motion = np.minimum(w.dt * np.sqrt(x * x + y * y + z * z), MOST_FOLLOWED * size[0])
+        self.reach[:] = np.maximum(2.02 * size[0] + motion, 1e-6)
+        listed_pairs = self.pairs(w)
+        row, other = listed_pairs.row, listed_pairs.other
+        order = np.argsort((w.id[row] << 32) + w.id[other], kind="stable")
+        return row[order], other[order]
+
+    def _shapes(self, w: WorldView) -> np.ndarray:
+        """Radius, negative for that of the body, and half lengths of each block [m], (n_blocks, 4)."""
+        half = 0.5 * w.context.boxes
+        is_box = half[:, 0] > 0.0
+        shapes = np.concatenate([np.where(is_box, 0.0, -1.0)[:, None], half], axis=1)
+        for block in self._blocks(w, "capsules"):
+            if not is_box[block]:
+                raise ParameterError(
+                    f"BulletCollision.capsules: block {w.context.block_names[block]!r} has no box; a capsule takes its length and width "
+                    "from box_x, box_y and box_z"
+                )
+            radius = max(half[block, 1], half[block, 2])
+            shapes[block] = radius, max(half[block, 0] - radius, 0.0), 0.0, 0.0
+        return shapes
+
+    def _blocks(self, w: WorldView, param: str) -> list[int]:
+        """Numbers of the blocks that a parameter names."""
+        known, numbers = w.context.block_names, []
+        for name in (part.strip() for part in getattr(self, param).split(",")):
+            if name and name not in known:
+                raise ParameterError(
+                    f"BulletCollision.{param} = {getattr(self, param)!r}: there is no block {name!r}{nearest_name(name, known)}; {listed(known)}"
+                )
+            numbers += [known.index(name)] if name else []
+        return numbers
+
+    def _scene(self, w: WorldView) -> StaticSolids:
+        solids = w.scene.static_solids if self.enable_terrain else w.scene.static_walls
+        if self.enable_ground_plane:
+            return solids.with_plane((0.0, 0.0, 1.0, self.ground_plane_height))
+        return solids
+
+    def _respond(
+        self,
+        w: WorldView,
+        contacts: found.ContactList,
+        sizes: np.ndarray,
+        guess: tuple[np.ndarray, np.ndarray],
+    ) -> None:
+        """Change velocities and positions of the bodies in contact."""
+        mass, inertia = w.mass_properties()
+        moves = ~self.remove_on_collision[w.world] & ~np.isin(w.block, self._blocks(w, "fixed"))
+        inverse = found.inverse_masses(mass, inertia, w.quat, moves)
+        state = np.ascontiguousarray(np.concatenate([w.vel, w.omega]).T)
+        before = state.copy()
+        materials = self.restitution, self.friction, self.bounce_speed
+        shifts = found.solve(
+            contacts, (state, inverse, sizes), materials, (w.dt, self.iterations), guess,
+            lambda n, run: w.context.split(n, run, 1),
+        )  # fmt: skip
+        rows = np.flatnonzero((state != before).any(axis=1) | (shifts != 0.0).any(axis=1))
+        if not len(rows):
+            return
+        vel, omega = np.split(state[rows].T, 2)
+        shift, turn = np.split(shifts[rows].T, 2)
+        w.move(rows, pos=w.pos[:, rows] + shift, vel=vel)
+        turns = np.flatnonzero(inverse[rows, 1] > 0.0)
+        if len(turns):
+            own = rows[turns]
+            small = np.concatenate([np.ones((1, len(own))), 0.5 * turn[:, turns]])
+            quat = quat_normalize(quat_multiply(small, w.quat[:, own]))
+            w.move(own, quat=quat, omega=omega[:, turns])
+
+    def _tell(
+        self, w: WorldView, contacts: found.ContactList, touches: np.ndarray, is_new: np.ndarray
+    ) -> None:
+        """Publish the contacts that begin, and remove entities where that is asked for."""
+        is_body = contacts.other >= 0
+        removes = self.remove_on_collision[w.world]
+        met = np.flatnonzero(touches & is_new & is_body)
+        if len(met):
+            pair = np.unique(np.stack([contacts.row[met], contacts.other[met]]), axis=1)
+            order = np.lexsort((w.id[pair[1]], w.id[pair[0]], w.world[pair[0]]))
+            first, second = pair[:, order]
+            w.publish(
+                EntityCollided, w.world[first], first=w.id[first], second=w.id[second],
+                first_team=w.team[first], second_team=w.team[second],
+            )  # fmt: skip
+            both = np.unique(pair)
+            w.kill(both[removes[both]], "collision")
+        down = np.zeros(w.n, bool)
+        down[contacts.row[touches & ~is_body]] = True
+        rows = np.flatnonzero(down & ~self.on_ground)
+        if len(rows):
+            w.publish(EntityHitGround, w.world[rows], entity=w.id[rows], team=w.team[rows])
+            w.kill(rows[removes[rows]], "ground")
+        self.on_ground[:] = down
+        if self.show_collision_shapes and touches.any():
+            at = contacts.row[touches]
+            normal = contacts.numbers[touches, :3].T
+            w.draw.vectors(
+                pos=w.pos[:, at] + contacts.numbers[touches, 3:6].T, direction=normal * sizes_of(w, at),
+                world=w.world[at], colour=(255, 0, 0),
+            )  # fmt: skip
+
+
+def sizes_of(w: WorldView, rows: np.ndarray) -> np.ndarray:
+    """Radii of entities [m], (m,)."""
+    return w.radius[rows]
