@@ -382,7 +382,7 @@ class Handle(Column):
 
     The plugin may define these methods:
 
-    * open_one(row): Create the object of a new row; `row` has world, id, seed and position. Without it the object is None.
+    * open_one(row): Create the object of a new row; `row` has world, id, seed, position and more. Without it the object is None.
     * close_one(handle): Release one row's object; called exactly once for each opened object.
     * save_one(handle): Picklable state of one row's object. Without it snapshots are refused.
     * load_one(row, state): Recreate a saved object. Without it `open_one` is called.

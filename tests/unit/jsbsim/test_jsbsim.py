@@ -172,7 +172,8 @@ def test_worlds_snapshots_and_moved_aircraft():
         assert body(alone, "vel")[:, 2] == pytest.approx(-9.8 * 61 / 120, rel=0.02)
 
 
-def test_a_flightgear_receives_the_states():
+@pytest.mark.parametrize("processes", [1, 2])
+def test_a_flightgear_receives_the_states(processes):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as viewer:
         viewer.bind(("127.0.0.1", 0))
         viewer.settimeout(60.0)
@@ -181,7 +182,7 @@ def test_a_flightgear_receives_the_states():
             "flightgear_ip": "127.0.0.1",
             "flightgear_port": viewer.getsockname()[1],
         }
-        Simulation(mission(JSBSimControl(aircraft="ball", **shown))).step(30)
+        Simulation(mission(JSBSimControl(aircraft="ball", processes=processes, **shown))).step(30)
         assert len(viewer.recv(4096)) > 300
 
 
