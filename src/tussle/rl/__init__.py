@@ -14,7 +14,7 @@ from tussle.rl.games import PredatorPrey
 from tussle.rl.observation import Component, Computed, Each, Means, NearestOthers, Own, Sectors
 from tussle.rl.parallel import TaskParallelEnv, parallel_env
 from tussle.rl.reward import Situation, Term, alive, captured, captures, collisions, died
-from tussle.rl.swarm import Swarm, make_swarm
+from tussle.rl.swarm import Swarm, make_swarm, record_episode
 from tussle.rl.task import Task
 
 __all__ = [
@@ -43,6 +43,7 @@ __all__ = [
     "make_swarm",
     "make_vec",
     "parallel_env",
+    "record_episode",
     "register",
 ]
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
@@ -426,4 +427,34 @@ def make_swarm(task: Any, num_envs: int = 1, *, autoreset: str = "same_step", th
     return Swarm(task, num_envs, autoreset=autoreset, threads=threads)
 
 
-__all__ = ["Swarm", "make_swarm", "task_of"]
+def record_episode(
+    task: Any, policy: Callable[[np.ndarray], Any], directory: str | Path, *, seed: int = 1
+) -> dict[str, float]:
+    """Play one episode and record it as a run directory, which the viewer, plots and tables open like any other.
+
+    Args:
+        task: A Task, or a class of one.
+        policy: Function of observations (1, A, n) that returns actions, as for `Swarm.step`.
+        directory: Run directory; it must not hold a run.
+        seed: Seed of the episode; `Swarm.seeds` has those of episodes that were played.
+
+    Returns:
+        Sum of each term over agents and decisions.
+
+    Raises:
+        RecordError: The directory holds a run, or cannot be written.
+    """
+    from tussle.record import Recorder  # Arrow takes long to import
+
+    with Swarm(task, 1, autoreset="disabled") as swarm:
+        obs = swarm.reset(seed=seed)
+        sums = dict.fromkeys(swarm.terms, 0.0)
+        with Recorder(swarm.simulation, directory):
+            while not swarm.over[0]:
+                obs, *_ = swarm.step(policy(obs))
+                for name, term in swarm.terms.items():
+                    sums[name] += float(term.sum(dtype=float))
+    return sums
+
+
+__all__ = ["Swarm", "make_swarm", "record_episode", "task_of"]

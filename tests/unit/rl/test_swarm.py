@@ -5,9 +5,20 @@ import gc
 import numpy as np
 import pytest
 
-from tussle import Simulation
+from tussle import Simulation, load_run
 from tussle.errors import ParameterError
-from tussle.rl import Act, Computed, Each, Means, NearestOthers, Own, Sectors, Term, make_swarm
+from tussle.rl import (
+    Act,
+    Computed,
+    Each,
+    Means,
+    NearestOthers,
+    Own,
+    Sectors,
+    Term,
+    make_swarm,
+    record_episode,
+)
 
 
 def play(swarm, actions, n):
@@ -243,3 +254,28 @@ def test_tasks_end_by_their_own_rule(task):
     bad.reset(seed=1)
     with pytest.raises(ParameterError, match="ends returns shape"):
         bad.step(np.ones((1, 6, 2), np.float32))
+
+
+def test_an_episode_is_recorded_as_a_run(task, tmp_path):
+    swarm = make_swarm(task, 1, autoreset="disabled")
+    obs = swarm.reset(seed=9)
+    total = 0.0
+    while not swarm.over[0]:
+        obs, rewards, *_ = swarm.step(np.sin(obs[..., :2]))
+        total += rewards.sum(dtype=float)
+    sums = record_episode(task, lambda seen: np.sin(seen[..., :2]), tmp_path / "run", seed=9)
+    assert sums["alive"] + sums["captured"] == pytest.approx(total, rel=1e-5)
+    run = load_run(tmp_path / "run")
+    last = run.trajectory[run.trajectory["step"] == run.trajectory["step"].max()]
+    assert 0 < len(last) <= 8
+    recorded = run.trajectory["step"].max()
+    assert recorded in (swarm.lengths[0] - 1, swarm.lengths[0])
+
+
+def test_other_libraries_share_the_memory(task):
+    swarm = make_swarm(task, 2)
+    obs = swarm.reset(seed=1)
+    shared = np.from_dlpack(obs)
+    swarm.step(np.zeros((2, 6, 2), np.float32))
+    assert np.shares_memory(shared, swarm.obs)
+    np.testing.assert_array_equal(shared, swarm.obs)
