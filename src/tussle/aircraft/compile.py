@@ -16,11 +16,21 @@ from tussle.aircraft import air, contact, runtime
 from tussle.aircraft.aerodynamics import emit_aerodynamics
 from tussle.aircraft.buoyancy import emit_buoyancy, read_buoyancy
 from tussle.aircraft.code import STATE, Code, normal
+from tussle.aircraft.contact import WIDTH
 from tussle.aircraft.control import declare, emit_control, offer_commands
-from tussle.aircraft.equations import AIR_DATA, CORE, FLOW_PROPERTIES, PROPULSION_PROPERTIES, emit_accelerations, emit_propagate, flow_by_lengths, lever, offer
+from tussle.aircraft.equations import (
+    AIR_DATA,
+    CORE,
+    FLOW_PROPERTIES,
+    PROPULSION_PROPERTIES,
+    emit_accelerations,
+    emit_propagate,
+    flow_by_lengths,
+    lever,
+    offer,
+)
 from tussle.aircraft.external import emit_external
 from tussle.aircraft.files import Files
-from tussle.aircraft.contact import WIDTH
 from tussle.aircraft.ground import emit_ground, offer_steering, read_ground
 from tussle.aircraft.mass import emit_mass, read_mass
 from tussle.aircraft.metrics import offer_metrics, read_metrics

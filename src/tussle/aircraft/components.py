@@ -12,7 +12,7 @@ from tussle.aircraft.functions import expression, only, table
 from tussle.aircraft.node import Node
 from tussle.errors import listed
 
-IGNORED = ("description", "documentation", "output")
+IGNORED = ("description", "documentation", "limitation", "output")
 OPERATORS = {"eq": "==", "==": "==", "ne": "!=", "!=": "!=", "gt": ">", ">": ">", "ge": ">=", ">=": ">=", "lt": "<", "<": "<",
              "le": "<=", "<=": "<="}  # fmt: skip
 MOST_DELAY, SHORTEST_STEP_RATE = 10_000, 240
