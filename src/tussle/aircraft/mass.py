@@ -125,7 +125,7 @@ def emit_mass(code: Code, mass: Mass, tanks: Any, cells: tuple[Bag, ...] = ()) -
         code.line(f"cg_{axis} = ({' + '.join(moments)}) / weight")
     for axes, value in zip(("xx", "yy", "zz", "xy", "xz", "yz"), mass.inertia, strict=True):
         code.line(f"j{axes} = {value!r}")
-    for k, (weight, (x, y, z), own) in enumerate(parts):
+    for k, (weight, (x, y, z), around) in enumerate(parts):
         center = "cg" if k < fixed else "last"
         code.lines(f"""
 m = {weight} / {POUND_PER_SLUG!r}
@@ -139,10 +139,10 @@ jxy -= m * arm_x * arm_y
 jxz -= m * arm_x * arm_z
 jyz -= m * arm_y * arm_z
 """)
-        for axes, value in zip(("xx", "yy", "zz"), own or (), strict=False):
-            code.line(f"j{axes} += {value}")
-    for axes, value in zip(("xx", "yy", "zz", "xy", "xz", "yz"), gas_inertia, strict=False):
-        code.line(f"j{axes} += {value}")
+        for axes, more in zip(("xx", "yy", "zz"), around or (), strict=False):
+            code.line(f"j{axes} += {more}")
+    for axes, more in zip(("xx", "yy", "zz", "xy", "xz", "yz"), gas_inertia, strict=False):
+        code.line(f"j{axes} += {more}")
     for axis, name in zip("xyz", last, strict=True):
         code.line(f"{name} = cg_{axis}")
     offer(code, {
