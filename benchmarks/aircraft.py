@@ -1,7 +1,7 @@
 """Compiled aircraft beside JSBSim: who compiles, how far flights are apart, speed, threads, compile time, a mission.
 
-    python benchmarks/aircraft.py --parts census match speed threads compile mission --json out.json
-    python benchmarks/aircraft.py --parts match --aircraft c172p 737
+python benchmarks/aircraft.py --parts census match speed threads compile mission --json out.json
+python benchmarks/aircraft.py --parts match --aircraft c172p 737
 """
 
 from __future__ import annotations
@@ -27,7 +27,13 @@ from tussle.aircraft.node import AircraftError
 DT = 1.0 / 120.0
 PARTS = ("census", "match", "speed", "threads", "compile", "mission")
 UNLOADABLE = ("L17", "Pterosaur", "dr1", "f104", "fokker100", "fokker50", "blank")
-PLACE = {"ic/lat-geod-deg": 33.0, "ic/long-gc-deg": -84.0, "ic/psi-true-deg": 30.0, "ic/theta-deg": 2.0, "ic/phi-deg": 1.0}
+PLACE = {
+    "ic/lat-geod-deg": 33.0,
+    "ic/long-gc-deg": -84.0,
+    "ic/psi-true-deg": 30.0,
+    "ic/theta-deg": 2.0,
+    "ic/phi-deg": 1.0,
+}
 STARTS = {  # altitude [ft], speed [ft/s] of those that 5,000 ft and 180 ft/s do not suit
     "737": (20000.0, 700.0), "787-8": (20000.0, 700.0), "A320": (20000.0, 700.0), "MD11": (20000.0, 700.0), "B747": (20000.0, 700.0),
     "T37": (15000.0, 450.0), "T38": (15000.0, 600.0), "XB-70": (30000.0, 1200.0), "Shuttle": (30000.0, 900.0), "A4": (15000.0, 600.0),
@@ -35,6 +41,8 @@ STARTS = {  # altitude [ft], speed [ft/s] of those that 5,000 ft and 180 ft/s do
     "Concorde": (30000.0, 1000.0), "OV10": (8000.0, 300.0), "B17": (8000.0, 280.0), "t6texan2": (8000.0, 350.0), "X15": (40000.0, 1500.0),
     "wrightFlyer1903": (2000.0, 45.0), "minisgs": (3000.0, 60.0), "J3Cub": (3000.0, 100.0), "F450": (500.0, 1.0),
 }  # fmt: skip
+SUBSTEPS = 12
+"""Steps of 1/120 s in a step of a mission of 0.1 s, which are one call of the kernel."""
 LOW = 300.0  # [ft] above ground where a comparison ends
 
 
@@ -62,7 +70,10 @@ def loaded(name: str, start: dict[str, float]) -> Any:
 
 def state_of(fdm: Any) -> list[np.ndarray]:
     """Arguments of `place` after the state."""
-    single = [np.array([fdm[key]]) for key in ("position/lat-geod-rad", "position/long-gc-rad", "position/geod-alt-ft")]
+    single = [
+        np.array([fdm[key]])
+        for key in ("position/lat-geod-rad", "position/long-gc-rad", "position/geod-alt-ft")
+    ]
     triples = (
         ("attitude/phi-rad", "attitude/theta-rad", "attitude/psi-rad"),
         ("velocities/v-north-fps", "velocities/v-east-fps", "velocities/v-down-fps"),
@@ -86,7 +97,11 @@ def start_of(name: str) -> dict[str, float]:
 
 
 def match(
-    name: str, end: float = 60.0, controls: Any = commands, start: dict[str, float] | None = None, low: float = LOW
+    name: str,
+    end: float = 60.0,
+    controls: Any = commands,
+    start: dict[str, float] | None = None,
+    low: float = LOW,
 ) -> dict[str, Any]:
     """Fly an aircraft in JSBSim and compiled; the largest distance [m] and angle [deg] until the end, or until it is low."""
     fdm = loaded(name, start or start_of(name))
@@ -100,7 +115,9 @@ def match(
     for step in range(round(end / DT)):
         t = (step + 1) * DT
         for key, value in controls(step * DT).items():
-            for name_k in [key] + [f"{key}[{k}]" for k in range(1, aircraft.n_engines) if "throttle" in key or "mixture" in key]:
+            for name_k in [key] + [
+                f"{key}[{k}]" for k in range(1, aircraft.n_engines) if "throttle" in key or "mixture" in key
+            ]:
                 fdm[name_k] = value
                 if name_k in aircraft.slots:
                     x[aircraft.slots[name_k]] = value
@@ -113,7 +130,13 @@ def match(
         angle = max(angle, angle_between(fdm, x[:4, 0]))
         if at_30 is None and t >= 30.0:
             at_30 = distance
-    return {"aircraft": name, "until_s": round(t, 2), "distance_m": distance, "angle_deg": angle, "distance_at_30_s_m": at_30}
+    return {
+        "aircraft": name,
+        "until_s": round(t, 2),
+        "distance_m": distance,
+        "angle_deg": angle,
+        "distance_at_30_s_m": at_30,
+    }
 
 
 def angle_between(fdm: Any, quat: np.ndarray) -> float:
@@ -122,8 +145,12 @@ def angle_between(fdm: Any, quat: np.ndarray) -> float:
     from tussle.numeric.quaternion import quat_conjugate, quat_multiply
 
     latitude, longitude, _, euler, *_ = state_of(fdm)
-    turn = quat_multiply(rotation(2, longitude + fdm["position/epa-rad"]), rotation(1, -0.5 * np.pi - latitude))
-    attitude = quat_multiply(rotation(2, euler[2]), quat_multiply(rotation(1, euler[1]), rotation(0, euler[0])))
+    turn = quat_multiply(
+        rotation(2, longitude + fdm["position/epa-rad"]), rotation(1, -0.5 * np.pi - latitude)
+    )
+    attitude = quat_multiply(
+        rotation(2, euler[2]), quat_multiply(rotation(1, euler[1]), rotation(0, euler[0]))
+    )
     error = quat_multiply(quat_conjugate(quat_multiply(turn, attitude)), quat[:, None])[:, 0]
     return math.degrees(2.0 * math.asin(min(1.0, float(np.linalg.norm(error[1:])))))
 
@@ -157,9 +184,9 @@ def speed(name: str, n: int) -> dict[str, float]:
             fdm.run()
         theirs.append((time.process_time() - begin) / 4000 * 1e6)
         begin = time.process_time()
-        for _ in range(40):
-            aircraft.advance(x, aircraft.tables, 0, n, 1, DT, DT)
-        ours.append((time.process_time() - begin) / 40 / n * 1e6)
+        for _ in range(5):
+            aircraft.advance(x, aircraft.tables, 0, n, SUBSTEPS, DT, DT)
+        ours.append((time.process_time() - begin) / 5 / SUBSTEPS / n * 1e6)
     return {"n": n, "jsbsim_us": min(theirs), "compiled_us": min(ours), "ratio": min(theirs) / min(ours)}
 
 
@@ -236,13 +263,17 @@ def mission(counts: list[int]) -> list[dict[str, float]]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--parts", nargs="+", choices=PARTS, default=list(PARTS))
     parser.add_argument("--aircraft", nargs="+", default=[])
     parser.add_argument("--counts", nargs="+", type=int, default=[200, 2000])
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
-    folders = sorted(each.name for each in (Path(jsbsim.get_default_root_dir()) / "aircraft").iterdir() if each.is_dir())
+    folders = sorted(
+        each.name for each in (Path(jsbsim.get_default_root_dir()) / "aircraft").iterdir() if each.is_dir()
+    )
     names = options.aircraft or [name for name in folders if name not in UNLOADABLE]
     made: dict[str, Any] = {}
     if "census" in options.parts:

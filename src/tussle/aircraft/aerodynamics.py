@@ -52,7 +52,9 @@ class Axes:
                 elif name in ("AXIAL", "NORMAL"):
                     self.forces = "AXIAL"
             else:
-                raise axis.error(f"axis {name[:40]!r} is not known; there are: {', '.join((*FORCES, *MOMENTS))}")
+                raise axis.error(
+                    f"axis {name[:40]!r} is not known; there are: {', '.join((*FORCES, *MOMENTS))}"
+                )
 
 
 def emit_aerodynamics(code: Code, node: Node | None, metrics: Metrics) -> None:

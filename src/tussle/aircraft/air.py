@@ -30,7 +30,9 @@ def atmosphere(height):
     lapse = LAPSES[b]
     temperature = TEMPERATURES[b] + lapse * (h - ALTITUDES[b])
     if lapse != 0.0:
-        return temperature, PRESSURES[b] * power(TEMPERATURES[b] / temperature, STANDARD_GRAVITY / (GAS * lapse))
+        return temperature, PRESSURES[b] * power(
+            TEMPERATURES[b] / temperature, STANDARD_GRAVITY / (GAS * lapse)
+        )
     return temperature, PRESSURES[b] * exp(-STANDARD_GRAVITY * (h - ALTITUDES[b]) / (GAS * TEMPERATURES[b]))
 
 
@@ -57,7 +59,9 @@ def pressure_altitude(pressure):
         b += 1
     lapse, base = LAPSES[b], TEMPERATURES[b]
     if lapse != 0.0:
-        h = ALTITUDES[b] + (base / lapse) * (power(pressure / PRESSURES[b], -GAS * lapse / STANDARD_GRAVITY) - 1.0)
+        h = ALTITUDES[b] + (base / lapse) * (
+            power(pressure / PRESSURES[b], -GAS * lapse / STANDARD_GRAVITY) - 1.0
+        )
     else:
         h = ALTITUDES[b] - GAS * base / STANDARD_GRAVITY * log(pressure / PRESSURES[b])
     return h * EARTH_RADIUS / (EARTH_RADIUS - h)

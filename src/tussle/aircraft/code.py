@@ -277,4 +277,3 @@ class Code:
         for line in self.sections[name].lines:
             if not line.name or self.is_used(line.name):
                 yield "    " * (depth + line.depth) + line.text
-

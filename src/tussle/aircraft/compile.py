@@ -16,11 +16,21 @@ from tussle.aircraft import air, contact, runtime
 from tussle.aircraft.aerodynamics import emit_aerodynamics
 from tussle.aircraft.buoyancy import emit_buoyancy, read_buoyancy
 from tussle.aircraft.code import STATE, Code, normal
+from tussle.aircraft.contact import WIDTH
 from tussle.aircraft.control import declare, emit_control, offer_commands
-from tussle.aircraft.equations import AIR_DATA, CORE, FLOW_PROPERTIES, PROPULSION_PROPERTIES, emit_accelerations, emit_propagate, flow_by_lengths, lever, offer
+from tussle.aircraft.equations import (
+    AIR_DATA,
+    CORE,
+    FLOW_PROPERTIES,
+    PROPULSION_PROPERTIES,
+    emit_accelerations,
+    emit_propagate,
+    flow_by_lengths,
+    lever,
+    offer,
+)
 from tussle.aircraft.external import emit_external
 from tussle.aircraft.files import Files
-from tussle.aircraft.contact import WIDTH
 from tussle.aircraft.ground import emit_ground, offer_steering, read_ground
 from tussle.aircraft.mass import emit_mass, read_mass
 from tussle.aircraft.metrics import offer_metrics, read_metrics
@@ -35,13 +45,20 @@ KNOWN = (
     "external_reactions", "buoyant_forces", "aerodynamics", "output", "input", "documentation", "description",
 )  # fmt: skip
 DECLARING = "metrics", "aerodynamics", "propulsion", "mass_balance", "ground_reactions", "buoyant_forces"
-WIND = tuple(f"atmosphere/{kind}-{axis}-fps" for kind in ("wind", "gust") for axis in ("north", "east", "down"))
+WIND = tuple(
+    f"atmosphere/{kind}-{axis}-fps" for kind in ("wind", "gust") for axis in ("north", "east", "down")
+)
 BUILT_IN = (
     "aero/", "atmosphere/", "velocities/", "position/", "attitude/", "propulsion/", "inertia/", "forces/", "moments/",
     "accelerations/", "simulation/", "flight-path/", "inertial/", "metrics/", "ic/", "environment/",
 )  # fmt: skip
 """Beginnings of JSBSim's own properties. Others belong to the aircraft: what nobody writes is a command from outside, 0 at first."""
-SCOPE = {name: each for module in (runtime, air, contact) for name, each in vars(module).items() if isinstance(each, Device)}
+SCOPE = {
+    name: each
+    for module in (runtime, air, contact)
+    for name, each in vars(module).items()
+    if isinstance(each, Device)
+}
 SCOPE |= {name: getattr(numeric, name) for name in numeric.__all__} | RUNTIME | {"math": math, "np": np}
 
 
@@ -87,7 +104,9 @@ class CompiledAircraft:
         return self.slots[name]
 
 
-def emit(root: Node, find: Callable[[Node, str, str], Node], keep: Sequence[str] = ()) -> tuple[Code, Propulsion | None]:
+def emit(
+    root: Node, find: Callable[[Node, str, str], Node], keep: Sequence[str] = ()
+) -> tuple[Code, Propulsion | None]:
     """Emit the step and the start of an aircraft.
 
     Raises:
@@ -132,7 +151,9 @@ def emit(root: Node, find: Callable[[Node, str, str], Node], keep: Sequence[str]
         code.line(f"force_{axis} = aero_f{axis} + prop_f{axis} + gear_f{axis} + ext_f{axis} + buoy_f{axis}")
         code.line(f"moment_{axis} = aero_m{axis} + prop_m{axis} + gear_m{axis} + ext_m{axis} + buoy_m{axis}")
     emit_accelerations(code, friction)
-    code.arrays = {"work": (2 * len(contacts), WIDTH), "matrix": (2 * len(contacts), 2 * len(contacts) + 1), "gear": (len(contacts), 11)} if contacts else {}
+    if contacts:
+        n = len(contacts)
+        code.arrays = {"work": (2 * n, WIDTH), "matrix": (2 * n, 2 * n + 1), "gear": (n, 11)}
     code.begin("start")
     if propulsion:
         propulsion.emit_start(code)

@@ -12,7 +12,7 @@ from tussle.aircraft.functions import expression, only, table
 from tussle.aircraft.node import Node
 from tussle.errors import listed
 
-IGNORED = ("description", "documentation", "output")
+IGNORED = ("description", "documentation", "limitation", "output")
 OPERATORS = {"eq": "==", "==": "==", "ne": "!=", "!=": "!=", "gt": ">", ">": ">", "ge": ">=", ">=": ">=", "lt": "<", "<": "<",
              "le": "<=", "<=": "<="}  # fmt: skip
 MOST_DELAY, SHORTEST_STEP_RATE = 10_000, 240
@@ -94,10 +94,16 @@ class Component:
         is_time = found.get("type", "time") != "frames"
         most = amount * SHORTEST_STEP_RATE if is_time else amount
         if not 0.0 <= most <= MOST_DELAY:
-            raise found.error(f"a delay of {amount:g} is not allowed; it is at most {MOST_DELAY} frames of 1/{SHORTEST_STEP_RATE} s")
+            raise found.error(
+                f"a delay of {amount:g} is not allowed; it is at most {MOST_DELAY} frames of 1/{SHORTEST_STEP_RATE} s"
+            )
         # JSBSim's ring of n outputs delays by n - 1 frames.
         ring, place = code.ring(int(most) + 2), self.state("delay")
-        n = code.temporary(f"min(math.floor({amount!r} / {self.dt}), {int(most)}.0)" if is_time else f"{float(int(amount))!r}")
+        n = code.temporary(
+            f"min(math.floor({amount!r} / {self.dt}), {int(most)}.0)"
+            if is_time
+            else f"{float(int(amount))!r}"
+        )
         with code.block(f"if {n} > 0.0"):
             code.line(f"x[{ring} + int({place}), row] = {out}")
             code.line(f"{place} = 0.0 if {place} >= {n} - 1.0 else {place} + 1.0")
@@ -164,7 +170,12 @@ class Component:
     def _filter(self, formula: Callable[[str, str, str], str]) -> str:
         """A filter of first order: output from input, last input and last output; it starts with its input as output."""
         code = self.code
-        x, x1, y1, begun = code.temporary(self.input), self.state("input"), self.state("output"), self.state("begun")
+        x, x1, y1, begun = (
+            code.temporary(self.input),
+            self.state("input"),
+            self.state("output"),
+            self.state("begun"),
+        )
         y = code.temporary(x)
         with code.block(f"if {begun} != 0.0"):
             code.line(f"{y} = {formula(x, x1, y1)}")
@@ -180,22 +191,28 @@ class Component:
     def washout_filter(self) -> str:
         c, dt = self.parameter("c1"), self.dt
         return self._filter(
-            lambda x, x1, y1: f"({x} - {x1}) * (2.0 / (2.0 + {dt} * {c})) + {y1} * ((2.0 - {dt} * {c}) / (2.0 + {dt} * {c}))"
+            lambda x, x1, y1: (
+                f"({x} - {x1}) * (2.0 / (2.0 + {dt} * {c})) + {y1} * ((2.0 - {dt} * {c}) / (2.0 + {dt} * {c}))"
+            )
         )
 
     def lead_lag_filter(self) -> str:
         a, b, c, d = (self.parameter(f"c{k}") for k in (1, 2, 3, 4))
         dt = self.dt
         return self._filter(
-            lambda x, x1, y1: f"({x} * (2.0 * {a} + {dt} * {b}) + {x1} * ({dt} * {b} - 2.0 * {a})"
-            f" + {y1} * (2.0 * {c} - {dt} * {d})) / (2.0 * {c} + {dt} * {d})"
+            lambda x, x1, y1: (
+                f"({x} * (2.0 * {a} + {dt} * {b}) + {x1} * ({dt} * {b} - 2.0 * {a})"
+                f" + {y1} * (2.0 * {c} - {dt} * {d})) / (2.0 * {c} + {dt} * {d})"
+            )
         )
 
     def second_order_filter(self) -> str:
         code, dt = self.code, self.dt
         a, b, c, d, e, f = (self.parameter(f"c{k}") for k in range(1, 7))
         x, y = code.temporary(self.input), code.temporary("0.0")
-        x1, x2, y1, y2, begun = (self.state(each) for each in ("input", "input before", "output", "output before", "begun"))
+        x1, x2, y1, y2, begun = (
+            self.state(each) for each in ("input", "input before", "output", "output before", "begun")
+        )
         code.line(f"{y} = {x}")
         with code.block(f"if {begun} != 0.0"):
             scale = code.temporary(f"4.0 * {d} + 2.0 * {e} * {dt} + {f} * {dt} * {dt}")
@@ -210,7 +227,12 @@ class Component:
 
     def pid(self) -> str:
         code, dt = self.code, self.dt
-        x, x1, x2, total = code.temporary(self.input), self.state("input"), self.state("input before"), self.state("integral")
+        x, x1, x2, total = (
+            code.temporary(self.input),
+            self.state("input"),
+            self.state("input before"),
+            self.state("integral"),
+        )
         is_pid = self.node.tag == "pid"
         kp = self.parameter("kp", "0.0") if is_pid else "0.0"
         kd = self.parameter("kd", "0.0") if is_pid else "0.0"
@@ -265,12 +287,16 @@ class Component:
         width = self.node.find("deadband_width")
         if width is not None:
             half = 0.5 * width.number()
-            code.line(f"{y} = {y} + {half!r} if {y} < {-half!r} else ({y} - {half!r} if {y} > {half!r} else 0.0)")
+            code.line(
+                f"{y} = {y} + {half!r} if {y} < {-half!r} else ({y} - {half!r} if {y} > {half!r} else 0.0)"
+            )
         play = self.node.find("hysteresis_width")
         if play is not None:
             half, y1 = 0.5 * play.number(), self.state("hysteresis")
             with code.block(f"if {begun} != 0.0"):
-                code.line(f"{y} = max({y1}, {y} - {half!r}) if {y} > {y1} else (min({y1}, {y} + {half!r}) if {y} < {y1} else {y})")
+                code.line(
+                    f"{y} = max({y1}, {y} - {half!r}) if {y} > {y1} else (min({y1}, {y} + {half!r}) if {y} < {y1} else {y})"
+                )
             code.line(f"{y1} = {y}")
         bias = self.node.find("bias")
         if bias is not None:
@@ -329,7 +355,9 @@ class Component:
             if not (1 <= bits <= 60 and low < high):
                 raise grain.error("it needs bits from 1 to 60 and min < max")
             step = (high - low) / 2.0**bits
-            code.line(f"{y} = math.floor((min(max({y}, {low!r}), {high!r}) - {low!r}) / {step!r}) * {step!r} + {low!r}")
+            code.line(
+                f"{y} = math.floor((min(max({y}, {low!r}), {high!r}) - {low!r}) / {step!r}) * {step!r} + {low!r}"
+            )
         return y
 
     def angle(self) -> str:
@@ -374,7 +402,9 @@ class Component:
 
 def lag(x: str, x1: str, y1: str, c: str, dt: str) -> str:
     """A lag c / (s + c) by Tustin's rule: output from input, last input and last output."""
-    return f"({x} + {x1}) * ({dt} * {c} / (2.0 + {dt} * {c})) + {y1} * ((2.0 - {dt} * {c}) / (2.0 + {dt} * {c}))"
+    return (
+        f"({x} + {x1}) * ({dt} * {c} / (2.0 + {dt} * {c})) + {y1} * ((2.0 - {dt} * {c}) / (2.0 + {dt} * {c}))"
+    )
 
 
 def condition(code: Code, node: Node) -> str:
@@ -391,7 +421,9 @@ def condition(code: Code, node: Node) -> str:
         words = line.split()
         if len(words) != 3 or words[1].lower() not in OPERATORS:
             raise node.error(f"{line[:80]!r} is no condition: property, operator, value; {listed(OPERATORS)}")
-        parts.append(f"{code.value(words[0], node)} {OPERATORS[words[1].lower()]} {code.value(words[2], node)}")
+        parts.append(
+            f"{code.value(words[0], node)} {OPERATORS[words[1].lower()]} {code.value(words[2], node)}"
+        )
     parts += [f"({condition(code, each)})" for each in node.find_all("test", "condition")]
     if not parts:
         raise node.error("it has no condition")

@@ -104,7 +104,11 @@ def touch(tables, at, work, gear, k, center, place, m, up, motion, dt):
     """Compute contact k, as `touch_all` does. Returns force and moment about the centre of gravity."""
     m11, m12, m13, m21, m22, m23, m31, m32, m33 = m
     u, v, w, p, q, r = motion
-    ax, ay, az = (center[0] - tables[at]) / 12.0, (tables[at + 1] - center[1]) / 12.0, (center[2] - tables[at + 2]) / 12.0
+    ax, ay, az = (
+        (center[0] - tables[at]) / 12.0,
+        (tables[at + 1] - center[1]) / 12.0,
+        (center[2] - tables[at + 2]) / 12.0,
+    )
     nx, ny, nz, altitude = ground_normal(
         place[0] + m11 * ax + m21 * ay + m31 * az,
         place[1] + m12 * ax + m22 * ay + m32 * az,
@@ -117,7 +121,11 @@ def touch(tables, at, work, gear, k, center, place, m, up, motion, dt):
         for j in range(7):
             gear[k, j] = 0.0
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    gx, gy, gz = m11 * nx + m12 * ny + m13 * nz, m21 * nx + m22 * ny + m23 * nz, m31 * nx + m32 * ny + m33 * nz
+    gx, gy, gz = (
+        m11 * nx + m12 * ny + m13 * nz,
+        m21 * nx + m22 * ny + m23 * nz,
+        m31 * nx + m32 * ny + m33 * nz,
+    )
     drop = nx * up[0] + ny * up[1] + nz * up[2]
     is_wheel = tables[at + 3] != 0.0
     project = -gz
@@ -155,7 +163,15 @@ def touch(tables, at, work, gear, k, center, place, m, up, motion, dt):
         limits = abs(tables[at + 9] * load), abs(tables[at + 9] * load)
     if not is_wheel and slide > 1e-3:
         a, b = forward / slide, left / slide
-        write(work, first, (a * lx + b * sx, a * ly + b * sy, a * lz + b * sz), (ex, ey, ez), -abs(tables[at + 10] * load), 0.0, gear[k, 2])
+        write(
+            work,
+            first,
+            (a * lx + b * sx, a * ly + b * sy, a * lz + b * sz),
+            (ex, ey, ez),
+            -abs(tables[at + 10] * load),
+            0.0,
+            gear[k, 2],
+        )
     else:
         write(work, first, (lx, ly, lz), (ex, ey, ez), -limits[0], limits[0], gear[k, 0])
         write(work, first + 1, (sx, sy, sz), (ex, ey, ez), -limits[1], limits[1], gear[k, 1])
@@ -199,10 +215,18 @@ def friction(work, matrix, mass, inverse, rates, motion, dt):
             continue
         ux, uy, uz, x, y, z = work[i, 0], work[i, 1], work[i, 2], work[i, 3], work[i, 4], work[i, 5]
         cx, cy, cz = y * uz - z * uy, z * ux - x * uz, x * uy - y * ux
-        tx, ty, tz = ixx * cx + ixy * cy + ixz * cz, ixy * cx + iyy * cy + iyz * cz, ixz * cx + iyz * cy + izz * cz
+        tx, ty, tz = (
+            ixx * cx + ixy * cy + ixz * cz,
+            ixy * cx + iyy * cy + iyz * cz,
+            ixz * cx + iyz * cy + izz * cz,
+        )
         for j in range(n):
             rx, ry, rz = work[j, 3], work[j, 4], work[j, 5]
-            vx, vy, vz = ux / mass + ty * rz - tz * ry, uy / mass + tz * rx - tx * rz, uz / mass + tx * ry - ty * rx
+            vx, vy, vz = (
+                ux / mass + ty * rz - tz * ry,
+                uy / mass + tz * rx - tx * rz,
+                uz / mass + tx * ry - ty * rx,
+            )
             matrix[i, j] = work[j, 0] * vx + work[j, 1] * vy + work[j, 2] * vz
         d = matrix[i, i]
         vx, vy, vz = ax + by * z - bz * y, ay + bz * x - bx * z, az + bx * y - by * x
@@ -227,7 +251,14 @@ def friction(work, matrix, mass, inverse, rates, motion, dt):
     for i in range(n):
         if work[i, 9] != 0.0:
             value = work[i, 8]
-            ux, uy, uz, x, y, z = value * work[i, 0], value * work[i, 1], value * work[i, 2], work[i, 3], work[i, 4], work[i, 5]
+            ux, uy, uz, x, y, z = (
+                value * work[i, 0],
+                value * work[i, 1],
+                value * work[i, 2],
+                work[i, 3],
+                work[i, 4],
+                work[i, 5],
+            )
             fx, fy, fz = fx + ux, fy + uy, fz + uz
             mx, my, mz = mx + y * uz - z * uy, my + z * ux - x * uz, mz + x * uy - y * ux
     return fx, fy, fz, mx, my, mz

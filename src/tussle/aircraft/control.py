@@ -64,7 +64,9 @@ def emit_control(code: Code, aircraft: Node, find: Find, n_engines: int) -> None
                     elif each.tag == "channel":
                         channels.append(each)
                     elif each.tag not in IGNORED:
-                        raise each.error("it is not supported in a system; there are: channel, function, property")
+                        raise each.error(
+                            "it is not supported in a system; there are: channel, function, property"
+                        )
     for each in before:
         emit_function(code, each)
     for channel in channels:
@@ -99,5 +101,7 @@ def _emit_channel(code: Code, channel: Node) -> None:
             if each.tag in IGNORED or each.tag == "property":
                 continue
             if each.tag not in COMPONENTS:
-                raise each.error(f"component not supported{nearest_name(each.tag, COMPONENTS)}; {listed(COMPONENTS)}")
+                raise each.error(
+                    f"component not supported{nearest_name(each.tag, COMPONENTS)}; {listed(COMPONENTS)}"
+                )
             Component(code, each, rate).emit()

@@ -80,5 +80,3 @@ ext_mx += arm_y * {z} - arm_z * {y}
 ext_my += arm_z * {x} - arm_x * {z}
 ext_mz += arm_x * {y} - arm_y * {x}
 """)
-
-

@@ -9,7 +9,11 @@ from pathlib import Path
 from tussle.aircraft.node import AircraftError, Node, read_file
 from tussle.errors import nearest_name
 
-FOLDERS = {"engine": ("", "Engines", "Engine", "engine", "engines"), "system": ("", "Systems", "systems"), "part": ("",)}
+FOLDERS = {
+    "engine": ("", "Engines", "Engine", "engine", "engines"),
+    "system": ("", "Systems", "systems"),
+    "part": ("",),
+}
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.+ -]*(/[A-Za-z0-9_][A-Za-z0-9_.+ -]*){0,3}")
 MOST_FILES = 200
 
@@ -22,7 +26,9 @@ def package_root() -> Path:
     """
     found = importlib.util.find_spec("jsbsim")
     if found is None or found.origin is None:
-        raise AircraftError("the package jsbsim with its aircraft is not installed: pip install 'tussle[jsbsim]', or name a jsbsim_root")
+        raise AircraftError(
+            "the package jsbsim with its aircraft is not installed: pip install 'tussle[jsbsim]', or name a jsbsim_root"
+        )
     for folder in (Path(found.origin).parent / "jsbsim", Path(found.origin).parent):
         if (folder / "aircraft").is_dir():
             return folder

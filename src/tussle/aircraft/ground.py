@@ -95,7 +95,9 @@ def emit_ground(code: Code, contacts: list[Contact]) -> str:
         return ""
     code.line("# Contacts, if one may be near the ground.")
     reach = max(math.dist((0.0, 0.0, 0.0), each.numbers[:3]) for each in contacts) / 12.0
-    code.line(f"near_ground = above_ground < {reach!r} + math.sqrt(cg_x * cg_x + cg_y * cg_y + cg_z * cg_z) / 12.0")
+    code.line(
+        f"near_ground = above_ground < {reach!r} + math.sqrt(cg_x * cg_x + cg_y * cg_y + cg_z * cg_z) / 12.0"
+    )
     memory = [[code.state(f"contact {k} {what}") for what in MEMORY] for k in range(len(contacts))]
     at = code.constant([number for each in contacts for number in each.numbers])
     with code.block("if near_ground"):

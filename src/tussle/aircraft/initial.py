@@ -34,17 +34,28 @@ def place(x: np.ndarray, latitude: np.ndarray, longitude: np.ndarray, altitude: 
         rates: Angular velocity relative to the Earth, forward, right, down [rad/s], (3, n).
     """
     frame = quat_multiply(rotation(2, longitude), rotation(1, -0.5 * np.pi - latitude))
-    attitude = quat_multiply(rotation(2, euler[2]), quat_multiply(rotation(1, euler[1]), rotation(0, euler[0])))
-    place_by_quaternion(x, latitude, longitude, altitude, quat_multiply(frame, attitude), quat_rotate(frame, velocity), rates)
-
-
-def place_by_quaternion(x: np.ndarray, latitude: np.ndarray, longitude: np.ndarray, altitude: np.ndarray, quat: np.ndarray,
-                        velocity: np.ndarray, rates: np.ndarray) -> None:  # fmt: skip
-    """Set the core of the state from a quaternion from body to Earth-centred axes, (4, n), and a velocity in those [ft/s], (3, n)."""
+    attitude = quat_multiply(
+        rotation(2, euler[2]), quat_multiply(rotation(1, euler[1]), rotation(0, euler[0]))
+    )
     normal = SEMI_MAJOR / np.sqrt(1.0 - ECCENTRICITY_SQUARED * sin(latitude) ** 2)
     across = (normal + altitude) * cos(latitude)
     along = ((1.0 - ECCENTRICITY_SQUARED) * normal + altitude) * sin(latitude)
     position = np.stack([across * cos(longitude), across * sin(longitude), along])
+    place_by_quaternion(x, position, quat_multiply(frame, attitude), quat_rotate(frame, velocity), rates)
+
+
+def place_by_quaternion(
+    x: np.ndarray, position: np.ndarray, quat: np.ndarray, velocity: np.ndarray, rates: np.ndarray
+) -> None:
+    """Set the core of the state from Earth-centred values.
+
+    Args:
+        x: The state, (k, n); written.
+        position: [ft], (3, n).
+        quat: From body axes forward, right, down, (4, n).
+        velocity: Relative to the Earth [ft/s], (3, n).
+        rates: As of `place`.
+    """
     spin = np.zeros_like(position)
     spin[2] = EARTH_RATE
     x[:4] = quat

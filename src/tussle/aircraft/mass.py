@@ -6,10 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from tussle.aircraft.buoyancy import Bag, emit_gas_mass
 from tussle.aircraft.code import Code
 from tussle.aircraft.constants import POUND_PER_SLUG
 from tussle.aircraft.equations import offer
 from tussle.aircraft.node import Node
+from tussle.aircraft.propulsion.bench import given
 
 Inertia = tuple[float, float, float, float, float, float]
 """xx, yy, zz, xy, xz, yz as they stand in the matrix [slug ft^2]."""
@@ -61,7 +63,9 @@ def read_mass(node: Node) -> Mass:
 
 
 def _inertia(node: Node) -> Inertia:
-    x, y, z, xy, xz, yz = (node.value(f"i{axes}", 0.0, "SLUG*FT2") for axes in ("xx", "yy", "zz", "xy", "xz", "yz"))
+    x, y, z, xy, xz, yz = (
+        node.value(f"i{axes}", 0.0, "SLUG*FT2") for axes in ("xx", "yy", "zz", "xy", "xz", "yz")
+    )
     if node.get("negated_crossproduct_inertia") == "false":
         xy, xz, yz = -xy, -xz, -yz
     return x, y, z, -xy, xz, -yz
@@ -87,8 +91,8 @@ def _point(node: Node) -> PointMass:
     return PointMass(weight, location, (own[0], own[1], own[1]))
 
 
-def emit_mass(code: Code, mass: Mass, tanks: Any) -> None:
-    """Emit weight, centre of gravity and inertia; `tanks` are those of the propulsion."""
+def emit_mass(code: Code, mass: Mass, tanks: Any, cells: tuple[Bag, ...] = ()) -> None:
+    """Emit weight, centre of gravity and inertia; `tanks` are those of the propulsion, `cells` those of gas."""
     parts: list[tuple[str, Sequence[str], Sequence[str] | None]]
     parts = [(repr(mass.empty_weight), list(map(repr, mass.center)), None)]
     for k, point in enumerate(mass.points):
@@ -97,7 +101,9 @@ def emit_mass(code: Code, mass: Mass, tanks: Any) -> None:
         code.inputs.add(name)
         weight = code.read(name)
         own = [f"{weight} * {each / POUND_PER_SLUG!r}" for each in point.own]
-        parts.append((weight, list(map(repr, point.location)), own if any(point.own) else None))
+        names = [indexed(f"inertia/pointmass-location-{axis}-inches", k) for axis in "XYZ"]
+        location = [given(code, each, inches) for each, inches in zip(names, point.location, strict=True)]
+        parts.append((weight, location, own if any(point.own) else None))
     fixed = len(parts)
     for tank in tanks:
         weight = code.read(tank.property)
@@ -108,14 +114,18 @@ def emit_mass(code: Code, mass: Mass, tanks: Any) -> None:
         if tanks:
             code.line(f"last_{axis} = {name}")
     code.line("# Mass, centre of gravity [in], inertia with its signs.")
-    code.line(f"weight = {' + '.join(weight for weight, _, _ in parts)}")
+    gas, gas_moments, gas_inertia = emit_gas_mass(code, cells) if cells else ("", [], [])
+    more = f" + {gas} * {POUND_PER_SLUG!r}" if cells else ""
+    code.line(f"weight = {' + '.join(weight for weight, _, _ in parts)}{more}")
     code.line(f"mass = weight / {POUND_PER_SLUG!r}")
     for k, axis in enumerate("xyz"):
         moments = [f"{weight} * {place[k]}" for weight, place, _ in parts]
+        if cells:
+            moments.append(f"{gas_moments[k]} * {POUND_PER_SLUG!r}")
         code.line(f"cg_{axis} = ({' + '.join(moments)}) / weight")
     for axes, value in zip(("xx", "yy", "zz", "xy", "xz", "yz"), mass.inertia, strict=True):
         code.line(f"j{axes} = {value!r}")
-    for k, (weight, (x, y, z), own) in enumerate(parts):
+    for k, (weight, (x, y, z), around) in enumerate(parts):
         center = "cg" if k < fixed else "last"
         code.lines(f"""
 m = {weight} / {POUND_PER_SLUG!r}
@@ -129,8 +139,10 @@ jxy -= m * arm_x * arm_y
 jxz -= m * arm_x * arm_z
 jyz -= m * arm_y * arm_z
 """)
-        for axes, value in zip(("xx", "yy", "zz"), own or (), strict=False):
-            code.line(f"j{axes} += {value}")
+        for axes, more in zip(("xx", "yy", "zz"), around or (), strict=False):
+            code.line(f"j{axes} += {more}")
+    for axes, more in zip(("xx", "yy", "zz", "xy", "xz", "yz"), gas_inertia, strict=False):
+        code.line(f"j{axes} += {more}")
     for axis, name in zip("xyz", last, strict=True):
         code.line(f"{name} = cg_{axis}")
     offer(code, {

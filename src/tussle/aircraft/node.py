@@ -167,7 +167,13 @@ def read_text(data: bytes, name: str) -> Node:
     def entity(entity_name: str, is_parameter: int, value: str | None, *_: object) -> None:
         nonlocal entities
         entities += 1
-        if value is None or is_parameter or len(value) > LONGEST_ENTITY or "&" in value or entities > MOST_ENTITIES:
+        if (
+            value is None
+            or is_parameter
+            or len(value) > LONGEST_ENTITY
+            or "&" in value
+            or entities > MOST_ENTITIES
+        ):
             raise AircraftError(
                 f"{name}:{parser.CurrentLineNumber}: entity {entity_name[:40]!r}: only {MOST_ENTITIES} short texts without "
                 "references can be declared"

@@ -6,7 +6,7 @@ import math
 
 FOOT = 0.3048  # [m]
 METRE = 3.2808399  # [ft]
-KILOGRAM = 2.20462262  # [lb]
+KILOGRAM = 1.0 / 0.45359237  # [lb]
 _TABLE: dict[tuple[str, str], float] = {
     ("M", "FT"): METRE, ("FT", "M"): 1.0 / METRE, ("CM", "FT"): METRE / 100.0, ("KM", "FT"): 1000.0 * METRE,
     ("FT", "IN"): 12.0, ("IN", "FT"): 1.0 / 12.0, ("IN", "M"): 1.0 / (12.0 * METRE), ("M", "IN"): METRE * 12.0,
@@ -25,10 +25,13 @@ _TABLE: dict[tuple[str, str], float] = {
     ("KTS", "FT/SEC"): 1.0 / 0.592483801, ("FT/SEC", "KTS"): 0.592483801, ("M/S", "FT/S"): METRE, ("M/S", "KTS"): METRE * 0.592483801,
     ("M/SEC", "FT/SEC"): METRE, ("KM/SEC", "FT/SEC"): 1000.0 * METRE,
     ("FT*LBS", "N*M"): 1.35581795, ("N*M", "FT*LBS"): 1.0 / 1.35581795,
-    ("ATM", "INHG"): 29.9246899, ("PSI", "INHG"): 2.03602097, ("INHG", "PSI"): 1.0 / 2.03602097, ("PA", "PSI"): 1.0 / 6894.75729,
-    ("INHG", "PA"): 3386.38864, ("PA", "INHG"): 1.0 / 3386.38864, ("PSI", "PA"): 6894.75729, ("ATM", "PA"): 101325.0,
-    ("KG/KW*HR", "LBS/HP*HR"): KILOGRAM / 1.341022, ("KG/KW-HR", "LBS/HP*HR"): KILOGRAM / 1.341022,
-    ("LBS/HP*HR", "KG/KW*HR"): 1.341022 / KILOGRAM, ("GAL", "LBS"): 6.02,
+    ("ATM", "INHG"): 29.9246899, ("PSI", "INHG"): 2.03625437, ("INHG", "PSI"): 1.0 / 2.03625437, ("PA", "PSI"): 1.0 / 6894.75729,
+    ("INHG", "PA"): 3386.0, ("PA", "INHG"): 1.0 / 3386.0, ("PSI", "PA"): 6894.75729, ("ATM", "PA"): 101325.0,
+    ("KG/KW*HR", "LBS/HP*HR"): 1.0 / 0.6083, ("KG/KW-HR", "LBS/HP*HR"): 1.0 / 0.6083,
+    ("LBS/HP*HR", "KG/KW*HR"): 0.6083, ("GAL", "LBS"): 6.02,
+    ("PA", "LBS/FT2"): 1.0 / (14.5939 * METRE), ("N/M2", "LBS/FT2"): 1.0 / (14.5939 * METRE), ("PSI", "LBS/FT2"): 144.0,
+    ("M4*SEC/KG", "FT4*SEC/SLUG"): METRE**4 / 0.06852168, ("KG/L", "LBS/GAL"): 8.3454045,
+    ("KG/SEC", "LBS/SEC"): KILOGRAM, ("N/SEC", "LBS/SEC"): 0.224808943,
 }  # fmt: skip
 
 

@@ -239,7 +239,8 @@ class MotionModel(EntityPlugin):
         ):
             raise ParameterError(
                 f"{type(self).__name__}.rollout: x0 is {np.shape(x0)} and inputs {np.shape(inputs)}; expected are "
-                f"({self.state_size(self.state().name)}, n) for {', '.join(self.state().fields)} and (T, {len(names)}) for {', '.join(names)}"
+                f"({self.state_size(self.state().name)}, n) for {', '.join(self.state().fields)} and "
+                f"(T, {len(names)}) for {', '.join(names)}"
             )
         for key in params or {}:
             if key not in self.row_params():

@@ -78,7 +78,7 @@ class RigidBodyModel(MotionModel):
         state[:3, rows] = body.pos[:, rows]
         state[3:6, rows] = body.vel[:, rows]
         state[6:10, rows] = quat
-        state[10:, rows] = quat_rotate_inverse(quat, body.omega[:, rows])
+        state[10:13, rows] = quat_rotate_inverse(quat, body.omega[:, rows])
 
     def to_body(self, body: MotionBody) -> None:
         """Write position, velocity, attitude and angular velocity."""

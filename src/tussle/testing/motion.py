@@ -201,6 +201,8 @@ def _check_velocity(model: MotionModel, flight: Flight) -> None:
     """
     if model.reads_all:
         return  # its states come from outside
+    if model.state_size(model.state().name) > len(model.state().fields):
+        return  # what it remembers of its last steps, as multistep methods do, belongs to their length
     far, near = (_velocity_gap(model, flight, flight.dt / parts) for parts in (8, 512))
     fastest = max(1e-3, float(np.abs(flight.group.moving.vel).max()))
     stays = (near > 0.5 * far) & (near > VELOCITY * fastest)

@@ -13,7 +13,13 @@ from tussle.aircraft.initial import place, run_initial
 from tussle.aircraft.node import MOST_NODES, AircraftError, read_text
 
 DT = 1.0 / 120.0
-START = {"ic/lat-geod-deg": 33.0, "ic/long-gc-deg": -84.0, "ic/psi-true-deg": 30.0, "ic/theta-deg": 2.0, "ic/phi-deg": 1.0}
+START = {
+    "ic/lat-geod-deg": 33.0,
+    "ic/long-gc-deg": -84.0,
+    "ic/psi-true-deg": 30.0,
+    "ic/theta-deg": 2.0,
+    "ic/phi-deg": 1.0,
+}
 GROUND = {**START, "ic/h-agl-ft": 4.6, "ic/vt-fps": 0.0, "ic/theta-deg": 0.0, "ic/phi-deg": 0.0}
 
 
@@ -24,7 +30,12 @@ def controls(t):
 
 def roll_along(t):
     brakes = 1.0 if t < 1.0 else 0.0
-    return {"fcs/throttle-cmd-norm": 1.0, "fcs/steer-cmd-norm": 0.01, "fcs/left-brake-cmd-norm": brakes, "fcs/right-brake-cmd-norm": brakes}
+    return {
+        "fcs/throttle-cmd-norm": 1.0,
+        "fcs/steer-cmd-norm": 0.01,
+        "fcs/left-brake-cmd-norm": brakes,
+        "fcs/right-brake-cmd-norm": brakes,
+    }
 
 
 def apart(name, start, end, script, start_engines=True):
@@ -39,7 +50,10 @@ def apart(name, start, end, script, start_engines=True):
     fdm.run_ic()
     aircraft = compile_aircraft(None, name)
     x = aircraft.first[:, None].copy()
-    single = [np.array([fdm[key]]) for key in ("position/lat-geod-rad", "position/long-gc-rad", "position/geod-alt-ft")]
+    single = [
+        np.array([fdm[key]])
+        for key in ("position/lat-geod-rad", "position/long-gc-rad", "position/geod-alt-ft")
+    ]
     place(x, *single, *(np.array([[fdm[key]] for key in keys]) for keys in (
         ("attitude/phi-rad", "attitude/theta-rad", "attitude/psi-rad"),
         ("velocities/v-north-fps", "velocities/v-east-fps", "velocities/v-down-fps"),
@@ -166,6 +180,8 @@ def test_an_aircraft_that_is_not_there_is_named_with_the_nearest(tmp_path):
 
 
 def test_unread_properties_are_not_computed(tmp_path):
-    aircraft = compiled(tmp_path, axis("<product><property>aero/qbar-psf</property><value>2.0</value></product>"))
+    aircraft = compiled(
+        tmp_path, axis("<product><property>aero/qbar-psf</property><value>2.0</value></product>")
+    )
     assert "p_aero_qbar_psf = dynamic" in aircraft.source
     assert "density_altitude" not in aircraft.source

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from tussle.aircraft.node import Node
 from tussle.aircraft.propulsion.bench import Bench
-from tussle.aircraft.propulsion.kernels import NEWTON_METRE
+from tussle.aircraft.propulsion.runtime import NEWTON_METRE
 from tussle.aircraft.propulsion.thruster import Propeller
 
 WATT_PER_HP = 745.7

@@ -39,7 +39,7 @@ MOST_SETTLING, SETTLED = 6000, 120
 
 
 @dataclass(frozen=True)
-class Unit:
+class PowerUnit:
     """An engine with its thruster and the numbers of the tanks that feed it."""
 
     engine: Engine
@@ -58,7 +58,7 @@ class Propulsion:
     """
 
     node: Node
-    engines: tuple[Unit, ...]
+    engines: tuple[PowerUnit, ...]
     tanks: tuple[Tank, ...]
 
     def emit(self, code: Code) -> None:
@@ -114,7 +114,7 @@ if k >= 0:
         break
 """)
 
-    def _emit_unit(self, bench: Bench, unit: Unit) -> str:
+    def _emit_unit(self, bench: Bench, unit: PowerUnit) -> str:
         """Emit an engine and its thruster. Return the fuel that it needs [lb]."""
         engine = unit.engine
         bench.has_levers = not isinstance(engine, Turbine | Rocket)
@@ -124,7 +124,7 @@ if k >= 0:
         bench.functions(engine.node, "post")
         return fuel
 
-    def _emit_feed(self, bench: Bench, unit: Unit, fuel: str) -> None:
+    def _emit_feed(self, bench: Bench, unit: PowerUnit, fuel: str) -> None:
         code, n, starved, engine = bench.code, bench.local, bench.state("starved"), unit.engine
         tanks = {
             kind: [self.tanks[k] for k in unit.feeds if self.tanks[k].kind == kind]
@@ -187,7 +187,7 @@ def read_propulsion(node: Node, find: Find) -> Propulsion:
     return Propulsion(node, units, tanks)
 
 
-def _unit(node: Node, index: int, n_tanks: int, find: Find) -> Unit:
+def _unit(node: Node, index: int, n_tanks: int, find: Find) -> PowerUnit:
     file = _content(node, find, tuple(ENGINES))
     if file.tag not in ENGINES:
         raise file.error(f"this engine is not supported; {listed(ENGINES)}")
@@ -205,7 +205,7 @@ def _unit(node: Node, index: int, n_tanks: int, find: Find) -> Unit:
         if not (0 <= number < n_tanks and number == int(number)):
             raise each.error(f"there is no tank {number:g}; the tanks are 0 to {n_tanks - 1}")
         feeds.append(int(number))
-    return Unit(engine, thruster, tuple(feeds))
+    return PowerUnit(engine, thruster, tuple(feeds))
 
 
 def _content(node: Node, find: Find, tags: tuple[str, ...]) -> Node:

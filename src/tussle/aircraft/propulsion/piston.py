@@ -9,7 +9,7 @@ from tussle.aircraft.constants import SEA_LEVEL_PRESSURE
 from tussle.aircraft.functions import table_of_pairs
 from tussle.aircraft.node import Node
 from tussle.aircraft.propulsion.bench import Bench, slot
-from tussle.aircraft.propulsion.kernels import PASCAL_PER_PSF
+from tussle.aircraft.propulsion.runtime import PASCAL_PER_PSF
 from tussle.aircraft.propulsion.thruster import Propeller
 from tussle.aircraft.units import FOOT
 

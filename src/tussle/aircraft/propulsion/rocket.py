@@ -102,7 +102,7 @@ def read_rocket(node: Node) -> Rocket:
         node=node,
         build_up=node.value("builduptime", 0.0),
         least=node.value("minthrottle", 0.0),
-        flows=(node.value("slfuelflowmax", 0.0), node.value("sloxiflowmax", 0.0)),
+        flows=(node.value("slfuelflowmax", 0.0, "LBS/SEC"), node.value("sloxiflowmax", 0.0, "LBS/SEC")),
         variations=(0.0, 0.0)
         if variation is None
         else (variation.value("thrust", 0.0), variation.value("total_isp", 0.0)),

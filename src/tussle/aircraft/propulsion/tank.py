@@ -22,7 +22,7 @@ DENSITIES = {
 
 
 @dataclass(frozen=True)
-class Grain:
+class SolidGrain:
     """Solid propellant: length and radius of its bore [in], density [slug/in^3]; without bore it burns at its end."""
 
     is_cylinder: bool
@@ -58,7 +58,7 @@ class Tank:
     contents: float
     density: float
     priority: int
-    grain: Grain | None
+    grain: SolidGrain | None
 
     @property
     def property(self) -> str:
@@ -132,7 +132,7 @@ def _density(node: Node) -> float:
     return node.value("density", 6.6, "LBS/GAL") if kind is None else DENSITIES.get(kind.text, 6.6)
 
 
-def _grain(node: Node, radius: float, contents: float) -> Grain:
+def _grain(node: Node, radius: float, contents: float) -> SolidGrain:
     kind, length = node.get("type"), node.value("length", 0.0, "IN")
     bore = node.value("bore_diameter", 0.0, "IN") / 2.0
     if kind not in ("CYLINDRICAL", "ENDBURNING"):
@@ -141,7 +141,7 @@ def _grain(node: Node, radius: float, contents: float) -> Grain:
     volume = math.pi * length * (radius * radius - (bore * bore if is_cylinder else 0.0))
     if not volume > 0.0 or not contents > 0.0:
         raise node.error("the grain has no volume or no contents")
-    return Grain(is_cylinder, length, contents / POUND_PER_SLUG / volume)
+    return SolidGrain(is_cylinder, length, contents / POUND_PER_SLUG / volume)
 
 
 # -- feed -------------------------------------------------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from tussle.aircraft.functions import content, expression
 from tussle.aircraft.node import Node
 from tussle.aircraft.propulsion.bench import Bench
-from tussle.aircraft.propulsion.kernels import OFF, RUN, SEIZE, SPIN_UP, STALL, START, TRIM
+from tussle.aircraft.propulsion.runtime import OFF, RUN, SEIZE, SPIN_UP, STALL, START, TRIM
 from tussle.aircraft.propulsion.thruster import Thruster
 
 FUNCTIONS = (

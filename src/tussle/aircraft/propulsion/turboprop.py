@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from tussle.aircraft.functions import table, table_of_pairs
 from tussle.aircraft.node import Node
 from tussle.aircraft.propulsion.bench import Bench
-from tussle.aircraft.propulsion.kernels import OFF, RUN, SPIN_UP, START, TRIM
+from tussle.aircraft.propulsion.runtime import OFF, RUN, SPIN_UP, START, TRIM
 from tussle.aircraft.propulsion.thruster import Propeller
 
 # N1 [%], efficiency of the combustion.

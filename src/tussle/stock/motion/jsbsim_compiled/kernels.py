@@ -10,19 +10,18 @@ from tussle.numeric.quaternion import quat_multiply, quat_rotate, quat_rotate_in
 FOOT = 0.3048  # [m]
 
 
-@kernel("F2 i8 (f8 f8 f8 f8) (f8 f8 f8) F2w")
-def to_world(x, earth_angle, frame, origin, out):
+@kernel("F2 i8 F2 F2w")
+def to_world(x, earth_angle, frame, out):
     """Write the rigid bodies of some aircraft.
 
     Args:
         x: State of the aircraft, (k, n): quaternion, angular velocity, position, velocity in inertial axes, foot and second.
         earth_angle: Its row with the Earth's angle [rad].
-        frame: Quaternion from the world frame to Earth-centred axes.
-        origin: Of the world frame, Earth-centred [m].
+        frame: Quaternion from the world frame to Earth-centred axes, and the world frame's origin in these [m], (7, n).
         out: Position [m], velocity [m/s], world frame, quaternion, angular velocity, body frame [rad/s], (13, n); written.
     """
-    w, a, b, c = frame
     for row in range(x.shape[1]):
+        w, a, b, c = frame[0, row], frame[1, row], frame[2, row], frame[3, row]
         angle = x[earth_angle, row]
         turn_w, turn_z = cos(0.5 * angle), -sin(0.5 * angle)
         rx, ry = x[7, row], x[8, row]
@@ -30,9 +29,11 @@ def to_world(x, earth_angle, frame, origin, out):
         px, py, pz = quat_rotate(turn_w, 0.0, 0.0, turn_z, rx, ry, x[9, row])
         vx, vy, vz = quat_rotate(turn_w, 0.0, 0.0, turn_z, vx, vy, x[12, row])
         out[0, row], out[1, row], out[2, row] = quat_rotate_inverse(
-            w, a, b, c, FOOT * px - origin[0], FOOT * py - origin[1], FOOT * pz - origin[2]
+            w, a, b, c, FOOT * px - frame[4, row], FOOT * py - frame[5, row], FOOT * pz - frame[6, row]
         )
-        out[3, row], out[4, row], out[5, row] = quat_rotate_inverse(w, a, b, c, FOOT * vx, FOOT * vy, FOOT * vz)
+        out[3, row], out[4, row], out[5, row] = quat_rotate_inverse(
+            w, a, b, c, FOOT * vx, FOOT * vy, FOOT * vz
+        )
         qw, qx, qy, qz = x[0, row], x[1, row], x[2, row], x[3, row]
         spin_x, spin_y, spin_z = quat_rotate_inverse(qw, qx, qy, qz, 0.0, 0.0, EARTH_RATE)
         qw, qx, qy, qz = quat_multiply(turn_w, 0.0, 0.0, turn_z, qw, qx, qy, qz)

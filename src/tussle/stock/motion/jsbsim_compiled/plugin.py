@@ -24,7 +24,8 @@ from tussle.stock.motion.jsbsim_compiled.script import Script, read_script
 
 FOOT = kernels.FOOT
 KNOT = float(units.NAUTICAL_MILE / 3600)  # [m/s]
-BODY = 13  # components of the rigid body, before the slots of the aircraft
+BODY, FRAME = 13, 7  # components of the rigid body and of the world frame, before the slots of the aircraft
+SLOTS = BODY + FRAME
 EARTH_ANGLE = CORE_SLOT["earth_angle"]
 SURFACES = "fcs/elevator-cmd-norm", "fcs/aileron-cmd-norm", "fcs/rudder-cmd-norm"
 SETPOINTS = "ap/bank_setpoint", "ap/altitude_setpoint", "ap/airspeed_setpoint"
@@ -39,7 +40,9 @@ MIRRORED = np.array([[1.0], [-1.0], [-1.0]])
 class Flown:
     """A compiled aircraft with the slots that the plugin sets and reads."""
 
-    def __init__(self, aircraft: CompiledAircraft, settings: tuple[tuple[str, float], ...], is_autopilot: bool) -> None:
+    def __init__(
+        self, aircraft: CompiledAircraft, settings: tuple[tuple[str, float], ...], is_autopilot: bool
+    ) -> None:
         self.aircraft, self.settings = aircraft, settings
         self.is_autopilot = is_autopilot
         n = max(1, aircraft.n_engines)
@@ -65,7 +68,9 @@ def compiled(root: str, aircraft: str, script: str, is_autopilot: bool) -> Flown
     try:
         made = compile_aircraft(folder, chosen.aircraft, keep)
     except AircraftError as error:
-        raise ParameterError(f"JSBSimCompiled: {error}; --set motion=JSBSimControl flies it by JSBSim itself") from None
+        raise ParameterError(
+            f"JSBSimCompiled: {error}; --set motion=JSBSimControl flies it by JSBSim itself"
+        ) from None
     return Flown(made, chosen.settings, is_autopilot)
 
 
@@ -82,7 +87,9 @@ class JSBSimCompiled(RigidBodyModel):
     """
 
     grade = "portable"
-    script_name = Param("", doc="File below `scripts` that names an aircraft and sets properties at the start.")
+    script_name = Param(
+        "", doc="File below `scripts` that names an aircraft and sets properties at the start."
+    )
     aircraft = Param("", doc="Folder below `aircraft`, in place of a script.")
     jsbsim_root = Param(
         "", doc="Folder of aircraft, engine, systems and scripts; empty for those of the package jsbsim."
@@ -108,7 +115,9 @@ class JSBSimCompiled(RigidBodyModel):
         own = self.values
         if bool(own["script_name"]) == bool(own["aircraft"]):
             raise ParameterError("JSBSimCompiled takes script_name or aircraft, one of them")
-        return compiled(own["jsbsim_root"], own["aircraft"], own["script_name"], own["commands"] == "autopilot")
+        return compiled(
+            own["jsbsim_root"], own["aircraft"], own["script_name"], own["commands"] == "autopilot"
+        )
 
     def source(self) -> Path:
         """Write the generated Python of the aircraft's kernels to the cache folder, to be read; return its path."""
@@ -120,8 +129,8 @@ class JSBSimCompiled(RigidBodyModel):
         return [name for name in type(self).inputs() if (name in self.by_autopilot) == is_autopilot]
 
     def state_size(self, name: str) -> int:
-        """The rigid body, and all slots of the aircraft."""
-        return BODY + len(self.flown.aircraft.slots)
+        """The rigid body, the world frame, and all slots of the aircraft."""
+        return SLOTS + len(self.flown.aircraft.slots)
 
     def from_body(self, body: MotionBody, rows: np.ndarray) -> None:
         """Start the aircraft of some rows at their place, with their velocity and rates, engines running."""
@@ -129,13 +138,17 @@ class JSBSimCompiled(RigidBodyModel):
         aircraft, origin = flown.aircraft, body.scene.origin
         frame, center = earth_frame(origin)
         x = np.repeat(aircraft.first[:, None], n, axis=1)
-        latitude, longitude, altitude = origin.to_geodetic(body.pos[:, rows])
+        latitude, longitude, _ = origin.to_geodetic(body.pos[:, rows])
+        position = (quat_rotate(frame, body.pos[:, rows]) + np.array(center)[:, None]) / FOOT
         quat = quat_multiply(frame, quat_multiply(body.quat[:, rows], FORWARD_RIGHT_DOWN))
         velocity = quat_rotate(frame, body.vel[:, rows]) / FOOT
         rates = MIRRORED * quat_rotate_inverse(body.quat[:, rows], body.omega[:, rows])
-        place_by_quaternion(x, latitude, longitude, altitude / FOOT, quat, velocity, rates)
+        place_by_quaternion(x, position, quat, velocity, rates)
         at = aircraft.slots
-        wind = quat_rotate_inverse(local_frame(latitude, longitude), quat_rotate(frame, self.wind[:, rows])) / FOOT
+        wind = (
+            quat_rotate_inverse(local_frame(latitude, longitude), quat_rotate(frame, self.wind[:, rows]))
+            / FOOT
+        )
         for name, value in zip(WIND, wind, strict=True):
             x[at[name]] = value
         if GROUND in at:
@@ -145,16 +158,9 @@ class JSBSimCompiled(RigidBodyModel):
         run_initial(aircraft, x, body.dt)
         aircraft.start(x, aircraft.tables, 0, n, 1, 0.0, body.dt)
         state = self.rigid_body
-        state[BODY:, rows] = x
-        part = np.empty((BODY, n))
-        kernels.to_world(x, EARTH_ANGLE, tuple(frame[:, 0].tolist()), center, part)
-        state[:BODY, rows] = part
-
-    def to_body(self, body: MotionBody) -> None:
-        """Write position, velocity, attitude and angular velocity of all rows."""
-        frame, center = earth_frame(body.scene.origin)
-        kernels.to_world(self.rigid_body[BODY:], EARTH_ANGLE, tuple(frame[:, 0].tolist()), center, self.rigid_body[:BODY])
-        super().to_body(body)
+        state[BODY:SLOTS, rows] = np.concatenate([frame, np.array(center)[:, None]])
+        state[SLOTS:, rows] = x
+        super().from_body(body, rows)
 
     @property
     def advance(self) -> Any:
@@ -165,10 +171,11 @@ class JSBSimCompiled(RigidBodyModel):
 
         def fly(x: np.ndarray, u: np.ndarray, p: np.ndarray, dt: float, substeps: int) -> None:
             """Make `substeps` steps of dt / substeps."""
-            slots = x[BODY:]
+            slots = x[SLOTS:]
             command(flown, x, slots, u)
             step = dt / substeps
             aircraft.advance(slots, aircraft.tables, 0, x.shape[1], substeps, step, step)
+            kernels.to_world(slots, EARTH_ANGLE, x[BODY:SLOTS], x[:BODY])
 
         return fly
 
@@ -199,7 +206,9 @@ def earth_frame(origin: Origin) -> tuple[np.ndarray, tuple[float, float, float]]
 def local_frame(latitude: np.ndarray, longitude: np.ndarray) -> np.ndarray:
     """Quaternions from axes north, east, down at geodetic places [rad] to Earth-centred ones, (4, n)."""
     zero, a, b = np.zeros_like(latitude), 0.5 * longitude, 0.5 * (-0.5 * np.pi - latitude)
-    return np.asarray(quat_multiply(np.stack([cos(a), zero, zero, sin(a)]), np.stack([cos(b), zero, sin(b), zero])))
+    return np.asarray(
+        quat_multiply(np.stack([cos(a), zero, zero, sin(a)]), np.stack([cos(b), zero, sin(b), zero]))
+    )
 
 
 assert CORE[EARTH_ANGLE] == "earth_angle"

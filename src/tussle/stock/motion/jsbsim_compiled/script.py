@@ -32,7 +32,9 @@ def read_script(root: Path, name: str) -> Script:
     run = top.find("run")
     for event in run.find_all("event") if run is not None else ():
         if not _is_at_start(event):
-            raise event.error("only events at the start (simulation/sim-time-sec ge 0) are compiled; motion=JSBSimControl plays all")
+            raise event.error(
+                "only events at the start (simulation/sim-time-sec ge 0) are compiled; motion=JSBSimControl plays all"
+            )
         for each in event.find_all("set"):
             if each.find("function") is not None or each.get("action", "FG_STEP") != "FG_STEP":
                 raise each.error("only a constant value can be set; motion=JSBSimControl plays all")
