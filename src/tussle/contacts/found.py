@@ -80,7 +80,7 @@ def find(
         n_worlds: Number of worlds.
     """
     vel, dt, world = motion
-    (items, sizes), n = shapes, len(world)
+    (items, sizes), n, moving = shapes, len(world), motion
     if len(scene.balls):
         shapes, pairs, vel = _with_balls(shapes, pairs, (vel, dt), scene.balls)
     ints, numbers = filled(
@@ -89,7 +89,7 @@ def find(
     ints[:, 1] = np.where(ints[:, 1] < n, ints[:, 1], -1)
     found = [(ints, numbers)]
     if not scene.is_empty:
-        bodies, moving = (items, np.ascontiguousarray(sizes[0])), (vel[:, :n], dt, world)
+        bodies = items, np.ascontiguousarray(sizes[0])
         found.append(
             filled(
                 4 * n + 16,

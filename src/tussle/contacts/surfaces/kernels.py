@@ -91,12 +91,12 @@ def ball_triangle_contact(place, radius, center, t, k, motion, found, n, feature
     elif distance < -radius:
         return n
     gap = dot(normal, minus(start, point)) - radius
-    for i in range(n):  # another triangle of the same surface: the edge between them is none
+    for i in range(n):  # of an edge within one surface, such as a floor of triangles, the face beside it is touched, not the edge
         if found[i, 10] == feature:
-            kept = minus(point, vector(found, i, 6))
-            if abs(dot(kept, vector(found, i, 0))) <= SAME_PLACE * radius:
-                if found[i, 9] <= gap + SAME_PLACE * radius:
-                    return n
+            apart = minus(point, vector(found, i, 6))
+            if abs(dot(apart, vector(found, i, 0))) <= SAME_PLACE * radius:
+                return n
+            if abs(dot(apart, normal)) <= SAME_PLACE * radius:
                 found[i, 9] = np.inf
     return put(found, n, normal, minus(place, scale(radius, normal)), point, gap, feature)
 

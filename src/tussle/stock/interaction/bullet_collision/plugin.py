@@ -83,6 +83,10 @@ class BulletCollision(Interaction):
             return None
         return other_id
 
+    def start(self, w: WorldView) -> None:
+        self._shapes(w)  # so that a wrong name is told of before the first step
+        self._blocks(w, "fixed")
+
     def step(self, w: WorldView) -> None:
         if not self.enable_collision_detection or not w.n:
             return
