@@ -11,14 +11,11 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
-import numpy as np
 import pytest
-from recordings import NAMES, Recording, folder, load, mission
+from recordings import NAMES, Recording, load, mission
 from replay import Flight, fly
 
 from tussle import Mission, historic, stock
-from tussle.api import Interaction
-from tussle.mission import read_mission
 
 LIMIT = 1e-6  # [m]
 ATTITUDE_LIMIT = (

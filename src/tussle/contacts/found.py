@@ -131,9 +131,7 @@ def _with_balls(
     )
 
 
-def inverse_masses(
-    mass: np.ndarray, inertia: np.ndarray, quat: np.ndarray, moves: np.ndarray
-) -> np.ndarray:
+def inverse_masses(mass: np.ndarray, inertia: np.ndarray, quat: np.ndarray, moves: np.ndarray) -> np.ndarray:
     """Inverse mass and inertia of each body, world frame, (n, 10); see `invert_masses`."""
     inverse = np.empty((len(mass), 10))
     impulses_kernels.invert_masses((mass, inertia, quat), moves, inverse)
@@ -184,7 +182,13 @@ def solve(
     split(
         len(contacts.starts) - 1,
         lambda *part: impulses_kernels.solve_worlds(
-            (moves, shifts, inverse, sizes), (*contacts.arrays, is_new), materials, *steps, contacts.starts, impulses, part
+            (moves, shifts, inverse, sizes),
+            (*contacts.arrays, is_new),
+            materials,
+            *steps,
+            contacts.starts,
+            impulses,
+            part,
         ),
     )
     return shifts

@@ -107,8 +107,10 @@ def test_fast_spheres_that_miss_each_other_are_left_alone():
 
 
 def test_rough_spheres_take_a_share_of_the_slip_as_spin():
-    """Equal solid spheres that touch with the relative velocity (-1, 1, 0) at the normal x: an impulse m / 2 along it; without sliding
-    the tangential impulse is m slip / 7, since 1 / m_t = 2 (1 / m + r^2 / I) = 7 / m; omega = impulse r / I = 5/14 of slip / r."""
+    """Equal solid spheres at the normal x, with the relative velocity (1, 1, 0): half of the normal speed, 1/7 of the slip, 5/14 of it as spin.
+
+    1 / m_t = 2 (1 / m + r^2 / I) = 7 / m; omega = impulse r / I.
+    """
     sim = play([ball("a", (-1.05, -0.05, 0), (1, 1, 0)), ball("b", (1, 0, 0))], 10, friction=10.0)
     assert one(sim, "a.vel") == pytest.approx([0.5, 6.0 / 7.0, 0.0], abs=1e-9)
     assert one(sim, "b.vel") == pytest.approx([0.5, 1.0 / 7.0, 0.0], abs=1e-9)
@@ -130,7 +132,7 @@ def test_a_ball_keeps_bouncing():
 
 
 def test_a_ball_that_slides_begins_to_roll():
-    """v = 5/7 v0 and omega = v / r when a solid sphere rolls, whatever the friction (Routh 1905)."""
+    """A solid sphere: v = 5/7 v0 and omega = v / r when a solid sphere rolls, whatever the friction (Routh 1905)."""
     sim = play([ball("a", (0, 0, 1.0), (7.0, 0, 0), gravity=GRAVITY)], 300, scene=FLOOR, friction=0.3)
     assert one(sim, "a.vel") == pytest.approx([5.0, 0.0, 0.0], abs=1e-9)
     assert bodies(sim).omega[:, 0] == pytest.approx([0.0, 5.0, 0.0], abs=1e-9)
@@ -138,14 +140,16 @@ def test_a_ball_that_slides_begins_to_roll():
 
 @pytest.mark.parametrize("mu", [0.6, 0.5])
 def test_a_box_on_a_slope_slides_if_the_friction_is_below_the_tangent(mu):
-    """tan 30 degrees = 0.577; else v = g t (sin - mu cos)."""
+    """The tangent of 30 degrees is 0.577; else v = g t (sin - mu cos)."""
     a = math.radians(30.0)
     normal = (-math.sin(a), 0.0, math.cos(a))
     sim = play(
         [box("b", tuple(0.5 * x for x in normal), climb=a)], 200, scene=Scene(walls=[Plane((0, 0, 0), normal)]), friction=mu
     )  # fmt: skip
     speed = float(np.linalg.norm(one(sim, "b.vel")))
-    assert speed == pytest.approx(0.0 if mu > 0.577 else GRAVITY * 2.0 * (math.sin(a) - mu * math.cos(a)), rel=1e-3, abs=1e-9)
+    assert speed == pytest.approx(
+        0.0 if mu > 0.577 else GRAVITY * 2.0 * (math.sin(a) - mu * math.cos(a)), rel=1e-3, abs=1e-9
+    )
 
 
 # -- many bodies -----------------------------------------------------------------------------------------------------------------
@@ -240,7 +244,9 @@ def test_nothing_falls_through_a_floor(floor):
 
 def test_a_ball_rolls_off_a_sphere_that_stands_still():
     sim = play(
-        [ball("a", (0.1, 0, 6.0), gravity=GRAVITY, radius=0.5)], 300, scene=Scene(walls=[Sphere((0, 0, 0), 5.0)])
+        [ball("a", (0.1, 0, 6.0), gravity=GRAVITY, radius=0.5)],
+        300,
+        scene=Scene(walls=[Sphere((0, 0, 0), 5.0)]),
     )
     x = one(sim, "a.pos")
     assert x[0] > 1.0
@@ -254,14 +260,24 @@ def test_capsules_lie_across_each_other_and_across_a_box():
         box("two", (0, 0, 1.9), (1.6, 0.4, 0.4), heading=math.pi / 2),
     ]
     sim = play(shapes, 100, scene=FLOOR, capsules="one, two")
-    assert [one(sim, f"{n}.pos")[2] for n in ("low", "one", "two")] == pytest.approx([0.5, 1.2, 1.6], abs=0.02)
+    assert [one(sim, f"{n}.pos")[2] for n in ("low", "one", "two")] == pytest.approx(
+        [0.5, 1.2, 1.6], abs=0.02
+    )
 
 
 def test_crossed_edges_of_boxes_hold():
     """Two long beams, each turned by 45 degrees about its own axis, lie crosswise on each other: edge on edge."""
     beams = [
         box("low", (0, 0, 0), (4.0, 1.0, 1.0), gravity=0.0, roll=math.pi / 4),
-        box("high", (0, 0, 1.5), (4.0, 1.0, 1.0), gravity=0.0, roll=math.pi / 4, heading=math.pi / 2, velocity=(0, 0, -1)),
+        box(
+            "high",
+            (0, 0, 1.5),
+            (4.0, 1.0, 1.0),
+            gravity=0.0,
+            roll=math.pi / 4,
+            heading=math.pi / 2,
+            velocity=(0, 0, -1),
+        ),
     ]
     sim = play(beams, 40, fixed="low", friction=0.0)
     assert one(sim, "high.pos")[2] == pytest.approx(math.sqrt(2.0), abs=0.01)
@@ -301,7 +317,10 @@ def test_remove_on_collision():
     sim = crossing(remove_on_collision=True)
     assert bodies(sim).n == 0
     assert sim.read("Told.pairs")[0].tolist() == [1]
-    assert bodies(play([ball("a", (0, 0, 3), gravity=GRAVITY)], 200, scene=FLOOR, remove_on_collision=True)).n == 0
+    assert (
+        bodies(play([ball("a", (0, 0, 3), gravity=GRAVITY)], 200, scene=FLOOR, remove_on_collision=True)).n
+        == 0
+    )
 
 
 @pytest.mark.parametrize(
@@ -325,7 +344,10 @@ def test_fixed_bodies_are_not_pushed():
 
 
 def test_terrain_can_be_left_out_and_a_plane_added():
-    assert one(play([ball("a", (0, 0, 3), gravity=GRAVITY)], 200, scene=FLOOR, enable_terrain=False), "a.pos")[2] < -5.0
+    assert (
+        one(play([ball("a", (0, 0, 3), gravity=GRAVITY)], 200, scene=FLOOR, enable_terrain=False), "a.pos")[2]
+        < -5.0
+    )
     drop = play(
         [ball("a", (0, 0, 3), gravity=GRAVITY)], 200, enable_ground_plane=True, ground_plane_height=-2.0
     )
@@ -333,7 +355,9 @@ def test_terrain_can_be_left_out_and_a_plane_added():
 
 
 def test_masses_without_inertia_do_not_turn():
-    blocks = [Block(name="a", position=(0, 0, 1.0), velocity=(7, 0, 0), variance=(0, 0, 0), motion=Ballistic())]
+    blocks = [
+        Block(name="a", position=(0, 0, 1.0), velocity=(7, 0, 0), variance=(0, 0, 0), motion=Ballistic())
+    ]
     sim = play(blocks, 100, scene=FLOOR, friction=0.3)
     assert one(sim, "a.vel")[0] == pytest.approx(7.0 - 0.3 * GRAVITY * 1.0, rel=1e-2)
     assert bodies(sim).omega.tolist() == [[0.0], [0.0], [0.0]]

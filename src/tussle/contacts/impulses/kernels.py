@@ -90,11 +90,21 @@ def speed_along(moves, pair, rows, c, first):
     a, b = pair
     speed = rows[c, first] * moves[a, 0] + rows[c, first + 1] * moves[a, 1] + rows[c, first + 2] * moves[a, 2]
     if b >= 0:
-        speed -= rows[c, first] * moves[b, 0] + rows[c, first + 1] * moves[b, 1] + rows[c, first + 2] * moves[b, 2]
+        speed -= (
+            rows[c, first] * moves[b, 0] + rows[c, first + 1] * moves[b, 1] + rows[c, first + 2] * moves[b, 2]
+        )
     if rows[c, TURNS] > 0.0:
-        speed += rows[c, first + 3] * moves[a, 3] + rows[c, first + 4] * moves[a, 4] + rows[c, first + 5] * moves[a, 5]
+        speed += (
+            rows[c, first + 3] * moves[a, 3]
+            + rows[c, first + 4] * moves[a, 4]
+            + rows[c, first + 5] * moves[a, 5]
+        )
         if b >= 0:
-            speed += rows[c, first + 6] * moves[b, 3] + rows[c, first + 7] * moves[b, 4] + rows[c, first + 8] * moves[b, 5]
+            speed += (
+                rows[c, first + 6] * moves[b, 3]
+                + rows[c, first + 7] * moves[b, 4]
+                + rows[c, first + 8] * moves[b, 5]
+            )
     return speed
 
 
@@ -286,7 +296,11 @@ def recall(found, bodies, memory, impulses, is_new):
                     normal = vector(contacts, c, 0)
                     t1, t2 = tangents(normal)
                     if dot(p, normal) > 0.0:
-                        impulses[c, 0], impulses[c, 1], impulses[c, 2] = dot(p, normal), dot(p, t1), dot(p, t2)
+                        impulses[c, 0], impulses[c, 1], impulses[c, 2] = (
+                            dot(p, normal),
+                            dot(p, t1),
+                            dot(p, t2),
+                        )
 
 
 @kernel("(I I F2) (I F2) F2 F2w Bw")

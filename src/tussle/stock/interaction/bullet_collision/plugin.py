@@ -138,7 +138,7 @@ class BulletCollision(Interaction):
         for name in (part.strip() for part in getattr(self, param).split(",")):
             if name and name not in known:
                 raise ParameterError(
-                    f"BulletCollision.{param} = {getattr(self, param)!r}: there is no block {name!r}{nearest_name(name, known)}; {listed(known)}"
+                    f"BulletCollision.{param}: there is no block {name!r}{nearest_name(name, known)}; {listed(known)}"
                 )
             numbers += [known.index(name)] if name else []
         return numbers
