@@ -28,9 +28,7 @@ def tray(n: int, block: dict[str, Any], plugin: BulletCollision) -> Simulation:
     """n bodies that fall into a tray about four layers deep."""
     side = 1.1 * (n / 4.0) ** 0.5
     wall = ((side / 2 + 1, 0.0), (-side / 2 - 1, 0.0), (0.0, side / 2 + 1), (0.0, -side / 2 - 1))
-    walls = [
-        Cuboid((x, y, 5.0), (2.0, side + 4.0, 10.0) if x else (side + 4.0, 2.0, 10.0)) for x, y in wall
-    ]
+    walls = [Cuboid((x, y, 5.0), (2.0, side + 4.0, 10.0) if x else (side + 4.0, 2.0, 10.0)) for x, y in wall]
     body = Block(
         name="body", count=n, radius=0.5, placement="uniform", half_width=(side / 2 - 0.6, side / 2 - 0.6, 3.0),
         position=(0.0, 0.0, 4.0), scatter_first=True, **block,

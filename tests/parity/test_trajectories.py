@@ -9,17 +9,13 @@ these missions draws a random number that counts.
 from __future__ import annotations
 
 import dataclasses
-from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
-from recordings import NAMES, Recording, folder, load, mission
+from recordings import NAMES, Recording, load, mission
 from replay import Flight, fly
 
 from tussle import Mission, historic, stock
-from tussle.api import Interaction
-from tussle.mission import read_mission
 
 LIMIT = 1e-6  # [m]
 ATTITUDE_LIMIT = (
@@ -76,20 +72,10 @@ def test_an_aircraft_with_surfaces_flies_as_recorded() -> None:
     assert max(flight.turn.values()) <= 1e-10
 
 
-def test_cars_drive_and_stop_as_recorded(tmp_path: Path) -> None:
-    """Two lots of cars, each at one point; from the second step on a force holds them, there by BulletCollision, here along x."""
-
-    class Hold(Interaction):
-        def step(self, w: Any) -> None:
-            w.bodies.force[0] += np.where(w.step_count[w.world] > 0, 1.0, 0.0)
-
-    place = folder()
-    assert place is not None
-    text = (place / "missions" / "colliding_spheres.xml").read_text()
-    path = tmp_path / "cars.xml"
-    path.write_text(text.replace("<entity_interaction>BulletCollision</entity_interaction>", ""))
-    cars = read_mission(path, compat="scrimmage").mission.replace(interactions=[Hold()], end=5.0)
-    flight = fly(cars, load("colliding_spheres"))
+def test_cars_drive_and_stop_as_recorded() -> None:
+    """Two lots of cars, each at one point, from which the forces of BulletCollision hold them from the second step on. 5 of 100 s."""
+    recording = load("colliding_spheres")
+    flight = fly(mission("colliding_spheres").replace(end=5.0, compat="scrimmage"), recording)
     assert len(flight.error) > 7
     assert max(flight.max_error, *flight.turn.values(), *flight.slip.values()) <= 1e-12
 

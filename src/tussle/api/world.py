@@ -136,7 +136,11 @@ class WorldView(GroupView):
     def mass_properties(self) -> tuple[np.ndarray, np.ndarray]:
         """Mass [kg], (n,), and inertia tensor [kg m^2], body frame, nine elements, (9, n); 0 for bodies that torques do not turn."""
         mass, inertia = self.context.mass_properties()
-        return (mass, inertia) if self.table_rows is None else (mass[self.table_rows], inertia[:, self.table_rows])
+        return (
+            (mass, inertia)
+            if self.table_rows is None
+            else (mass[self.table_rows], inertia[:, self.table_rows])
+        )
 
     def spawn(self, block: str, world: Any, **where: Any) -> None:
         """Request new entities of a block, one per item of `world`. They are born at the beginning of the next step.

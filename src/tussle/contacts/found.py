@@ -80,7 +80,7 @@ def find(
         n_worlds: Number of worlds.
     """
     vel, dt, world = motion
-    (items, sizes), n = shapes, len(world)
+    (items, sizes), n, moving = shapes, len(world), motion
     if len(scene.balls):
         shapes, pairs, vel = _with_balls(shapes, pairs, (vel, dt), scene.balls)
     ints, numbers = filled(
@@ -89,7 +89,7 @@ def find(
     ints[:, 1] = np.where(ints[:, 1] < n, ints[:, 1], -1)
     found = [(ints, numbers)]
     if not scene.is_empty:
-        bodies, moving = (items, np.ascontiguousarray(sizes[0])), (vel[:, :n], dt, world)
+        bodies = items, np.ascontiguousarray(sizes[0])
         found.append(
             filled(
                 4 * n + 16,
@@ -131,9 +131,7 @@ def _with_balls(
     )
 
 
-def inverse_masses(
-    mass: np.ndarray, inertia: np.ndarray, quat: np.ndarray, moves: np.ndarray
-) -> np.ndarray:
+def inverse_masses(mass: np.ndarray, inertia: np.ndarray, quat: np.ndarray, moves: np.ndarray) -> np.ndarray:
     """Inverse mass and inertia of each body, world frame, (n, 10); see `invert_masses`."""
     inverse = np.empty((len(mass), 10))
     impulses_kernels.invert_masses((mass, inertia, quat), moves, inverse)
@@ -184,7 +182,13 @@ def solve(
     split(
         len(contacts.starts) - 1,
         lambda *part: impulses_kernels.solve_worlds(
-            (moves, shifts, inverse, sizes), (*contacts.arrays, is_new), materials, *steps, contacts.starts, impulses, part
+            (moves, shifts, inverse, sizes),
+            (*contacts.arrays, is_new),
+            materials,
+            *steps,
+            contacts.starts,
+            impulses,
+            part,
         ),
     )
     return shifts

@@ -16,10 +16,10 @@ PAGE = Path(__file__).parents[3] / "docs" / "mission-format.md"
 RUN_AS_THEY_ARE = {
     "straight.xml": 3, "straight-no-gui.xml": 2, "unicycle.xml": 2, "harmonic-oscillator.xml": 1, "waypoint_follower.xml": 2,
     "batch-example-mission.xml": 2, "straight_include/straight_complete.xml": 2, "capture-the-flag-simple.xml": 4,
+    "colliding_spheres.xml": 2,
 }  # fmt: skip
 """Number of blocks of each."""
 WAIT_FOR_PLUGINS = {
-    "colliding_spheres.xml": "BulletCollision SimpleCarControllerHeading SimpleCar",
     "fixed_wing_6dof.xml": "AircraftPIDController FixedWing6DOF",
     "multirotor-test.xml": "RigidBody6DOFStateSensor MultirotorTests Multirotor MultirotorControllerPID",
     "predator_prey_boids.xml": "JSBSimModel JSBSimModelControllerHeadingPID",
@@ -190,8 +190,8 @@ def test_what_a_mission_of_the_existing_system_lacks_is_named_in_one_line_each(e
 
 
 def test_missing_plugins_have_an_error_of_their_own():
-    with pytest.raises(catalogue.AbsentPluginError, match="BulletCollision is not in tussle yet"):
-        catalogue.Catalogue().load("BulletCollision")
+    with pytest.raises(catalogue.AbsentPluginError, match="MOOSAutonomy is not in tussle yet"):
+        catalogue.Catalogue().load("MOOSAutonomy")
 
 
 def test_only_plugins_that_do_not_ship_are_named_as_missing():

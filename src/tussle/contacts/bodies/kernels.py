@@ -46,8 +46,8 @@ def size_of(items, k):
 def place_shapes(bodies, block, shapes, items, sizes):
     """Write the items (n, ITEM) of all bodies; the distance of their furthest point from the centre, and their size [m], (2, n).
 
-    bodies: positions [m] (3, n), attitudes (4, n), radii [m] (n,). block (n,). shapes: radius and half lengths of each block [m], (n_blocks, 4); a negative
-    radius for spheres with the body's own one.
+    bodies: positions [m] (3, n), attitudes (4, n), radii [m] (n,). block (n,). shapes: radius and half lengths of each block [m],
+    (n_blocks, 4); a negative radius for spheres with the body's own one.
     """
     pos, quat, radius = bodies
     for row in range(block.shape[0]):
@@ -251,8 +251,8 @@ def pair_contacts(items, a, b, motion, found, scratch):
 def find_pairs(shapes, pairs, motion, ints, contacts):
     """Write the contacts of pairs of bodies; returns their number, which may be larger than there is place for.
 
-    shapes: items (n, ITEM), and furthest point and size of each body [m], (2, n). pairs: row and other row, (m,). motion: velocities [m/s], (3, n), and length of a step [s]. Written: ints (c, 3):
-    row, other row and pair; contacts (c, CONTACT).
+    shapes: items (n, ITEM), and furthest point and size of each body [m], (2, n). pairs: row and other row, (m,). motion: velocities
+    [m/s], (3, n), and length of a step [s]. Written: ints (c, 3): row, other row and pair; contacts (c, CONTACT).
     """
     items, sizes = shapes
     row, other = pairs

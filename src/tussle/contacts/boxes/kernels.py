@@ -278,7 +278,9 @@ def box_contacts(items, k, other, reach, found, n, scratch):
         bodies = second, n_second, axes_b, first, 8, axes_a
         n = clipped_faces(bodies, way, reach, (center_b, center_a), False, found, n, polygons)
     n = thinned(found, before, n, SAME_CORNER * min(items[k, 4], items[k, 5], items[k, 6]))
-    for i in range(before, n):  # the octant of the box: it stays the same when the polygon gets another corner
+    for i in range(
+        before, n
+    ):  # the octant of the box: it stays the same when the polygon gets another corner
         arm = vector(found, i, 3)
         found[i, 10] = 0.0
         for j in range(3):

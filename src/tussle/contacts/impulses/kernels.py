@@ -22,13 +22,13 @@ FEATURES = 64
 SETTLED = 1e-9
 """Change of the velocities [m/s] below which a world is solved."""
 SHARE = 0.3
-"""Share of an overlap that is undone in a step: with all of it, piles tremble."""
+"""Share of a small overlap that is undone in a step: with all of it, piles tremble. What is deeper is undone at once."""
 WAY, MASS = 16, 15
 """Numbers of a contact for each of its directions, the normal and two tangents: unit vector; how the angular velocities of both bodies
 change the speed along it, and how an impulse along it changes them; last, at MASS, the effective mass."""
-SOFT, GOAL, FRICTION, OVERLAP, TURNS, ROW = 48, 49, 50, 51, 52, 53
-"""Further numbers: inverse of the effective mass along the normal, goal of the normal speed, friction, allowed overlap, and 1 if a body
-turns."""
+SOFT, GOAL, FRICTION, OVERLAP, TURNS, HOLDS, ROW = 48, 49, 50, 51, 52, 53, 54
+"""Further numbers: inverse of the effective mass along the normal, goal of the normal speed, friction, allowed overlap, 1 if a body turns,
+and 1 if the contact held during the whole step."""
 
 
 @kernel("(F F2 F2) B F2w")
@@ -90,11 +90,21 @@ def speed_along(moves, pair, rows, c, first):
     a, b = pair
     speed = rows[c, first] * moves[a, 0] + rows[c, first + 1] * moves[a, 1] + rows[c, first + 2] * moves[a, 2]
     if b >= 0:
-        speed -= rows[c, first] * moves[b, 0] + rows[c, first + 1] * moves[b, 1] + rows[c, first + 2] * moves[b, 2]
+        speed -= (
+            rows[c, first] * moves[b, 0] + rows[c, first + 1] * moves[b, 1] + rows[c, first + 2] * moves[b, 2]
+        )
     if rows[c, TURNS] > 0.0:
-        speed += rows[c, first + 3] * moves[a, 3] + rows[c, first + 4] * moves[a, 4] + rows[c, first + 5] * moves[a, 5]
+        speed += (
+            rows[c, first + 3] * moves[a, 3]
+            + rows[c, first + 4] * moves[a, 4]
+            + rows[c, first + 5] * moves[a, 5]
+        )
         if b >= 0:
-            speed += rows[c, first + 6] * moves[b, 3] + rows[c, first + 7] * moves[b, 4] + rows[c, first + 8] * moves[b, 5]
+            speed += (
+                rows[c, first + 6] * moves[b, 3]
+                + rows[c, first + 7] * moves[b, 4]
+                + rows[c, first + 8] * moves[b, 5]
+            )
     return speed
 
 
@@ -148,13 +158,17 @@ def prepare(c, pair, lasts, contacts, bodies, material, dt, rows):
         rows[c, i + 15] = 1.0 / soft if soft > 0.0 else 0.0
     rows[c, SOFT] = 1.0 / rows[c, MASS] if rows[c, MASS] > 0.0 else 0.0
     speed = speed_along(moves, pair, rows, c, 0)
-    # A bounce if they would touch in the step; else they may approach until they touch.
-    bounces = speed < -bounce_speed and restitution > 0.0 and gap + speed * dt <= 0.0
+    # A bounce if they would touch in the step; else they may approach until they touch. Newton's law also where they part and others
+    # push them together again: with any other goal, the energy would grow.
+    bounces = restitution > 0.0 and (
+        (speed < -bounce_speed and gap + speed * dt <= 0.0) or speed > max(bounce_speed, gap / dt)
+    )
     slack = SLACK * (min(sizes[1, a], sizes[1, b]) if b >= 0 else sizes[1, a])
     # A contact that lasts holds within the slack: if it closed the gap in each step, a pile would tremble.
     rests = gap <= 0.0 or (lasts and gap <= slack)
     rows[c, GOAL] = -restitution * speed if bounces else 0.0 if rests else -gap / dt
     rows[c, FRICTION], rows[c, OVERLAP] = friction, slack
+    rows[c, HOLDS] = 1.0 if lasts and -0.5 * speed * dt <= slack else 0.0
 
 
 @device
@@ -186,7 +200,8 @@ def undo_overlap(c, pair, gap, bodies, rows, pushes, dt):
     """Move the bodies of a contact apart, if their velocities do not do it in the next step."""
     moves, inverse, shifts = bodies
     speed = speed_along(moves, pair, rows, c, 0)
-    deep = SHARE * max(0.0, -gap - rows[c, OVERLAP] - max(0.0, speed) * dt)
+    deep = max(0.0, -gap - rows[c, OVERLAP] - max(0.0, speed) * dt)
+    deep -= (1.0 - SHARE) * min(deep, 5.0 * rows[c, OVERLAP])
     p = max(0.0, pushes[c] + rows[c, MASS] * (deep - speed_along(shifts, pair, rows, c, 0)))
     d = p - pushes[c]
     if d != 0.0:
@@ -205,7 +220,7 @@ def push_all(c, pair, inverse, rows, impulses, factor, moves):
 def solve_worlds(bodies, found, materials, dt, iterations, starts, impulses, part):
     """Solve the contacts of worlds part[0] to part[1] - 1.
 
-    The impulses of a contact that lasts acted during the whole step, so that they also undo half of the path that their change of the
+    The impulses of a contact that held acted during the whole step, so that they also undo half of the path that their change of the
     velocity makes in it: a body at rest, which its motion model lets fall in each step, stays where it is.
 
     bodies: velocity and angular velocity [m/s rad/s], (n, 6), changed; shifts [m rad], (n, 6), changed from 0; inverse masses (n, 10);
@@ -236,7 +251,7 @@ def solve_worlds(bodies, found, materials, dt, iterations, starts, impulses, par
             if change < SETTLED * SETTLED:
                 break
         for c in range(first, last):
-            if not is_new[c]:
+            if rows[c, HOLDS] > 0.0:
                 push_all(c, (row[c], other[c]), inverse, rows, impulses, 0.5 * dt, shifts)
         for _ in range((iterations + 1) // 2):
             for c in range(first, last):
@@ -281,7 +296,11 @@ def recall(found, bodies, memory, impulses, is_new):
                     normal = vector(contacts, c, 0)
                     t1, t2 = tangents(normal)
                     if dot(p, normal) > 0.0:
-                        impulses[c, 0], impulses[c, 1], impulses[c, 2] = dot(p, normal), dot(p, t1), dot(p, t2)
+                        impulses[c, 0], impulses[c, 1], impulses[c, 2] = (
+                            dot(p, normal),
+                            dot(p, t1),
+                            dot(p, t2),
+                        )
 
 
 @kernel("(I I F2) (I F2) F2 F2w Bw")

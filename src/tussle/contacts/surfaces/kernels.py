@@ -17,7 +17,7 @@ from tussle.contacts.bodies.kernels import (
     unit_or,
 )
 from tussle.contacts.boxes.kernels import CONTACT, MOST_FOUND, box_contacts, dot, minus, put, vector
-from tussle.numeric.kernel import device, kernel, routine
+from tussle.numeric.kernel import kernel, routine
 from tussle.numeric.rigid_body import add, cross, scale
 
 TRIANGLE = 13
@@ -91,12 +91,14 @@ def ball_triangle_contact(place, radius, center, t, k, motion, found, n, feature
     elif distance < -radius:
         return n
     gap = dot(normal, minus(start, point)) - radius
-    for i in range(n):  # another triangle of the same surface: the edge between them is none
+    for i in range(
+        n
+    ):  # of an edge within one surface, such as a floor of triangles, the face beside it is touched, not the edge
         if found[i, 10] == feature:
-            kept = minus(point, vector(found, i, 6))
-            if abs(dot(kept, vector(found, i, 0))) <= SAME_PLACE * radius:
-                if found[i, 9] <= gap + SAME_PLACE * radius:
-                    return n
+            apart = minus(point, vector(found, i, 6))
+            if abs(dot(apart, vector(found, i, 0))) <= SAME_PLACE * radius:
+                return n
+            if abs(dot(apart, normal)) <= SAME_PLACE * radius:
                 found[i, 9] = np.inf
     return put(found, n, normal, minus(place, scale(radius, normal)), point, gap, feature)
 
@@ -138,7 +140,10 @@ def box_triangle_contacts(items, a, t, k, motion, found, n, scratch):
         is_new = True
         for j in range(kept):
             way = minus(vector(found, i, 6), vector(found, j, 6))
-            if dot(way, way) <= (SAME_PLACE * size) ** 2 and dot(vector(found, i, 0), vector(found, j, 0)) > 0.99:
+            if (
+                dot(way, way) <= (SAME_PLACE * size) ** 2
+                and dot(vector(found, i, 0), vector(found, j, 0)) > 0.99
+            ):
                 is_new = False
         if is_new:
             for j in range(CONTACT):
@@ -198,7 +203,9 @@ def tree_contacts(items, a, box, surface, motion, found, n, stack):
             continue
         for k in range(links[node, 0], links[node, 0] + links[node, 1]):
             for j in range(TRIANGLE):
-                t[0, j] = triangles[k, j]  # as for a field: one array type, so that the compiler makes one version
+                t[0, j] = triangles[
+                    k, j
+                ]  # as for a field: one array type, so that the compiler makes one version
             n = triangle_contacts(items, a, t, 0, motion, found, n, inner)
     return n
 

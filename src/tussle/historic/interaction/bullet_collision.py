@@ -58,7 +58,9 @@ class BulletCollision(bullet_collision.BulletCollision):
         removes = self.remove_on_collision[w.world[row]]
         is_body = other >= 0
         is_own, world = w.team[row] == w.team[other], w.world[row]
-        is_asked = np.where(is_own, self.enable_team_collisions[world], self.enable_non_team_collisions[world])
+        is_asked = np.where(
+            is_own, self.enable_team_collisions[world], self.enable_non_team_collisions[world]
+        )
         met = np.flatnonzero(removes & is_body & is_asked)
         pair = np.unique(np.stack([row[met], other[met]]), axis=1)
         first, second = pair

@@ -83,6 +83,10 @@ class BulletCollision(Interaction):
             return None
         return other_id
 
+    def start(self, w: WorldView) -> None:
+        self._shapes(w)  # so that a wrong name is told of before the first step
+        self._blocks(w, "fixed")
+
     def step(self, w: WorldView) -> None:
         if not self.enable_collision_detection or not w.n:
             return
@@ -134,7 +138,7 @@ class BulletCollision(Interaction):
         for name in (part.strip() for part in getattr(self, param).split(",")):
             if name and name not in known:
                 raise ParameterError(
-                    f"BulletCollision.{param} = {getattr(self, param)!r}: there is no block {name!r}{nearest_name(name, known)}; {listed(known)}"
+                    f"BulletCollision.{param}: there is no block {name!r}{nearest_name(name, known)}; {listed(known)}"
                 )
             numbers += [known.index(name)] if name else []
         return numbers
