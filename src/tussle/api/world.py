@@ -48,6 +48,7 @@ class WorldView(GroupView):
     """
 
     def __init__(self, bodies: Bodies, context: Context) -> None:
+        self.unsound = dict[int, str]()  # row -> the plugin that moved it to no finite place
         super().__init__(bodies, 0, bodies.n, context, context.clock.dt)
         self.only: np.ndarray | None = None  # worlds this call acts on, (n_worlds,); None for all
         self.failing_world: int | None = None
@@ -61,6 +62,7 @@ class WorldView(GroupView):
 
     def reset(self, bodies: Bodies, first: int, last: int) -> None:
         super().reset(bodies, first, last)
+        self.unsound.clear()
         self.n_worlds = bodies.n_worlds
         self._writable = WorldBodies(bodies)
 
@@ -121,6 +123,9 @@ class WorldView(GroupView):
                         f"w.move: {name} has shape {value.shape}; it takes ({k}, {len(rows)})"
                     )
                 getattr(self._bodies, name)[:, rows] = value
+                if not np.isfinite(value).all():
+                    bad = rows[~np.isfinite(getattr(self._bodies, name)[:, rows]).all(axis=0)]
+                    self.unsound |= dict.fromkeys(map(int, bad), self._caller.instance_name)
         for row in rows:
             self._bodies.touch(int(row), int(row) + 1)
         self.moved.append(rows)
