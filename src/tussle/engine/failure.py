@@ -69,7 +69,9 @@ def in_call(error: Exception, plugin: Any, view: GroupView, group: Group | None 
     return raised(error, plugin, where=where, step=step, world=world)
 
 
-def not_finite(group: Group, bodies: Bodies, row: int, step: int, view: WorldView, writers: list[Any]) -> PluginError:
+def not_finite(
+    group: Group, bodies: Bodies, row: int, step: int, view: WorldView, writers: list[Any]
+) -> PluginError:
     """The error for a body row whose state is not finite.
 
     Names the first plugin output, in call order, that is not finite; else the plugin that moved it there; else the motion model, or the

@@ -52,7 +52,9 @@ def _record_faults(state: SimulationState) -> None:
         if not state.failed[world]:
             group = next(g for g in state.population.groups if g.first <= row < g.last)
             step = int(state.context.clock.step[world])
-            state.record_failure(world, failure.not_finite(group, bodies, row, step, state.world_view, writers))
+            state.record_failure(
+                world, failure.not_finite(group, bodies, row, step, state.world_view, writers)
+            )
     state.world_view.kill(~faulty & ~(bodies.health > 0.0), "health")
 
 

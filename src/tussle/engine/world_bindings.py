@@ -18,7 +18,9 @@ from tussle.errors import DeclarationError, TussleError, WiringError
 from tussle.lists import RaggedColumn
 
 
-def offer(services: dict[str, Callable[..., Any]], name: str, plugin: str, function: Callable[..., Any]) -> None:
+def offer(
+    services: dict[str, Callable[..., Any]], name: str, plugin: str, function: Callable[..., Any]
+) -> None:
     """Add a service of a world plugin by "plugin.service", and by its own name unless several plugins offer it.
 
     A call by a name that several offer raises an error, which names them.

@@ -101,7 +101,9 @@ class Catalogue:
         if name not in self._sources:
             if name in historic()["plugins"]["names"]:
                 kind, _, why = missing()[name].partition(": ")
-                raise AbsentPluginError(f"{name} is {'dropped' if kind == 'dropped' else 'not in tussle yet'}: {why}")
+                raise AbsentPluginError(
+                    f"{name} is {'dropped' if kind == 'dropped' else 'not in tussle yet'}: {why}"
+                )
             raise MissionError(
                 f"there is no plugin {name[:80]!r}{nearest_name(name[:80], self.names)}; `tussle plugins` lists them, "
                 "and --plugin-path FILE adds those of a file"

@@ -80,14 +80,14 @@ def test_the_motion_model_is_named_where_its_own_state_is_wrong():
 
 
 def test_a_world_plugin_has_no_references():
-    with pytest.raises(DeclarationError, match="Keeper.target: a world plugin has no EntityRef"):
+    with pytest.raises(DeclarationError, match=r"Keeper\.target: a world plugin has no EntityRef"):
 
         class Keeper(Interaction):
             target = EntityRef()
 
 
 def test_a_column_cannot_hide_a_hook_and_other_names_are_free():
-    with pytest.raises(DeclarationError, match="Late.start: WorldPlugin has a method of this name"):
+    with pytest.raises(DeclarationError, match=r"Late\.start: WorldPlugin has a method of this name"):
 
         class Late(Interaction):
             start = Param(1.0, unit="s")
@@ -134,5 +134,7 @@ def test_a_service_of_several_plugins_is_called_by_plugin_and_name():
     two = Depot(name="east", stock=2.0), Depot(name="west", stock=3.0)
     assert speed("level", Depot(stock=4.0)) == 4.0
     assert (speed("east.level", *two), speed("west.level", *two)) == (2.0, 3.0)
-    with pytest.raises((PluginError, TussleError), match=r"several plugins offer the service 'level'; call one of east\.level, west\.level"):
+    with pytest.raises(
+        TussleError, match=r"several plugins offer the service 'level'; call one of east\.level, west\.level"
+    ):
         speed("level", *two)

@@ -20,7 +20,9 @@ PLAY = {
 }  # fmt: skip
 """Missions of the existing system that play as they are, and the number of blocks of each."""
 WAIT = {
-    "colliding_spheres.xml": {"entity_interaction BulletCollision is not in tussle yet: needs bodies that push each other"},
+    "colliding_spheres.xml": {
+        "entity_interaction BulletCollision is not in tussle yet: needs bodies that push each other"
+    },
     "rlsimple.xml": {
         "sensor RLSimpleSensor is not in tussle yet: needs environments for learning",
         "autonomy RLSimple is not in tussle yet: needs environments for learning",
@@ -200,7 +202,9 @@ def test_what_a_mission_of_the_existing_system_waits_for_is_named_in_one_line_ea
 def test_a_mission_that_flies_the_rascal_says_what_is_missing(existing, name):
     pytest.importorskip("jsbsim")
     mission = read_mission(existing(name)).mission
-    with pytest.raises(PluginError, match="jsbsim_root names the folder with aircraft, engine, systems and scripts"):
+    with pytest.raises(
+        PluginError, match="jsbsim_root names the folder with aircraft, engine, systems and scripts"
+    ):
         Simulation(mission, seeds=1).step()
 
 

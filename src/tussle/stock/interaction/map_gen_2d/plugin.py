@@ -14,8 +14,8 @@ MOST_WALLS = 20_000
 class MapGen2D(Interaction):
     """Walls where the image of a map is dark: boxes on which rays of the scene end. The upper edge of the image is north.
 
-    It needs Pillow, which `pip install 'tussle[maps]'` installs. The existing system looked the map up in its own folders. Entities
-    do not collide with walls yet.
+    It needs Pillow, which `pip install 'tussle[maps]'` installs. The existing system looked the map up in its own folders. With
+    `SceneCollision` entities collide with them.
 
     Raises:
         ParameterError: The map is not a readable image, has more than 20,000 walls, or Pillow is not installed.

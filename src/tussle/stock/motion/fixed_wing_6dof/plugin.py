@@ -42,8 +42,8 @@ class FixedWing6DOF(RigidBodyModel):
     gave three times the reverse thrust); the ground damps critically (there, hardly); the product of inertia turns a banking nose
     to its side, as Nelson's positive I_xz does (there, the sign was that of the axes upside down).
 
-    With `use_launcher` it rests on a launcher for `launch_time`; then a catapult accelerates it along its x axis by `launch_accel` from rest
-    to `launch_speed`, x = a t^2 / 2, and releases it at the end of that substep. Until then nothing else moves or turns it.
+    With `use_launcher` it rests on a launcher for `launch_time`; then a catapult accelerates it along its x axis by `launch_accel`
+    from rest to `launch_speed`, x = a t^2 / 2, and releases it at the end of that substep. Until then nothing else moves or turns it.
     """
 
     grade = "portable"
