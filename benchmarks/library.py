@@ -5,8 +5,8 @@
 N entities of one kind in one world, on one thread. `ns_per_substep` is the CPU time of a substep of controller and motion model alone
 (without autonomies), per entity: the median of the repetitions; `ns_least` is the fastest one, an estimate without other load on the
 machine. Commands are those of the conformance kit. The models and controllers are those of the manifest; a line without a number says
-why there is none. `limit` is what is wanted: 300 ns of a model and of a controller, 1,000 ns of a model with six degrees of freedom; none of
-a flight model outside.
+why there is none. `limit` is what is wanted: 300 ns of a model and of a controller, 1,000 ns of a model with six degrees of freedom; none
+of a flight model outside.
 
 `existing` is the CPU time of SCRIMMAGE (2025-08-12, one thread of a 2.6 GHz Xeon) for the mission of table1.py with 200 entities, by entity
 and substep: with its autonomies, for it can't be measured without them. There is no other measurement of it.
@@ -67,7 +67,9 @@ def pairs() -> Iterator[tuple[Any, Any]]:
         for controller in classes("controller"):
             gives = {c for column in controller.outputs().values() for c in column.channels}
             takes = {c for column in controller.inputs().values() for c in column.channels}
-            if needs and needs <= gives and not controller.passthrough and not needs & takes:  # nor one in series
+            if (
+                needs and needs <= gives and not controller.passthrough and not needs & takes
+            ):  # nor one in series
                 yield motion, controller
 
 

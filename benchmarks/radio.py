@@ -3,8 +3,8 @@
     python benchmarks/radio.py [--sizes 2000] [--repeats 3] [--json FILE]
 
 Nodes drift in a plane, with 16 others within the range of 100 m. One world, one thread. `copies` is the number of copies of messages
-that are received in a step, `wall_ms` and `cpu_ms` are per step, `to_real_time` is simulated time over CPU time: 10 is wanted of 2,000 nodes with
-SphereNetwork, on one core.
+that are received in a step, `wall_ms` and `cpu_ms` are per step, `to_real_time` is simulated time over CPU time: 10 is wanted
+of 2,000 nodes with SphereNetwork, on one core.
 """
 
 from __future__ import annotations

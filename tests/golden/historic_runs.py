@@ -50,7 +50,12 @@ def play(folder: str) -> tuple[float, set[str]]:
         plugins = [b.plugin for g in sim.state.population.groups for b in g.walk()]
         plugins += [b.plugin for b in sim.state.world_bindings]
         classes = {type(p).__mro__ for p in plugins}
-    played = {f"{c.__module__}:{c.__name__}" for mro in classes for c in mro if c.__module__.startswith("tussle.historic.")}
+    played = {
+        f"{c.__module__}:{c.__name__}"
+        for mro in classes
+        for c in mro
+        if c.__module__.startswith("tussle.historic.")
+    }
     return total, played
 
 

@@ -11,7 +11,8 @@ from tussle.api.group import GroupView
 from tussle.api.plugin import HistoricAttributes, Plugin
 from tussle.api.row_laws import step_rows
 from tussle.api.world import WorldView
-from tussle.columns import Output, Param
+from tussle.columns import EntityRef, Output, Param
+from tussle.errors import DeclarationError
 from tussle.messages import Messages
 from tussle.scene import HeightField, TeamRegion, Volume
 
@@ -87,6 +88,14 @@ class WorldPlugin(Plugin):
     kind: ClassVar[str] = "world plugin"
     reads_start_positions: ClassVar[bool] = False
     """Whether `step` reads `w.start_pos`."""
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        for name, column in cls.columns.items():
+            if isinstance(column, EntityRef):
+                raise DeclarationError(
+                    f"{cls.__name__}.{name}: a world plugin has no EntityRef columns; keep ids in a State(dtype=int)"
+                )
 
     def regions(self) -> tuple[TeamRegion, ...]:
         """Regions that this plugin defines, for `w.region` and pictures; its structural parameters are known."""

@@ -102,6 +102,15 @@ class Plugin:
                 raise DeclarationError(
                     f"{cls.__name__}.{name}: the name is reserved; choose another name for this {type(column).__name__}"
                 )
+            hidden = [
+                b.__name__
+                for b in cls.__mro__
+                if callable(vars(b).get(name)) and b.__module__.startswith("tussle.api.")
+            ]
+            if hidden:
+                raise DeclarationError(
+                    f"{cls.__name__}.{name}: {hidden[0]} has a method of this name; choose another name for this {type(column).__name__}"
+                )
         for name, law in vars(cls).items():
             if isinstance(law, (NeighborLaw, RowLaw)):
                 law.check(cls, name)

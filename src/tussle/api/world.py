@@ -48,6 +48,7 @@ class WorldView(GroupView):
     """
 
     def __init__(self, bodies: Bodies, context: Context) -> None:
+        self.unsound = dict[int, str]()  # row -> the plugin that moved it to no finite place
         super().__init__(bodies, 0, bodies.n, context, context.clock.dt)
         self.only: np.ndarray | None = None  # worlds this call acts on, (n_worlds,); None for all
         self.table_rows: np.ndarray | None = None  # of a call for some worlds: rows of the whole table, (n,)
@@ -62,6 +63,7 @@ class WorldView(GroupView):
 
     def reset(self, bodies: Bodies, first: int, last: int) -> None:
         super().reset(bodies, first, last)
+        self.unsound.clear()
         self.n_worlds = bodies.n_worlds
         self._writable = WorldBodies(bodies)
 
@@ -126,6 +128,9 @@ class WorldView(GroupView):
                         f"w.move: {name} has shape {value.shape}; it takes ({k}, {len(rows)})"
                     )
                 getattr(self._bodies, name)[:, rows] = value
+                if not np.isfinite(value).all():
+                    bad = rows[~np.isfinite(getattr(self._bodies, name)[:, rows]).all(axis=0)]
+                    self.unsound |= dict.fromkeys(map(int, bad), self._caller.instance_name)
         if self._bodies.scans:
             for row in rows:
                 self._bodies.touch(int(row), int(row) + 1)

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from tussle import stock
 from tussle.cli.interrupt import Interrupt
 from tussle.cli.options import MissionOptions
 from tussle.cli.play_options import ConvertOptions, RunOptions
@@ -119,7 +120,7 @@ def run(options: RunOptions) -> int:
         from tussle.record import read_table
 
         more["start_from"] = read_table(options.start_from)
-    name, recorder = loaded.path.stem, None
+    name, recorder = options.mission if options.mission in stock.examples() else loaded.path.stem, None
     with ExitStack() as stack:
         with compiling():
             simulation = stack.enter_context(simulate(loaded, mission, seed, **more))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,8 +14,28 @@ from tussle.columns import Handle, Input, Output, Param, Publish, State, Subscri
 from tussle.comms import Publisher
 from tussle.engine.params import Overrides
 from tussle.engine.table import ColumnPlace, Stored, Table
-from tussle.errors import DeclarationError, WiringError
+from tussle.errors import DeclarationError, TussleError, WiringError
 from tussle.lists import RaggedColumn
+
+
+def offer(
+    services: dict[str, Callable[..., Any]], name: str, plugin: str, function: Callable[..., Any]
+) -> None:
+    """Add a service of a world plugin by "plugin.service", and by its own name unless several plugins offer it.
+
+    A call by a name that several offer raises an error, which names them.
+    """
+    several = name in services
+    services[f"{plugin}.{name}"] = function
+    if not several:
+        services[name] = function
+        return
+    offered = [key for key in services if key.endswith(f".{name}")]
+
+    def refuse(*args: Any, **kwargs: Any) -> Any:
+        raise TussleError(f"several plugins offer the service {name!r}; call one of {', '.join(offered)}")
+
+    services[name] = refuse
 
 
 @dataclass
@@ -84,7 +105,7 @@ class WorldBinding:
         view.context.regions += spec.regions()
         view.context.scene = view.context.scene.with_parts(spec.walls(), spec.terrain())
         for service in type(spec).services:
-            view.context.services[service] = getattr(world_binding.plugin, service)
+            offer(view.context.services, service, spec.instance_name, getattr(world_binding.plugin, service))
         world_binding.attach()
         return world_binding
 

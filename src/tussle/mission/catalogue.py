@@ -37,6 +37,13 @@ def historic() -> dict[str, Any]:
     return tomllib.loads((Path(stock.__file__).parent / "historic.toml").read_text(encoding="utf-8"))
 
 
+@cache
+def missing() -> dict[str, str]:
+    """Plugins of the existing system that are not here -> "not yet: needs ROS", "dropped: ..."."""
+    file = Path(stock.__file__).parents[1] / "historic" / "differences.toml"
+    return dict(tomllib.loads(file.read_text(encoding="utf-8"))["missing"])
+
+
 class AbsentPluginError(MissionError):
     """A plugin of the existing system that tussle does not have yet."""
 
@@ -93,7 +100,10 @@ class Catalogue:
         """
         if name not in self._sources:
             if name in historic()["plugins"]["names"]:
-                raise AbsentPluginError(f"{name} is not in tussle yet")
+                kind, _, why = missing()[name].partition(": ")
+                raise AbsentPluginError(
+                    f"{name} is {'dropped' if kind == 'dropped' else 'not in tussle yet'}: {why}"
+                )
             raise MissionError(
                 f"there is no plugin {name[:80]!r}{nearest_name(name[:80], self.names)}; `tussle plugins` lists them, "
                 "and --plugin-path FILE adds those of a file"

@@ -110,7 +110,7 @@ class Watch:
         self.drawn: dict[Key, tuple[str, int]] = {}
         self.calls = 0
         for hook in HOOKS:
-            if hasattr(plugin, hook):
+            if callable(getattr(plugin, hook, None)):  # else a column of this name
                 plugin.__dict__[hook] = self._watched(hook, getattr(plugin, hook))
 
     def _error(self, rule: str, text: str) -> ConformanceError:

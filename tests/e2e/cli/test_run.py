@@ -321,3 +321,9 @@ def test_a_mission_that_outgrows_its_limit_in_play_needs_allow_large(tussle, fol
     ended = tussle("run", "growing.xml", "--no-log", code=3)
     assert " 2 more entities" in ended.stderr
     tussle("run", "growing.xml", "--no-log", "--allow-large")
+
+
+def test_the_run_of_an_example_is_named_after_its_plugin(process, folder):
+    process("run", "SingleIntegrator", "--end", "1")
+    (run,) = (folder / "runs").iterdir()
+    assert re.fullmatch(r"SingleIntegrator-1-\d{8}-\d{6}", run.name)

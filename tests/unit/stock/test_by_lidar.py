@@ -22,7 +22,9 @@ def flown(scene, lidar=LIDAR, *, count=1, **law):
         name="r", team=1, count=count, radius=0.5, sensor=lidar, motion=SingleIntegrator(),
         autonomy=GoToByLidar(goal=(80.0, 0.0, 0.0), speed=10.0, **law),
     )  # fmt: skip
-    game = mission(block, scene=scene, dt=0.1, end=20.0, interactions=[SceneCollision()], metrics=[Arrivals()])
+    game = mission(
+        block, scene=scene, dt=0.1, end=20.0, interactions=[SceneCollision()], metrics=[Arrivals()]
+    )
     sim = Simulation(game.replace(end_conditions="time"), seeds=[1])
     path = []
     while not sim.is_over:
@@ -57,7 +59,11 @@ def test_without_a_wall_it_flies_straight_and_one_that_sees_nothing_hits_the_wal
 
 def test_it_slows_down_before_a_dead_end():
     """In a pocket that is closed on three sides the speed is one from which it stops."""
-    walls = [Cuboid((40, 0, 0), (2, 300, 40)), Cuboid((0, 20, 0), (90, 2, 40)), Cuboid((0, -20, 0), (90, 2, 40))]
+    walls = [
+        Cuboid((40, 0, 0), (2, 300, 40)),
+        Cuboid((0, 20, 0), (90, 2, 40)),
+        Cuboid((0, -20, 0), (90, 2, 40)),
+    ]
     path, result = flown(Scene(walls=walls), deceleration=2.0)
     speed = np.linalg.norm(np.diff(path[:, 0], axis=0), axis=1) / 0.1
     free = 39.0 - path[:-1, 0, 0] - 2.0

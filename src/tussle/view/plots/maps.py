@@ -245,7 +245,9 @@ def _draw_scenery(axes: Axes, tracks: Trajectories) -> list[Handle]:
         if region.is_wall:
             triangles = region.mesh.vertices[region.mesh.faces][:, :, :2]
             grey = mixed(MUTED, PAPER, 0.6)
-            axes.add_collection(PolyCollection(triangles, facecolor=grey, edgecolor=grey, linewidth=0.3), autolim=False)
+            axes.add_collection(
+                PolyCollection(triangles, facecolor=grey, edgecolor=grey, linewidth=0.3), autolim=False
+            )
             signs["wall"] = (mark_sign("s", grey, markersize=7.0), "wall")
         elif _is_in_picture(lines.min(axis=(0, 1)), lines.max(axis=(0, 1)), corners):
             look: dict[str, Any] = {"linewidth": 0.8, "linestyle": "--"}

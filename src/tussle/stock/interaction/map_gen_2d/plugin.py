@@ -15,7 +15,7 @@ class MapGen2D(Interaction):
     """Walls where the image of a map is dark: boxes on which rays of the scene end. The upper edge of the image is north.
 
     It needs Pillow, which `pip install 'tussle[maps]'` installs. The existing system looked the map up in its own folders.
-    Entities collide with the walls where the mission has `BulletCollision`.
+    Entities collide with the walls where the mission has `BulletCollision` or `SceneCollision`.
 
     Raises:
         ParameterError: The map is not a readable image, has more than 20,000 walls, or Pillow is not installed.

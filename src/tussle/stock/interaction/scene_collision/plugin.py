@@ -16,7 +16,12 @@ class SceneCollision(Interaction):
 
     grade = "portable"
 
-    margin = Param(0.0, unit="m", ge=0.0, doc="Distance to the scene below which an entity of radius 0 collides; adds to the radius.")
+    margin = Param(
+        0.0,
+        unit="m",
+        ge=0.0,
+        doc="Distance to the scene below which an entity of radius 0 collides; adds to the radius.",
+    )
     team = Param(0, doc="Team that collides; 0 for all.")
     last = State("x y z", unit="m", per="entity", doc="Position at the last call.")
     is_known = State(dtype=bool, per="entity", doc="Whether there was a call before.")
@@ -32,7 +37,9 @@ class SceneCollision(Interaction):
         rows = np.flatnonzero(((team == 0) | (team == w.team)) & np.isfinite(w.pos.sum(axis=0)))
         pos = w.pos[:, rows]
         last = np.where(self.is_known[rows], self.last[:, rows], pos)
-        is_clear = w.scene.free(pos, w.radius[rows] + self.margin[w.world[rows]]) & w.scene.line_of_sight(last, pos)
+        is_clear = w.scene.free(pos, w.radius[rows] + self.margin[w.world[rows]]) & w.scene.line_of_sight(
+            last, pos
+        )
         w.kill(rows[~is_clear], "scene")
         self.last[:, rows], self.is_known[rows] = pos, True
 

@@ -42,8 +42,9 @@ class FixedWing6DOF(RigidBodyModel):
     gave three times the reverse thrust); the ground damps critically (there, hardly); the product of inertia turns a banking nose
     to its side, as Nelson's positive I_xz does (there, the sign was that of the axes upside down).
 
-    With `use_launcher` it rests on a launcher for `launch_time`; then a catapult accelerates it along its x axis by `launch_accel` from rest
-    to `launch_speed`, x = a t^2 / 2, and releases it at the end of that substep. Until then nothing else moves or turns it.
+    With `use_launcher` it rests on a launcher for `launch_time`; then a catapult accelerates it along its x axis by `launch_accel`
+    from rest to `launch_speed`, x = a t^2 / 2, and releases it at the end of that substep. Until then nothing else moves or turns it.
+    A `rollout` is one without a launcher.
     """
 
     grade = "portable"
@@ -98,7 +99,7 @@ class FixedWing6DOF(RigidBodyModel):
     use_ground_model = Param(
         True, structural=True, doc="A spring and damper hold the aircraft above height 0."
     )
-    use_launcher = Param(False, structural=True, doc="It starts from a launcher.")
+    use_launcher = Param(False, doc="It starts from a launcher.")
     launch_accel = Param(200.0, unit="m/s^2", gt=0.0, doc="Acceleration by the launcher.")
     launch_speed = Param(20.0, unit="m/s", ge=0.0, doc="Speed at which the launcher releases it.")
     launch_time = Param(30.0, unit="s", ge=0.0, doc="Time from its birth to the launch.")
@@ -180,14 +181,14 @@ class FixedWing6DOF(RigidBodyModel):
 
     def to_body(self, body: MotionBody) -> None:
         """Write the state; that of an aircraft on its launcher is the launcher's."""
-        if self.use_launcher:
+        if self.use_launcher.any():
             self._launch(body)
         super().to_body(body)
 
     def _launch(self, body: MotionBody) -> None:
         """Move those on their launchers from where they were before this substep; `body.t` is the time of its start."""
         pushed = body.t - self.born - self.launch_time
-        rows = np.flatnonzero(pushed * self.launch_accel < self.launch_speed)
+        rows = np.flatnonzero((self.use_launcher != 0) & (pushed * self.launch_accel < self.launch_speed))
         since, push = np.maximum(pushed[rows], 0.0), self.launch_accel[rows]
         way = 0.5 * push * since * since
         forward, state = body.forward[:, rows], self.rigid_body
