@@ -20,9 +20,10 @@ from tussle.mission import Mission
 
 ROWS = 8192
 """Entities of a stack, about: with more rows a row costs no less, and the cache overflows."""
-SEQUENTIAL_ROWS = 4 * ROWS
-"""The same where entities move one after another: a call has one row per world, so that more worlds cost less each."""
-MOST = 256
+SEQUENTIAL_ROWS = 8 * ROWS
+"""The same where entities move one after another: a call has one row per world, and its fixed cost is shared by them."""
+MOST = 512
+"""Most worlds of a stack: a sequential game costs 18 % less in a stack of 512 than of 256, and with 1,024 only 5 % less again."""
 BEAT_EVERY = 0.25  # [s]
 
 Take = Callable[[int], Sequence[BatchRun]]

@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 import time
-from concurrent.futures import Future
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
 from importlib import import_module
 from importlib.util import find_spec
@@ -397,8 +397,9 @@ def test_an_asynchronous_client_is_refused(cluster):
         async with Client(cluster.scheduler_address, asynchronous=True, set_as_default=False) as client:
             OnDask(client)
 
-    with pytest.raises(ParameterError, match="asynchronous=False"):
-        asyncio.run(give_it_one())
+    # In a thread of its own: in this one, a browser of other tests may keep an event loop.
+    with ThreadPoolExecutor(1) as thread, pytest.raises(ParameterError, match="asynchronous=False"):
+        thread.submit(lambda: asyncio.run(give_it_one())).result()
 
 
 def test_without_dask_it_says_what_to_install(monkeypatch):
