@@ -6,7 +6,7 @@ from tussle.aircraft.code import Code
 from tussle.aircraft.equations import offer
 from tussle.aircraft.functions import emit_function, expression, only
 from tussle.aircraft.metrics import Metrics
-from tussle.aircraft.node import Node
+from tussle.aircraft.node import Element
 
 FORCES = {"DRAG": 0, "SIDE": 1, "LIFT": 2, "AXIAL": 0, "NORMAL": 2, "X": 0, "Y": 1, "Z": 2}
 MOMENTS = {"ROLL": 0, "PITCH": 1, "YAW": 2}
@@ -35,9 +35,9 @@ def turned(rows: tuple[tuple[str, ...], ...], vector: tuple[str, str, str]) -> l
 class Axes:
     """The axes of <aerodynamics>: their frames, and their functions in JSBSim's order."""
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: Element) -> None:
         self.forces, self.moments = "WIND", "BODY"
-        self.by_axis: dict[int, Node] = {}
+        self.by_axis: dict[int, Element] = {}
         for axis in node.find_all("axis"):
             name, frame = axis.get("name"), (axis.get("frame") or "BODY").upper()
             if frame not in FRAMES:
@@ -57,7 +57,7 @@ class Axes:
                 )
 
 
-def emit_aerodynamics(code: Code, node: Node | None, metrics: Metrics) -> None:
+def emit_aerodynamics(code: Code, node: Element | None, metrics: Metrics) -> None:
     """Emit the locals aero_fx, _fy, _fz [lbf] and aero_mx, _my, _mz [lbf ft].
 
     Raises:
@@ -96,16 +96,17 @@ def emit_aerodynamics(code: Code, node: Node | None, metrics: Metrics) -> None:
     _emit_sum(code, axes, sums, at_center, lift)
 
 
-def _axis_sums(code: Code, axis: Node, k: int) -> tuple[str, str]:
+def _axis_sums(code: Code, axis: Element, k: int) -> tuple[str, str]:
     """Emit the functions of an axis; return their sums, and those that act at the centre of gravity."""
-    plain, central = [], []
+    plain: list[str] = []
+    central: list[str] = []
     for each in axis.find_all("function"):
         (central if each.get("apply_at_cg") == "true" and k < 3 else plain).append(emit_function(code, each))
     code.line(f"axis_{k} = {' + '.join(plain) or '0.0'}")
     return f"axis_{k}", " + ".join(central) or "0.0"
 
 
-def _emit_hysteresis(code: Code, node: Node) -> None:
+def _emit_hysteresis(code: Code, node: Element) -> None:
     limits = node.find("hysteresis_limits")
     name = "aero/stall-hyst-norm"
     stalled = code.state("stalled")

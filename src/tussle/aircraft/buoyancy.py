@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from tussle.aircraft.code import Code, normal
 from tussle.aircraft.constants import SEA_LEVEL_PRESSURE, TEMPERATURES
 from tussle.aircraft.functions import content, emit_function, expression
-from tussle.aircraft.node import Node
+from tussle.aircraft.node import Element
 from tussle.errors import listed, nearest_name
 
 GAS_CONSTANT = 3.4071  # [ft lbf/mol/R]
@@ -37,7 +37,7 @@ class Bag:
         ballonets: Bags of air in it.
     """
 
-    node: Node
+    node: Element
     name: str
     gas: tuple[float, float]
     location: tuple[float, float, float]
@@ -87,7 +87,7 @@ class Bag:
         )
 
 
-def read_bag(node: Node, name: str, ballonets: bool = True) -> Bag:
+def read_bag(node: Element, name: str, ballonets: bool = True) -> Bag:
     """Read a <gas_cell>, or a <ballonet> in one.
 
     Raises:
@@ -132,7 +132,7 @@ def read_bag(node: Node, name: str, ballonets: bool = True) -> Bag:
     )
 
 
-def read_buoyancy(node: Node | None) -> tuple[Bag, ...]:
+def read_buoyancy(node: Element | None) -> tuple[Bag, ...]:
     """Read <buoyant_forces>.
 
     Raises:
@@ -160,7 +160,7 @@ def emit_gas_mass(code: Code, cells: tuple[Bag, ...]) -> tuple[str, list[str], l
     return code.read(mass), [code.read(each) for each in moments], [code.read(each) for each in inertia]
 
 
-def emit_buoyancy(code: Code, node: Node | None, cells: tuple[Bag, ...]) -> None:
+def emit_buoyancy(code: Code, node: Element | None, cells: tuple[Bag, ...]) -> None:
     """Emit force and moment of buoyancy, `buoy_fx` ... `buoy_mz`, and the state of the gas."""
     code.line("buoy_fx = buoy_fy = buoy_fz = buoy_mx = buoy_my = buoy_mz = 0.0")
     if node is None or not cells:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tussle.aircraft.node import AircraftError, Node
+from tussle.aircraft.node import AircraftError, Element
 from tussle.errors import nearest_name
 
 MOST_LINES = 40_000
@@ -32,7 +32,7 @@ def normal(name: str) -> str:
 
 
 @dataclass
-class Line:
+class CodeLine:
     """A line of a section.
 
     Attributes:
@@ -47,7 +47,7 @@ class Line:
 
 
 @dataclass
-class Section:
+class CodeSection:
     """Lines of code that run in order.
 
     Attributes:
@@ -57,7 +57,7 @@ class Section:
         touched: All names that are written somewhere.
     """
 
-    lines: list[Line] = field(default_factory=list)
+    lines: list[CodeLine] = field(default_factory=list)
     written: set[str] = field(default_factory=set)
     live: dict[str, None] = field(default_factory=dict)
     touched: dict[str, None] = field(default_factory=dict)
@@ -80,10 +80,10 @@ class Code:
         self.initial: dict[str, float] = {}
         self.constants: dict[str, float] = {}
         self.inputs: set[str] = set()
-        self.sections: dict[str, Section] = {}
+        self.sections: dict[str, CodeSection] = {}
         self.names: dict[str, str] = {}
         self._variables: set[str] = set()
-        self.readers: dict[str, Node | None] = {}
+        self.readers: dict[str, Element | None] = {}
         self.kept: dict[str, None] = {}
         self.arrays: dict[str, tuple[int, int]] = {}
         self.rings: list[int] = []
@@ -94,9 +94,9 @@ class Code:
 
     # -- sections and lines ---------------------------------------------------------------------------------------------------
 
-    def begin(self, name: str) -> Section:
+    def begin(self, name: str) -> CodeSection:
         """Continue with a section, new if there is none of that name."""
-        self.section = self.sections.setdefault(name, Section())
+        self.section = self.sections.setdefault(name, CodeSection())
         return self.section
 
     def line(self, text: str) -> None:
@@ -105,9 +105,9 @@ class Code:
         Raises:
             AircraftError: The aircraft has grown beyond all measure.
         """
-        self._add(Line(self._depth, text))
+        self._add(CodeLine(self._depth, text))
 
-    def _add(self, line: Line) -> None:
+    def _add(self, line: CodeLine) -> None:
         self._total += 1
         if self._total > MOST_LINES:
             raise AircraftError(f"the aircraft needs more than {MOST_LINES} lines of generated code")
@@ -118,7 +118,7 @@ class Code:
         for line in text.strip("\n").splitlines():
             bare = line.lstrip(" ")
             if bare:
-                self._add(Line(self._depth + (len(line) - len(bare)) // 4, bare))
+                self._add(CodeLine(self._depth + (len(line) - len(bare)) // 4, bare))
 
     @contextmanager
     def block(self, head: str) -> Iterator[None]:
@@ -162,7 +162,7 @@ class Code:
             self.section.live[name] = None
         return self.variable(name)
 
-    def read(self, name: str, node: Node | None = None) -> str:
+    def read(self, name: str, node: Element | None = None) -> str:
         """Return the expression of a property; `node` is who asks, for the message if nobody writes it."""
         name = normal(name)
         if name in self.constants:
@@ -170,7 +170,7 @@ class Code:
         self.readers.setdefault(name, node)
         return self._read(name)
 
-    def value(self, text: str, node: Node | None = None) -> str:
+    def value(self, text: str, node: Element | None = None) -> str:
         """Return the expression of a text of the file: a number, a property, or a property with a minus sign.
 
         Raises:
@@ -204,7 +204,7 @@ class Code:
         variable = self.variable(name)
         if read:
             self.readers.setdefault(read, None)
-        self._add(Line(self._depth, f"{variable} = {expression}", name))
+        self._add(CodeLine(self._depth, f"{variable} = {expression}", name))
         self.section.touched[name] = None
         if not self._depth:
             self.section.written.add(name)

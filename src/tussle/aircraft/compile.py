@@ -34,7 +34,7 @@ from tussle.aircraft.files import Files
 from tussle.aircraft.ground import emit_ground, offer_steering, read_ground
 from tussle.aircraft.mass import emit_mass, read_mass
 from tussle.aircraft.metrics import offer_metrics, read_metrics
-from tussle.aircraft.node import Node
+from tussle.aircraft.node import Element
 from tussle.aircraft.propulsion import RUNTIME, Propulsion, read_propulsion
 from tussle.errors import ParameterError, nearest_name
 from tussle.numeric import store
@@ -105,7 +105,7 @@ class CompiledAircraft:
 
 
 def emit(
-    root: Node, find: Callable[[Node, str, str], Node], keep: Sequence[str] = ()
+    root: Element, find: Callable[[Element, str, str], Element], keep: Sequence[str] = ()
 ) -> tuple[Code, Propulsion | None]:
     """Emit the step and the start of an aircraft.
 

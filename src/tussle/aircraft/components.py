@@ -9,7 +9,7 @@ from itertools import pairwise
 
 from tussle.aircraft.code import Code
 from tussle.aircraft.functions import expression, only, table
-from tussle.aircraft.node import Node
+from tussle.aircraft.node import Element
 from tussle.errors import listed
 
 IGNORED = ("description", "documentation", "limitation", "output")
@@ -23,7 +23,7 @@ EARTH = {"FT": 21144000.0, "M": 21144000.0 * 0.3048}
 """Radius that JSBSim's waypoints use by default."""
 
 
-def property_of(node: Node) -> str:
+def property_of(node: Element) -> str:
     """The property of a component's name."""
     name = node.get("name")
     if not name:
@@ -40,7 +40,7 @@ class Component:
         rate: Frames per run of its channel; the time step of its dynamics is as many frames.
     """
 
-    def __init__(self, code: Code, node: Node, rate: int = 1) -> None:
+    def __init__(self, code: Code, node: Element, rate: int = 1) -> None:
         self.code, self.node = code, node
         self.name = property_of(node)
         self.dt = "frozen_dt" if rate == 1 else f"({rate}.0 * frozen_dt)"
@@ -407,7 +407,7 @@ def lag(x: str, x1: str, y1: str, c: str, dt: str) -> str:
     )
 
 
-def condition(code: Code, node: Node) -> str:
+def condition(code: Code, node: Element) -> str:
     """Expression of a <test>: lines `property operator value`, and tests in it.
 
     Raises:

@@ -9,10 +9,10 @@ from tussle.aircraft.code import Code
 from tussle.aircraft.components import COMPONENTS, IGNORED, Component
 from tussle.aircraft.functions import emit_function
 from tussle.aircraft.mass import indexed
-from tussle.aircraft.node import Node
+from tussle.aircraft.node import Element
 from tussle.errors import listed, nearest_name
 
-Find = Callable[[Node, str, str], Node]
+Find = Callable[[Element, str, str], Element]
 PASSED = {"throttle": 0.0, "mixture": 0.0, "advance": 0.0, "feather": 0.0}
 """Commands of each engine that become positions unchanged, and their first values."""
 COMMANDS = (
@@ -43,7 +43,7 @@ def offer_commands(code: Code, n_engines: int) -> None:
             code.inputs.add(command)
 
 
-def emit_control(code: Code, aircraft: Node, find: Find, n_engines: int) -> None:
+def emit_control(code: Code, aircraft: Element, find: Find, n_engines: int) -> None:
     """Emit all systems, autopilots and the flight control of an aircraft.
 
     Raises:
@@ -52,7 +52,9 @@ def emit_control(code: Code, aircraft: Node, find: Find, n_engines: int) -> None
     for k in range(n_engines):
         for name in PASSED:
             code.write(indexed(f"fcs/{name}-pos-norm", k), code.read(indexed(f"fcs/{name}-cmd-norm", k)))
-    channels, before, after = [], [], []
+    channels: list[Element] = []
+    before: list[Element] = []
+    after: list[Element] = []
     for tag in ("system", "autopilot", "flight_control"):
         for node in aircraft.find_all(tag):
             for part in (find(node, node.get("file"), "system"), node) if node.get("file") else (node,):
@@ -78,14 +80,14 @@ def emit_control(code: Code, aircraft: Node, find: Find, n_engines: int) -> None
         emit_function(code, each)
 
 
-def declare(code: Code, node: Node) -> None:
+def declare(code: Code, node: Element) -> None:
     """Declare a <property> of the aircraft, which may be set from outside."""
     name = node.text.removeprefix("-")
     code.initial[name.replace("[0]", "")] = node.attribute_number("value", 0.0)
     code.inputs.add(name.replace("[0]", ""))
 
 
-def _emit_channel(code: Code, channel: Node) -> None:
+def _emit_channel(code: Code, channel: Element) -> None:
     rate = max(1, int(channel.attribute_number("execrate", 1.0)))
     conditions = []
     if channel.get("execute"):

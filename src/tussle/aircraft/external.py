@@ -7,7 +7,7 @@ import math
 from tussle.aircraft.aerodynamics import WIND_TO_BODY, turned
 from tussle.aircraft.code import Code
 from tussle.aircraft.functions import emit_function
-from tussle.aircraft.node import Node
+from tussle.aircraft.node import Element
 
 LOCAL_TO_BODY = (("l11", "l12", "l13"), ("l21", "l22", "l23"), ("l31", "l32", "l33"))
 INERTIAL_TO_BODY = (("m11", "m12", "m13"), ("m21", "m22", "m23"), ("m31", "m32", "m33"))
@@ -15,7 +15,7 @@ BODY = (("1.0", "0.0", "0.0"), ("0.0", "1.0", "0.0"), ("0.0", "0.0", "1.0"))
 FRAMES = {"BODY": BODY, "LOCAL": LOCAL_TO_BODY, "WIND": WIND_TO_BODY, "INERTIAL": INERTIAL_TO_BODY}
 
 
-def emit_external(code: Code, node: Node | None) -> None:
+def emit_external(code: Code, node: Element | None) -> None:
     """Emit the locals ext_fx ... ext_mz of <external_reactions>.
 
     Raises:
@@ -34,7 +34,7 @@ def emit_external(code: Code, node: Node | None) -> None:
             raise each.error("it is not supported; there are: force, moment, function, property")
 
 
-def _emit_one(code: Code, node: Node) -> None:
+def _emit_one(code: Code, node: Element) -> None:
     is_moment = node.tag == "moment"
     name, letters = f"external_reactions/{node.get('name')}", "lmn" if is_moment else "xyz"
     frame = (node.get("frame") or "BODY").upper()

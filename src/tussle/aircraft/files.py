@@ -6,7 +6,7 @@ import importlib.util
 import re
 from pathlib import Path
 
-from tussle.aircraft.node import AircraftError, Node, read_file
+from tussle.aircraft.node import AircraftError, Element, read_file
 from tussle.errors import nearest_name
 
 FOLDERS = {
@@ -57,7 +57,7 @@ class Files:
             known = [each.name for each in (self.root / "aircraft").glob("*") if each.is_dir()]
             raise AircraftError(f"{self.path}: there is no such aircraft{nearest_name(aircraft, known)}")
 
-    def load(self) -> Node:
+    def load(self) -> Element:
         """Read the aircraft's file.
 
         Raises:
@@ -65,13 +65,13 @@ class Files:
         """
         return self._read(self.path)
 
-    def _read(self, path: Path) -> Node:
+    def _read(self, path: Path) -> Element:
         self.read.append(path)
         if len(self.read) > MOST_FILES:
             raise AircraftError(f"{path}: the aircraft has more than {MOST_FILES} files")
         return read_file(path)
 
-    def find(self, node: Node, name: str, kind: str) -> Node:
+    def find(self, node: Element, name: str, kind: str) -> Element:
         """Read the file that an element names; `kind` is "engine", "system" or "part".
 
         Raises:

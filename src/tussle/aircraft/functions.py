@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from tussle.aircraft.code import Code
-from tussle.aircraft.node import AircraftError, Node
+from tussle.aircraft.node import AircraftError, Element
 from tussle.errors import listed, nearest_name
 
 TEXTS = ("description", "documentation")
@@ -23,12 +23,12 @@ OTHERS = ("avg", "ifthen", "and", "or", "not", "min", "max", "pi", "todegrees", 
 MOST_CELLS = 200_000
 
 
-def content(node: Node) -> list[Node]:
+def content(node: Element) -> list[Element]:
     """The children that are not documentation."""
     return [each for each in node if each.tag not in TEXTS]
 
 
-def only(node: Node) -> Node:
+def only(node: Element) -> Element:
     """The single operand of a function.
 
     Raises:
@@ -40,7 +40,7 @@ def only(node: Node) -> Node:
     return found[0]
 
 
-def emit_function(code: Code, node: Node, prefix: str = "") -> str:
+def emit_function(code: Code, node: Element, prefix: str = "") -> str:
     """Emit a <function>, write its property if it has a name, and return its value."""
     result = expression(code, only(node))
     if node.get("name"):
@@ -50,7 +50,7 @@ def emit_function(code: Code, node: Node, prefix: str = "") -> str:
     return result
 
 
-def expression(code: Code, node: Node) -> str:
+def expression(code: Code, node: Element) -> str:
     """Return the expression of an operand.
 
     Raises:
@@ -74,7 +74,7 @@ def expression(code: Code, node: Node) -> str:
     return code.short(_operation(node, tag, operands))
 
 
-def _operation(node: Node, tag: str, a: list[str]) -> str:
+def _operation(node: Element, tag: str, a: list[str]) -> str:
     known = (*CALLS, *PAIRS, *COMPARISONS, *SUMS, *OTHERS)
     if tag not in known:
         raise node.error(f"function not supported{nearest_name(tag, known)}; {listed(known)}")
@@ -115,7 +115,7 @@ def _operation(node: Node, tag: str, a: list[str]) -> str:
 # -- tables -------------------------------------------------------------------------------------------------------------------
 
 
-def table(code: Code, node: Node, keys: Sequence[str] = ()) -> str:
+def table(code: Code, node: Element, keys: Sequence[str] = ()) -> str:
     """Store a <table> and return the expression of its value.
 
     Args:
@@ -147,7 +147,7 @@ def table(code: Code, node: Node, keys: Sequence[str] = ()) -> str:
     return f"table_4(tables, {code.constant(numbers)}, {len(outer)}, {', '.join(keys)})"
 
 
-def _keys(code: Code, node: Node) -> list[str]:
+def _keys(code: Code, node: Element) -> list[str]:
     found = {
         each.get("lookup") or KEYS[min(k, 3)]: each for k, each in enumerate(node.find_all("independentVar"))
     }
@@ -157,7 +157,7 @@ def _keys(code: Code, node: Node) -> list[str]:
     return [code.value(found[name].text, found[name]) for name in KEYS if name in found]
 
 
-def table_of_pairs(code: Code, numbers: list[float], key: str, node: Node) -> str:
+def table_of_pairs(code: Code, numbers: list[float], key: str, node: Element) -> str:
     """Store key, value, key, value ... and return the expression of the value at a key.
 
     Raises:
@@ -170,18 +170,18 @@ def table_of_pairs(code: Code, numbers: list[float], key: str, node: Node) -> st
     return f"table_1(tables, {code.constant(keys + values)}, {len(keys)}, {key})"
 
 
-def _rising(keys: list[float], node: Node) -> None:
+def _rising(keys: list[float], node: Element) -> None:
     if any(not a < b for a, b in pairwise(keys)):
         raise node.error("the keys of a table must rise")
 
 
-def _break(node: Node) -> float:
+def _break(node: Element) -> float:
     if not node.get("breakPoint"):
         raise node.error("it needs a breakPoint")
     return node.attribute_number("breakPoint", 0.0)
 
 
-def _numbers(node: Node) -> list[float]:
+def _numbers(node: Element) -> list[float]:
     words = "".join(node.chunks).split()
     if len(words) > MOST_CELLS:
         raise node.error(f"the table has more than {MOST_CELLS} numbers")
@@ -194,7 +194,7 @@ def _numbers(node: Node) -> list[float]:
     return numbers
 
 
-def _grid(code: Code, node: Node) -> tuple[int, int, int]:
+def _grid(code: Code, node: Element) -> tuple[int, int, int]:
     """Store a 2-D table: a line of column keys, then lines of a row key and values. Returns place, rows and columns."""
     numbers = _numbers(node)
     first = next((line for line in "".join(node.chunks).splitlines() if line.strip()), "")
@@ -209,7 +209,7 @@ def _grid(code: Code, node: Node) -> tuple[int, int, int]:
     return code.constant([row[0] for row in rows] + numbers[:columns] + values), len(rows), columns
 
 
-def _layers(code: Code, data: list[Node]) -> tuple[int, int]:
+def _layers(code: Code, data: list[Element]) -> tuple[int, int]:
     """Store a 3-D table. Returns place and number of keys."""
     keys = [_break(each) for each in data]
     numbers = list(keys)

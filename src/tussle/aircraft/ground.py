@@ -10,7 +10,7 @@ from tussle.aircraft.contact import MEMORY
 from tussle.aircraft.equations import offer
 from tussle.aircraft.functions import emit_function
 from tussle.aircraft.mass import indexed
-from tussle.aircraft.node import Node
+from tussle.aircraft.node import Element
 
 MOST_CONTACTS = 64
 BRAKES = {"LEFT": "left", "RIGHT": "right", "CENTER": "center"}
@@ -25,14 +25,14 @@ class Contact:
     steering: float
     brake: str
     retracts: bool
-    strut: Node | None = None
+    strut: Element | None = None
 
     @property
     def is_wheel(self) -> bool:
         return self.numbers[3] != 0.0
 
 
-def read_ground(node: Node | None) -> list[Contact]:
+def read_ground(node: Element | None) -> list[Contact]:
     """Read <ground_reactions>.
 
     Raises:
@@ -46,7 +46,7 @@ def read_ground(node: Node | None) -> list[Contact]:
     return contacts
 
 
-def _contact(node: Node) -> Contact:
+def _contact(node: Element) -> Contact:
     kind = node.get("type")
     if kind not in ("BOGEY", "STRUCTURE"):
         raise node.error(f"contact type {kind[:40]!r} is not known; there are: BOGEY, STRUCTURE")
@@ -60,17 +60,17 @@ def _contact(node: Node) -> Contact:
         *_damping(damping), *_damping(rebound), node.value("static_friction", 0.0), node.value("dynamic_friction", 0.0),
         node.value("rolling_friction", 0.0), node.value("maximum_force", math.inf) or math.inf,
     )  # fmt: skip
-    numbers = tuple(min(number, 1e300) for number in numbers)
     retracts = node.find("retractable")
     group = node.find("brake_group")
     steer = node.find("max_steer")
     return Contact(
-        numbers, steer.number("DEG") if steer else 0.0, BRAKES.get(group.text.upper() if group else "", ""),
+        tuple(min(number, 1e300) for number in numbers), steer.number("DEG") if steer else 0.0,
+        BRAKES.get(group.text.upper() if group else "", ""),
         retracts is not None and retracts.number() > 0.0, node.find("strut_force"),
     )  # fmt: skip
 
 
-def _damping(node: Node | None) -> tuple[float, float]:
+def _damping(node: Element | None) -> tuple[float, float]:
     if node is None:
         return 1.0, 0.0
     is_square = node.get("type").upper() == "SQUARE"
@@ -118,12 +118,12 @@ def emit_ground(code: Code, contacts: list[Contact]) -> str:
                 code.write(f"{unit}/compression-velocity-fps", f"gear[{k}, 6]")
                 code.line(f"gear[{k}, 10] = min({emit_function(code, strut.need('function'))}, 0.0)")
         code.line(call)
-        for k, each in enumerate(memory):
+        for k, kept in enumerate(memory):
             for j in range(3, len(MEMORY)):
-                code.line(f"{each[j]} = gear[{k}, {j}]")
+                code.line(f"{kept[j]} = gear[{k}, {j}]")
     with code.block("else"):
-        for each in memory:
-            code.line(f"{' = '.join(each)} = 0.0")
+        for kept in memory:
+            code.line(f"{' = '.join(kept)} = 0.0")
     for k, (_, _, _, slip, touches, length, speed) in enumerate(memory):
         unit = indexed("gear/unit", k)
         offer(code, {f"{unit}/WOW": touches, f"{unit}/compression-ft": length, f"{unit}/slip-angle-deg": slip,
@@ -156,7 +156,7 @@ def _friction(memory: list[list[str]]) -> str:
              "    turn_z = i13 * hold[3] + i23 * hold[4] + i33 * hold[5]",
              "    pidot += turn_x", "    qidot += turn_y", "    ridot += turn_z",
              "    pdot += turn_x", "    qdot += turn_y", "    rdot += turn_z", "    remember(work, gear)"]  # fmt: skip
-    lines += [f"    {each[j]} = gear[{k}, {j}]" for k, each in enumerate(memory) for j in range(3)]
+    lines += [f"    {kept[j]} = gear[{k}, {j}]" for k, kept in enumerate(memory) for j in range(3)]
     return "\n".join(lines)
 
 

@@ -10,7 +10,7 @@ from tussle.aircraft.buoyancy import Bag, emit_gas_mass
 from tussle.aircraft.code import Code
 from tussle.aircraft.constants import POUND_PER_SLUG
 from tussle.aircraft.equations import offer
-from tussle.aircraft.node import Node
+from tussle.aircraft.node import Element
 from tussle.aircraft.propulsion.bench import given
 
 Inertia = tuple[float, float, float, float, float, float]
@@ -42,7 +42,7 @@ def indexed(name: str, k: int) -> str:
     return f"{name}[{k}]" if k else name
 
 
-def read_mass(node: Node) -> Mass:
+def read_mass(node: Element) -> Mass:
     """Read <mass_balance>.
 
     Raises:
@@ -62,7 +62,7 @@ def read_mass(node: Node) -> Mass:
     return Mass(weight, center.vector("IN") if center else (0.0, 0.0, 0.0), inertia, tuple(points))
 
 
-def _inertia(node: Node) -> Inertia:
+def _inertia(node: Element) -> Inertia:
     x, y, z, xy, xz, yz = (
         node.value(f"i{axes}", 0.0, "SLUG*FT2") for axes in ("xx", "yy", "zz", "xy", "xz", "yz")
     )
@@ -71,7 +71,7 @@ def _inertia(node: Node) -> Inertia:
     return x, y, z, -xy, xz, -yz
 
 
-def _point(node: Node) -> PointMass:
+def _point(node: Element) -> PointMass:
     weight, form = node.value("weight", 0.0, "LBS"), node.find("form")
     location = node.need("location").vector("IN")
     if form is None:

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from tussle.aircraft.code import Code
-from tussle.aircraft.node import Node
+from tussle.aircraft.node import Element
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Metrics:
     visual: tuple[float, float, float]
 
 
-def read_metrics(node: Node) -> Metrics:
+def read_metrics(node: Element) -> Metrics:
     """Read <metrics>.
 
     Raises:

@@ -23,7 +23,7 @@ class AircraftError(ParameterError):
 
 
 @dataclass(eq=False)
-class Node:
+class Element:
     """An element.
 
     Attributes:
@@ -38,9 +38,9 @@ class Node:
     place: str
     attributes: dict[str, str]
     chunks: list[str] = field(default_factory=list)
-    children: list[Node] = field(default_factory=list)
+    children: list[Element] = field(default_factory=list)
 
-    def __iter__(self) -> Iterator[Node]:
+    def __iter__(self) -> Iterator[Element]:
         return iter(self.children)
 
     @property
@@ -52,11 +52,11 @@ class Node:
         """An error at this place."""
         return AircraftError(f"{self.place}: <{self.tag[:80]}>: {message}")
 
-    def find_all(self, *tags: str) -> list[Node]:
+    def find_all(self, *tags: str) -> list[Element]:
         """The children with one of the tags."""
         return [each for each in self.children if each.tag in tags]
 
-    def find(self, tag: str) -> Node | None:
+    def find(self, tag: str) -> Element | None:
         """The first child with a tag."""
         return next((each for each in self.children if each.tag == tag), None)
 
@@ -64,7 +64,7 @@ class Node:
         """An attribute, stripped."""
         return self.attributes.get(name, default).strip()
 
-    def need(self, tag: str) -> Node:
+    def need(self, tag: str) -> Element:
         """The first child with a tag.
 
         Raises:
@@ -126,7 +126,7 @@ class Node:
         return x, y, z
 
 
-def read_file(path: Path) -> Node:
+def read_file(path: Path) -> Element:
     """Read an XML file. Declared entities may only be short texts.
 
     Raises:
@@ -140,20 +140,20 @@ def read_file(path: Path) -> Node:
     return read_text(data, path.name)
 
 
-def read_text(data: bytes, name: str) -> Node:
+def read_text(data: bytes, name: str) -> Element:
     """Read XML; `name` of the file is for messages.
 
     Raises:
         AircraftError: It is no XML, or exceeds a limit.
     """
-    top = Node("", name, {})
+    top = Element("", name, {})
     stack, count, entities = [top], 0, 0
     parser = expat.ParserCreate()
 
     def start(tag: str, attributes: dict[str, str]) -> None:
         nonlocal count
         count += 1
-        node = Node(tag, f"{name}:{parser.CurrentLineNumber}", attributes)
+        node = Element(tag, f"{name}:{parser.CurrentLineNumber}", attributes)
         if count > MOST_NODES or len(stack) > DEEPEST:
             raise node.error(
                 f"the file has more than {MOST_NODES} elements, or they nest deeper than {DEEPEST}"

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from tussle.aircraft.code import Code
-from tussle.aircraft.node import AircraftError, Node, read_text
+from tussle.aircraft.node import AircraftError, Element, read_text
 from tussle.aircraft.propulsion import Propulsion, read_propulsion
 from tussle.aircraft.propulsion.thruster import Propeller
 
@@ -26,7 +26,7 @@ THRUSTS = "".join(
 
 
 def read(body: str) -> Propulsion:
-    def find(node: Node, name: str, kind: str) -> Node:
+    def find(node: Element, name: str, kind: str) -> Element:
         raise node.error(f"no file {name} of kind {kind}")
 
     return read_propulsion(read_text(f"<propulsion>{body}</propulsion>".encode(), "own.xml"), find)
@@ -141,5 +141,5 @@ def test_an_engine_of_an_unknown_kind_in_a_file_is_refused() -> None:
     text = f"<propulsion><engine file='steam'>{DIRECT}</engine></propulsion>"
     with pytest.raises(AircraftError, match="this engine is not supported"):
         read_propulsion(
-            read_text(text.encode(), "own.xml"), lambda *_: Node("steam_engine", "steam.xml:1", {})
+            read_text(text.encode(), "own.xml"), lambda *_: Element("steam_engine", "steam.xml:1", {})
         )

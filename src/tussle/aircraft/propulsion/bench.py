@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from tussle.aircraft.code import Code, normal
 from tussle.aircraft.functions import emit_function
-from tussle.aircraft.node import Node
+from tussle.aircraft.node import Element
 
 
 @dataclass
@@ -66,7 +66,7 @@ class Bench:
         """Emit the assignment of a property of the engine."""
         self.code.write(self.name(leaf), expression)
 
-    def functions(self, node: Node, kind: str) -> None:
+    def functions(self, node: Element, kind: str) -> None:
         """Emit the functions of the engine's file that run before ("pre") or after ("post") its step.
 
         Raises:
@@ -98,10 +98,10 @@ def given(code: Code, name: str, default: float) -> str:
     return repr(default)
 
 
-def numbered(node: Node, index: int) -> Node:
+def numbered(node: Element, index: int) -> Element:
     """A copy of a file's content in which [#] is the number of the engine."""
     mark, number = "[#]", f"[{index}]"
-    return Node(
+    return Element(
         node.tag,
         node.place,
         {name: text.replace(mark, number) for name, text in node.attributes.items()},

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tussle.aircraft.node import Node
+from tussle.aircraft.node import Element
 from tussle.aircraft.propulsion.bench import Bench
 from tussle.aircraft.propulsion.runtime import NEWTON_METRE
 from tussle.aircraft.propulsion.thruster import Propeller
@@ -16,7 +16,7 @@ WATT_PER_HP = 745.7
 class Electric:
     """A motor whose power [W] is proportional to the throttle."""
 
-    node: Node
+    node: Element
     power: float
     burns = False
 
@@ -42,7 +42,7 @@ class Electric:
 class Brushless:
     """A brushless motor: speed constant [1/min/V], resistance [ohm], current without load [A], greatest voltage [V]."""
 
-    node: Node
+    node: Element
     constants: tuple[float, float, float, float]
     burns = False
 
@@ -64,7 +64,7 @@ class Brushless:
         """It takes no fuel."""
 
 
-def read_electric(node: Node) -> Electric:
+def read_electric(node: Element) -> Electric:
     """Read an <electric_engine>.
 
     Raises:
@@ -73,7 +73,7 @@ def read_electric(node: Node) -> Electric:
     return Electric(node, node.value("power", WATT_PER_HP, "WATTS"))
 
 
-def read_brushless(node: Node) -> Brushless:
+def read_brushless(node: Element) -> Brushless:
     """Read a <brushless_dc_motor>.
 
     Raises:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from tussle.aircraft.code import Code, normal
 from tussle.aircraft.functions import emit_function
-from tussle.aircraft.node import Node
+from tussle.aircraft.node import Element
 from tussle.aircraft.propulsion.bench import Bench, numbered
 from tussle.aircraft.propulsion.electric import Brushless, Electric, read_brushless, read_electric
 from tussle.aircraft.propulsion.piston import Piston, read_piston
@@ -18,9 +18,9 @@ from tussle.aircraft.propulsion.turbine import Turbine, read_turbine
 from tussle.aircraft.propulsion.turboprop import Turboprop, read_turboprop
 from tussle.errors import listed
 
-Find = Callable[[Node, str, str], Node]
+Find = Callable[[Element, str, str], Element]
 Engine = Piston | Turbine | Turboprop | Electric | Brushless | Rocket
-ENGINES: dict[str, Callable[[Node], Engine]] = {
+ENGINES: dict[str, Callable[[Element], Engine]] = {
     "piston_engine": read_piston,
     "turbine_engine": read_turbine,
     "turboprop_engine": read_turboprop,
@@ -57,7 +57,7 @@ class Propulsion:
         tanks: The tanks.
     """
 
-    node: Node
+    node: Element
     engines: tuple[PowerUnit, ...]
     tanks: tuple[Tank, ...]
 
@@ -170,7 +170,7 @@ if k >= 0:
                 emit_function(code, each)
 
 
-def read_propulsion(node: Node, find: Find) -> Propulsion:
+def read_propulsion(node: Element, find: Find) -> Propulsion:
     """Read <propulsion>.
 
     Args:
@@ -187,7 +187,7 @@ def read_propulsion(node: Node, find: Find) -> Propulsion:
     return Propulsion(node, units, tanks)
 
 
-def _unit(node: Node, index: int, n_tanks: int, find: Find) -> PowerUnit:
+def _unit(node: Element, index: int, n_tanks: int, find: Find) -> PowerUnit:
     file = _content(node, find, tuple(ENGINES))
     if file.tag not in ENGINES:
         raise file.error(f"this engine is not supported; {listed(ENGINES)}")
@@ -208,7 +208,7 @@ def _unit(node: Node, index: int, n_tanks: int, find: Find) -> PowerUnit:
     return PowerUnit(engine, thruster, tuple(feeds))
 
 
-def _content(node: Node, find: Find, tags: tuple[str, ...]) -> Node:
+def _content(node: Element, find: Find, tags: tuple[str, ...]) -> Element:
     """The content of an engine or a thruster: its file's, or what stands in it."""
     if node.get("file"):
         return find(node, node.get("file"), "engine")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from tussle.aircraft.constants import SEA_LEVEL_PRESSURE
 from tussle.aircraft.functions import table_of_pairs
-from tussle.aircraft.node import Node
+from tussle.aircraft.node import Element
 from tussle.aircraft.propulsion.bench import Bench, slot
 from tussle.aircraft.propulsion.runtime import PASCAL_PER_PSF
 from tussle.aircraft.propulsion.thruster import Propeller
@@ -63,7 +63,7 @@ class Piston:
         boost_loss: Factor of the power that the supercharger takes.
     """
 
-    node: Node
+    node: Element
     idle_rpm: float
     displacement: float
     cycles: float
@@ -177,7 +177,7 @@ if {n("indicated")} < 0.125:
         return n("map")
 
 
-def read_piston(node: Node) -> Piston:
+def read_piston(node: Element) -> Piston:
     """Read a <piston_engine>.
 
     Raises:
@@ -246,12 +246,12 @@ def read_piston(node: Node) -> Piston:
     )
 
 
-def _positive(node: Node, tag: str, default: float) -> float:
+def _positive(node: Element, tag: str, default: float) -> float:
     value = node.value(tag, -1.0)
     return default if value < 0.0 else value
 
 
-def _mixture(node: Node) -> tuple[float, ...]:
+def _mixture(node: Element) -> tuple[float, ...]:
     found = next((each for each in node.find_all("table") if each.get("name") == "MIXTURE"), None)
     if found is None:
         return MIXTURE
@@ -265,7 +265,7 @@ def _mixture(node: Node) -> tuple[float, ...]:
     return numbers
 
 
-def _gears(node: Node) -> tuple[Gear, ...]:
+def _gears(node: Element) -> tuple[Gear, ...]:
     n = int(node.value("numboostspeeds", 0.0))
     if not 0 <= n <= 3:
         raise node.error("numboostspeeds is 0 to 3")

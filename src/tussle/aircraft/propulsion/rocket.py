@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from tussle.aircraft.functions import content, expression, table
-from tussle.aircraft.node import Node
+from tussle.aircraft.node import Element
 from tussle.aircraft.propulsion.bench import Bench
 from tussle.aircraft.propulsion.thruster import Thruster
 
@@ -24,7 +24,7 @@ class Rocket:
         oxidizer: Whether it takes oxidizer.
     """
 
-    node: Node
+    node: Element
     build_up: float
     least: float
     flows: tuple[float, float]
@@ -87,7 +87,7 @@ class Rocket:
         return bench.given("isp", node.number())
 
 
-def read_rocket(node: Node) -> Rocket:
+def read_rocket(node: Element) -> Rocket:
     """Read a <rocket_engine>.
 
     Raises:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from tussle.aircraft.code import Code, normal
 from tussle.aircraft.constants import POUND_PER_SLUG
-from tussle.aircraft.node import Node
+from tussle.aircraft.node import Element
 from tussle.aircraft.propulsion.bench import given, slot
 from tussle.errors import listed, nearest_name
 
@@ -92,7 +92,7 @@ class Tank:
         return f"0.5 * {mass} * {r2 / 144.0!r}", across, across
 
 
-def read_tank(node: Node, index: int) -> Tank:
+def read_tank(node: Element, index: int) -> Tank:
     """Read a <tank>.
 
     Raises:
@@ -126,13 +126,13 @@ def read_tank(node: Node, index: int) -> Tank:
     )
 
 
-def _density(node: Node) -> float:
+def _density(node: Element) -> float:
     """Density of the contents [lb/gal]: that of a named fuel, or the number given."""
     kind = node.find("type")
     return node.value("density", 6.6, "LBS/GAL") if kind is None else DENSITIES.get(kind.text, 6.6)
 
 
-def _grain(node: Node, radius: float, contents: float) -> SolidGrain:
+def _grain(node: Element, radius: float, contents: float) -> SolidGrain:
     kind, length = node.get("type"), node.value("length", 0.0, "IN")
     bore = node.value("bore_diameter", 0.0, "IN") / 2.0
     if kind not in ("CYLINDRICAL", "ENDBURNING"):

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from tussle.aircraft.functions import table
-from tussle.aircraft.node import Node
+from tussle.aircraft.node import Element
 from tussle.aircraft.propulsion.bench import Bench, given
 
 Vector = tuple[float, float, float]
@@ -140,7 +140,7 @@ class Propeller:
         gyroscopic: Sign of the angular momentum; files of a version above 1 have it right.
     """
 
-    node: Node
+    node: Element
     mount: Mount
     inertia: float
     diameter: float
@@ -331,7 +331,7 @@ if {n("across")} > 0.0001:
 Thruster = Direct | Nozzle | Propeller
 
 
-def read_thruster(node: Node, file: Node) -> Thruster:
+def read_thruster(node: Element, file: Element) -> Thruster:
     """Read a <thruster> and the content of its file.
 
     Raises:
@@ -355,7 +355,7 @@ def read_thruster(node: Node, file: Node) -> Thruster:
     raise file.error("this thruster is not supported; there are: direct, nozzle, propeller")
 
 
-def _read_propeller(node: Node, file: Node, mount: Mount) -> Propeller:
+def _read_propeller(node: Element, file: Element, mount: Mount) -> Propeller:
     names = [each.get("name") for each in file.find_all("table")]
     missing = [name for name in TABLES[:2] if name not in names]
     if missing:

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from tussle.aircraft.functions import content, expression
-from tussle.aircraft.node import Node
+from tussle.aircraft.node import Element
 from tussle.aircraft.propulsion.bench import Bench
 from tussle.aircraft.propulsion.runtime import OFF, RUN, SEIZE, SPIN_UP, STALL, START, TRIM
 from tussle.aircraft.propulsion.thruster import Thruster
@@ -45,7 +45,7 @@ class Turbine:
         has_water: Whether there is water at the start.
     """
 
-    node: Node
+    node: Element
     thrust: tuple[float, float]
     bypass: float
     bleed: float
@@ -267,14 +267,14 @@ elif {now} == {SEIZE!r}:
 """)
 
 
-def _value(bench: Bench, node: Node | None, default: float) -> str:
+def _value(bench: Bench, node: Element | None, default: float) -> str:
     if node is None:
         return repr(default)
     operands = content(node)
     return expression(bench.code, operands[0]) if operands else repr(node.number())
 
 
-def read_turbine(node: Node) -> Turbine:
+def read_turbine(node: Element) -> Turbine:
     """Read a <turbine_engine>.
 
     Raises:
@@ -326,12 +326,12 @@ def read_turbine(node: Node) -> Turbine:
     )
 
 
-def _renamed(node: Node) -> Node:
+def _renamed(node: Element) -> Element:
     """A copy whose functions of known names become properties of the engine."""
     children = []
     for each in node:
         attributes = dict(each.attributes)
         if each.tag == "function" and each.get("name") in FUNCTIONS:
             attributes["name"] = f"propulsion/engine[#]/{each.get('name')}"
-        children.append(Node(each.tag, each.place, attributes, each.chunks, each.children))
-    return Node(node.tag, node.place, node.attributes, node.chunks, children)
+        children.append(Element(each.tag, each.place, attributes, each.chunks, each.children))
+    return Element(node.tag, node.place, node.attributes, node.chunks, children)

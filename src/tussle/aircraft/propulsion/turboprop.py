@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from tussle.aircraft.functions import table, table_of_pairs
-from tussle.aircraft.node import Node
+from tussle.aircraft.node import Element
 from tussle.aircraft.propulsion.bench import Bench
 from tussle.aircraft.propulsion.runtime import OFF, RUN, SPIN_UP, START, TRIM
 from tussle.aircraft.propulsion.thruster import Propeller
@@ -33,7 +33,7 @@ class Turboprop:
         torque: Above which the throttle is reduced [ft lbf]; none if it is not positive.
     """
 
-    node: Node
+    node: Element
     idle: float
     top: float
     beta_end: float
@@ -204,7 +204,7 @@ if {now} != {TRIM!r}:
 """)
 
 
-def read_turboprop(node: Node) -> Turboprop:
+def read_turboprop(node: Element) -> Turboprop:
     """Read a <turboprop_engine>.
 
     Raises:
@@ -220,9 +220,9 @@ def read_turboprop(node: Node) -> Turboprop:
         attributes = dict(each.attributes)
         if each.tag == "function" and each.get("name") == TABLES[0]:
             attributes["name"] = f"propulsion/engine[#]/{TABLES[0]}"
-        children.append(Node(each.tag, each.place, attributes, each.chunks, each.children))
+        children.append(Element(each.tag, each.place, attributes, each.chunks, each.children))
     return Turboprop(
-        node=Node(node.tag, node.place, node.attributes, node.chunks, children),
+        node=Element(node.tag, node.place, node.attributes, node.chunks, children),
         idle=node.value("idlen1", 30.0),
         top=node.value("maxn1", 100.0),
         beta_end=min(max(node.value("betarangeend", 0.0) / 100.0, 0.0), 0.99999),

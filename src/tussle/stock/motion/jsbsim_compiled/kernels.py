@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from tussle.aircraft.constants import EARTH_RATE
 from tussle.numeric import cos, sin
 from tussle.numeric.kernel import kernel
 from tussle.numeric.quaternion import quat_multiply, quat_rotate, quat_rotate_inverse
@@ -10,13 +9,14 @@ from tussle.numeric.quaternion import quat_multiply, quat_rotate, quat_rotate_in
 FOOT = 0.3048  # [m]
 
 
-@kernel("F2 i8 F2 F2w")
-def to_world(x, earth_angle, frame, out):
+@kernel("F2 i8 f8 F2 F2w")
+def to_world(x, earth_angle, earth_rate, frame, out):
     """Write the rigid bodies of some aircraft.
 
     Args:
         x: State of the aircraft, (k, n): quaternion, angular velocity, position, velocity in inertial axes, foot and second.
         earth_angle: Its row with the Earth's angle [rad].
+        earth_rate: Angular velocity of the Earth [rad/s].
         frame: Quaternion from the world frame to Earth-centred axes, and the world frame's origin in these [m], (7, n).
         out: Position [m], velocity [m/s], world frame, quaternion, angular velocity, body frame [rad/s], (13, n); written.
     """
@@ -25,7 +25,7 @@ def to_world(x, earth_angle, frame, out):
         angle = x[earth_angle, row]
         turn_w, turn_z = cos(0.5 * angle), -sin(0.5 * angle)
         rx, ry = x[7, row], x[8, row]
-        vx, vy = x[10, row] + EARTH_RATE * ry, x[11, row] - EARTH_RATE * rx
+        vx, vy = x[10, row] + earth_rate * ry, x[11, row] - earth_rate * rx
         px, py, pz = quat_rotate(turn_w, 0.0, 0.0, turn_z, rx, ry, x[9, row])
         vx, vy, vz = quat_rotate(turn_w, 0.0, 0.0, turn_z, vx, vy, x[12, row])
         out[0, row], out[1, row], out[2, row] = quat_rotate_inverse(
@@ -35,7 +35,7 @@ def to_world(x, earth_angle, frame, out):
             w, a, b, c, FOOT * vx, FOOT * vy, FOOT * vz
         )
         qw, qx, qy, qz = x[0, row], x[1, row], x[2, row], x[3, row]
-        spin_x, spin_y, spin_z = quat_rotate_inverse(qw, qx, qy, qz, 0.0, 0.0, EARTH_RATE)
+        spin_x, spin_y, spin_z = quat_rotate_inverse(qw, qx, qy, qz, 0.0, 0.0, earth_rate)
         qw, qx, qy, qz = quat_multiply(turn_w, 0.0, 0.0, turn_z, qw, qx, qy, qz)
         qw, qx, qy, qz = quat_multiply(w, -a, -b, -c, qw, qx, qy, qz)
         # From axes forward, right, down to forward, left, up: half a turn about the first.

@@ -10,6 +10,7 @@ import numpy as np
 
 from tussle import units
 from tussle.aircraft.compile import CompiledAircraft, compile_aircraft, save_source
+from tussle.aircraft.constants import EARTH_RATE
 from tussle.aircraft.equations import CORE
 from tussle.aircraft.files import package_root
 from tussle.aircraft.initial import CORE_SLOT, place_by_quaternion, run_initial
@@ -175,7 +176,7 @@ class JSBSimCompiled(RigidBodyModel):
             command(flown, x, slots, u)
             step = dt / substeps
             aircraft.advance(slots, aircraft.tables, 0, x.shape[1], substeps, step, step)
-            kernels.to_world(slots, EARTH_ANGLE, x[BODY:SLOTS], x[:BODY])
+            kernels.to_world(slots, EARTH_ANGLE, EARTH_RATE, x[BODY:SLOTS], x[:BODY])
 
         return fly
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from tussle.aircraft.files import NAME
-from tussle.aircraft.node import AircraftError, Node, read_file
+from tussle.aircraft.node import AircraftError, Element, read_file
 
 START = ("simulation/sim-time-sec", "ge", "0")
 COMPARISONS = {">=": "ge", "ge": "ge", "gt": "ge", ">": "ge"}
@@ -42,7 +42,7 @@ def read_script(root: Path, name: str) -> Script:
     return Script(top.need("use").get("aircraft"), tuple(settings))
 
 
-def _is_at_start(event: Node) -> bool:
+def _is_at_start(event: Element) -> bool:
     words = event.need("condition").text.split()
     if len(words) != 3 or words[1] not in COMPARISONS:
         return False
