@@ -22,6 +22,7 @@ FOR_KERNELS = (
     "tussle.numeric",
     "tussle.rng",
     "tussle.neighbors",
+    "tussle.contacts",
 )
 # Of NumPy, what makes scratch arrays and names constants and types, and the functions that IEEE 754 rounds exactly.
 NUMPY_FOR_KERNELS = {

@@ -31,7 +31,7 @@ def property_of(node: Element) -> str:
     return name if "/" in name else "fcs/" + re.sub(r"[ \\]", "-", name).lower()
 
 
-class Component:
+class ControlPart:
     """One component.
 
     Args:
@@ -430,12 +430,12 @@ def condition(code: Code, node: Element) -> str:
     return logic.join(parts)
 
 
-COMPONENTS: dict[str, Callable[[Component], str]] = {
-    "summer": Component.summer, "pure_gain": Component.pure_gain, "scheduled_gain": Component.scheduled_gain,
-    "aerosurface_scale": Component.aerosurface_scale, "kinematic": Component.kinematic, "kinemat": Component.kinematic,
-    "fcs_function": Component.fcs_function, "lag_filter": Component.lag_filter, "washout_filter": Component.washout_filter,
-    "lead_lag_filter": Component.lead_lag_filter, "second_order_filter": Component.second_order_filter, "pid": Component.pid,
-    "integrator": Component.pid, "deadband": Component.deadband, "switch": Component.switch, "actuator": Component.actuator,
-    "sensor": Component.sensor, "angle": Component.angle, "waypoint_heading": Component.waypoint_heading,
-    "waypoint_distance": Component.waypoint_distance,
+COMPONENTS: dict[str, Callable[[ControlPart], str]] = {
+    "summer": ControlPart.summer, "pure_gain": ControlPart.pure_gain, "scheduled_gain": ControlPart.scheduled_gain,
+    "aerosurface_scale": ControlPart.aerosurface_scale, "kinematic": ControlPart.kinematic, "kinemat": ControlPart.kinematic,
+    "fcs_function": ControlPart.fcs_function, "lag_filter": ControlPart.lag_filter, "washout_filter": ControlPart.washout_filter,
+    "lead_lag_filter": ControlPart.lead_lag_filter, "second_order_filter": ControlPart.second_order_filter, "pid": ControlPart.pid,
+    "integrator": ControlPart.pid, "deadband": ControlPart.deadband, "switch": ControlPart.switch, "actuator": ControlPart.actuator,
+    "sensor": ControlPart.sensor, "angle": ControlPart.angle, "waypoint_heading": ControlPart.waypoint_heading,
+    "waypoint_distance": ControlPart.waypoint_distance,
 }  # fmt: skip

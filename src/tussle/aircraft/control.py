@@ -6,7 +6,7 @@ from collections.abc import Callable
 from contextlib import nullcontext
 
 from tussle.aircraft.code import Code
-from tussle.aircraft.components import COMPONENTS, IGNORED, Component
+from tussle.aircraft.components import COMPONENTS, IGNORED, ControlPart
 from tussle.aircraft.functions import emit_function
 from tussle.aircraft.mass import indexed
 from tussle.aircraft.node import Element
@@ -106,4 +106,4 @@ def _emit_channel(code: Code, channel: Element) -> None:
                 raise each.error(
                     f"component not supported{nearest_name(each.tag, COMPONENTS)}; {listed(COMPONENTS)}"
                 )
-            Component(code, each, rate).emit()
+            ControlPart(code, each, rate).emit()

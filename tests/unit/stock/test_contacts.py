@@ -107,7 +107,7 @@ def test_fast_spheres_that_miss_each_other_are_left_alone():
 
 
 def test_rough_spheres_take_a_share_of_the_slip_as_spin():
-    """Equal solid spheres at the normal x, relative velocity (1, 1, 0): half of the normal speed, 1/7 of the slip, 5/14 of it as spin.
+    """Equal solid spheres at the normal x, with the relative velocity (1, 1, 0): half of the speed, 1/7 of the slip, 5/14 as spin.
 
     1 / m_t = 2 (1 / m + r^2 / I) = 7 / m; omega = impulse r / I.
     """

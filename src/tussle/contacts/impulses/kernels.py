@@ -313,10 +313,10 @@ def remember(found, bodies, impulses, memory, touches):
     for c in range(touches.shape[0]):
         touches[c] = impulses[c, 0] > 0.0 or contacts[c, 9] <= 0.0
         own, partner, sign = owner(c, row, other, sizes)
-        k = used[own]
-        if not touches[c] or k >= SLOTS:
+        if not touches[c] or used[own] >= SLOTS:
             continue
-        used[own] = k + 1
+        k = min(used[own], SLOTS - 1)
+        used[own] += 1
         normal = vector(contacts, c, 0)
         t1, t2 = tangents(normal)
         p = add(add(scale(impulses[c, 0], normal), scale(impulses[c, 1], t1)), scale(impulses[c, 2], t2))

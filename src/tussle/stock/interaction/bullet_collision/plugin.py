@@ -208,11 +208,6 @@ class BulletCollision(Interaction):
             at = contacts.row[touches]
             normal = contacts.numbers[touches, :3].T
             w.draw.vectors(
-                pos=w.pos[:, at] + contacts.numbers[touches, 3:6].T, direction=normal * sizes_of(w, at),
+                pos=w.pos[:, at] + contacts.numbers[touches, 3:6].T, direction=normal * w.radius[at],
                 world=w.world[at], colour=(255, 0, 0),
             )  # fmt: skip
-
-
-def sizes_of(w: WorldView, rows: np.ndarray) -> np.ndarray:
-    """Radii of entities [m], (m,)."""
-    return w.radius[rows]
