@@ -318,7 +318,7 @@ def test_tags_of_the_scene(folder, monkeypatch):
     assert [(region.name, len(region.mesh.faces)) for region in shown.boundaries] == [
         ("mesh 1", 5),
         ("wall 1", 12),
-        ("wall 2", 6),
+        ("wall 2", 8),
     ]
     assert shown.notes == ("mesh 1 has 6 triangles; 5 of them are shown",)
     assert shown.terrain.height.max() == 6.0
