@@ -257,8 +257,10 @@ class Scene:
         start, end = checked_vectors("a", a), checked_vectors("b", b)
         if start.shape != end.shape:
             raise ParameterError(f"a has shape {start.shape} and b {end.shape}; they must be equal")
-        x, y, z = end - start
-        return ~(self.cast(start, end - start, np.sqrt(x * x + y * y + z * z)).distance < np.inf)
+        with np.errstate(over="ignore"):  # of points that are far beyond any scene
+            x, y, z = way = end - start
+            length = np.sqrt(x * x + y * y + z * z)
+        return ~(self.cast(start, way, length).distance < np.inf)
 
 
 def _check_kinds(name: str, parts: Iterable[Any], kind: type) -> None:

@@ -13,6 +13,7 @@ from tussle.api import Autonomy, Input, MotionModel, Output, Param, State
 N_WARM = 40
 ROOT = str(stock.examples()["JSBSimModel"].with_name("hawk"))
 GIVEN = {
+    "JSBSimCompiled": {"aircraft": "hawk", "jsbsim_root": ROOT},
     "JSBSimControl": {"aircraft": "hawk", "jsbsim_root": ROOT},
     "JSBSimModel": {"script_name": "patrol.xml", "jsbsim_root": ROOT},
 }

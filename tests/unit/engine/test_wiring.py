@@ -183,11 +183,11 @@ class Swap(Controller):
     """Reads z, x, y and writes them back in another order."""
 
     wanted = Input("velocity_z velocity_x velocity_y", unit="m/s")
-    given = Output("velocity_y velocity_z velocity_x", unit="m/s")
+    passed = Output("velocity_y velocity_z velocity_x", unit="m/s")
 
     def step(self, g):
         z, x, y = self.wanted
-        self.given[0], self.given[1], self.given[2] = y, z, x
+        self.passed[0], self.passed[1], self.passed[2] = y, z, x
 
 
 def test_controllers_stand_in_a_chain():

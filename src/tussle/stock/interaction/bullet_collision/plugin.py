@@ -13,6 +13,8 @@ from tussle.numeric.quaternion import quat_multiply, quat_normalize
 
 MOST_FOLLOWED = 2.0
 """Relative motion in a step up to which pairs are followed, in sizes of the largest body: beyond, all pairs would be near each other."""
+FAST = 1e150
+"""Speed beyond which a body is not followed [m/s]: the square of a velocity would overflow."""
 
 
 class BulletCollision(Interaction):
@@ -102,7 +104,7 @@ class BulletCollision(Interaction):
 
     def _near(self, w: WorldView, far: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Rows of the pairs that may touch, ordered by ids, (m,) each."""
-        is_sane = np.isfinite(w.vel[0] + w.vel[1] + w.vel[2])
+        is_sane = (np.abs(w.vel) < FAST).all(axis=0)
         size, low, high = (np.full((k, w.n_worlds), v) for k, v in ((1, 0.0), (3, np.inf), (3, -np.inf)))
         vel = np.where(is_sane, w.vel, 0.0)
         np.maximum.at(size[0], w.world, far)
@@ -111,7 +113,8 @@ class BulletCollision(Interaction):
             np.maximum.at(high[i], w.world, vel[i])
         x, y, z = np.where(high > low, high - low, 0.0)
         motion = np.minimum(w.dt * np.sqrt(x * x + y * y + z * z), MOST_FOLLOWED * size[0])
-        self.reach[:] = np.maximum(2.02 * size[0] + motion, 1e-6)
+        reach = np.maximum(2.02 * size[0] + motion, 1e-6)
+        self.reach[w.world] = reach[w.world]  # of worlds without bodies nothing changes
         listed_pairs = self.pairs(w)
         row, other = listed_pairs.row, listed_pairs.other
         order = np.argsort((w.id[row] << 32) + w.id[other], kind="stable")

@@ -6,6 +6,9 @@ import numpy as np
 
 from tussle.api import Interaction, Param, State, WorldView
 
+FAR = 1e150
+"""Coordinate beyond which nobody collides [m]: the square of a distance would overflow."""
+
 
 class SceneCollision(Interaction):
     """Removes entities whose sphere of `radius` touches the scene: walls, buildings, meshes, hills, ground.
@@ -33,8 +36,8 @@ class SceneCollision(Interaction):
     def step(self, w: WorldView) -> None:
         """Remove who collides."""
         team = self.team[w.world]
-        # A state that is not finite ends its world at the end of the step.
-        rows = np.flatnonzero(((team == 0) | (team == w.team)) & np.isfinite(w.pos.sum(axis=0)))
+        is_near = (np.abs(w.pos) < FAR).all(axis=0)
+        rows = np.flatnonzero(((team == 0) | (team == w.team)) & is_near)
         pos = w.pos[:, rows]
         last = np.where(self.is_known[rows], self.last[:, rows], pos)
         is_clear = w.scene.free(pos, w.radius[rows] + self.margin[w.world[rows]]) & w.scene.line_of_sight(
