@@ -48,7 +48,6 @@ class WorldView(GroupView):
     """
 
     def __init__(self, bodies: Bodies, context: Context) -> None:
-        self.unsound = dict[int, str]()  # row -> the plugin that moved it to no finite place
         super().__init__(bodies, 0, bodies.n, context, context.clock.dt)
         self.only: np.ndarray | None = None  # worlds this call acts on, (n_worlds,); None for all
         self.table_rows: np.ndarray | None = None  # of a call for some worlds: rows of the whole table, (n,)
@@ -63,7 +62,6 @@ class WorldView(GroupView):
 
     def reset(self, bodies: Bodies, first: int, last: int) -> None:
         super().reset(bodies, first, last)
-        self.unsound.clear()
         self.n_worlds = bodies.n_worlds
         self._writable = WorldBodies(bodies)
 
@@ -114,7 +112,7 @@ class WorldView(GroupView):
     ) -> None:
         """Set pos [m] (3, m), vel [m/s] (3, m), quat (4, m) or omega [rad/s] (3, m) of entities.
 
-        Their motion models continue from the new state.
+        Their motion models continue from the new state. Where it is not finite, the world ends with an error.
         """
         rows = self._rows(rows)
         if not len(rows):
@@ -128,9 +126,10 @@ class WorldView(GroupView):
                         f"w.move: {name} has shape {value.shape}; it takes ({k}, {len(rows)})"
                     )
                 getattr(self._bodies, name)[:, rows] = value
-                if not np.isfinite(value).all():
-                    bad = rows[~np.isfinite(getattr(self._bodies, name)[:, rows]).all(axis=0)]
-                    self.unsound |= dict.fromkeys(map(int, bad), self._caller.instance_name)
+                is_sound = np.isfinite(value).all(axis=0)
+                if not is_sound.all():
+                    for row in rows[~np.broadcast_to(is_sound, len(rows))]:
+                        self.fail(row, f"w.move: {name} is not finite")
         if self._bodies.scans:
             for row in rows:
                 self._bodies.touch(int(row), int(row) + 1)
@@ -141,11 +140,9 @@ class WorldView(GroupView):
     def mass_properties(self) -> tuple[np.ndarray, np.ndarray]:
         """Mass [kg], (n,), and inertia tensor [kg m^2], body frame, nine elements, (9, n); 0 for bodies that torques do not turn."""
         mass, inertia = self.context.mass_properties()
-        return (
-            (mass, inertia)
-            if self.table_rows is None
-            else (mass[self.table_rows], inertia[:, self.table_rows])
-        )
+        if self.table_rows is None:
+            return mass, inertia
+        return mass[self.table_rows], np.take(inertia, self.table_rows, axis=1)  # contiguous, for kernels
 
     def spawn(self, block: str, world: Any, **where: Any) -> None:
         """Request new entities of a block, one per item of `world`. They are born at the beginning of the next step.

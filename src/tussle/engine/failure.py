@@ -69,21 +69,18 @@ def in_call(error: Exception, plugin: Any, view: GroupView, group: Group | None 
     return raised(error, plugin, where=where, step=step, world=world)
 
 
-def not_finite(
-    group: Group, bodies: Bodies, row: int, step: int, view: WorldView, writers: list[Any]
-) -> PluginError:
+def not_finite(group: Group, bodies: Bodies, row: int, step: int, interactions: list[str]) -> PluginError:
     """The error for a body row whose state is not finite.
 
-    Names the first plugin output, in call order, that is not finite; else the plugin that moved it there; else the motion model, or the
-    interactions if the motion model's own state is finite.
+    Names the first plugin output, in call order, that is not finite; else the motion model, or the interactions if the motion model's
+    own state is finite.
 
     Args:
         group: Group of the row.
         bodies: The body table.
         row: The row.
         step: The step.
-        view: View of the world plugins.
-        writers: Interactions.
+        interactions: Names of the interactions.
     """
     i, world = row - group.first, int(bodies.world[row])
     who = f"{group.block_of(i)} {int(bodies.id[row])}"
@@ -98,9 +95,6 @@ def not_finite(
             for name in ("pos", "quat", "health")
         )
         text = f"the entity's state is not finite: {values}; all outputs of its autonomies and controllers are finite"
-        if mover := view.unsound.get(row):
-            return PluginError(text, where=who, step=step, world=world, plugin=mover)
-        interactions = [b.instance_name for b in writers]
         if interactions and np.isfinite(group.x[:, i]).all():
             text += f", and so is the state of its motion model, {binding.spec.instance_name}: who wrote it is one of the interactions"
             return PluginError(text, where=who, step=step, world=world, plugin=" or ".join(interactions))

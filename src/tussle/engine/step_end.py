@@ -46,15 +46,13 @@ def end_step(state: SimulationState) -> None:
 def _record_faults(state: SimulationState) -> None:
     """Fail the worlds that have non-finite states, and kill entities without health."""
     bodies, faulty = state.population.bodies, state.checked[-1]
-    writers = [b.spec for b in state.world_bindings if isinstance(b.spec, Interaction)]
     for row in map(int, np.flatnonzero(faulty)):
         world = int(bodies.world[row])
         if not state.failed[world]:
             group = next(g for g in state.population.groups if g.first <= row < g.last)
             step = int(state.context.clock.step[world])
-            state.record_failure(
-                world, failure.not_finite(group, bodies, row, step, state.world_view, writers)
-            )
+            names = [b.spec.instance_name for b in state.world_bindings if isinstance(b.spec, Interaction)]
+            state.record_failure(world, failure.not_finite(group, bodies, row, step, names))
     state.world_view.kill(~faulty & ~(bodies.health > 0.0), "health")
 
 

@@ -31,8 +31,8 @@ from tussle.api import (
 KINDS = (Behavior, Autonomy, Controller, MotionModel, Sensor, Interaction, Metric, Network)
 ON_FILES = ("GraphInteraction", "MapGen2D", "TrajectoryRecordPlayback")
 """Plugins that read a file, which random missions do not have."""
-UNFIT = ("AvoidWalls", "TerrainGenerator", *(name for name in stock.manifest() if "JSBSim" in name))
-"""Plugins that random companions and parameters hardly ever suit: a list to read, two equal resolutions, an aircraft's files."""
+UNFIT = ("TerrainGenerator", *(name for name in stock.manifest() if "JSBSim" in name))
+"""Plugins that random companions and parameters hardly ever suit: two equal resolutions, an aircraft's files."""
 RATES = (1.0, 2.5, 3.0, 4.0, 9.0)
 
 
@@ -132,15 +132,37 @@ def some(chance: random.Random, kind: type, most: int, *rest: Any) -> list[Plugi
     return [made(chance, c, *rest) for c in chosen]
 
 
+def needed_channels(kind: type[Plugin]) -> dict[str, None]:
+    """Channels without which a plugin cannot be played, in order."""
+    inputs = [column for column in kind.inputs().values() if not column.optional]
+    return dict.fromkeys(channel for column in inputs for channel in column.channels)
+
+
+def written_channels(kind: type[Plugin]) -> set[str]:
+    """Channels that a plugin writes."""
+    return {channel for column in kind.outputs().values() for channel in column.channels}
+
+
 def block(chance: random.Random, name: str, teams: list[int], blocks: list[str]) -> Block:
     """Entities whose plugins may or may not fit together."""
     rest = teams, blocks
     motion = made(chance, chance.choice(plugins(MotionModel)), *rest)
-    needed = {c for column in type(motion).inputs().values() for c in column.channels if not column.optional}
-    fitting = [
-        c for c in plugins(Controller) if needed <= {n for o in c.outputs().values() for n in o.channels}
-    ]
+    needed = needed_channels(type(motion))
+    fitting = [c for c in plugins(Controller) if needed.keys() <= written_channels(c)]
     controllers = [made(chance, chance.choice(fitting), *rest)] if fitting and chance.random() < 0.6 else []
+    passed = " ".join(f"[ {channel}, 1.0, NonZero, true, 0.0 ]" for channel in needed)
+    controllers = [
+        c.replace(depletion_map=passed) if "depletion_map" in c.params() else c for c in controllers
+    ]
+    autonomies = [Stir(size=chance.choice([0.5, 5.0])), *some(chance, Autonomy, 2, *rest)]
+    sensors = some(chance, Sensor, 1, *rest) if chance.random() < 0.4 else []
+    sensors += [
+        made(chance, chance.choice(writers), *rest)
+        for autonomy in autonomies
+        for channel in needed_channels(type(autonomy))
+        if (writers := [c for c in plugins(Sensor) if channel in written_channels(c)])
+        and not any(channel in written_channels(type(sensor)) for sensor in sensors)
+    ]
     spread = chance.choice([0.0, 25.0, 400.0, 4000.0])
     births: dict[str, Any] = {}
     if chance.random() < 0.4:
@@ -152,8 +174,7 @@ def block(chance: random.Random, name: str, teams: list[int], blocks: list[str])
         name=name, team=chance.choice(teams), count=chance.choice([1, 1, 2, 3, 5, 9, 14]), variance=(spread, spread, 0.2 * spread),
         position=(*(chance.uniform(-60.0, 60.0) for _ in range(2)), chance.uniform(5.0, 60.0)), heading_variance=chance.choice([0.0, 1.0]),
         speed=chance.choice([0.0, 5.0, 20.0]), health=chance.choice([1.0, 2.0]),
-        autonomy=[Stir(size=chance.choice([0.5, 5.0])), *some(chance, Autonomy, 2, *rest)], controller=controllers, motion=motion,
-        sensor=some(chance, Sensor, 1, *rest) if chance.random() < 0.4 else (), **births,
+        autonomy=autonomies, controller=controllers, motion=motion, sensor=sensors, **births,
     )  # fmt: skip
 
 
@@ -178,8 +199,13 @@ def draw(seed: int) -> Mission:
         stock.load("Boundary")(name=f"region {i:g}", boundary_id=int(i), team=chance.choice(teams), **values)
         for i in sorted(named)
     ]
+    rates = [
+        p.rate
+        for p in [*drawn["interactions"], *drawn["metrics"], *(p for c in crowds for p in c.plugins)]
+        if p.rate
+    ]
     return Mission(
-        blocks=crowds, dt=chance.choice([0.1, 0.1, 0.05, 0.25]),
+        blocks=crowds, dt=chance.choice([dt for dt in (0.1, 0.1, 0.05, 0.25) if dt * max(rates, default=0.0) <= 1.0]),
         motion_multiplier=chance.choice([1, 1, 2, 5]), update=chance.choice(["synchronous", "sequential"]), end=10.0,
         end_conditions=chance.choice(["time", "time, one_team", "time, all_dead"]),
         networks=[stock.load("SphereNetwork")(range=chance.choice([30.0, 100.0]), comm_delay=chance.choice([0.0, 0.0, 0.3]))],

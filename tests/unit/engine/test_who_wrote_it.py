@@ -66,7 +66,7 @@ class Turn(Autonomy):
 
 
 def test_the_interaction_that_moved_it_or_wrote_its_health_is_named():
-    assert error_of(Beam()).startswith("Beam, r 1, world 0, step 0: the entity's state is not finite")
+    assert error_of(Beam()).startswith("Beam, r 1, world 0, step 0: w.move: pos is not finite")
     assert error_of(Bystander(), Beam()).startswith("Beam, ")
     text = error_of(Heal())
     assert text.startswith("Heal, r 1, world 0, step 2: ")

@@ -41,8 +41,9 @@ class Control3D(Autonomy):
             rows, _ = self.keys.pairs()
             self.is_stopped[:] ^= np.bincount(rows, minlength=g.n) % 2 == 1
         way = self.goal - g.pos
-        level = np.sqrt(way[0] * way[0] + way[1] * way[1])
-        distance = np.sqrt(level * level + way[2] * way[2])
+        with np.errstate(over="ignore"):  # of entities that are beyond all goals
+            level = np.sqrt(way[0] * way[0] + way[1] * way[1])
+            distance = np.sqrt(level * level + way[2] * way[2])
         speed = np.where(self.is_stopped, 0.0, np.minimum(distance, self.max_speed))
         self.velocity[:] = way * (speed / np.where(distance > 0.0, distance, 1.0))
         self.desired_speed[:] = speed

@@ -170,7 +170,9 @@ class BulletCollision(Interaction):
             contacts, (state, inverse, sizes), materials, (w.dt, self.iterations), guess,
             lambda n, run: w.context.split(n, run, 1),
         )  # fmt: skip
-        rows = np.flatnonzero((state != before).any(axis=1) | (shifts != 0.0).any(axis=1))
+        is_moved = (state != before).any(axis=1) | (shifts != 0.0).any(axis=1)
+        # A state that is not finite is not this plugin's to tell of.
+        rows = np.flatnonzero(is_moved & np.isfinite(state).all(axis=1))
         if not len(rows):
             return
         vel, omega = np.split(state[rows].T, 2)
