@@ -1,8 +1,8 @@
 """Kernels of actions and observations: from rows of the body table to arrays (agents, numbers), and back.
 
-An agent's number is world * agents per world + place in its world. A `spec` has one line per feature: kind, row of the source table,
-scale, then for the own features the point (x, y, z) [m] that is subtracted, for those of others 1 where a vector is relative to the own
-one. Lines are written side by side from a column on.
+An agent's number is world * agents per world + place in its world. A `spec` is kind and source of each feature, (n,), a row of the
+table that it is taken from, and its numbers, (n, 4): scale, then for own features the point (x, y, z) [m] that is subtracted, for
+those of others 1 where a vector is relative to the own one. Features are written side by side from a column on.
 """
 
 from __future__ import annotations
@@ -46,29 +46,29 @@ def frame_of(floats, row, mode):
 
 @device
 def put_vector(kind, scale, x, y, z, turn, a, column, out):
-    """Write a vector of the world in the frame `turn`. Returns the next column."""
+    """Write a vector of the world in the frame `turn`: two numbers if kind is PLANE, else three."""
     out[a, column] = scale * (turn[0] * x + turn[1] * y + turn[2] * z)
     out[a, column + 1] = scale * (turn[3] * x + turn[4] * y + turn[5] * z)
-    if kind == PLANE:
-        return column + 2
-    out[a, column + 2] = scale * (turn[6] * x + turn[7] * y + turn[8] * z)
-    return column + 3
+    if kind != PLANE:
+        out[a, column + 2] = scale * (turn[6] * x + turn[7] * y + turn[8] * z)
 
 
 @device
 def put_other(floats, row, other, is_mate, spec, turn, a, column, out):
     """Write the features of another entity for that of `row`. Returns the next column."""
-    for f in range(spec.shape[0]):
-        kind, source, scale = int(spec[f, 0]), int(spec[f, 1]), spec[f, 2]
+    kinds, source, numbers = spec
+    for f in range(kinds.shape[0]):
+        kind, k, scale = kinds[f], source[f], numbers[f, 0]
         if kind == PLANE or kind == SPACE:
-            x, y, z = floats[source, other], floats[source + 1, other], floats[source + 2, other]
-            if spec[f, 3] != 0.0:
-                x, y, z = x - floats[source, row], y - floats[source + 1, row], z - floats[source + 2, row]
-            column = put_vector(kind, scale, x, y, z, turn, a, column, out)
+            x, y, z = floats[k, other], floats[k + 1, other], floats[k + 2, other]
+            if numbers[f, 1] != 0.0:
+                x, y, z = x - floats[k, row], y - floats[k + 1, row], z - floats[k + 2, row]
+            put_vector(kind, scale, x, y, z, turn, a, column, out)
+            column += 2 if kind == PLANE else 3
             continue
         value = 1.0
         if kind == SCALAR:
-            value = floats[source, other]
+            value = floats[k, other]
         elif kind == DISTANCE:
             x, y = floats[0, other] - floats[0, row], floats[1, other] - floats[1, row]
             z = floats[2, other] - floats[2, row]
@@ -80,31 +80,31 @@ def put_other(floats, row, other, is_mate, spec, turn, a, column, out):
     return column
 
 
-def own(floats, source, shift, who, spec, mode, column, out):
+def own(floats, table, shift, who, spec, mode, column, out):
     """Write features of the entities themselves.
 
-    floats: body table (22, N). source: table of the features; row r of the body table is its column r - shift. who: rows of the body
+    floats: body table (22, N). table: that of the features; row r of the body table is its column r - shift. who: rows of the body
     table, and agents, (m,) each. mode: frame of vectors. out: (agents, numbers), written from `column` on.
     """
     rows, agents = who
+    kinds, source, numbers = spec
     for i in range(rows.shape[0]):
         row, a, at = rows[i], agents[i], column
         turn = frame_of(floats, row, mode)
-        for f in range(spec.shape[0]):
-            kind, k, scale, j = int(spec[f, 0]), int(spec[f, 1]), spec[f, 2], row - shift
+        for f in range(kinds.shape[0]):
+            kind, k, scale, j = kinds[f], source[f], numbers[f, 0], row - shift
             if kind == SCALAR:
-                out[a, at] = scale * (source[k, j] - spec[f, 3])
+                out[a, at] = scale * (table[k, j] - numbers[f, 1])
                 at += 1
             elif kind == FORWARD:
                 nose = frame_of(floats, row, BODY)
-                at = put_vector(SPACE, scale, nose[0], nose[1], nose[2], turn, a, at, out)
+                put_vector(SPACE, scale, nose[0], nose[1], nose[2], turn, a, at, out)
+                at += 3
             else:
-                x, y, z = (
-                    source[k, j] - spec[f, 3],
-                    source[k + 1, j] - spec[f, 4],
-                    source[k + 2, j] - spec[f, 5],
-                )
-                at = put_vector(kind, scale, x, y, z, turn, a, at, out)
+                x, y = table[k, j] - numbers[f, 1], table[k + 1, j] - numbers[f, 2]
+                z = table[k + 2, j] - numbers[f, 3]
+                put_vector(kind, scale, x, y, z, turn, a, at, out)
+                at += 2 if kind == PLANE else 3
 
 
 def nearest(floats, who, wanted, places, arrays, spec, numbers, radius, out):
@@ -211,14 +211,15 @@ def each(floats, who, wanted, members, spec, numbers, out):
 
 
 ROWS = "F2 (I I)"
+SPEC = "(I I F2)"
 SEARCH = f"{ROWS} F (I I I) {TABLE}"
 # Those of observations are compiled for float32 and float64.
 SIGNATURES: dict[Any, str] = {
-    own: "F2 F2 i8 (I I) F2 i8 i8",
-    nearest: f"{SEARCH} F2 (i8 i8 i8 i8 i8) f8",
+    own: f"F2 F2 i8 (I I) {SPEC} i8 i8",
+    nearest: f"{SEARCH} {SPEC} (i8 i8 i8 i8 i8) f8",
     sectors: f"{SEARCH} (i8 i8 i8 i8) f8",
-    sums: f"{SEARCH} F2 (i8 i8 i8 i8 i8) f8",
-    each: f"{ROWS} F (I2 I I) F2 (i8 i8 i8 i8)",
+    sums: f"{SEARCH} {SPEC} (i8 i8 i8 i8 i8) f8",
+    each: f"{ROWS} F (I2 I I) {SPEC} (i8 i8 i8 i8)",
 }
 
 
@@ -228,11 +229,11 @@ def act(actions, who, first, column, low, high, channel):
 
     actions: (agents, numbers). who: rows of the body table, and agents, (m,) each. first: row of the table that is channel[0].
     """
-    rows, agents = who
+    row, place = who
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
-    for i in range(rows.shape[0]):
-        value = actions[agents[i], column]
+    for i in range(row.shape[0]):
+        value = actions[place[i], column]
         if math.isnan(value):
-            return agents[i]
-        channel[rows[i] - first] = middle + half * min(max(value, -1.0), 1.0)
+            return place[i]
+        channel[row[i] - first] = middle + half * min(max(value, -1.0), 1.0)
     return -1

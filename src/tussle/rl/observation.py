@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,6 +28,8 @@ OWN = ("forward", *FLOATS)
 OTHERS = {"distance": kernels.DISTANCE, "same_team": kernels.SAME_TEAM, "present": kernels.PRESENT}
 RELATIVE = {"offset": "pos", "relative_vel": "vel"}
 Scale = float | Mapping[str, float]
+Spec = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""Features as kernels take them: kinds and rows of their source table, (n,), and their numbers, (n, 4)."""
 WRITERS = {
     np.dtype(dtype): {
         law.__name__: kernel(f"{signature} {out}")(law) for law, signature in kernels.SIGNATURES.items()
@@ -90,7 +93,13 @@ def _factor(scale: Scale, name: str) -> float:
     return 1.0 / (scale.get(name, 1.0) if isinstance(scale, Mapping) else scale)
 
 
-def _lines(names: Sequence[str], scale: Scale, planar: bool) -> tuple[np.ndarray, int]:
+def _spec(lines: Sequence[tuple[float, ...]]) -> Spec:
+    """Features as kernels take them, from a line (kind, source, scale, x, y, z) for each."""
+    numbers = np.array(lines, float).reshape(-1, 6)
+    return numbers[:, 0].astype(np.int64), numbers[:, 1].astype(np.int64), numbers[:, 2:].copy()
+
+
+def _of_others(names: Sequence[str], scale: Scale, planar: bool) -> tuple[Spec, int]:
     """The spec of features of others, and its number of columns."""
     lines, width = [], 0
     for name in names:
@@ -106,7 +115,7 @@ def _lines(names: Sequence[str], scale: Scale, planar: bool) -> tuple[np.ndarray
         else:
             lines += [(kernels.SCALAR, OFFSETS[source] + k, factor, 0, 0, 0) for k in range(FLOATS[source])]
             width += FLOATS[source]
-    return np.array(lines, float).reshape(-1, 6), width
+    return _spec(lines), width
 
 
 @dataclass(frozen=True)
@@ -140,24 +149,37 @@ class Own(Component):
                 total += 2 if k == 3 and self.planar and name != "forward" else k
         return total
 
+    @cached_property
+    def _specs(self) -> dict[str, tuple[Spec, int]]:
+        """The spec of each body column, and its number of columns."""
+        found = {}
+        for name in self.columns.split():
+            factor, point = _factor(self.scale, name), (0.0, 0.0, 0.0)
+            if name == "forward":
+                found[name] = _spec([(kernels.FORWARD, 0, factor, *point)]), 3
+            elif name in VECTORS:
+                kind, width = (kernels.PLANE, 2) if self.planar else (kernels.SPACE, 3)
+                point = self.origin if name == "pos" else point
+                found[name] = _spec([(kind, OFFSETS[name], factor, *point)]), width
+            elif name in FLOATS:
+                found[name] = self._numbers(name, OFFSETS[name], FLOATS[name])
+        return found
+
+    def _numbers(self, name: str, first: int, width: int) -> tuple[Spec, int]:
+        factor = _factor(self.scale, name)
+        return _spec([(kernels.SCALAR, first + k, factor, 0.0, 0.0, 0.0) for k in range(width)]), width
+
     def write(self, simulation: Simulation, part: AgentRows, column: int, out: np.ndarray) -> None:
         floats, own = simulation.state.population.bodies.floats, WRITERS[out.dtype]["own"]
         who = part.rows, part.agents
         for name in self.columns.split():
-            factor, source, shift, point = _factor(self.scale, name), floats, 0, (0.0, 0.0, 0.0)
-            if name == "forward":
-                lines = [(kernels.FORWARD, 0, factor, *point)]
-                width = 3
-            elif name in VECTORS:
-                kind = kernels.PLANE if self.planar else kernels.SPACE
-                lines = [(kind, OFFSETS[name], factor, *(self.origin if name == "pos" else point))]
-                width = 2 if self.planar else 3
+            table, shift = floats, 0
+            if "." in name:
+                table, shift, first, width = _plugin_column(part.group, name)
+                spec, width = self._numbers(name, first, width)
             else:
-                first, width = OFFSETS.get(name, 0), FLOATS.get(name, 0)
-                if "." in name:
-                    source, shift, first, width = _plugin_column(part.group, name)
-                lines = [(kernels.SCALAR, first + k, factor, *point) for k in range(width)]
-            own(floats, source, shift, who, np.array(lines), FRAMES[self.frame], column, out)
+                spec, width = self._specs[name]
+            own(floats, table, shift, who, spec, FRAMES[self.frame], column, out)
             column += width
 
 
@@ -191,8 +213,19 @@ def _plugin_column(group: Group, path: str) -> tuple[np.ndarray, int, int, int]:
     return table, group.first, place.first, max(1, place.k)
 
 
-@dataclass(frozen=True)
-class _Search(Component):
+class _Others(Component):
+    """Others whose columns are observed; abstract."""
+
+    columns: str
+    scale: Scale
+    planar: bool
+
+    @cached_property
+    def _features(self) -> tuple[Spec, int]:
+        return _of_others(self.columns.split(), self.scale, self.planar)
+
+
+class _Search(_Others):
     """Others that are looked for; abstract.
 
     Attributes:
@@ -256,10 +289,10 @@ class NearestOthers(_Search):
             raise ParameterError(
                 f"NearestOthers: k = {self.k!r} is not allowed; it takes a whole number >= 1"
             )
-        return self.k * _lines(names, self.scale, self.planar)[1]
+        return self.k * self._features[1]
 
     def write(self, simulation: Simulation, part: AgentRows, column: int, out: np.ndarray) -> None:
-        spec, width = _lines(self.columns.split(), self.scale, self.planar)
+        spec, width = self._features
         mode, wanted = self._wanted(part, self.of)
         is_small = (
             simulation.state.population.bodies.n <= WHOLE_WORLD * simulation.n_worlds
@@ -310,10 +343,10 @@ class Means(_Search):
         names = self.columns.split()
         _check("Means", self.frame, names, (*RELATIVE, *OTHERS, *FLOATS), self.scale)
         self._check_of(self.of, self.radius, True)
-        return 1 + _lines(names, self.scale, self.planar)[1]
+        return 1 + self._features[1]
 
     def write(self, simulation: Simulation, part: AgentRows, column: int, out: np.ndarray) -> None:
-        spec, width = _lines(self.columns.split(), self.scale, self.planar)
+        spec, width = self._features
         mode, wanted = self._wanted(part, self.of)
         floats, places, arrays = self._index(simulation, self.radius)
         numbers = mode, FRAMES[self.frame], column, width, self.count_scale
@@ -322,7 +355,7 @@ class Means(_Search):
 
 
 @dataclass(frozen=True)
-class Each(Component):
+class Each(_Others):
     """All entities of some blocks by their place in them, without the agent itself; zeros for those that are gone.
 
     The columns are those of `NearestOthers`.
@@ -346,10 +379,10 @@ class Each(Component):
                     f"Each: there is no block {name!r}{nearest_name(name, blocks)}; {listed(blocks)}"
                 )
         n_others = sum(blocks[name] for name in self.of.split()) - (block in self.of.split())
-        return n_others * _lines(names, self.scale, self.planar)[1]
+        return n_others * self._features[1]
 
     def write(self, simulation: Simulation, part: AgentRows, column: int, out: np.ndarray) -> None:
-        spec, width = _lines(self.columns.split(), self.scale, self.planar)
+        spec, width = self._features
         bodies = simulation.state.population.bodies
         if self.of not in part.kept:
             part.kept[self.of] = self._places(simulation)
