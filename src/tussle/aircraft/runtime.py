@@ -78,9 +78,9 @@ def table_1_of(tables, keys, values, n, key):
     ]
 
 
-@outlined
-def table_3(tables, at, n, row, column, key):
-    """Linear between n 2-D tables: from `at` n keys, then place, rows and columns of each table."""
+@device
+def between(tables, at, n, key):
+    """Number, from 1, of the table before a key, and the share of the next one; n keys begin at `at`."""
     k = 1
     if not key > tables[at]:
         share = 0.0
@@ -90,6 +90,13 @@ def table_3(tables, at, n, row, column, key):
         while tables[at + k] < key:
             k += 1
         share = (key - tables[at + k - 1]) / (tables[at + k] - tables[at + k - 1])
+    return k, share
+
+
+@outlined
+def table_3(tables, at, n, row, column, key):
+    """Linear between n 2-D tables: from `at` n keys, then place, rows and columns of each table."""
+    k, share = between(tables, at, n, key)
     here = at + n + 3 * (k - 1)
     first = table_2(tables, int(tables[here]), int(tables[here + 1]), int(tables[here + 2]), row, column)
     if share == 0.0:
@@ -101,15 +108,7 @@ def table_3(tables, at, n, row, column, key):
 @outlined
 def table_4(tables, at, n, row, column, key, last):
     """Linear between n 3-D tables: from `at` n keys, then place and number of keys of each table."""
-    k = 1
-    if not last > tables[at]:
-        share = 0.0
-    elif last >= tables[at + n - 1]:
-        k, share = n, 0.0
-    else:
-        while tables[at + k] < last:
-            k += 1
-        share = (last - tables[at + k - 1]) / (tables[at + k] - tables[at + k - 1])
+    k, share = between(tables, at, n, last)
     here = at + n + 2 * (k - 1)
     first = table_3(tables, int(tables[here]), int(tables[here + 1]), row, column, key)
     if share == 0.0:

@@ -14,6 +14,7 @@ import numpy as np
 from tussle.neighbors.lane_count import LANES
 from tussle.neighbors.lanes import below, bits, choose, lanes_sqrt, load_some, splat, store_some
 from tussle.numeric.kernel import device, kernel
+from tussle.numeric.triangle import closest_weights
 
 LEAF = 4
 """Largest number of items of a leaf."""
@@ -445,31 +446,12 @@ def cast_field(height, grid, rays, found, part):
 
 @device
 def square_distance(items, k, x, y, z):
-    """Square of the distance from a point to a triangle [m^2]. C. Ericson, Real-Time Collision Detection (2005), section 5.1.5."""
+    """Square of the distance from a point to a triangle [m^2]."""
     ax, ay, az = items[k, 0], items[k, 1], items[k, 2]
     bx, by, bz = items[k, 3] - ax, items[k, 4] - ay, items[k, 5] - az
     cx, cy, cz = items[k, 6] - ax, items[k, 7] - ay, items[k, 8] - az
     px, py, pz = x - ax, y - ay, z - az
-    d1, d2 = bx * px + by * py + bz * pz, cx * px + cy * py + cz * pz
-    bb, bc, cc = bx * bx + by * by + bz * bz, bx * cx + by * cy + bz * cz, cx * cx + cy * cy + cz * cz
-    d3, d4, d5, d6 = d1 - bb, d2 - bc, d1 - bc, d2 - cc
-    va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
-    s, t = 0.0, 0.0
-    if d1 <= 0.0 and d2 <= 0.0:
-        pass
-    elif d3 >= 0.0 and d4 <= d3:
-        s = 1.0
-    elif vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
-        s = d1 / (d1 - d3)
-    elif d6 >= 0.0 and d5 <= d6:
-        t = 1.0
-    elif vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0:
-        t = d2 / (d2 - d6)
-    elif va <= 0.0 and d4 - d3 >= 0.0 and d5 - d6 >= 0.0:
-        t = (d4 - d3) / ((d4 - d3) + (d5 - d6))
-        s = 1.0 - t
-    else:
-        s, t = vb / (va + vb + vc), vc / (va + vb + vc)
+    s, t = closest_weights((bx, by, bz), (cx, cy, cz), (px, py, pz))
     qx, qy, qz = px - s * bx - t * cx, py - s * by - t * cy, pz - s * bz - t * cz
     return qx * qx + qy * qy + qz * qz
 

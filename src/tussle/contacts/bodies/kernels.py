@@ -93,6 +93,20 @@ def segment_gap(first, a, second, b, offset):
     return p, q, way, math.sqrt(dot(way, way))
 
 
+@device
+def advanced(s, gap, rate, radius):
+    """A step of conservative advancement: share of the motion, whether the search is over, and whether the bodies touch.
+
+    gap: distance of the surfaces after the share s of the motion [m]. rate: by how much it closes along the whole motion, at most [m].
+    """
+    if gap <= 1e-9 * radius:
+        return s, True, True
+    if not rate > 0.0:
+        return s, True, False
+    s += gap / rate
+    return s, not s <= 1.0, False
+
+
 @routine
 def round_contact(first, a, second, b, motion, found, n):
     """Add the contact of two spheres or capsules, if they touch within the motion [m] of the first relative to the second."""
@@ -104,15 +118,8 @@ def round_contact(first, a, second, b, motion, found, n):
     if distance - radius > slack:
         s, is_hit = 0.0, False
         for _ in range(MOST_ADVANCES):
-            gap = distance - radius
-            if gap <= 1e-9 * radius:
-                is_hit = True
-                break
-            rate = -dot(way, motion) / distance
-            if not rate > 0.0:
-                break
-            s += gap / rate
-            if not s <= 1.0:
+            s, is_over, is_hit = advanced(s, distance - radius, -dot(way, motion) / distance, radius)
+            if is_over:
                 break
             offset = add(start, scale(s, motion))
             p, q, way, distance = segment_gap(first, a, second, b, offset)
@@ -189,15 +196,8 @@ def ball_box_contact(ball, box, b, motion, found, n):
     if distance - radius > SLACK * min(radius, size_of(box, b)):
         s, is_hit = 0.0, False
         for _ in range(MOST_ADVANCES):
-            gap = distance - radius
-            if gap <= 1e-9 * radius:
-                is_hit = True
-                break
-            rate = -dot(normal, motion)
-            if not rate > 0.0:
-                break
-            s += gap / rate
-            if not s <= 1.0:
+            s, is_over, is_hit = advanced(s, distance - radius, -dot(normal, motion), radius)
+            if is_over:
                 break
             point, normal, distance = point_of_box(box, b, add(offset, scale(s, motion)))
         if not is_hit:

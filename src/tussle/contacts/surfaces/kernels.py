@@ -13,12 +13,14 @@ from tussle.contacts.bodies.kernels import (
     BOX_REACH,
     MOST_ADVANCES,
     SLACK,
+    advanced,
     size_of,
     unit_or,
 )
 from tussle.contacts.boxes.kernels import CONTACT, MOST_FOUND, box_contacts, dot, minus, put, vector
 from tussle.numeric.kernel import kernel, routine
 from tussle.numeric.rigid_body import add, cross, scale
+from tussle.numeric.triangle import closest_weights
 
 TRIANGLE = 13
 """Numbers of a triangle: corners, unit normal, 1 if only the side of the normal is outside."""
@@ -29,28 +31,10 @@ SAME_PLACE = 1e-3
 
 @routine
 def closest_on_triangle(t, k, p):
-    """Closest point of a triangle to a point. C. Ericson, Real-Time Collision Detection (2005), section 5.1.5."""
+    """Closest point of a triangle to a point."""
     a = vector(t, k, 0)
-    b, c, d = minus(vector(t, k, 3), a), minus(vector(t, k, 6), a), minus(p, a)
-    d1, d2, bb, bc, cc = dot(b, d), dot(c, d), dot(b, b), dot(b, c), dot(c, c)
-    d3, d4, d5, d6 = d1 - bb, d2 - bc, d1 - bc, d2 - cc
-    va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
-    s, w = 0.0, 0.0
-    if d1 <= 0.0 and d2 <= 0.0:
-        pass
-    elif d3 >= 0.0 and d4 <= d3:
-        s = 1.0
-    elif vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
-        s = d1 / (d1 - d3)
-    elif d6 >= 0.0 and d5 <= d6:
-        w = 1.0
-    elif vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0:
-        w = d2 / (d2 - d6)
-    elif va <= 0.0 and d4 - d3 >= 0.0 and d5 - d6 >= 0.0:
-        w = (d4 - d3) / ((d4 - d3) + (d5 - d6))
-        s = 1.0 - w
-    else:
-        s, w = vb / (va + vb + vc), vc / (va + vb + vc)
+    b, c = minus(vector(t, k, 3), a), minus(vector(t, k, 6), a)
+    s, w = closest_weights(b, c, minus(p, a))
     return add(a, add(scale(s, b), scale(w, c)))
 
 
@@ -75,25 +59,17 @@ def ball_triangle_contact(place, radius, center, t, k, motion, found, n, feature
     if distance - radius > SLACK * radius:
         s, is_hit = 0.0, False
         for _ in range(MOST_ADVANCES):
-            gap = distance - radius
-            if gap <= 1e-9 * radius:
-                is_hit = gap > -radius
-                break
-            rate = -dot(normal, motion)
-            if not rate > 0.0:
-                break
-            s += gap / rate
-            if not s <= 1.0:
+            s, is_over, is_hit = advanced(s, distance - radius, -dot(normal, motion), radius)
+            if is_over:
                 break
             point, normal, distance = point_of_triangle(t, k, add(start, scale(s, motion)))
-        if not is_hit:
+        if not is_hit or distance - radius <= -radius:
             return n
     elif distance < -radius:
         return n
     gap = dot(normal, minus(start, point)) - radius
-    for i in range(
-        n
-    ):  # of an edge within one surface, such as a floor of triangles, the face beside it is touched, not the edge
+    # Of an edge within one surface, such as a floor of triangles, the face beside it is touched, not the edge.
+    for i in range(n):
         if found[i, 10] == feature:
             apart = minus(point, vector(found, i, 6))
             if abs(dot(apart, vector(found, i, 0))) <= SAME_PLACE * radius:
