@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tussle.contacts.solids import StaticSolids
 from tussle.errors import MissionError, ParameterError, listed, nearest_name
 from tussle.geodesy import Origin
 from tussle.prism import Prism
@@ -28,6 +27,9 @@ from tussle.shapes import (
     checked_number,
     checked_vector,
 )
+
+if TYPE_CHECKING:
+    from tussle.contacts.solids import StaticSolids
 
 __all__ = [
     "Base",
@@ -199,11 +201,15 @@ class Scene:
     @cached_property
     def static_solids(self) -> StaticSolids:
         """The solids, ready for contacts; made on first access."""
+        from tussle.contacts.solids import StaticSolids
+
         return StaticSolids(self.solids)
 
     @cached_property
     def static_walls(self) -> StaticSolids:
         """The walls alone, ready for contacts; made on first access."""
+        from tussle.contacts.solids import StaticSolids
+
         return StaticSolids(self.walls)
 
     def cast(self, origins: Any, directions: Any, max_range: Any = np.inf) -> Hits:
