@@ -251,7 +251,9 @@ def mission(counts: list[int]) -> list[dict[str, float]]:
                 name="c", team=1, count=n, position=(0, 0, 1500), variance=(1e6, 1e6, 1e4), speed=55.0,
                 autonomy=Straight(speed=55.0), controller=AircraftPIDController(), motion=model(aircraft="c172p"),
             )  # fmt: skip
-            with Simulation(Mission(blocks=[block], dt=0.1, motion_multiplier=12, end=1e6), seeds=[1]) as simulation:
+            with Simulation(
+                Mission(blocks=[block], dt=0.1, motion_multiplier=12, end=1e6), seeds=[1]
+            ) as simulation:
                 simulation.step(2)
                 begin = time.process_time()
                 steps = 20 if model is JSBSimCompiled else max(1, 400 // n)
