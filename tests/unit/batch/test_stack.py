@@ -103,7 +103,7 @@ def test_values_of_their_own_make_runs_differ(alone):
         ({"how": "step"}, "Trouble, step 2: gambles.py:{line}: RuntimeError: this seed goes wrong"),
         ({"how": "start"}, "Trouble, step 0: gambles.py:{line}: RuntimeError: this seed cannot begin"),
         ({"how": "result"}, "RuntimeError: this seed has no result"),
-        ({"how": "nan"}, "the entity's state is not finite: pos = [nan nan nan]"),
+        ({"how": "nan"}, "Trouble, reds 1, step 2: w.move: pos is not finite"),
         ({"how": "leave"}, "SystemExit: this seed leaves"),
         ({"mood": "spawn"}, "Nervous, reds, step 0: gambles.py:{line}: RuntimeError: it does not want to"),
         ({"mood": "open"}, "Nervous, reds 1, step 0: gambles.py:{line}: RuntimeError: nobody answers"),

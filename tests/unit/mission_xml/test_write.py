@@ -15,7 +15,7 @@ import random_missions
 
 from tussle import Block, Mission
 from tussle.api import Interaction
-from tussle.errors import MissionError
+from tussle.errors import MissionError, TussleError
 from tussle.mission import Loaded, read_mission, shipped_missions, to_python, to_xml
 from tussle.scene import Base, Scene, Sphere
 from tussle.stock import Boids, MotorSchemas, MoveToGoalMS, SimpleCollision, SphereNetwork, Still
@@ -44,7 +44,7 @@ def test_shipped_missions_are_read_back_equal(name, tmp_path):
 
 def drawn(n: int) -> Iterator[Mission]:
     for number in range(n):
-        with suppress(MissionError):  # a rate that does not fit the step
+        with suppress(TussleError):  # a rate that does not fit the step, a text that a parameter refuses
             mission = random_missions.draw(number)
             # A file has no more slots than entities: they would have no births.
             blocks = [b.replace(slots=min(b.slots, max(1, b.count))) for b in mission.blocks]
