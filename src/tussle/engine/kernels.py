@@ -117,24 +117,15 @@ def merge(gone, first, last, old, new, fresh, out):
 
 @device
 def gather(table, first, fresh, source, out):
-    """Copy columns source - first of table (k, n) to out (k, m); where source < 0, column -1 - source of fresh, or its only column.
-
-    Adjacent source columns are copied together.
-    """
-    k, m = table.shape[0], source.shape[0]
+    """Copy columns source - first of table (k, n) to out (k, m); where source < 0, column -1 - source of fresh, or its only column."""
     last = fresh.shape[1] - 1
-    j = 0
-    while j < m:
-        row, end = source[j], j + 1
-        while row >= 0 and end < m and source[end] == source[end - 1] + 1:
-            end += 1
-        for r in range(k):
+    for r in range(table.shape[0]):
+        for j in range(source.shape[0]):
+            row = source[j]
             if row >= 0:
-                for i in range(end - j):
-                    out[r, j + i] = table[r, row - first + i]
+                out[r, j] = table[r, row - first]
             else:
                 out[r, j] = fresh[r, min(-1 - row, last)]
-        j = end
 
 
 @kernel("F2 i8 F2 I F2w")
