@@ -85,7 +85,9 @@ class Population:
         self._asked: dict[tuple[int, int, int], Group] = {}
         self._specs: dict[tuple[int, tuple[str, ...]], Any] = {}
         self._params: dict[Group, tuple[Params, Params]] = {}
-        self._of_block = np.zeros(0, np.int64)  # where entities of a block share a group: its number in `groups`
+        self._of_block = np.zeros(
+            0, np.int64
+        )  # where entities of a block share a group: its number in `groups`
         self.on_new_group: Callable[[], None] = lambda: None
 
     def mass_properties(self) -> tuple[np.ndarray, np.ndarray]:
@@ -154,7 +156,7 @@ class Population:
             if len(self._of_block) < len(blocks):
                 owners = [self.group_of(blocks, k, 0) for k in range(len(blocks))]
                 self._of_block = np.array([self.groups.index(g) for g in owners], np.int64)
-            return self._of_block[new.block]
+            return np.take(self._of_block, new.block)
         alike = new.block  # entities with equal numbers belong to the same group
         if self.is_sequential:
             alike = alike << 32 | new.id
