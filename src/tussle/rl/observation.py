@@ -53,6 +53,7 @@ class AgentRows:
         agents: Number of each agent: world * agents per world + place in its world, (m,).
         team: Team of each as a float, (m,).
         kept: What components keep until rows change.
+        span: All agents of the block in this group have rows from span[0] to span[1] - 1, though `rows` may be some of them.
     """
 
     block: str
@@ -61,6 +62,7 @@ class AgentRows:
     agents: np.ndarray
     team: np.ndarray
     kept: dict[Any, Any]
+    span: tuple[int, int]
 
 
 class Component(ABC):
@@ -247,6 +249,12 @@ class _Others(Component):
         return _of_others(self.columns.split(), self.scale, self.planar)
 
 
+def _split_of(simulation: Simulation) -> Any:
+    """What calls a function for parts of the rows in several threads; None with one thread."""
+    state = simulation.state
+    return None if state.context.threads == 1 else state.world_view.split_rows
+
+
 class _Search(_Others):
     """Others that are looked for; abstract.
 
@@ -275,8 +283,7 @@ class _Search(_Others):
     def _index(
         self, simulation: Simulation, reach: float
     ) -> tuple[Any, tuple[np.ndarray, ...], tuple[np.ndarray, ...]]:
-        bodies, threads = simulation.state.population.bodies, simulation.state.context
-        split = None if threads.threads == 1 else simulation.state.world_view.split_rows
+        bodies, split = simulation.state.population.bodies, _split_of(simulation)
         index = bodies.any_index() if reach == np.inf else bodies.index(reach, split)
         places = index.row_world, index.place, index.order
         return bodies.floats, places, (*index.table, bodies.by_place(index, "team", split)[0])
@@ -346,16 +353,16 @@ class NearestOthers(_Search):
         reach: float,
         out: np.ndarray,
     ) -> None:
-        group, bodies = part.group, simulation.state.population.bodies
-        split = simulation.state.world_view.split_rows
+        bodies, split = simulation.state.population.bodies, _split_of(simulation)
         index = bodies.index(reach, split)
-        blocks = index.blocks(group.first, group.last, split)
+        first, last = part.span
+        blocks = index.blocks(first, last, split)
         world_start, keys, strips, _, _, points = index.table
         places = index.members, strips[1], index.order, world_start, keys, points
         table = *places, bodies.by_place(index, "team", split)[0]
-        agent, teams = np.full(group.n, -1), np.zeros(group.n)
-        agent[part.rows - group.first], teams[part.rows - group.first] = part.agents, wanted
-        who, found = (agent, group.first, bodies.team), (blocks.cuts, blocks.spans, blocks.points)
+        agent, teams = np.full(last - first, -1), np.zeros(last - first)
+        agent[part.rows - first], teams[part.rows - first] = part.agents, wanted
+        who, found = (agent, first, bodies.team), (blocks.cuts, blocks.spans, blocks.points)
         write, spec = WRITERS[out.dtype]["nearest"], self._features[0]
         simulation.state.context.split(
             blocks.n_blocks,
