@@ -85,20 +85,21 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
         )
         self.agents = [] if swarm.over[0] else self._living()
         if self.agents == before:
-            told, numbers = before, [self._number[name] for name in before]
+            reported, numbers = before, [self._number[name] for name in before]
         else:
-            told = before + [name for name in self.agents if name not in set(before)]
-            numbers = [self._number[name] for name in told]
+            reported = before + [name for name in self.agents if name not in set(before)]
+            numbers = [self._number[name] for name in reported]
             self.agents = [name for name in self.agents if not dead[self._number[name]]]
         terms = {name: term[0].tolist() for name, term in swarm.terms.items()}
         infos = {
-            name: {key: term[a] for key, term in terms.items()} for name, a in zip(told, numbers, strict=True)
+            name: {key: term[a] for key, term in terms.items()}
+            for name, a in zip(reported, numbers, strict=True)
         }
         return (
-            self._observed(told),
-            {name: rewards[a] for name, a in zip(told, numbers, strict=True)},
-            {name: dead[a] for name, a in zip(told, numbers, strict=True)},
-            {name: late[a] for name, a in zip(told, numbers, strict=True)},
+            self._observed(reported),
+            {name: rewards[a] for name, a in zip(reported, numbers, strict=True)},
+            {name: dead[a] for name, a in zip(reported, numbers, strict=True)},
+            {name: late[a] for name, a in zip(reported, numbers, strict=True)},
             infos,
         )
 
