@@ -13,7 +13,6 @@ from parity_page import KINDS, PAGE, SECTIONS, differences, parity_page, plugins
 
 from tussle import historic, stock
 
-
 STATES = ("works", "works otherwise: ", "dropped: ", "not yet: ")
 
 
@@ -26,7 +25,9 @@ def exists(test: str) -> bool:
 def features() -> list[list[str]]:
     """Rows of the tables of features besides plugins: what it is, its state, its test."""
     text = PAGE.read_text().partition("\n## Features besides plugins\n")[2].partition("\n## ")[0]
-    lines = [line for line in text.splitlines() if line.startswith("| ") and not line.startswith("| SCRIMMAGE ")]
+    lines = [
+        line for line in text.splitlines() if line.startswith("| ") and not line.startswith("| SCRIMMAGE ")
+    ]
     return [[cell.strip() for cell in line.strip("|").split(" | ")] for line in lines]
 
 
@@ -51,7 +52,7 @@ def words(text: str) -> list[str]:
 def test_each_feature_has_a_state_and_what_works_a_test():
     for row in features():
         assert len(row) == 3, row
-        feature, state, test = row
+        _, state, test = row
         assert state == "works" or state.startswith(STATES[1:]), row
         assert bool(test) == state.startswith("works"), row
         assert not test or exists(test.strip("`")), row
