@@ -151,11 +151,9 @@ class ScrimmageAutonomy:
     """Base class that a class may have."""
 
 
-Quaternion, State, ID, Contact, Autonomy = (
-    ScrimmageQuaternion,
-    ScrimmageState,
-    ScrimmageID,
-    ScrimmageContact,
-    ScrimmageAutonomy,
-)
-"""Their names there."""
+# Their names there.
+Quaternion = ScrimmageQuaternion
+State = ScrimmageState
+ID = ScrimmageID
+Contact = ScrimmageContact
+Autonomy = ScrimmageAutonomy

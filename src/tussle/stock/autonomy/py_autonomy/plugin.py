@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
+import types
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -165,4 +166,4 @@ def adapted(python_class: type) -> type[PyAutonomy]:
     name = PREFIX + python_class.__name__
     doc = f"Runs the Python class {python_class.__name__}, see PyAutonomy."
     members = {"__module__": python_class.__module__, "__doc__": doc, "python_class": python_class}
-    return type(PyAutonomy)(name, (PyAutonomy,), members)
+    return types.new_class(name, (PyAutonomy,), exec_body=lambda body: body.update(members))
