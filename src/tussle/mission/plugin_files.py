@@ -23,6 +23,7 @@ from pathlib import Path, PurePosixPath
 from types import ModuleType
 from typing import Any
 
+from tussle import stock
 from tussle.api.plugin import Plugin
 from tussle.errors import MissionError
 
@@ -219,14 +220,9 @@ def _finder() -> _Finder:
 
 def _adapt_python_autonomies(module: ModuleType) -> None:
     """Add a plugin to a module for each class of SCRIMMAGE's Python interface that it defines."""
-    classes = [value for value in vars(module).values() if hasattr(value, "step_autonomy")]
-    if classes:
-        from tussle.stock.autonomy.py_autonomy import adapted, is_python_autonomy
-
-        for value in classes:
-            if is_python_autonomy(value, module.__name__):
-                plugin = adapted(value)
-                vars(module)[plugin.__name__] = plugin
+    if any(hasattr(value, "step_autonomy") for value in vars(module).values()):
+        for plugin in stock.load("PyAutonomy").adapters(vars(module)):
+            vars(module)[plugin.__name__] = plugin
 
 
 @dataclass(frozen=True)

@@ -123,6 +123,13 @@ class PyAutonomy(Autonomy):
         vars(python).update(copy.deepcopy(state[0]))
         return PythonAgent(python, state[1])
 
+    @staticmethod
+    def adapters(module: Mapping[str, Any]) -> list[type[PyAutonomy]]:
+        """A plugin for each Python class that a module, given by its names, defines."""
+        return [
+            adapted(value) for value in list(module.values()) if is_python_autonomy(value, module["__name__"])
+        ]
+
     def step(self, g: GroupView) -> None:
         worlds: dict[int, Contacts] = {}
         dt = np.broadcast_to(g.dt, g.n)
