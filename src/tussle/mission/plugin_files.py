@@ -220,9 +220,8 @@ def _finder() -> _Finder:
 
 def _adapt_python_autonomies(module: ModuleType) -> None:
     """Add a plugin to a module for each class of SCRIMMAGE's Python interface that it defines."""
-    if any(hasattr(value, "step_autonomy") for value in vars(module).values()):
-        for plugin in stock.load("PyAutonomy").adapters(vars(module)):
-            vars(module)[plugin.__name__] = plugin
+    for plugin in stock.adapters(vars(module)):
+        vars(module)[plugin.__name__] = plugin
 
 
 @dataclass(frozen=True)
