@@ -42,6 +42,13 @@ EXISTING = {
 """Its CPU time [ns], from simulated seconds per CPU second; 10 steps of 12 substeps per second."""
 START = {"UUV6DOF": {"position": (0, 0, -50), "speed": 1.0}}
 """Where a model can't start as the others do."""
+HAWK = {"jsbsim_root": str(stock.examples()["JSBSimModel"].with_name("hawk"))}
+PARAMS = {
+    "JSBSimCompiled": HAWK | {"aircraft": "hawk"},
+    "JSBSimControl": HAWK | {"aircraft": "hawk"},
+    "JSBSimModel": HAWK | {"script_name": "patrol.xml"},
+}
+"""Parameters of models that need some."""
 WARM = 20
 """Steps before the measurement, in which kernels are compiled and vehicles get going."""
 
@@ -89,7 +96,7 @@ def measure(motion: Any, controller: Any, n: int) -> dict[str, Any]:
         pilot = driver(first.inputs().values(), (), (), ())
         block = Block(
             name="a", count=n, variance=(1e4, 1e4, 1e2), heading_variance=1.0, autonomy=pilot,
-            controller=[controller()] if controller else (), motion=motion(),
+            controller=[controller()] if controller else (), motion=motion(**PARAMS.get(motion.__name__, {})),
             **{"position": (0, 0, 500), "speed": 20.0} | START.get(motion.__name__, {}),
         )  # fmt: skip
         dt = 0.01 if issubclass(motion, RigidBodyModel) else 0.1

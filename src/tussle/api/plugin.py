@@ -42,6 +42,8 @@ class HistoricAttributes:
         unread: Attributes that are ignored.
         least_zero: Parameters for which a negative number, "none" in SCRIMMAGE, is read as 0.
         differs: Parameter -> note for files that omit it, since SCRIMMAGE has another default.
+        chosen_by: Attribute that names the class of a plugin file that the plugin runs; "" for none.
+        rest: Parameter that takes all other attributes, as an object in JSON; "" for none.
     """
 
     renamed: Mapping[str, str] = field(default_factory=dict)
@@ -49,6 +51,8 @@ class HistoricAttributes:
     unread: tuple[str, ...] = ()
     least_zero: tuple[str, ...] = ()
     differs: Mapping[str, str] = field(default_factory=dict)
+    chosen_by: str = ""
+    rest: str = ""
 
 
 def service(method: F) -> F:

@@ -118,6 +118,25 @@ class Catalogue:
             raise MissionError(f"plugin {name!r} {source.place} is {found!r}, which is not a plugin class")
         return found
 
+    def adapter(self, cls: type[Plugin], name: str) -> type[Plugin]:
+        """The plugin that runs a class of a plugin file.
+
+        Args:
+            cls: The plugin of the mission, such as PyAutonomy.
+            name: Name of the class.
+
+        Raises:
+            MissionError: No plugin file has such a class.
+        """
+        prefix = f"{cls.__name__}_"
+        if prefix + name in self._sources:
+            return self.load(prefix + name)
+        found = [known.removeprefix(prefix) for known in self.names if known.startswith(prefix)]
+        raise MissionError(
+            f"{cls.__name__}: no plugin file has a class {name[:80]!r} with the methods init and step_autonomy"
+            f"{nearest_name(name[:80], found)}; give its file with --plugin-path"
+        )
+
     def hides(self, name: str) -> str:
         """Note for a name that several plugins have: which of them is used; "" if there is only one."""
         *others, winner = (f"the one {source.place}" for source in self._sources[name])

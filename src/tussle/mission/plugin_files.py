@@ -23,6 +23,7 @@ from pathlib import Path, PurePosixPath
 from types import ModuleType
 from typing import Any
 
+from tussle import stock
 from tussle.api.plugin import Plugin
 from tussle.errors import MissionError
 
@@ -31,6 +32,8 @@ PREFIX = "tussle_plugins_"
 DIGEST = "__plugin_file_digest__"
 """Attribute of a file's module: hash of the texts that it was made from, its own and those that it imports."""
 INIT = "__init__"
+BINDINGS = "scrimmage"
+"""Module of SCRIMMAGE's Python interface, which plugin files import from tussle."""
 
 
 @dataclass(frozen=True)
@@ -215,6 +218,12 @@ def _finder() -> _Finder:
     return found
 
 
+def _adapt_python_autonomies(module: ModuleType) -> None:
+    """Add a plugin to a module for each class of SCRIMMAGE's Python interface that it defines."""
+    for plugin in stock.adapters(vars(module)):
+        vars(module)[plugin.__name__] = plugin
+
+
 @dataclass(frozen=True)
 class _Finder(MetaPathFinder):
     """Finds the modules of plugin files; one in a process, on `sys.meta_path`."""
@@ -263,6 +272,7 @@ class _Loader(ExecutionLoader):
             {DIGEST: self.digest, "__builtins__": {**vars(builtins), "__import__": self._import}}
         )
         super().exec_module(module)
+        _adapt_python_autonomies(module)
 
     def _import(
         self,
@@ -273,8 +283,11 @@ class _Loader(ExecutionLoader):
         level: int = 0,
     ) -> Any:
         """Import for the file's statements: a plain name is looked up in its folder first."""
-        neighbour = f"{self.package}.{name.partition('.')[0]}"
+        head = name.partition(".")[0]
+        neighbour = f"{self.package}.{head}"
         if level == 0 and neighbour in _finder().loaders:
             found = builtins.__import__(f"{self.package}.{name}", globals, locals, fromlist)
             return found if fromlist else sys.modules[neighbour]
+        if level == 0 and head == BINDINGS:
+            return importlib.import_module("tussle.stock.autonomy.py_autonomy.bindings")
         return builtins.__import__(name, globals, locals, fromlist, level)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -91,10 +92,10 @@ class PluginReader:
         self._add_shared(written)
         name, rate = self._name(written, taken), self._rate(written)
         values: dict[str, Any] = {}
-        known, is_right = cls.historic_attributes, True
+        known, is_right, rest = cls.historic_attributes, True, dict[str, str]()
         self._join(written, cls)
         for attribute, text in written.attributes.items():
-            if attribute in PLUGIN:
+            if attribute in (*PLUGIN, known.chosen_by):
                 continue
             parameter = known.renamed.get(attribute, attribute)
             if parameter in cls.params() or parameter in cls.children():
@@ -103,8 +104,12 @@ class PluginReader:
                 except TussleError as error:
                     self._report(written.where(attribute), cls, parameter, error)
                     is_right = False
+            elif known.rest and attribute not in known.unread:
+                rest[attribute] = text
             else:
                 self._not_a_parameter(written, cls, attribute)
+        if rest:
+            values[known.rest] = json.dumps(rest)
         for attribute, text in known.differs.items():
             if attribute not in values:
                 self.problems.note(written.where(""), text)
@@ -129,7 +134,14 @@ class PluginReader:
         except MissionError as error:
             self.problems.error(place, f"{tag}: {error}")
             return None
-        if hides := self.catalogue.hides(written.plugin):
+        chosen = written.attributes.get(cls.historic_attributes.chosen_by)
+        if chosen is not None:
+            try:
+                cls = self.catalogue.adapter(cls, chosen)
+            except MissionError as error:
+                self.problems.error(written.where(cls.historic_attributes.chosen_by), str(error))
+                return None
+        elif hides := self.catalogue.hides(written.plugin):
             self.problems.note(place, hides)
         if not issubclass(cls, KINDS[written.tag]):
             its = next(

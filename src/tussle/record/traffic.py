@@ -84,8 +84,9 @@ class Traffic:
     ) -> None:
         """Count links of a network, each (m,); `outcome` is 0 or 1 + the index of a reason in the network's losses."""
         m, number = len(world), list(self._outcomes).index(network)
-        one, of_network = np.ones(m, np.int64), np.full(m, number)
-        self._links.append(np.stack([world, of_network, sender, receiver, outcome, one]))
+        rows = np.empty((6, m), np.int32)  # as in the file: half the memory, which is most of the cost
+        rows[0], rows[1], rows[2], rows[3], rows[4], rows[5] = world, number, sender, receiver, outcome, 1
+        self._links.append(rows)
         self._n_links += m
         if self._n_links > MOST_LINKS:
             self._links = [self._summed()]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -69,6 +69,13 @@ def advise_controllers(offered: Iterable[str], needed: Iterable[str]) -> list[st
             if takes and takes <= offered and needed <= gives:
                 found.append(name)
     return found
+
+
+def adapters(module: Mapping[str, Any]) -> list[Any]:
+    """Return a plugin class for each class of SCRIMMAGE's Python interface that a module, given by its names, defines."""
+    if not any(hasattr(value, "step_autonomy") for value in module.values()):
+        return []
+    return list(load("PyAutonomy").adapters(module))
 
 
 def __getattr__(name: str) -> Any:
