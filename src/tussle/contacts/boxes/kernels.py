@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from tussle.numeric.kernel import device, routine
+from tussle.numeric.kernel import device, lean_routine
 from tussle.numeric.rigid_body import add, cross, scale
 
 CONTACT = 11
@@ -49,7 +49,7 @@ def vector(array, row, first):
     return array[row, first], array[row, first + 1], array[row, first + 2]
 
 
-@routine
+@lean_routine
 def put(found, n, normal, arm_a, arm_b, gap, feature):
     """Add contact number n; of too many, the one with the largest gap is dropped. Returns the number of contacts."""
     k = n
@@ -66,7 +66,7 @@ def put(found, n, normal, arm_a, arm_b, gap, feature):
     return min(n + 1, found.shape[0])
 
 
-@routine
+@lean_routine
 def set_box(items, k, corners, axes):
     """Write the corners (8, 3), relative to the origin, and the axes (3, 3) of a box."""
     for i in range(3):
@@ -82,7 +82,7 @@ def set_box(items, k, corners, axes):
             )
 
 
-@routine
+@lean_routine
 def span(corners, n, way):
     """Least and greatest component of n corners along a direction."""
     least, most = np.inf, -np.inf
@@ -92,7 +92,7 @@ def span(corners, n, way):
     return least, most
 
 
-@routine
+@lean_routine
 def between(first, n_first, second, n_second, way):
     """How far two bodies are apart along a unit vector [m], and whether the first lies towards its tip."""
     low_a, high_a = span(first, n_first, way)
@@ -100,7 +100,7 @@ def between(first, n_first, second, n_second, way):
     return max(low_a - high_b, low_b - high_a), low_a - high_b >= low_b - high_a
 
 
-@routine
+@lean_routine
 def face(corners, n, axes, way, polygon):
     """Write the corners of the face that looks most along a direction, in order; returns their number and the face's normal."""
     if n == 3:
@@ -127,7 +127,7 @@ def face(corners, n, axes, way, polygon):
     return 4, scale(sign, vector(axes, best, 0))
 
 
-@routine
+@lean_routine
 def clip(polygon, n, normal, limit, out):
     """Write the part of a polygon on which normal . x <= limit; returns its number of corners."""
     m = 0
@@ -143,7 +143,7 @@ def clip(polygon, n, normal, limit, out):
     return m
 
 
-@routine
+@lean_routine
 def clipped_faces(bodies, way, reach, centers, is_first, found, n, scratch):
     """Add the points of the face of one body that lie behind a face of the other.
 
@@ -181,7 +181,7 @@ def clipped_faces(bodies, way, reach, centers, is_first, found, n, scratch):
     return n
 
 
-@routine
+@lean_routine
 def crossed_edges(pair, way, edges, centers, gap, found, n):
     """Add the contact of two edges: the closest points of the lines through the corners that lie deepest.
 
@@ -209,7 +209,7 @@ def crossed_edges(pair, way, edges, centers, gap, found, n):
     return put(found, n, way, minus(p, centers[0]), minus(q, centers[1]), gap, 15.0)
 
 
-@routine
+@lean_routine
 def thinned(found, first, n, distance):
     """Keep the deeper one of contacts nearer than a distance to each other; returns the number of contacts."""
     kept = first
@@ -225,7 +225,7 @@ def thinned(found, first, n, distance):
     return kept
 
 
-@routine
+@lean_routine
 def box_contacts(items, k, other, reach, found, n, scratch):
     """Add the contacts of box k with a body nearer than `reach` [m]; returns the number of contacts.
 
