@@ -132,7 +132,11 @@ def _with_balls(
 
 
 def entered(
-    mass: np.ndarray, inertia: np.ndarray, quat: np.ndarray, motion: tuple[np.ndarray, np.ndarray], moves: np.ndarray
+    mass: np.ndarray,
+    inertia: np.ndarray,
+    quat: np.ndarray,
+    motion: tuple[np.ndarray, np.ndarray],
+    moves: np.ndarray,
 ) -> np.ndarray:
     """Velocities and inverse masses of bodies for the solver, (n, BODY); see `enter_bodies`."""
     bodies = np.empty((len(mass), impulses_kernels.BODY))

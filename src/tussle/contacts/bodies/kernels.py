@@ -19,7 +19,6 @@ from tussle.contacts.boxes.kernels import (
     dot,
     minus,
     put,
-    set_box,
     vector,
 )
 from tussle.numeric.kernel import device, kernel, lean_device, lean_routine
@@ -240,10 +239,9 @@ def pair_contacts(items, a, b, motion, found, scratch):
     if other_is_round:
         return round_box_contacts(items, b, items, a, scale(-1.0, motion), -1.0, found, 0)
     first, axes_a, second, axes_b, one, two, three = scratch
-    set_box(items, b, second, axes_b)
     size = min(size_of(items, a), size_of(items, b))
     reach = max(SLACK * size, min(BOX_REACH * size, math.sqrt(dot(motion, motion))))
-    other = second, 8, axes_b, 3, axes_b, vector(items, b, 0), False
+    other = b, second, axes_b, axes_b, False
     return box_contacts(items, a, other, reach, found, 0, (first, axes_a, one, two, three))
 
 

@@ -236,10 +236,11 @@ def undo_overlap(c, pair, gap, moves, shifts, rows, dt):
 
 
 @lean_routine
-def sweep(first, last, begin, row, other, moves, rows, friction):
+def sweep(first, last, begin, row, other, moves, rows, friction, is_back):
     """Solve the contacts of one world once, one after another; returns the square of the largest change of the velocity [m^2/s^2]."""
     largest = 0.0
-    for i in range(first, last):
+    for k in range(first, last):
+        i = first + last - 1 - k if is_back else k
         if rows[i - begin, MASS] > 0.0:
             largest = max(largest, solve_contact(i - begin, (row[i], other[i]), moves, rows, friction))
     return largest
@@ -282,8 +283,11 @@ def solve_worlds(bodies, found, materials, dt, iterations, starts, impulses, par
         for i in range(first, last):
             if impulses[i, 0] > 0.0:
                 push(moves, moves, (row[i], other[i]), rows, i - begin, impulse_of(rows, i - begin))
-        for _ in range(iterations):
-            if sweep(first, last, begin, row, other, moves, rows, friction[w]) < SETTLED * SETTLED:
+        for k in range(iterations):
+            if (
+                sweep(first, last, begin, row, other, moves, rows, friction[w], k % 2 == 1)
+                < SETTLED * SETTLED
+            ):
                 break
         for i in range(first, last):
             c, pair = i - begin, (row[i], other[i])

@@ -109,7 +109,7 @@ def box_triangle_contacts(items, a, t, k, motion, found, n, scratch):
         edges[c, 0], edges[c, 1], edges[c, 2] = unit_or(edge, math.sqrt(dot(edge, edge)), (1.0, 0.0, 0.0))
     size = size_of(items, a)
     reach = max(SLACK * size, min(BOX_REACH * size, math.sqrt(dot(motion, motion))))
-    other = corners, 3, axes, 1, edges, (0.0, 0.0, 0.0), t[k, 12] > 0.0
+    other = -1, corners, axes, edges, t[k, 12] > 0.0
     m = box_contacts(items, a, other, reach, found, n, inner)
     kept = n
     for i in range(n, m):
@@ -125,6 +125,34 @@ def box_triangle_contacts(items, a, t, k, motion, found, n, scratch):
             for j in range(CONTACT):
                 found[kept, j] = found[i, j]
             kept += 1
+    return kept
+
+
+@lean_routine
+def one_by_octant(found, n, size):
+    """Of the contacts of a box with one plane, keep one in each octant of the box; returns the number of contacts.
+
+    Where a floor is made of triangles, its edges add contacts between the corners of the box, and redundant contacts take more
+    iterations. The outermost is kept, or one that is deeper by more than the slack.
+    """
+    kept = 0
+    for i in range(n):
+        same = kept
+        for j in range(kept):
+            apart = minus(vector(found, i, 6), vector(found, j, 6))
+            normal = vector(found, j, 0)
+            is_same = found[i, 10] == found[j, 10] and dot(vector(found, i, 0), normal) > 0.9999
+            same = j if is_same and abs(dot(apart, normal)) <= SAME_PLACE * size else same
+        deeper = 0.0 if same == kept else found[same, 9] - found[i, 9]
+        arm, other = vector(found, i, 3), vector(found, same, 3)
+        if (
+            same == kept
+            or deeper > SLACK * size
+            or (deeper >= -SLACK * size and dot(arm, arm) > dot(other, other))
+        ):
+            for j in range(CONTACT):
+                found[same, j] = found[i, j]
+        kept += 1 if same == kept else 0
     return kept
 
 
@@ -257,6 +285,8 @@ def find_surfaces(bodies, motion, planes, tree, field, ints, contacts):
             items, a, (low, high), (bounds, links, root, triangles, single, inner), move, found, n, stack
         )
         n = field_contacts(items, a, (low, high), (height, grid, single, inner), move, found, n)
+        if items[a, 3] == 0.0:
+            n = one_by_octant(found, n, size_of(items, a))
         for k in range(n):
             if not found[k, 9] < np.inf:  # replaced by another contact
                 continue

@@ -165,7 +165,12 @@ class BulletCollision(Interaction):
         state = found.entered(mass, inertia, w.quat, (w.vel, w.omega), moves)
         materials = self.restitution, self.friction, self.bounce_speed
         shifts = found.solve(
-            contacts, (state, sizes), materials, (w.dt, self.iterations), guess, lambda n, run: w.context.split(n, run, 1)
+            contacts,
+            (state, sizes),
+            materials,
+            (w.dt, self.iterations),
+            guess,
+            lambda n, run: w.context.split(n, run, 1),
         )
         vel, omega, turns = state[:, :3].T, state[:, 3:6].T, state[:, 7] > 0.0
         is_moved = (vel != w.vel).any(axis=0) | (omega != w.omega).any(axis=0) | (shifts != 0.0).any(axis=1)
@@ -189,15 +194,17 @@ class BulletCollision(Interaction):
         removes = self.remove_on_collision[w.world]
         met = np.flatnonzero(touches & is_new & is_body)
         if len(met):
-            pair = np.unique(np.stack([contacts.row[met], contacts.other[met]]), axis=1)
-            order = np.lexsort((w.id[pair[1]], w.id[pair[0]], w.world[pair[0]]))
-            first, second = pair[:, order]
+            pair = np.stack([contacts.row[met], contacts.other[met]])
+            pair = pair[:, np.lexsort((w.id[pair[1]], w.id[pair[0]], w.world[pair[0]]))]
+            is_first = np.append(True, (pair[:, 1:] != pair[:, :-1]).any(axis=0))
+            first, second = pair = pair[:, is_first]
             w.publish(
                 EntityCollided, w.world[first], first=w.id[first], second=w.id[second],
                 first_team=w.team[first], second_team=w.team[second],
             )  # fmt: skip
-            both = np.unique(pair)
-            w.kill(both[removes[both]], "collision")
+            if removes.any():
+                both = np.unique(pair)
+                w.kill(both[removes[both]], "collision")
         down = np.zeros(w.n, bool)
         down[contacts.row[touches & ~is_body]] = True
         rows = np.flatnonzero(down & ~self.on_ground)
