@@ -227,8 +227,9 @@ def thinned(found, first, n, distance):
 
 @lean_routine
 def least_gap_of_boxes(items, k, j, reach, r, slack):
-    """Largest gap of two boxes along an axis [m], inf if they are further apart than `reach`, that axis, 1 or 2 if it belongs to a face of
-    the first or the second, 3 for two edges, and these.
+    """Largest gap of two boxes along an axis [m], inf if they are further apart than `reach`; that axis; its kind; edges.
+
+    The kind is 1 for a face of the first box, 2 for one of the second, 3 for an edge of each, whose numbers follow.
 
     Projected half lengths instead of corners (Gottschalk, Lin and Manocha 1996, section 5). Written to r, (8, 3): cosines between the
     axes (3, 3), and the way from the second centre to the first along the axes of the first.
