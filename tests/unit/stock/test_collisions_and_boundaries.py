@@ -68,7 +68,9 @@ def test_a_no_fly_volume_reports_who_enters_and_removes_them_if_asked(shape, rem
     starts = {"in": (-30, 0, 20), "above": (-30, 0, 31), "below": (-30, 0, 9), "beside": (-30, 10.1, 20)}
     blocks = [block(name, position=pos, autonomy=Drift(to=(10, 0, 0))) for name, pos in starts.items()]
     square = ((-10, -10), (10, -10), (10, 10), (-10, 10))
-    volume = Boundary(boundary_id=7, shape=shape, center=(0, 0, 20), lengths=(1, 1, 20), radius=10, polygon_points=square)
+    volume = Boundary(
+        boundary_id=7, shape=shape, center=(0, 0, 20), lengths=(1, 1, 20), radius=10, polygon_points=square
+    )
     rule = EnforceBoundaryInteraction(active_boundary_ids=(), no_fly_boundary_ids=(7,))
     game = mission(
         *blocks, interactions=[volume, rule] if removes else [volume], metrics=[Crossings()], end=6.0, end_conditions="time"
@@ -76,7 +78,11 @@ def test_a_no_fly_volume_reports_who_enters_and_removes_them_if_asked(shape, rem
     alive, sim = left(game)
     assert alive == [not removes, True, True, True]
     assert sim.read("Crossings.entries")[0].tolist() == [1]
-    assert volume.region().contains(np.array([[9.9, 0, 20.0], [0, 0, 30.1], [0, 10.1, 20]]).T).tolist() == [True, False, False]
+    assert volume.region().contains(np.array([[9.9, 0, 20.0], [0, 0, 30.1], [0, 10.1, 20]]).T).tolist() == [
+        True,
+        False,
+        False,
+    ]
 
 
 def test_the_range_is_strict():

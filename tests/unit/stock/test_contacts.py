@@ -301,7 +301,13 @@ def test_boxes_of_each_world_are_the_same_alone_and_in_a_stack():
         name="rover", radius=0.5, position=(0, 0, 0), variance=(0, 0, 0), sensor=RayTrace(num_rays_horiz=24, angle_res_horiz="15 deg"),
         autonomy=Drift(to=(3, 1, 0)), motion=SingleIntegrator(),
     )  # fmt: skip
-    game = Mission(blocks=[rover, crates], dt=0.05, end=1e6, interactions=[BulletCollision(fixed="crate")], end_conditions="time")
+    game = Mission(
+        blocks=[rover, crates],
+        dt=0.05,
+        end=1e6,
+        interactions=[BulletCollision(fixed="crate")],
+        end_conditions="time",
+    )
     stack = Simulation(game, seeds=[3, 4, 5])
     stack.step(120)
     alone = Simulation(game, seeds=[4])
