@@ -256,7 +256,7 @@ def sweep_overlaps(first, last, begin, row, other, contacts, moves, shifts, rows
 
 
 @kernel("(F2w F2w F2) (I I F2 B) (F F F) f8 i8 I F2w (i8 i8)")
-def solve_worlds(bodies, found, materials, dt, iterations, starts, impulses, part):
+def solve_worlds(bodies, found, materials, dt, iterations, span_start, impulses, part):
     """Solve the contacts of worlds part[0] to part[1] - 1.
 
     The impulses of a contact that held acted during the whole step, so that they also undo half of the path that their change of the
@@ -264,16 +264,16 @@ def solve_worlds(bodies, found, materials, dt, iterations, starts, impulses, par
 
     bodies: their numbers (n, BODY), of which the velocities are changed; shifts [m rad], (n, 6), changed from 0; sizes [m] (2, n).
     found: row, other row (-1 for the scene), (m,), contacts (m, CONTACT), and whether they are new, (m,). materials: restitution,
-    friction, and speed from which bodies bounce [m/s], by world. dt: length of a step [s]. starts: first contact of each world,
+    friction, and speed from which bodies bounce [m/s], by world. dt: length of a step [s]. span_start: first contact of each world,
     (n_worlds + 1,). impulses: along the normal and both tangents [N s], (m, 3), first guess and result.
     """
     moves, shifts, sizes = bodies
     row, other, contacts, is_new = found
     restitution, friction, bounce_speed = materials
-    begin = starts[part[0]]
-    rows = np.empty((starts[part[1]] - begin, ROW))
+    begin = span_start[part[0]]
+    rows = np.empty((span_start[part[1]] - begin, ROW))
     for w in range(part[0], part[1]):
-        first, last = starts[w], starts[w + 1]
+        first, last = span_start[w], span_start[w + 1]
         for i in range(first, last):
             c, pair = i - begin, (row[i], other[i])
             material = restitution[w], bounce_speed[w]
@@ -284,10 +284,8 @@ def solve_worlds(bodies, found, materials, dt, iterations, starts, impulses, par
             if impulses[i, 0] > 0.0:
                 push(moves, moves, (row[i], other[i]), rows, i - begin, impulse_of(rows, i - begin))
         for k in range(iterations):
-            if (
-                sweep(first, last, begin, row, other, moves, rows, friction[w], k % 2 == 1)
-                < SETTLED * SETTLED
-            ):
+            square = sweep(first, last, begin, row, other, moves, rows, friction[w], k % 2 == 1)
+            if square < SETTLED * SETTLED:
                 break
         for i in range(first, last):
             c, pair = i - begin, (row[i], other[i])
