@@ -270,9 +270,10 @@ def solve_worlds(bodies, found, materials, dt, iterations, span_start, impulses,
     moves, shifts, sizes = bodies
     row, other, contacts, is_new = found
     restitution, friction, bounce_speed = materials
-    begin = span_start[part[0]]
-    rows = np.empty((span_start[part[1]] - begin, ROW))
-    for w in range(part[0], part[1]):
+    world, end = part
+    begin = span_start[world]
+    rows = np.empty((span_start[end] - begin, ROW))
+    for w in range(world, end):
         first, last = span_start[w], span_start[w + 1]
         for i in range(first, last):
             c, pair = i - begin, (row[i], other[i])
