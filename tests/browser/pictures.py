@@ -1,4 +1,4 @@
-"""Makes the pictures of docs/view.md: python tests/browser/pictures.py [NAME ...]."""
+"""Makes the pictures of docs/view.md and those of missions in the viewer: python tests/browser/pictures.py [NAME ...]."""
 
 from __future__ import annotations
 
@@ -113,6 +113,20 @@ def narrow(browser: Browser) -> None:
             shoot(watched, "view-narrow")
 
 
+def dozers(browser: Browser) -> None:
+    """The shipped mission dozers, from the side to which crates are pushed."""
+    loaded = read_mission("dozers")
+    camera = {"pos": "52,-34,30", "focal_point": "8,0,0"}
+    with tempfile.TemporaryDirectory() as folder:
+        with Simulation(loaded.mission, 1) as game, Recorder(game, folder, mission_text=loaded.text):
+            game.run(until=26.0)
+        with shown(
+            browser, Page(Recording(folder), viewer={**loaded.viewer, "camera": camera}, is_paused=True)
+        ) as watched:
+            seek(watched, 26.0)
+            shoot(watched, "mission-dozers")
+
+
 def offline(browser: Browser) -> None:
     """The page in a file, opened from there."""
     with tempfile.TemporaryDirectory() as folder:
@@ -189,6 +203,7 @@ PICTURES: dict[str, Callable[[Browser], None]] = {
     "two-runs": two_runs,
     "replay": replay,
     "narrow": narrow,
+    "dozers": dozers,
     "offline": offline,
     "shapes": shapes,
 }

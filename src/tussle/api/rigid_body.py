@@ -87,5 +87,5 @@ class RigidBodyModel(MotionModel):
     def mass_properties(self) -> tuple[np.ndarray | None, np.ndarray] | None:
         """The parameters `mass` and the inertia tensor, if the model has one."""
         tensors = [name for name, column in type(self).params().items() if isinstance(column, InertiaParam)]
-        mass = getattr(self, "mass", None)
+        mass = self.mass if "mass" in type(self).columns else None
         return (mass, getattr(self, tensors[0])) if tensors else None

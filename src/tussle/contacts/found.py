@@ -131,11 +131,17 @@ def _with_balls(
     )
 
 
-def inverse_masses(mass: np.ndarray, inertia: np.ndarray, quat: np.ndarray, moves: np.ndarray) -> np.ndarray:
-    """Inverse mass and inertia of each body, world frame, (n, 10); see `invert_masses`."""
-    inverse = np.empty((len(mass), 10))
-    impulses_kernels.invert_masses((mass, inertia, quat), moves, inverse)
-    return inverse
+def entered(
+    mass: np.ndarray,
+    inertia: np.ndarray,
+    quat: np.ndarray,
+    motion: tuple[np.ndarray, np.ndarray],
+    moves: np.ndarray,
+) -> np.ndarray:
+    """Velocities and inverse masses of bodies for the solver, (n, BODY); see `enter_bodies`."""
+    bodies = np.empty((len(mass), impulses_kernels.BODY))
+    impulses_kernels.enter_bodies((mass, inertia, quat), motion, moves, bodies)
+    return bodies
 
 
 def recalled(
@@ -158,7 +164,7 @@ def remembered(
 
 def solve(
     contacts: ContactList,
-    bodies: tuple[np.ndarray, np.ndarray, np.ndarray],
+    bodies: tuple[np.ndarray, np.ndarray],
     materials: tuple[np.ndarray, np.ndarray, np.ndarray],
     steps: tuple[float, int],
     guess: tuple[np.ndarray, np.ndarray],
@@ -168,7 +174,7 @@ def solve(
 
     Args:
         contacts: The contacts.
-        bodies: Velocity and angular velocity [m/s rad/s], (n, 6), changed; inverse masses (n, 10); sizes [m], (2, n).
+        bodies: Numbers of bodies, (n, BODY), of which the velocities are changed; sizes [m], (2, n).
         materials: Restitution, friction, and speed from which bodies bounce [m/s], by world.
         steps: Length of a step [s], and number of iterations.
         guess: First guess of the impulses [N s], (m, 3), replaced by the result, and which contacts are new, (m,).
@@ -177,12 +183,12 @@ def solve(
     Returns:
         Shifts and small rotations [m rad] that undo overlaps, (n, 6).
     """
-    (moves, inverse, sizes), (impulses, is_new) = bodies, guess
-    shifts = np.zeros_like(moves)
+    (moves, sizes), (impulses, is_new) = bodies, guess
+    shifts = np.zeros((len(moves), 6))
     split(
         len(contacts.starts) - 1,
         lambda *part: impulses_kernels.solve_worlds(
-            (moves, shifts, inverse, sizes),
+            (moves, shifts, sizes),
             (*contacts.arrays, is_new),
             materials,
             *steps,

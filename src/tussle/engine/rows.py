@@ -40,7 +40,9 @@ def apply_moves(state: SimulationState, phase: float = 1.0) -> None:
     view = state.world_view
     if not view.moved:
         return
-    rows = np.unique(np.concatenate(view.moved))
+    is_moved = np.zeros(state.population.bodies.n, bool)
+    is_moved[np.concatenate(view.moved)] = True
+    rows = np.flatnonzero(is_moved)
     view.moved = []
     for group in state.population.groups:
         mine = rows[(rows >= group.first) & (rows < group.last)] - group.first

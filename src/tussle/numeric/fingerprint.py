@@ -64,7 +64,7 @@ class Fingerprint:
             self._visit_function(value)
         elif isinstance(getattr(value, "py_func", None), types.FunctionType):
             self.holders.append(value)
-            options = getattr(value, "targetoptions", None)
+            options = getattr(value, "targetoptions", getattr(value, "options", None))
             self._write("jitted", repr(sorted(options.items())) if isinstance(options, dict) else "")
             self._visit(value.py_func, names)
         elif isinstance(value, types.ModuleType):

@@ -233,6 +233,39 @@ class Routine(Device):
     options: ClassVar[dict[str, Any]] = {"error_model": "numpy"}
 
 
+def lean_device(function: Callable[..., Any]) -> Any:
+    """Like `device`, for functions that create no arrays: compiled without counting references to those that they get.
+
+    Where such a function has branches, the compiler does not remove the counting: two atomic operations for each array and call.
+    """
+    return LeanDevice(function)
+
+
+def lean_routine(function: Callable[..., Any]) -> Any:
+    """Like `routine`, for functions that create no arrays; see `lean_device`."""
+    return LeanRoutine(function)
+
+
+class LeanDevice(Device):
+    """A small function that creates no arrays.
+
+    Args:
+        function: The Python function, available as `py_func`.
+    """
+
+    options: ClassVar[dict[str, Any]] = {**Device.options, "_nrt": False}
+
+
+class LeanRoutine(Routine):
+    """A larger function that creates no arrays.
+
+    Args:
+        function: The Python function, available as `py_func`.
+    """
+
+    options: ClassVar[dict[str, Any]] = {**Routine.options, "_nrt": False}
+
+
 class Kernel(Device):
     """A function over arrays with one explicit signature, compiled or loaded from disk on the first call.
 

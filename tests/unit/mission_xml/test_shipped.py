@@ -134,6 +134,15 @@ def test_quadrotors_that_see_far_enough_to_brake_arrive():
     assert sum(blind.alive.values()) <= 2
 
 
+def test_strong_dozers_clear_more_than_weak_ones():
+    """A crate holds against 490 N: with 1 kN a dozer halts before the third, with 8 kN it takes all along."""
+    mission = read_mission("dozers", {"end": "30"}, strict=True).mission
+    push = {f"dozer_{k}.DoubleIntegrator.max_acc": [2.0, 16.0] for k in range(1, 6)}
+    weak, strong = Simulation(mission, seeds=[1, 1], params=push).run()
+    assert weak.alive[2] >= 38
+    assert strong.alive[2] <= 30
+
+
 @pytest.mark.parametrize("name", GAMES)
 def test_the_games_are_those_built_in_python(name):
     loaded = read_mission(name, {"end": "20"}, strict=True)
@@ -151,7 +160,7 @@ OTHERS = ("convoy", "auction_search", "underwater_survey")
 
 def test_shipped_missions_have_titles_and_are_packaged():
     shipped = shipped_missions()
-    assert set(shipped) == {*GAMES, *ON_REGIONS, *OTHERS, "car_maze", "urban_quadrotors"}
+    assert set(shipped) == {*GAMES, *ON_REGIONS, *OTHERS, "car_maze", "urban_quadrotors", "dozers"}
     for path, title in shipped.values():
         assert title
         assert read_mission(path, strict=True).name == title

@@ -9,7 +9,7 @@ from small_worlds import Drift, block, mission
 from tussle import Simulation
 from tussle.api import Autonomy, Metric, State, Subscribe
 from tussle.messages import BoundaryCrossed, BoundaryShape, EntityCollided
-from tussle.stock import Boundary, SimpleCollision
+from tussle.stock import Boundary, EnforceBoundaryInteraction, SimpleCollision
 
 
 class Log(Metric):
@@ -23,6 +23,16 @@ class Log(Metric):
         told = w.inbox(EntityCollided)
         np.add.at(self.n, told.world, 1)
         self.first[told.world], self.second[told.world] = told.first, told.second
+
+
+class Crossings(Metric):
+    """Entries into boundaries."""
+
+    entries = State(dtype=int, per="world")
+
+    def step(self, w):
+        told = w.inbox(BoundaryCrossed)
+        np.add.at(self.entries, told.world[told.inside], 1)
 
 
 def meet(*entities, **referee):
@@ -49,6 +59,30 @@ def test_two_that_come_nearer_than_the_range_are_gone():
     assert sim.steps[0] == 5
     assert sim.read("Log.n")[0].tolist() == [1]
     assert (sim.read("Log.first")[0][0], sim.read("Log.second")[0][0]) == (1, 2)
+
+
+@pytest.mark.parametrize("removes", [False, True])
+@pytest.mark.parametrize("shape", ["cylinder", "polygon"])
+def test_a_no_fly_volume_reports_who_enters_and_removes_them_if_asked(shape, removes):
+    """Between z = 10 m and 30 m: above, below and beside it one may fly."""
+    starts = {"in": (-30, 0, 20), "above": (-30, 0, 31), "below": (-30, 0, 9), "beside": (-30, 10.1, 20)}
+    blocks = [block(name, position=pos, autonomy=Drift(to=(10, 0, 0))) for name, pos in starts.items()]
+    square = ((-10, -10), (10, -10), (10, 10), (-10, 10))
+    volume = Boundary(
+        boundary_id=7, shape=shape, center=(0, 0, 20), lengths=(1, 1, 20), radius=10, polygon_points=square
+    )
+    rule = EnforceBoundaryInteraction(active_boundary_ids=(), no_fly_boundary_ids=(7,))
+    game = mission(
+        *blocks, interactions=[volume, rule] if removes else [volume], metrics=[Crossings()], end=6.0, end_conditions="time"
+    )  # fmt: skip
+    alive, sim = left(game)
+    assert alive == [not removes, True, True, True]
+    assert sim.read("Crossings.entries")[0].tolist() == [1]
+    assert volume.region().contains(np.array([[9.9, 0, 20.0], [0, 0, 30.1], [0, 10.1, 20]]).T).tolist() == [
+        True,
+        False,
+        False,
+    ]
 
 
 def test_the_range_is_strict():

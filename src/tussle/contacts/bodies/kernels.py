@@ -19,10 +19,9 @@ from tussle.contacts.boxes.kernels import (
     dot,
     minus,
     put,
-    set_box,
     vector,
 )
-from tussle.numeric.kernel import device, kernel, routine
+from tussle.numeric.kernel import device, kernel, lean_device, lean_routine
 from tussle.numeric.rigid_body import add, cross, scale
 
 ITEM = 16
@@ -36,7 +35,7 @@ BOX_REACH = 0.25
 UP = (0.0, 0.0, 1.0)
 
 
-@device
+@lean_device
 def size_of(items, k):
     """Radius, or smallest half length of a box [m]."""
     return items[k, 3] if items[k, 3] > 0.0 else min(items[k, 4], items[k, 5], items[k, 6])
@@ -71,7 +70,7 @@ def unit_or(v, length, other):
     return scale(1.0 / length, v) if length > 0.0 else other
 
 
-@routine
+@lean_routine
 def closest_of_segments(offset, u, a, v, b):
     """Places s in [-a, a] and t in [-b, b] of the closest points offset + s u and t v. C. Ericson (2005), section 5.1.9."""
     cosine, c, f = dot(u, v), dot(u, offset), dot(v, offset)
@@ -83,7 +82,7 @@ def closest_of_segments(offset, u, a, v, b):
     return s, t
 
 
-@routine
+@lean_routine
 def segment_gap(first, a, second, b, offset):
     """Points on the segments seen from their centres, difference and distance; the first body moved by offset from the second's centre."""
     u, v = vector(first, a, 7), vector(second, b, 7)
@@ -107,7 +106,7 @@ def advanced(s, gap, rate, radius):
     return s, not s <= 1.0, False
 
 
-@routine
+@lean_routine
 def round_contact(first, a, second, b, motion, found, n):
     """Add the contact of two spheres or capsules, if they touch within the motion [m] of the first relative to the second."""
     radius = first[a, 3] + second[b, 3]
@@ -131,7 +130,7 @@ def round_contact(first, a, second, b, motion, found, n):
     return put(found, n, normal, arm_a, arm_b, gap, 0.0)
 
 
-@routine
+@lean_routine
 def round_contacts(first, a, second, b, motion, found, n):
     """Add the contacts of two spheres or capsules: two for capsules side by side."""
     u, v = vector(first, a, 7), vector(second, b, 7)
@@ -159,7 +158,7 @@ def round_contacts(first, a, second, b, motion, found, n):
     return n
 
 
-@routine
+@lean_routine
 def point_of_box(items, b, offset):
     """Closest point of a box's surface seen from its centre, outward unit normal there, and signed distance of a point at offset."""
     x, y, z = vector(items, b, 7), vector(items, b, 10), vector(items, b, 13)
@@ -187,7 +186,7 @@ def point_of_box(items, b, offset):
     return point, add(add(scale(nx, x), scale(ny, y)), scale(nz, z)), distance
 
 
-@routine
+@lean_routine
 def ball_box_contact(ball, box, b, motion, found, n):
     """Add the contact of a ball of a capsule with a box. ball: place seen from the centre, radius, offset of the centre, feature."""
     place, radius, start, feature, sign = ball
@@ -209,7 +208,7 @@ def ball_box_contact(ball, box, b, motion, found, n):
     return put(found, n, scale(-1.0, normal), point, arm, gap, feature)
 
 
-@routine
+@lean_routine
 def round_box_contacts(ball, a, box, b, motion, sign, found, n):
     """Add the contacts of a sphere or capsule with a box. sign: 1 if it is the first body of the contact, -1 if the second."""
     radius, half, u = ball[a, 3], ball[a, 4], vector(ball, a, 7)
@@ -229,7 +228,7 @@ def round_box_contacts(ball, a, box, b, motion, sign, found, n):
     return ball_box_contact((scale(s, u), radius, start, 2.0, sign), box, b, motion, found, n)
 
 
-@routine
+@lean_routine
 def pair_contacts(items, a, b, motion, found, scratch):
     """Write the contacts of two bodies; returns their number."""
     is_round, other_is_round = items[a, 3] > 0.0, items[b, 3] > 0.0
@@ -240,10 +239,9 @@ def pair_contacts(items, a, b, motion, found, scratch):
     if other_is_round:
         return round_box_contacts(items, b, items, a, scale(-1.0, motion), -1.0, found, 0)
     first, axes_a, second, axes_b, one, two, three = scratch
-    set_box(items, b, second, axes_b)
     size = min(size_of(items, a), size_of(items, b))
     reach = max(SLACK * size, min(BOX_REACH * size, math.sqrt(dot(motion, motion))))
-    other = second, 8, axes_b, 3, axes_b, vector(items, b, 0), False
+    other = b, second, axes_b, axes_b, False
     return box_contacts(items, a, other, reach, found, 0, (first, axes_a, one, two, three))
 
 

@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from tussle.numeric.kernel import device, routine
+from tussle.numeric.kernel import device, lean_routine
 from tussle.numeric.rigid_body import add, cross, scale
 
 CONTACT = 11
@@ -49,7 +49,7 @@ def vector(array, row, first):
     return array[row, first], array[row, first + 1], array[row, first + 2]
 
 
-@routine
+@lean_routine
 def put(found, n, normal, arm_a, arm_b, gap, feature):
     """Add contact number n; of too many, the one with the largest gap is dropped. Returns the number of contacts."""
     k = n
@@ -66,7 +66,7 @@ def put(found, n, normal, arm_a, arm_b, gap, feature):
     return min(n + 1, found.shape[0])
 
 
-@routine
+@lean_routine
 def set_box(items, k, corners, axes):
     """Write the corners (8, 3), relative to the origin, and the axes (3, 3) of a box."""
     for i in range(3):
@@ -82,7 +82,7 @@ def set_box(items, k, corners, axes):
             )
 
 
-@routine
+@lean_routine
 def span(corners, n, way):
     """Least and greatest component of n corners along a direction."""
     least, most = np.inf, -np.inf
@@ -92,7 +92,7 @@ def span(corners, n, way):
     return least, most
 
 
-@routine
+@lean_routine
 def between(first, n_first, second, n_second, way):
     """How far two bodies are apart along a unit vector [m], and whether the first lies towards its tip."""
     low_a, high_a = span(first, n_first, way)
@@ -100,7 +100,7 @@ def between(first, n_first, second, n_second, way):
     return max(low_a - high_b, low_b - high_a), low_a - high_b >= low_b - high_a
 
 
-@routine
+@lean_routine
 def face(corners, n, axes, way, polygon):
     """Write the corners of the face that looks most along a direction, in order; returns their number and the face's normal."""
     if n == 3:
@@ -127,7 +127,7 @@ def face(corners, n, axes, way, polygon):
     return 4, scale(sign, vector(axes, best, 0))
 
 
-@routine
+@lean_routine
 def clip(polygon, n, normal, limit, out):
     """Write the part of a polygon on which normal . x <= limit; returns its number of corners."""
     m = 0
@@ -143,7 +143,7 @@ def clip(polygon, n, normal, limit, out):
     return m
 
 
-@routine
+@lean_routine
 def clipped_faces(bodies, way, reach, centers, is_first, found, n, scratch):
     """Add the points of the face of one body that lie behind a face of the other.
 
@@ -181,7 +181,7 @@ def clipped_faces(bodies, way, reach, centers, is_first, found, n, scratch):
     return n
 
 
-@routine
+@lean_routine
 def crossed_edges(pair, way, edges, centers, gap, found, n):
     """Add the contact of two edges: the closest points of the lines through the corners that lie deepest.
 
@@ -209,7 +209,7 @@ def crossed_edges(pair, way, edges, centers, gap, found, n):
     return put(found, n, way, minus(p, centers[0]), minus(q, centers[1]), gap, 15.0)
 
 
-@routine
+@lean_routine
 def thinned(found, first, n, distance):
     """Keep the deeper one of contacts nearer than a distance to each other; returns the number of contacts."""
     kept = first
@@ -225,46 +225,114 @@ def thinned(found, first, n, distance):
     return kept
 
 
-@routine
-def box_contacts(items, k, other, reach, found, n, scratch):
-    """Add the contacts of box k with a body nearer than `reach` [m]; returns the number of contacts.
+@lean_routine
+def least_gap_of_boxes(items, k, j, reach, r, slack):
+    """Largest gap of two boxes along an axis [m], inf if they are further apart than `reach`; that axis; its kind; edges.
 
-    other: corners (8, 3) and their number; axes (3, 3) and number of face normals; edges (3, 3), unit vectors; centre; whether only
-    the side of the first normal is solid, as for the triangle of a wall. scratch: arrays (8, 3), (3, 3) and three (16, 3).
+    The kind is 1 for a face of the first box, 2 for one of the second, 3 for an edge of each, whose numbers follow.
+
+    Projected half lengths instead of corners (Gottschalk, Lin and Manocha 1996, section 5). Written to r, (8, 3): cosines between the
+    axes (3, 3), and the way from the second centre to the first along the axes of the first.
     """
-    second, n_second, axes_b, n_axes_b, edges_b, center_b, is_one_sided = other
-    first, axes_a, reference, polygon, spare = scratch
-    set_box(items, k, first, axes_a)
-    center_a = vector(items, k, 0)
-    best, way, kind, edge_a, edge_b = -np.inf, (0.0, 0.0, 1.0), 0, 0, 0
-    slack = PREFER_FACES * min(items[k, 4], items[k, 5], items[k, 6])
-    for i in range(3 + n_axes_b):
-        axis = vector(axes_a, i, 0) if i < 3 else vector(axes_b, i - 3, 0)
-        gap, is_above = between(first, 8, second, n_second, axis)
-        if i >= 3 and n_second == 3:
+    way = minus(vector(items, k, 0), vector(items, j, 0))
+    for i in range(3):
+        axis = vector(items, k, 7 + 3 * i)
+        for e in range(3):
+            r[i, e] = dot(axis, vector(items, j, 7 + 3 * e))
+        r[3, i] = dot(axis, way)
+    best, normal, kind, edge, other_edge = -np.inf, (0.0, 0.0, 1.0), 0, 0, 0
+    for i in range(6):
+        e = i % 3
+        box = k if i < 3 else j
+        along = r[3, e] if i < 3 else dot(vector(items, j, 7 + 3 * e), way)
+        gap = abs(along) - items[box, 4 + e]
+        for m in range(3):
+            gap -= items[j, 4 + m] * abs(r[e, m]) if i < 3 else items[k, 4 + m] * abs(r[m, e])
+        if gap > reach:
+            return np.inf, normal, 0, 0, 0
+        # The second body's faces win ties.
+        if gap > best + (0.0 if i < 3 else -0.1 * slack):
+            best, kind = gap, 1 if i < 3 else 2
+            normal = scale(1.0 if along >= 0.0 else -1.0, vector(items, box, 7 + 3 * e))
+    for i in range(3):
+        i1, i2 = (i + 1) % 3, (i + 2) % 3
+        for e in range(3):
+            square = 1.0 - r[i, e] * r[i, e]
+            if square < 1e-6:
+                continue
+            e1, e2 = (e + 1) % 3, (e + 2) % 3
+            along, length = r[3, i2] * r[i1, e] - r[3, i1] * r[i2, e], math.sqrt(square)
+            gap = abs(along) - items[k, 4 + i1] * abs(r[i2, e]) - items[k, 4 + i2] * abs(r[i1, e])
+            gap -= items[j, 4 + e1] * abs(r[i, e2]) + items[j, 4 + e2] * abs(r[i, e1])
+            if gap > reach * length:
+                return np.inf, normal, 0, 0, 0
+            if gap > (best + slack) * length:
+                axis = cross(vector(items, k, 7 + 3 * i), vector(items, j, 7 + 3 * e))
+                best, normal, kind = gap / length, scale((1.0 if along >= 0.0 else -1.0) / length, axis), 3
+                edge, other_edge = i, e
+    return best, normal, kind, edge, other_edge
+
+
+@lean_routine
+def least_gap_of_triangle(center, bodies, is_one_sided, reach, slack):
+    """The same of a box and a triangle; bodies: corners and axes of the box, of the triangle corners, normal and edges."""
+    first, axes, second, normals, edges = bodies
+    best, normal, kind, edge, other_edge = -np.inf, (0.0, 0.0, 1.0), 0, 0, 0
+    for i in range(4):
+        axis = vector(axes, i, 0) if i < 3 else vector(normals, 0, 0)
+        gap, is_above = between(first, 8, second, 3, axis)
+        if i == 3:
             # The whole box lies on the side of its centre; behind a wall's surface there is the inside of the wall.
-            is_above = is_one_sided or dot(axis, minus(center_a, vector(second, 0, 0))) >= 0.0
+            is_above = is_one_sided or dot(axis, minus(center, vector(second, 0, 0))) >= 0.0
             low, high = span(first, 8, axis)
             height = dot(axis, vector(second, 0, 0))
             gap = low - height if is_above else height - high
-        # The second body's faces win ties, and the scene's surfaces with them.
+        # The scene's surfaces win ties.
         if gap > best + (0.0 if i < 3 else -0.1 * slack):
-            best, way, kind = gap, axis if is_above else scale(-1.0, axis), 1 if i < 3 else 2
+            best, normal, kind = gap, axis if is_above else scale(-1.0, axis), 1 if i < 3 else 2
         if gap > reach:
-            return n
+            return np.inf, normal, 0, 0, 0
     for i in range(3):
         for j in range(3):
-            axis = cross(vector(axes_a, i, 0), vector(edges_b, j, 0))
+            axis = cross(vector(axes, i, 0), vector(edges, j, 0))
             square = dot(axis, axis)
             if square < 1e-6:
                 continue
             axis = scale(1.0 / math.sqrt(square), axis)
-            gap, is_above = between(first, 8, second, n_second, axis)
+            gap, is_above = between(first, 8, second, 3, axis)
             if gap > reach:
-                return n
+                return np.inf, normal, 0, 0, 0
             if gap > best + slack:
-                best, way, kind = gap, axis if is_above else scale(-1.0, axis), 3
-                edge_a, edge_b = i, j
+                best, normal, kind = gap, axis if is_above else scale(-1.0, axis), 3
+                edge, other_edge = i, j
+    return best, normal, kind, edge, other_edge
+
+
+@lean_routine
+def box_contacts(items, k, other, reach, found, n, scratch):
+    """Add the contacts of box k with a body nearer than `reach` [m]; returns the number of contacts.
+
+    other: item of the other box, -1 for a triangle; corners (8, 3); axes (3, 3), of a triangle its normal; edges (3, 3), unit
+    vectors; whether only the side of the normal is solid, as for the triangle of a wall. scratch: arrays (8, 3), (3, 3) and three (16, 3).
+    """
+    box, second, axes_b, edges_b, is_one_sided = other
+    first, axes_a, reference, polygon, spare = scratch
+    center_a = vector(items, k, 0)
+    center_b, n_second = (vector(items, box, 0), 8) if box >= 0 else ((0.0, 0.0, 0.0), 3)
+    slack = PREFER_FACES * min(items[k, 4], items[k, 5], items[k, 6])
+    if box >= 0:
+        best, way, kind, edge_a, edge_b = least_gap_of_boxes(items, k, box, reach, first, slack)
+        if best > reach:
+            return n
+        set_box(items, k, first, axes_a)
+        set_box(items, box, second, axes_b)
+    else:
+        set_box(items, k, first, axes_a)
+        best, way, kind, edge_a, edge_b = least_gap_of_triangle(
+            center_a, (first, axes_a, second, axes_b, edges_b), is_one_sided, reach, slack
+        )
+        if best > reach:
+            return n
     if is_one_sided and dot(way, vector(axes_b, 0, 0)) < -1e-3:
         return n
     if kind == 3:

@@ -12,8 +12,8 @@ import math
 import numpy as np
 
 from tussle.contacts.bodies.kernels import SLACK
-from tussle.contacts.boxes.kernels import dot, vector
-from tussle.numeric.kernel import device, kernel, routine
+from tussle.contacts.boxes.kernels import dot, minus, vector
+from tussle.numeric.kernel import device, kernel, lean_device, lean_routine
 from tussle.numeric.rigid_body import add, cross, scale, solve
 
 SLOTS = 12
@@ -23,27 +23,34 @@ SETTLED = 1e-9
 """Change of the velocities [m/s] below which a world is solved."""
 SHARE = 0.3
 """Share of a small overlap that is undone in a step: with all of it, piles tremble. What is deeper is undone at once."""
-WAY, MASS = 16, 15
-"""Numbers of a contact for each of its directions, the normal and two tangents: unit vector; how the angular velocities of both bodies
-change the speed along it, and how an impulse along it changes them; last, at MASS, the effective mass."""
-SOFT, GOAL, FRICTION, OVERLAP, TURNS, HOLDS, ROW = 48, 49, 50, 51, 52, 53, 54
-"""Further numbers: inverse of the effective mass along the normal, goal of the normal speed, friction, allowed overlap, 1 if a body turns,
-and 1 if the contact held during the whole step."""
+BODY = 16
+"""Numbers of a body, two cache lines: velocity and angular velocity, inverse mass, inverse inertia tensor, world frame."""
+INVERSE = 6
+NORMAL, ARM, OTHER_ARM, TANGENT, MASS, SOFT, GOAL, COUPLING, IMPULSE, PUSHED, OVERLAP, HOLDS, TURNS, ROW = (
+    0, 3, 6, 9, 12, 15, 16, 17, 19, 22, 23, 24, 25, 26,
+)  # fmt: skip
+"""Numbers of a contact: normal; arms; first tangent; effective masses along normal and tangents, and the inverse of the first; goal of
+the normal speed; by how much impulses along the tangents change the normal speed; impulses; what undid the overlap; overlap that is
+left alone; 1 if it held during the whole step; 1 if a body turns."""
 
 
-@kernel("(F F2 F2) B F2w")
-def invert_masses(bodies, moves, inverse):
-    """Write inverse mass and inverse inertia tensor, world frame, (n, 10); 0 for bodies that do not move or turn.
+@kernel("(F F2 F2) (F2 F2) B F2w")
+def enter_bodies(shapes, motion, moves, bodies):
+    """Write the numbers of bodies, (n, BODY); inverses are 0 for bodies that do not move or turn.
 
-    bodies: mass [kg] (n,), inertia tensor [kg m^2], body frame, (9, n), attitude (4, n). moves (n,).
+    shapes: mass [kg] (n,), inertia tensor [kg m^2], body frame, (9, n), attitude (4, n). motion: velocity and angular velocity
+    [m/s rad/s], (3, n) each. moves (n,).
     """
-    mass, inertia, quat = bodies
-    for row in range(inverse.shape[0]):
-        for j in range(10):
-            inverse[row, j] = 0.0
+    mass, inertia, quat = shapes
+    vel, omega = motion
+    for row in range(bodies.shape[0]):
+        for j in range(3):
+            bodies[row, j], bodies[row, 3 + j] = vel[j, row], omega[j, row]
+        for j in range(INVERSE, BODY):
+            bodies[row, j] = 0.0
         if not moves[row] or not mass[row] > 0.0:
             continue
-        inverse[row, 0] = 1.0 / mass[row]
+        bodies[row, INVERSE] = 1.0 / mass[row]
         if not inertia[0, row] > 0.0:
             continue
         m = (
@@ -59,16 +66,16 @@ def invert_masses(bodies, moves, inverse):
             s = solve(m, (a[j], b[j], c[j]))
             turned = add(add(scale(s[0], a), scale(s[1], b)), scale(s[2], c))
             for i in range(3):
-                inverse[row, 1 + 3 * i + j] = turned[i]
+                bodies[row, 7 + 3 * i + j] = turned[i]
 
 
-@device
-def turned_by(inverse, row, torque):
+@lean_device
+def turned_by(bodies, row, torque):
     """Change of the angular velocity by an angular impulse."""
     return (
-        inverse[row, 1] * torque[0] + inverse[row, 2] * torque[1] + inverse[row, 3] * torque[2],
-        inverse[row, 4] * torque[0] + inverse[row, 5] * torque[1] + inverse[row, 6] * torque[2],
-        inverse[row, 7] * torque[0] + inverse[row, 8] * torque[1] + inverse[row, 9] * torque[2],
+        dot(vector(bodies, row, 7), torque),
+        dot(vector(bodies, row, 10), torque),
+        dot(vector(bodies, row, 13), torque),
     )
 
 
@@ -84,80 +91,91 @@ def tangents(n):
     return t, cross(n, t)
 
 
-@device
-def speed_along(moves, pair, rows, c, first):
-    """Speed of the first body at a contact relative to the second, along the normal or a tangent; moves (n, 6)."""
+@lean_device
+def slip(moves, pair, rows, c):
+    """Velocity of the first body at a contact relative to the second [m/s]; moves: velocity and angular velocity in the first columns."""
     a, b = pair
-    speed = rows[c, first] * moves[a, 0] + rows[c, first + 1] * moves[a, 1] + rows[c, first + 2] * moves[a, 2]
+    speed = vector(moves, a, 0)
+    turns = rows[c, TURNS] > 0.0
+    if turns:
+        speed = add(speed, cross(vector(moves, a, 3), vector(rows, c, ARM)))
     if b >= 0:
-        speed -= (
-            rows[c, first] * moves[b, 0] + rows[c, first + 1] * moves[b, 1] + rows[c, first + 2] * moves[b, 2]
-        )
-    if rows[c, TURNS] > 0.0:
-        speed += (
-            rows[c, first + 3] * moves[a, 3]
-            + rows[c, first + 4] * moves[a, 4]
-            + rows[c, first + 5] * moves[a, 5]
-        )
-        if b >= 0:
-            speed += (
-                rows[c, first + 6] * moves[b, 3]
-                + rows[c, first + 7] * moves[b, 4]
-                + rows[c, first + 8] * moves[b, 5]
-            )
+        speed = minus(speed, vector(moves, b, 0))
+        if turns:
+            speed = minus(speed, cross(vector(moves, b, 3), vector(rows, c, OTHER_ARM)))
     return speed
 
 
-@device
-def push(moves, inverse, pair, rows, c, first, impulse):
-    """Change the velocities of the bodies of a contact by an impulse along the normal or a tangent on the first."""
+@lean_device
+def change(moves, row, by, way, turn):
+    """Add `by` times a change of the velocity, and a change of the angular velocity."""
+    moves[row, 0] += by * way[0]
+    moves[row, 1] += by * way[1]
+    moves[row, 2] += by * way[2]
+    moves[row, 3] += turn[0]
+    moves[row, 4] += turn[1]
+    moves[row, 5] += turn[2]
+
+
+@lean_device
+def push(moves, bodies, pair, rows, c, p):
+    """Change the velocities of the bodies of a contact by an impulse on the first [N s], world frame."""
     a, b = pair
-    p = impulse * inverse[a, 0]
-    moves[a, 0] += p * rows[c, first]
-    moves[a, 1] += p * rows[c, first + 1]
-    moves[a, 2] += p * rows[c, first + 2]
+    turn = 0.0, 0.0, 0.0
+    turns = rows[c, TURNS] > 0.0
+    if turns:
+        turn = turned_by(bodies, a, cross(vector(rows, c, ARM), p))
+    change(moves, a, bodies[a, INVERSE], p, turn)
     if b >= 0:
-        p = impulse * inverse[b, 0]
-        moves[b, 0] -= p * rows[c, first]
-        moves[b, 1] -= p * rows[c, first + 1]
-        moves[b, 2] -= p * rows[c, first + 2]
-    if rows[c, TURNS] > 0.0:
-        moves[a, 3] += impulse * rows[c, first + 9]
-        moves[a, 4] += impulse * rows[c, first + 10]
-        moves[a, 5] += impulse * rows[c, first + 11]
-        if b >= 0:
-            moves[b, 3] += impulse * rows[c, first + 12]
-            moves[b, 4] += impulse * rows[c, first + 13]
-            moves[b, 5] += impulse * rows[c, first + 14]
+        if turns:
+            turn = turned_by(bodies, b, cross(p, vector(rows, c, OTHER_ARM)))
+        change(moves, b, -bodies[b, INVERSE], p, turn)
 
 
-@routine
-def prepare(c, pair, lasts, contacts, bodies, material, dt, rows):
-    """Write the numbers of a contact for the solver."""
-    moves, inverse, sizes = bodies
-    restitution, friction, bounce_speed = material
+@lean_device
+def impulse_of(rows, c):
+    """Impulse of a contact on its first body [N s], world frame."""
+    n, t = vector(rows, c, NORMAL), vector(rows, c, TANGENT)
+    normal, one, two = vector(rows, c, IMPULSE)
+    return add(add(scale(normal, n), scale(one, t)), scale(two, cross(n, t)))
+
+
+@lean_device
+def response(bodies, pair, rows, c, way):
+    """Change of the relative velocity at a contact by a unit impulse on the first body [1/kg], without that along it by the masses."""
     a, b = pair
-    normal, gap = vector(contacts, c, 0), contacts[c, 9]
+    arm = vector(rows, c, ARM)
+    turn = cross(turned_by(bodies, a, cross(arm, way)), arm)
+    if b >= 0:
+        arm = vector(rows, c, OTHER_ARM)
+        turn = add(turn, cross(turned_by(bodies, b, cross(arm, way)), arm))
+    return turn
+
+
+@lean_routine
+def prepare(c, pair, lasts, contact, bodies, material, dt, rows):
+    """Write the numbers of a contact for the solver, but for its impulses."""
+    contacts, i = contact
+    moves, sizes = bodies
+    restitution, bounce_speed = material
+    a, b = pair
+    normal, gap = vector(contacts, i, 0), contacts[i, 9]
     t1, t2 = tangents(normal)
-    rows[c, TURNS] = 1.0 if inverse[a, 1] > 0.0 or (b >= 0 and inverse[b, 1] > 0.0) else 0.0
+    for j in range(9):
+        rows[c, j] = contacts[i, j]
+    rows[c, TANGENT], rows[c, TANGENT + 1], rows[c, TANGENT + 2] = t1
+    rows[c, TURNS] = 1.0 if moves[a, 7] > 0.0 or (b >= 0 and moves[b, 7] > 0.0) else 0.0
+    linear = moves[a, INVERSE] + (moves[b, INVERSE] if b >= 0 else 0.0)
     for k in range(3):
         way = normal if k == 0 else t1 if k == 1 else t2
-        lever = cross(vector(contacts, c, 3), way)
-        turned = turned_by(inverse, a, lever)
-        soft = inverse[a, 0] + dot(turned, lever)
-        i = WAY * k
-        rows[c, i], rows[c, i + 1], rows[c, i + 2] = way
-        rows[c, i + 3], rows[c, i + 4], rows[c, i + 5] = lever
-        rows[c, i + 9], rows[c, i + 10], rows[c, i + 11] = turned
-        if b >= 0:
-            lever = cross(way, vector(contacts, c, 6))
-            turned = turned_by(inverse, b, lever)
-            soft += inverse[b, 0] + dot(turned, lever)
-            rows[c, i + 6], rows[c, i + 7], rows[c, i + 8] = lever
-            rows[c, i + 12], rows[c, i + 13], rows[c, i + 14] = turned
-        rows[c, i + 15] = 1.0 / soft if soft > 0.0 else 0.0
-    rows[c, SOFT] = 1.0 / rows[c, MASS] if rows[c, MASS] > 0.0 else 0.0
-    speed = speed_along(moves, pair, rows, c, 0)
+        turn = response(moves, pair, rows, c, way)
+        soft = linear + dot(turn, way)
+        rows[c, MASS + k] = 1.0 / soft if soft > 0.0 else 0.0
+        if k == 0:
+            rows[c, SOFT] = soft
+        else:
+            rows[c, COUPLING + k - 1] = dot(turn, normal)
+    speed = dot(slip(moves, pair, rows, c), normal)
     # A bounce if they would touch in the step; else they may approach until they touch. Newton's law also where they part and others
     # push them together again: with any other goal, the energy would grow.
     bounces = restitution > 0.0 and (
@@ -167,97 +185,117 @@ def prepare(c, pair, lasts, contacts, bodies, material, dt, rows):
     # A contact that lasts holds within the slack: if it closed the gap in each step, a pile would tremble.
     rests = gap <= 0.0 or (lasts and gap <= slack)
     rows[c, GOAL] = -restitution * speed if bounces else 0.0 if rests else -gap / dt
-    rows[c, FRICTION], rows[c, OVERLAP] = friction, slack
+    rows[c, PUSHED], rows[c, OVERLAP] = 0.0, slack
     rows[c, HOLDS] = 1.0 if lasts and -0.5 * speed * dt <= slack else 0.0
 
 
-@device
-def solve_contact(c, pair, moves, inverse, rows, impulses):
-    """Change the velocities at one contact towards its goal; returns the square of the change of the velocity [m^2/s^2]."""
-    change = 0.0
-    limit = rows[c, FRICTION] * impulses[c, 0]
-    if limit > 0.0 or impulses[c, 1] != 0.0 or impulses[c, 2] != 0.0:
-        p1 = impulses[c, 1] - rows[c, MASS + WAY] * speed_along(moves, pair, rows, c, WAY)
-        p2 = impulses[c, 2] - rows[c, MASS + 2 * WAY] * speed_along(moves, pair, rows, c, 2 * WAY)
-        square = p1 * p1 + p2 * p2
-        if square > limit * limit:  # Coulomb's cone
-            p1, p2 = p1 * limit / math.sqrt(square), p2 * limit / math.sqrt(square)
-        d1, d2 = p1 - impulses[c, 1], p2 - impulses[c, 2]
-        impulses[c, 1], impulses[c, 2] = p1, p2
-        push(moves, inverse, pair, rows, c, WAY, d1)
-        push(moves, inverse, pair, rows, c, 2 * WAY, d2)
-        change = d1 * d1 + d2 * d2
-    p = max(0.0, impulses[c, 0] + rows[c, MASS] * (rows[c, GOAL] - speed_along(moves, pair, rows, c, 0)))
-    d = p - impulses[c, 0]
-    if d != 0.0:
-        impulses[c, 0] = p
-        push(moves, inverse, pair, rows, c, 0, d)
-    return (change + d * d) * rows[c, SOFT] * rows[c, SOFT]
+@lean_device
+def solve_contact(c, pair, moves, rows, friction):
+    """Change the velocities at one contact towards its goal; returns the square of the change of the velocity [m^2/s^2].
+
+    One velocity is read and one impulse applied: what friction does to the normal speed follows from the coupling.
+    """
+    n, t = vector(rows, c, NORMAL), vector(rows, c, TANGENT)
+    v = slip(moves, pair, rows, c)
+    normal, one, two = vector(rows, c, IMPULSE)
+    speed, limit = dot(n, v), friction * normal
+    along, square = (0.0, 0.0, 0.0), 0.0
+    if limit > 0.0 or one != 0.0 or two != 0.0:
+        t2 = cross(n, t)
+        p1 = one - rows[c, MASS + 1] * dot(t, v)
+        p2 = two - rows[c, MASS + 2] * dot(t2, v)
+        size = p1 * p1 + p2 * p2
+        if size > limit * limit:  # Coulomb's cone
+            cut = limit / math.sqrt(size)
+            p1, p2 = p1 * cut, p2 * cut
+        rows[c, IMPULSE + 1], rows[c, IMPULSE + 2] = p1, p2
+        d1, d2 = p1 - one, p2 - two
+        speed += rows[c, COUPLING] * d1 + rows[c, COUPLING + 1] * d2
+        along, square = add(scale(d1, t), scale(d2, t2)), d1 * d1 + d2 * d2
+    p = max(0.0, normal + rows[c, MASS] * (rows[c, GOAL] - speed))
+    rows[c, IMPULSE] = p
+    d = p - normal
+    square += d * d
+    if square > 0.0:
+        push(moves, moves, pair, rows, c, add(along, scale(d, n)))
+    return square * rows[c, SOFT] * rows[c, SOFT]
 
 
-@device
-def undo_overlap(c, pair, gap, bodies, rows, pushes, dt):
+@lean_device
+def undo_overlap(c, pair, gap, moves, shifts, rows, dt):
     """Move the bodies of a contact apart, if their velocities do not do it in the next step."""
-    moves, inverse, shifts = bodies
-    speed = speed_along(moves, pair, rows, c, 0)
+    n = vector(rows, c, NORMAL)
+    speed = dot(n, slip(moves, pair, rows, c))
     deep = max(0.0, -gap - rows[c, OVERLAP] - max(0.0, speed) * dt)
     deep -= (1.0 - SHARE) * min(deep, 5.0 * rows[c, OVERLAP])
-    p = max(0.0, pushes[c] + rows[c, MASS] * (deep - speed_along(shifts, pair, rows, c, 0)))
-    d = p - pushes[c]
+    p = max(0.0, rows[c, PUSHED] + rows[c, MASS] * (deep - dot(n, slip(shifts, pair, rows, c))))
+    d = p - rows[c, PUSHED]
     if d != 0.0:
-        pushes[c] = p
-        push(shifts, inverse, pair, rows, c, 0, d)
+        rows[c, PUSHED] = p
+        push(shifts, moves, pair, rows, c, scale(d, n))
 
 
-@device
-def push_all(c, pair, inverse, rows, impulses, factor, moves):
-    """Change velocities, or shifts, by the impulses of a contact, times a factor."""
-    for k in range(3):
-        push(moves, inverse, pair, rows, c, WAY * k, factor * impulses[c, k])
+@lean_routine
+def sweep(first, last, begin, row, other, moves, rows, friction, is_back):
+    """Solve the contacts of one world once, one after another; returns the square of the largest change of the velocity [m^2/s^2]."""
+    largest = 0.0
+    for k in range(first, last):
+        i = first + last - 1 - k if is_back else k
+        if rows[i - begin, MASS] > 0.0:
+            largest = max(largest, solve_contact(i - begin, (row[i], other[i]), moves, rows, friction))
+    return largest
 
 
-@kernel("(F2w F2w F2 F2) (I I F2 B) (F F F) f8 i8 I F2w (i8 i8)")
-def solve_worlds(bodies, found, materials, dt, iterations, starts, impulses, part):
+@lean_routine
+def sweep_overlaps(first, last, begin, row, other, contacts, moves, shifts, rows, dt):
+    """Undo the overlaps of one world once, one after another."""
+    for i in range(first, last):
+        c = i - begin
+        if rows[c, MASS] > 0.0 and contacts[i, 9] < -rows[c, OVERLAP]:
+            undo_overlap(c, (row[i], other[i]), contacts[i, 9], moves, shifts, rows, dt)
+
+
+@kernel("(F2w F2w F2) (I I F2 B) (F F F) f8 i8 I F2w (i8 i8)")
+def solve_worlds(bodies, found, materials, dt, iterations, span_start, impulses, part):
     """Solve the contacts of worlds part[0] to part[1] - 1.
 
     The impulses of a contact that held acted during the whole step, so that they also undo half of the path that their change of the
     velocity makes in it: a body at rest, which its motion model lets fall in each step, stays where it is.
 
-    bodies: velocity and angular velocity [m/s rad/s], (n, 6), changed; shifts [m rad], (n, 6), changed from 0; inverse masses (n, 10);
-    sizes [m] (2, n). found: row, other row (-1 for the scene), (m,), contacts (m, CONTACT), and whether they are new, (m,). materials:
-    restitution, friction, and speed from which bodies bounce [m/s], by world. dt: length of a step [s]. starts: first contact of
-    each world, (n_worlds + 1,). impulses: along the normal and both tangents [N s], (m, 3), first guess and result.
+    bodies: their numbers (n, BODY), of which the velocities are changed; shifts [m rad], (n, 6), changed from 0; sizes [m] (2, n).
+    found: row, other row (-1 for the scene), (m,), contacts (m, CONTACT), and whether they are new, (m,). materials: restitution,
+    friction, and speed from which bodies bounce [m/s], by world. dt: length of a step [s]. span_start: first contact of each world,
+    (n_worlds + 1,). impulses: along the normal and both tangents [N s], (m, 3), first guess and result.
     """
-    moves, shifts, inverse, sizes = bodies
+    moves, shifts, sizes = bodies
     row, other, contacts, is_new = found
     restitution, friction, bounce_speed = materials
-    rows = np.empty((contacts.shape[0], ROW))
-    pushes = np.zeros(contacts.shape[0])
-    for w in range(part[0], part[1]):
-        first, last = starts[w], starts[w + 1]
-        material = restitution[w], friction[w], bounce_speed[w]
-        for c in range(first, last):
-            lasts = not is_new[c]
-            prepare(c, (row[c], other[c]), lasts, contacts, (moves, inverse, sizes), material, dt, rows)
-        for c in range(first, last):
-            if impulses[c, 0] > 0.0:
-                push_all(c, (row[c], other[c]), inverse, rows, impulses, 1.0, moves)
-        for _ in range(iterations):
-            change = 0.0
-            for c in range(first, last):
-                if rows[c, MASS] > 0.0:
-                    pair = row[c], other[c]
-                    change = max(change, solve_contact(c, pair, moves, inverse, rows, impulses))
-            if change < SETTLED * SETTLED:
+    world, end = part
+    begin = span_start[world]
+    rows = np.empty((span_start[end] - begin, ROW))
+    for w in range(world, end):
+        first, last = span_start[w], span_start[w + 1]
+        for i in range(first, last):
+            c, pair = i - begin, (row[i], other[i])
+            material = restitution[w], bounce_speed[w]
+            prepare(c, pair, not is_new[i], (contacts, i), (moves, sizes), material, dt, rows)
+            for k in range(3):
+                rows[c, IMPULSE + k] = impulses[i, k]
+        for i in range(first, last):
+            if impulses[i, 0] > 0.0:
+                push(moves, moves, (row[i], other[i]), rows, i - begin, impulse_of(rows, i - begin))
+        for k in range(iterations):
+            square = sweep(first, last, begin, row, other, moves, rows, friction[w], k % 2 == 1)
+            if square < SETTLED * SETTLED:
                 break
-        for c in range(first, last):
+        for i in range(first, last):
+            c, pair = i - begin, (row[i], other[i])
+            for k in range(3):
+                impulses[i, k] = rows[c, IMPULSE + k]
             if rows[c, HOLDS] > 0.0:
-                push_all(c, (row[c], other[c]), inverse, rows, impulses, 0.5 * dt, shifts)
+                push(shifts, moves, pair, rows, c, scale(0.5 * dt, impulse_of(rows, c)))
         for _ in range((iterations + 1) // 2):
-            for c in range(first, last):
-                if rows[c, MASS] > 0.0 and contacts[c, 9] < -rows[c, OVERLAP]:
-                    pair = row[c], other[c]
-                    undo_overlap(c, pair, contacts[c, 9], (moves, inverse, shifts), rows, pushes, dt)
+            sweep_overlaps(first, last, begin, row, other, contacts, moves, shifts, rows, dt)
 
 
 @device
@@ -284,7 +322,9 @@ def recall(found, bodies, memory, impulses, is_new):
         is_new[c] = True
         for k in range(SLOTS):
             kept = memory[k, own]
-            if kept > 0.0 and math.floor((kept - 1.0) / FEATURES) == partner_id:
+            if not kept > 0.0:
+                break
+            if math.floor((kept - 1.0) / FEATURES) == partner_id:
                 is_new[c] = False
                 if kept == key and not is_taken[k, own]:
                     is_taken[k, own] = True

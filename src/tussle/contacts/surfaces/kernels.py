@@ -18,7 +18,7 @@ from tussle.contacts.bodies.kernels import (
     unit_or,
 )
 from tussle.contacts.boxes.kernels import CONTACT, MOST_FOUND, box_contacts, dot, minus, put, vector
-from tussle.numeric.kernel import kernel, routine
+from tussle.numeric.kernel import kernel, lean_routine
 from tussle.numeric.rigid_body import add, cross, scale
 from tussle.numeric.triangle import closest_weights
 
@@ -29,7 +29,7 @@ SAME_PLACE = 1e-3
 """Contacts nearer than this, relative to the body's size, are one."""
 
 
-@routine
+@lean_routine
 def closest_on_triangle(t, k, p):
     """Closest point of a triangle to a point."""
     a = vector(t, k, 0)
@@ -38,7 +38,7 @@ def closest_on_triangle(t, k, p):
     return add(a, add(scale(s, b), scale(w, c)))
 
 
-@routine
+@lean_routine
 def point_of_triangle(t, k, p):
     """Closest point of a triangle, unit normal towards a point p, and signed distance of p: negative behind a wall's surface."""
     q = closest_on_triangle(t, k, p)
@@ -51,7 +51,7 @@ def point_of_triangle(t, k, p):
     return q, unit_or(way, distance, normal), distance
 
 
-@routine
+@lean_routine
 def ball_triangle_contact(place, radius, center, t, k, motion, found, n, feature):
     """Add the contact of a ball at center + place with a triangle, if it touches within the motion [m]."""
     start = add(center, place)
@@ -79,7 +79,7 @@ def ball_triangle_contact(place, radius, center, t, k, motion, found, n, feature
     return put(found, n, normal, minus(place, scale(radius, normal)), point, gap, feature)
 
 
-@routine
+@lean_routine
 def round_triangle_contacts(items, a, t, k, motion, found, n):
     """Add the contacts of a sphere or capsule with a triangle."""
     radius, half, u, center = items[a, 3], items[a, 4], vector(items, a, 7), vector(items, a, 0)
@@ -96,7 +96,7 @@ def round_triangle_contacts(items, a, t, k, motion, found, n):
     return ball_triangle_contact(scale(s, u), radius, center, t, k, motion, found, n, 2.0)
 
 
-@routine
+@lean_routine
 def box_triangle_contacts(items, a, t, k, motion, found, n, scratch):
     """Add the contacts of a box with a triangle, but for those where it has one already."""
     corners, axes, edges, inner = scratch
@@ -109,7 +109,7 @@ def box_triangle_contacts(items, a, t, k, motion, found, n, scratch):
         edges[c, 0], edges[c, 1], edges[c, 2] = unit_or(edge, math.sqrt(dot(edge, edge)), (1.0, 0.0, 0.0))
     size = size_of(items, a)
     reach = max(SLACK * size, min(BOX_REACH * size, math.sqrt(dot(motion, motion))))
-    other = corners, 3, axes, 1, edges, (0.0, 0.0, 0.0), t[k, 12] > 0.0
+    other = -1, corners, axes, edges, t[k, 12] > 0.0
     m = box_contacts(items, a, other, reach, found, n, inner)
     kept = n
     for i in range(n, m):
@@ -128,7 +128,35 @@ def box_triangle_contacts(items, a, t, k, motion, found, n, scratch):
     return kept
 
 
-@routine
+@lean_routine
+def one_by_octant(found, n, size):
+    """Of the contacts of a box with one plane, keep one in each octant of the box; returns the number of contacts.
+
+    Where a floor is made of triangles, its edges add contacts between the corners of the box, and redundant contacts take more
+    iterations. The outermost is kept, or one that is deeper by more than the slack.
+    """
+    kept = 0
+    for i in range(n):
+        same = kept
+        for j in range(kept):
+            apart = minus(vector(found, i, 6), vector(found, j, 6))
+            normal = vector(found, j, 0)
+            is_same = found[i, 10] == found[j, 10] and dot(vector(found, i, 0), normal) > 0.9999
+            same = j if is_same and abs(dot(apart, normal)) <= SAME_PLACE * size else same
+        deeper = 0.0 if same == kept else found[same, 9] - found[i, 9]
+        arm, other = vector(found, i, 3), vector(found, same, 3)
+        if (
+            same == kept
+            or deeper > SLACK * size
+            or (deeper >= -SLACK * size and dot(arm, arm) > dot(other, other))
+        ):
+            for j in range(CONTACT):
+                found[same, j] = found[i, j]
+        kept += 1 if same == kept else 0
+    return kept
+
+
+@lean_routine
 def triangle_contacts(items, a, t, k, motion, found, n, scratch):
     """Add the contacts of a body with a triangle; returns their number."""
     if items[a, 3] > 0.0:
@@ -136,7 +164,7 @@ def triangle_contacts(items, a, t, k, motion, found, n, scratch):
     return box_triangle_contacts(items, a, t, k, motion, found, n, scratch)
 
 
-@routine
+@lean_routine
 def plane_contacts(items, a, planes, k, motion, found, n):
     """Add the contacts of a body with a half-space m . x < d; planes (n, 4)."""
     normal, center = vector(planes, k, 0), vector(items, a, 0)
@@ -157,7 +185,7 @@ def plane_contacts(items, a, planes, k, motion, found, n):
     return n
 
 
-@routine
+@lean_routine
 def tree_contacts(items, a, box, surface, motion, found, n, stack):
     """Add the contacts of a body with the triangles of a tree that a box, lower and upper corner, meets."""
     bounds, links, root, triangles, t, inner = surface
@@ -186,7 +214,7 @@ def tree_contacts(items, a, box, surface, motion, found, n, stack):
     return n
 
 
-@routine
+@lean_routine
 def field_contacts(items, a, box, field, motion, found, n):
     """Add the contacts of a body with the triangles of a height field below and above which a box lies."""
     height, grid, t, inner = field
@@ -257,6 +285,8 @@ def find_surfaces(bodies, motion, planes, tree, field, ints, contacts):
             items, a, (low, high), (bounds, links, root, triangles, single, inner), move, found, n, stack
         )
         n = field_contacts(items, a, (low, high), (height, grid, single, inner), move, found, n)
+        if items[a, 3] == 0.0:
+            n = one_by_octant(found, n, size_of(items, a))
         for k in range(n):
             if not found[k, 9] < np.inf:  # replaced by another contact
                 continue

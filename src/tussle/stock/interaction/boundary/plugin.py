@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 
 import numpy as np
 
 from tussle.api import HistoricAttributes, Interaction, Param, State, WorldView, service
 from tussle.messages import BoundaryCrossed, BoundaryShape
+from tussle.numeric import cos, sin
 from tussle.scene import Cuboid, Plane, Polyhedron, Prism, Sphere, TeamRegion, Volume
 from tussle.shapes import Vector
 
 CUBE = tuple((x, y, z) for z in (0.0, 1000.0) for x in (1000.0, -1000.0) for y in (1000.0, -1000.0))
+N_SIDES = 64
 SHAPING = (
     "shape", "center", "lengths", "rpy", "radius", "normal", "polyhedron_points", "polygon_points",
 )  # fmt: skip
 
 
 class Boundary(Interaction):
-    """A cuboid, sphere, half-space, polyhedron, or polygon between two heights.
+    """A cuboid, sphere, half-space, polyhedron, or polygon or cylinder between two heights.
 
     Publishes its shape once (`BoundaryShape`) and each entry and exit (`BoundaryCrossed`).
 
@@ -34,7 +37,9 @@ class Boundary(Interaction):
     boundary_id = Param(0, structural=True, doc="Id of the boundary in its messages.")
     team = Param(0, structural=True, doc="Team that owns the boundary.")
     shape = Param(
-        "cuboid", choices=("cuboid", "sphere", "plane", "polyhedron", "polygon"), doc="Kind of region."
+        "cuboid",
+        choices=("cuboid", "sphere", "plane", "polyhedron", "polygon", "cylinder"),
+        doc="Kind of region; a cylinder is vertical, with 64 sides.",
     )
     center = Param(
         (0.0, 0.0, 0.0), fields="x y z", unit="m", structural=True, doc="Centre; of a plane, a point on it."
@@ -45,12 +50,12 @@ class Boundary(Interaction):
         unit="m",
         gt=0.0,
         structural=True,
-        doc="Edge lengths of a cuboid; of a polygon, z is the height.",
+        doc="Edge lengths of a cuboid; of a polygon or cylinder, z is the height.",
     )
     rpy = Param(
         (0.0, 0.0, 0.0), fields="roll pitch yaw", unit="rad", structural=True, doc="Attitude of a cuboid."
     )
-    radius = Param(500.0, unit="m", gt=0.0, structural=True, doc="Radius of a sphere.")
+    radius = Param(500.0, unit="m", gt=0.0, structural=True, doc="Radius of a sphere or cylinder.")
     normal = Param((0.0, 0.0, 1.0), fields="x y z", structural=True, doc="Outward normal of a plane.")
     polyhedron_points = Param(
         CUBE, fields="x y z", unit="m", ragged=True, doc="Points whose convex hull is the polyhedron."
@@ -119,7 +124,11 @@ def _volume(
         return Plane(point=center, normal=normal)
     if shape == "polyhedron":
         return Polyhedron(polyhedron)
-    if shape == "polygon":
+    if shape == "cylinder":
+        angle = np.arange(N_SIDES) * (2.0 * math.pi / N_SIDES)
+        x, y = center[0] + radius * cos(angle), center[1] + radius * sin(angle)
+        polygon = tuple(zip(x.tolist(), y.tolist(), strict=True))
+    if shape in ("polygon", "cylinder"):
         return Prism(polygon, low=center[2] - 0.5 * lengths[2], high=center[2] + 0.5 * lengths[2])
     return Cuboid(center=center, lengths=lengths, rpy=rpy)
 

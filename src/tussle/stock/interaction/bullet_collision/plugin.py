@@ -162,28 +162,29 @@ class BulletCollision(Interaction):
         """Change velocities and positions of the bodies in contact."""
         mass, inertia = w.mass_properties()
         moves = ~self.remove_on_collision[w.world] & ~np.isin(w.block, self._blocks(w, "fixed"))
-        inverse = found.inverse_masses(mass, inertia, w.quat, moves)
-        state = np.ascontiguousarray(np.concatenate([w.vel, w.omega]).T)
-        before = state.copy()
+        state = found.entered(mass, inertia, w.quat, (w.vel, w.omega), moves)
         materials = self.restitution, self.friction, self.bounce_speed
         shifts = found.solve(
-            contacts, (state, inverse, sizes), materials, (w.dt, self.iterations), guess,
+            contacts,
+            (state, sizes),
+            materials,
+            (w.dt, self.iterations),
+            guess,
             lambda n, run: w.context.split(n, run, 1),
-        )  # fmt: skip
-        is_moved = (state != before).any(axis=1) | (shifts != 0.0).any(axis=1)
+        )
+        vel, omega, turns = state[:, :3].T, state[:, 3:6].T, state[:, 7] > 0.0
+        is_moved = (vel != w.vel).any(axis=0) | (omega != w.omega).any(axis=0) | (shifts != 0.0).any(axis=1)
         # A state that is not finite is not this plugin's to tell of.
-        rows = np.flatnonzero(is_moved & np.isfinite(state).all(axis=1))
+        rows = np.flatnonzero(is_moved & np.isfinite(vel + omega).all(axis=0))
         if not len(rows):
             return
-        vel, omega = np.split(state[rows].T, 2)
-        shift, turn = np.split(shifts[rows].T, 2)
-        w.move(rows, pos=w.pos[:, rows] + shift, vel=vel)
-        turns = np.flatnonzero(inverse[rows, 1] > 0.0)
-        if len(turns):
-            own = rows[turns]
-            small = np.concatenate([np.ones((1, len(own))), 0.5 * turn[:, turns]])
+        shift, turn = shifts[:, :3].T, shifts[:, 3:].T
+        w.move(rows, pos=w.pos[:, rows] + shift[:, rows], vel=vel[:, rows])
+        own = rows[turns[rows]]
+        if len(own):
+            small = np.concatenate([np.ones((1, len(own))), 0.5 * turn[:, own]])
             quat = quat_normalize(quat_multiply(small, w.quat[:, own]))
-            w.move(own, quat=quat, omega=omega[:, turns])
+            w.move(own, quat=quat, omega=omega[:, own])
 
     def _tell(
         self, w: WorldView, contacts: found.ContactList, touches: np.ndarray, is_new: np.ndarray
@@ -193,15 +194,17 @@ class BulletCollision(Interaction):
         removes = self.remove_on_collision[w.world]
         met = np.flatnonzero(touches & is_new & is_body)
         if len(met):
-            pair = np.unique(np.stack([contacts.row[met], contacts.other[met]]), axis=1)
-            order = np.lexsort((w.id[pair[1]], w.id[pair[0]], w.world[pair[0]]))
-            first, second = pair[:, order]
+            pair = np.stack([contacts.row[met], contacts.other[met]])
+            pair = pair[:, np.lexsort((w.id[pair[1]], w.id[pair[0]], w.world[pair[0]]))]
+            is_first = np.append(True, (pair[:, 1:] != pair[:, :-1]).any(axis=0))
+            first, second = pair = pair[:, is_first]
             w.publish(
                 EntityCollided, w.world[first], first=w.id[first], second=w.id[second],
                 first_team=w.team[first], second_team=w.team[second],
             )  # fmt: skip
-            both = np.unique(pair)
-            w.kill(both[removes[both]], "collision")
+            if removes.any():
+                both = np.unique(pair)
+                w.kill(both[removes[both]], "collision")
         down = np.zeros(w.n, bool)
         down[contacts.row[touches & ~is_body]] = True
         rows = np.flatnonzero(down & ~self.on_ground)
