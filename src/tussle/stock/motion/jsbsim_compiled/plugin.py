@@ -10,24 +10,22 @@ import numpy as np
 
 from tussle import units
 from tussle.aircraft.compile import CompiledAircraft, compile_aircraft, save_source
-from tussle.aircraft.constants import EARTH_RATE
-from tussle.aircraft.equations import CORE
 from tussle.aircraft.files import package_root
-from tussle.aircraft.initial import CORE_SLOT, place_by_quaternion, run_initial
+from tussle.aircraft.initial import place_by_quaternion, run_initial
 from tussle.aircraft.node import AircraftError
 from tussle.api import Input, MotionBody, Param, RigidBodyModel
+from tussle.api.range_kernel import RangeKernel
 from tussle.errors import ParameterError
 from tussle.geodesy import Origin
 from tussle.numeric import cos, sin
 from tussle.numeric.quaternion import quat_multiply, quat_rotate, quat_rotate_inverse
 from tussle.stock.motion.jsbsim_compiled import kernels
+from tussle.stock.motion.jsbsim_compiled.kernels import BODY, FOOT, SLOTS
 from tussle.stock.motion.jsbsim_compiled.script import Script, read_script
 
-FOOT = kernels.FOOT
 KNOT = float(units.NAUTICAL_MILE / 3600)  # [m/s]
-BODY, FRAME = 13, 7  # components of the rigid body and of the world frame, before the slots of the aircraft
-SLOTS = BODY + FRAME
-EARTH_ANGLE = CORE_SLOT["earth_angle"]
+ROWS_PER_THREAD = 64
+"""A step of an aircraft takes half a microsecond, starting a thread 50."""
 SURFACES = "fcs/elevator-cmd-norm", "fcs/aileron-cmd-norm", "fcs/rudder-cmd-norm"
 SETPOINTS = "ap/bank_setpoint", "ap/altitude_setpoint", "ap/airspeed_setpoint"
 ALTITUDE = "position/geod-alt-ft"
@@ -54,6 +52,29 @@ class Flown:
         if is_autopilot:
             self.setpoints = [aircraft.slot(name) for name in SETPOINTS]
         self.altitude = at[ALTITUDE]
+
+    def commands(self) -> tuple[np.ndarray, np.ndarray]:
+        """The constants of `kernels.flight`: numbers and whole numbers; throttle and surfaces are kept within their limits.
+
+        An autopilot takes bank [rad], altitude above the ellipsoid [ft] and airspeed [knot].
+        """
+        infinite = np.inf
+        if self.is_autopilot:
+            roll, altitude, speed = self.setpoints
+            found = [
+                (0, roll, -1, 1.0, -infinite, infinite),
+                (1, altitude, self.altitude, FOOT, -infinite, infinite),
+                (2, speed, -1, KNOT, -infinite, infinite),
+            ]
+        else:
+            found = [(0, slot, -1, 1.0, 0.0, 1.0) for slot in self.throttles]
+            found += [(1 + k, slot, -1, 1.0, -1.0, 1.0) for k, slot in self.surfaces]
+        tables = self.aircraft.tables
+        numbers = np.concatenate([tables, *([unit, low, high] for *_, unit, low, high in found)])
+        wholes = [self.aircraft.advance.address, len(found)]
+        for k, (given, slot, base, *_) in enumerate(found):
+            wholes += [given, slot, base, len(tables) + 3 * k]
+        return numbers, np.array(wholes, np.int64)
 
 
 @cache
@@ -164,37 +185,15 @@ class JSBSimCompiled(RigidBodyModel):
         super().from_body(body, rows)
 
     @property
+    def range_kernel(self) -> RangeKernel:
+        """The kernel that makes steps of all aircraft."""
+        numbers, wholes = self.flown.commands()
+        return RangeKernel(kernels.flight(), numbers, wholes, ROWS_PER_THREAD)
+
+    @property
     def advance(self) -> Any:
         """The function that makes steps of all aircraft."""
-        flown = self.flown
-        aircraft = flown.aircraft
-        command = autopilot if flown.is_autopilot else surfaces
-
-        def fly(x: np.ndarray, u: np.ndarray, p: np.ndarray, dt: float, substeps: int) -> None:
-            """Make `substeps` steps of dt / substeps."""
-            slots = x[SLOTS:]
-            command(flown, x, slots, u)
-            step = dt / substeps
-            aircraft.advance(slots, aircraft.tables, 0, x.shape[1], substeps, step, step)
-            kernels.to_world(slots, EARTH_ANGLE, EARTH_RATE, x[BODY:SLOTS], x[:BODY])
-
-        return fly
-
-
-def surfaces(flown: Flown, x: np.ndarray, slots: np.ndarray, u: np.ndarray) -> None:
-    """Set throttle and surfaces, within their limits."""
-    for slot in flown.throttles:
-        np.clip(u[0], 0.0, 1.0, out=slots[slot])
-    for k, slot in flown.surfaces:
-        np.clip(u[1 + k], -1.0, 1.0, out=slots[slot])
-
-
-def autopilot(flown: Flown, x: np.ndarray, slots: np.ndarray, u: np.ndarray) -> None:
-    """Set bank [rad], altitude above the ellipsoid [ft] and airspeed [knot] of the autopilot."""
-    roll, altitude, speed = flown.setpoints
-    slots[roll] = u[0]
-    slots[altitude] = slots[flown.altitude] + (u[1] - x[2]) / FOOT
-    slots[speed] = u[2] / KNOT
+        return self.range_kernel.advance
 
 
 def earth_frame(origin: Origin) -> tuple[np.ndarray, tuple[float, float, float]]:
@@ -210,6 +209,3 @@ def local_frame(latitude: np.ndarray, longitude: np.ndarray) -> np.ndarray:
     return np.asarray(
         quat_multiply(np.stack([cos(a), zero, zero, sin(a)]), np.stack([cos(b), zero, sin(b), zero]))
     )
-
-
-assert CORE[EARTH_ANGLE] == "earth_angle"
