@@ -65,7 +65,9 @@ def forward(quat, first, last, base, out):
     """Unit vectors along the body x axis, world frame, (3, n)."""
     for i in range(first, last):
         place = i - base
-        out[0, place], out[1, place], out[2, place] = forward_of(quat[0, i], quat[1, i], quat[2, i], quat[3, i])
+        out[0, place], out[1, place], out[2, place] = forward_of(
+            quat[0, i], quat[1, i], quat[2, i], quat[3, i]
+        )
 
 
 @device

@@ -15,7 +15,17 @@ from tussle.api.laws import BODY, components
 from tussle.columns import Channel, Numbers, Output, Param, State
 from tussle.errors import DeclarationError, listed, nearest_name
 from tussle.numeric.rk4 import label
-from tussle.numeric.row_kernel import BlockCall, Item, Number, RowCall, RowKernel, Text, Value, numbers_of, read_first
+from tussle.numeric.row_kernel import (
+    BlockCall,
+    Item,
+    Number,
+    RowCall,
+    RowKernel,
+    Text,
+    Value,
+    numbers_of,
+    read_first,
+)
 
 BODY_INPUTS = ("force_x", "force_y", "force_z", "torque_x", "torque_y", "torque_z", "mass")
 BODY_NUMBERS: dict[str, Value] = {

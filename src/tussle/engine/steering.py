@@ -16,7 +16,6 @@ from tussle.columns import Handle, Topic
 from tussle.engine.group import Binding, Group
 from tussle.numeric.row_kernel import BlockCall, Item, Number, RowCall, numbers_of
 
-
 ARRAYS = "address", "x", "u", "p", "numbers", "wholes"
 MORE = "u8 F2w F2 F2 F I", "".join(f"{name}, " for name in ARRAYS)
 RANGE_CALL = BlockCall(ARRAYS, RANGE_STEP, "dt, 1", (), "x", RIGID_BODY)

@@ -158,7 +158,9 @@ class RowKernel:
 
     def _block_call(self, place: int, call: BlockCall, kept: Mapping[str, Sequence[Number]]) -> Iterator[str]:
         for number in call.arguments:
-            name, at = next((name, list(every).index(number)) for name, every in kept.items() if number in every)
+            name, at = next(
+                (name, list(every).index(number)) for name, every in kept.items() if number in every
+            )
             yield f"            column = {name}[{at}]"
             yield "            for l in range(m):"
             yield f"                column[start + l] = {self._text(number)}"
