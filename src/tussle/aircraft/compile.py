@@ -74,7 +74,8 @@ class CompiledAircraft:
         first: Values of the slots before the initial conditions are run, (k,).
         tables: Numbers of its tables.
         advance: advance(x, tables, begin, end, n_steps, dt, frozen_dt): step rows of the state x, (k, n).
-        start: start(x, tables, begin, end, n_steps, dt, frozen_dt): start the engines.
+        start: start(x, tables, begin, end, n_steps, dt, frozen_dt): start the engines, with open throttles; where dt > 0, they settle
+            with the present positions of their levers.
         source: Python text of the kernels.
         inputs: Properties that may be set from outside.
         n_engines: Number of engines.

@@ -13,15 +13,17 @@ from tussle.aircraft.compile import CompiledAircraft, compile_aircraft, save_sou
 from tussle.aircraft.files import package_root
 from tussle.aircraft.initial import place_by_quaternion, run_initial
 from tussle.aircraft.node import AircraftError
+from tussle.aircraft.trim import LinearModel, TrimPoint, level_flight, linearize, throttles_of, trim
 from tussle.api import Input, MotionBody, Param, RigidBodyModel
 from tussle.api.range_kernel import RangeKernel
 from tussle.errors import ParameterError
 from tussle.geodesy import Origin
 from tussle.numeric import cos, sin
-from tussle.numeric.quaternion import quat_multiply, quat_rotate, quat_rotate_inverse
+from tussle.numeric.quaternion import quat_conjugate, quat_multiply, quat_rotate, quat_rotate_inverse
 from tussle.stock.motion.jsbsim_compiled import kernels
 from tussle.stock.motion.jsbsim_compiled.kernels import BODY, FOOT, SLOTS
 from tussle.stock.motion.jsbsim_compiled.script import Script, read_script
+from tussle.stock.motion.jsbsim_model.plugin import TrimParam
 
 KNOT = float(units.NAUTICAL_MILE / 3600)  # [m/s]
 ROWS_PER_THREAD = 64
@@ -36,6 +38,12 @@ FORWARD_RIGHT_DOWN = np.array([[0.0], [1.0], [0.0], [0.0]])
 MIRRORED = np.array([[1.0], [-1.0], [-1.0]])
 
 
+class SteadyFlightParam(TrimParam):
+    """A trim of compiled aircraft."""
+
+    allowed = ("none", "longitudinal", "full")
+
+
 class Flown:
     """A compiled aircraft with the slots that the plugin sets and reads."""
 
@@ -44,10 +52,8 @@ class Flown:
     ) -> None:
         self.aircraft, self.settings = aircraft, settings
         self.is_autopilot = is_autopilot
-        n = max(1, aircraft.n_engines)
-        names = [f"fcs/throttle-cmd-norm[{k}]" if k else "fcs/throttle-cmd-norm" for k in range(n)]
         at = aircraft.slots
-        self.throttles = [at[name] for name in names if name in at]
+        self.throttles = throttles_of(aircraft)
         self.surfaces = [(k, at[name]) for k, name in enumerate(SURFACES) if name in at]
         if is_autopilot:
             self.setpoints = [aircraft.slot(name) for name in SETPOINTS]
@@ -116,6 +122,10 @@ class JSBSimCompiled(RigidBodyModel):
     jsbsim_root = Param(
         "", doc="Folder of aircraft, engine, systems and scripts; empty for those of the package jsbsim."
     )
+    trim = SteadyFlightParam(
+        "none",
+        doc="Trim at the start: none; longitudinal, by pitch, throttle and elevator trim; or full, by bank and the other surfaces too.",
+    )
     commands = Param("surfaces", choices=["surfaces", "autopilot"], doc="What is commanded.")
     wind = Param((0.0, 0.0, 0.0), fields="east north up", unit="m/s", doc="Velocity of the air, world frame.")
     throttle = Input(doc="Throttle.")
@@ -144,6 +154,22 @@ class JSBSimCompiled(RigidBodyModel):
     def source(self) -> Path:
         """Write the generated Python of the aircraft's kernels to the cache folder, to be read; return its path."""
         return save_source(self.flown.aircraft)
+
+    def steady_flight(self, speed: float, altitude: float) -> TrimPoint:
+        """Steady level flight at a speed [m/s] and an altitude [m], in calm air.
+
+        Raises:
+            ParameterError: There is none, or the aircraft cannot be compiled.
+        """
+        return level_flight(self.flown.aircraft, speed, altitude)
+
+    def linearize(self, speed: float, altitude: float) -> LinearModel:
+        """The matrices of the linear model of steady level flight, e.g. for a linear-quadratic regulator.
+
+        Raises:
+            ParameterError: As `steady_flight`.
+        """
+        return linearize(self.flown.aircraft, self.steady_flight(speed, altitude))
 
     def active_inputs(self) -> list[str]:
         """The inputs of surfaces, or of the autopilot."""
@@ -177,8 +203,14 @@ class JSBSimCompiled(RigidBodyModel):
             x[at[GROUND]] = origin.altitude / FOOT
         for name, number in flown.settings:
             x[aircraft.slot(name)] = number
-        run_initial(aircraft, x, body.dt)
-        aircraft.start(x, aircraft.tables, 0, n, 1, 0.0, body.dt)
+        trimmed = self.values["trim"]
+        if trimmed == "none":
+            run_initial(aircraft, x, body.dt)
+            aircraft.start(x, aircraft.tables, 0, n, 1, 0.0, body.dt)
+        else:
+            x = trim(aircraft, x, body.dt, full=trimmed == "full").state
+            attitude = quat_multiply(quat_conjugate(frame), quat_multiply(x[:4], FORWARD_RIGHT_DOWN))
+            body.quat[:, rows], body.omega[:, rows] = attitude, 0.0
         state = self.rigid_body
         state[BODY:SLOTS, rows] = np.concatenate([frame, np.array(center)[:, None]])
         state[SLOTS:, rows] = x
