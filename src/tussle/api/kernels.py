@@ -144,7 +144,13 @@ def find_rows(world, ids, id_row, id_start, rows):
 @kernel("F I Fw -> f8")
 def longest_reach(radius, world, reach):
     """Set reach[w], 0 on entry, to the largest radius of its rows [m]. Returns the value common to all worlds with rows, or -1."""
-    for i in range(radius.shape[0]):
+    n = radius.shape[0]
+    same = 0
+    while same < n and radius[same] == radius[0]:
+        same += 1
+    if same == n:
+        return max(0.0, radius[0]) if n > 0 else 0.0
+    for i in range(n):
         w = world[i]
         reach[w] = max(reach[w], radius[i])
     common = 0.0

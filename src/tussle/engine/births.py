@@ -50,7 +50,8 @@ def joined(parts: list[Bodies]) -> Bodies:
 
 def in_order(bodies: Bodies) -> Bodies:
     """Order rows by (world, id)."""
-    if (np.diff(bodies.world << 32 | bodies.id) > 0).all():
+    key = bodies.world << 32 | bodies.id
+    if (key[1:] > key[:-1]).all():
         return bodies
     order = np.lexsort((bodies.id, bodies.world))
     return Bodies(bodies.floats.take(order, axis=1), bodies.ints.take(order, axis=1), bodies.n_worlds)

@@ -85,6 +85,9 @@ class Population:
         self._asked: dict[tuple[int, int, int], Group] = {}
         self._specs: dict[tuple[int, tuple[str, ...]], Any] = {}
         self._params: dict[Group, tuple[Params, Params]] = {}
+        self._of_block = np.zeros(
+            0, np.int64
+        )  # where entities of a block share a group: its number in `groups`
         self.on_new_group: Callable[[], None] = lambda: None
 
     def mass_properties(self) -> tuple[np.ndarray, np.ndarray]:
@@ -149,10 +152,11 @@ class Population:
     def _groups_of(self, new: Bodies) -> np.ndarray:
         """Number in `groups` of each newborn, (m,)."""
         if not (self.is_sequential or self.overrides.structural):
-            number = {id(g): i for i, g in enumerate(self.groups)}
             blocks = self.overrides.variant(0)
-            by_block = [number[id(self.group_of(blocks, k, 0))] for k in range(len(blocks))]
-            return np.take(by_block, new.block)
+            if len(self._of_block) < len(blocks):
+                owners = [self.group_of(blocks, k, 0) for k in range(len(blocks))]
+                self._of_block = np.array([self.groups.index(g) for g in owners], np.int64)
+            return np.take(self._of_block, new.block)
         alike = new.block  # entities with equal numbers belong to the same group
         if self.is_sequential:
             alike = alike << 32 | new.id

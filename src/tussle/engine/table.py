@@ -47,6 +47,7 @@ class Table:
     Attributes:
         n: Number of rows.
         arrays: dtype -> (columns, n).
+        fresh: dtype -> values of a new row, (columns, 1).
         places: Column key -> location.
         lists: List columns, in order of declaration.
     """
@@ -54,6 +55,7 @@ class Table:
     n: int = 0
     defaults: dict[type, list[float]] = field(default_factory=lambda: {float: [], int: [], bool: []})
     arrays: dict[type, np.ndarray] = field(default_factory=dict)
+    fresh: dict[type, np.ndarray] = field(default_factory=dict)
     places: dict[Any, ColumnPlace] = field(default_factory=dict)
     lists: list[RaggedColumn] = field(default_factory=list)
 
@@ -74,7 +76,8 @@ class Table:
         """Allocate n rows with default values."""
         self.n = n
         for dtype, values in self.defaults.items():
-            self.arrays[dtype] = np.repeat(np.array(values, DTYPES[dtype])[:, None], n, axis=1)
+            self.fresh[dtype] = np.array(values, DTYPES[dtype])[:, None]
+            self.arrays[dtype] = np.repeat(self.fresh[dtype], n, axis=1)
         self.lists = [column.take(np.full(n, -1)) for column in self.lists]
 
     def array(self, place: ColumnPlace) -> np.ndarray:
@@ -84,9 +87,10 @@ class Table:
 
     def renew(self, rows: np.ndarray) -> None:
         """Reset rows, (m,), to the defaults."""
-        for dtype, values in self.defaults.items():
-            if values:
-                self.arrays[dtype][:, span(rows)] = np.array(values, DTYPES[dtype])[:, None]
+        places = span(rows)
+        for dtype, values in self.fresh.items():
+            if len(values):
+                self.arrays[dtype][:, places] = values
         for column in self.lists:
             column.put(rows, column.take(np.full(len(rows), -1)))
 
@@ -95,7 +99,7 @@ class Table:
         for dtype, old in self.arrays.items():
             new = np.empty((len(old), len(index)), old.dtype)
             if len(old):
-                _GATHER[dtype](old, first, np.array(self.defaults[dtype], old.dtype)[:, None], index, new)
+                _GATHER[dtype](old, first, self.fresh[dtype], index, new)
             self.arrays[dtype] = new
         if self.lists:
             index = np.where(index >= 0, index - first, -1)

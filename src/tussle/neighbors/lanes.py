@@ -154,6 +154,13 @@ def lanes_abs(lanes: Any) -> Any:
 
 
 @LaneFunction
+def tagged(lanes: Any, tag: int, n_bits: int) -> Any:
+    """Replace the lowest n_bits bits of each number by `tag`; of numbers >= 0, the order stays but for these bits."""
+    whole = lanes.view(np.int64)
+    return ((whole >> n_bits << n_bits) | tag).view(np.float64)
+
+
+@LaneFunction
 def rsqrt_guess(lanes: Any) -> Any:
     """Approximate 1 / sqrt within 3.5 percent by integer arithmetic on the bits, with the same result on every machine."""
     return (np.int64(RSQRT_MAGIC) - (lanes.view(np.int64) >> 1)).view(np.float64)

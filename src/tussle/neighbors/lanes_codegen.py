@@ -107,11 +107,11 @@ def _implement(function: Any, result: Any, *arguments: Any) -> Callable[[Any], A
     return register
 
 
-def _splat(builder: Any, value: Any) -> Any:
+def _splat(builder: Any, value: Any, lanes: Any = _DOUBLES) -> Any:
     zero = ir.Constant(ir.IntType(32), 0)
-    one = builder.insert_element(ir.Constant(_DOUBLES, ir.Undefined), value, zero)
+    one = builder.insert_element(ir.Constant(lanes, ir.Undefined), value, zero)
     places = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
-    return builder.shuffle_vector(one, ir.Constant(_DOUBLES, ir.Undefined), places)
+    return builder.shuffle_vector(one, ir.Constant(lanes, ir.Undefined), places)
 
 
 def _as_lanes(builder: Any, value: Any) -> Any:
@@ -234,12 +234,7 @@ def _generate_store(context: Any, builder: Any, sig: Any, args: Any) -> Any:
 def _first_lanes(builder: Any, count: Any) -> Any:
     """Mask of the lanes below `count`."""
     numbers = ir.Constant(_LONGS, list(range(LANES)))
-    zero = ir.Constant(ir.IntType(32), 0)
-    one = builder.insert_element(ir.Constant(_LONGS, ir.Undefined), count, zero)
-    places = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
-    return builder.icmp_signed(
-        "<", numbers, builder.shuffle_vector(one, ir.Constant(_LONGS, ir.Undefined), places)
-    )
+    return builder.icmp_signed("<", numbers, _splat(builder, count, _LONGS))
 
 
 @_implement("load_some", LANES_TYPE, types.Array, types.int64, types.int64)
@@ -306,6 +301,14 @@ def _generate_ones(context: Any, builder: Any, sig: Any, args: Any) -> Any:
 @_implement("lanes_sqrt", LANES_TYPE, LANES_TYPE)
 def _generate_sqrt(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return _call_llvm(builder, f"llvm.sqrt.v{LANES}f64", _DOUBLES, [args[0]])
+
+
+@_implement("tagged", LANES_TYPE, LANES_TYPE, types.int64, types.int64)
+def _generate_tagged(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    lanes, tag, n_bits = args
+    mask = builder.shl(ir.Constant(ir.IntType(64), -1), n_bits)
+    kept = builder.and_(builder.bitcast(lanes, _LONGS), _splat(builder, mask, _LONGS))
+    return builder.bitcast(builder.or_(kept, _splat(builder, tag, _LONGS)), _DOUBLES)
 
 
 @_implement("rsqrt_guess", LANES_TYPE, LANES_TYPE)

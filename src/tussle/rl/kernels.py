@@ -12,8 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from tussle.neighbors.few import nearest_few, scratch_of
-from tussle.neighbors.search import TABLE, in_range, table_of
+from tussle.neighbors.kernels import rank_bits
+from tussle.neighbors.lane_count import LANES
+from tussle.neighbors.nearest_lanes import NONE, find_nearest
+from tussle.neighbors.search import TABLE, in_range, nearest_places, table_of
 from tussle.numeric import atan2
 from tussle.numeric.kernel import device, kernel
 
@@ -54,30 +56,34 @@ def put_vector(kind, scale, x, y, z, turn, a, column, out):
 
 
 @device
-def put_other(floats, row, other, is_mate, spec, turn, a, column, out):
-    """Write the features of another entity for that of `row`. Returns the next column."""
+def put_others(floats, team, row, near, n, spec, turn, a, column, width, out):
+    """Write the features of near[:n], rows of the body table, for the entity `row`, `width` numbers for each; zeros for row -1."""
     kinds, source, numbers = spec
+    for j in range(n):
+        if near[j] < 0:
+            out[a, column + j * width : column + (j + 1) * width] = 0.0
     for f in range(kinds.shape[0]):
         kind, k, scale = kinds[f], source[f], numbers[f, 0]
-        if kind == PLANE or kind == SPACE:
-            x, y, z = floats[k, other], floats[k + 1, other], floats[k + 2, other]
-            if numbers[f, 1] != 0.0:
-                x, y, z = x - floats[k, row], y - floats[k + 1, row], z - floats[k + 2, row]
-            put_vector(kind, scale, x, y, z, turn, a, column, out)
-            column += 2 if kind == PLANE else 3
-            continue
-        value = 1.0
-        if kind == SCALAR:
-            value = floats[k, other]
-        elif kind == DISTANCE:
-            x, y = floats[0, other] - floats[0, row], floats[1, other] - floats[1, row]
-            z = floats[2, other] - floats[2, row]
-            value = math.sqrt(x * x + y * y + z * z)
-        elif kind == SAME_TEAM:
-            value = 1.0 if is_mate else 0.0
-        out[a, column] = scale * value
-        column += 1
-    return column
+        is_vector = kind == PLANE or kind == SPACE
+        x, y, z = 0.0, 0.0, 0.0
+        if is_vector and numbers[f, 1] != 0.0:
+            x, y, z = floats[k, row], floats[k + 1, row], floats[k + 2, row]
+        for j in range(n):
+            other, at = near[j], column + j * width
+            if other < 0:
+                continue
+            if is_vector:
+                dx, dy, dz = floats[k, other] - x, floats[k + 1, other] - y, floats[k + 2, other] - z
+                put_vector(kind, scale, dx, dy, dz, turn, a, at, out)
+            elif kind == SCALAR:
+                out[a, at] = scale * floats[k, other]
+            elif kind == DISTANCE:
+                dx, dy = floats[0, other] - floats[0, row], floats[1, other] - floats[1, row]
+                dz = floats[2, other] - floats[2, row]
+                out[a, at] = scale * math.sqrt(dx * dx + dy * dy + dz * dz)
+            else:
+                out[a, at] = scale if kind == PRESENT or team[other] == team[row] else 0.0
+        column += (2 if kind == PLANE else 3) if is_vector else 1
 
 
 def own(floats, table, shift, who, spec, mode, column, out):
@@ -107,31 +113,66 @@ def own(floats, table, shift, who, spec, mode, column, out):
                 at += 2 if kind == PLANE else 3
 
 
-def nearest(floats, who, wanted, places, arrays, spec, numbers, radius, out):
-    """Write features of the k nearest others within `radius` [m], nearest first; zeros for those that are missing.
+def nearest(floats, who, wanted, blocks, index, spec, numbers, radius, part, out):
+    """Write features of the k <= LANES nearest others within `radius` [m], nearest first; zeros for those that are missing.
+
+    who: agent of each row from `first` on, or -1; `first`; team of all rows. wanted: team that is looked for, by row from `first` on.
+    blocks: cuts, spans and points of `Blocks`. index: members, world of the strips, order, world_start, keys, points, team by place.
+    numbers: k, mode of the teams, frame, first column, columns per neighbour. part: blocks [begin, end).
+    """
+    agent, first, team = who
+    cuts, spans, points = blocks
+    queries, block_first, block_strip, span_first, span_last = cuts[0], cuts[1], cuts[2], cuts[3], cuts[4]
+    members, strip_world, order, world_start, keys, placed, place_team = index
+    k, mode, frame, column, width = numbers
+    candidates = queries, spans[0], spans[1], points
+    table = world_start, keys, (placed[0], placed[1], placed[2]), place_team
+    kept, teams, others = np.empty((LANES, LANES)), np.zeros(LANES), np.empty(k, np.int64)
+    for b in range(part[0], part[1]):
+        begin, end = block_first[b], block_first[b + 1]
+        n_agents = 0
+        for q in range(begin, end):
+            own = order[queries[q]] - first
+            teams[q - begin] = wanted[own]
+            n_agents += agent[own] >= 0
+        if n_agents == 0:
+            continue
+        w = strip_world[block_strip[b]]
+        find_nearest(begin, (span_first[b], span_last[b]), w, candidates, table, mode, teams, radius, kept)
+        start = world_start[w]
+        rank = (1 << rank_bits(world_start[w + 1] - start)) - 1
+        whole = kept.view(np.int64)
+        for q in range(begin, end):
+            row = order[queries[q]]
+            a = agent[row - first]
+            if a < 0:
+                continue
+            for j in range(k):
+                is_there = kept[j, q - begin] < NONE
+                others[j] = members[start + (whole[j, q - begin] & rank)] if is_there else -1
+            turn = frame_of(floats, row, frame)
+            put_others(floats, team, row, others, k, spec, turn, a, column, width, out)
+
+
+def nearest_apart(floats, who, wanted, places, arrays, spec, numbers, radius, team, out):
+    """Like `nearest` for any k and any number of candidates, one agent after another.
 
     wanted: team that is looked for, (m,). places: row_world, place, order of the index. arrays: its table. numbers: k, mode of the
-    teams, frame, first column, columns per neighbour.
+    teams, frame, first column, columns per neighbour. team: team of all rows.
     """
     rows, agents = who
     row_world, place, order = places
     k, mode, frame, column, width = numbers
     table = table_of(arrays)
-    team = table[8]
-    scratch = scratch_of(k, order.shape[0])
-    found = scratch[2]
+    best, ranks, others = np.empty(k), np.empty(k, np.int64), np.empty(k, np.int64)
     for i in range(rows.shape[0]):
-        row, a = rows[i], agents[i]
+        row = rows[i]
         me, x, y, z = place[row], floats[0, row], floats[1, row], floats[2, row]
-        nearest_few(row_world[row], me, x, y, z, radius, mode, wanted[i], table, scratch, k)
-        turn = frame_of(floats, row, frame)
+        nearest_places(row_world[row], me, x, y, z, mode, wanted[i], table, best, ranks, others, k)
         for j in range(k):
-            at = column + j * width
-            if found[j] >= 0:
-                q = found[j]
-                put_other(floats, row, order[q], team[q] == team[me], spec, turn, a, at, out)
-            else:
-                out[a, at : at + width] = 0.0
+            others[j] = order[others[j]] if best[j] < radius * radius else -1
+        turn = frame_of(floats, row, frame)
+        put_others(floats, team, row, others, k, spec, turn, agents[i], column, width, out)
 
 
 def sectors(floats, who, wanted, places, arrays, numbers, radius, out):
@@ -159,67 +200,65 @@ def sectors(floats, who, wanted, places, arrays, numbers, radius, out):
             out[a, column + s] = max(out[a, column + s], near)
 
 
-def sums(floats, who, wanted, places, arrays, spec, numbers, radius, out):
+def sums(floats, who, wanted, places, arrays, spec, numbers, radius, team, out):
     """Write the number of others within `radius` [m], divided by `unit`, and the means of their features; zeros without others.
 
-    numbers: mode of the teams, frame, first column, columns of the features, `unit`. The rest is as in `nearest`.
+    numbers: mode of the teams, frame, first column, columns of the features, `unit`. The rest is as in `nearest_apart`.
     """
     rows, agents = who
     row_world, place, order = places
     mode, frame, column, width, unit = numbers
     table = table_of(arrays)
-    team = table[8]
-    found = np.empty(order.shape[0], np.int64)
-    one, total = np.empty((1, width)), np.empty(width)
+    others = np.empty(order.shape[0], np.int64)
+    features = np.empty((1, width * order.shape[0]))
     for i in range(rows.shape[0]):
         row, a = rows[i], agents[i]
         me, x, y, z = place[row], floats[0, row], floats[1, row], floats[2, row]
-        m = in_range(row_world[row], me, x, y, z, radius, mode, wanted[i], table, found, 0)
-        turn = frame_of(floats, row, frame)
-        total[:] = 0.0
+        m = in_range(row_world[row], me, x, y, z, radius, mode, wanted[i], table, others, 0)
         for j in range(m):
-            q = found[j]
-            put_other(floats, row, order[q], team[q] == team[me], spec, turn, 0, 0, one)
-            total += one[0]
+            others[j] = order[others[j]]
+        turn = frame_of(floats, row, frame)
+        put_others(floats, team, row, others, m, spec, turn, 0, 0, width, features)
         out[a, column] = m / unit
         for c in range(width):
-            out[a, column + 1 + c] = total[c] / max(m, 1)
+            total = 0.0
+            for j in range(m):
+                total += features[0, j * width + c]
+            out[a, column + 1 + c] = total / max(m, 1)
 
 
-def each(floats, who, wanted, members, spec, numbers, out):
+def each(floats, who, members, spec, numbers, out):
     """Write features of all entities of a block in order of their place in it, without the entity itself; zeros for those that are gone.
 
-    wanted: team of the entity, (m,). members: body row of each (world, place in the block), or -1; world and team of all rows, (N,).
-    numbers: frame, first column, columns per entity, most entities.
+    members: body row of each (world, place in the block), or -1; world and team of all rows, (N,). numbers: frame, first column,
+    columns per entity, most entities.
     """
     rows, agents = who
     of, world, team = members
     frame, column, width, most = numbers
+    others = np.empty(of.shape[1], np.int64)
     for i in range(rows.shape[0]):
-        row, a, slot = rows[i], agents[i], 0
-        turn = frame_of(floats, row, frame)
+        row, n = rows[i], 0
         for j in range(of.shape[1]):
-            other = of[world[row], j]
-            if other == row or slot == most:
-                continue
-            at = column + slot * width
-            slot += 1
-            if other >= 0:
-                put_other(floats, row, other, team[other] == wanted[i], spec, turn, a, at, out)
-            else:
-                out[a, at : at + width] = 0.0
+            if of[world[row], j] != row:
+                others[n] = of[world[row], j]
+                n += 1
+        turn = frame_of(floats, row, frame)
+        put_others(floats, team, row, others, min(n, most), spec, turn, agents[i], column, width, out)
 
 
 ROWS = "F2 (I I)"
 SPEC = "(I I F2)"
 SEARCH = f"{ROWS} F (I I I) {TABLE}"
+BLOCKS = "(I2 I2 F2) (I I I I I F2 F)"
 # Those of observations are compiled for float32 and float64.
 SIGNATURES: dict[Any, str] = {
     own: f"F2 F2 i8 (I I) {SPEC} i8 i8",
-    nearest: f"{SEARCH} {SPEC} (i8 i8 i8 i8 i8) f8",
+    nearest: f"F2 (I i8 I) F {BLOCKS} {SPEC} (i8 i8 i8 i8 i8) f8 (i8 i8)",
+    nearest_apart: f"{SEARCH} {SPEC} (i8 i8 i8 i8 i8) f8 I",
     sectors: f"{SEARCH} (i8 i8 i8 i8) f8",
-    sums: f"{SEARCH} {SPEC} (i8 i8 i8 i8 i8) f8",
-    each: f"{ROWS} F (I2 I I) {SPEC} (i8 i8 i8 i8)",
+    sums: f"{SEARCH} {SPEC} (i8 i8 i8 i8 i8) f8 I",
+    each: f"{ROWS} (I2 I I) {SPEC} (i8 i8 i8 i8)",
 }
 
 

@@ -6,13 +6,14 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from tussle.api.bodies import FLOATS, OFFSETS
 from tussle.errors import ParameterError, listed, nearest_name
-from tussle.neighbors.few import WHOLE_WORLD
+from tussle.neighbors.lane_count import LANES
 from tussle.neighbors.search import ANY, DIFFERENT, SAME
 from tussle.numeric.kernel import kernel
 from tussle.rl import kernels
@@ -27,6 +28,8 @@ VECTORS = ("pos", "vel", "omega", "force", "torque")
 OWN = ("forward", *FLOATS)
 OTHERS = {"distance": kernels.DISTANCE, "same_team": kernels.SAME_TEAM, "present": kernels.PRESENT}
 RELATIVE = {"offset": "pos", "relative_vel": "vel"}
+WHOLE_WORLD = 500
+"""Up to this many entities, the nearest others are looked for among all of a world."""
 Scale = float | Mapping[str, float]
 Spec = tuple[np.ndarray, np.ndarray, np.ndarray]
 """Features as kernels take them: kinds and rows of their source table, (n,), and their numbers, (n, 4)."""
@@ -50,6 +53,7 @@ class AgentRows:
         agents: Number of each agent: world * agents per world + place in its world, (m,).
         team: Team of each as a float, (m,).
         kept: What components keep until rows change.
+        span: All agents of the block in this group have rows from span[0] to span[1] - 1, though `rows` may be some of them.
     """
 
     block: str
@@ -58,6 +62,7 @@ class AgentRows:
     agents: np.ndarray
     team: np.ndarray
     kept: dict[Any, Any]
+    span: tuple[int, int]
 
 
 class Component(ABC):
@@ -99,9 +104,15 @@ def _spec(lines: Sequence[tuple[float, ...]]) -> Spec:
     return numbers[:, 0].astype(np.int64), numbers[:, 1].astype(np.int64), numbers[:, 2:].copy()
 
 
+def _scalars(first: int, n: int, factor: float) -> list[tuple[float, ...]]:
+    """Features that are n numbers of a table from row `first` on."""
+    return [(kernels.SCALAR, first + k, factor, 0.0, 0.0, 0.0) for k in range(n)]
+
+
 def _of_others(names: Sequence[str], scale: Scale, planar: bool) -> tuple[Spec, int]:
     """The spec of features of others, and its number of columns."""
-    lines, width = [], 0
+    lines: list[tuple[float, ...]] = []
+    width = 0
     for name in names:
         source = RELATIVE.get(name, name)
         factor = _factor(scale, name)
@@ -113,7 +124,7 @@ def _of_others(names: Sequence[str], scale: Scale, planar: bool) -> tuple[Spec, 
             lines.append((kind, OFFSETS[source], factor, name in RELATIVE, 0, 0))
             width += k
         else:
-            lines += [(kernels.SCALAR, OFFSETS[source] + k, factor, 0, 0, 0) for k in range(FLOATS[source])]
+            lines += _scalars(OFFSETS[source], FLOATS[source], factor)
             width += FLOATS[source]
     return _spec(lines), width
 
@@ -150,37 +161,50 @@ class Own(Component):
         return total
 
     @cached_property
-    def _specs(self) -> dict[str, tuple[Spec, int]]:
-        """The spec of each body column, and its number of columns."""
-        found = {}
-        for name in self.columns.split():
-            factor, point = _factor(self.scale, name), (0.0, 0.0, 0.0)
-            if name == "forward":
-                found[name] = _spec([(kernels.FORWARD, 0, factor, *point)]), 3
-            elif name in VECTORS:
-                kind, width = (kernels.PLANE, 2) if self.planar else (kernels.SPACE, 3)
-                point = self.origin if name == "pos" else point
-                found[name] = _spec([(kind, OFFSETS[name], factor, *point)]), width
-            elif name in FLOATS:
-                found[name] = self._numbers(name, OFFSETS[name], FLOATS[name])
-        return found
+    def _parts(self) -> list[tuple[str, Spec, int]]:
+        """What is written with one call each: a plugin's column, or "" for body columns side by side; their spec, number of columns."""
+        parts: list[tuple[str, Spec, int]] = []
+        for is_plugin, names in groupby(self.columns.split(), lambda name: "." in name):
+            if is_plugin:
+                parts += [(name, _spec([]), 0) for name in names]
+            else:
+                found: list[tuple[float, ...]] = []
+                width = 0
+                for name in names:
+                    lines, k = self._lines(name)
+                    found, width = found + lines, width + k
+                parts.append(("", _spec(found), width))
+        return parts
 
-    def _numbers(self, name: str, first: int, width: int) -> tuple[Spec, int]:
+    def _lines(self, name: str) -> tuple[list[tuple[float, ...]], int]:
+        """The features of a body column, and its number of columns."""
         factor = _factor(self.scale, name)
-        return _spec([(kernels.SCALAR, first + k, factor, 0.0, 0.0, 0.0) for k in range(width)]), width
+        if name == "forward":
+            return [(kernels.FORWARD, 0, factor, 0.0, 0.0, 0.0)], 3
+        if name in VECTORS:
+            kind, width = (kernels.PLANE, 2) if self.planar else (kernels.SPACE, 3)
+            point = self.origin if name == "pos" else (0.0, 0.0, 0.0)
+            return [(kind, OFFSETS[name], factor, *point)], width
+        return _scalars(OFFSETS[name], FLOATS[name], factor), FLOATS[name]
 
     def write(self, simulation: Simulation, part: AgentRows, column: int, out: np.ndarray) -> None:
         floats, own = simulation.state.population.bodies.floats, WRITERS[out.dtype]["own"]
         who = part.rows, part.agents
-        for name in self.columns.split():
-            table, shift = floats, 0
-            if "." in name:
-                table, shift, first, width = _plugin_column(part.group, name)
-                spec, width = self._numbers(name, first, width)
-            else:
-                spec, width = self._specs[name]
-            own(floats, table, shift, who, spec, FRAMES[self.frame], column, out)
+        for name, spec, width in self._parts:
+            if name:
+                column = self._write_plugin_column(name, part, floats, column, out)
+                continue
+            own(floats, floats, 0, who, spec, FRAMES[self.frame], column, out)
             column += width
+
+    def _write_plugin_column(
+        self, name: str, part: AgentRows, floats: np.ndarray, column: int, out: np.ndarray
+    ) -> int:
+        """Write a column of a plugin. Returns the next column."""
+        table, shift, first, width = _plugin_column(part.group, name)
+        spec, who = _spec(_scalars(first, width, _factor(self.scale, name))), (part.rows, part.agents)
+        WRITERS[out.dtype]["own"](floats, table, shift, who, spec, FRAMES[self.frame], column, out)
+        return column + width
 
 
 def _column_of(block: Any, path: str) -> int:
@@ -225,6 +249,12 @@ class _Others(Component):
         return _of_others(self.columns.split(), self.scale, self.planar)
 
 
+def _split_of(simulation: Simulation) -> Any:
+    """What calls a function for parts of the rows in several threads; None with one thread."""
+    state = simulation.state
+    return None if state.context.threads == 1 else state.world_view.split_rows
+
+
 class _Search(_Others):
     """Others that are looked for; abstract.
 
@@ -253,8 +283,7 @@ class _Search(_Others):
     def _index(
         self, simulation: Simulation, reach: float
     ) -> tuple[Any, tuple[np.ndarray, ...], tuple[np.ndarray, ...]]:
-        bodies, threads = simulation.state.population.bodies, simulation.state.context
-        split = None if threads.threads == 1 else simulation.state.world_view.split_rows
+        bodies, split = simulation.state.population.bodies, _split_of(simulation)
         index = bodies.any_index() if reach == np.inf else bodies.index(reach, split)
         places = index.row_world, index.place, index.order
         return bodies.floats, places, (*index.table, bodies.by_place(index, "team", split)[0])
@@ -292,15 +321,55 @@ class NearestOthers(_Search):
         return self.k * self._features[1]
 
     def write(self, simulation: Simulation, part: AgentRows, column: int, out: np.ndarray) -> None:
-        spec, width = self._features
+        bodies = simulation.state.population.bodies
+        is_small = bodies.n <= WHOLE_WORLD * simulation.n_worlds
         mode, wanted = self._wanted(part, self.of)
-        is_small = (
-            simulation.state.population.bodies.n <= WHOLE_WORLD * simulation.n_worlds
-        )  # then all are looked at
-        floats, places, arrays = self._index(simulation, np.inf if is_small else self.radius)
-        numbers = self.k, mode, FRAMES[self.frame], column, width
-        who = part.rows, part.agents
-        WRITERS[out.dtype]["nearest"](floats, who, wanted, places, arrays, spec, numbers, self.radius, out)
+        numbers = self.k, mode, FRAMES[self.frame], column, self._features[1]
+        if self.k > LANES or (self.radius == np.inf and not is_small):
+            self._write_apart(simulation, part, wanted, numbers, out)
+        else:
+            reach = np.inf if is_small else self.radius
+            self._write_blocks(simulation, part, wanted, numbers, reach, out)
+
+    def _write_apart(
+        self,
+        simulation: Simulation,
+        part: AgentRows,
+        wanted: np.ndarray,
+        numbers: tuple[int, ...],
+        out: np.ndarray,
+    ) -> None:
+        floats, places, arrays = self._index(simulation, np.inf)
+        who, team = (part.rows, part.agents), simulation.state.population.bodies.team
+        write, spec = WRITERS[out.dtype]["nearest_apart"], self._features[0]
+        write(floats, who, wanted, places, arrays, spec, numbers, self.radius, team, out)
+
+    def _write_blocks(
+        self,
+        simulation: Simulation,
+        part: AgentRows,
+        wanted: np.ndarray,
+        numbers: tuple[int, ...],
+        reach: float,
+        out: np.ndarray,
+    ) -> None:
+        bodies, split = simulation.state.population.bodies, _split_of(simulation)
+        index = bodies.index(reach, split)
+        first, last = part.span
+        blocks = index.blocks(first, last, split)
+        world_start, keys, strips, _, _, points = index.table
+        places = index.members, strips[1], index.order, world_start, keys, points
+        table = *places, bodies.by_place(index, "team", split)[0]
+        agent, teams = np.full(last - first, -1), np.zeros(last - first)
+        agent[part.rows - first], teams[part.rows - first] = part.agents, wanted
+        who, found = (agent, first, bodies.team), (blocks.cuts, blocks.spans, blocks.points)
+        write, spec = WRITERS[out.dtype]["nearest"], self._features[0]
+        simulation.state.context.split(
+            blocks.n_blocks,
+            lambda *some: write(
+                bodies.floats, who, teams, found, table, spec, numbers, self.radius, some, out
+            ),
+        )
 
 
 @dataclass(frozen=True)
@@ -350,8 +419,8 @@ class Means(_Search):
         mode, wanted = self._wanted(part, self.of)
         floats, places, arrays = self._index(simulation, self.radius)
         numbers = mode, FRAMES[self.frame], column, width, self.count_scale
-        who = part.rows, part.agents
-        WRITERS[out.dtype]["sums"](floats, who, wanted, places, arrays, spec, numbers, self.radius, out)
+        who, team = (part.rows, part.agents), simulation.state.population.bodies.team
+        WRITERS[out.dtype]["sums"](floats, who, wanted, places, arrays, spec, numbers, self.radius, team, out)
 
 
 @dataclass(frozen=True)
@@ -390,7 +459,7 @@ class Each(_Others):
         numbers = FRAMES[self.frame], column, width, of.shape[1] - (part.block in self.of.split())
         members = of, bodies.world, bodies.team
         who = part.rows, part.agents
-        WRITERS[out.dtype]["each"](bodies.floats, who, part.team, members, spec, numbers, out)
+        WRITERS[out.dtype]["each"](bodies.floats, who, members, spec, numbers, out)
 
     def _places(self, simulation: Simulation) -> np.ndarray:
         """Body row of each (world, place in the blocks), or -1."""

@@ -69,6 +69,9 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
     def step(self, actions: Mapping[str, Any]) -> tuple[dict[str, Any], ...]:
         """Play one decision.
 
+        The info of an agent whose episode ends has "episode": its return `r` and the number of decisions `l`. What each term of
+        the reward gave in this step is in `swarm.terms`.
+
         Raises:
             ParameterError: An agent's action is missing, is not allowed, or belongs to an agent that is not there.
         """
@@ -78,29 +81,28 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
         self._take(actions)
         swarm = self.swarm
         swarm.step(self._actions[None])
-        rewards, dead, late = (
-            swarm.rewards[0].tolist(),
-            swarm.terminations[0].tolist(),
-            swarm.truncations[0].tolist(),
-        )
+        dead = swarm.terminations[0]
         self.agents = [] if swarm.over[0] else self._living()
+        numbers: Any = slice(None)
         if self.agents == before:
-            told, numbers = before, [self._number[name] for name in before]
+            told = before
         else:
             told = before + [name for name in self.agents if name not in set(before)]
-            numbers = [self._number[name] for name in told]
             self.agents = [name for name in self.agents if not dead[self._number[name]]]
-        terms = {name: term[0].tolist() for name, term in swarm.terms.items()}
-        infos = {
-            name: {key: term[a] for key, term in terms.items()} for name, a in zip(told, numbers, strict=True)
-        }
-        return (
-            self._observed(told),
-            {name: rewards[a] for name, a in zip(told, numbers, strict=True)},
-            {name: dead[a] for name, a in zip(told, numbers, strict=True)},
-            {name: late[a] for name, a in zip(told, numbers, strict=True)},
-            infos,
+        if len(told) < len(self.possible_agents) or told is not before:
+            numbers = [self._number[name] for name in told]
+        rewards, deaths, ends = (
+            dict(zip(told, values[0, numbers].tolist(), strict=True))
+            for values in (swarm.rewards, swarm.terminations, swarm.truncations)
         )
+        infos: dict[str, dict[str, Any]] = {name: {} for name in told}
+        if len(self.agents) < len(told):
+            for name in set(told).difference(self.agents):
+                infos[name]["episode"] = {
+                    "r": float(swarm.returns[0, self._number[name]]),
+                    "l": int(swarm.lengths[0]),
+                }
+        return self._observed(told), rewards, deaths, ends, infos
 
     def _take(self, actions: Mapping[str, Any]) -> None:
         """Write the actions to one array."""
@@ -120,12 +122,19 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
         numbers: Any = slice(None)
         if len(many) < len(self._actions):
             numbers = [self._number[name] for name in self.agents]
-        kinds = {(getattr(value, "dtype", None), getattr(value, "shape", None)) for value in many}
-        dtype, shape = kinds.pop()
-        if kinds or dtype is None or dtype.kind != self._actions.dtype.kind or shape != self._shape:
+        try:
+            dtypes, given = {value.dtype for value in many}, np.array(many)
+        except (AttributeError, ValueError):  # numbers of Python, or shapes that differ
+            self._take_each(many)
+            return
+        if (
+            dtypes != {given.dtype}
+            or given.dtype.kind != self._actions.dtype.kind
+            or given.shape[1:] != self._shape
+        ):
             self._take_each(many)
         else:
-            self._actions[numbers] = np.array(many).reshape(len(many), -1)
+            self._actions[numbers] = given.reshape(len(many), -1)
 
     def _take_each(self, many: list[Any]) -> None:
         """Write actions that differ in shape or type, and say which is wrong."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Self
 
@@ -208,9 +209,8 @@ class Swarm:
                     )
                 agents = bodies.world[rows] * self.n_agents + (first + place)
                 alive[agents], ids[agents] = True, bodies.id[rows]
-                self._parts.append(
-                    AgentRows(name, group, rows, agents, bodies.team[rows].astype(float), kept)
-                )
+                team, span = bodies.team[rows].astype(float), (int(rows[0]), int(rows[-1]) + 1)
+                self._parts.append(AgentRows(name, group, rows, agents, team, kept, span))
         none = [np.zeros(0, np.int64)]
         self.now.rows = np.concatenate([*none, *(p.rows for p in self._parts)])
         self.now.agents = np.concatenate([*none, *(p.agents for p in self._parts)])
@@ -230,9 +230,7 @@ class Swarm:
                 mask = np.zeros(self.n_worlds, bool)
                 mask[worlds] = True
                 kept = mask[part.agents // self.n_agents]
-                some = AgentRows(
-                    part.block, part.group, part.rows[kept], part.agents[kept], part.team[kept], part.kept
-                )
+                some = replace(part, rows=part.rows[kept], agents=part.agents[kept], team=part.team[kept])
             column = 0
             if len(some.rows):
                 for component, width in zip(

@@ -44,12 +44,17 @@ def test_agents_leave_when_they_die(task):
     env = parallel_env(task)
     obs, _ = env.reset(seed=3)
     assert list(obs) == env.agents == env.possible_agents
-    n_dead = 0
+    n_dead, totals, n_steps = 0, dict.fromkeys(env.agents, 0.0), 0
     while env.agents:
         before = list(env.agents)
+        n_steps += 1
         obs, rewards, dead, late, infos = env.step({a: np.zeros(2, np.float32) for a in before})
         assert list(obs) == list(rewards) == list(dead) == list(late) == list(infos) == before
         n_dead += sum(dead.values())
+        for a in before:
+            totals[a] += rewards[a]
+            ended = {"episode": {"r": pytest.approx(totals[a]), "l": n_steps}} if dead[a] or late[a] else {}
+            assert infos[a] == ended
         assert set(env.agents) == {a for a in before if not dead[a] and not late[a]}
         assert all((rewards[a] < 0) == dead[a] for a in before)
     assert n_dead > 0

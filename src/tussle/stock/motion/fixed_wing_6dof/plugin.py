@@ -191,7 +191,7 @@ class FixedWing6DOF(RigidBodyModel):
         rows = np.flatnonzero((self.use_launcher != 0) & (pushed * self.launch_accel < self.launch_speed))
         since, push = np.maximum(pushed[rows], 0.0), self.launch_accel[rows]
         way = 0.5 * push * since * since
-        forward, state = body.forward[:, rows], self.rigid_body
+        forward, state = body.column("forward", rows), self.rigid_body
         state[:3, rows] = body.pos[:, rows] + (way - self.on_rail[rows]) * forward
         state[3:6, rows] = push * since * forward
         state[6:10, rows], state[10:, rows] = body.quat[:, rows], 0.0

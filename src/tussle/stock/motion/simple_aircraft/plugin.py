@@ -59,9 +59,9 @@ class SimpleAircraft(MotionModel):
         speed = np.sqrt(vx * vx + vy * vy + vz * vz)
         x = self.x
         x[:3, rows] = body.pos[:, rows]
-        x[3, rows] = np.clip(-body.roll[rows], -self.max_roll[rows], self.max_roll[rows])
-        x[4, rows] = np.clip(body.climb[rows], -self.max_pitch[rows], self.max_pitch[rows])
-        x[5, rows] = body.yaw[rows]
+        x[3, rows] = np.clip(-body.column("roll", rows), -self.max_roll[rows], self.max_roll[rows])
+        x[4, rows] = np.clip(body.column("climb", rows), -self.max_pitch[rows], self.max_pitch[rows])
+        x[5, rows] = body.column("yaw", rows)
         x[6, rows] = np.clip(speed, self.min_velocity[rows], self.max_velocity[rows])
 
     def to_body(self, body: MotionBody) -> None:

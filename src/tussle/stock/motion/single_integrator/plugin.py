@@ -47,8 +47,8 @@ class SingleIntegrator(MotionModel):
         """Copy position, velocity, heading and elevation."""
         self.x[:3, rows] = body.pos[:, rows]
         self.x[3:6, rows] = body.vel[:, rows]
-        self.x[6, rows] = body.yaw[rows]
-        self.x[7, rows] = body.climb[rows]
+        self.x[6, rows] = body.column("yaw", rows)
+        self.x[7, rows] = body.column("climb", rows)
 
     def to_body(self, body: MotionBody) -> None:
         """Write position, attitude and velocity."""

@@ -81,8 +81,8 @@ class Unicycle(MotionModel):
     def from_body(self, body: MotionBody, rows: np.ndarray) -> None:
         """Copy position, heading and elevation."""
         self.x[:3, rows] = body.pos[:, rows]
-        self.x[3, rows] = body.yaw[rows]
-        self.x[4, rows] = body.climb[rows]
+        self.x[3, rows] = body.column("yaw", rows)
+        self.x[4, rows] = body.column("climb", rows)
 
     def to_body(self, body: MotionBody) -> None:
         """Write position, attitude, velocity and angular velocity."""
