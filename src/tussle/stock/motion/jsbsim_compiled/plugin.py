@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar
@@ -16,14 +17,13 @@ from tussle.aircraft.node import AircraftError
 from tussle.aircraft.trim import LinearModel, TrimPoint, level_flight, linearize, throttles_of, trim
 from tussle.api import Input, MotionBody, Param, RigidBodyModel
 from tussle.api.range_kernel import RangeKernel
-from tussle.errors import ParameterError
+from tussle.errors import ParameterError, listed, nearest_name
 from tussle.geodesy import Origin
 from tussle.numeric import cos, sin
 from tussle.numeric.quaternion import quat_conjugate, quat_multiply, quat_rotate, quat_rotate_inverse
-from tussle.stock.motion.jsbsim_compiled import kernels
-from tussle.stock.motion.jsbsim_compiled.kernels import BODY, FOOT, SLOTS
+from tussle.stock.motion.jsbsim_compiled import flying
+from tussle.stock.motion.jsbsim_compiled.flying import BODY, FOOT, SLOTS
 from tussle.stock.motion.jsbsim_compiled.script import Script, read_script
-from tussle.stock.motion.jsbsim_model.plugin import TrimParam
 
 KNOT = float(units.NAUTICAL_MILE / 3600)  # [m/s]
 ROWS_PER_THREAD = 64
@@ -38,10 +38,24 @@ FORWARD_RIGHT_DOWN = np.array([[0.0], [1.0], [0.0], [0.0]])
 MIRRORED = np.array([[1.0], [-1.0], [-1.0]])
 
 
-class SteadyFlightParam(TrimParam):
-    """A trim of compiled aircraft."""
+TRIMS = "none", "longitudinal", "full"
 
-    allowed = ("none", "longitudinal", "full")
+
+class SteadyFlightParam(Param):
+    """A trim. The conformance kit does not try all, as it tries `choices`: in its games no aircraft is in trim."""
+
+    def convert(self, value: Any, where: str = "", from_geodetic: Callable[..., Any] | None = None) -> Any:
+        """Check the name.
+
+        Raises:
+            ParameterError: There is no such trim.
+        """
+        name = super().convert(value, where, from_geodetic)
+        if name not in TRIMS:
+            raise ParameterError(
+                f"{self._place(where)} = {name!r} is not allowed{nearest_name(name, TRIMS)}; {listed(TRIMS)}"
+            )
+        return name
 
 
 class Flown:
@@ -60,7 +74,7 @@ class Flown:
         self.altitude = at[ALTITUDE]
 
     def commands(self) -> tuple[np.ndarray, np.ndarray]:
-        """The constants of `kernels.flight`: numbers and whole numbers; throttle and surfaces are kept within their limits.
+        """The constants of `flying.flight`: numbers and whole numbers; throttle and surfaces are kept within their limits.
 
         An autopilot takes bank [rad], altitude above the ellipsoid [ft] and airspeed [knot].
         """
@@ -220,7 +234,7 @@ class JSBSimCompiled(RigidBodyModel):
     def range_kernel(self) -> RangeKernel:
         """The kernel that makes steps of all aircraft."""
         numbers, wholes = self.flown.commands()
-        return RangeKernel(kernels.flight(), numbers, wholes, ROWS_PER_THREAD)
+        return RangeKernel(flying.flight(), numbers, wholes, ROWS_PER_THREAD)
 
     @property
     def advance(self) -> Any:

@@ -34,18 +34,16 @@ MIRRORED = np.array([[1.0], [-1.0], [-1.0]])
 class TrimParam(Param):
     """A trim of JSBSim. The conformance kit does not try all, as it tries `choices`: in its games no aircraft is in trim."""
 
-    allowed: ClassVar[tuple[str, ...]] = tuple(TRIMS)
-
     def convert(self, value: Any, where: str = "", from_geodetic: Callable[..., Any] | None = None) -> Any:
         """Check the name.
 
         Raises:
-            ParameterError: There is no such trim.
+            ParameterError: JSBSim has no such trim.
         """
         name = super().convert(value, where, from_geodetic)
-        if name not in self.allowed:
+        if name not in TRIMS:
             raise ParameterError(
-                f"{self._place(where)} = {name!r} is not allowed{nearest_name(name, self.allowed)}; {listed(self.allowed)}"
+                f"{self._place(where)} = {name!r} is not allowed{nearest_name(name, TRIMS)}; {listed(TRIMS)}"
             )
         return name
 

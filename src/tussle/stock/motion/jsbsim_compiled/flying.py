@@ -24,7 +24,7 @@ COMMAND = 4  # whole numbers of a command: its input, its slot, a slot that is a
 
 
 @device
-def to_world(x, row):
+def to_world(x, row):  # type: ignore[no-untyped-def]
     """Write the rigid body of an aircraft from its state; x is (k, n): rigid body, frame, slots, in foot and second."""
     w, a, b, c = x[BODY, row], x[BODY + 1, row], x[BODY + 2, row], x[BODY + 3, row]
     angle = x[EARTH_ANGLE, row]
