@@ -48,10 +48,10 @@ def mission(update: str, law: str) -> Mission:
     """The mission of section 6.5 of the paper, one motion step per decision."""
     if law == "scrimmage":
         return mission_2025()
-    means = "historic" if law == "historic" else "team"
+    averaging = "historic" if law == "historic" else "team"
     base = game.mission(motion_multiplier=1)
     prey, *predators = base.blocks
-    boids = Boids(means=means, goal_distance=GOAL_AHEAD)
+    boids = Boids(averaging=averaging, goal_distance=GOAL_AHEAD)
     blocks = [type(prey)(**{**vars(prey), "autonomy": boids}), *predators]
     return base.replace(blocks=blocks, update=update, interactions=[SimpleCapture(credit="each")])
 

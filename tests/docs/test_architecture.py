@@ -18,6 +18,8 @@ def test_every_file_and_folder_that_it_names_exists():
     assert not [name for name in named if not (ROOT / name.rstrip(".")).exists()]
 
 
-def test_every_package_is_on_it():
+def test_every_package_and_single_module_is_on_it():
     packages = {path.parent.name for path in (ROOT / "src/tussle").glob("*/__init__.py")}
     assert not [name for name in packages if f"| `{name}` |" not in TEXT]
+    modules = {path.stem for path in (ROOT / "src/tussle").glob("*.py")} - {"__init__"}
+    assert not [name for name in modules if f"`{name}`" not in TEXT]

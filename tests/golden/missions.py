@@ -68,7 +68,8 @@ def chase_sequential() -> Mission:
     """The same one after another, with the paper's means and scoring."""
     return Mission(
         blocks=[
-            _prey(8, means="historic"), _hunters("keepers", 2, 2, -40.0, switches=False), _hunters("switchers", 3, 1, 40.0, switches=True),
+            _prey(8, averaging="historic"),
+            _hunters("keepers", 2, 2, -40.0, switches=False), _hunters("switchers", 3, 1, 40.0, switches=True),
         ],
         update="sequential", end=5.0, end_conditions="time, one_team, all_dead",
         interactions=[SimpleCapture(capture_range=20.0, credit="each")], metrics=[SimpleCaptureMetrics()],

@@ -1,9 +1,11 @@
 """Writes golden.json anew: `python tests/golden/regenerate.py`. With `--check` it writes nothing and fails where a hash differs.
 
 Only where a plugin's numbers are meant to have changed. Says which missions differ from what was kept; name these in the changelog.
+With `--old-processor` all is played with what the oldest x86-64 processors can do.
 """
 
 import json
+import os
 import sys
 from pathlib import Path
 
@@ -17,8 +19,31 @@ ABOUT = (
 )
 
 
+OLD_PROCESSOR = {
+    "NUMBA_CPU_NAME": "x86-64-v2",
+    "NUMBA_CPU_FEATURES": "",
+    "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX,-AVX2,-FMA,-FMA4,-AVX512F,-AVX512CD,-AVX512BW,-AVX512DQ,-AVX512VL",
+}
+
+
+def use_old_processor() -> None:
+    """Start this program again with the oldest processors' instructions in kernels, in NumPy and in the C library."""
+    from numba.core.registry import cpu_target
+    from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
+
+    newer = [name for name in __cpu_dispatch__ if __cpu_features__.get(name)]
+    if "NPY_DISABLE_CPU_FEATURES" not in os.environ:
+        features = {"NPY_DISABLE_CPU_FEATURES": " ".join(newer)}
+        os.execve(sys.executable, [sys.executable, *sys.argv], os.environ | OLD_PROCESSOR | features)
+    target = cpu_target.target_context.codegen().magic_tuple()
+    assert not newer, newer
+    assert "x86-64-v2" in target, target
+
+
 def main() -> None:
     """Play all missions and say what differs."""
+    if "--old-processor" in sys.argv[1:]:
+        use_old_processor()
     before = golden() | kept_examples() if FILE.exists() else {}
     hashes, shown = play_all(), play_examples()
     changed = [name for name, now in (hashes | shown).items() if now != before.get(name)]

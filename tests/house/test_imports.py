@@ -30,7 +30,7 @@ NUMPY_FOR_KERNELS = {
     *("inf", "nan", "pi", "float64", "int64", "uint64", "bool_", "ndarray"),
     *("sqrt", "floor", "abs", "minimum", "maximum", "isnan", "isfinite"),
 }
-OPTIONAL_PARTS = ("tussle.view", "tussle.batch", "tussle.rl", "tussle.bridges", "tussle.cli")
+OPTIONAL_PARTS = ("tussle.view", "tussle.batch", "tussle.rl", "tussle.plan", "tussle.bridges", "tussle.cli")
 
 
 def is_within(name: str, packages: tuple[str, ...]) -> bool:

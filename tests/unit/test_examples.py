@@ -55,12 +55,20 @@ def parameter_sweep(lines):
     assert means[0] < min(means[1:])
 
 
+def plan_and_fly(lines):
+    known = [int(n) for n in re.findall(r"(\d) walls are known", "\n".join(lines))]
+    assert known == sorted(known)
+    assert (known[0], known[-1]) == (0, 4)
+    assert float(re.findall(r"(\S+) m from its goal", lines[-1])[0]) <= 4.0
+
+
 PROMISES = {
     "01_predator_prey.py": (predator_prey, ("--seeds", "3", "--end", "120")),
     "02_your_own_chaser.py": (your_own_chaser, ()),
     "03_your_own_motion_model.py": (your_own_motion_model, ()),
     "04_vector_flock.py": (vector_flock, ()),
     "05_parameter_sweep_in_one_stack.py": (parameter_sweep, ()),
+    "07_plan_and_fly.py": (plan_and_fly, ()),
 }
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
@@ -260,13 +261,19 @@ class MotionModel(EntityPlugin):
             value = value[:, None] if column.fields and value.ndim == 1 else value
             rows.append(np.broadcast_to(value, (len(column.fields) or 1, n)))
         p = np.ascontiguousarray(np.concatenate(rows)) if rows else np.zeros((0, n))
-        integrate = self.advance
+        integrate = _advance_of(self)
         path = np.empty((len(u) + 1, *x.shape))
         path[0] = x
         for k in range(len(u)):
             integrate(x, np.ascontiguousarray(np.broadcast_to(u[k], (len(names), n))), p, dt, substeps)
             path[k + 1] = x
         return path[..., 0] if is_single else path
+
+
+@lru_cache(maxsize=64)
+def _advance_of(model: MotionModel) -> Any:
+    """The compiled function of a model; to find it takes much longer than a short rollout."""
+    return model.advance
 
 
 def _numbers(name: str, param: Param) -> tuple[str, ...]:

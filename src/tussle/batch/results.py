@@ -77,7 +77,7 @@ class Results:
         if n_copies := self.n_runs - self.n_failed - self.n_distinct:
             self.notes.append(
                 f"{n_copies:,} of {self.n_runs:,} runs are copies of another run of their point: they end in the same state; "
-                f"intervals count the {self.n_distinct:,} distinct games"
+                f"intervals count distinct games ({self.n_distinct:,})"
             )
         self._columns = self._quantities_of(facts)
         names = [v.name for v in self.variables]

@@ -144,7 +144,7 @@ def test_sweep_gives_each_world_what_the_parameter_alone_gives(update):
     game = mission("chase_synchronous").replace(update=update, motion_multiplier=2)
     sweep = {
         "prey.Boids.goal_weight": [0.1, 0.2, 0.3, 0.1],
-        "prey.Boids.means": ["team", "historic", "team", "historic"],
+        "prey.Boids.averaging": ["team", "historic", "team", "historic"],
         "prey.Boids.fov_az": [6.3, 2.0, 1.0, 6.3],
         "prey.Boids.comms_range": [200.0, 50.0, 100.0, 30.0],
         "prey.speed": [1.0, 2.0, 3.0, 4.0],

@@ -45,9 +45,10 @@ print(json.dumps([[each.name, each.key()] for each in gc.get_objects() if issubc
 
 @pytest.fixture(scope="module")
 def plain_cache(tmp_path_factory):
-    """A folder with the kernels that the user has anyway, filled up by one run of the program."""
+    """A copy of the user's kernels, in which those of the program are: other tests need most of them too."""
+    run(PACKAGE.parent, store.directory())
     folder = tmp_path_factory.mktemp("kernels")
-    for path in store.directory().glob("tussle.*.kernel") if store.directory().is_dir() else ():
+    for path in store.directory().glob("tussle.*.kernel"):
         with contextlib.suppress(FileNotFoundError):  # another process has just removed an old one
             shutil.copy2(path, folder)
     return folder
@@ -55,7 +56,6 @@ def plain_cache(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def plain(plain_cache):
-    run(PACKAGE.parent, plain_cache)
     found = run(PACKAGE.parent, plain_cache)
     assert found["made"] == []
     return found

@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 from histories import difference
 
-N_MISSIONS = int(os.environ.get("TUSSLE_FUZZ", "200"))
-N_CHECKED = 24
+N_MISSIONS = int(os.environ.get("TUSSLE_FUZZ", "100"))
+N_CHECKED = 16
 CHUNK = 10
 pytestmark = pytest.mark.filterwarnings(
     "ignore:.*its messages are not received"

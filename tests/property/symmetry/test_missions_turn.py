@@ -228,7 +228,7 @@ def test_historic_means_depend_on_where_east_is():
     """The law that the paper's code had, kept to reproduce it, fails where the corrected one passes."""
 
     def flock(goal):
-        law = Boids(goal=goal, use_initial_heading=False, comms_range=80.0, means="historic")
+        law = Boids(goal=goal, use_initial_heading=False, comms_range=80.0, averaging="historic")
         return Mission(
             blocks=one_each(
                 "point", places(25, 100.0, 100.0), team=1, autonomy=law, motion=SingleIntegrator()

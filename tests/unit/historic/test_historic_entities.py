@@ -74,7 +74,7 @@ def test_boids_average_over_all_neighbors_and_take_the_climb_speed_for_an_altitu
     assert found["desired_heading"] == pytest.approx(math.atan2(v[1], v[0]), abs=1e-9)
     assert found["desired_altitude"] == pytest.approx(v[2], abs=1e-9)
     assert found["desired_speed"] == 30
-    assert commanded(stock, [mate, rival], means="historic")["desired_altitude"] == pytest.approx(
+    assert commanded(stock, [mate, rival], averaging="historic")["desired_altitude"] == pytest.approx(
         40 + v[2], abs=1e-9
     )
 

@@ -56,7 +56,7 @@ def game(*, update: str, boids: Boids, credit: str, health: float) -> Mission:
 GAMES = {
     "predator_prey": game(update="synchronous", boids=Boids(), credit="once", health=1),
     "predator_prey_paper": game(
-        update="sequential", boids=Boids(goal_distance=1e4, means="historic"), credit="each", health=5
+        update="sequential", boids=Boids(goal_distance=1e4, averaging="historic"), credit="each", health=5
     ),
 }
 

@@ -12,7 +12,7 @@ from tussle.stock.autonomy import boids
 
 
 class Boids(boids.Boids):
-    """Boids with SCRIMMAGE's averages, whatever `means` says, and with its output of the climb speed as the desired altitude.
+    """Boids with SCRIMMAGE's averages, whatever `averaging` says, and with its output of the climb speed as the desired altitude.
 
     The sign of pitch_rate is opposite: SCRIMMAGE turned the pitch of its vehicles nose down in 2020, but not this command, so entities
     that should climb dive, do half a loop, and fly on upside down, where the sign is right. Fields of view are whole degrees: the rest

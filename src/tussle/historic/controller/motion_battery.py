@@ -36,4 +36,4 @@ class MotionBattery(motion_battery.MotionBattery):
         if self.publish_charge:
             span = self.charge_max - self.charge_min
             share = np.divide(self.charge - self.charge_min, span, out=np.zeros(g.n), where=span > 0.0)
-            self.told.publish(np.arange(g.n), percentage=100.0 * share)
+            self.reported.publish(np.arange(g.n), percentage=100.0 * share)

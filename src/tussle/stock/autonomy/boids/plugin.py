@@ -22,7 +22,7 @@ class Boids(Autonomy):
 
     The neighbours are all entities nearer than `comms_range`. The desired velocity is the weighted sum of five vectors (goal,
     repulsion from team mates, repulsion from others, centroid of the team mates, mean heading of the team mates), divided by the sum
-    of their lengths, times `max_speed`. With `means="historic"` centroid and heading are computed as in the code of the paper: yaw is
+    of their lengths, times `max_speed`. With `averaging="historic"` centroid and heading are computed as in the code of the paper: yaw is
     averaged as a plain number (wrong near West), and both sums are divided by the number of all neighbours, other teams included,
     which biases the centroid towards the world's origin and the heading towards East.
 
@@ -58,7 +58,7 @@ class Boids(Autonomy):
     use_initial_heading = Param(True, doc="Place the goal `goal_distance` ahead of the initial position.")
     goal_distance = Param(AHEAD, unit="m", ge=0.0, doc="Distance to the goal, with use_initial_heading.")
     goal = Param((1e6, 1e6, 1e3), fields="x y z", unit="m", doc="Goal without use_initial_heading.")
-    means = Param("team", choices=("team", "historic"), doc="How mean heading and centroid are computed.")
+    averaging = Param("team", choices=("team", "historic"), doc="How mean heading and centroid are computed.")
     target = State("x y z", unit="m", doc="Current goal.")
     speed = Output(unit="m/s")
     turn_rate = Output(unit="rad/s")
@@ -145,7 +145,7 @@ class Boids(Autonomy):
     def _neighbor_sums(self, g: GroupView) -> np.ndarray:
         """Sums over the neighbours as `kernels.law` takes them, (13, n)."""
         sees_all = g.once(kernels.sees_all, self.fov_az, self.fov_el)
-        if self.means == "historic":
+        if self.averaging == "historic":
             return self._with_historic_means(g, self.historic if sees_all else self.historic_in_view)
         return np.asarray((self.seen if sees_all else self.seen_in_view)(g).values)
 

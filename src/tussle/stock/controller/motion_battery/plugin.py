@@ -97,7 +97,7 @@ class MotionBattery(Controller):
     last = State(" ".join(CHANNEL_UNITS), doc="Values of the last call.")
     is_started = State(dtype=bool, doc="Whether there was a call.")
     charged = Subscribe(ChargeAdded)
-    told = Publish(ChargePercentage, network="LocalNetwork")
+    reported = Publish(ChargePercentage, network="LocalNetwork")
 
     def active_inputs(self) -> list[str]:
         """Return the channels of the map."""
@@ -135,7 +135,7 @@ class MotionBattery(Controller):
         if self.publish_charge:
             span = self.charge_max - self.charge_min
             share = np.divide(self.charge - self.charge_min, span, out=np.zeros(g.n), where=span > 0.0)
-            self.told.publish(np.arange(g.n), percentage=100.0 * share)
+            self.reported.publish(np.arange(g.n), percentage=100.0 * share)
 
     @service
     def get_battery_charge(self, g: GroupView) -> np.ndarray:

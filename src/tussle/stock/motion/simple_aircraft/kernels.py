@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tussle.numeric import sincos, tan, wrap
+from tussle.numeric import sincos, wrap
 from tussle.numeric.kernel import device, kernel
 
 BLOCK = 64  # rows; the scratch of a block fits into the L1 cache
@@ -25,16 +25,6 @@ def clamp(value, low, high):
 def turn_rate(sine, cosine, speed, radius, slope, target):
     """Turn rate [rad/s] at a bank given by its sine and cosine: V tan(roll) / (radius + slope (V - target))."""
     return speed * sine / (cosine * (radius + slope * (speed - target)))
-
-
-@device
-def state_equation(roll, pitch, yaw, speed, throttle, roll_rate, pitch_rate, radius, slope, target):
-    """(x', y', z' [m/s], roll', pitch', yaw' [rad/s], speed' [m/s^2]) away from the limits; what `flown` integrates."""
-    sp, cp = sincos(pitch)
-    sy, cy = sincos(yaw)
-    turn = speed / (radius + slope * (speed - target)) * tan(roll)
-    pull = ACCELERATION * clamp(throttle, -THROTTLE_MAX, THROTTLE_MAX)
-    return speed * cp * cy, speed * cp * sy, speed * sp, roll_rate, pitch_rate, turn, pull
 
 
 @device

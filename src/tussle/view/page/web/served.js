@@ -1,5 +1,5 @@
 // Data from the page's own server: by requests for ranges of frames, or by a socket while a game is played.
-/** @import { Hearer } from './types' */
+/** @import { MessageHandlers } from './types' */
 
 import { readMessage } from './packing.js';
 import { SOURCES } from './sources.js';
@@ -22,7 +22,7 @@ class RangeSource {
 class SocketSource extends RangeSource {
   isLive = true;
 
-  /** @param {Hearer} hear called with header and data of each message */
+  /** @param {MessageHandlers} hear called with header and data of each message */
   connect(hear) {
     this.socket = new WebSocket(ADDRESS.replace('http', 'ws'));
     this.socket.binaryType = 'arraybuffer';

@@ -49,10 +49,10 @@ export interface ShapesHeader {
 export interface Source {
   isLive: boolean;
   blob(name: string): Promise<Uint8Array>;
-  connect?(hear: Hearer): void;
+  connect?(hear: MessageHandlers): void;
   send?(command: string, fields?: object): void;
 }
-export interface Hearer {
+export interface MessageHandlers {
   status(status: Status): void; frame(header: { epoch: number }, bytes: Uint8Array): void; lost(): void;
   past(header: { epoch: number; seconds: number }, bytes: Uint8Array): void; drawn(header: ShapesHeader, bytes: Uint8Array): void;
 }

@@ -1,0 +1,157 @@
+"""Plans reach their goals, keep to the rules of the problem, and are what the vehicle flies."""
+
+import math
+
+import numpy as np
+import pytest
+
+from tussle import Block, Mission, Simulation
+from tussle.api import Autonomy, Output
+from tussle.errors import ParameterError
+from tussle.plan import Problem, solve, solve_with_ompl
+from tussle.plan.sst import Tree, _grow
+from tussle.scene import Cuboid, Scene
+from tussle.stock import Multirotor, Unicycle
+
+WALLS = [
+    Cuboid(center=(50, 40, 0), lengths=(10, 80, 20)),
+    Cuboid(center=(50, 97, 0), lengths=(10, 6, 20)),
+]  # a gap of 14 m
+
+
+def problem(**changes):
+    given = {
+        "motion": Unicycle(vel_max=5.0, turn_rate_max=1.0, use_pitch=False),
+        "start": {"x": 10.0, "y": 10.0},
+        "goal": (90.0, 10.0, 0.0),
+        "goal_radius": 3.0,
+        "bounds": {"x": (0, 100), "y": (0, 100), "yaw": (-math.tau, math.tau)},
+        "commands": {"speed": (2.0, 5.0), "turn_rate": (-1.0, 1.0)},
+        "scene": Scene(walls=WALLS),
+        "radius": 1.0,
+        "dt": 0.2,
+    }
+    return Problem(**{**given, **changes})
+
+
+def check(plan):
+    """The path begins at the start, is allowed in every step, and ends in the goal; its commands are within their ranges."""
+    asked = plan.problem
+    np.testing.assert_array_equal(plan.path[0], asked.first)
+    assert asked.is_allowed(np.ascontiguousarray(plan.path.T)).all()
+    assert asked.distance(plan.path[-1]) <= asked.goal_radius
+    low, high = np.array(list(asked.commands.values())).T
+    assert ((plan.commands >= low) & (plan.commands <= high)).all()
+    assert ((plan.steps >= 1) & (plan.steps <= asked.longest)).all()
+    assert plan.cost == pytest.approx(asked.dt * (len(plan.path) - 1))
+
+
+def test_a_plan_leads_through_the_gap_and_better_ones_are_found_later():
+    plan, longer = solve(problem(), seed=1, branches=20_000), solve(problem(), seed=1, branches=60_000)
+    assert plan.is_solved
+    assert longer.is_solved
+    check(plan)
+    check(longer)
+    shortest = (2 * math.hypot(36, 71) + 8 - 3) / 5  # straight to the gap, through it and back, at full speed
+    assert shortest < longer.cost <= plan.cost < 1.6 * shortest
+    np.testing.assert_array_equal(plan.path, solve(problem(), seed=1, branches=20_000).path)
+    assert np.isfinite(plan.costs).all()
+    assert (plan.parents < np.arange(len(plan.parents))).all()
+
+
+def test_every_node_is_the_end_of_the_path_to_it():
+    asked, chance = problem(scene=Scene(), goal=(20.0, 12.0, 0.0)), np.random.default_rng(1)
+    tree = Tree(asked, np.array([2.0, 2.0, 1.0]), 20_000)
+    none, start = np.zeros((2, 1)), asked.first[:, None]
+    tree.add(start, np.zeros(1), np.full(1, -1), none, np.zeros(1, np.int64), np.ones(1, bool))
+    for _ in range(8):
+        _grow(asked, tree, chance.integers(0, tree.n, 500), chance)
+    assert tree.n > 1000
+    for node in chance.integers(0, tree.n, 300):
+        plan = tree.plan_to(int(node), False, 0)
+        assert plan.path[-1].tobytes() == tree.x[:, node].tobytes()
+        assert plan.cost == pytest.approx(plan.costs[node])
+
+
+def test_what_is_planned_is_what_flies():
+    plan = solve(problem(), seed=2, branches=60_000, stop_at_first=True)
+    assert plan.is_solved
+
+    class Follow(Autonomy):
+        """Plays the inputs of the plan."""
+
+        command = Output("speed turn_rate velocity_z", unit="m/s rad/s m/s")
+
+        def step(self, g):
+            self.command[:] = plan.inputs[round(float(g.t[0]) / 0.2), :, None]
+
+    body = plan.problem.motion
+    block = Block(name="car", position=(10, 10, 0), autonomy=Follow(), motion=body)
+    with Simulation(Mission(blocks=[block], dt=0.2, end=1000.0)) as simulation:
+        for expected in plan.path[1:]:
+            simulation.step()
+            flown = simulation.read("car.Unicycle.x")[0][0]
+            assert np.reshape(flown, -1).tobytes() == expected.tobytes()
+
+
+def test_a_vehicle_with_forces_and_an_empty_scene():
+    hover = Multirotor()
+    asked = problem(
+        motion=Unicycle(vel_max=20.0, turn_rate_max=1.0, pitch_rate_max=1.0),
+        goal=(60.0, 60.0, 40.0),
+        bounds={"x": (0, 100), "y": (0, 100), "z": (0, 50), "yaw": (-math.tau, math.tau), "pitch": (-1, 1)},
+        commands={"speed": (5.0, 20.0), "turn_rate": (-1.0, 1.0), "pitch_rate": (-1.0, 1.0)},
+        scene=Scene(),
+        goal_radius=5.0,
+    )
+    plan = solve(asked, seed=1, branches=60_000)
+    assert plan.is_solved
+    check(plan)
+    assert set(
+        problem(motion=hover, commands={"motor_1": (0, 1)}, bounds={"x": (0, 100), "y": (0, 100)}).inputs
+    ) > {
+        "motor_0",
+        "force_x",
+    }
+
+
+def test_a_goal_that_cannot_be_reached_gives_the_way_to_the_nearest_node():
+    walled = Scene(walls=[Cuboid(center=(50, 50, 0), lengths=(10, 100, 20))])
+    plan = solve(problem(scene=walled), seed=1, branches=20_000)
+    assert not plan.is_solved
+    gaps = plan.problem.distance(np.vstack([plan.nodes, np.zeros((2, plan.nodes.shape[1]))]))
+    assert plan.problem.distance(plan.path[-1]) == pytest.approx(gaps.min())
+
+
+@pytest.mark.parametrize("planner", ["RRT", "KPIECE1", "EST"])
+def test_planners_of_ompl_propagate_with_the_motion_model(planner):
+    open_field = problem(scene=Scene(), goal=(40.0, 20.0, 0.0), goal_radius=8.0)
+    plan = solve_with_ompl(open_field, planner, seconds=60.0)
+    assert plan.is_solved
+    check(plan)
+    assert plan.n_propagated >= len(plan.path) - 1
+
+
+@pytest.mark.parametrize(
+    ("changes", "error"),
+    [
+        ({"start": {"north": 1.0}}, "start: Unicycle has no 'north'"),
+        ({"commands": {"sped": (0, 1)}}, "did you mean 'speed'"),
+        ({"bounds": {"x": (0, 100)}}, "bounds of x and y are missing"),
+        ({"bounds": {"x": (0, np.nan), "y": (0, 1)}}, "two finite numbers"),
+        ({"goal": (1.0, 2.0)}, "three finite numbers"),
+        ({"start": {"x": 50.0, "y": 50.0}}, "touches an obstacle"),
+        ({"start": {"x": -5.0}}, "outside the bounds"),
+        ({"shortest": 3, "longest": 2}, "shortest <= longest"),
+    ],
+)
+def test_problems_that_make_no_sense_are_refused(changes, error):
+    with pytest.raises(ParameterError, match=error):
+        problem(**changes)
+
+
+def test_wrong_options_are_refused():
+    with pytest.raises(ParameterError, match="cells: Unicycle has no 'z'"):
+        solve(problem(), cells={"z": 1.0})
+    with pytest.raises(ParameterError, match="did you mean 'RRT'"):
+        solve_with_ompl(problem(), "RTT")
