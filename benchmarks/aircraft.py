@@ -1,6 +1,6 @@
-"""Compiled aircraft beside JSBSim: who compiles, how far flights are apart, speed, threads, compile time, a mission.
+"""Compiled aircraft beside JSBSim: who compiles, how far flights are apart, speed, threads, compile time, missions.
 
-python benchmarks/aircraft.py --parts census match speed threads compile mission --json out.json
+python benchmarks/aircraft.py --parts census match speed threads compile mission predator_prey --json out.json
 python benchmarks/aircraft.py --parts match --aircraft c172p 737
 """
 
@@ -25,7 +25,7 @@ from tussle.aircraft.initial import place, run_initial
 from tussle.aircraft.node import AircraftError
 
 DT = 1.0 / 120.0
-PARTS = ("census", "match", "speed", "threads", "compile", "mission")
+PARTS = ("census", "match", "speed", "threads", "compile", "mission", "predator_prey")
 UNLOADABLE = ("L17", "Pterosaur", "dr1", "f104", "fokker100", "fokker50", "blank")
 PLACE = {
     "ic/lat-geod-deg": 33.0,
@@ -238,30 +238,89 @@ def compile_times(name: str, folder: str) -> dict[str, float]:
     return {"cold_s": found[0], "warm_s": found[1]}
 
 
-def mission(counts: list[int]) -> list[dict[str, float]]:
-    """CPU time of a step of 0.1 s of c172p that hold their course, by JSBSim and compiled [ms]."""
-    from tussle import Block, Mission, Simulation
-    from tussle.stock import AircraftPIDController, JSBSimCompiled, JSBSimControl, Straight
+ORIGINAL = {200: 2.63, 500: 0.66, 800: 0.227, 1100: 0.163, 1400: 0.128, 1700: 0.105, 2000: 0.090}
+"""Entities -> simulated seconds per CPU second of SCRIMMAGE with JSBSim (revision of 2025-08-12, Release build, one thread, logs off) on a
+2-core 2.6 GHz Xeon virtual machine: the third column of the paper's Table 1, measured again."""
+
+
+def cruise(n: int, model: Any, aircraft: str) -> Any:
+    """A mission of aircraft that hold their course."""
+    from tussle import Block, Mission
+    from tussle.stock import AircraftPIDController, Straight
+
+    block = Block(
+        name="c", team=1, count=n, position=(0, 0, 1500), variance=(1e6, 1e6, 1e4), speed=55.0,
+        autonomy=Straight(speed=55.0), controller=AircraftPIDController(), motion=model(aircraft=aircraft),
+    )  # fmt: skip
+    return Mission(blocks=[block], dt=0.1, motion_multiplier=SUBSTEPS, end=1e6)
+
+
+def predator_prey(n: int, model: Any, aircraft: str) -> Any:
+    """The game of the paper's Table 1: n - 10 prey that fly as aircraft, 5 + 5 predators, faster than the prey as there."""
+    from tussle import Block, Mission, stock
+
+    def predators(name: str, team: int, switching: bool) -> Any:
+        hunter = stock.Predator(max_speed=65.0, capture_range=5.0, allow_prey_switching=switching)
+        legs = stock.Unicycle(vel_max=65.0, turn_rate_max=2.0, pitch_rate_max=1.5)
+        place = {"position": (1000, 0, 1500), "heading": "180 deg"}
+        return Block(name=name, team=team, count=5, **place, autonomy=hunter, motion=legs)
+
+    prey = Block(
+        name="prey", team=1, count=n - 10, position=(0, 0, 1500), variance=(400_000, 400_000, 1000), speed=55.0,
+        autonomy=stock.Boids(max_speed=55.0), controller=stock.AircraftPIDController(), motion=model(aircraft=aircraft),
+    )  # fmt: skip
+    return Mission(
+        blocks=[prey, predators("keepers", 2, False), predators("switchers", 3, True)],
+        dt=0.1, end=20.0, motion_multiplier=SUBSTEPS, networks=[stock.LocalNetwork()],
+        interactions=[stock.SimpleCollision(startup_collisions_only=True), stock.SimpleCapture()],
+        metrics=[stock.SimpleCaptureMetrics()],
+    )  # fmt: skip
+
+
+def side_by_side(make: Any, counts: list[int], aircraft: str) -> list[dict[str, float]]:
+    """CPU time of a step of a mission, compiled and by JSBSim [ms], and simulated seconds per CPU second of both."""
+    from tussle import Simulation
+    from tussle.stock import JSBSimCompiled, JSBSimControl
 
     rows = []
     for n in counts:
         row: dict[str, float] = {"n": n}
         for model in (JSBSimCompiled, JSBSimControl):
-            block = Block(
-                name="c", team=1, count=n, position=(0, 0, 1500), variance=(1e6, 1e6, 1e4), speed=55.0,
-                autonomy=Straight(speed=55.0), controller=AircraftPIDController(), motion=model(aircraft="c172p"),
-            )  # fmt: skip
-            with Simulation(
-                Mission(blocks=[block], dt=0.1, motion_multiplier=12, end=1e6), seeds=[1]
-            ) as simulation:
+            with Simulation(make(n, model, aircraft), seeds=[1]) as simulation:
                 simulation.step(2)
+                steps = 100 if model is JSBSimCompiled else max(2, 800 // n)
                 begin = time.process_time()
-                steps = 20 if model is JSBSimCompiled else max(1, 400 // n)
                 simulation.step(steps)
                 row[model.__name__] = (time.process_time() - begin) / steps * 1e3
+                row[f"{model.__name__}_sim_per_cpu"] = 100.0 / row[model.__name__]
         row["ratio"] = row["JSBSimControl"] / row["JSBSimCompiled"]
+        if make is predator_prey and n in ORIGINAL:
+            row |= {
+                "original": ORIGINAL[n],
+                "ratio_original": row["JSBSimCompiled_sim_per_cpu"] / ORIGINAL[n],
+            }
         rows.append(row)
+        print(json.dumps(row), flush=True)
     return rows
+
+
+def mission_threads(n: int) -> dict[str, float]:
+    """A step of `cruise` with two threads and with one: shortest times of a clock [ms], which need two idle cores, and CPU times [ms]."""
+    from tussle import Simulation
+    from tussle.stock import JSBSimCompiled
+
+    best: dict[str, float] = {}
+    simulations = [Simulation(cruise(n, JSBSimCompiled, "c172p"), seeds=[1], threads=k) for k in (1, 2)]
+    for _ in range(60):
+        for k, simulation in enumerate(simulations, 1):
+            begin = time.perf_counter(), time.process_time()
+            simulation.step()
+            for name, taken in (
+                ("wall", time.perf_counter() - begin[0]),
+                ("cpu", time.process_time() - begin[1]),
+            ):
+                best[f"{name}_{k}"] = min(best.get(f"{name}_{k}", math.inf), taken * 1e3)
+    return best | {"ratio": best["wall_1"] / best["wall_2"], "cpu_ratio": best["cpu_1"] / best["cpu_2"]}
 
 
 def main() -> None:
@@ -297,16 +356,17 @@ def main() -> None:
         print(json.dumps(made["speed"], indent=1))
     if "threads" in options.parts:
         made["threads"] = threads("c172p", 2000)
-        print("two threads:", made["threads"])
+        made["mission_threads"] = mission_threads(2000)
+        print("two threads:", made["threads"], "in a mission:", made["mission_threads"])
     if "compile" in options.parts:
         import tempfile
 
         with tempfile.TemporaryDirectory() as folder:
             made["compile"] = {name: compile_times(name, folder) for name in chosen}
         print(json.dumps(made["compile"], indent=1))
-    if "mission" in options.parts:
-        made["mission"] = mission(options.counts)
-        print(json.dumps(made["mission"], indent=1))
+    for name, make in (("mission", cruise), ("predator_prey", predator_prey)):
+        if name in options.parts:
+            made[name] = side_by_side(make, options.counts, (options.aircraft or ["c172p"])[0])
     if options.json:
         options.json.write_text(json.dumps(made, indent=1))
 

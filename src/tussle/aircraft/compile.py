@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -53,6 +54,7 @@ BUILT_IN = (
     "accelerations/", "simulation/", "flight-path/", "inertial/", "metrics/", "ic/", "environment/",
 )  # fmt: skip
 """Beginnings of JSBSim's own properties. Others belong to the aircraft: what nobody writes is a command from outside, 0 at first."""
+WORD = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 SCOPE = {
     name: each
     for module in (runtime, air, contact)
@@ -72,7 +74,8 @@ class CompiledAircraft:
         first: Values of the slots before the initial conditions are run, (k,).
         tables: Numbers of its tables.
         advance: advance(x, tables, begin, end, n_steps, dt, frozen_dt): step rows of the state x, (k, n).
-        start: start(x, tables, begin, end, n_steps, dt, frozen_dt): start the engines.
+        start: start(x, tables, begin, end, n_steps, dt, frozen_dt): start the engines, with open throttles; where dt > 0, they settle
+            with the present positions of their levers.
         source: Python text of the kernels.
         inputs: Properties that may be set from outside.
         n_engines: Number of engines.
@@ -209,13 +212,16 @@ def _module(code: Code, variables: dict[str, str]) -> Iterator[str]:
         for array, (rows, columns) in code.arrays.items() if section == "step" else ():
             yield f"    {array} = np.zeros(({rows}, {columns}))"
         yield "    for row in range(begin, end):"
-        for k, variable in enumerate(variables.values()):
+        body = [*code.body(section, 3), "            pass"]
+        # What the section does not mention is neither loaded nor stored, which would only take time to compile.
+        used = {word for line in body for word in WORD.findall(line)}
+        mentioned = [(k, name, v) for k, (name, v) in enumerate(variables.items()) if v in used]
+        for k, _, variable in mentioned:
             yield f"        {variable} = x[{k}, row]"
         yield "        for _ in range(n_steps):"
-        yield from code.body(section, 3)
-        yield "            pass"
+        yield from body
         changed = code.sections[section].touched
-        for k, (name, variable) in enumerate(variables.items()):
+        for k, name, variable in mentioned:
             if k < len(CORE) or name.startswith(STATE) or name in changed:
                 yield f"        x[{k}, row] = {variable}"
         yield ""

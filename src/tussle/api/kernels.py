@@ -10,44 +10,64 @@ from tussle.numeric.kernel import device, kernel
 from tussle.numeric.quaternion import quat_normalize, quat_rotate
 
 
+@device
+def yaw_of(w, x, y, z):
+    """Heading of the body x axis, counter-clockwise from East [rad]; here and below, quaternions need not have unit length."""
+    return atan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z)
+
+
+@device
+def climb_of(w, x, y, z):
+    """Elevation of the body x axis, nose up positive [rad]."""
+    east = w * w + x * x - y * y - z * z
+    north = 2.0 * (w * z + x * y)
+    return atan2(2.0 * (x * z - w * y), math.sqrt(east * east + north * north))
+
+
+@device
+def roll_of(w, x, y, z):
+    """Bank about the body x axis, right wing down positive [rad]."""
+    return atan2(2.0 * (w * x + y * z), w * w - x * x - y * y + z * z)
+
+
+@device
+def forward_of(w, x, y, z):
+    """Unit vector along the body x axis, world frame."""
+    scale = 1.0 / (w * w + x * x + y * y + z * z)
+    return (
+        (w * w + x * x - y * y - z * z) * scale, 2.0 * (w * z + x * y) * scale, 2.0 * (x * z - w * y) * scale,
+    )  # fmt: skip
+
+
 @kernel("F2 i8 i8 i8 Fw")
 def yaw(quat, first, last, base, out):
-    """Heading of the body x axis, counter-clockwise from East [rad], of the columns [first, last) of quaternions (4, n).
-
-    Here and below, the result of column i is written to out[i - base]; the quaternions need not have unit length.
-    """
+    """Headings [rad] of the columns [first, last) of quaternions (4, n); here and below, that of column i is written to out[i - base]."""
     for i in range(first, last):
-        w, x, y, z = quat[0, i], quat[1, i], quat[2, i], quat[3, i]
-        out[i - base] = atan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z)
+        out[i - base] = yaw_of(quat[0, i], quat[1, i], quat[2, i], quat[3, i])
 
 
 @kernel("F2 i8 i8 i8 Fw")
 def climb(quat, first, last, base, out):
-    """Elevation of the body x axis, nose up positive [rad], (n,)."""
+    """Elevations of the body x axis [rad], (n,)."""
     for i in range(first, last):
-        w, x, y, z = quat[0, i], quat[1, i], quat[2, i], quat[3, i]
-        east = w * w + x * x - y * y - z * z
-        north = 2.0 * (w * z + x * y)
-        out[i - base] = atan2(2.0 * (x * z - w * y), math.sqrt(east * east + north * north))
+        out[i - base] = climb_of(quat[0, i], quat[1, i], quat[2, i], quat[3, i])
 
 
 @kernel("F2 i8 i8 i8 Fw")
 def roll(quat, first, last, base, out):
-    """Bank about the body x axis, right wing down positive [rad], (n,)."""
+    """Banks about the body x axis [rad], (n,)."""
     for i in range(first, last):
-        w, x, y, z = quat[0, i], quat[1, i], quat[2, i], quat[3, i]
-        out[i - base] = atan2(2.0 * (w * x + y * z), w * w - x * x - y * y + z * z)
+        out[i - base] = roll_of(quat[0, i], quat[1, i], quat[2, i], quat[3, i])
 
 
 @kernel("F2 i8 i8 i8 F2w")
 def forward(quat, first, last, base, out):
-    """Unit vector along the body x axis, world frame, (3, n)."""
+    """Unit vectors along the body x axis, world frame, (3, n)."""
     for i in range(first, last):
-        w, x, y, z = quat[0, i], quat[1, i], quat[2, i], quat[3, i]
-        scale = 1.0 / (w * w + x * x + y * y + z * z)
-        out[0, i - base] = (w * w + x * x - y * y - z * z) * scale
-        out[1, i - base] = 2.0 * (w * z + x * y) * scale
-        out[2, i - base] = 2.0 * (x * z - w * y) * scale
+        place = i - base
+        out[0, place], out[1, place], out[2, place] = forward_of(
+            quat[0, i], quat[1, i], quat[2, i], quat[3, i]
+        )
 
 
 @device
@@ -155,6 +175,20 @@ def check(pos, quat, health, faulty, part):
         faulty[i] = bad
         count += 1 if bad or not (health[i] > 0.0) else 0
     return count
+
+
+@device
+def columns_of_body(state):
+    """Numbers of the body columns, pos, vel, quat, omega, yaw, climb, roll, forward, level_forward, of a rigid body's 13 numbers."""
+    px, py, pz, vx, vy, vz, qw, qx, qy, qz, p, q, r = state
+    w, x, y, z = quat_normalize(qw, qx, qy, qz)
+    spin_x, spin_y, spin_z = quat_rotate(w, x, y, z, p, q, r)
+    forward_x, forward_y, forward_z = forward_of(w, x, y, z)
+    east, north = level(w, x, y, z)
+    return (
+        px, py, pz, vx, vy, vz, w, x, y, z, spin_x, spin_y, spin_z, yaw_of(w, x, y, z), climb_of(w, x, y, z),
+        roll_of(w, x, y, z), forward_x, forward_y, forward_z, east, north,
+    )  # fmt: skip
 
 
 @kernel("F2 F2w i8")

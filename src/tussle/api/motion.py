@@ -12,6 +12,7 @@ import numpy as np
 from tussle.api.bodies import DERIVED, OFFSETS, Bodies, derive
 from tussle.api.group import GroupView
 from tussle.api.kinds import EntityPlugin
+from tussle.api.range_kernel import RangeKernel
 from tussle.api.row_laws import BODY_INPUTS, advance_rows
 from tussle.columns import Channel, Param, State
 from tussle.errors import DeclarationError, ParameterError, listed, nearest_name
@@ -73,7 +74,8 @@ class MotionModel(EntityPlugin):
     are constants. It is integrated by the shared fourth-order Runge-Kutta method. Alternatively, a model consists of `row_law`s,
     which also return body columns, so that one kernel can run controllers with row laws and the model in all substeps; or it has
     a kernel: `advance = kernel` with arguments (x, u, p, dt, substeps), x (m, n), u (k, n) inputs and p (q, n) parameters in
-    order of declaration; or a property `advance` that returns the kernel of the structural variant.
+    order of declaration; or a property `advance` that returns the kernel of the structural variant. With `range_kernel` several threads
+    share the rows, and controllers with row laws and the model run in one kernel.
 
     Raises:
         DeclarationError: There is not exactly one state, it is a list, or an argument of `derivative` is unknown.
@@ -164,6 +166,11 @@ class MotionModel(EntityPlugin):
             names = set(inspect.signature(self.derivative).parameters)
         own = self._param_names()
         return [name for name in BODY_INPUTS if (name in names or name[:-2] in names) and name not in own]
+
+    @property
+    def range_kernel(self) -> RangeKernel | None:
+        """A kernel that steps a range of rows, if the model has one; then `advance` is that of this kernel."""
+        return None
 
     @property
     def advance(self) -> Any:

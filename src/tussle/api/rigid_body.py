@@ -7,10 +7,13 @@ from typing import Any
 import numpy as np
 
 from tussle.api import kernels
+from tussle.api.bodies import DERIVED
+from tussle.api.laws import BODY
 from tussle.api.motion import MotionBody, MotionModel
 from tussle.columns import Param, State
 from tussle.errors import ParameterError
 from tussle.numeric.quaternion import quat_rotate_inverse
+from tussle.numeric.row_kernel import Number, RowCall
 
 
 class InertiaParam(Param):
@@ -56,6 +59,21 @@ class PositiveParam(Param):
 
     def __init__(self, default: float, *, unit: str = "", doc: str = "") -> None:
         super().__init__(default, unit=unit, gt=0.0, doc=doc)
+
+
+RIGID_BODY = tuple(Number(f"rigid_body {k}") for k in range(13))
+"""The state of a rigid body as numbers of a row kernel."""
+TO_COLUMNS = RowCall(
+    kernels.columns_of_body,
+    (RIGID_BODY,),
+    tuple(
+        Number(part)
+        for name in ("pos", "vel", "quat", "omega", *DERIVED)
+        for part, (column, _) in BODY.items()
+        if column == name
+    ),
+)
+"""The body columns that belong to the state of a rigid body, as `to_body` writes them."""
 
 
 class RigidBodyModel(MotionModel):

@@ -10,12 +10,22 @@ from typing import Any
 import numpy as np
 
 from tussle.api.bodies import DERIVED, FLOATS
-from tussle.api.group import GroupView
+from tussle.api.group import ROWS_PER_THREAD, GroupView
 from tussle.api.laws import BODY, components
 from tussle.columns import Channel, Numbers, Output, Param, State
 from tussle.errors import DeclarationError, listed, nearest_name
 from tussle.numeric.rk4 import label
-from tussle.numeric.row_kernel import Item, Number, RowCall, RowKernel, Text, Value, numbers_of, read_first
+from tussle.numeric.row_kernel import (
+    BlockCall,
+    Item,
+    Number,
+    RowCall,
+    RowKernel,
+    Text,
+    Value,
+    numbers_of,
+    read_first,
+)
 
 BODY_INPUTS = ("force_x", "force_y", "force_z", "torque_x", "torque_y", "torque_z", "mass")
 BODY_NUMBERS: dict[str, Value] = {
@@ -160,9 +170,15 @@ class Rows:
     Args:
         calls: The laws, in order.
         held: Body numbers that stay constant over all substeps.
+        more: Codes and names of further arguments of the kernel.
     """
 
-    def __init__(self, calls: Sequence[RowCall], held: Collection[Number] = ()) -> None:
+    def __init__(
+        self,
+        calls: Sequence[RowCall | BlockCall],
+        held: Collection[Number] = (),
+        more: tuple[str, str] = ("", ""),
+    ) -> None:
         read = {each for call in calls for each in numbers_of(call.arguments)} - set(held)
 
         def needed(item: Item) -> Item:
@@ -178,10 +194,15 @@ class Rows:
         self.given = [*(each for each in first if each not in written), *both]
         self.kept = [*both, *(each for each in written if each not in both)]
         codes = f"({' '.join('F' * len(self.given))}) ({' '.join(['Fw'] * len(self.kept))})"
-        head = f"{codes} f8 i8 (i8 i8)", "own, out, dt, substeps, part", "part", "substeps"
+        further, names = more
+        arguments = f"own, out, dt, substeps, {names}part"
+        head = f"{codes} f8 i8 {further} (i8 i8)", arguments, "part", "substeps"
         self.kernel = RowKernel(calls, {"own": self.given}, {"out": self.kept}, head)
 
-    def run(self, g: GroupView, own: Callable[..., np.ndarray], dt: float, substeps: int) -> None:
+    def run(
+        self, g: GroupView, own: Callable[..., np.ndarray], dt: float, substeps: int, more: tuple[Any, ...] = (),
+        rows_per_thread: int = ROWS_PER_THREAD,
+    ) -> None:  # fmt: skip
         """Run the laws for all rows of a view, in substeps of dt [s] each; `own` returns the column of a key, (n,)."""
 
         def column(number: Number) -> np.ndarray:
@@ -191,7 +212,11 @@ class Rows:
             return np.asarray(np.atleast_2d(g.column(name))[place], float)
 
         given, kept = tuple(map(column, self.given)), tuple(map(column, self.kept))
-        g.split(self.kernel, given, kept, dt, substeps)
+        arguments = given, kept, dt, substeps, *more
+        if g.context.threads == 1:
+            self.kernel(*arguments, (0, g.n))
+        else:
+            g.context.split(g.n, lambda *part: self.kernel(*arguments, part), rows_per_thread)
 
 
 def step_rows(plugin: Any, g: GroupView) -> None:

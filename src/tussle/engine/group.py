@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -170,6 +171,7 @@ class Group:
         self.holds_handles = any(b.handles for b in self.walk())
         self._believe()
         self.integrate = self.motion.plugin.advance
+        self.range_kernel = self.motion.plugin.range_kernel
         self._place_motion()
         self.table.allocate(0)
         self.attach(bodies, bodies.n)
@@ -389,8 +391,11 @@ class Group:
         u = self.u
         if self.stacks_inputs:
             u = self._stacked_inputs()
-        if self.moving.context.threads == 1 or self.motion.handles:
+        if self.context.threads == 1 or self.motion.handles:
             self.integrate(self.x, u, self.p, dt, substeps)
+        elif ranged := self.range_kernel:
+            part = partial(ranged.part, self.x, u, self.p, dt, substeps)
+            self.context.split(self.n, part, ranged.rows_per_thread)
         else:
             self.moving.split(self._integrate_part, u, dt, substeps)
         self.publish()

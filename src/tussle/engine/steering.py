@@ -1,15 +1,25 @@
-"""Runs the controllers and the motion model of a group in one kernel over all substeps, if all of them are row laws."""
+"""Runs the controllers and the motion model of a group in one kernel over all substeps, if row laws or kernels over ranges allow it."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from tussle.api.bodies import DERIVED
+from tussle.api.group import ROWS_PER_THREAD
 from tussle.api.kinds import Controller
 from tussle.api.laws import BODY
 from tussle.api.motion import WRITABLE, MotionModel
+from tussle.api.range_kernel import RANGE_STEP, RangeKernel
+from tussle.api.rigid_body import RIGID_BODY, TO_COLUMNS, RigidBodyModel
 from tussle.api.row_laws import Rows, laws_of
 from tussle.columns import Handle, Topic
 from tussle.engine.group import Binding, Group
-from tussle.numeric.row_kernel import Item, Number, RowCall, numbers_of
+from tussle.numeric.row_kernel import BlockCall, Item, Number, RowCall, numbers_of
+
+ARRAYS = "address", "x", "u", "p", "numbers", "wholes"
+MORE = "u8 F2w F2 F2 F I", "".join(f"{name}, " for name in ARRAYS)
+RANGE_CALL = BlockCall(ARRAYS, RANGE_STEP, "dt, 1", (), "x", RIGID_BODY)
+"""A substep of a motion model with a kernel over ranges."""
 
 
 class Steering:
@@ -19,35 +29,46 @@ class Steering:
     controllers read the body values that the law of the motion model returns. The body table is written after the last substep.
     """
 
-    def __init__(self, group: Group, rows: Rows) -> None:
-        self.group, self.rows = group, rows
+    def __init__(self, group: Group, rows: Rows, ranged: RangeKernel | None = None) -> None:
+        self.group, self.rows, self.ranged = group, rows, ranged
 
     def run(self, dt: float, substeps: int) -> None:
         """Run controllers and motion of all rows for a number of substeps of dt [s]."""
         group = self.group
-        table = group.table
-        self.rows.run(group.steering, lambda dtype, row: table.arrays[dtype][row], dt, substeps)
+        table, ranged = group.table, self.ranged
+        more = ranged.arrays(group.x, group.u, group.p) if ranged else ()
+        least = ranged.rows_per_thread if ranged else ROWS_PER_THREAD
+        self.rows.run(group.steering, lambda dtype, row: table.arrays[dtype][row], dt, substeps, more, least)
         group.publish()
 
 
 def steering_of(group: Group) -> Steering | None:
     """Return the kernel of a group, or None if there is none.
 
-    There is none if a plugin has no row laws or has a rate, or if a controller reads body values that the law of the motion model
-    does not return.
+    There is none if a controller has no row laws or has a rate, if the motion model has neither row laws nor a kernel over ranges, or if
+    a controller reads body values that the law of the motion model does not return.
     """
     motion = group.motion
-    if not all(_is_law(b) for b in group.controllers) or not _flies_by_law(motion):
+    flies_in_ranges = _flies_in_ranges(group)
+    if not all(_is_law(b) for b in group.controllers) or not (flies_in_ranges or _flies_by_law(motion)):
         return None
     calls = [placed(call, group, b) for b in group.controllers for call in laws_of(b.plugin, b.plugin.wired)]
-    moves = [placed(call, group, motion) for call in laws_of(motion.plugin)]
+    moves: list[RowCall | BlockCall]
+    if flies_in_ranges:
+        commands = {Number((float, row)) for row in group.u_rows}
+        given = [each for call in calls for each in numbers_of(call.results) if each in commands]
+        moves = [replace(RANGE_CALL, arguments=tuple(dict.fromkeys(given))), TO_COLUMNS]
+    else:
+        moves = [placed(call, group, motion) for call in laws_of(motion.plugin)]
     believed = set(group.belief) | ({*DERIVED} if "quat" in group.belief else set())
     held = [Number(part) for part, (name, _) in BODY.items() if name in believed]
     changing = {Number(part) for part, (name, _) in BODY.items() if name in (*WRITABLE, *DERIVED)}
-    given = {each for call in moves for each in numbers_of(call.results)}
+    returned = {each for call in moves for each in numbers_of(call.results)}
     read = {each for call in calls for each in numbers_of(call.arguments)}
-    if (read & changing) - given - set(held):
+    if (read & changing) - returned - set(held):
         return None
+    if flies_in_ranges:
+        return Steering(group, Rows([*calls, *moves], held, MORE), group.range_kernel)
     return Steering(group, Rows([*calls, *moves], held))
 
 
@@ -60,6 +81,13 @@ def _is_law(binding: Binding) -> bool:
 def _flies_by_law(binding: Binding) -> bool:
     cls = type(binding.plugin)
     return bool(cls.row_laws) and cls.advance is MotionModel.advance and not cls.handles()
+
+
+def _flies_in_ranges(group: Group) -> bool:
+    """Whether the kernel over ranges can read the inputs and write the state where they are."""
+    cls = type(group.motion.plugin)
+    is_rigid_body = issubclass(cls, RigidBodyModel) and cls.to_body is RigidBodyModel.to_body
+    return group.range_kernel is not None and is_rigid_body and not group.stacks_inputs and not cls.handles()
 
 
 def placed(call: RowCall, group: Group, binding: Binding) -> RowCall:

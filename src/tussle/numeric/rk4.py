@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tussle.errors import DeclarationError, listed, nearest_name
+from tussle.numeric.address import caller
 from tussle.numeric.kernel import Device, Kernel, device, is_interpreted, kernel
 
 Floats = NDArray[np.float64]
@@ -87,28 +88,7 @@ def label(function: Callable[..., Any]) -> str:
 @cache
 def driver() -> Kernel:
     """The integration kernel, built on first use because importing this module must not import the compiler."""
-    from numba import types
-    from numba.core import cgutils
-    from numba.extending import intrinsic
-
-    array = types.Array(types.float64, 1, "C")
-
-    @intrinsic
-    def call(typingctx, address, x, u, p, dx):  # type: ignore[no-untyped-def]
-        """Call the compiled derivative at an address. Unboxing a first-class function object costs microseconds per call."""
-
-        def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
-            arguments = signature.args[1:]
-            kind = context.call_conv.get_function_type(types.none, arguments)
-            pointer = builder.inttoptr(args[0], kind.as_pointer())
-            status, _ = context.call_conv.call_function(builder, pointer, types.none, arguments, args[1:])
-            with cgutils.if_unlikely(builder, status.is_error):
-                context.call_conv.return_status_propagate(builder, status)
-            return context.get_dummy_value()
-
-        return types.none(types.uint64, array, array, array, array), generate
-
-    return kernel("u8 F2w F2 F2 f8 i8")(integrating(call))
+    return kernel("u8 F2w F2 F2 f8 i8")(integrating(caller("Fw Fw Fw Fw")))
 
 
 def integrating(call: Callable[..., Any]) -> Callable[..., Any]:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from tussle.errors import DeclarationError
+from tussle.numeric.address import caller
 from tussle.numeric.fingerprint import package
 from tussle.numeric.kernel import Device, device, kernel
 from tussle.numeric.rk4 import label
@@ -52,6 +53,32 @@ class RowCall:
         return RowCall(self.function, each(argument, self.arguments), each(result, self.results))
 
 
+@dataclass(frozen=True)
+class BlockCall:
+    """A call of a kernel for all rows of a block, between functions of one row.
+
+    Attributes:
+        kernel: Name of the argument of the row kernel that holds the address of the kernel, and names of those it is called with before
+            the range of rows.
+        codes: Codes of all arguments of the kernel.
+        after: Source text of its arguments after the range of rows.
+        arguments: Numbers that are stored to their columns before, since the kernel reads them there.
+        state: Name of a 2-D array that the kernel writes.
+        results: Its first rows, loaded afterwards.
+    """
+
+    kernel: tuple[str, ...]
+    codes: str
+    after: str
+    arguments: tuple[Number, ...]
+    state: str
+    results: tuple[Number, ...]
+
+    def replaced(self, argument: Callable[[Item], Item], result: Callable[[Item], Item]) -> BlockCall:
+        """Return the call as it is."""
+        return self
+
+
 def numbers_of(values: Iterable[Value]) -> Iterator[Number]:
     """Yield the numbers of the row in arguments or results."""
     for value in values:
@@ -79,7 +106,7 @@ class RowKernel:
 
     def __init__(
         self,
-        calls: Sequence[RowCall],
+        calls: Sequence[RowCall | BlockCall],
         given: Mapping[str, Sequence[Number]],
         kept: Mapping[str, Sequence[Number]],
         head: tuple[str, str, str, str],
@@ -89,10 +116,14 @@ class RowKernel:
         every = [*(each for part in (given, kept) for numbers in part.values() for each in numbers)]
         every += [each for call in calls for each in numbers_of((*call.arguments, *call.results))]
         self._line = {each: place for place, each in enumerate(dict.fromkeys(every))}
-        functions = [call.function for call in calls]
+        functions = [call.function for call in calls if isinstance(call, RowCall)]
         scope: dict[str, Any] = {"np": np, "BLOCK": BLOCK}
-        for place, function in enumerate(functions):
-            scope[f"call_{place}"] = function if isinstance(function, Device) else device(function)
+        for place, call in enumerate(calls):
+            if isinstance(call, BlockCall):
+                scope[f"call_{place}"] = caller(call.codes)
+            else:
+                own = call.function
+                scope[f"call_{place}"] = own if isinstance(own, Device) else device(own)
         text = [f"def row_kernel({arguments}):", *self._lines(given, kept, rows, times)]
         exec("\n".join(text) + "\n", scope)  # noqa: S102 - written here; what authors wrote is in functions of its own
         made = scope["row_kernel"]
@@ -116,11 +147,26 @@ class RowKernel:
             yield from self._copies(name, numbers, "work[{line} + k, l] = column[start + l]")
         yield f"        for _ in range({times}):"
         for place, call in enumerate(self.calls):
+            if isinstance(call, BlockCall):
+                yield from self._block_call(place, call, kept)
+                continue
             yield "            for l in range(m):"
             results = ", ".join(map(self._text, call.results))
             yield f"                {results} = call_{place}({', '.join(map(self._text, call.arguments))})"
         for name, numbers in kept.items():
             yield from self._copies(name, numbers, "column[start + l] = work[{line} + k, l]")
+
+    def _block_call(self, place: int, call: BlockCall, kept: Mapping[str, Sequence[Number]]) -> Iterator[str]:
+        for number in call.arguments:
+            name, at = next(
+                (name, list(every).index(number)) for name, every in kept.items() if number in every
+            )
+            yield f"            column = {name}[{at}]"
+            yield "            for l in range(m):"
+            yield f"                column[start + l] = {self._text(number)}"
+        yield f"            call_{place}({', '.join(call.kernel)}, start, start + m, {call.after})"
+        for line in self._copies(call.state, call.results, "work[{line} + k, l] = column[start + l]"):
+            yield f"    {line}"
 
     def _copies(self, name: str, numbers: Sequence[Number], copy: str) -> Iterator[str]:
         if not numbers:
@@ -132,6 +178,9 @@ class RowKernel:
         yield "            for l in range(m):"
         yield f"                {copy.format(line=line)}"
 
+    def _functions(self) -> Iterator[RowCall]:
+        return (call for call in self.calls if isinstance(call, RowCall))
+
     def __call__(self, *arguments: Any) -> None:
         try:
             self.kernel(*arguments)
@@ -142,7 +191,7 @@ class RowKernel:
     def _explain(self, error: Exception) -> None:
         from numba.core.errors import NumbaError
 
-        for call in self.calls:
+        for call in self._functions():
             function = getattr(call.function, "py_func", call.function)
             ones = [(1.0,) * len(each) if isinstance(each, tuple) else 1.0 for each in call.arguments]
             wanted = shape_of(call.results[0] if len(call.results) == 1 else call.results)
@@ -155,7 +204,7 @@ class RowKernel:
                     f"{label(function)} returns {found}; its results are {wanted}"
                 ) from error
         if isinstance(error, NumbaError):
-            names = ", ".join(label(call.function) for call in self.calls)
+            names = ", ".join(label(call.function) for call in self._functions())
             raise DeclarationError(f"{names} cannot be compiled: {error}") from error
 
 
@@ -166,7 +215,7 @@ def shape_of(value: Any) -> str:
     return f"({', '.join(shape_of(each) for each in value)})"
 
 
-def read_first(calls: Iterable[RowCall]) -> list[Number]:
+def read_first(calls: Iterable[RowCall | BlockCall]) -> list[Number]:
     """Return the numbers that a call reads before any call has written them."""
     found: dict[Number, None] = {}
     written: set[Number] = set()

@@ -155,12 +155,30 @@ def test_the_games_are_those_built_in_python(name):
     assert read.scores == built.scores
 
 
+def test_a_jet_and_compiled_aircraft_hold_their_courses():
+    for name, speed, options in (("fixed_wing_6dof", 220.0, {}), ("straight_jsbsim", 24.0, {"count": "2"})):
+        sim = Simulation(read_mission(name, {"end": "12", **options}, strict=True).mission, seeds=1)
+        sim.run()
+        vel = sim.state.population.bodies.vel
+        assert vel.shape[1] >= (1 if name == "fixed_wing_6dof" else 4)
+        assert abs(vel[0] / speed).min() > 0.85
+        assert abs(vel[1:] / speed).max() < 0.2
+
+
+def test_prey_that_fly_as_aircraft_are_hunted():
+    mission = read_mission("predator_prey_jsbsim", {"end": "40", "prey": "60"}, strict=True).mission
+    result = Simulation(mission, seeds=1).run()[0]
+    captured = sum(result.metrics["SimpleCaptureMetrics"]["NonTeamCapture"].values())
+    assert 0 < 60 - result.alive[1] <= captured + 12  # others collided at the start
+
+
 OTHERS = ("convoy", "auction_search", "underwater_survey")
+AIRCRAFT = ("straight_jsbsim", "fixed_wing_6dof", "predator_prey_jsbsim")
 
 
 def test_shipped_missions_have_titles_and_are_packaged():
     shipped = shipped_missions()
-    assert set(shipped) == {*GAMES, *ON_REGIONS, *OTHERS, "car_maze", "urban_quadrotors", "dozers"}
+    assert set(shipped) == {*GAMES, *ON_REGIONS, *OTHERS, *AIRCRAFT, "car_maze", "urban_quadrotors", "dozers"}
     for path, title in shipped.values():
         assert title
         assert read_mission(path, strict=True).name == title

@@ -85,7 +85,7 @@ class Propulsion:
         self._emit_functions(code, "post")
 
     def emit_start(self, code: Code) -> None:
-        """Emit that all engines run and have settled, with open throttles, at the present state of flight."""
+        """Emit that all engines run and have settled: with open throttles, or where dt > 0 with throttle and mixture as they are."""
         code.line("settled_now = 0.0")
         code.line("prop_fx = prop_fy = prop_fz = prop_mx = prop_my = prop_mz = 0.0")
         for k, unit in enumerate(self.engines):
@@ -94,7 +94,11 @@ class Propulsion:
                 isinstance(unit.engine, Turbine | Turboprop),
             )
             mixture = f"{code.read('atmosphere/P-psf')} / 2116.228 * 1.3" if is_piston else "1.0"
-            bench = Bench(code, k, "settling", "1.0", f"({mixture})")
+            throttle_now, mixture_now = (
+                code.read(f"fcs/{each}-pos-norm[{k}]") for each in ("throttle", "mixture")
+            )
+            throttle = f"(1.0 if dt == 0.0 else {throttle_now})"
+            bench = Bench(code, k, "settling", throttle, f"({mixture} if dt == 0.0 else {mixture_now})")
             unit.engine.emit_start(bench, unit.thruster)  # type: ignore[arg-type]
             code.line("settled = 0")
             # turbines first take a step of no duration

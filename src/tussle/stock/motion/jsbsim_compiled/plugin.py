@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar
@@ -10,24 +11,23 @@ import numpy as np
 
 from tussle import units
 from tussle.aircraft.compile import CompiledAircraft, compile_aircraft, save_source
-from tussle.aircraft.constants import EARTH_RATE
-from tussle.aircraft.equations import CORE
 from tussle.aircraft.files import package_root
-from tussle.aircraft.initial import CORE_SLOT, place_by_quaternion, run_initial
+from tussle.aircraft.initial import place_by_quaternion, run_initial
 from tussle.aircraft.node import AircraftError
+from tussle.aircraft.trim import LinearModel, TrimPoint, level_flight, linearize, throttles_of, trim
 from tussle.api import Input, MotionBody, Param, RigidBodyModel
-from tussle.errors import ParameterError
+from tussle.api.range_kernel import RangeKernel
+from tussle.errors import ParameterError, listed, nearest_name
 from tussle.geodesy import Origin
 from tussle.numeric import cos, sin
-from tussle.numeric.quaternion import quat_multiply, quat_rotate, quat_rotate_inverse
-from tussle.stock.motion.jsbsim_compiled import kernels
+from tussle.numeric.quaternion import quat_conjugate, quat_multiply, quat_rotate, quat_rotate_inverse
+from tussle.stock.motion.jsbsim_compiled import flying
+from tussle.stock.motion.jsbsim_compiled.flying import BODY, FOOT, SLOTS
 from tussle.stock.motion.jsbsim_compiled.script import Script, read_script
 
-FOOT = kernels.FOOT
 KNOT = float(units.NAUTICAL_MILE / 3600)  # [m/s]
-BODY, FRAME = 13, 7  # components of the rigid body and of the world frame, before the slots of the aircraft
-SLOTS = BODY + FRAME
-EARTH_ANGLE = CORE_SLOT["earth_angle"]
+ROWS_PER_THREAD = 64
+"""A step of an aircraft takes half a microsecond, starting a thread 50."""
 SURFACES = "fcs/elevator-cmd-norm", "fcs/aileron-cmd-norm", "fcs/rudder-cmd-norm"
 SETPOINTS = "ap/bank_setpoint", "ap/altitude_setpoint", "ap/airspeed_setpoint"
 ALTITUDE = "position/geod-alt-ft"
@@ -38,6 +38,26 @@ FORWARD_RIGHT_DOWN = np.array([[0.0], [1.0], [0.0], [0.0]])
 MIRRORED = np.array([[1.0], [-1.0], [-1.0]])
 
 
+TRIMS = "none", "longitudinal", "full"
+
+
+class SteadyFlightParam(Param):
+    """A trim. The conformance kit does not try all, as it tries `choices`: in its games no aircraft is in trim."""
+
+    def convert(self, value: Any, where: str = "", from_geodetic: Callable[..., Any] | None = None) -> Any:
+        """Check the name.
+
+        Raises:
+            ParameterError: There is no such trim.
+        """
+        name = super().convert(value, where, from_geodetic)
+        if name not in TRIMS:
+            raise ParameterError(
+                f"{self._place(where)} = {name!r} is not allowed{nearest_name(name, TRIMS)}; {listed(TRIMS)}"
+            )
+        return name
+
+
 class Flown:
     """A compiled aircraft with the slots that the plugin sets and reads."""
 
@@ -46,14 +66,35 @@ class Flown:
     ) -> None:
         self.aircraft, self.settings = aircraft, settings
         self.is_autopilot = is_autopilot
-        n = max(1, aircraft.n_engines)
-        names = [f"fcs/throttle-cmd-norm[{k}]" if k else "fcs/throttle-cmd-norm" for k in range(n)]
         at = aircraft.slots
-        self.throttles = [at[name] for name in names if name in at]
+        self.throttles = throttles_of(aircraft)
         self.surfaces = [(k, at[name]) for k, name in enumerate(SURFACES) if name in at]
         if is_autopilot:
             self.setpoints = [aircraft.slot(name) for name in SETPOINTS]
         self.altitude = at[ALTITUDE]
+
+    def commands(self) -> tuple[np.ndarray, np.ndarray]:
+        """The constants of `flying.flight`: numbers and whole numbers; throttle and surfaces are kept within their limits.
+
+        An autopilot takes bank [rad], altitude above the ellipsoid [ft] and airspeed [knot].
+        """
+        infinite = np.inf
+        if self.is_autopilot:
+            roll, altitude, speed = self.setpoints
+            found = [
+                (0, roll, -1, 1.0, -infinite, infinite),
+                (1, altitude, self.altitude, FOOT, -infinite, infinite),
+                (2, speed, -1, KNOT, -infinite, infinite),
+            ]
+        else:
+            found = [(0, slot, -1, 1.0, 0.0, 1.0) for slot in self.throttles]
+            found += [(1 + k, slot, -1, 1.0, -1.0, 1.0) for k, slot in self.surfaces]
+        tables = self.aircraft.tables
+        numbers = np.concatenate([tables, *([unit, low, high] for *_, unit, low, high in found)])
+        wholes = [self.aircraft.advance.address, len(found)]
+        for k, (given, slot, base, *_) in enumerate(found):
+            wholes += [given, slot, base, len(tables) + 3 * k]
+        return numbers, np.array(wholes, np.int64)
 
 
 @cache
@@ -95,6 +136,10 @@ class JSBSimCompiled(RigidBodyModel):
     jsbsim_root = Param(
         "", doc="Folder of aircraft, engine, systems and scripts; empty for those of the package jsbsim."
     )
+    trim = SteadyFlightParam(
+        "none",
+        doc="Trim at the start: none; longitudinal, by pitch, throttle and elevator trim; or full, by bank and the other surfaces too.",
+    )
     commands = Param("surfaces", choices=["surfaces", "autopilot"], doc="What is commanded.")
     wind = Param((0.0, 0.0, 0.0), fields="east north up", unit="m/s", doc="Velocity of the air, world frame.")
     throttle = Input(doc="Throttle.")
@@ -123,6 +168,22 @@ class JSBSimCompiled(RigidBodyModel):
     def source(self) -> Path:
         """Write the generated Python of the aircraft's kernels to the cache folder, to be read; return its path."""
         return save_source(self.flown.aircraft)
+
+    def steady_flight(self, speed: float, altitude: float) -> TrimPoint:
+        """Steady level flight at a speed [m/s] and an altitude [m], in calm air.
+
+        Raises:
+            ParameterError: There is none, or the aircraft cannot be compiled.
+        """
+        return level_flight(self.flown.aircraft, speed, altitude)
+
+    def linearize(self, speed: float, altitude: float) -> LinearModel:
+        """The matrices of the linear model of steady level flight, e.g. for a linear-quadratic regulator.
+
+        Raises:
+            ParameterError: As `steady_flight`.
+        """
+        return linearize(self.flown.aircraft, self.steady_flight(speed, altitude))
 
     def active_inputs(self) -> list[str]:
         """The inputs of surfaces, or of the autopilot."""
@@ -156,45 +217,29 @@ class JSBSimCompiled(RigidBodyModel):
             x[at[GROUND]] = origin.altitude / FOOT
         for name, number in flown.settings:
             x[aircraft.slot(name)] = number
-        run_initial(aircraft, x, body.dt)
-        aircraft.start(x, aircraft.tables, 0, n, 1, 0.0, body.dt)
+        trimmed = self.values["trim"]
+        if trimmed == "none":
+            run_initial(aircraft, x, body.dt)
+            aircraft.start(x, aircraft.tables, 0, n, 1, 0.0, body.dt)
+        else:
+            x = trim(aircraft, x, body.dt, full=trimmed == "full").state
+            attitude = quat_multiply(quat_conjugate(frame), quat_multiply(x[:4], FORWARD_RIGHT_DOWN))
+            body.quat[:, rows], body.omega[:, rows] = attitude, 0.0
         state = self.rigid_body
         state[BODY:SLOTS, rows] = np.concatenate([frame, np.array(center)[:, None]])
         state[SLOTS:, rows] = x
         super().from_body(body, rows)
 
     @property
+    def range_kernel(self) -> RangeKernel:
+        """The kernel that makes steps of all aircraft."""
+        numbers, wholes = self.flown.commands()
+        return RangeKernel(flying.flight(), numbers, wholes, ROWS_PER_THREAD)
+
+    @property
     def advance(self) -> Any:
         """The function that makes steps of all aircraft."""
-        flown = self.flown
-        aircraft = flown.aircraft
-        command = autopilot if flown.is_autopilot else surfaces
-
-        def fly(x: np.ndarray, u: np.ndarray, p: np.ndarray, dt: float, substeps: int) -> None:
-            """Make `substeps` steps of dt / substeps."""
-            slots = x[SLOTS:]
-            command(flown, x, slots, u)
-            step = dt / substeps
-            aircraft.advance(slots, aircraft.tables, 0, x.shape[1], substeps, step, step)
-            kernels.to_world(slots, EARTH_ANGLE, EARTH_RATE, x[BODY:SLOTS], x[:BODY])
-
-        return fly
-
-
-def surfaces(flown: Flown, x: np.ndarray, slots: np.ndarray, u: np.ndarray) -> None:
-    """Set throttle and surfaces, within their limits."""
-    for slot in flown.throttles:
-        np.clip(u[0], 0.0, 1.0, out=slots[slot])
-    for k, slot in flown.surfaces:
-        np.clip(u[1 + k], -1.0, 1.0, out=slots[slot])
-
-
-def autopilot(flown: Flown, x: np.ndarray, slots: np.ndarray, u: np.ndarray) -> None:
-    """Set bank [rad], altitude above the ellipsoid [ft] and airspeed [knot] of the autopilot."""
-    roll, altitude, speed = flown.setpoints
-    slots[roll] = u[0]
-    slots[altitude] = slots[flown.altitude] + (u[1] - x[2]) / FOOT
-    slots[speed] = u[2] / KNOT
+        return self.range_kernel.advance
 
 
 def earth_frame(origin: Origin) -> tuple[np.ndarray, tuple[float, float, float]]:
@@ -210,6 +255,3 @@ def local_frame(latitude: np.ndarray, longitude: np.ndarray) -> np.ndarray:
     return np.asarray(
         quat_multiply(np.stack([cos(a), zero, zero, sin(a)]), np.stack([cos(b), zero, sin(b), zero]))
     )
-
-
-assert CORE[EARTH_ANGLE] == "earth_angle"
