@@ -110,7 +110,7 @@ class Bench:
 
     def start(self) -> None:
         self.fdm["propulsion/set-running"] = -1
-        self.call("start", DT)
+        self.call("start", 0.0)
 
     def command(self, commands: dict[str, float]) -> None:
         for name, value in commands.items():
