@@ -188,12 +188,12 @@ class GroupView:
         """True states of all entities of all groups."""
         return self._bodies.view
 
-    def split(self, kernel: Callable[..., Any], *arguments: Any) -> None:
-        """Call kernel(*arguments, (first, last)) for parts of the rows, in several threads if there are enough rows."""
+    def split(self, kernel: Callable[..., Any], *arguments: Any, least: int = ROWS_PER_THREAD) -> None:
+        """Call kernel(*arguments, (first, last)) for parts of the rows, in several threads from 2 * least rows on."""
         if self.context.threads == 1:
             kernel(*arguments, (0, self.n))
         else:
-            self.split_rows(self.n, lambda *part: kernel(*arguments, part))
+            self.context.split(self.n, lambda *part: kernel(*arguments, part), least)
 
     def once(self, function: Callable[..., Any], *parameters: np.ndarray) -> Any:
         """Return function(*parameters), evaluated again only after rows or parameters have changed; for columns of parameters."""

@@ -212,11 +212,7 @@ class Rows:
             return np.asarray(np.atleast_2d(g.column(name))[place], float)
 
         given, kept = tuple(map(column, self.given)), tuple(map(column, self.kept))
-        arguments = given, kept, dt, substeps, *more
-        if g.context.threads == 1:
-            self.kernel(*arguments, (0, g.n))
-        else:
-            g.context.split(g.n, lambda *part: self.kernel(*arguments, part), rows_per_thread)
+        g.split(self.kernel, given, kept, dt, substeps, *more, least=rows_per_thread)
 
 
 def step_rows(plugin: Any, g: GroupView) -> None:

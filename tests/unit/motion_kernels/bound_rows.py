@@ -25,5 +25,9 @@ def bound(plugin, n):
 def seen(n, dt, **columns):
     """A view of n rows with these body columns."""
     return SimpleNamespace(
-        n=n, dt=dt, column=columns.__getitem__, split=lambda run, *given: run(*given, (0, n)), **columns
+        n=n,
+        dt=dt,
+        column=columns.__getitem__,
+        split=lambda run, *given, least: run(*given, (0, n)),
+        **columns,
     )
