@@ -29,6 +29,7 @@ class Overrides:
         self.columns: dict[tuple[str, tuple[str, ...], str], np.ndarray] = {}
         self.given: dict[tuple[str, tuple[str, ...], str], np.ndarray] = {}
         self.structural: dict[tuple[str, tuple[str, ...], str], list[Any]] = {}
+        self._block_values: dict[tuple[str, tuple[str, ...]], np.ndarray] = {}
         self._variants: dict[tuple[Any, ...], tuple[Block, ...]] = {}
 
     def set(self, values: Mapping[str, Any], worlds: np.ndarray) -> None:
@@ -81,7 +82,11 @@ class Overrides:
 
     def block_values(self, block: Block, names: Sequence[str], world: np.ndarray) -> np.ndarray:
         """Values of a block for entities of the worlds `world`, (k, m), or (k, 1) if all are equal."""
-        values = np.array([[getattr(block, name)] for name in names], float)
+        asked = block.name, tuple(names)
+        values = self._block_values.get(asked)
+        if values is None:
+            values = np.array([[getattr(block, name)] for name in names], float)
+            self._block_values[asked] = values
         keys = [(block.name, (), name) for name in names] if self.columns else []
         if any(key in self.columns for key in keys):
             values = np.repeat(values, len(world), axis=1)

@@ -217,7 +217,7 @@ class Simulation:
             ParameterError: A world does not exist or is given twice, or a seed or parameter is not allowed.
         """
         numbers = [int(w) for w in worlds]
-        if len(set(numbers)) < len(numbers) or not set(numbers) <= set(range(self.n_worlds)):
+        if len(set(numbers)) < len(numbers) or not all(0 <= w < self.n_worlds for w in numbers):
             raise ParameterError(
                 f"reset: worlds = {numbers} is not allowed; it takes numbers from 0 to {self.n_worlds - 1}, each once"
             )
