@@ -85,9 +85,7 @@ class Population:
         self._asked: dict[tuple[int, int, int], Group] = {}
         self._specs: dict[tuple[int, tuple[str, ...]], Any] = {}
         self._params: dict[Group, tuple[Params, Params]] = {}
-        self._of_block = np.zeros(
-            0, np.int64
-        )  # where entities of a block share a group: its number in `groups`
+        self._of_block = np.zeros(0, np.int64)  # number in `groups` of each block, if its entities share one
         self.on_new_group: Callable[[], None] = lambda: None
 
     def mass_properties(self) -> tuple[np.ndarray, np.ndarray]:

@@ -57,10 +57,10 @@ class Problem:
 
     def __post_init__(self) -> None:
         name = type(self.motion).__name__
-        self._check_names("start", self.start, self.fields)
-        self._check_names("bounds", self.bounds, self.fields)
-        self._check_names("commands", self.commands, self.inputs)
-        self._check_names("held", self.held, self.inputs)
+        self.check_names("start", self.start, self.fields)
+        self.check_names("bounds", self.bounds, self.fields)
+        self.check_names("commands", self.commands, self.inputs)
+        self.check_names("held", self.held, self.inputs)
         if not set(POSITION) <= set(self.fields):
             raise ParameterError(f"{name} has no state fields x, y, z; it has {', '.join(self.fields)}")
         for owner, ranges in (("bounds", self.bounds), ("commands", self.commands)):
@@ -80,7 +80,8 @@ class Problem:
         if not self.is_allowed(self.first[:, None])[0]:
             raise ParameterError("the start is outside the bounds, or touches an obstacle")
 
-    def _check_names(self, what: str, given: Mapping[str, Any], allowed: Sequence[str]) -> None:
+    def check_names(self, what: str, given: Mapping[str, Any], allowed: Sequence[str]) -> None:
+        """Raise a `ParameterError` for a name that is not allowed in the argument `what`."""
         for name in given:
             if name not in allowed:
                 raise ParameterError(

@@ -137,7 +137,7 @@ def solve(
 
 
 def _cell_sizes(problem: Problem, cells: Mapping[str, float]) -> np.ndarray:
-    problem._check_names("cells", cells, tuple(problem.bounds))
+    problem.check_names("cells", cells, tuple(problem.bounds))
     sizes = []
     for name, (low, high) in problem.bounds.items():
         size = cells.get(name, (high - low) / (50 if name in POSITION else 8) or 1.0)

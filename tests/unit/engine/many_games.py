@@ -74,7 +74,8 @@ def grown(name, n_games):
 
 if __name__ == "__main__":
     for name in sys.argv[2:]:
-        by, n_games = grown(name, int(sys.argv[1])), int(sys.argv[1])
+        n_games = int(sys.argv[1])
+        by = grown(name, n_games)
         for _ in range(2):  # an allocator takes a megabyte at some time; what games keep, they keep each time
             by = by if by < 1.0 else min(by, grown(name, n_games))
         print(name, round(by, 3), flush=True)
