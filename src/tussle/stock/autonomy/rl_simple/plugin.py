@@ -125,7 +125,7 @@ class RLSimple(Autonomy):
 
     def reward(self, g: GroupView) -> np.ndarray:
         """Rewards of this step, (n,)."""
-        return (np.floor(np.abs(g.pos[0]) + 0.5) < self.radius).astype(float)
+        return np.where(np.floor(np.abs(g.pos[0]) + 0.5) < self.radius, 1.0, 0.0)
 
     def _actor(self, row: int, spaces: tuple[Any, Any]) -> Any:
         """A new actor."""
