@@ -1,4 +1,4 @@
-"""Robots that move as an actor says and earn rewards near the origin."""
+"""Robots that move as an actor says and earn rewards near the origin or near each other."""
 
 from __future__ import annotations
 
@@ -101,8 +101,6 @@ class RLSimple(Autonomy):
     @staticmethod
     def adapters(module: Mapping[str, Any]) -> list[type[RLSimple]]:
         """Plugins for each function that a module, given by its names, defines to create actors."""
-        from tussle.stock.autonomy.rl_consensus import RLConsensus
-
         names = [name for name, value in module.items() if is_actor_init(value, module["__name__"])]
         return [adapted(base, module[name]) for name in names for base in (RLSimple, RLConsensus)]
 
@@ -167,6 +165,35 @@ class RLSimple(Autonomy):
                 (1.0 if number > 0 else -1.0) if is_discrete[i] else float(np.clip(number, -limit, limit))
             )
         return velocity[0], velocity[1], velocity[2]
+
+
+class RLConsensus(RLSimple):
+    """Moves as a Python actor says, and earns rewards near others; see `RLSimple` for actors and actions.
+
+    The reward of a step is the share of the world's entities that are other ones with |x - own x| below `radius`; with
+    `reward_type="origin"` it is that of `RLSimple`.
+
+    Differences from the existing system: it divides rewards by the duration of the mission [s].
+    """
+
+    grade = "external"
+
+    reward_type = Param(
+        "others", choices=("others", "origin"), doc="What is rewarded: to be near others, or near the origin."
+    )
+
+    def reward(self, g: GroupView) -> np.ndarray:
+        """Rewards of this step, (n,)."""
+        if self.reward_type == "origin":
+            return super().reward(g)
+        reward = np.zeros(g.n)
+        for world in np.unique(g.world):
+            x = np.sort(g.bodies.pos[0, g.bodies.world == world])
+            rows = np.flatnonzero(g.world == world)
+            own, radius = g.pos[0, rows], np.broadcast_to(self.radius, g.n)[rows]
+            near = np.searchsorted(x, own + radius, "left") - np.searchsorted(x, own - radius, "right")
+            reward[rows] = np.maximum(near - 1, 0) / len(x)
+        return reward
 
 
 def is_actor_init(value: Any, module: str) -> bool:
