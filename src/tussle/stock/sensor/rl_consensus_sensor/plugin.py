@@ -16,18 +16,21 @@ class RLConsensusSensor(Sensor):
     observation = Output(fields="value", ragged=True, doc="Numbers of an observation.")
 
     def spawn(self, g: GroupView, rows: np.ndarray) -> None:
-        """Observe the initial states, which actors see first."""
-        self.step(g)
+        """Observe the initial states, which actors see first; the others keep what they saw."""
+        self._observe(g, rows)
 
     def step(self, g: GroupView) -> None:
-        bodies, parts = g.bodies, []
-        with_id = np.broadcast_to(self.include_id, g.n).astype(bool)
-        worlds: dict[int, np.ndarray] = {}
-        for world in np.unique(g.world):
-            rows = np.flatnonzero(bodies.world == world)
-            worlds[world] = bodies.pos[0, rows[np.argsort(bodies.id[rows])]]
-        for row in range(g.n):
-            x = worlds[g.world[row]]
-            parts.append(np.concatenate([[float(g.id[row])], x]) if with_id[row] else x)
-        start = np.concatenate([[0], np.cumsum([len(part) for part in parts])]).astype(np.int64)
-        self.observation.set(start, np.concatenate(parts)[None] if parts else np.empty((1, 0)))
+        self._observe(g, np.arange(g.n))
+
+    def _observe(self, g: GroupView, rows: np.ndarray) -> None:
+        """Observe in some rows."""
+        bodies, parts = g.bodies, [self.observation[row] for row in range(g.n)]
+        with_id = np.broadcast_to(self.include_id, g.n)
+        for world in np.unique(g.world[rows]):
+            there = np.flatnonzero(bodies.world == world)
+            x = bodies.pos[0, there[np.argsort(bodies.id[there])]]
+            for row in rows[g.world[rows] == world]:
+                parts[row] = np.concatenate([[float(g.id[row])], x] if with_id[row] else [x])[None]
+        self.observation.set(
+            np.cumsum([0, *(part.shape[1] for part in parts)]), np.concatenate(parts, axis=1)
+        )

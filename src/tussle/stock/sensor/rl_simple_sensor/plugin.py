@@ -16,11 +16,19 @@ class RLSimpleSensor(Sensor):
     observation = Output(fields="value", ragged=True, doc="Numbers of an observation.")
 
     def spawn(self, g: GroupView, rows: np.ndarray) -> None:
-        """Observe the initial states, which actors see first."""
-        self.step(g)
+        """Observe the initial states, which actors see first; the others keep what they saw."""
+        self._observe(g, rows)
 
     def step(self, g: GroupView) -> None:
-        with_id = np.broadcast_to(self.include_id, g.n).astype(bool)
-        all_values = np.stack([g.id.astype(float), g.pos[0], np.broadcast_to(g.t, g.n)], axis=1)
-        kept = np.stack([with_id, np.ones(g.n, bool), np.ones(g.n, bool)], axis=1)
-        self.observation.set(np.concatenate([[0], np.cumsum(kept.sum(axis=1))]), all_values[kept][None])
+        self._observe(g, np.arange(g.n))
+
+    def _observe(self, g: GroupView, rows: np.ndarray) -> None:
+        """Observe in some rows."""
+        parts = [self.observation[row] for row in range(g.n)]
+        with_id, t = np.broadcast_to(self.include_id, g.n), np.broadcast_to(g.t, g.n)
+        for row in rows:
+            ids = [float(g.id[row])] if with_id[row] else []
+            parts[row] = np.array([[*ids, g.pos[0, row], t[row]]])
+        self.observation.set(
+            np.cumsum([0, *(part.shape[1] for part in parts)]), np.concatenate(parts, axis=1)
+        )
