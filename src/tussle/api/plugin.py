@@ -43,6 +43,8 @@ class HistoricAttributes:
         least_zero: Parameters for which a negative number, "none" in SCRIMMAGE, is read as 0.
         differs: Parameter -> note for files that omit it, since SCRIMMAGE has another default.
         chosen_by: Attribute that names the class of a plugin file that the plugin runs; "" for none.
+        chosen_default: Its value where the attribute is missing; if no plugin file has it, the plugin itself is meant.
+        chosen_kind: What it names, for errors, with {} for the name.
         rest: Parameter that takes all other attributes, as an object in JSON; "" for none.
     """
 
@@ -52,6 +54,8 @@ class HistoricAttributes:
     least_zero: tuple[str, ...] = ()
     differs: Mapping[str, str] = field(default_factory=dict)
     chosen_by: str = ""
+    chosen_default: str = ""
+    chosen_kind: str = "class {} with the methods init and step_autonomy"
     rest: str = ""
 
 

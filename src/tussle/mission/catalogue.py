@@ -119,21 +119,23 @@ class Catalogue:
         return found
 
     def adapter(self, cls: type[Plugin], name: str) -> type[Plugin]:
-        """The plugin that runs a class of a plugin file.
+        """The plugin that runs a class or a function of a plugin file.
 
         Args:
             cls: The plugin of the mission, such as PyAutonomy.
-            name: Name of the class.
+            name: Its name.
 
         Raises:
-            MissionError: No plugin file has such a class.
+            MissionError: No plugin file has it.
         """
         prefix = f"{cls.__name__}_"
         if prefix + name in self._sources:
             return self.load(prefix + name)
+        if name and name == cls.historic_attributes.chosen_default:
+            return cls
         found = [known.removeprefix(prefix) for known in self.names if known.startswith(prefix)]
         raise MissionError(
-            f"{cls.__name__}: no plugin file has a class {name[:80]!r} with the methods init and step_autonomy"
+            f"{cls.__name__}: no plugin file has a {cls.historic_attributes.chosen_kind.format(repr(name[:80]))}"
             f"{nearest_name(name[:80], found)}; give its file with --plugin-path"
         )
 

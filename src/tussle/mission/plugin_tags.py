@@ -134,12 +134,13 @@ class PluginReader:
         except MissionError as error:
             self.problems.error(place, f"{tag}: {error}")
             return None
-        chosen = written.attributes.get(cls.historic_attributes.chosen_by)
+        known = cls.historic_attributes
+        chosen = written.attributes.get(known.chosen_by, known.chosen_default or None)
         if chosen is not None:
             try:
                 cls = self.catalogue.adapter(cls, chosen)
             except MissionError as error:
-                self.problems.error(written.where(cls.historic_attributes.chosen_by), str(error))
+                self.problems.error(written.where(known.chosen_by), str(error))
                 return None
         elif hides := self.catalogue.hides(written.plugin):
             self.problems.note(place, hides)

@@ -7,6 +7,7 @@ import tomllib
 from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
+from types import FunctionType
 from typing import Any
 
 from tussle.errors import ParameterError, listed, nearest_name
@@ -72,10 +73,16 @@ def advise_controllers(offered: Iterable[str], needed: Iterable[str]) -> list[st
 
 
 def adapters(module: Mapping[str, Any]) -> list[Any]:
-    """Return a plugin class for each class of SCRIMMAGE's Python interface that a module, given by its names, defines."""
-    if not any(hasattr(value, "step_autonomy") for value in module.values()):
-        return []
-    return list(load("PyAutonomy").adapters(module))
+    """Return plugin classes for the classes and actors of SCRIMMAGE's Python interface that a module, given by its names, defines."""
+    found: list[Any] = []
+    if any(hasattr(value, "step_autonomy") for value in module.values()):
+        found += load("PyAutonomy").adapters(module)
+    if any(
+        isinstance(value, FunctionType) and "action_space" in value.__code__.co_varnames
+        for value in module.values()
+    ):
+        found += load("RLSimple").adapters(module)
+    return found
 
 
 def __getattr__(name: str) -> Any:

@@ -1,0 +1,186 @@
+"""Robots that move as an actor says and earn rewards near the origin."""
+
+from __future__ import annotations
+
+import copy
+import inspect
+import types
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from tussle.api import Autonomy, GroupView, Handle, HistoricAttributes, Input, Output, Param, Publish
+from tussle.errors import ParameterError
+from tussle.messages import RewardGiven
+from tussle.stock.autonomy.rl_simple.actors import Alternating, spaces_of
+
+DEFAULT_MODULE = "scrimmage.openai.tests.test_openai"
+DEFAULT_FUNCTION = "actor_init_func"
+
+
+@dataclass
+class Agent:
+    """The actor of an entity.
+
+    Attributes:
+        actor: The actor; None before the first observation.
+    """
+
+    actor: Any = None
+
+
+class RLSimple(Autonomy):
+    """Moves as a Python actor says, and earns a reward of 1 in each step in which it is near the origin.
+
+    The reward is published as `RewardGiven`, which `OpenAIRewards` sums: 1 where |x|, rounded to whole metres, is below `radius`. The actor
+    gets the observation of `RLSimpleSensor` or `RLConsensusSensor`, (k,), and returns an action: first the discrete components, then the
+    continuous ones. A discrete one is 1 (1 m/s along its axis) or 0 (-1 m/s); a continuous one is a velocity, limited to `max_speed`.
+
+    Actors come from plugin files (`--plugin-path`), since a mission names no code: a function whose first parameter is named
+    `action_space`, such as `def actor_init_func(action_space, obs_space, params)`. It is called once for each entity, with spaces of
+    Gymnasium (None without it) and the parameters as texts, and returns a callable or an object with `act`. A mission names it by
+    `actor_init_func`, the default being the function of that name. Without one, entities go to and fro.
+
+    Differences from the existing system: it imports any module; a snapshot has the attributes of an actor that is an object of a
+    class, and no variables of functions.
+    """
+
+    grade = "external"
+    historic_attributes = HistoricAttributes(
+        unread=("port", "grpc_address", "server_address", "library"), chosen_by="actor_init_func",
+        chosen_default=DEFAULT_FUNCTION, chosen_kind="function {} whose first parameter is action_space",
+    )  # fmt: skip
+    actor_init: ClassVar[Callable[[Any, Any, dict[str, str]], Any]] = Alternating
+    """Creates an actor."""
+    is_own_actor: ClassVar[bool] = True
+    """Whether there is no function of a plugin file."""
+
+    radius = Param(
+        2.0, unit="m", ge=0.0, doc="Distance from the origin along x below which there are rewards."
+    )
+    x_discrete = Param(True, doc="Choose the velocity along x from two values.")
+    ctrl_y = Param(False, doc="Choose a velocity along y too.")
+    y_discrete = Param(False, doc="Choose the velocity along y from two values.")
+    max_speed = Param(10.0, unit="m/s", ge=0.0, doc="Limit of a continuous velocity.")
+    module = Param(
+        DEFAULT_MODULE, doc="Module of the actor in the mission file; the actor itself is in a plugin file."
+    )
+    grpc_mode = Param(False, doc="Ask a server for actions; refused.")
+    agent = Handle(doc="The actor.")
+    observation = Input(fields="value", ragged=True)
+    rewards = Publish(RewardGiven)
+    velocity = Output("velocity_x velocity_y velocity_z", unit="m/s")
+
+    def check_values(self) -> None:
+        """Check that there is an actor."""
+        name = type(self).__name__
+        if self.grpc_mode:
+            raise ParameterError(
+                f"{name}.grpc_mode = true is not allowed: actors are Python functions of a file given by --plugin-path, not servers"
+            )
+        if self.is_own_actor and self.module != DEFAULT_MODULE:
+            raise ParameterError(
+                f"{name}.module = {self.module[:80]!r}: a mission names no code; give the actor's file with --plugin-path, in which a "
+                f"function such as {DEFAULT_FUNCTION}(action_space, obs_space, params) returns the actor, or omit module"
+            )
+
+    def open_one(self, row: Any) -> Agent:
+        """No actor before the first observation."""
+        return Agent()
+
+    def save_one(self, agent: Agent) -> Any:
+        """A copy of the actor."""
+        return copy.deepcopy(agent.actor)
+
+    def load_one(self, row: Any, state: Any) -> Agent:
+        """Recreate the actor."""
+        return Agent(copy.deepcopy(state))
+
+    @staticmethod
+    def adapters(module: Mapping[str, Any]) -> list[type[RLSimple]]:
+        """Plugins for each function that a module, given by its names, defines to create actors."""
+        from tussle.stock.autonomy.rl_consensus import RLConsensus
+
+        names = [name for name, value in module.items() if is_actor_init(value, module["__name__"])]
+        return [adapted(base, module[name]) for name in names for base in (RLSimple, RLConsensus)]
+
+    def step(self, g: GroupView) -> None:
+        reward = self.reward(g)
+        rows = np.flatnonzero(reward)
+        self.rewards.publish(rows, entity=g.id[rows], team=g.team[rows], reward=reward[rows])
+        x_discrete, ctrl_y, y_discrete, max_speed = (
+            np.broadcast_to(value, g.n) for value in (self.x_discrete, self.ctrl_y, self.y_discrete, self.max_speed)
+        )  # fmt: skip
+        for row, agent in enumerate(self.agent):
+            seen = np.array(self.observation[row][0])
+            kinds = (bool(x_discrete[row]), bool(y_discrete[row]) if ctrl_y[row] else None)
+            limit = float(max_speed[row])
+            if agent.actor is None:
+                agent.actor = self._actor(row, spaces_of(*kinds, limit, len(seen)))
+            self.velocity[:, row] = self._velocity(
+                getattr(agent.actor, "act", agent.actor)(seen), kinds, limit
+            )
+
+    def reward(self, g: GroupView) -> np.ndarray:
+        """Rewards of this step, (n,)."""
+        return (np.floor(np.abs(g.pos[0]) + 0.5) < self.radius).astype(float)
+
+    def _actor(self, row: int, spaces: tuple[Any, Any]) -> Any:
+        """A new actor."""
+        values = {name: np.asarray(getattr(self, name)) for name in self.params()}
+        texts = {name: str(value[row] if value.ndim == 1 else value) for name, value in values.items()}
+        actor = type(self).actor_init(*spaces, texts)
+        if not callable(getattr(actor, "act", actor)):
+            raise ParameterError(
+                f"{type(self).__name__}: {self._function()} returned {str(actor)[:80]!r}; it returns a callable or an object with act"
+            )
+        return actor
+
+    def _function(self) -> str:
+        return str(getattr(type(self).actor_init, "__name__", "the actor's function"))
+
+    def _velocity(
+        self, action: Any, kinds: tuple[bool, bool | None], limit: float
+    ) -> tuple[float, float, float]:
+        """Velocity [m/s] of an action."""
+        is_discrete = [kind for kind in kinds if kind is not None]
+        order = [i for i, kind in enumerate(is_discrete) if kind] + [
+            i for i, kind in enumerate(is_discrete) if not kind
+        ]
+        parts = action if isinstance(action, tuple | list) else (action,)
+        try:
+            numbers = np.concatenate([np.ravel(np.asarray(part, float)) for part in parts])
+        except (TypeError, ValueError):
+            numbers = np.empty(0)
+        if self.is_own_actor:
+            numbers = np.repeat(numbers, len(order))
+        if len(numbers) != len(order) or not np.isfinite(numbers).all():
+            raise ParameterError(
+                f"{type(self).__name__}: the actor of {self._function()} chose {str(action)[:80]}; an action has {len(order)} finite "
+                "numbers, first the discrete ones"
+            )
+        velocity = [0.0, 0.0, 0.0]
+        for i, number in zip(order, numbers, strict=True):
+            velocity[i] = (
+                (1.0 if number > 0 else -1.0) if is_discrete[i] else float(np.clip(number, -limit, limit))
+            )
+        return velocity[0], velocity[1], velocity[2]
+
+
+def is_actor_init(value: Any, module: str) -> bool:
+    """Whether a value of a module is a function that is defined there and creates actors."""
+    if not isinstance(value, types.FunctionType) or value.__module__ != module:
+        return False
+    return next(iter(inspect.signature(value).parameters), "") == "action_space"
+
+
+def adapted(base: type[RLSimple], function: Callable[..., Any]) -> type[RLSimple]:
+    """The plugin that plays with the actors of a function; it belongs to the module of the function."""
+    name = f"{base.__name__}_{function.__name__}"
+    members = {
+        "__module__": function.__module__, "__doc__": f"{base.__name__} with the actors of {function.__name__}.",
+        "actor_init": staticmethod(function), "is_own_actor": False,
+    }  # fmt: skip
+    return types.new_class(name, (base,), exec_body=lambda body: body.update(members))

@@ -1,0 +1,5 @@
+"""RLConsensusSensor: what RLConsensus observes."""
+
+from tussle.stock.sensor.rl_consensus_sensor.plugin import RLConsensusSensor
+
+__all__ = ["RLConsensusSensor"]
