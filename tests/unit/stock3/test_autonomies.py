@@ -101,7 +101,7 @@ def auction(network, seeds, **values):
     sim = Simulation(mission(*blocks, networks=[network], end=9.0), seeds)
 
     def winners():
-        read = [sim.read(f"{name}.auction_assign.winner")[0] for name in ("head", "near", "far")]
+        read = [sim.read(f"{name}.AuctionAssign.winner")[0] for name in ("head", "near", "far")]
         return np.concatenate(read, axis=1)
 
     sim.step(40)
