@@ -10,7 +10,7 @@ except ImportError:
 
 from tussle.rl.action import Act
 from tussle.rl.environments import TaskEnv, TaskVectorEnv, make, make_vec, register
-from tussle.rl.games import PredatorPrey
+from tussle.rl.games import Consensus, NearOrigin, PredatorPrey
 from tussle.rl.observation import Component, Computed, Each, Means, NearestOthers, Own, Sectors
 from tussle.rl.parallel import TaskParallelEnv, parallel_env
 from tussle.rl.reward import Situation, Term, alive, captured, captures, collisions, died
@@ -21,8 +21,10 @@ __all__ = [
     "Act",
     "Component",
     "Computed",
+    "Consensus",
     "Each",
     "Means",
+    "NearOrigin",
     "NearestOthers",
     "Own",
     "PredatorPrey",
@@ -48,3 +50,5 @@ __all__ = [
 ]
 
 register("tussle/PredatorPrey-v0", PredatorPrey)
+register("tussle/RLSimple-v0", NearOrigin)
+register("tussle/RLConsensus-v0", Consensus)

@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from tussle.engine.simulation import Simulation
+from tussle.mission import Block, Mission
 from tussle.rl.action import Act
-from tussle.rl.observation import NearestOthers, Own
-from tussle.rl.reward import Term, alive, captured
+from tussle.rl.observation import Computed, NearestOthers, Own
+from tussle.rl.reward import Situation, Term, alive, captured
 from tussle.rl.task import Task
+from tussle.stock import SingleIntegrator
+
+RADIUS = 2.0
+"""Distance along x below which robots are near [m]."""
 
 
 class PredatorPrey(Task):
@@ -26,4 +34,61 @@ class PredatorPrey(Task):
     reward = {"alive": Term(alive, 0.01), "captured": Term(captured, -1.0)}  # noqa: RUF012 - declared as ClassVar in Task
 
 
-__all__ = ["PredatorPrey"]
+def robots(count: int, spread: float) -> Mission:
+    """Robots that move on a line for 100 s.
+
+    Args:
+        count: How many.
+        spread: Half of the range of their first x [m].
+    """
+    block = Block(
+        name="robot", count=count, placement="uniform", half_width=(spread, 0.0, 0.0), scatter_first=True, motion=SingleIntegrator()
+    )  # fmt: skip
+    return Mission(blocks=[block], end=100.0, dt=1.0, name="robots")
+
+
+def x_and_time(simulation: Simulation) -> np.ndarray:
+    """Position along x [m] and time [s] of each robot, (W, A, 2)."""
+    x = simulation.read("robot.pos")[0][..., 0]
+    return np.stack([x, np.broadcast_to(simulation.t[:, None], x.shape)], axis=-1)
+
+
+def all_x(simulation: Simulation) -> np.ndarray:
+    """Positions of all robots along x [m], the same for each, (W, A, A)."""
+    x = simulation.read("robot.pos")[0][..., 0]
+    return np.repeat(x[:, None], x.shape[1], axis=1)
+
+
+def near_origin(now: Situation) -> np.ndarray:
+    """1 for who is nearer to the origin than `RADIUS` along x, rounded to whole metres, (W, A)."""
+    return np.where(np.floor(np.abs(now.pos[..., 0]) + 0.5) < RADIUS, 1.0, 0.0)
+
+
+def near_others(now: Situation) -> np.ndarray:
+    """Share of all robots that are others nearer than `RADIUS` along x, (W, A)."""
+    x = now.pos[..., 0]
+    near = np.abs(x[:, :, None] - x[:, None]) < RADIUS
+    return np.asarray((near.sum(axis=-1) - 1) / x.shape[-1])
+
+
+class NearOrigin(Task):
+    """SCRIMMAGE's game RLSimple: a robot goes 1 m/s to the left or right, and is rewarded for each second near the origin."""
+
+    mission = robots(1, 10.0)
+    learners = "robot"
+    observation = (Computed(2, x_and_time),)
+    action = (Act("velocity_x", levels=[-1.0, 1.0]),)
+    reward = {"near": Term(near_origin)}  # noqa: RUF012 - declared as ClassVar in Task
+
+
+class Consensus(Task):
+    """SCRIMMAGE's game RLConsensus: ten robots go 1 m/s to the left or right, and are rewarded for being near each other."""
+
+    mission = robots(10, 50.0)
+    learners = "robot"
+    observation = (Computed(10, all_x),)
+    action = (Act("velocity_x", levels=[-1.0, 1.0]),)
+    reward = {"near": Term(near_others)}  # noqa: RUF012 - declared as ClassVar in Task
+
+
+__all__ = ["Consensus", "NearOrigin", "PredatorPrey"]

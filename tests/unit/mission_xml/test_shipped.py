@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tussle import Block, Mission, Simulation, stock
-from tussle.errors import MissionError, PluginError
+from tussle.errors import PluginError
 from tussle.mission import catalogue, read_mission, shipped_missions, tags
 from tussle.scene import Origin, Scene
 from tussle.stock import Boids, DirectController, Predator, SimpleCapture, SimpleCaptureMetrics, Unicycle
@@ -16,7 +16,8 @@ PAGE = Path(__file__).parents[3] / "docs" / "mission-format.md"
 PLAY = {
     "straight.xml": 3, "straight-no-gui.xml": 2, "unicycle.xml": 2, "harmonic-oscillator.xml": 1, "waypoint_follower.xml": 2,
     "batch-example-mission.xml": 2, "straight_include/straight_complete.xml": 2, "capture-the-flag-simple.xml": 4,
-    "colliding_spheres.xml": 2, "fixed_wing_6dof.xml": 1, "multirotor-test.xml": 1, "rlsimple.xml": 1, "straight_include/straight_include.xml": 2,
+    "colliding_spheres.xml": 2, "fixed_wing_6dof.xml": 1, "multirotor-test.xml": 1, "rlsimple.xml": 1,
+    "straight_include/straight_include.xml": 2,
 }  # fmt: skip
 """Missions of the existing system that play as they are, and the number of blocks of each."""
 RASCAL = ("predator_prey_boids.xml", "straight_jsbsim.xml")

@@ -100,7 +100,7 @@ def test_a_mission_names_no_code(game):
 def test_wrong_actors_and_actions_are_told(game):
     with pytest.raises(PluginError, match="nothing returned 'None'; it returns a callable"):
         played(game('actor_init_func="nothing"'))
-    with pytest.raises(PluginError, match="northward chose .*; an action has 1 finite numbers"):
+    with pytest.raises(PluginError, match=r"northward chose .*; an action has 1 finite numbers"):
         played(one_number())
 
 

@@ -1,5 +1,5 @@
-"""RLSimple: earns rewards near the origin, with actions of an actor."""
+"""RLSimple and RLConsensus: robots earn rewards near the origin or near each other, with actions of an actor."""
 
-from tussle.stock.autonomy.rl_simple.plugin import RLSimple, adapted
+from tussle.stock.autonomy.rl_simple.plugin import RLConsensus, RLSimple, adapted
 
-__all__ = ["RLSimple", "adapted"]
+__all__ = ["RLConsensus", "RLSimple", "adapted"]

@@ -1,4 +1,4 @@
-"""Robots that move as an actor says and earn rewards near the origin."""
+"""Robots that move as an actor says and earn rewards near the origin or near each other."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ class RLSimple(Autonomy):
 
     def reward(self, g: GroupView) -> np.ndarray:
         """Rewards of this step, (n,)."""
-        return (np.floor(np.abs(g.pos[0]) + 0.5) < self.radius).astype(float)
+        return np.where(np.floor(np.abs(g.pos[0]) + 0.5) < self.radius, 1.0, 0.0)
 
     def _actor(self, row: int, spaces: tuple[Any, Any]) -> Any:
         """A new actor."""
@@ -166,6 +166,35 @@ class RLSimple(Autonomy):
                 (1.0 if number > 0 else -1.0) if is_discrete[i] else float(np.clip(number, -limit, limit))
             )
         return velocity[0], velocity[1], velocity[2]
+
+
+class RLConsensus(RLSimple):
+    """Moves as a Python actor says, and earns rewards near others; see `RLSimple` for actors and actions.
+
+    The reward of a step is the share of the world's entities that are other ones with |x - own x| below `radius`; with
+    `reward_type="origin"` it is that of `RLSimple`.
+
+    Differences from the existing system: it divides rewards by the duration of the mission [s].
+    """
+
+    grade = "external"
+
+    reward_type = Param(
+        "others", choices=("others", "origin"), doc="What is rewarded: to be near others, or near the origin."
+    )
+
+    def reward(self, g: GroupView) -> np.ndarray:
+        """Rewards of this step, (n,)."""
+        if self.reward_type == "origin":
+            return super().reward(g)
+        reward = np.zeros(g.n)
+        for world in np.unique(g.world):
+            x = np.sort(g.bodies.pos[0, g.bodies.world == world])
+            rows = np.flatnonzero(g.world == world)
+            own, radius = g.pos[0, rows], np.broadcast_to(self.radius, g.n)[rows]
+            near = np.searchsorted(x, own + radius, "left") - np.searchsorted(x, own - radius, "right")
+            reward[rows] = np.maximum(near - 1, 0) / len(x)
+        return reward
 
 
 def is_actor_init(value: Any, module: str) -> bool:

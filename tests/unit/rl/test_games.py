@@ -1,0 +1,56 @@
+"""The tasks that come with tussle are the games that they say."""
+
+from __future__ import annotations
+
+import gymnasium
+import numpy as np
+import pytest
+
+from tussle.rl import Consensus, make_swarm
+
+
+@pytest.mark.parametrize(
+    ("name", "shape"), [("tussle/RLSimple-v0", (2,)), ("tussle/RLConsensus-v0", (10, 10))]
+)
+def test_the_games_of_scrimmage_are_registered(name, shape):
+    env = gymnasium.make(name, disable_env_checker=True)
+    obs, _ = env.reset(seed=1)
+    assert obs.shape == shape
+    env.close()
+
+
+def test_a_robot_that_goes_to_the_origin_is_rewarded_there():
+    env = gymnasium.make("tussle/RLSimple-v0", disable_env_checker=True)
+    obs, _ = env.reset(seed=1)
+    start, rewards, is_over = float(obs[0]), [], False
+    while not is_over:
+        before = obs.copy()
+        action = int(obs[0] < 0)
+        obs, reward, terminated, truncated, _ = env.step(action)
+        assert (
+            obs == pytest.approx([before[0] + (1 if action else -1), before[1] + 1], abs=1e-5)
+            or terminated
+            or truncated
+        )
+        rewards.append(reward)
+        is_over = terminated or truncated
+    assert truncated
+    assert len(rewards) == 100
+    assert abs(start) > 2.5
+    far = int(abs(start) - 1.5)
+    assert rewards == [0.0] * far + [1.0] * (100 - far)
+    env.close()
+
+
+def test_consensus_rewards_the_share_of_near_others():
+    swarm = make_swarm(Consensus(), 3)
+    obs = swarm.reset(seed=4)
+    assert obs.shape == (3, 10, 10)
+    actions = np.where(np.asarray(obs)[:, 0] < 0, 1, 0)
+    for _ in range(60):
+        obs, reward, *_ = swarm.step(actions)
+        x = np.array(obs)[:, 0]
+        wanted = ((np.abs(x[:, :, None] - x[:, None]) < 2).sum(axis=-1) - 1) / 10
+        np.testing.assert_allclose(reward, wanted, atol=1e-6)
+        actions = np.where(x < 0, 1, 0)
+    assert np.asarray(reward).mean() > 0.5
