@@ -67,7 +67,7 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
         return [self.possible_agents[a] for a in np.flatnonzero(alive)]
 
     def step(self, actions: Mapping[str, Any]) -> tuple[dict[str, Any], ...]:
-        """Play one decision.
+        """Play one decision; with no actions where all agents are dead and others are still to be born.
 
         The info of an agent whose episode ends has "episode": its return `r` and the number of decisions `l`. What each term of
         the reward gave in this step is in `swarm.terms`.
@@ -75,7 +75,7 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
         Raises:
             ParameterError: An agent's action is missing, is not allowed, or belongs to an agent that is not there.
         """
-        if not self.agents:
+        if not self.agents and self.swarm.over[0]:
             return {}, {}, {}, {}, {}
         before = self.agents
         self._take(actions)

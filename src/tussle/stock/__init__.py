@@ -81,7 +81,7 @@ def adapters(module: Mapping[str, Any]) -> list[Any]:
         isinstance(value, FunctionType) and "action_space" in value.__code__.co_varnames
         for value in module.values()
     ):
-        found += load("RLSimple").adapters(module)
+        found += [plugin for name in ("RLSimple", "RLConsensus") for plugin in load(name).adapters(module)]
     return found
 
 

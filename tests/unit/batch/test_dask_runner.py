@@ -26,7 +26,9 @@ from tussle.errors import BatchError, MissingExtraError, ParameterError
 from tussle.mission import read_mission
 
 pytestmark = [
-    pytest.mark.skipif(find_spec("distributed") is None, reason="Dask is not installed: pip install 'tussle[cluster]'"),
+    pytest.mark.skipif(
+        find_spec("distributed") is None, reason="Dask is not installed: pip install 'tussle[cluster]'"
+    ),
     # Dask warns where the disk of a busy machine needs more than a second for a folder.
     pytest.mark.filterwarnings("ignore:Creating scratch directories is taking"),
 ]

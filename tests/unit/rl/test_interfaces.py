@@ -2,6 +2,7 @@
 
 import types
 import warnings
+from dataclasses import replace
 
 import gymnasium
 import numpy as np
@@ -140,7 +141,7 @@ def test_vector_environments_reset_as_gymnasium_says(solo, mode):
 
 
 def test_tasks_are_registered():
-    env = gymnasium.make("tussle/PredatorPrey-v0", disable_env_checker=True)
+    env = gymnasium.make("tussle.rl:tussle/PredatorPrey-v0", disable_env_checker=True)
     obs, _ = env.reset(seed=1)
     assert obs.shape == (100, 73)
     env.close()
@@ -157,3 +158,42 @@ def test_pictures_show_the_world(task):
     env.close()
     with pytest.raises(ParameterError, match="render_mode"):
         make(task, render_mode="ascii")
+
+
+def test_agents_join_when_they_are_born(task):
+    """Two slots of births: these agents come later; agents that are not there take no actions and get no rewards."""
+    given = task.mission
+    prey, hunters = given.blocks
+    late = replace(prey, name="late", rate=1.0, slots=2)
+    env = parallel_env(
+        task.replace(mission=replace(given, blocks=(prey, late, hunters)), learners="prey late")
+    )
+    obs, _ = env.reset(seed=3)
+    n_born, seen = 0, set(env.agents)
+    assert 0 < len(seen) < len(env.possible_agents)
+    while env.agents:
+        before = set(env.agents)
+        obs, rewards, dead, late_, infos = env.step({a: np.zeros(2, np.float32) for a in env.agents})
+        assert set(obs) == set(rewards) == set(dead) == set(infos)
+        born = set(obs) - before
+        assert not born & seen
+        assert all(np.abs(obs[a]).max() > 0 for a in born)
+        assert set(env.agents) == {a for a in obs if not dead[a] and not late_[a]}
+        n_born, seen = n_born + len(born), seen | born
+    assert n_born > 1
+    assert seen <= set(env.possible_agents)
+
+
+def test_an_episode_may_begin_without_agents(task):
+    prey, hunters = task.mission.blocks
+    late = replace(prey, rate=1.0, slots=2, first_birth=1.0)
+    env = parallel_env(task.replace(mission=replace(task.mission, blocks=(late, hunters))))
+    env.reset(seed=3)
+    n_empty = 0
+    while not env.agents:
+        assert env.step({})[0].keys() == set(env.agents)
+        n_empty += 1
+    assert n_empty >= 10
+    while env.agents or not env.swarm.over[0]:
+        env.step({a: np.zeros(2, np.float32) for a in env.agents})
+    assert env.step({}) == ({}, {}, {}, {}, {})

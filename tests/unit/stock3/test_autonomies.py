@@ -14,6 +14,7 @@ from tussle.api import Autonomy, Publish, State, Subscribe
 from tussle.errors import ParameterError, PluginError, UnitError
 from tussle.geodesy import Origin
 from tussle.messages import CustomKeyPress, RemoveEntity, WaypointList, WorldPointClicked
+from tussle.mission import read_mission
 from tussle.stock import (
     AuctionAssign,
     Boids,
@@ -119,6 +120,20 @@ def test_the_highest_bid_wins_among_those_in_reach():
     assert winners[:, :5].all()
     assert (winners[:, :5] <= 5).all()
     assert not winners[:, 5].any()
+
+
+def test_what_missions_call_auction_assign_is_an_auction(tmp_path):
+    """There it is a class of Python, which the tag or the file of the plugin names."""
+    path = tmp_path / "m.xml"
+    path.write_text("""<runscript>
+      <run start="0" end="8" dt="0.1"/> <network name="CommsNetwork">GlobalNetwork</network>
+      <entity> <team_id>1</team_id> <count>3</count> <motion_model>SingleIntegrator</motion_model>
+        <autonomy module="auction_assign" class="AuctionAssign" auctioneer="true">auction_assign</autonomy>
+      </entity></runscript>""")
+    sim = Simulation(read_mission(path).mission, [1])
+    sim.step(60)
+    winners = sim.read("team_1.auction_assign.winner")[0]
+    assert np.isin(winners, [1, 2, 3]).all()
 
 
 def test_two_auctions_at_once_are_kept_apart():

@@ -9,6 +9,7 @@ from tussle.api import (
     EntityRef,
     Field,
     GroupView,
+    HistoricAttributes,
     Message,
     Output,
     Param,
@@ -47,6 +48,7 @@ class AuctionAssign(Autonomy):
     """
 
     grade = "portable"
+    historic_attributes = HistoricAttributes(unread=("module", "class", "library"))
 
     auctioneer = Param(True, doc="Whether it starts an auction.")
     duration = Param(5.0, unit="s", ge=0.0, doc="Time from the start of an auction to its result.")

@@ -98,11 +98,12 @@ class RLSimple(Autonomy):
         """Recreate the actor."""
         return Agent(copy.deepcopy(state))
 
-    @staticmethod
-    def adapters(module: Mapping[str, Any]) -> list[type[RLSimple]]:
-        """Plugins for each function that a module, given by its names, defines to create actors."""
-        names = [name for name, value in module.items() if is_actor_init(value, module["__name__"])]
-        return [adapted(base, module[name]) for name in names for base in (RLSimple, RLConsensus)]
+    @classmethod
+    def adapters(cls, module: Mapping[str, Any]) -> list[type[RLSimple]]:
+        """A plugin for each function that a module, given by its names, defines to create actors."""
+        return [
+            adapted(cls, value) for value in list(module.values()) if is_actor_init(value, module["__name__"])
+        ]
 
     def step(self, g: GroupView) -> None:
         reward = self.reward(g)
