@@ -74,6 +74,7 @@ def cluster_of(n_workers, **options):
 @pytest.fixture(scope="module")
 def cluster():
     import dask
+    import distributed  # noqa: F401 - its settings are there before one of them is changed, so that all are there afterwards
 
     # Dask gives up a worker of this machine that has not come back by then, which on a busy machine takes its time.
     with dask.config.set({"distributed.deploy.lost-worker-timeout": "10 minutes"}), cluster_of(2) as cluster:
