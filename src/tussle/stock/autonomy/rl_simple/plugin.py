@@ -171,8 +171,8 @@ class RLSimple(Autonomy):
 class RLConsensus(RLSimple):
     """Moves as a Python actor says, and earns rewards near others; see `RLSimple` for actors and actions.
 
-    The reward of a step is the share of the world's entities that are other ones with |x - own x| below `radius`; with
-    `reward_type="origin"` it is that of `RLSimple`.
+    With `reward_type="others"`, the reward of a step is the share of the world's entities that are other ones with
+    |x - own x| below `radius`; with "origin", the default, it is that of `RLSimple`.
 
     Differences from the existing system: it divides rewards by the duration of the mission [s].
     """
@@ -180,7 +180,7 @@ class RLConsensus(RLSimple):
     grade = "external"
 
     reward_type = Param(
-        "others", choices=("others", "origin"), doc="What is rewarded: to be near others, or near the origin."
+        "origin", choices=("origin", "others"), doc="What is rewarded: to be near the origin, or near others."
     )
 
     def reward(self, g: GroupView) -> np.ndarray:
