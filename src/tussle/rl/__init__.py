@@ -14,15 +14,24 @@ from tussle.rl.games import Consensus, NearOrigin, PredatorPrey
 from tussle.rl.observation import Component, Computed, Each, Means, NearestOthers, Own, Sectors
 from tussle.rl.parallel import TaskParallelEnv, parallel_env
 from tussle.rl.reward import Situation, Term, alive, captured, captures, collisions, died
-from tussle.rl.swarm import Swarm, make_swarm, record_episode
+from tussle.rl.robots import Coverage, FindWay, Formation, Hover, Waypoint
+from tussle.rl.swarm import Swarm, evaluate, make_swarm, record_episode
 from tussle.rl.task import Task
+from tussle.rl.teams import Battle, CaptureTheFlag, Intercept
 
 __all__ = [
     "Act",
+    "Battle",
+    "CaptureTheFlag",
     "Component",
     "Computed",
     "Consensus",
+    "Coverage",
     "Each",
+    "FindWay",
+    "Formation",
+    "Hover",
+    "Intercept",
     "Means",
     "NearOrigin",
     "NearestOthers",
@@ -36,11 +45,13 @@ __all__ = [
     "TaskParallelEnv",
     "TaskVectorEnv",
     "Term",
+    "Waypoint",
     "alive",
     "captured",
     "captures",
     "collisions",
     "died",
+    "evaluate",
     "make",
     "make_swarm",
     "make_vec",
@@ -49,6 +60,7 @@ __all__ = [
     "register",
 ]
 
-register("tussle/PredatorPrey-v0", PredatorPrey)
+for _task in (Battle, CaptureTheFlag, Coverage, FindWay, Formation, Hover, Intercept, PredatorPrey, Waypoint):
+    register(f"tussle/{_task.__name__}-v0", _task)
 register("tussle/RLSimple-v0", NearOrigin)
 register("tussle/RLConsensus-v0", Consensus)
