@@ -14,7 +14,7 @@ from tussle.rl.games import Consensus, NearOrigin, PredatorPrey
 from tussle.rl.observation import Component, Computed, Each, Means, NearestOthers, Own, Sectors
 from tussle.rl.parallel import TaskParallelEnv, parallel_env
 from tussle.rl.reward import Situation, Term, alive, captured, captures, collisions, died
-from tussle.rl.robots import Coverage, FindWay, Formation, Hover, Waypoint
+from tussle.rl.robots import Coverage, FindWay, Formation, Hover, ReachPoint
 from tussle.rl.swarm import Swarm, evaluate, make_swarm, record_episode
 from tussle.rl.task import Task
 from tussle.rl.teams import Battle, CaptureTheFlag, Intercept
@@ -37,6 +37,7 @@ __all__ = [
     "NearestOthers",
     "Own",
     "PredatorPrey",
+    "ReachPoint",
     "Sectors",
     "Situation",
     "Swarm",
@@ -45,7 +46,6 @@ __all__ = [
     "TaskParallelEnv",
     "TaskVectorEnv",
     "Term",
-    "Waypoint",
     "alive",
     "captured",
     "captures",
@@ -60,7 +60,17 @@ __all__ = [
     "register",
 ]
 
-for _task in (Battle, CaptureTheFlag, Coverage, FindWay, Formation, Hover, Intercept, PredatorPrey, Waypoint):
+for _task in (
+    Battle,
+    CaptureTheFlag,
+    Coverage,
+    FindWay,
+    Formation,
+    Hover,
+    Intercept,
+    PredatorPrey,
+    ReachPoint,
+):
     register(f"tussle/{_task.__name__}-v0", _task)
 register("tussle/RLSimple-v0", NearOrigin)
 register("tussle/RLConsensus-v0", Consensus)

@@ -49,7 +49,7 @@ def nearness(now: Situation) -> np.ndarray:
     return np.asarray(np.maximum(0.0, 1.0 - np.linalg.norm(now.pos, axis=-1) / 100.0))
 
 
-class Waypoint(Task):
+class ReachPoint(Task):
     """A unicycle drives to the origin and stays there; it starts up to 70 m away."""
 
     mission = single("waypoint", 30.0, motion=Unicycle(vel_max=10, turn_rate_max=1))
@@ -228,4 +228,4 @@ class Coverage(Task):
     decide_every = 5
 
 
-__all__ = ["Coverage", "FindWay", "Formation", "Hover", "Waypoint"]
+__all__ = ["Coverage", "FindWay", "Formation", "Hover", "ReachPoint"]

@@ -7,7 +7,7 @@ import pytest
 from tussle import rl
 from tussle.rl import evaluate
 
-TASKS = ("Battle", "CaptureTheFlag", "Coverage", "FindWay", "Formation", "Hover", "Intercept", "Waypoint")
+TASKS = ("Battle", "CaptureTheFlag", "Coverage", "FindWay", "Formation", "Hover", "Intercept", "ReachPoint")
 N = 8
 
 
