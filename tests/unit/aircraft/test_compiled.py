@@ -38,8 +38,26 @@ def roll_along(t):
     }
 
 
+def pilot(t):
+    """The autopilot of c172x, its holds one after the other."""
+    return {"fcs/throttle-cmd-norm": 0.8, "fcs/mixture-cmd-norm": 0.9, "ap/attitude_hold": float(t >= 1.0),
+            "ap/altitude_hold": float(t >= 5.0), "ap/altitude_setpoint": 4100.0, "ap/heading_hold": float(t >= 20.0),
+            "ap/heading_setpoint": 90.0 if t < 40.0 else 60.0}  # fmt: skip
+
+
+def take_off(t):
+    elevator = 0.0 if t < 18.0 else -0.15 if t < 19.5 else -0.08
+    return {"fcs/throttle-cmd-norm": 1.0, "fcs/mixture-cmd-norm": 0.95, "fcs/elevator-cmd-norm": elevator,
+            "fcs/rudder-cmd-norm": -0.1, "fcs/aileron-cmd-norm": 0.1 if t > 18.0 else 0.0}  # fmt: skip
+
+
 def apart(name, start, end, script, start_engines=True):
     """Largest distance between JSBSim's flight and the compiled one [m]."""
+    return both_flights(name, start, end, script, start_engines)[0]
+
+
+def both_flights(name, start, end, script, start_engines=True):
+    """Largest distance between JSBSim's flight and the compiled one [m], and JSBSim at the end."""
     jsbsim = pytest.importorskip("jsbsim")
     fdm = jsbsim.FGFDMExec(jsbsim.get_default_root_dir())
     fdm.set_debug_level(0)
@@ -74,7 +92,7 @@ def apart(name, start, end, script, start_engines=True):
         if step % 12 == 11:
             far = max(far, 0.3048 * math.dist([fdm[f"position/eci-{axis}-ft"] for axis in "xyz"], x[7:10, 0]))
     assert math.isfinite(far)
-    return far
+    return far, fdm
 
 
 def test_a_ball_falls_as_in_jsbsim():
@@ -86,7 +104,19 @@ def test_a_light_aircraft_flies_as_in_jsbsim_for_a_minute():
 
 
 def test_a_light_aircraft_rolls_along_the_runway_as_in_jsbsim():
-    assert apart("c172p", GROUND, 12.0, roll_along) < 0.05
+    assert apart("c172p", GROUND, 12.0, roll_along) < 1e-3
+
+
+def test_a_take_off_from_standstill_is_that_of_jsbsim():
+    far, fdm = both_flights("c172p", GROUND, 27.0, take_off)
+    assert fdm["position/h-agl-ft"] > 50.0 and not fdm["gear/wow"]
+    assert far < 1e-3
+
+
+def test_an_autopilot_flies_as_in_jsbsim_for_a_minute():
+    far, fdm = both_flights("c172x", {**START, "ic/h-sl-ft": 4000.0, "ic/vt-fps": 180.0}, 60.0, pilot)
+    assert math.cos(fdm["attitude/psi-rad"] - math.radians(60.0)) > 0.99  # it flies to where it was told
+    assert far < 1e-3
 
 
 def test_a_jet_flies_as_in_jsbsim_for_a_minute():
