@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tussle.aircraft.compile import CompiledAircraft, compile_aircraft
+from tussle.aircraft.compile import CompiledAircraft, GeneratedKernel, compile_aircraft
 from tussle.aircraft.initial import place, run_initial
 from tussle.aircraft.node import MOST_NODES, AircraftError, read_text
 
@@ -216,3 +216,26 @@ def test_unread_properties_are_not_computed(tmp_path):
     )
     assert "p_aero_qbar_psf = dynamic" in aircraft.source
     assert "density_altitude" not in aircraft.source
+
+
+def test_the_compiler_leaves_out_what_takes_seconds_for_generated_code():
+    from numba.core.event import install_recorder
+
+    def step(x, tables, begin, end, n_steps, dt, frozen_dt):
+        for row in range(begin, end):
+            y = x[0, row]
+            for _ in range(n_steps):
+                y = y + dt * tables[0] if y > frozen_dt else 0.0
+            x[0, row] = y
+
+    made = GeneratedKernel(step, "F2w F i8 i8 i8 f8 f8")
+    compiler = made._new_dispatcher("any")
+    with install_recorder("numba:run_pass") as passes:
+        compiler.compile(made.types)
+    names = " ".join(event.data["name"] for _, event in passes.buffer)
+    assert "native_lowering" in names
+    assert "ssa" not in names
+    assert "rewrite" not in names
+    x = np.full((1, 3), 2.0)
+    compiler(x, np.array([0.5]), 0, 2, 4, 0.25, 1.0)
+    assert x[0].tolist() == [2.5, 2.5, 2.0]
