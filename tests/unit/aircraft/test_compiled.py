@@ -51,6 +51,11 @@ def take_off(t):
             "fcs/rudder-cmd-norm": -0.1, "fcs/aileron-cmd-norm": 0.1 if t > 18.0 else 0.0}  # fmt: skip
 
 
+def in_wind(t):
+    return {**controls(t), "atmosphere/wind-north-fps": 20.0, "atmosphere/wind-east-fps": -10.0, "atmosphere/wind-down-fps": 2.0,
+            "atmosphere/gust-east-fps": 8.0 * math.sin(t)}  # fmt: skip
+
+
 def apart(name, start, end, script, start_engines=True):
     """Largest distance between JSBSim's flight and the compiled one [m]."""
     return both_flights(name, start, end, script, start_engines)[0]
@@ -101,6 +106,10 @@ def test_a_ball_falls_as_in_jsbsim():
 
 def test_a_light_aircraft_flies_as_in_jsbsim_for_a_minute():
     assert apart("c172p", {**START, "ic/h-sl-ft": 5000.0, "ic/vt-fps": 180.0}, 60.0, controls) < 1e-6
+
+
+def test_a_light_aircraft_flies_in_wind_as_in_jsbsim():
+    assert apart("c172p", {**START, "ic/h-sl-ft": 5000.0, "ic/vt-fps": 180.0}, 60.0, in_wind) < 1e-6
 
 
 def test_a_light_aircraft_rolls_along_the_runway_as_in_jsbsim():
