@@ -114,11 +114,11 @@ def to_world(x, row):  # type: ignore[no-untyped-def]
 
 
 @device
-def command(x, u, numbers, wholes, begin, end):  # type: ignore[no-untyped-def]
-    """Set the commands of rows."""
-    for k in range(wholes[1]):
+def command(x, u, numbers, places, begin, end):  # type: ignore[no-untyped-def]
+    """Set the commands of rows; places are the whole numbers of `flight`."""
+    for k in range(places[1]):
         at = 2 + COMMAND * k
-        given, slot, base, place = wholes[at], wholes[at + 1], wholes[at + 2], wholes[at + 3]
+        given, slot, base, place = places[at], places[at + 1], places[at + 2], places[at + 3]
         unit, low, high = numbers[place], numbers[place + 1], numbers[place + 2]
         for row in range(begin, end):
             value = u[given, row]
