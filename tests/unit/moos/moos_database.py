@@ -28,12 +28,14 @@ def text(data):
     return struct.pack("<i", len(data)) + data
 
 
-def message(kind, key, value, source="", community="", when=0.0):
-    """A message as bytes; a value that is a str is sent as a text."""
+def message(kind, key, value, source="", community="", when=0.0, extra=""):
+    """A message as bytes; a value that is a str is sent as a text, and `extra` beside a number."""
     is_text = isinstance(value, str)
     numbers = struct.pack("<ddd", when, -1.0 if is_text else value, -1.0)
     body = struct.pack("<i2s", -1, (kind + ("S" if is_text else "D")).encode())
-    body += text(source) + text("") + text(community) + text(key) + numbers + text(value if is_text else "")
+    body += (
+        text(source) + text("") + text(community) + text(key) + numbers + text(value if is_text else extra)
+    )
     return struct.pack("<i", len(body) + 4) + body
 
 
@@ -194,7 +196,7 @@ class MoosDatabase:
                 self.send(client, message("K", "", f'A client of this name ("{name}") already exists'))
                 return self.drop(client)
             client.name, community.clients[name] = name, client
-            return self.send(client, message("W", "", "asynchronous", "", community.name))
+            return self.send(client, message("W", "", 0.0, "", community.name, extra="asynchronous"))
         mail = {}
         for kind, key, value, source, origin, when in messages:
             assert source == client.name, f"{source} is not the name of {client.name}"
