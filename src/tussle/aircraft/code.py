@@ -247,7 +247,7 @@ class Code:
     # -- the whole ------------------------------------------------------------------------------------------------------------
 
     def is_used(self, name: str) -> bool:
-        """Whether somebody reads a property or keeps it."""
+        """Return True if somebody reads a property or keeps it."""
         return name in self.readers or name in self.kept
 
     def check(self, settable: Sequence[str] = ()) -> None:

@@ -58,7 +58,7 @@ class StaticSolids:
 
     @property
     def is_empty(self) -> bool:
-        """Whether there is nothing to touch."""
+        """True if there is nothing to touch."""
         return not (len(self.planes) + len(self.balls) + len(self.tree[3]) + self.field[0].size)
 
 

@@ -122,7 +122,7 @@ def renamed(function: Any, key: str) -> types.FunctionType:
 
 
 def is_interpreted(function: Callable[..., Any]) -> bool:
-    """Whether NUMBA_DISABLE_JIT is set and the function runs as Python, for a debugger. Functions of tussle stay compiled."""
+    """Return True if NUMBA_DISABLE_JIT is set and the function runs as Python, for a debugger. Functions of tussle stay compiled."""
     if package(function) == "tussle":
         return False
     from numba.core import config

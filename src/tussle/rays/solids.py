@@ -139,7 +139,7 @@ class Solids:
         return normal
 
     def touches(self, points: object, radius: object) -> np.ndarray:
-        """Whether spheres round points [m], (3, n), touch a part or lie inside one, (n,)."""
+        """Return whether spheres round points [m], (3, n), touch a part or lie inside one, (n,)."""
         center = checked_vectors("points", points)
         reach = np.minimum(checked_numbers("radius", radius, center.shape[1]), FARTHEST_RAY)
         touches = np.zeros(center.shape[1], np.bool_)

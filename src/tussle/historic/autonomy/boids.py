@@ -26,7 +26,7 @@ class Boids(boids.Boids):
         offset_x: float, offset_y: float, offset_z: float,
         quat_w: float, quat_x: float, quat_y: float, quat_z: float, half_view_az: float, half_view_el: float,
     ) -> bool:  # fmt: skip
-        """Whether azimuth and elevation of an offset [m] are smaller than half the fields of view, cut to whole degrees."""
+        """Return True if azimuth and elevation of an offset [m] are smaller than half the fields of view, cut to whole degrees."""
         w, i, j, k = quat_w, quat_x, quat_y, quat_z
         ahead = (
             (1 - 2 * (j * j + k * k)) * offset_x

@@ -18,7 +18,7 @@ class AutonomyExecutor(StateFollower):
     grade = "portable"
     historic_attributes = HistoricAttributes(
         differs={
-            "autonomies": "AutonomyExecutor without autonomies does nothing; in the existing system it has Straight"
+            "autonomies": "AutonomyExecutor without autonomies does nothing; in SCRIMMAGE it has Straight"
         }
     )
 

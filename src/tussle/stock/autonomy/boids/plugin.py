@@ -27,7 +27,7 @@ class Boids(Autonomy):
     which biases the centroid towards the world's origin and the heading towards East.
 
     The outputs fit a unicycle (speed, turn_rate, pitch_rate), an integrator (velocity) and heading controllers (desired_...). Only
-    outputs that are wired are computed. In the existing system the desired altitude was the climb speed; here it is the altitude one
+    outputs that are wired are computed. In SCRIMMAGE the desired altitude was the climb speed; here it is the altitude one
     second ahead.
     """
 
@@ -110,7 +110,7 @@ class Boids(Autonomy):
         offset_x: float, offset_y: float, offset_z: float, distance: float,
         quat_w: float, quat_x: float, quat_y: float, quat_z: float, fov_az: float, fov_el: float,
     ) -> bool:  # fmt: skip
-        """Whether azimuth and elevation of an offset [m] in body axes are inside the fields of view [rad].
+        """Return True if azimuth and elevation of an offset [m] in body axes are inside the fields of view [rad].
 
         For angles up to pi, |angle| < half is equivalent to cos(angle) > cos(half). A field of view of 2 pi has no edge: an entity
         exactly astern is seen.

@@ -80,7 +80,7 @@ class GoTo(Autonomy):
         return length(offset + back * way)
 
     def _is_last(self) -> np.ndarray:
-        """Whether no waypoint follows, (n,)."""
+        """Return whether no waypoint follows, (n,)."""
         n_points = self.waypoints.count
         is_end = (n_points <= 1) | (self.mode == "stop") & (self.current + 1 >= n_points)
         return np.asarray(self.is_told | is_end)

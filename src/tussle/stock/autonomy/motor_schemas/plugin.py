@@ -32,7 +32,7 @@ class MotorSchemas(StateFollower):
         unread=("pub_vel_vec",),
         differs={
             "behaviors": "MotorSchemas without behaviors flies straight on; "
-            "in the existing system it avoids others and goes to (100, 0, 0)"
+            "in SCRIMMAGE it avoids others and goes to (100, 0, 0)"
         },
     )
 

@@ -116,7 +116,7 @@ class ScrimmageState:
         return self.quat.rotate((1.0, 0.0, 0.0))
 
     def in_field_of_view(self, other: Any, width: float, height: float) -> bool:
-        """Whether a state or position is within a field of view, of a width and a height [rad]."""
+        """Return True if a state or position is within a field of view, of a width and a height [rad]."""
         x, y, z = self.rel_pos_local_frame(getattr(other, "pos", other))
         return abs(math.atan2(y, x)) < 0.5 * width and abs(math.atan2(z, math.hypot(x, y))) < 0.5 * height
 

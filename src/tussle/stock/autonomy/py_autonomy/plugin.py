@@ -163,7 +163,7 @@ class PyAutonomy(Autonomy):
 
 
 def is_python_autonomy(value: Any, module: str) -> bool:
-    """Whether a value of a module is a class that is defined there and has the methods of SCRIMMAGE's Python interface."""
+    """Return True if a value of a module is a class that is defined there and has the methods of SCRIMMAGE's Python interface."""
     is_own = isinstance(value, type) and value.__module__ == module and not issubclass(value, Autonomy)
     return is_own and all(callable(getattr(value, name, None)) for name in METHODS)
 

@@ -43,7 +43,7 @@ class RLSimple(Autonomy):
     Gymnasium (None without it) and the parameters as texts, and returns a callable or an object with `act`. A mission names it by
     `actor_init_func`, the default being the function of that name. Without one, entities go to and fro.
 
-    Differences from the existing system: it imports any module; a snapshot has the attributes of an actor that is an object of a
+    Differences from SCRIMMAGE: it imports any module; a snapshot has the attributes of an actor that is an object of a
     class, and no variables of functions.
     """
 
@@ -174,7 +174,7 @@ class RLConsensus(RLSimple):
     The reward of a step is the share of the world's entities that are other ones with |x - own x| below `radius`; with
     `reward_type="origin"` it is that of `RLSimple`.
 
-    Differences from the existing system: it divides rewards by the duration of the mission [s].
+    Differences from SCRIMMAGE: it divides rewards by the duration of the mission [s].
     """
 
     grade = "external"
@@ -198,7 +198,7 @@ class RLConsensus(RLSimple):
 
 
 def is_actor_init(value: Any, module: str) -> bool:
-    """Whether a value of a module is a function that is defined there and creates actors."""
+    """Return True if a value of a module is a function that is defined there and creates actors."""
     if not isinstance(value, types.FunctionType) or value.__module__ != module:
         return False
     return next(iter(inspect.signature(value).parameters), "") == "action_space"

@@ -28,7 +28,7 @@ class WaypointDispatcher(Autonomy):
     counter-clockwise at `loiter_radius`: the point lies `lead_distance` ahead on the tangent of that circle. A new list starts at its
     first waypoint. Until that is reached, and at the end of a list, the line starts at the entity itself.
 
-    The existing system published its status in every step at the end of a list, stayed one step longer at the turning points of
+    SCRIMMAGE published its status in every step at the end of a list, stayed one step longer at the turning points of
     back_and_forth, and had no loiter.
     """
 

@@ -76,7 +76,7 @@ class MotionBattery(Controller):
     have the value of their row. Only the channels in the map are passed. A `ChargeAdded` message charges the battery; the service
     `get_battery_charge` returns the charge of each row, (n,).
 
-    Differences from the existing system: there the type was ignored and the charge taken was rate times value, so that negative values
+    Differences from SCRIMMAGE: there the type was ignored and the charge taken was rate times value, so that negative values
     charged the battery; an empty battery removed the entity, whose limited values were then useless. The charge starts at charge_initial
     within its limits, so at 1 with the defaults.
     """

@@ -15,7 +15,7 @@ class MultirotorControllerOmega(Controller):
 
     A pulse width in [pwm_min, pwm_max] gives linearly a speed in [omega_min, omega_max] of the motion model.
 
-    In the existing system it takes them from a state object of the autonomy, and is not connected to the motion model.
+    In SCRIMMAGE it takes them from a state object of the autonomy, and is not connected to the motion model.
     """
 
     grade = "portable"

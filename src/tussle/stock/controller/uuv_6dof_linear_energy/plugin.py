@@ -14,7 +14,7 @@ class UUV6DOFLinearEnergy(Controller):
 
     When the energy is at energy_min, the throttle is 0.
 
-    Differences from the existing system: a negative throttle takes energy too (there, it charged the battery); the time step is that of
+    Differences from SCRIMMAGE: a negative throttle takes energy too (there, it charged the battery); the time step is that of
     the call; the energy starts within its limits and does not fall below them.
     """
 

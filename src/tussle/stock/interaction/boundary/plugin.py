@@ -25,7 +25,7 @@ class Boundary(Interaction):
 
     Publishes its shape once (`BoundaryShape`) and each entry and exit (`BoundaryCrossed`).
 
-    The existing system ignored the rotation, and could not use a polyhedron.
+    SCRIMMAGE ignored the rotation, and could not use a polyhedron.
     """
 
     grade = "portable"

@@ -28,7 +28,7 @@ class BulletCollision(Interaction):
     Fast spheres and capsules are followed within the step, so that they do not pass through others; a box that moves by more than
     its own size in a step may. `EntityCollided` and `EntityHitGround` are published when a contact begins.
 
-    In the existing system all bodies are spheres; a contact sets the external force to 1 N along the normal, so that a SimpleCar stops.
+    In SCRIMMAGE all bodies are spheres; a contact sets the external force to 1 N along the normal, so that a SimpleCar stops.
     """
 
     grade = "portable"

@@ -13,7 +13,7 @@ class FlagCaptureInteraction(Interaction):
 
     An entity that is not of the flag's team takes the flag by entering its boundary; of several in one step, the nearest to the
     centre (on ties the smaller id). It captures the flag, once per game, by entering the capture boundary. When the carrier is
-    removed, the flag is free again, at its place. Publishes `FlagTaken` and `FlagCaptured`. In the existing system, of several
+    removed, the flag is free again, at its place. Publishes `FlagTaken` and `FlagCaptured`. In SCRIMMAGE, of several
     entities that took a flag in one step each published it and the last one had it.
 
     Raises:

@@ -47,5 +47,5 @@ class SceneCollision(Interaction):
         self.last[:, rows], self.is_known[rows] = pos, True
 
     def rejects(self, w: WorldView, world: int, pos: np.ndarray, taken: np.ndarray) -> bool:
-        """Whether a point is in the scene."""
+        """Return True if a point is in the scene."""
         return not w.scene.free(pos[:, None], self.margin[world])[0]

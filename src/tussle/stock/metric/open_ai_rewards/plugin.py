@@ -11,7 +11,7 @@ from tussle.messages import RewardGiven
 class OpenAIRewards(Metric):
     """Sums the rewards (`RewardGiven`) of each team, and in the column `earned` those of each living entity.
 
-    The existing system wrote the sum of each entity to a file.
+    SCRIMMAGE wrote the sum of each entity to a file.
     """
 
     grade = "portable"

@@ -21,7 +21,7 @@ class DubinsAirplane(MotionModel):
     right wing down (Owen, Beard, McLain 2015, "Implementing Dubins airplane paths on fixed-wing UAVs", equation 5). Helices are exact.
     A command keeps its value within its two limits; a bank beyond 89 degrees turns like one of 89 degrees.
 
-    In the existing system a positive desired_pitch lowers the nose, and `vel` is the mean over the last substep.
+    In SCRIMMAGE a positive desired_pitch lowers the nose, and `vel` is the mean over the last substep.
     """
 
     grade = "portable"

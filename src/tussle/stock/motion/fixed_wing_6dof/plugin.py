@@ -35,7 +35,7 @@ class FixedWing6DOF(RigidBodyModel):
     Positive elevator lowers the nose, positive aileron the right wing; rudder by C_n_delta_rudder. The defaults are the A-4D
     Skyhawk (Nelson 1998, "Flight stability and automatic control", appendix B), also called FixedWing6DOF-A-4D.
 
-    Differences from the existing system: air loads, weight and gyroscopic moment are those of each stage of the integration
+    Differences from SCRIMMAGE: air loads, weight and gyroscopic moment are those of each stage of the integration
     (there, of the start of the step); the rate of the angle of attack is used (there, 0); the wind is subtracted (there, added);
     the aspect ratio is span^2 / area (there, span / chord); lift is limited (there, it grew up to backward flight); the side
     force acts along the body y axis; drag by the elevator is read; the throttle is clamped to its range (there, to [-1, 1], which

@@ -229,7 +229,7 @@ class JSBSimControl(JSBSimAircraft):
 
     Positive elevator lowers the nose, positive aileron the right wing; positive rudder turns the nose to the left in most aircraft.
 
-    Differences from the existing system: the attitude and velocity of the entity count at the start; an aircraft can be named without
+    Differences from SCRIMMAGE: the attitude and velocity of the entity count at the start; an aircraft can be named without
     a script and trimmed; the throttle counts from the start on (there, after 0.05 s); latitudes are geodetic.
 
     Raises:
@@ -253,7 +253,7 @@ class JSBSimModel(JSBSimAircraft):
     It sets the properties ap/bank_setpoint [rad], ap/altitude_setpoint [ft] and ap/airspeed_setpoint [knot]; the script switches the
     autopilot on. None of the aircraft of the package has a bank setpoint: `jsbsim_root` names the folder with yours.
 
-    Differences from the existing system: latitudes are geodetic, positions are not rounded, the entity has not flown a step when it
+    Differences from SCRIMMAGE: latitudes are geodetic, positions are not rounded, the entity has not flown a step when it
     is born, and it starts with its own velocity, if it has one.
 
     Raises:

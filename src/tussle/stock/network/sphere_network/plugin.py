@@ -11,7 +11,7 @@ from tussle.api.links import BLOCKS
 class SphereNetwork(Network):
     """Delivers a message to each entity nearer than `range` with probability `prob_transmit`, and always to the sender.
 
-    Distances are measured at the end of the step in which the message is sent. The existing system measured from the sender's new
+    Distances are measured at the end of the step in which the message is sent. SCRIMMAGE measured from the sender's new
     position to the old positions of the others, and could lose messages of an entity to itself.
     """
 

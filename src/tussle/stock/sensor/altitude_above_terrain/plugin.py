@@ -10,7 +10,7 @@ from tussle.api import GroupView, Output, Param, Sensor
 class AltitudeAboveTerrain(Sensor):
     """Measures the height of an entity above the highest surface of the scene at its place: roof, mesh, terrain or ground.
 
-    Where the scene has no surface, it is the height above z = 0. The existing system knows the terrain of TerrainGenerator only, at the
+    Where the scene has no surface, it is the height above z = 0. SCRIMMAGE knows the terrain of TerrainGenerator only, at the
     corner of the cell instead of below the entity.
     """
 

@@ -23,7 +23,7 @@ class ContactBlobCamera(Sensor):
     false positive has id 0; the other ids are true, for scoring. The camera looks along the body's x axis, turned by `rpy`. With
     `occlusion`, an entity whose centre is hidden is not seen. Set `rate` for a lower frame rate than that of the steps.
 
-    In the existing system the size is the widest chord's, and each detected entity brings its own false positives of its own size,
+    In SCRIMMAGE the size is the widest chord's, and each detected entity brings its own false positives of its own size,
     one more than `max_false_positives_per_frame`, and none come without one. Its focal length cancels.
     """
 

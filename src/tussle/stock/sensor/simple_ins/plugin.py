@@ -24,7 +24,7 @@ class SimpleINS(Sensor):
     the body's x, then y, then z axis. `ins_cep` is the radius of the circle around the belief that holds the position with a
     probability of 50 %, from the standard deviations of the horizontal error, 1 m after a correction; the approximation is within 1.5 %.
 
-    The existing system added the noise in each step, whatever its length; took the change of velocity over 0.01 s for the acceleration;
+    SCRIMMAGE added the noise in each step, whatever its length; took the change of velocity over 0.01 s for the acceleration;
     and grew the variance by the absolute value of noise that was not that of the error.
     """
 
