@@ -143,14 +143,14 @@ class Boids(Autonomy):
         self.target[:, rows] = np.where(self.use_initial_heading[rows], ahead, self.goal[:, rows])
 
     def _neighbor_sums(self, g: GroupView) -> np.ndarray:
-        """Sums over the neighbours as `kernels.law` takes them, (13, n)."""
+        """Return the neighbour sums for `kernels.law`, (13, n)."""
         sees_all = g.once(kernels.sees_all, self.fov_az, self.fov_el)
         if self.averaging == "historic":
             return self._with_historic_means(g, self.historic if sees_all else self.historic_in_view)
         return np.asarray((self.seen if sees_all else self.seen_in_view)(g).values)
 
     def _with_historic_means(self, g: GroupView, law: Callable[[GroupView], Contributions]) -> np.ndarray:
-        """Sums of a law of yaw and others, (13, n), with the means of the paper's code."""
+        """Return the neighbour sums, (13, n), with the means of the paper's code."""
         seen = law(g).values
         kernels.historic_means(g.components("pos"), seen)
         return seen

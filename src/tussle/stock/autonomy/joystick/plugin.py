@@ -1,4 +1,4 @@
-"""Commands by hand: the axes of a joystick as channels."""
+"""Manual commands: the axes of a joystick as channels."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class JoystickButtons(Message):
 
 
 class JoystickAxis(NamedTuple):
-    """How an axis gives a channel."""
+    """Mapping of a joystick axis to a channel."""
 
     channel: str
     axis: float

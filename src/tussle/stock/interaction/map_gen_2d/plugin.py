@@ -69,7 +69,7 @@ class MapGen2D(Interaction):
 
 
 def _boxes(is_wall: np.ndarray) -> list[tuple[int, int, int, int]]:
-    """First and end row, first and end column of boxes: runs of pixels, joined with equal runs in the rows below."""
+    """Return first and end row, first and end column of boxes: runs of pixels, joined with equal runs in the rows below."""
     found, growing = [], dict[tuple[int, int], int]()
     for row in range(len(is_wall) + 1):
         runs = set()

@@ -32,7 +32,7 @@ MIRRORED = np.array([[1.0], [-1.0], [-1.0]])
 
 
 class TrimParam(Param):
-    """A trim of JSBSim. The conformance kit does not try all, as it tries `choices`: in its games no aircraft is in trim."""
+    """Name of a trim of JSBSim. It has no `choices`, because the conformance kit would try all, and its aircraft cannot be trimmed."""
 
     def convert(self, value: Any, where: str = "", from_geodetic: Callable[..., Any] | None = None) -> Any:
         """Check the name.
@@ -53,9 +53,9 @@ class FlightHandle:
 
     Attributes:
         fleet: The aircraft of all entities.
-        number: In the fleet.
-        origin: Of the world frame.
-        failure: Why it flies no more, or empty.
+        number: Number in the fleet.
+        origin: Origin of the world frame.
+        failure: Error that ended the flight, or empty.
     """
 
     def __init__(self, fleet: Fleet | FleetProcesses, origin: Origin) -> None:
@@ -117,10 +117,10 @@ class JSBSimAircraft(RigidBodyModel):
         return flight
 
     def save_one(self, flight: FlightHandle) -> SavedFlight:
-        """Return all that was done to the aircraft.
+        """Return the record of the flight.
 
         Raises:
-            SnapshotError: It has failed.
+            SnapshotError: The aircraft has failed.
         """
         saved = flight.fleet.save(flight.number)
         if not saved:

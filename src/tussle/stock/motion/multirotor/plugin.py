@@ -125,7 +125,7 @@ class Multirotor(RigidBodyModel):
 
     @service
     def airframe(self, g: GroupView) -> dict[str, np.ndarray]:
-        """Weight per mass, mass, inertia, rotor coefficients and limits of each row, (n,) or (9, n), for controllers of this model.
+        """Return gravity, mass, inertia, rotor coefficients and limits of each row, (n,) or (9, n), for controllers of this model.
 
         `rotor_config` is (rotors, 7).
         """

@@ -26,7 +26,7 @@ class SphereNetwork(Network):
     comms_boundary_epsilon = Param(0.0, unit="m", ge=0.0, doc="Distance by which both sides overlap.")
 
     blocked_by = Param(
-        "nothing", choices=BLOCKS, doc="What blocks a message where it stands between sender and receiver."
+        "nothing", choices=BLOCKS, doc="Obstacles between sender and receiver that block a message."
     )
 
     losses = ("plane", "chance", "blocked")

@@ -132,7 +132,7 @@ def _extent(
         draws: Standard normal draws for both, (2, m).
     """
     slope, square = offset / x, x * x + offset * offset - radius * radius
-    # Tangent of the half angle of the sphere; a camera inside of it sees it everywhere.
+    # Tangent of the sphere's half angle. A camera inside the sphere sees it in all directions.
     tangent = radius / np.sqrt(np.maximum(square, 1e-12))
     low, high = (_turned(slope, sign * tangent, sign * np.inf) for sign in (-1.0, 1.0))
     low, high = (0.5 * size * (1.0 + np.clip(edge / half, -1.0, 1.0)) for edge in (low, high))

@@ -17,7 +17,7 @@ FIELDS, UNITS = "x y z range in_range", "m m m m 1"
 
 
 class RayTrace(Sensor):
-    """Measures distances along a pattern of rays, which the scene and other entities stop: a lidar.
+    """A lidar: measures distances along a pattern of rays, which end at the scene and at other entities.
 
     The rays of a scan spread evenly about the sensor's x axis: `num_rays_horiz` angles, `angle_res_horiz` apart, for each of
     `num_rays_vert` elevations, from the highest down. The sensor is mounted at `xyz` on the body, turned by `rpy`. A ray that meets nothing
@@ -74,7 +74,7 @@ class RayTrace(Sensor):
     next_scan = State(default=-math.inf, unit="s", doc="Time of the next scan.")
 
     def step(self, g: GroupView) -> None:
-        """Scan where it is time."""
+        """Scan in the rows whose next scan is due."""
         rows = np.flatnonzero(g.t >= self.next_scan - 1e-9)
         if not len(rows):
             return
