@@ -82,7 +82,7 @@ def _numbers(part: Volume | TriangleMesh) -> np.ndarray:
 
 
 def _hull_triangles(part: Volume) -> np.ndarray:
-    """Triangles of the faces of a polyhedron, (m, 3, 3): its corners in each face, joined in the order round their middle."""
+    """Triangles of the faces of a polyhedron, (m, 3, 3): its corners in each face, joined in the order around their middle."""
     assert isinstance(part, Convex)
     points = np.array(getattr(part, "points", ()), float).reshape(-1, 3)
     found = []

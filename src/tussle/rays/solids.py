@@ -13,7 +13,7 @@ from tussle.rays.surfaces import HeightField, TriangleMesh
 from tussle.shapes import FlatGround, Polyhedron, Sphere, Volume
 
 KINDS = ("nothing", "ground", "wall", "mesh", "entity")
-"""What a ray may hit, by number: ground and hills are ground, walls and buildings walls."""
+"""Kinds of solids that rays hit, by number; hills are "ground", buildings "wall"."""
 Split = Callable[[int, Callable[[int, int], Any]], Any]
 
 

@@ -15,7 +15,7 @@ TABLES = ("C_THRUST", "C_POWER", "CT_MACH", "CP_MACH")
 
 @dataclass(frozen=True)
 class Mount:
-    """Where a thruster sits.
+    """Position and direction of a thruster.
 
     Attributes:
         location: In the structural frame [in].

@@ -15,8 +15,8 @@ class Boids(boids.Boids):
     """Boids with SCRIMMAGE's averages, whatever `averaging` says, and with its output of the climb speed as the desired altitude.
 
     The sign of pitch_rate is opposite: SCRIMMAGE turned the pitch of its vehicles nose down in 2020, but not this command, so entities
-    that should climb dive, do half a loop, and fly on upside down, where the sign is right. Fields of view are whole degrees: the rest
-    is cut off. A neighbour exactly astern is outside of 360 degrees too.
+    that should climb dive, do half a loop, and fly on upside down, where the sign is right. Fields of view are cut to whole
+    degrees. A neighbour exactly astern is outside of a field of view of 360 degrees too.
     """
 
     half_view = State("az el", unit="rad", doc="Half the fields of view, of whole degrees.")
