@@ -1,4 +1,4 @@
-"""The missions that ship, and those of the existing system."""
+"""The missions that ship, and those of SCRIMMAGE."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ PLAY = {
     "colliding_spheres.xml": 2, "fixed_wing_6dof.xml": 1, "multirotor-test.xml": 1, "rlsimple.xml": 1,
     "straight_include/straight_include.xml": 2,
 }  # fmt: skip
-"""Missions of the existing system that play as they are, and the number of blocks of each."""
+"""Missions of SCRIMMAGE that play as they are, and the number of blocks of each."""
 RASCAL = ("predator_prey_boids.xml", "straight_jsbsim.xml")
 """Those that fly the Rascal in JSBSim, which JSBSim's package doesn't have."""
 PARTS = {f"straight_include/{name}.xml" for name in ("entity1", "entity2", "run_tag", "sim_info")}
