@@ -167,7 +167,7 @@ def test_prey_that_fly_as_aircraft_are_hunted():
 
 
 OTHERS = ("convoy", "auction_search", "underwater_survey")
-AIRCRAFT = ("straight_jsbsim", "fixed_wing_6dof", "predator_prey_jsbsim")
+AIRCRAFT = ("formation_flight", "straight_jsbsim", "fixed_wing_6dof", "predator_prey_jsbsim")
 
 
 def test_shipped_missions_have_titles_and_are_packaged():

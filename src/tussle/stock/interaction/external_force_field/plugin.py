@@ -6,8 +6,8 @@ import numpy as np
 
 from tussle.api import Interaction, Param, State, WorldView
 from tussle.numeric import cos, sin
+from tussle.numeric.dryden import at_start, gust, low_altitude, passed
 from tussle.numeric.quaternion import quat_rotate
-from tussle.stock.interaction.external_force_field.dryden import at_start, gust, low_altitude, passed
 
 TAU = 6.283185307179586
 
@@ -82,13 +82,13 @@ class ExternalForceField(Interaction):
         c, s = c[w.world], s[w.world]
         x, y, z = w.vel - np.array([wind * c, wind * s, np.zeros(w.n)])
         path = w.dt * np.sqrt(x * x + y * y + z * z)
-        scale, sd = low_altitude(w.pos[2], wind)
+        scale_uv, scale_w, sd_uv, sd_w = low_altitude(w.pos[2], wind)
         draw = w.normal_by("gust", w.world, w.id, np.zeros(w.n, np.int64), 5)
         self.filters[:] = np.where(
-            self.is_known, passed(self.filters, path / scale[0], path / scale[1], draw), at_start(draw)
+            self.is_known, passed(self.filters, path / scale_uv, path / scale_w, draw), at_start(draw)
         )
         self.is_known[:] = True
-        along, across, up = gust(self.filters) * sd[[0, 0, 1]]
+        along, across, up = gust(self.filters) * np.array([sd_uv, sd_uv, sd_w])
         return np.array([c * along - s * across, s * along + c * across, up])
 
     def _turn(self, w: WorldView) -> None:

@@ -20,6 +20,7 @@ from tussle.api.range_kernel import RangeKernel
 from tussle.errors import ParameterError, listed, nearest_name
 from tussle.geodesy import Origin
 from tussle.numeric import cos, sin
+from tussle.numeric.dryden import at_start
 from tussle.numeric.quaternion import quat_conjugate, quat_multiply, quat_rotate, quat_rotate_inverse
 from tussle.stock.motion.jsbsim_compiled import flying
 from tussle.stock.motion.jsbsim_compiled.flying import BODY, FOOT, SLOTS
@@ -32,9 +33,11 @@ SURFACES = "fcs/elevator-cmd-norm", "fcs/aileron-cmd-norm", "fcs/rudder-cmd-norm
 SETPOINTS = "ap/bank_setpoint", "ap/altitude_setpoint", "ap/airspeed_setpoint"
 ALTITUDE = "position/geod-alt-ft"
 WIND = "atmosphere/wind-north-fps", "atmosphere/wind-east-fps", "atmosphere/wind-down-fps"
+GUST = "atmosphere/gust-north-fps", "atmosphere/gust-east-fps", "atmosphere/gust-down-fps"
 GROUND = "position/terrain-elevation-asl-ft"
 FORWARD_RIGHT_DOWN = np.array([[0.0], [1.0], [0.0], [0.0]])
 """Rotation between body axes forward, left, up and forward, right, down."""
+TWO_TO_53 = 2.0**53
 MIRRORED = np.array([[1.0], [-1.0], [-1.0]])
 
 
@@ -124,6 +127,10 @@ class JSBSimCompiled(RigidBodyModel):
     are those of JSBSimControl, and with commands="autopilot" those of JSBSimModel. Commands of surfaces are in [-1, 1], the throttle of
     all engines in [0, 1]. Engines run from the start. What is not compiled is refused by name; JSBSimControl flies it.
 
+    Gusts have the spectra of MIL-F-8785C (1980) section 3.7, along and across the flight through the air, and change in each substep.
+    Below 1000 ft above the origin's tangent plane their scales and intensity follow from the height and the wind at 20 ft, above 2000 ft
+    the scales are 1750 ft, and between they change linearly. Gusts do not turn the air.
+
     Raises:
         ParameterError: The aircraft cannot be read, or has something that is not compiled.
     """
@@ -141,7 +148,24 @@ class JSBSimCompiled(RigidBodyModel):
         doc="Trim at the start: none; longitudinal, by pitch, throttle and elevator trim; or full, by bank and the other surfaces too.",
     )
     commands = Param("surfaces", choices=["surfaces", "autopilot"], doc="What is commanded.")
-    wind = Param((0.0, 0.0, 0.0), fields="east north up", unit="m/s", doc="Velocity of the air, world frame.")
+    wind = Param(
+        (0.0, 0.0, 0.0), fields="east north up", unit="m/s", doc="Mean velocity of the air, world frame."
+    )
+    gusts = Param("none", choices=["none", "dryden"], doc="Gusts, drawn for each aircraft.")
+    gust_wind_speed = Param(
+        7.7,
+        unit="m/s",
+        ge=0.0,
+        le=30.0,
+        doc="Wind at 20 ft (6.1 m) that makes gusts below 2000 ft (610 m); 7.7 m/s is light turbulence.",
+    )
+    gust_deviation = Param(
+        1.5,
+        unit="m/s",
+        ge=0.0,
+        le=30.0,
+        doc="Standard deviation of each component of gusts above 2000 ft (610 m).",
+    )
     throttle = Input(doc="Throttle.")
     elevator = Input(doc="Elevator, nose down positive.")
     aileron = Input(doc="Aileron, right wing down positive.")
@@ -191,8 +215,13 @@ class JSBSimCompiled(RigidBodyModel):
         return [name for name in type(self).inputs() if (name in self.by_autopilot) == is_autopilot]
 
     def state_size(self, name: str) -> int:
-        """The rigid body, the world frame, and all slots of the aircraft."""
-        return SLOTS + len(self.flown.aircraft.slots)
+        """The rigid body, the world frame, all slots of the aircraft, and the state of gusts."""
+        return SLOTS + len(self.flown.aircraft.slots) + (flying.GUSTS if self.is_gusty else 0)
+
+    @property
+    def is_gusty(self) -> bool:
+        """Whether there are gusts."""
+        return bool(self.values["gusts"] == "dryden")
 
     def from_body(self, body: MotionBody, rows: np.ndarray) -> None:
         """Start the aircraft of some rows at their place, with their velocity and rates, engines running."""
@@ -227,14 +256,25 @@ class JSBSimCompiled(RigidBodyModel):
             body.quat[:, rows], body.omega[:, rows] = attitude, 0.0
         state = self.rigid_body
         state[BODY:SLOTS, rows] = np.concatenate([frame, np.array(center)[:, None]])
-        state[SLOTS:, rows] = x
+        state[SLOTS : SLOTS + len(x), rows] = x
+        if self.is_gusty:
+            filters = at_start(body.normal("gusts", 5)[:, rows])
+            seeds = np.floor(TWO_TO_53 * body.uniform("seeds of gusts")[rows])
+            own = [seeds, 0.0 * seeds, self.gust_wind_speed[rows], self.gust_deviation[rows]]
+            state[SLOTS + len(x) :, rows] = np.concatenate([filters, own])
         super().from_body(body, rows)
 
     @property
     def range_kernel(self) -> RangeKernel:
         """The kernel that makes steps of all aircraft."""
         numbers, wholes = self.flown.commands()
-        return RangeKernel(flying.flight(), numbers, wholes, ROWS_PER_THREAD)
+        if not self.is_gusty:
+            return RangeKernel(flying.flight(), numbers, wholes, ROWS_PER_THREAD)
+        slots = self.flown.aircraft.slots
+        places = [SLOTS + len(slots), *(SLOTS + slots[name] for name in (ALTITUDE, GROUND, *WIND, *GUST))]
+        return RangeKernel(
+            flying.gusty_flight(), numbers, np.concatenate([wholes, np.array(places)]), ROWS_PER_THREAD
+        )
 
     @property
     def advance(self) -> Any:
