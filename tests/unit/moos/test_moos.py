@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 import re
@@ -469,15 +470,18 @@ def test_a_flood_for_seconds_ends_its_world(database):
 
     def flood(helm):
         def run():
-            while not is_over.wait(0.01):
-                helm.link.socket.sendall(
-                    packet(*(message("N", "IVPHELM_STATE", "DRIVE", "pHelmIvP", "alpha") for _ in range(100)))
-                )
+            with contextlib.suppress(OSError):  # the helm is gone
+                while not is_over.is_set():
+                    helm.link.socket.sendall(
+                        packet(
+                            *(message("N", "IVPHELM_STATE", "DRIVE", "pHelmIvP", "alpha") for _ in range(100))
+                        )
+                    )
+                    time.sleep(0.01)
 
-        thread = threading.Thread(target=run, daemon=True)
-        thread.start()
         helm.is_mute = True
-        threads.append(thread)
+        threads.append(threading.Thread(target=run, daemon=True))
+        threads[0].start()
 
     threads = []
     try:

@@ -83,7 +83,7 @@ class MoosClient:
         with suppress(OSError):  # it is closed already
             if self._socket:
                 self._socket.shutdown(socket.SHUT_RDWR)
-        self._thread.join()
+        self._thread.join(2.0 * LONGEST_ATTEMPT)  # longer only while the name of the host is looked up
 
     def allow(self, n: int) -> None:
         """Let the peer send this many messages more than it may send in its time."""
