@@ -203,7 +203,7 @@ def emit(
     known = code.known()
     for name in ("position/geod-alt-ft", *keep, *(each for each in keep_known if normal(each) in known)):
         code.keep(name)
-    # What the aircraft reads and nobody writes is a command from outside, unless JSBSim itself should write it.
+    # A property that the aircraft reads and nothing writes is a command from outside, unless JSBSim itself should write it.
     code.inputs.update(name for name in code.readers if not name.startswith(BUILT_IN))
     code.check()
     return code, propulsion
@@ -257,7 +257,7 @@ def _module(code: Code, variables: dict[str, str]) -> Iterator[str]:
             yield f"    {array} = np.zeros(({rows}, {columns}))"
         yield "    for row in range(begin, end):"
         body = [*code.body(section, 3), "            pass"]
-        # What the section does not mention is neither loaded nor stored, which would only take time to compile.
+        # Values that the section does not use are neither loaded nor stored: that would only take time to compile.
         used = {word for line in body for word in WORD.findall(line)}
         mentioned = [(k, name, v) for k, (name, v) in enumerate(variables.items()) if v in used]
         for k, _, variable in mentioned:

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import os
-import sys
 import time
-import webbrowser
 from collections.abc import Callable
 from contextlib import ExitStack
 from typing import Any
@@ -107,14 +104,8 @@ def announce(page: Page, options: PageOptions) -> None:
             " steer the game, and what they send is not encrypted",
             "bold yellow",
         )
-    if not options.no_browser and has_screen():
-        webbrowser.open(page.url)
-
-
-def has_screen() -> bool:
-    """Whether a browser can be opened: on Linux without a display, only the one that the user names in BROWSER."""
-    names = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")
-    return not sys.platform.startswith("linux") or any(os.environ.get(name) for name in names)
+    if not options.no_browser:
+        page.open()
 
 
 def watch(page: Page, interrupt: Interrupt, is_done: Callable[[], bool]) -> int:

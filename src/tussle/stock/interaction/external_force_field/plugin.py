@@ -15,10 +15,13 @@ TAU = 6.283185307179586
 class ExternalForceField(Interaction):
     """Pushes all entities with a force that is constant, changes at random, or follows from Dryden gusts, and turns them near the ground.
 
-    constant: `constant_force`. variable: one force for all entities of a world, drawn anew after times that are drawn too. dryden: `drag`
-    times the gust velocity, which has the spectra of MIL-F-8785C (1980) section 3.7.3 and is drawn for each entity; its intensity and
-    scales follow from the height, held between 10 and 1000 ft, and from the wind at 20 ft. A gust is convected at the speed of the
-    entity relative to the wind.
+    The values of `force_type` are:
+
+    * constant: `constant_force`.
+    * variable: one force for all entities of a world, redrawn after random times.
+    * dryden: `drag` times the gust velocity of each entity, with the spectra of MIL-F-8785C (1980) section 3.7.3. Intensity and length
+      scales follow from the height, clamped to 10 to 1000 ft, and from the wind at 20 ft. An entity flies through the gusts at its speed
+      relative to the wind.
 
     Between two heights moments about the body axes act, amplitude times sin(2 pi t / period). Motion models without forces ignore
     all of this.

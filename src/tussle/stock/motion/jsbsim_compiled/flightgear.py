@@ -67,7 +67,7 @@ LAYOUT = _layout()
 
 
 def packets(x: np.ndarray, slots: Mapping[str, int], n_engines: int) -> np.ndarray:
-    """Packets of aircraft, (n,), from their slots, (k, n). What an aircraft has not is 0, as temperatures are."""
+    """Return the packets of aircraft, (n,), from their slots, (k, n). Fields without a property are 0, e.g. temperatures of engines."""
     out = np.zeros(x.shape[1], LAYOUT)
     out["version"], out["cur_time"], out["visibility"] = 24, ANY_TIME, VISIBILITY
     for field, name in SINGLE.items():

@@ -23,7 +23,9 @@ FOOT = 0.3048  # [m]
 BODY, FRAME = 13, 7  # components of the rigid body and of the world frame, before the slots of the aircraft
 SLOTS = BODY + FRAME
 EARTH_ANGLE = SLOTS + CORE.index("earth_angle")
-COMMAND = 4  # whole numbers of a command: its input, its slot, a slot that is added or -1, and its place in the numbers
+COMMAND = (
+    4  # integers of a command: its input, its slot, a slot that is added or -1, and its index in the numbers
+)
 
 
 GUSTS = 9
@@ -131,7 +133,7 @@ def command(x, u, numbers, places, begin, end):  # type: ignore[no-untyped-def]
 
 @cache
 def flight() -> Kernel:
-    """The kernel that flies any compiled aircraft, built on first use because importing this module must not import the compiler."""
+    """Return the kernel that flies any compiled aircraft. It is built on first use, because this module must not import the compiler."""
     advance = caller("F2w F i8 i8 i8 f8 f8")
 
     def fly(x, u, p, numbers, wholes, begin, end, dt, substeps):  # type: ignore[no-untyped-def]

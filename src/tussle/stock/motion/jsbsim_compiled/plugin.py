@@ -45,7 +45,7 @@ TRIMS = "none", "longitudinal", "full"
 
 
 class SteadyFlightParam(Param):
-    """A trim. The conformance kit does not try all, as it tries `choices`: in its games no aircraft is in trim."""
+    """Name of a trim. It has no `choices`, because the conformance kit would try all, and its aircraft cannot be trimmed."""
 
     def convert(self, value: Any, where: str = "", from_geodetic: Callable[..., Any] | None = None) -> Any:
         """Check the name.
@@ -77,7 +77,7 @@ class Flown:
         self.altitude = at[ALTITUDE]
 
     def commands(self) -> tuple[np.ndarray, np.ndarray]:
-        """The constants of `flying.flight`: numbers and whole numbers; throttle and surfaces are kept within their limits.
+        """Return the constants of `flying.flight`, floats and integers. Throttle and surfaces are clamped to their limits.
 
         An autopilot takes bank [rad], altitude above the ellipsoid [ft] and airspeed [knot].
         """
@@ -102,7 +102,7 @@ class Flown:
 
 @cache
 def compiled(root: str, aircraft: str, script: str, is_autopilot: bool, is_shown: bool) -> Flown:
-    """The aircraft of a plugin, compiled once a process.
+    """Return the aircraft of a plugin, compiled once per process.
 
     Raises:
         ParameterError: It cannot be read or compiled.
@@ -123,9 +123,9 @@ class JSBSimCompiled(RigidBodyModel):
     """An aircraft of JSBSim's file format, compiled to one kernel for all its entities.
 
     Its equations, models and integrators are those of JSBSim (J. S. Berndt 2004, "JSBSim: an open source flight dynamics model in
-    C++") in their order, so that a flight is JSBSim's; one step per substep of the mission, 1/120 s is usual. Parameters and inputs
+    C++") in their order, so that flights equal JSBSim's; one step per substep of the mission, 1/120 s is usual. Parameters and inputs
     are those of JSBSimControl, and with commands="autopilot" those of JSBSimModel. Commands of surfaces are in [-1, 1], the throttle of
-    all engines in [0, 1]. Engines run from the start. What is not compiled is refused by name; JSBSimControl flies it.
+    all engines in [0, 1]. Engines run from the start. Parts that cannot be compiled are refused by name; JSBSimControl flies such aircraft.
 
     Gusts have the spectra of MIL-F-8785C (1980) section 3.7, along and across the flight through the air, and change in each substep.
     Below 1000 ft above the origin's tangent plane their scales and intensity follow from the height and the wind at 20 ft, above 2000 ft
@@ -154,7 +154,11 @@ class JSBSimCompiled(RigidBodyModel):
         "none",
         doc="Trim at the start: none; longitudinal, by pitch, throttle and elevator trim; or full, by bank and the other surfaces too.",
     )
-    commands = Param("surfaces", choices=["surfaces", "autopilot"], doc="What is commanded.")
+    commands = Param(
+        "surfaces",
+        choices=["surfaces", "autopilot"],
+        doc="Commands: control surfaces, or setpoints of the autopilot.",
+    )
     wind = Param(
         (0.0, 0.0, 0.0), fields="east north up", unit="m/s", doc="Mean velocity of the air, world frame."
     )
@@ -207,15 +211,15 @@ class JSBSimCompiled(RigidBodyModel):
         return save_source(self.flown.aircraft)
 
     def steady_flight(self, speed: float, altitude: float) -> TrimPoint:
-        """Steady level flight at a speed [m/s] and an altitude [m], in calm air.
+        """Return steady level flight at a speed [m/s] and an altitude [m], in calm air.
 
         Raises:
-            ParameterError: There is none, or the aircraft cannot be compiled.
+            ParameterError: Steady flight is impossible, or the aircraft cannot be compiled.
         """
         return level_flight(self.flown.aircraft, speed, altitude)
 
     def linearize(self, speed: float, altitude: float) -> LinearModel:
-        """The matrices of the linear model of steady level flight, e.g. for a linear-quadratic regulator.
+        """Return the matrices of the linear model of steady level flight, e.g. for a linear-quadratic regulator.
 
         Raises:
             ParameterError: As `steady_flight`.
@@ -223,21 +227,21 @@ class JSBSimCompiled(RigidBodyModel):
         return linearize(self.flown.aircraft, self.steady_flight(speed, altitude))
 
     def active_inputs(self) -> list[str]:
-        """The inputs of surfaces, or of the autopilot."""
+        """Return the inputs of the surfaces, or of the autopilot."""
         is_autopilot = self.values["commands"] == "autopilot"
         return [name for name in type(self).inputs() if (name in self.by_autopilot) == is_autopilot]
 
     def state_size(self, name: str) -> int:
-        """The rigid body, the world frame, all slots of the aircraft, and the state of gusts."""
+        """Return the number of components: rigid body, world frame, all slots of the aircraft, and the state of gusts."""
         return SLOTS + len(self.flown.aircraft.slots) + (flying.GUSTS if self.is_gusty else 0)
 
     @property
     def is_gusty(self) -> bool:
-        """Whether there are gusts."""
+        """True if there are gusts."""
         return bool(self.values["gusts"] == "dryden")
 
     def from_body(self, body: MotionBody, rows: np.ndarray) -> None:
-        """Start the aircraft of some rows at their place, with their velocity and rates, engines running."""
+        """Start the aircraft of some rows at their positions, with their velocities and rates, engines running."""
         flown, n = self.flown, len(rows)
         aircraft, origin = flown.aircraft, body.scene.origin
         frame, center = earth_frame(origin)
@@ -290,7 +294,7 @@ class JSBSimCompiled(RigidBodyModel):
 
     @property
     def range_kernel(self) -> RangeKernel | None:
-        """The kernel, if nothing is sent after each step."""
+        """The kernel, None if states are sent after steps."""
         return None if self.values["flightgear_output_enable"] else self.kernel
 
     @property
@@ -311,14 +315,14 @@ class JSBSimCompiled(RigidBodyModel):
 
 
 def earth_frame(origin: Origin) -> tuple[np.ndarray, tuple[float, float, float]]:
-    """Quaternion from the world frame to Earth-centred axes, (4, 1), and the origin in these [m]."""
+    """Return the quaternion from the world frame to Earth-centred axes, (4, 1), and the origin in these axes [m]."""
     half = np.sqrt(0.5)
     local = local_frame(np.array([origin.latitude]), np.array([origin.longitude]))
     return quat_multiply(local, np.array([[0.0], [half], [half], [0.0]])), origin.earth_centred
 
 
 def local_frame(latitude: np.ndarray, longitude: np.ndarray) -> np.ndarray:
-    """Quaternions from axes north, east, down at geodetic places [rad] to Earth-centred ones, (4, n)."""
+    """Return quaternions from axes north, east, down at geodetic positions [rad], (n,), to Earth-centred axes, (4, n)."""
     zero, a, b = np.zeros_like(latitude), 0.5 * longitude, 0.5 * (-0.5 * np.pi - latitude)
     return np.asarray(
         quat_multiply(np.stack([cos(a), zero, zero, sin(a)]), np.stack([cos(b), zero, sin(b), zero]))
