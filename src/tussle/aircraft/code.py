@@ -250,14 +250,18 @@ class Code:
         """Return True if somebody reads a property or keeps it."""
         return name in self.readers or name in self.kept
 
+    def known(self) -> set[str]:
+        """Return the properties that are written, set or given."""
+        made = {name for section in self.sections.values() for name in section.touched}
+        return made | self.initial.keys() | self.inputs
+
     def check(self, settable: Sequence[str] = ()) -> None:
         """Check that all properties that are read are written, set or given.
 
         Raises:
             AircraftError: One is not.
         """
-        made = {name for section in self.sections.values() for name in section.touched}
-        made |= self.initial.keys() | self.inputs | set(settable)
+        made = self.known() | set(settable)
         for name, node in self.readers.items():
             if name not in made:
                 near = nearest_name(name, made)

@@ -145,7 +145,10 @@ class CompiledAircraft:
 
 
 def emit(
-    root: Element, find: Callable[[Element, str, str], Element], keep: Sequence[str] = ()
+    root: Element,
+    find: Callable[[Element, str, str], Element],
+    keep: Sequence[str] = (),
+    keep_known: Sequence[str] = (),
 ) -> tuple[Code, Propulsion | None]:
     """Emit the step and the start of an aircraft.
 
@@ -197,7 +200,8 @@ def emit(
     code.begin("start")
     if propulsion:
         propulsion.emit_start(code)
-    for name in ("position/geod-alt-ft", *keep):
+    known = code.known()
+    for name in ("position/geod-alt-ft", *keep, *(each for each in keep_known if normal(each) in known)):
         code.keep(name)
     # A property that the aircraft reads and nothing writes is a command from outside, unless JSBSim itself should write it.
     code.inputs.update(name for name in code.readers if not name.startswith(BUILT_IN))
@@ -205,19 +209,22 @@ def emit(
     return code, propulsion
 
 
-def compile_aircraft(root: Path | None, name: str, keep: Sequence[str] = ()) -> CompiledAircraft:
+def compile_aircraft(
+    root: Path | None, name: str, keep: Sequence[str] = (), keep_known: Sequence[str] = ()
+) -> CompiledAircraft:
     """Compile an aircraft; the kernels are loaded from the cache or compiled on their first call.
 
     Args:
         root: Folder of aircraft, engine and systems; None for that of the package jsbsim.
         name: The aircraft.
         keep: Properties to be kept in the state, for who reads them.
+        keep_known: The same, as far as the aircraft has them.
 
     Raises:
         AircraftError: It cannot be read, is invalid, or has something that is not supported.
     """
     files = Files(root, name)
-    code, propulsion = emit(files.load(), files.find, keep)
+    code, propulsion = emit(files.load(), files.find, keep, keep_known)
     slots = code.slots()
     names = [*CORE, *slots]
     variables = {each: each if k < len(CORE) else code.variable(each) for k, each in enumerate(names)}

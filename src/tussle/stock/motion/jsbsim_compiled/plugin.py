@@ -22,7 +22,7 @@ from tussle.geodesy import Origin
 from tussle.numeric import cos, sin
 from tussle.numeric.dryden import at_start
 from tussle.numeric.quaternion import quat_conjugate, quat_multiply, quat_rotate, quat_rotate_inverse
-from tussle.stock.motion.jsbsim_compiled import flying
+from tussle.stock.motion.jsbsim_compiled import flightgear, flying
 from tussle.stock.motion.jsbsim_compiled.flying import BODY, FOOT, SLOTS
 from tussle.stock.motion.jsbsim_compiled.script import Script, read_script
 
@@ -101,7 +101,7 @@ class Flown:
 
 
 @cache
-def compiled(root: str, aircraft: str, script: str, is_autopilot: bool) -> Flown:
+def compiled(root: str, aircraft: str, script: str, is_autopilot: bool, is_shown: bool) -> Flown:
     """Return the aircraft of a plugin, compiled once per process.
 
     Raises:
@@ -111,7 +111,7 @@ def compiled(root: str, aircraft: str, script: str, is_autopilot: bool) -> Flown
     chosen = read_script(folder or package_root(), script) if script else Script(aircraft, ())
     keep = [ALTITUDE, *(name for name, _ in chosen.settings), *(SETPOINTS if is_autopilot else ())]
     try:
-        made = compile_aircraft(folder, chosen.aircraft, keep)
+        made = compile_aircraft(folder, chosen.aircraft, keep, flightgear.PROPERTIES if is_shown else ())
     except AircraftError as error:
         raise ParameterError(
             f"JSBSimCompiled: {error}; --set motion=JSBSimControl flies it by JSBSim itself"
@@ -130,6 +130,13 @@ class JSBSimCompiled(RigidBodyModel):
     Gusts have the spectra of MIL-F-8785C (1980) section 3.7, along and across the flight through the air, and change in each substep.
     Below 1000 ft above the origin's tangent plane their scales and intensity follow from the height and the wind at 20 ft, above 2000 ft
     the scales are 1750 ft, and between they change linearly. Gusts do not turn the air.
+
+    A FlightGear receives the packets that JSBSim would send, without temperatures of engines and angles of wheels; each aircraft
+    sends its own, so let one have the address.
+
+    `source()` writes the generated Python, which can be read, to the folder of compiled kernels, and returns its path:
+    `python -c "from tussle.stock import JSBSimCompiled; print(JSBSimCompiled(aircraft='c172p').source().read_text())"` prints it;
+    see [Six degrees of freedom](../six-degrees.md#generated-code).
 
     Raises:
         ParameterError: The aircraft cannot be read, or has something that is not compiled.
@@ -170,6 +177,11 @@ class JSBSimCompiled(RigidBodyModel):
         le=30.0,
         doc="Standard deviation of each component of gusts above 2000 ft (610 m).",
     )
+    flightgear_output_enable = Param(
+        False, structural=True, doc="Send the states to a FlightGear, by UDP, at most 30 times a second."
+    )
+    flightgear_ip = Param("localhost", doc="Its address.")
+    flightgear_port = Param(5600, structural=True, ge=1, le=65535, doc="Its port.")
     throttle = Input(doc="Throttle.")
     elevator = Input(doc="Elevator, nose down positive.")
     aileron = Input(doc="Aileron, right wing down positive.")
@@ -190,8 +202,9 @@ class JSBSimCompiled(RigidBodyModel):
         if bool(own["script_name"]) == bool(own["aircraft"]):
             raise ParameterError("JSBSimCompiled takes script_name or aircraft, one of them")
         return compiled(
-            own["jsbsim_root"], own["aircraft"], own["script_name"], own["commands"] == "autopilot"
-        )
+            own["jsbsim_root"], own["aircraft"], own["script_name"], own["commands"] == "autopilot",
+            own["flightgear_output_enable"],
+        )  # fmt: skip
 
     def source(self) -> Path:
         """Write the generated Python of the aircraft's kernels to the cache folder, to be read; return its path."""
@@ -269,21 +282,36 @@ class JSBSimCompiled(RigidBodyModel):
         super().from_body(body, rows)
 
     @property
-    def range_kernel(self) -> RangeKernel:
+    def kernel(self) -> RangeKernel:
         """The kernel that makes steps of all aircraft."""
         numbers, wholes = self.flown.commands()
         if not self.is_gusty:
             return RangeKernel(flying.flight(), numbers, wholes, ROWS_PER_THREAD)
         slots = self.flown.aircraft.slots
         places = [SLOTS + len(slots), *(SLOTS + slots[name] for name in (ALTITUDE, GROUND, *WIND, *GUST))]
-        return RangeKernel(
-            flying.gusty_flight(), numbers, np.concatenate([wholes, np.array(places)]), ROWS_PER_THREAD
-        )
+        wholes = np.concatenate([wholes, np.array(places)])
+        return RangeKernel(flying.gusty_flight(), numbers, wholes, ROWS_PER_THREAD)
+
+    @property
+    def range_kernel(self) -> RangeKernel | None:
+        """The kernel, None if states are sent after steps."""
+        return None if self.values["flightgear_output_enable"] else self.kernel
 
     @property
     def advance(self) -> Any:
         """The function that makes steps of all aircraft."""
-        return self.range_kernel.advance
+        fly = self.kernel.advance
+        if not self.values["flightgear_output_enable"]:
+            return fly
+        viewer = self.values["flightgear_ip"], self.values["flightgear_port"]
+        aircraft = self.flown.aircraft
+
+        def advance(x: np.ndarray, u: np.ndarray, p: np.ndarray, dt: float, substeps: int) -> None:
+            """Make steps of all aircraft, and send their states."""
+            fly(x, u, p, dt, substeps)
+            flightgear.send(x[SLOTS:], aircraft.slots, aircraft.n_engines, dt, *viewer)
+
+        return advance
 
 
 def earth_frame(origin: Origin) -> tuple[np.ndarray, tuple[float, float, float]]:
