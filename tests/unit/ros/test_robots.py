@@ -6,6 +6,8 @@ import gc
 import itertools
 import json
 import math
+import os
+import signal
 import subprocess
 import sys
 import threading
@@ -39,7 +41,7 @@ pytestmark = [
     ),
 ]
 DT = 0.125
-PEER = Path(__file__).with_name("peer.py")
+PEER = Path(__file__).with_name("peer.rospy")
 NANO = 1_000_000_000
 
 
@@ -265,3 +267,32 @@ def test_the_example_of_a_plugin_plays(roscore, name):
     with Simulation(loaded.mission) as simulation:
         simulation.step(3)
         assert simulation.result()[0].error is None
+
+
+DRIVER = """
+from tussle.api import EasyAutonomy, Output
+
+
+class Driver(EasyAutonomy):
+    \"\"\"Drives on.\"\"\"
+
+    speed = Output(unit="m/s")
+
+    def step_one(self, me):
+        me.speed = 2.0 + me.step_count
+"""
+
+
+def test_tussle_ros_node_drives_a_car_of_a_simulation(roscore, tmp_path):
+    (tmp_path / "driver.py").write_text(DRIVER)
+    command = [sys.executable, "-m", "tussle.cli", "ros-node", "--plugin", "driver.py", "--dt", str(DT)]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
+    node = subprocess.Popen(command, cwd=tmp_path, env=environment, stdout=subprocess.PIPE, text=True)
+    with Simulation(cars(1, lockstep=60.0)) as simulation:
+        start = simulation.read("car.pos")[0][0, 0]
+        simulation.step(4)
+        way = simulation.read("car.pos")[0][0, 0] - start
+    node.send_signal(signal.SIGTERM)
+    assert node.communicate()[0] == "answered 4 odoms\n"
+    assert node.returncode == 143
+    assert np.hypot(*way[:2]) == pytest.approx(DT * (2 + 3 + 4 + 5))
