@@ -304,6 +304,8 @@ RATE_PROPERTIES = {
     "accelerations/uidot-ft_sec2": "ax", "accelerations/vidot-ft_sec2": "ay", "accelerations/widot-ft_sec2": "az",
     "forces/fbx-total-lbs": "force_x", "forces/fby-total-lbs": "force_y", "forces/fbz-total-lbs": "force_z",
     "moments/l-total-lbsft": "moment_x", "moments/m-total-lbsft": "moment_y", "moments/n-total-lbsft": "moment_z",
+    "forces/fbx-gear-lbs": "gear_fx", "forces/fby-gear-lbs": "gear_fy", "forces/fbz-gear-lbs": "gear_fz",
+    "moments/l-gear-lbsft": "gear_mx", "moments/m-gear-lbsft": "gear_my", "moments/n-gear-lbsft": "gear_mz",
 }  # fmt: skip
 
 

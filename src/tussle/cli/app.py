@@ -23,6 +23,7 @@ COMMANDS = {
     "export": (export_options.ExportOptions, "tussle.cli.export:export"),
     "view": (play_options.ViewOptions, "tussle.cli.view:view"),
     "replay": (play_options.ReplayOptions, "tussle.cli.view:replay"),
+    "serve": (play_options.ServeOptions, "tussle.cli.serve:serve"),
     "plot": (export_options.PlotOptions, "tussle.cli.export:plot"),
     "batch": (batch_options.BatchOptions, "tussle.cli.batch:batch"),
     "analyze": (batch_options.AnalyzeOptions, "tussle.cli.analyze:analyze"),

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 NAP = 0.05  # [s] longest sleep of a paced run, so that Ctrl-C is handled in time
 
 
-def simulate(loaded: Loaded, mission: Mission, seed: int, **more: Any) -> Simulation:
+def simulate(loaded: Loaded, mission: Mission, seed: int | range, **more: Any) -> Simulation:
     """Build the simulation of a mission.
 
     Raises:

@@ -14,20 +14,30 @@ from tussle.rl.games import Consensus, NearOrigin, PredatorPrey
 from tussle.rl.observation import Component, Computed, Each, Means, NearestOthers, Own, Sectors
 from tussle.rl.parallel import TaskParallelEnv, parallel_env
 from tussle.rl.reward import Situation, Term, alive, captured, captures, collisions, died
-from tussle.rl.swarm import Swarm, make_swarm, record_episode
+from tussle.rl.robots import Coverage, FindWay, Formation, Hover, ReachPoint
+from tussle.rl.swarm import Swarm, evaluate, make_swarm, record_episode
 from tussle.rl.task import Task
+from tussle.rl.teams import Battle, CaptureTheFlag, Intercept
 
 __all__ = [
     "Act",
+    "Battle",
+    "CaptureTheFlag",
     "Component",
     "Computed",
     "Consensus",
+    "Coverage",
     "Each",
+    "FindWay",
+    "Formation",
+    "Hover",
+    "Intercept",
     "Means",
     "NearOrigin",
     "NearestOthers",
     "Own",
     "PredatorPrey",
+    "ReachPoint",
     "Sectors",
     "Situation",
     "Swarm",
@@ -41,6 +51,7 @@ __all__ = [
     "captures",
     "collisions",
     "died",
+    "evaluate",
     "make",
     "make_swarm",
     "make_vec",
@@ -49,6 +60,17 @@ __all__ = [
     "register",
 ]
 
-register("tussle/PredatorPrey-v0", PredatorPrey)
+for _task in (
+    Battle,
+    CaptureTheFlag,
+    Coverage,
+    FindWay,
+    Formation,
+    Hover,
+    Intercept,
+    PredatorPrey,
+    ReachPoint,
+):
+    register(f"tussle/{_task.__name__}-v0", _task)
 register("tussle/RLSimple-v0", NearOrigin)
 register("tussle/RLConsensus-v0", Consensus)
