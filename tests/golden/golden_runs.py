@@ -20,7 +20,9 @@ EXTRAS = {"interaction/graph_interaction": "networkx", "interaction/map_gen_2d":
 """Package that an example needs, of those that `import tussle` does not."""
 JSBSIM = ("controller/jsbsim_controllers", "motion/jsbsim_model")
 """Folders whose examples are flown by JSBSim, so that their hashes depend on the machine; tests/unit/jsbsim plays them."""
-SERVED = ("autonomy/moos", "autonomy/ros_autonomy", "interaction/ros_clock_server")
+SERVED = (
+    "autonomy/moos", "autonomy/ros_autonomy", "controller/ros_controllers", "interaction/ros_clock_server", "sensor/ros_compass",
+)  # fmt: skip
 """Folders whose examples need a server; tests of their own play them."""
 
 

@@ -7,6 +7,7 @@ import itertools
 import json
 import math
 import os
+import queue
 import signal
 import subprocess
 import sys
@@ -24,12 +25,18 @@ from tussle.ros import link as ros_link
 from tussle.ros.link import RosLink, StepGate
 from tussle.ros.node import load_rospy
 from tussle.stock import (
+    FixedWing6DOF,
+    FixedWing6DOFControllerROS,
     RayTrace,
+    RigidBody6DOF,
+    RigidBody6DOFControllerROS,
     ROSAutonomy,
     ROSClockServer,
+    ROSCompass,
     ROSControl,
     SimpleCar,
     SingleIntegrator,
+    Still,
     Unicycle,
 )
 
@@ -258,6 +265,57 @@ def test_a_lidar_of_several_elevations_is_refused(roscore):
         pytest.raises(PluginError, match="base_scan takes one elevation; RayTrace has num_rays_vert = 2"),
     ):
         simulation.run()
+
+
+def test_commands_set_thrust_and_surfaces(roscore):
+    ros = load_rospy()
+    blocks = [
+        Block(name="body", controller=RigidBody6DOFControllerROS(), motion=RigidBody6DOF()),
+        Block(
+            name="wing",
+            controller=FixedWing6DOFControllerROS(namespace_prefix="wing"),
+            motion=FixedWing6DOF(),
+        ),
+    ]
+
+    def command():
+        message = twist(ros, x=2.0)
+        message.angular.x, message.angular.y, message.angular.z = 0.1, 0.2, 0.3
+        return message
+
+    with Simulation(Mission(blocks=blocks, dt=DT, end=100.0)) as simulation:
+        publishers = [published(ros, simulation, topic, command) for topic in ("cmd_vel", "wing2/cmd_vel")]
+        inboxes = [group.controllers[0].plugin.inbox[0] for group in simulation.state.population.groups]
+        while not all(inbox.n_received for inbox in inboxes):
+            time.sleep(0.01)
+        simulation.step()
+        for path, push in (
+            ("body.RigidBody6DOFControllerROS", "thrust"),
+            ("wing.FixedWing6DOFControllerROS", "throttle"),
+        ):
+            values = [
+                simulation.read(f"{path}.{name}")[0][0, 0] for name in (push, "aileron", "elevator", "rudder")
+            ]
+            assert values == [2.0, 0.1, 0.2, 0.3]
+        assert simulation.read("body.vel")[0][0, 0][0] > 0.0
+        for publisher in publishers:
+            publisher.unregister()
+
+
+def test_a_compass_shows_north_in_the_body_frame(roscore):
+    ros = load_rospy()
+    heard = queue.Queue()
+    subscriber = ros.rospy.Subscriber("/tug/compass", ros.MagneticField, heard.put)
+    block = Block(name="car", heading="30 deg", motion=Still(), sensor=ROSCompass(vehicle_name="tug"))
+    with Simulation(Mission(blocks=[block], dt=DT, end=1e6)) as simulation:
+        while heard.empty():
+            simulation.step()
+            time.sleep(0.01)
+    message = heard.get()
+    subscriber.unregister()
+    field = message.magnetic_field
+    assert [field.x, field.y, field.z] == pytest.approx([0.5, math.sqrt(0.75), 0.0])
+    assert message.header.frame_id == "tug/base_link"
 
 
 @pytest.mark.parametrize("name", sorted(n for n in stock.manifest() if "ROS" in n))
