@@ -34,6 +34,7 @@ from tussle.stock import (
     ROSClockServer,
     ROSCompass,
     ROSControl,
+    ROSShapeViz,
     SimpleCar,
     SingleIntegrator,
     Still,
@@ -316,6 +317,42 @@ def test_a_compass_shows_north_in_the_body_frame(roscore):
     field = message.magnetic_field
     assert [field.x, field.y, field.z] == pytest.approx([0.5, math.sqrt(0.75), 0.0])
     assert message.header.frame_id == "tug/base_link"
+
+
+def test_markers_are_drawn_until_they_are_deleted_and_entities_are_published(roscore):
+    ros, heard, drawn = load_rospy(), queue.Queue(), []
+
+    def marker(action=0, x=3.0):
+        message = ros.Marker(ns="a", id=1, type=2, action=action)
+        message.pose.position.x, message.scale.x, message.color.r = x, 4.0, 1.0
+        return message
+
+    subscriber = ros.rospy.Subscriber("/tussle/markers", ros.MarkerArray, heard.put)
+    block = Block(name="car", count=2, motion=Still())
+    with Simulation(Mission(blocks=[block], dt=DT, end=1e6, interactions=[ROSShapeViz()])) as simulation:
+        expected = simulation.read("car.pos")[0][0]
+        simulation.state.context.draw.sinks.append(lambda kind, shape: drawn.append((kind, shape)))
+        publisher = published(ros, simulation, "shapes", marker)
+        while not drawn or heard.empty():
+            simulation.step()
+            time.sleep(0.01)
+        kind, shape = drawn[-1]
+        assert kind == "sphere"
+        assert shape["pos"].ravel().tolist() == [3.0, 0.0, 0.0]
+        assert shape["radius"] == 2.0
+        assert shape["colour"] == (255.0, 0.0, 0.0)
+        publisher.publish(marker(action=2))
+        while drawn:
+            drawn.clear()
+            simulation.step()
+            time.sleep(0.01)
+        publisher.publish(marker(x=math.nan))
+        with pytest.raises(PluginError, match=r"/shapes: marker \('a', 1\) has a number that is not finite"):
+            simulation.run_until(lambda _: time.sleep(0.01))
+        publisher.unregister()
+    places = [one.pose.position for one in heard.get().markers]
+    subscriber.unregister()
+    assert [[p.x, p.y, p.z] for p in places] == expected.tolist()
 
 
 @pytest.mark.parametrize("name", sorted(n for n in stock.manifest() if "ROS" in n))
