@@ -23,6 +23,7 @@ JSBSIM = ("controller/jsbsim_controllers", "motion/jsbsim_model")
 SERVED = (
     "autonomy/moos", "autonomy/ros_autonomy", "controller/ros_controllers", "interaction/ros_clock_server",
     "interaction/ros_shape_viz", "sensor/ros_compass",
+    "sensor/ros_imu_sensor",
 )  # fmt: skip
 """Folders whose examples need a server; tests of their own play them."""
 

@@ -25,6 +25,7 @@ from tussle.ros import link as ros_link
 from tussle.ros.link import RosLink, StepGate
 from tussle.ros.node import load_rospy
 from tussle.stock import (
+    External,
     FixedWing6DOF,
     FixedWing6DOFControllerROS,
     RayTrace,
@@ -34,6 +35,7 @@ from tussle.stock import (
     ROSClockServer,
     ROSCompass,
     ROSControl,
+    ROSIMUSensor,
     ROSShapeViz,
     SimpleCar,
     SingleIntegrator,
@@ -353,6 +355,37 @@ def test_markers_are_drawn_until_they_are_deleted_and_entities_are_published(ros
     places = [one.pose.position for one in heard.get().markers]
     subscriber.unregister()
     assert [[p.x, p.y, p.z] for p in places] == expected.tolist()
+
+
+@pytest.mark.parametrize(
+    "errors", [{}, {"acceleration_bias": 0.5, "rate_bias": 0.1, "acceleration_noise": 0.2, "rate_noise": 0.3}]
+)
+def test_an_imu_measures_specific_force_and_rates_with_its_errors(roscore, errors):
+    ros, heard, n = load_rospy(), queue.Queue(), 30
+    subscriber = ros.rospy.Subscriber("/tug/imu", ros.Imu, heard.put)
+    block = Block(
+        name="car", heading="90 deg", motion=External(), sensor=ROSIMUSensor(vehicle_name="tug", **errors)
+    )
+    with Simulation(Mission(blocks=[block], dt=DT, end=1e6)) as simulation:
+        topic = simulation.state.context.shared["ROS 1"].advertise("tug/imu", ros.Imu)
+        while not topic.get_num_connections():
+            time.sleep(0.01)
+        found = []
+        for k in range(1, n + 1):
+            simulation.write("car.vel", [[[0.0, 2.0 * DT * k, 0.0]]])
+            simulation.write("car.omega", [[[0.0, 0.5, 0.25]]])
+            simulation.step()
+            message = heard.get()
+            force, rate = message.linear_acceleration, message.angular_velocity
+            found.append([force.x, force.y, force.z, rate.x, rate.y, rate.z])
+    subscriber.unregister()
+    wrong = np.array(found) - [2.0, 0.0, 9.80665, 0.5, 0.0, 0.25]
+    if errors:
+        assert np.abs(wrong.mean(axis=0)).max() < 1.6
+        assert wrong[:, :3].std() > 0.1
+        assert 0.2 < wrong[:, 3:].std(axis=0).mean() < 0.4
+    else:
+        assert np.abs(wrong).max() < 1e-9
 
 
 @pytest.mark.parametrize("name", sorted(n for n in stock.manifest() if "ROS" in n))
