@@ -500,14 +500,14 @@ def test_ctrl_c_ends_a_run_that_waits_for_its_helm(database, tmp_path):
     )
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
     process = subprocess.Popen(
-        [sys.executable, "-m", "tussle.cli", "run", str(file)],
+        [sys.executable, "-m", "tussle.cli", "run", str(file), "--out", str(tmp_path / "out")],
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
         env=environment,
     )
     try:
-        while not database.clients:
+        while not (tmp_path / "out").exists():  # it is made when Ctrl-C is handled
             assert process.poll() is None, process.stdout.read()
             time.sleep(0.02)
         for _ in range(2):  # the second one ends the step
