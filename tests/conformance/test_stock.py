@@ -60,7 +60,11 @@ ON_REGIONS = (
 
 
 @pytest.mark.parametrize("name", {path: name for name, path in stock.manifest().items()}.values())
-def test_plugin_meets_the_contract(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_plugin_meets_the_contract(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
+) -> None:
+    if "ROS" in name:
+        request.getfixturevalue("roscore")
     if name == "GraphInteraction":
         pytest.importorskip("networkx")
     if name == "TrajectoryRecordPlayback":

@@ -20,7 +20,11 @@ EXTRAS = {"interaction/graph_interaction": "networkx", "interaction/map_gen_2d":
 """Package that an example needs, of those that `import tussle` does not."""
 JSBSIM = ("controller/jsbsim_controllers", "motion/jsbsim_model")
 """Folders whose examples are flown by JSBSim, so that their hashes depend on the machine; tests/unit/jsbsim plays them."""
-SERVED = ("autonomy/moos",)
+SERVED = (
+    "autonomy/moos", "autonomy/ros_autonomy", "controller/ros_controllers", "interaction/ros_clock_server",
+    "interaction/ros_shape_viz", "sensor/ros_compass",
+    "sensor/ros_imu_sensor",
+)  # fmt: skip
 """Folders whose examples need a server; tests of their own play them."""
 
 

@@ -125,6 +125,7 @@ def run(options: RunOptions) -> int:
         with compiling():
             simulation = stack.enter_context(simulate(loaded, mission, seed, **more))
             interrupt = stack.enter_context(Interrupt())
+            simulation.state.context.is_interrupted = lambda: bool(interrupt.code)
             if not options.no_log:
                 directory = options.directory or _new_directory(name, seed)
                 recorder = record(simulation, directory, loaded, options.log_period, options.shapes)

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
-from tussle.api import GroupView, HistoricAttributes, Output, Param, Publish, Sensor, State
+from tussle.api import GroupView, HistoricAttributes, Output, Param, Publish, Sensor, State, service
 from tussle.messages import PointCloud
 from tussle.numeric import cos, sin
 from tussle.numeric.quaternion import quat_from_euler, quat_rotate
-from tussle.rays.patterns import aimed
+from tussle.rays.patterns import ScanPattern, aimed
 from tussle.stock.sensor.ray_trace import kernels
 
 FIELDS, UNITS = "x y z range in_range", "m m m m 1"
@@ -95,6 +96,21 @@ class RayTrace(Sensor):
         self.points.set(k * np.arange(g.n + 1), scan)
         if self.publish_on_local_networks:
             self.cloud.publish(rows, points=[scan[:, row * k : (row + 1) * k] for row in rows])
+
+    @service
+    def scan_pattern(self, g: GroupView) -> Callable[[int], ScanPattern]:
+        """Return a function that tells how the lidar of a row scans, for plugins that pass scans on."""
+        quats = quat_from_euler(*self.rpy)
+
+        def of(row: int) -> ScanPattern:
+            period = float(self.max_sample_rate[row])
+            return ScanPattern(
+                self.xyz[:, row], quats[:, row], self.angle_res_horiz, self.num_rays_vert,
+                float(self.min_range[row]), float(self.max_range[row]), period,
+                min(float(g.t[row]), float(self.next_scan[row]) - period),
+            )  # fmt: skip
+
+        return of
 
     def _pattern(self) -> np.ndarray:
         """Unit directions of the rays, sensor frame, (3, k)."""
