@@ -20,13 +20,21 @@ EXTRAS = {"interaction/graph_interaction": "networkx", "interaction/map_gen_2d":
 """Package that an example needs, of those that `import tussle` does not."""
 JSBSIM = ("controller/jsbsim_controllers", "motion/jsbsim_model")
 """Folders whose examples are flown by JSBSim, so that their hashes depend on the machine; tests/unit/jsbsim plays them."""
+SERVED = (
+    "autonomy/moos", "autonomy/ros_autonomy", "controller/ros_controllers", "interaction/ros_clock_server",
+    "interaction/ros_shape_viz", "sensor/ros_compass",
+    "sensor/ros_imu_sensor",
+)  # fmt: skip
+"""Folders whose examples need a server; tests of their own play them."""
 
 
 @cache
 def examples() -> tuple[str, ...]:
     """Folders of the plugins whose examples can be played with the installed packages."""
     names = sorted({path.parent.relative_to(STOCK).as_posix() for path in stock.examples().values()})
-    return tuple(n for n in names if n not in JSBSIM and (n not in EXTRAS or find_spec(EXTRAS[n])))
+    return tuple(
+        n for n in names if n not in (*JSBSIM, *SERVED) and (n not in EXTRAS or find_spec(EXTRAS[n]))
+    )
 
 
 def play_example(name: str, seeds=1) -> list[str]:

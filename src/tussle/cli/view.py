@@ -37,6 +37,7 @@ def view(options: ViewOptions) -> int:
         with compiling():
             simulation = stack.enter_context(simulate(loaded, mission, seed))
         interrupt = stack.enter_context(Interrupt())
+        simulation.state.context.is_interrupted = lambda: bool(interrupt.code)
         recorder = None
         if options.record is not None:
             # Closed last, however the game ends.

@@ -210,7 +210,7 @@ class Coverage(Task):
         blocks=[
             Block(
                 name="robot", count=12, placement="uniform", half_width=(20.0, 20.0, 0.0), scatter_first=True,
-                motion=SingleIntegrator(max_speed=5.0),
+                motion=SingleIntegrator(),
                 autonomy=MotorSchemas(
                     max_speed=5.0, behaviors=[AvoidEntityMS(sphere_of_influence=50.0, minimum_range=1.0), MoveToGoalMS(gain=0.1)]
                 ),
