@@ -10,9 +10,10 @@ except ImportError:
 
 from tussle.rl.action import Act
 from tussle.rl.environments import TaskEnv, TaskVectorEnv, make, make_vec, register
-from tussle.rl.games import Consensus, NearOrigin, PredatorPrey
+from tussle.rl.games import Consensus, NearOrigin, PredatorPrey, PredatorTeam
 from tussle.rl.observation import Component, Computed, Each, Means, NearestOthers, Own, Sectors
 from tussle.rl.parallel import TaskParallelEnv, parallel_env
+from tussle.rl.policy_file import write_policy
 from tussle.rl.reward import Situation, Term, alive, captured, captures, collisions, died
 from tussle.rl.swarm import Swarm, make_swarm, record_episode
 from tussle.rl.task import Task
@@ -28,6 +29,7 @@ __all__ = [
     "NearestOthers",
     "Own",
     "PredatorPrey",
+    "PredatorTeam",
     "Sectors",
     "Situation",
     "Swarm",
@@ -47,8 +49,10 @@ __all__ = [
     "parallel_env",
     "record_episode",
     "register",
+    "write_policy",
 ]
 
 register("tussle/PredatorPrey-v0", PredatorPrey)
+register("tussle/PredatorTeam-v0", PredatorTeam)
 register("tussle/RLSimple-v0", NearOrigin)
 register("tussle/RLConsensus-v0", Consensus)
