@@ -68,7 +68,6 @@ class Policy:
         """The file's content, with the weights from other files."""
         try:
             import onnx
-            from google.protobuf.message import DecodeError
         except ImportError:
             raise MissingExtraError("Learned needs onnx: pip install 'tussle[policy]'") from None
         path = Path(self.path)
@@ -78,7 +77,7 @@ class Policy:
             raise self._refused(f"it has more than {MOST_BYTES // 2**20} MiB")
         try:
             model = onnx.load_model(path, format="protobuf", load_external_data=False)
-        except (DecodeError, OSError):
+        except Exception:  # noqa: BLE001 - a class of protobuf, which onnx does not export
             model = None
         if model is None or not model.graph.node:
             raise self._refused("it is not an ONNX file")
@@ -140,7 +139,7 @@ def tensors_of(graph: Any, refused: Callable[[str], ParameterError]) -> Iterator
             yield from attribute.tensors
 
 
-class Flight:
+class LearnedFlight:
     """A policy as the agents of one block of a task.
 
     Attributes:
@@ -248,7 +247,7 @@ def registered_task(name: str, path: str) -> Task:
     return task_of(known[name])
 
 
-def load_flight(path: str, task: str, block: str) -> Flight:
+def load_flight(path: str, task: str, block: str) -> LearnedFlight:
     """A policy with its task; read once per version of the file.
 
     Raises:
@@ -261,10 +260,10 @@ def load_flight(path: str, task: str, block: str) -> Flight:
 
 
 @lru_cache(maxsize=64)
-def _flight(path: str, task: str, block: str, stamp: int) -> Flight:
+def _flight(path: str, task: str, block: str, stamp: int) -> LearnedFlight:
     policy = Policy(path)
     name = task or policy.task
-    return Flight(policy, registered_task(name, path), name, block)
+    return LearnedFlight(policy, registered_task(name, path), name, block)
 
 
-__all__ = ["Flight", "Policy", "load_flight", "registered_task"]
+__all__ = ["LearnedFlight", "Policy", "load_flight", "registered_task"]
