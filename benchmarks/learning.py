@@ -18,7 +18,6 @@ import numpy as np
 from tag import Tag
 
 from tussle import Block, Mission
-from tussle.api import Interaction, Param, neighbors
 from tussle.rl import (
     Act,
     NearestOthers,
@@ -33,6 +32,7 @@ from tussle.rl import (
     make_vec,
     parallel_env,
 )
+from tussle.rl.teams import Fire
 from tussle.stock import Unicycle
 
 EPISODE = 100
@@ -42,21 +42,6 @@ class Prey(PredatorPrey):
     """100 learned prey and ten scripted predators."""
 
     time_limit = 10.0
-
-
-class Fire(Interaction):
-    """Every entity damages all enemies within reach."""
-
-    reach = Param(6.0, unit="m", gt=0.0)
-    damage = Param(0.1, gt=0.0)
-
-    @neighbors("reach", n="count", teams="other")
-    @staticmethod
-    def hit(distance: float) -> bool:
-        return distance >= 0.0
-
-    def step(self, w: Any) -> None:
-        w.bodies.health[:] -= self.damage[w.world] * self.hit(w).n
 
 
 def army(name: str, team: int, east: float) -> Block:

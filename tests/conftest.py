@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import os
+import shutil
+import socket
+import subprocess
+import time
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -31,3 +35,33 @@ def _own_state(tmp_path_factory):
         del os.environ["XDG_STATE_HOME"]
     else:
         os.environ["XDG_STATE_HOME"] = before
+
+
+@pytest.fixture(scope="session")
+def roscore(tmp_path_factory):
+    """Address of a ROS master, for nodes of this process too; where ROS is not installed, the test is skipped."""
+    from tussle.errors import MissingExtraError
+    from tussle.ros.node import load_rospy, master_fault
+
+    if shutil.which("roscore") is None:
+        pytest.skip("roscore is not installed")
+    try:
+        load_rospy()
+    except MissingExtraError as error:
+        pytest.skip(str(error))
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+    folder = str(tmp_path_factory.mktemp("ros"))
+    uri = f"http://127.0.0.1:{port}"
+    with pytest.MonkeyPatch.context() as patch:
+        for name, value in {"MASTER_URI": uri, "IP": "127.0.0.1", "LOG_DIR": folder, "HOME": folder}.items():
+            patch.setenv(f"ROS_{name}", value)
+        process = subprocess.Popen(
+            ["roscore", "-p", str(port)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
+        while master_fault():
+            assert process.poll() is None, "roscore has ended"
+            time.sleep(0.05)
+        yield uri
+        process.terminate()
+        process.wait()

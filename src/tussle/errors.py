@@ -51,6 +51,10 @@ class MissingExtraError(TussleError, ImportError):
     """A feature needs a package from an optional extra; the message names both."""
 
 
+class RosError(TussleError):
+    """The ROS master cannot be reached, or a node sent something that is not allowed."""
+
+
 class ConformanceError(TussleError):
     """A plugin breaks a rule of the plugin contract.
 

@@ -127,6 +127,23 @@ def dozers(browser: Browser) -> None:
             shoot(watched, "mission-dozers")
 
 
+def formation(browser: Browser) -> None:
+    """A part of the shipped mission formation_flight, when all are in their places."""
+    loaded = read_mission("formation_flight", {"leaders": "40", "wings": "360"})
+    camera = {"pos": "1200,-1500,750", "focal_point": "2500,-350,330"}
+    with tempfile.TemporaryDirectory() as folder:
+        with (
+            Simulation(loaded.mission, 1) as game,
+            Recorder(game, folder, period=0.5, mission_text=loaded.text),
+        ):
+            game.run()
+        with shown(
+            browser, Page(Recording(folder), viewer={**loaded.viewer, "camera": camera}, is_paused=True)
+        ) as watched:
+            seek(watched, 115.0)
+            shoot(watched, "mission-formation-flight")
+
+
 def offline(browser: Browser) -> None:
     """The page in a file, opened from there."""
     with tempfile.TemporaryDirectory() as folder:
@@ -204,6 +221,7 @@ PICTURES: dict[str, Callable[[Browser], None]] = {
     "replay": replay,
     "narrow": narrow,
     "dozers": dozers,
+    "formation": formation,
     "offline": offline,
     "shapes": shapes,
 }

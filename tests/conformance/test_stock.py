@@ -5,8 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from moos_database import MoosDatabase
+from moos_helm import MoosHelm
 
 from tussle import historic, stock
+from tussle.api import Plugin
 from tussle.stock import Boundary
 from tussle.testing import check_plugin
 
@@ -57,7 +60,11 @@ ON_REGIONS = (
 
 
 @pytest.mark.parametrize("name", {path: name for name, path in stock.manifest().items()}.values())
-def test_plugin_meets_the_contract(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_plugin_meets_the_contract(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
+) -> None:
+    if "ROS" in name:
+        request.getfixturevalue("roscore")
     if name == "GraphInteraction":
         pytest.importorskip("networkx")
     if name == "TrajectoryRecordPlayback":
@@ -73,7 +80,18 @@ def test_plugin_meets_the_contract(name: str, tmp_path: Path, monkeypatch: pytes
     if name == "JSBSimCompiled":
         params = {"aircraft": "hawk", "jsbsim_root": str(stock.examples()["JSBSimModel"].with_name("hawk"))}
     companions = [stock.load(other)() for other in NEEDED.get(name, ())]
-    check_plugin(stock.load(name), companions=BOUNDARIES if name in ON_REGIONS else companions, **params)
+    if name == "MOOSAutonomy":
+        return check_with_helms(stock.load(name))
+    return check_plugin(
+        stock.load(name), companions=BOUNDARIES if name in ON_REGIONS else companions, **params
+    )
+
+
+def check_with_helms(cls: type[Plugin], n: int = 40) -> None:
+    """Check MOOSAutonomy; each of the kit's entities has a community and a helm."""
+    with MoosDatabase(n) as database, MoosHelm(*range(database.port, database.port + n)):
+        check_plugin(cls, moos_port=database.port, port_step=1, moos_time_warp=1000.0, timeout=300.0)
+        assert database.violations == []
 
 
 @pytest.mark.parametrize(

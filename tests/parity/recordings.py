@@ -1,4 +1,4 @@
-"""Recorded trajectories of the existing system: where they are, and their columns."""
+"""Recorded trajectories of SCRIMMAGE: where they are, and their columns."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def folder() -> Path | None:
 
 @dataclass(frozen=True)
 class Recording:
-    """A run of the existing system.
+    """A run of SCRIMMAGE.
 
     Frame k is the state before step k, at time k dt; some frames are left out. The last frame is the state after the last step.
 
@@ -101,7 +101,7 @@ NAMES = (
 
 @cache
 def mission(name: str) -> Mission:
-    """The mission of a recording, from the existing system's own file."""
+    """The mission of a recording, from SCRIMMAGE's own file."""
     place = folder()
     assert place is not None
     return read_mission(place / "missions" / f"{name}.xml").mission

@@ -1,6 +1,6 @@
 """Missions that draw random numbers agree with their recordings in distribution.
 
-A recording is one run of the existing system. Its numbers are held against those of 200 seeds at the 1 % level: one number of a run by
+A recording is one run of SCRIMMAGE. Its numbers are held against those of 200 seeds at the 1 % level: one number of a run by
 its rank among theirs, positions of many by the two-sample Kolmogorov-Smirnov test.
 """
 

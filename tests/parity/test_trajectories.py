@@ -1,4 +1,4 @@
-"""The existing system's missions fly as it flew them with `compat="scrimmage"`.
+"""SCRIMMAGE's missions fly as it flew them with `compat="scrimmage"`.
 
 The missions are read from its own files. Compared are, from the recorded ids, times of birth and first states on and over the
 whole length: every position, attitude, who is there in each frame, the frame in which each entity was last seen, and what the

@@ -64,7 +64,7 @@ class CodeSection:
 
 
 class Code:
-    """What parts of an aircraft emit, in the order in which they run.
+    """Code that the parts of an aircraft emit, in the order in which it runs.
 
     Attributes:
         initial: Property -> its value before the first step.
@@ -103,7 +103,7 @@ class Code:
         """Emit a line; several are given by several calls.
 
         Raises:
-            AircraftError: The aircraft has grown beyond all measure.
+            AircraftError: The aircraft's code is too long.
         """
         self._add(CodeLine(self._depth, text))
 
@@ -122,7 +122,7 @@ class Code:
 
     @contextmanager
     def block(self, head: str) -> Iterator[None]:
-        """Emit `head:`; what is emitted inside is indented, and may not run."""
+        """Emit `head:`; the code emitted inside is indented, and may not run."""
         self.line(head + ":")
         self._depth += 1
         before = len(self.section.lines)
@@ -163,7 +163,7 @@ class Code:
         return self.variable(name)
 
     def read(self, name: str, node: Element | None = None) -> str:
-        """Return the expression of a property; `node` is who asks, for the message if nobody writes it."""
+        """Return the expression of a property; `node` reads it, and is named in the message if nothing writes it."""
         name = normal(name)
         if name in self.constants:
             return repr(self.constants[name])
@@ -227,7 +227,7 @@ class Code:
         return f"ring_{len(self.rings) - 1}"
 
     def keep(self, name: str) -> None:
-        """Keep a property as a slot, for who looks at it from outside."""
+        """Keep a property as a slot, so that it can be read from outside."""
         self.kept[normal(name)] = None
         self.readers.setdefault(normal(name), None)
 
@@ -247,8 +247,13 @@ class Code:
     # -- the whole ------------------------------------------------------------------------------------------------------------
 
     def is_used(self, name: str) -> bool:
-        """Whether somebody reads a property or keeps it."""
+        """Return True if somebody reads a property or keeps it."""
         return name in self.readers or name in self.kept
+
+    def known(self) -> set[str]:
+        """Return the properties that are written, set or given."""
+        made = {name for section in self.sections.values() for name in section.touched}
+        return made | self.initial.keys() | self.inputs
 
     def check(self, settable: Sequence[str] = ()) -> None:
         """Check that all properties that are read are written, set or given.
@@ -256,8 +261,7 @@ class Code:
         Raises:
             AircraftError: One is not.
         """
-        made = {name for section in self.sections.values() for name in section.touched}
-        made |= self.initial.keys() | self.inputs | set(settable)
+        made = self.known() | set(settable)
         for name, node in self.readers.items():
             if name not in made:
                 near = nearest_name(name, made)

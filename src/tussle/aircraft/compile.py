@@ -7,8 +7,9 @@ import math
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -39,7 +40,7 @@ from tussle.aircraft.node import Element
 from tussle.aircraft.propulsion import RUNTIME, Propulsion, read_propulsion
 from tussle.errors import ParameterError, nearest_name
 from tussle.numeric import store
-from tussle.numeric.kernel import Device, kernel
+from tussle.numeric.kernel import Device, Kernel, jitted, renamed
 
 KNOWN = (
     "fileheader", "metrics", "mass_balance", "propulsion", "system", "autopilot", "flight_control", "ground_reactions",
@@ -62,6 +63,42 @@ SCOPE = {
     if isinstance(each, Device)
 }
 SCOPE |= {name: getattr(numeric, name) for name in numeric.__all__} | RUNTIME | {"math": math, "np": np}
+
+
+class GeneratedKernel(Kernel):
+    """A kernel of a thousand lines, compiled without Numba's passes that take seconds and give nothing to plain arithmetic.
+
+    Args:
+        function: The Python function.
+        signature: Codes of its arguments.
+    """
+
+    options: ClassVar[dict[str, Any]] = {**Kernel.options, "no_rewrites": True}
+
+    def _new_dispatcher(self, key: str) -> Any:
+        return jitted(
+            renamed(self.py_func, key),
+            nogil=True,
+            no_cfunc_wrapper=True,
+            pipeline_class=plain_compiler(),
+            **self.options,
+        )
+
+
+@cache
+def plain_compiler() -> Any:
+    """Numba's compiler without the conversion to single assignment, which LLVM does too, and faster; numbers are the same bits."""
+    from numba.core.compiler import CompilerBase, DefaultPassBuilder
+
+    class PlainCompiler(CompilerBase):
+        """Numba's compiler without the conversion to single assignment."""
+
+        def define_pipelines(self) -> list[Any]:
+            """The passes."""
+            self.state.flags.enable_ssa = False
+            return [DefaultPassBuilder.define_nopython_pipeline(self.state)]  # type: ignore[no-untyped-call]
+
+    return PlainCompiler
 
 
 @dataclass(frozen=True)
@@ -108,7 +145,10 @@ class CompiledAircraft:
 
 
 def emit(
-    root: Element, find: Callable[[Element, str, str], Element], keep: Sequence[str] = ()
+    root: Element,
+    find: Callable[[Element, str, str], Element],
+    keep: Sequence[str] = (),
+    keep_known: Sequence[str] = (),
 ) -> tuple[Code, Propulsion | None]:
     """Emit the step and the start of an aircraft.
 
@@ -160,27 +200,31 @@ def emit(
     code.begin("start")
     if propulsion:
         propulsion.emit_start(code)
-    for name in ("position/geod-alt-ft", *keep):
+    known = code.known()
+    for name in ("position/geod-alt-ft", *keep, *(each for each in keep_known if normal(each) in known)):
         code.keep(name)
-    # What the aircraft reads and nobody writes is a command from outside, unless JSBSim itself should write it.
+    # A property that the aircraft reads and nothing writes is a command from outside, unless JSBSim itself should write it.
     code.inputs.update(name for name in code.readers if not name.startswith(BUILT_IN))
     code.check()
     return code, propulsion
 
 
-def compile_aircraft(root: Path | None, name: str, keep: Sequence[str] = ()) -> CompiledAircraft:
+def compile_aircraft(
+    root: Path | None, name: str, keep: Sequence[str] = (), keep_known: Sequence[str] = ()
+) -> CompiledAircraft:
     """Compile an aircraft; the kernels are loaded from the cache or compiled on their first call.
 
     Args:
         root: Folder of aircraft, engine and systems; None for that of the package jsbsim.
         name: The aircraft.
         keep: Properties to be kept in the state, for who reads them.
+        keep_known: The same, as far as the aircraft has them.
 
     Raises:
         AircraftError: It cannot be read, is invalid, or has something that is not supported.
     """
     files = Files(root, name)
-    code, propulsion = emit(files.load(), files.find, keep)
+    code, propulsion = emit(files.load(), files.find, keep, keep_known)
     slots = code.slots()
     names = [*CORE, *slots]
     variables = {each: each if k < len(CORE) else code.variable(each) for k, each in enumerate(names)}
@@ -192,7 +236,7 @@ def compile_aircraft(root: Path | None, name: str, keep: Sequence[str] = ()) -> 
     for section in ("step", "start"):
         made = scope[section]
         made.__module__, made.__qualname__ = __name__, f"{name}_{section}"
-        kernels[section] = kernel("F2w F i8 i8 i8 f8 f8")(made)
+        kernels[section] = GeneratedKernel(made, "F2w F i8 i8 i8 f8 f8")
     first = np.array([0.0] * len(CORE) + [code.initial.get(each, 0.0) for each in names[len(CORE) :]])
     return CompiledAircraft(
         name, {each: k for k, each in enumerate(names)}, first, code.tables,
@@ -213,7 +257,7 @@ def _module(code: Code, variables: dict[str, str]) -> Iterator[str]:
             yield f"    {array} = np.zeros(({rows}, {columns}))"
         yield "    for row in range(begin, end):"
         body = [*code.body(section, 3), "            pass"]
-        # What the section does not mention is neither loaded nor stored, which would only take time to compile.
+        # Values that the section does not use are neither loaded nor stored: that would only take time to compile.
         used = {word for line in body for word in WORD.findall(line)}
         mentioned = [(k, name, v) for k, (name, v) in enumerate(variables.items()) if v in used]
         for k, _, variable in mentioned:

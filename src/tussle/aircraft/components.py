@@ -168,20 +168,15 @@ class ControlPart:
         return f"{value} * {self.inputs[0]}" if self.inputs else value
 
     def _filter(self, formula: Callable[[str, str, str], str]) -> str:
-        """A filter of first order: output from input, last input and last output; it starts with its input as output."""
+        """A filter of first order: output from input, last input and last output; as in JSBSim, its first run ignores the input."""
         code = self.code
-        x, x1, y1, begun = (
-            code.temporary(self.input),
-            self.state("input"),
-            self.state("output"),
-            self.state("begun"),
-        )
-        y = code.temporary(x)
+        x, y = code.temporary(self.input), code.temporary("0.0")
+        x1, y1, begun = (self.state(each) for each in ("input", "output", "begun"))
         with code.block(f"if {begun} != 0.0"):
             code.line(f"{y} = {formula(x, x1, y1)}")
+            code.line(f"{x1} = {x}")
+            code.line(f"{y1} = {y}")
         code.line(f"{begun} = 1.0")
-        code.line(f"{x1} = {x}")
-        code.line(f"{y1} = {y}")
         return y
 
     def lag_filter(self) -> str:
@@ -213,7 +208,6 @@ class ControlPart:
         x1, x2, y1, y2, begun = (
             self.state(each) for each in ("input", "input before", "output", "output before", "begun")
         )
-        code.line(f"{y} = {x}")
         with code.block(f"if {begun} != 0.0"):
             scale = code.temporary(f"4.0 * {d} + 2.0 * {e} * {dt} + {f} * {dt} * {dt}")
             code.line(
@@ -221,8 +215,9 @@ class ControlPart:
                 f" + {x2} * (4.0 * {a} - 2.0 * {b} * {dt} + {c} * {dt} * {dt}) - {y1} * (2.0 * {f} * {dt} * {dt} - 8.0 * {d})"
                 f" - {y2} * (4.0 * {d} - 2.0 * {e} * {dt} + {f} * {dt} * {dt})) / {scale}"
             )
-        for line in (f"{begun} = 1.0", f"{y2} = {y1}", f"{y1} = {y}", f"{x2} = {x1}", f"{x1} = {x}"):
-            code.line(line)
+            for line in (f"{y2} = {y1}", f"{y1} = {y}", f"{x2} = {x1}", f"{x1} = {x}"):
+                code.line(line)
+        code.line(f"{begun} = 1.0")
         return y
 
     def pid(self) -> str:

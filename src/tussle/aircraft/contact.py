@@ -149,7 +149,9 @@ def touch(tables, at, work, gear, k, center, place, m, up, motion, dt):
     lx, ly, lz = lx / size, ly / size, lz / size
     forward, left = lx * vx + ly * vy + lz * vz, sx * vx + sy * vy + sz * vz
     rise = gx * vx + gy * vy + gz * vz
-    speed = 0.0 if dt == 0.0 else -rise / project if is_wheel else -rise
+    # A contact that begins in this step cannot have been faster than its compression in the step.
+    most = abs(length) / dt if dt != 0.0 else 0.0
+    speed = min(max(-rise / project if is_wheel else -rise, -most), most)
     strut = gear[k, 10] if gear[k, 10] == gear[k, 10] else strut_force(tables, at, length, speed)
     load = strut / -project if is_wheel else -strut
     slide = math.sqrt(forward * forward + left * left)

@@ -288,6 +288,10 @@ FLOW_PROPERTIES = {
         f"(by + ridot * eye_x - pidot * eye_z + ri * (qi * eye_z - ri * eye_y) - pi * (pi * eye_y - qi * eye_x)) / {GEES}",
     "accelerations/n-pilot-z-norm":
         f"(bz + pidot * eye_y - qidot * eye_x + pi * (ri * eye_x - pi * eye_z) - qi * (qi * eye_z - ri * eye_y)) / {GEES}",
+    "accelerations/a-pilot-x-ft_sec2":
+        "bx + qidot * eye_z - ridot * eye_y + qi * (pi * eye_y - qi * eye_x) - ri * (ri * eye_x - pi * eye_z)",
+    "accelerations/a-pilot-y-ft_sec2":
+        "by + ridot * eye_x - pidot * eye_z + ri * (qi * eye_z - ri * eye_y) - pi * (pi * eye_y - qi * eye_x)",
     "accelerations/a-pilot-z-ft_sec2":
         "bz + pidot * eye_y - qidot * eye_x + pi * (ri * eye_x - pi * eye_z) - qi * (qi * eye_z - ri * eye_y)",
 }  # fmt: skip
@@ -304,6 +308,8 @@ RATE_PROPERTIES = {
     "accelerations/uidot-ft_sec2": "ax", "accelerations/vidot-ft_sec2": "ay", "accelerations/widot-ft_sec2": "az",
     "forces/fbx-total-lbs": "force_x", "forces/fby-total-lbs": "force_y", "forces/fbz-total-lbs": "force_z",
     "moments/l-total-lbsft": "moment_x", "moments/m-total-lbsft": "moment_y", "moments/n-total-lbsft": "moment_z",
+    "forces/fbx-gear-lbs": "gear_fx", "forces/fby-gear-lbs": "gear_fy", "forces/fbz-gear-lbs": "gear_fz",
+    "moments/l-gear-lbsft": "gear_mx", "moments/m-gear-lbsft": "gear_my", "moments/n-gear-lbsft": "gear_mz",
 }  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Where aircraft, engines and systems are found."""
+"""Paths of the files of aircraft, engines and systems."""
 
 from __future__ import annotations
 

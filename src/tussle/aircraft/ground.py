@@ -91,7 +91,7 @@ def emit_ground(code: Code, contacts: list[Contact]) -> str:
     code.line(f"{' = '.join(names)} = 0.0")
     code.line("touching = 0.0")
     if not contacts:
-        _offer_sums(code)
+        offer(code, {"gear/wow": "touching"})
         return ""
     code.line("# Contacts, if one may be near the ground.")
     reach = max(math.dist((0.0, 0.0, 0.0), each.numbers[:3]) for each in contacts) / 12.0
@@ -125,10 +125,10 @@ def emit_ground(code: Code, contacts: list[Contact]) -> str:
         for kept in memory:
             code.line(f"{' = '.join(kept)} = 0.0")
     for k, (_, _, _, slip, touches, length, speed) in enumerate(memory):
-        unit = indexed("gear/unit", k)
+        unit = indexed("gear/unit" if contacts[k].is_wheel else "contact/unit", k)
         offer(code, {f"{unit}/WOW": touches, f"{unit}/compression-ft": length, f"{unit}/slip-angle-deg": slip,
                      f"{unit}/compression-velocity-fps": speed})  # fmt: skip
-    _offer_sums(code)
+    offer(code, {"gear/wow": "touching"})
     return _friction(memory)
 
 
@@ -156,13 +156,9 @@ def _friction(memory: list[list[str]]) -> str:
              "    turn_z = i13 * hold[3] + i23 * hold[4] + i33 * hold[5]",
              "    pidot += turn_x", "    qidot += turn_y", "    ridot += turn_z",
              "    pdot += turn_x", "    qdot += turn_y", "    rdot += turn_z", "    remember(work, gear)"]  # fmt: skip
+    for k, axis in enumerate("xyz"):
+        for kind, j in (("f", k), ("m", k + 3)):
+            lines.append(f"    gear_{kind}{axis} += hold[{j}]")
+            lines.append(f"    {'force' if kind == 'f' else 'moment'}_{axis} += hold[{j}]")
     lines += [f"    {kept[j]} = gear[{k}, {j}]" for k, kept in enumerate(memory) for j in range(3)]
     return "\n".join(lines)
-
-
-def _offer_sums(code: Code) -> None:
-    offer(code, {
-        "forces/fbx-gear-lbs": "gear_fx", "forces/fby-gear-lbs": "gear_fy", "forces/fbz-gear-lbs": "gear_fz",
-        "moments/l-gear-lbsft": "gear_mx", "moments/m-gear-lbsft": "gear_my", "moments/n-gear-lbsft": "gear_mz",
-        "gear/wow": "touching",
-    })  # fmt: skip

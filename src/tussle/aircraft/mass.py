@@ -14,7 +14,7 @@ from tussle.aircraft.node import Element
 from tussle.aircraft.propulsion.bench import given
 
 Inertia = tuple[float, float, float, float, float, float]
-"""xx, yy, zz, xy, xz, yz as they stand in the matrix [slug ft^2]."""
+"""xx, yy, zz, xy, xz, yz elements of the inertia matrix [slug ft^2]."""
 FORMS = ("tube", "cylinder", "sphere", "ball")
 
 

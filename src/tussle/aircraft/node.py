@@ -1,4 +1,4 @@
-"""XML of aircraft files as nodes that know their file and line, read with limits."""
+"""XML of aircraft files as nodes with file and line, read with limits."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MOST_ENTITIES, LONGEST_ENTITY = 100, 100
 
 
 class AircraftError(ParameterError):
-    """An aircraft's file cannot be read, is invalid, or asks for what is not compiled. The message begins with file and line."""
+    """An aircraft's file cannot be read, is invalid, or uses an unsupported part of JSBSim. The message begins with file and line."""
 
 
 @dataclass(eq=False)

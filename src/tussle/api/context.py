@@ -43,6 +43,7 @@ class Context:
         shared: Objects that handles of several entities use; their method `end` is called when the simulation is closed.
         boxes: Lengths of the boxes of each block for rays [m], (n_blocks, 3); 0 for spheres.
         mass_properties: Returns mass [kg], (n,), and inertia tensor [kg m^2], (9, n), of all rows of the body table.
+        is_interrupted: Whether the user asked to stop; a plugin that waits for others then waits no longer.
     """
 
     clock: Clock
@@ -62,6 +63,7 @@ class Context:
     boxes: np.ndarray = field(init=False)
     mass_properties: Callable[[], tuple[np.ndarray, np.ndarray]] = field(init=False)
     shared: dict[Hashable, Any] = field(default_factory=dict)
+    is_interrupted: Callable[[], bool] = lambda: False
     _pool: ThreadPoolExecutor | None = None
 
     def __post_init__(self) -> None:

@@ -9,6 +9,7 @@ import typer
 import tussle
 from tussle.cli import batch_options, export_options, play_options, train_options
 from tussle.cli.options import EPILOG, MissionOptions, PluginOptions, add_command
+from tussle.cli.ros_node import RosNodeOptions
 from tussle.cli.terminal import OK, out, run_guarded
 
 COMMANDS = {
@@ -22,12 +23,14 @@ COMMANDS = {
     "export": (export_options.ExportOptions, "tussle.cli.export:export"),
     "view": (play_options.ViewOptions, "tussle.cli.view:view"),
     "replay": (play_options.ReplayOptions, "tussle.cli.view:replay"),
+    "serve": (play_options.ServeOptions, "tussle.cli.serve:serve"),
     "plot": (export_options.PlotOptions, "tussle.cli.export:plot"),
     "batch": (batch_options.BatchOptions, "tussle.cli.batch:batch"),
     "analyze": (batch_options.AnalyzeOptions, "tussle.cli.analyze:analyze"),
     "report": (batch_options.ReportOptions, "tussle.cli.analyze:report"),
     "optimize": (batch_options.OptimizeOptions, "tussle.cli.optimize:optimize"),
     "train": (train_options.TrainOptions, "tussle.cli.train:train"),
+    "ros-node": (RosNodeOptions, "tussle.cli.ros_node:ros_node"),
     "doctor": (play_options.DoctorOptions, "tussle.cli.doctor:doctor"),
 }
 """Name, options and function of each command."""

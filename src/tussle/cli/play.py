@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 NAP = 0.05  # [s] longest sleep of a paced run, so that Ctrl-C is handled in time
 
 
-def simulate(loaded: Loaded, mission: Mission, seed: int, **more: Any) -> Simulation:
+def simulate(loaded: Loaded, mission: Mission, seed: int | range, **more: Any) -> Simulation:
     """Build the simulation of a mission.
 
     Raises:
@@ -125,6 +125,7 @@ def run(options: RunOptions) -> int:
         with compiling():
             simulation = stack.enter_context(simulate(loaded, mission, seed, **more))
             interrupt = stack.enter_context(Interrupt())
+            simulation.state.context.is_interrupted = lambda: bool(interrupt.code)
             if not options.no_log:
                 directory = options.directory or _new_directory(name, seed)
                 recorder = record(simulation, directory, loaded, options.log_period, options.shapes)

@@ -202,3 +202,27 @@ class ReplayOptions(PageOptions):
         super().__post_init__()
         if self.over and self.other is None:
             raise typer.BadParameter("--over draws two runs in one place; a second run is required")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ServeOptions(MissionOptions):
+    """Serve a mission to programs in any language, which step it, read and write its columns, and publish messages."""
+
+    worlds: Annotated[
+        int,
+        option(
+            "N", "Number of worlds; they have the seeds that follow.", min=1, max=100_000, shows_default=True
+        ),
+    ] = 1
+    host: Annotated[
+        str,
+        option(
+            "ADDRESS",
+            "Serve at this address of the machine; at any but 127.0.0.1, others can connect.",
+            shows_default=True,
+        ),
+    ] = "127.0.0.1"
+    port: Annotated[
+        int | None,
+        option("N", "Serve at this port; by default the first free one from 8123.", min=1, max=65535),
+    ] = None

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import os
-import sys
 import time
-import webbrowser
 from collections.abc import Callable
 from contextlib import ExitStack
 from typing import Any
@@ -40,6 +37,7 @@ def view(options: ViewOptions) -> int:
         with compiling():
             simulation = stack.enter_context(simulate(loaded, mission, seed))
         interrupt = stack.enter_context(Interrupt())
+        simulation.state.context.is_interrupted = lambda: bool(interrupt.code)
         recorder = None
         if options.record is not None:
             # Closed last, however the game ends.
@@ -107,14 +105,8 @@ def announce(page: Page, options: PageOptions) -> None:
             " steer the game, and what they send is not encrypted",
             "bold yellow",
         )
-    if not options.no_browser and has_screen():
-        webbrowser.open(page.url)
-
-
-def has_screen() -> bool:
-    """Whether a browser can be opened: on Linux without a display, only the one that the user names in BROWSER."""
-    names = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")
-    return not sys.platform.startswith("linux") or any(os.environ.get(name) for name in names)
+    if not options.no_browser:
+        page.open()
 
 
 def watch(page: Page, interrupt: Interrupt, is_done: Callable[[], bool]) -> int:

@@ -76,7 +76,7 @@ def find(
         shapes: Items and sizes of the bodies.
         pairs: Rows of the pairs that may touch, in the order in which they are solved, (m,) each.
         motion: Velocities [m/s], (3, n), length of a step [s], and world of each body, (n,).
-        scene: What does not move.
+        scene: The static scene.
         n_worlds: Number of worlds.
     """
     vel, dt, world = motion
@@ -156,7 +156,7 @@ def recalled(
 def remembered(
     contacts: ContactList, ids: np.ndarray, sizes: np.ndarray, impulses: np.ndarray, memory: np.ndarray
 ) -> np.ndarray:
-    """Which contacts touch, (m,); their impulses are written to the memory, (4 SLOTS, n)."""
+    """Return True for contacts that touch, (m,); write their impulses to the memory, (4 SLOTS, n)."""
     touches = np.empty(len(contacts), bool)
     impulses_kernels.remember(contacts.arrays, (ids, sizes), impulses, memory, touches)
     return touches

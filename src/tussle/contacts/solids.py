@@ -58,7 +58,7 @@ class StaticSolids:
 
     @property
     def is_empty(self) -> bool:
-        """Whether there is nothing to touch."""
+        """True if there is nothing to touch."""
         return not (len(self.planes) + len(self.balls) + len(self.tree[3]) + self.field[0].size)
 
 
@@ -82,7 +82,7 @@ def _numbers(part: Volume | TriangleMesh) -> np.ndarray:
 
 
 def _hull_triangles(part: Volume) -> np.ndarray:
-    """Triangles of the faces of a polyhedron, (m, 3, 3): its corners in each face, joined in the order round their middle."""
+    """Triangles of the faces of a polyhedron, (m, 3, 3): its corners in each face, joined in the order around their middle."""
     assert isinstance(part, Convex)
     points = np.array(getattr(part, "points", ()), float).reshape(-1, 3)
     found = []

@@ -51,7 +51,7 @@ def _columns(owner: Any) -> dict[str, Numbers]:
 
 
 def _follow(state: SimulationState, path: str) -> tuple[Any, tuple[str, ...], str, Numbers]:
-    """Return block or world plugin, plugin path in the block, column name and its declaration."""
+    """Resolve a path. Returns the block or world plugin, the plugin path in the block, the column's name and its declaration."""
     owners, name = paths.follow(path, paths.MissionRoot(state.mission), paths.inside, _columns)
     return owners[0], tuple(p.instance_name for p in owners[1:]), name, _columns(owners[-1])[name]
 
@@ -128,16 +128,16 @@ def write(state: SimulationState, path: str, values: Any) -> None:
             raise type(error)(f"{path!r}: {error}") from None
     if not isinstance(head, Block):
         array = _world_column(state, path, name)
-        given = np.moveaxis(_shaped(path, values, np.moveaxis(array, -1, 0).shape), 0, -1)
-        _check_written(path, given, column)
-        array[:] = given
+        new_values = np.moveaxis(_shaped(path, values, np.moveaxis(array, -1, 0).shape), 0, -1)
+        _check_written(path, new_values, column)
+        array[:] = new_values
         return
     if not key and name not in FLOATS:
         raise ParameterError(f"{path!r} cannot be written; {listed(FLOATS)}")
     if column.ragged:
         raise ParameterError(f"{path!r} is a list per entity; lists cannot be written")
     number, bodies = state.context.block_names.index(head.name), state.population.bodies
-    given = _shaped(path, values, (state.n_worlds, capacity(state, number), *column.shape))
+    new_values = _shaped(path, values, (state.n_worlds, capacity(state, number), *column.shape))
     for group in state.population.groups:
         rows = np.arange(group.first, group.last)
         mine = np.flatnonzero(bodies.block[rows] == number)
@@ -145,7 +145,7 @@ def write(state: SimulationState, path: str, values: Any) -> None:
         if not len(mine) or (key and binding is None):
             continue
         target = getattr(bodies, name) if binding is None else group.table.array(binding.places[name])
-        part = np.moveaxis(given[bodies.world[rows[mine]], bodies.block_index[rows[mine]]], 0, -1)
+        part = np.moveaxis(new_values[bodies.world[rows[mine]], bodies.block_index[rows[mine]]], 0, -1)
         _check_written(path, part, column, is_body=binding is None)
         if binding is None:
             # Unchanged rows keep their motion state: setting it from the attitude would round it.
@@ -154,8 +154,8 @@ def write(state: SimulationState, path: str, values: Any) -> None:
             bodies.has_loads = True
             bodies.touch(group.first, group.last)
             if name in ("pos", "vel", "quat") and differs.any():
-                group.moving.begin(group.motion.plugin)
-                group.motion.plugin.from_body(group.moving, mine[differs])
+                group.motion_view.begin(group.motion.plugin)
+                group.motion.plugin.from_body(group.motion_view, mine[differs])
         else:
             target[..., mine] = part
             for view in group.views:  # views cache the reaches of parameters until the next repack
@@ -163,14 +163,16 @@ def write(state: SimulationState, path: str, values: Any) -> None:
 
 
 def _shaped(path: str, values: Any, shape: tuple[int, ...]) -> np.ndarray:
-    given = np.asarray(values)
-    if given.dtype.kind not in "biuf":
-        raise ParameterError(f"{path!r}: values are {given.dtype}; they must be numbers, or one text for all")
+    array = np.asarray(values)
+    if array.dtype.kind not in "biuf":
+        raise ParameterError(
+            f"{path!r}: values are {array.dtype}; they must be numbers, or one text for all entities"
+        )
     try:
-        return np.broadcast_to(given, shape)
+        return np.broadcast_to(array, shape)
     except ValueError:
         raise ParameterError(
-            f"{path!r}: values have shape {given.shape}; the shape must be {shape}"
+            f"{path!r}: values have shape {array.shape}; the shape must be {shape}"
         ) from None
 
 

@@ -51,8 +51,8 @@ def reset(
         if state.overrides.columns:
             world_binding.fill_params(state.overrides, chosen)
     due = state.births.begin(chosen)
-    gone = mask | ~state.running  # the worlds that ended last keep their rows while no world runs
-    repack(state, gone[state.population.bodies.world], _create(state, due, at_start=True))
+    removed = mask | ~state.running  # when all worlds have ended, those that ended last still have rows
+    repack(state, removed[state.population.bodies.world], _create(state, due, at_start=True))
     steps = clock.step[state.running]
     clock.common = int(steps[0]) if len(steps) and (steps == steps[0]).all() else -1
     _start_world_plugins(state, mask)
@@ -89,9 +89,9 @@ def _create(state: SimulationState, due: Mapping[int, np.ndarray], at_start: boo
     rejecting = [r for r in state.interactions if type(r.plugin).rejects is not Interaction.rejects]
     placed: dict[int, list[np.ndarray]] = {}
 
-    def standing(world: int) -> np.ndarray:
+    def occupied(world: int) -> np.ndarray:
         bodies = state.population.bodies
-        # At a reset, the table still holds the rows of the last game.
+        # At a reset, the table still holds the rows of the previous episode.
         here = [] if at_start else [bodies.pos[:, bodies.world == world]]
         return np.concatenate([np.zeros((3, 0)), *here, *placed.get(world, [])], axis=1)
 
@@ -103,26 +103,26 @@ def _create(state: SimulationState, due: Mapping[int, np.ndarray], at_start: boo
             raise error
         state.record_failure(world, state.error(world, str(error)))
 
-    occupancy = Occupancy(rejects, standing, fail) if rejecting else None
+    occupancy = Occupancy(rejects, occupied, fail) if rejecting else None
     state.world_view.begin()
     new, first = Bodies.empty(sum(map(len, due.values())), state.n_worlds), 0
     for block, worlds in due.items():
-        mine = slice(first, first := first + len(worlds))
-        state.births.create(new, mine, block, worlds, occupancy=occupancy)
+        rows = slice(first, first := first + len(worlds))
+        state.births.create(new, rows, block, worlds, occupancy=occupancy)
         if rejecting:
             for world in np.unique(worlds):
-                placed.setdefault(int(world), []).append(new.pos[:, mine][:, worlds == world])
+                placed.setdefault(int(world), []).append(new.pos[:, rows][:, worlds == world])
     return in_order(new) if due else None
 
 
 def spawn_due(state: SimulationState) -> None:
     """Add the entities that are due, and those that plugins have spawned, at the beginning of a step."""
     parts, births = [], state.births
-    asked, state.world_view.births = state.world_view.births, []
-    if asked:
-        _check_space(state, np.concatenate([request["world"] for request in asked]))
+    requests, state.world_view.births = state.world_view.births, []
+    if requests:
+        _check_space(state, np.concatenate([request["world"] for request in requests]))
     is_open = state.running & ~state.failed
-    for request in asked:
+    for request in requests:
         where = {k: v for k, v in request.items() if k not in ("block", "world")}
         worlds = request["world"]
         order = np.argsort(worlds, kind="stable")
@@ -143,12 +143,12 @@ def spawn_due(state: SimulationState) -> None:
 
 def _check_space(state: SimulationState, worlds: np.ndarray) -> None:
     """Fail the worlds that would exceed their size limit with the spawned entities of `worlds`, (m,)."""
-    n_asked = np.bincount(worlds, minlength=state.n_worlds)
+    n_requested = np.bincount(worlds, minlength=state.n_worlds)
     space = state.births.space(np.bincount(state.population.bodies.world, minlength=state.n_worlds))
     limits, update = state.mission.limits, state.mission.update
-    for world in map(int, np.flatnonzero(state.running & (n_asked > space))):
+    for world in map(int, np.flatnonzero(state.running & (n_requested > space))):
         text = (
-            f"plugins spawn {n_asked[world]:,} more entities, but only {max(0, space[world]):,} are allowed: with update={update!r} the "
-            f"limit of a world is {limits.most_rows(update):,}; allow_large raises it, for missions that you trust"
+            f"plugins spawn {n_requested[world]:,} more entities, but only {max(0, space[world]):,} are allowed: with update={update!r} "
+            f"the limit of a world is {limits.most_rows(update):,}; allow_large raises it, for missions that you trust"
         )
         state.record_failure(world, state.error(world, text))

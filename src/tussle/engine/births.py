@@ -27,15 +27,16 @@ class Occupancy:
     """Occupied positions while the entities of one moment are placed.
 
     Attributes:
-        rejects: (world, pos, taken) -> whether a position is not free.
-        standing: World -> positions of its entities [m], (3, j).
+        rejects: Returns True if a position is not free. Arguments: world; position [m], (3,); positions of the other entities [m],
+            (3, j).
+        occupied: Returns the positions of the entities of a world [m], (3, j).
         fail: Called with a world that has no free position, and the error.
-        tries: World -> number of positions drawn again so far.
+        tries: World -> number of positions redrawn so far.
         full: Worlds without a free position.
     """
 
     rejects: Callable[[int, np.ndarray, np.ndarray], bool]
-    standing: Callable[[int], np.ndarray]
+    occupied: Callable[[int], np.ndarray]
     fail: Callable[[int, MissionError], None]
     tries: dict[int, int] = field(default_factory=lambda: defaultdict(int))
     full: set[int] = field(default_factory=set)
@@ -110,7 +111,7 @@ class Births:
                 continue
             parts = []
             for slot in range(block.slots):
-                again = 0  # more than one birth of a slot per step, if the rate is above the step rate
+                n_in_step = 0  # more than one if the rate is above the step rate
                 while True:
                     is_due = running & (self.next_time[i][:, slot] <= t + 1e-9) & (self.n_left[i] > 0)
                     worlds = np.flatnonzero(is_due)
@@ -119,13 +120,13 @@ class Births:
                     parts.append(worlds)
                     self.n_left[i, worlds] -= 1
                     wait = 1.0 / block.rate
-                    number = self.n_born[i, worlds] + again
-                    again += 1
+                    number = self.n_born[i, worlds] + n_in_step
+                    n_in_step += 1
                     seeds = self.seeds[worlds] ^ self.keys[i]
                     jitter = rng.normal(
                         seeds, stream_key("birth", "birth"), np.full(len(worlds), slot), number
                     )[0]
-                    # Counted from the due time, not from the step, so that any rate is kept on average.
+                    # Counted from the due time, not from the step, so that the average rate is exact.
                     due_at = self.next_time[i][worlds, slot]
                     later = due_at + wait + block.interval_sd * jitter
                     self.next_time[i][worlds, slot] = np.where(later > due_at, later, due_at + wait)
@@ -148,7 +149,7 @@ class Births:
         return np.asarray(space)
 
     def is_over(self, world: int) -> bool:
-        """Whether the blocks have no future births in a world."""
+        """Return True if the blocks have no future births in a world."""
         return not (self.n_left[:, world] > 0).any()
 
     def create(
@@ -167,33 +168,33 @@ class Births:
             mine: Rows to fill.
             block: Number of the block.
             worlds: World of each entity, (m,).
-            where: pos, vel, quat and team, if given by a plugin or a recorded table.
+            where: Initial pos, vel, quat and team that a plugin or a recorded table specifies, by name.
             occupancy: Occupied positions; None allows all positions.
         """
         where = where or {}
         spec = self.overrides.mission.blocks[block]
         new.world[mine], new.block[mine], new.team[mine] = worlds, block, spec.team
-        values = self.overrides.block_values(spec, VALUES, worlds)
+        block_values = self.overrides.block_values(spec, VALUES, worlds)
         out = new.id, new.block_index, new.pos, new.vel, new.quat, new.health, new.radius, new.mass
         keys, counts = (self.keys[block], POSITION, HEADING), (self.next_id, self.n_born[block])
         kernels.place_newborn(
-            (self.seeds, worlds), keys, *self._placing[block], values, counts, out, mine.start
+            (self.seeds, worlds), keys, *self._placing[block], block_values, counts, out, mine.start
         )
         self._first_places(block, new.pos[:, mine])
         if "pos" not in where and occupancy is not None:
             self._separate(block, worlds, new.block_index[mine], new.pos[:, mine], occupancy)
         if spec.velocity is not None:
             new.vel[:, mine] = np.array(spec.velocity)[:, None]
-        for name, asked in where.items():
-            getattr(new, name)[..., mine] = asked
+        for name, values in where.items():
+            getattr(new, name)[..., mine] = values
 
     def _first_places(self, block: int, pos: np.ndarray) -> None:
-        """A hook that may change the positions drawn first [m], (3, m), of entities of a block."""
+        """Change the first drawn positions [m], (3, m), of entities of a block, in place. Does nothing by default."""
 
     def _separate(
         self, block: int, worlds: np.ndarray, places: np.ndarray, pos: np.ndarray, occupancy: Occupancy
     ) -> None:
-        """Draw positions again that an interaction rejects, one entity after another, since each occupies space."""
+        """Redraw the positions that an interaction rejects, one entity after another, since each occupies space."""
         for world in map(int, np.unique(worlds)):
             if world not in occupancy.full:
                 try:
@@ -214,7 +215,7 @@ class Births:
         occupancy: Occupancy,
     ) -> None:
         spec, most = self.overrides.mission.blocks[block], self.overrides.mission.limits.tries
-        before = occupancy.standing(world)
+        before = occupancy.occupied(world)
         n = before.shape[1]
         taken = np.empty((3, n + len(mine)))
         taken[:, :n] = before
@@ -229,9 +230,9 @@ class Births:
                         f"block {spec.name!r}: no free position for entity {int(places[i]) + 1} of {spec.count} "
                         f"after {attempt - 1} tries{others}; give the block more space (placement {spec.placement!r}) or fewer entities"
                     )
-                again = np.empty(3)
+                redrawn = np.empty(3)
                 seed = self.seeds[world] ^ self.keys[block]
-                kernels.scatter(seed, POSITION, places[i], attempt, *self._placing[block], again)
-                pos[:, i] = again
+                kernels.scatter(seed, POSITION, places[i], attempt, *self._placing[block], redrawn)
+                pos[:, i] = redrawn
             taken[:, n] = pos[:, i]
             n += 1

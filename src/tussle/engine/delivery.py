@@ -45,11 +45,11 @@ def _request_births(state: SimulationState, batch: Messages) -> None:
     """Turn `SpawnEntity` messages into spawn requests for the next step, block by block in the order of the mission."""
     view = state.world_view
     has_attitude = (batch.quat != 0.0).any(axis=0)
-    known = {name: k for k, name in enumerate(view.templates)}
-    number = np.array([known.get(str(block), -1) for block in batch.block], np.int64)
-    for k, turned in sorted(set(zip(number.tolist(), has_attitude.tolist(), strict=True))):
-        index = np.flatnonzero((number == k) & (has_attitude == turned))
-        attitude = {"quat": batch.quat[:, index]} if turned else {}
+    numbers = {name: k for k, name in enumerate(view.templates)}
+    number = np.array([numbers.get(str(block), -1) for block in batch.block], np.int64)
+    for k, with_attitude in sorted(set(zip(number.tolist(), has_attitude.tolist(), strict=True))):
+        index = np.flatnonzero((number == k) & (has_attitude == with_attitude))
+        attitude = {"quat": batch.quat[:, index]} if with_attitude else {}
         if k >= 0:
             where = {"pos": batch.pos[:, index], "vel": batch.vel[:, index], **attitude}
             view.spawn(view.templates[k], batch.world[index], **where)
@@ -105,12 +105,12 @@ def _post_links(
     """Count the links of a network, and queue the messages that are received."""
     _count_links(state, network, topics, links)
     own = np.flatnonzero((links.sender >= 0) & links.reaches_sender)
-    heard = np.flatnonzero(links.outcome == 0)
-    number = np.concatenate([own, links.message[heard]])
-    ids = state.population.bodies.id[np.concatenate([links.sender[own], links.receiver[heard]])]
+    received = np.flatnonzero(links.outcome == 0)
+    number = np.concatenate([own, links.message[received]])
+    ids = state.population.bodies.id[np.concatenate([links.sender[own], links.receiver[received]])]
     delay = network.plugin.comm_delay[links.world[number]]
     if links.delay is not None:
-        delay[len(own) :] += links.delay[heard]
+        delay[len(own) :] += links.delay[received]
     steps = _steps(delay, state.context.clock.dt)
     for topic, first, last in zip(topics, links.starts[:-1], links.starts[1:], strict=True):
         here: Any = (number >= first) & (number < last) if len(topics) > 1 else slice(None)
@@ -123,15 +123,15 @@ def _post_copies(
 ) -> None:
     """Queue copies of a topic's messages: message number, id of the receiver and number of steps until then, (m,) each."""
     batch = topic.outbox()
-    lates = steps[:1] if (steps == steps[:1]).all() else np.unique(steps)
-    for late in lates:
-        mine: Any = steps == late if len(lates) > 1 else slice(None)
-        # Only messages with a receiver: others may be there only because of another world of the stack.
+    delays = steps[:1] if (steps == steps[:1]).all() else np.unique(steps)
+    for n_steps in delays:
+        mine: Any = steps == n_steps if len(delays) > 1 else slice(None)
+        # Keep only messages with a receiver: the other messages may belong to other worlds of the stack.
         is_kept = np.zeros(batch.n, bool)
         is_kept[number[mine]] = True
         part = batch if is_kept.all() else batch.take(np.flatnonzero(is_kept))
         place = number[mine] if part is batch else (np.cumsum(is_kept) - 1)[number[mine]]
-        topic.post(part, (place, ids[mine]), now[part.world] + late)
+        topic.post(part, (place, ids[mine]), now[part.world] + n_steps)
 
 
 def _count_links(

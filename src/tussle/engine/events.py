@@ -30,10 +30,10 @@ REPORTED: dict[type[Message], tuple[str, str, str, str]] = {
 
 
 class Listeners:
-    """Functions called with each `Events` of a simulation. True if there are any.
+    """Functions called with each `Events` of a simulation. The object is true if there are listeners.
 
     Attributes:
-        is_replaying: The steps were reported before; listeners are not called again.
+        is_replaying: True while steps are repeated that have been reported already; listeners are not called.
         on_change: Called when a listener is added or removed.
         traffic: Objects that count messages.
     """
@@ -50,7 +50,7 @@ class Listeners:
         return bool(self._listeners)
 
     def listen(self, listener: Callable[[Events], None]) -> None:
-        """Add a listener: it is called with all events from now on."""
+        """Add a listener, which is called with all later events."""
         self._listeners.append(listener)
         self.on_change()
 
@@ -84,13 +84,13 @@ class Listeners:
     def _report_messages(self, view: WorldView, type_: type[Message]) -> None:
         kind, first, second, text = REPORTED[type_]
         batch = view.inbox(type_)
-        one = batch.data[first]
-        two = batch.data[second] if second else np.zeros_like(one)
+        first_ids = batch.data[first]
+        second_ids = batch.data[second] if second else np.zeros_like(first_ids)
         step = self._context.clock.step[batch.world]
-        self._report(Events(kind, batch.world, step, one, two, [text] * batch.n))
+        self._report(Events(kind, batch.world, step, first_ids, second_ids, [text] * batch.n))
         if not second:
             return
-        for world, a, b in zip(batch.world.tolist(), one.tolist(), two.tolist(), strict=True):
+        for world, a, b in zip(batch.world.tolist(), first_ids.tolist(), second_ids.tolist(), strict=True):
             self._causes.setdefault((world, b), a)
             if kind == COLLISION:
                 self._causes.setdefault((world, a), b)

@@ -19,7 +19,7 @@ _OWN = str(Path(__file__).resolve().parents[1])
 
 
 def _location(error: BaseException, plugin: Any) -> str:
-    """file:line of the deepest frame in the plugin's file, else of the deepest frame outside this package."""
+    """Return file:line of the deepest frame in the plugin's file, else of the deepest frame outside this package."""
     try:
         own_file = inspect.getfile(type(plugin))
     except (OSError, TypeError):
@@ -34,7 +34,7 @@ def _location(error: BaseException, plugin: Any) -> str:
 
 
 def raised(error: BaseException, plugin: Any, *, where: str, step: int, world: int | None) -> PluginError:
-    """The `PluginError` for an exception raised in a plugin. Its cause has a traceback that starts in the plugin's code."""
+    """Return the `PluginError` for an exception raised in a plugin. Its cause has a traceback that starts in the plugin's code."""
     if isinstance(error, TussleError) and all(
         frame.filename.startswith(_OWN) for frame in traceback.extract_tb(error.__traceback__)
     ):  # raised by this package: its message names the place
@@ -50,7 +50,7 @@ def raised(error: BaseException, plugin: Any, *, where: str, step: int, world: i
 
 
 def in_call(error: Exception, plugin: Any, view: GroupView, group: Group | None = None) -> PluginError:
-    """The `PluginError` for an exception in a plugin call: with plugin and step, and with entity and world if they are known."""
+    """Return the `PluginError` for an exception in a plugin call: with plugin and step, and with entity and world if they are known."""
     if isinstance(error, PluginError) and error.step is not None:  # raised by `fail`
         return error
     row, view.failing_row = view.failing_row, None
@@ -70,10 +70,10 @@ def in_call(error: Exception, plugin: Any, view: GroupView, group: Group | None 
 
 
 def not_finite(group: Group, bodies: Bodies, row: int, step: int, interactions: list[str]) -> PluginError:
-    """The error for a body row whose state is not finite.
+    """Return the error for a body row whose state is not finite.
 
-    Names the first plugin output, in call order, that is not finite; else the motion model, or the interactions if the motion model's
-    own state is finite.
+    The error names the first plugin output, in call order, that is not finite. If all outputs are finite, it names the motion model,
+    or the interactions if the motion model's own state is finite.
 
     Args:
         group: Group of the row.
@@ -83,7 +83,7 @@ def not_finite(group: Group, bodies: Bodies, row: int, step: int, interactions: 
         interactions: Names of the interactions.
     """
     i, world = row - group.first, int(bodies.world[row])
-    who = f"{group.block_of(i)} {int(bodies.id[row])}"
+    entity = f"{group.block_of(i)} {int(bodies.id[row])}"
     for binding in [*(b for a in group.autonomies for b in a.walk()), *group.controllers]:
         if found := _not_finite_output(binding, group, i):
             text = f"{found} is not a finite number"
@@ -96,12 +96,12 @@ def not_finite(group: Group, bodies: Bodies, row: int, step: int, interactions: 
         )
         text = f"the entity's state is not finite: {values}; all outputs of its autonomies and controllers are finite"
         if interactions and np.isfinite(group.x[:, i]).all():
-            text += f", and so is the state of its motion model, {binding.spec.instance_name}: who wrote it is one of the interactions"
-            return PluginError(text, where=who, step=step, world=world, plugin=" or ".join(interactions))
+            text += f", and so is the state of its motion model, {binding.spec.instance_name}: one of the interactions wrote it"
+            return PluginError(text, where=entity, step=step, world=world, plugin=" or ".join(interactions))
         loads = np.concatenate([bodies.force[:, row], bodies.torque[:, row]])
         if interactions and not np.isfinite(loads).all():
-            text += f"; the force or torque on it is not, which {' or '.join(interactions)} wrote"
-    return PluginError(text, where=who, step=step, world=world, plugin=binding.spec.instance_name)
+            text += f"; the force or torque on it, written by {' or '.join(interactions)}, is not finite"
+    return PluginError(text, where=entity, step=step, world=world, plugin=binding.spec.instance_name)
 
 
 def _not_finite_output(binding: Binding, group: Group, row: int) -> str:

@@ -13,7 +13,6 @@ from tussle.api.bodies import Bodies, read_only
 from tussle.api.context import Context
 from tussle.api.easy.plugins import EasyEntityPlugin
 from tussle.api.group import GroupView
-from tussle.api.kinds import Behavior
 from tussle.api.motion import MotionBody
 from tussle.api.rigid_body import RigidBodyModel
 from tussle.columns import (
@@ -40,7 +39,7 @@ class Binding:
         plugin: The bound copy.
         spec: The plugin as data.
         view: View that is passed to its `step`.
-        path: Plugin names, outermost first, such as ("MotorSchemas", "AvoidEntityMS").
+        path: Plugin names, outermost first: ("MotorSchemas", "AvoidEntityMS").
         places: Attribute -> place of its column in the table.
         params: Attributes that are parameters.
         writable: Attributes that the plugin may write.
@@ -159,17 +158,17 @@ class Group:
         self.bodies = bodies
         self.wiring = Wiring(f"block {name!r}", self.table, advise)
         self.wiring.connect(block.sensor, block.autonomy, block.controller, block.motion)
-        self.thinking = GroupView(bodies, bodies.n, bodies.n, context, dt)
-        self.steering = GroupView(bodies, bodies.n, bodies.n, context, dt / substeps)
-        self.sensing = GroupView(bodies, bodies.n, bodies.n, context, dt)
-        self.moving = MotionBody(bodies, bodies.n, bodies.n, context, dt / substeps)
+        self.autonomy_view = GroupView(bodies, bodies.n, bodies.n, context, dt)
+        self.controller_view = GroupView(bodies, bodies.n, bodies.n, context, dt / substeps)
+        self.sensor_view = GroupView(bodies, bodies.n, bodies.n, context, dt)
+        self.motion_view = MotionBody(bodies, bodies.n, bodies.n, context, dt / substeps)
         working = [c for c in block.controller if not c.passthrough]
-        self.motion = self._bind(block.motion, self.moving, (), is_motion=True)
-        self.autonomies = [self._bind(p, self.thinking, ()) for p in block.autonomy]
-        self.controllers = [self._bind(p, self.steering, ()) for p in working]
-        self.sensors = [self._bind(p, self.sensing, ()) for p in block.sensor]
+        self.motion = self._bind(block.motion, self.motion_view, (), is_motion=True)
+        self.autonomies = [self._bind(p, self.autonomy_view, ()) for p in block.autonomy]
+        self.controllers = [self._bind(p, self.controller_view, ()) for p in working]
+        self.sensors = [self._bind(p, self.sensor_view, ()) for p in block.sensor]
         self.holds_handles = any(b.handles for b in self.walk())
-        self._believe()
+        self._find_beliefs()
         self.integrate = self.motion.plugin.advance
         self.range_kernel = self.motion.plugin.range_kernel
         self._place_motion()
@@ -200,7 +199,7 @@ class Group:
 
     @property
     def views(self) -> list[GroupView]:
-        return [self.thinking, self.steering, self.sensing, self.moving]
+        return [self.autonomy_view, self.controller_view, self.sensor_view, self.motion_view]
 
     # -- binding ------------------------------------------------------------------------------------------------------------
 
@@ -258,7 +257,7 @@ class Group:
             binding.children += inner
         plugin.__dict__["wired"] = frozenset(wired)
         for service in type(spec).services:
-            for one in self.views if hasattr(self, "moving") else [view]:
+            for one in self.views if hasattr(self, "motion_view") else [view]:
                 one.services[service] = getattr(plugin, service)
         return binding
 
@@ -272,7 +271,7 @@ class Group:
                     f"{self.wiring.where}: {'.'.join(binding.path)}.{name}: a plugin inside another one can only read channels that "
                     f"sensors write, and only in an autonomy; no sensor writes {channel!r}{nearest_name(channel, sensed)}; {listed(sensed)}"
                 )
-            link = self.wiring.alone(column, (binding.path, name))
+            link = self.wiring.unconnected(column, (binding.path, name))
         if isinstance(link, int):
             binding.ragged[name] = link
         else:
@@ -298,7 +297,7 @@ class Group:
             f"{self.wiring.where}: {spec.instance_name}",
         )
 
-    def _believe(self) -> None:
+    def _find_beliefs(self) -> None:
         """Find the sensor outputs that hold the entity's belief."""
         self.belief: dict[str, ColumnPlace] = {}
         for sensor in self.sensors:
@@ -331,7 +330,7 @@ class Group:
     def attach(self, bodies: Bodies, first: int) -> None:
         """Set the rows [first, first + n) in the body table, and set the arrays of all plugins and views."""
         belief = {name: self.table.array(place) for name, place in self.belief.items()}
-        self.thinking.belief = self.steering.belief = belief
+        self.autonomy_view.belief = self.controller_view.belief = belief
         self.shift(bodies, first)
         for binding in self.bindings:
             binding.attach(self.table)
@@ -379,7 +378,7 @@ class Group:
 
     def from_body(self, rows: np.ndarray) -> None:
         """Let the motion model set the states of some rows, (m,) ascending, from the body table."""
-        view = self.moving
+        view = self.motion_view
         view.span = (int(rows[0]), int(rows[-1]) + 1)
         try:
             self.motion.plugin.from_body(view, rows)
@@ -397,12 +396,12 @@ class Group:
             part = partial(ranged.part, self.x, u, self.p, dt, substeps)
             self.context.split(self.n, part, ranged.rows_per_thread)
         else:
-            self.moving.split(self._integrate_part, u, dt, substeps)
+            self.motion_view.split(self._integrate_part, u, dt, substeps)
         self.publish()
 
     def publish(self) -> None:
         """Write the states to the body table."""
-        self.motion.plugin.to_body(self.moving)
+        self.motion.plugin.to_body(self.motion_view)
         self.bodies.touch(self.first, self.last)
 
     def _integrate_part(self, u: np.ndarray, dt: float, substeps: int, part: tuple[int, int]) -> None:
@@ -419,9 +418,6 @@ class Group:
         axes = {"x": 0, "y": 1, "z": 2}
         for name in self.body_inputs:
             column, _, axis = name.partition("_")
-            values = getattr(self.moving, column)
+            values = getattr(self.motion_view, column)
             rows.append((values[axes[axis]] if axis else values)[None, :])
         return np.ascontiguousarray(np.concatenate(rows))
-
-
-__all__ = ["Behavior", "Binding", "Group"]

@@ -16,10 +16,11 @@ from tussle.rng import stream_key
 class HistoricBirths(Births):
     """Births by the rules of SCRIMMAGE, where tussle's differ.
 
-    All entities of a block are placed at its position, and scattered only if an interaction rejects that, or with `scatter_first`: so
-    they stand on one point without SimpleCollision. Each heading is the mean of the next one of the block. Positions and headings pass
-    through text with six decimals, headings in degrees. The initial `speed` points East. A slot has at most one birth per step, and its
-    next one is counted from the step, not from the due time. Placement "uniform", which SCRIMMAGE has no more, is that of tussle.
+    All entities of a block are placed at its position. They are scattered only with `scatter_first`, or if an interaction rejects that
+    position; without SimpleCollision, they all start at one point. Each heading is drawn around the heading of the previous entity of
+    the block. Positions [m] and headings [deg] are rounded to six decimals. The initial `speed` points East. A slot has at most one
+    birth per step, and the time of its next birth is counted from the step, not from the due time. Placement "uniform", which
+    SCRIMMAGE no longer has, works as in tussle.
     """
 
     def create(
@@ -35,7 +36,7 @@ class HistoricBirths(Births):
         where = where or {}
         spec = self.overrides.mission.blocks[block]
         if "pos" not in where:
-            new.pos[:, mine] = _in_text(new.pos[:, mine])
+            new.pos[:, mine] = _rounded(new.pos[:, mine])
         if "quat" not in where:
             new.quat[:, mine] = self._attitudes(block, worlds, new.block_index[mine])
         if "vel" not in where and spec.velocity is None:
@@ -54,7 +55,7 @@ class HistoricBirths(Births):
         heading, variance, climb, roll = (
             np.broadcast_to(v, worlds.shape) for v in self.overrides.block_values(spec, names, worlds)
         )
-        yaw = _in_degrees(heading)
+        yaw = _rounded_in_degrees(heading)
         for i in np.flatnonzero(variance > 0.0):
             seeds = np.full(places[i] + 1, self.seeds[worlds[i]] ^ self.keys[block])
             steps = rng.normal(
@@ -62,7 +63,7 @@ class HistoricBirths(Births):
             )[0]
             at = heading[i]
             for step in steps:  # each number of the walk is rounded
-                at = _in_degrees(at + math.sqrt(variance[i]) * step)
+                at = _rounded_in_degrees(at + math.sqrt(variance[i]) * step)
             yaw[i] = at
         return np.stack(quat_from_euler(roll, -climb, yaw))
 
@@ -89,11 +90,11 @@ class HistoricBirths(Births):
         return found
 
 
-def _in_text(values: np.ndarray) -> np.ndarray:
-    """Numbers as they come back from a text with six decimals."""
+def _rounded(values: np.ndarray) -> np.ndarray:
+    """Return numbers rounded by writing and reading them with six decimals."""
     return np.char.mod("%.6f", values).astype(float)
 
 
-def _in_degrees(angle: np.ndarray) -> np.ndarray:
-    """Angles [rad] as they come back from a text in degrees with six decimals."""
-    return np.asarray(_in_text(angle * (180.0 / math.pi)) * (math.pi / 180.0))
+def _rounded_in_degrees(angle: np.ndarray) -> np.ndarray:
+    """Return angles [rad] rounded by writing and reading them in degrees with six decimals."""
+    return np.asarray(_rounded(angle * (180.0 / math.pi)) * (math.pi / 180.0))

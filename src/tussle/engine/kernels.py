@@ -12,7 +12,7 @@ from tussle.rng import normal2, uniform2
 
 @device
 def drawn_place(seed, stream, index, attempt, flags, shape):
-    """Position [m] of entity number `index` of a block; flags and shape as in `scatter`."""
+    """Return the position x, y, z [m] of entity number `index` of a block; flags and shape as in `scatter`."""
     if attempt == 0 and index == 0 and not flags[1]:
         x, y, z = 0.0, 0.0, 0.0
     elif flags[0]:
@@ -29,8 +29,8 @@ def drawn_place(seed, stream, index, attempt, flags, shape):
 def scatter(seed, stream, place, attempt, flags, shape, pos):
     """Draw the position [m], (3,), of an entity of a block.
 
-    place: number of the entity in its block. flags: whether positions are uniform in a box, otherwise normal; whether the first
-    entity is scattered too. shape: centre and half width or standard deviation [m], (2, 3).
+    place: number of the entity in its block. flags: True for positions that are uniform in a box, False for normally distributed
+    ones; True if the first entity is scattered too. shape: centre and half width or standard deviation [m], (2, 3).
     """
     pos[0], pos[1], pos[2] = drawn_place(seed, stream, place, attempt, flags, shape)
 
@@ -68,14 +68,14 @@ def place_newborn(worlds, keys, flags, shape, values, counts, out, first):
 
 
 @kernel("I I I B2w")
-def mark_teams(world, team, teams, there):
-    """Set there[w, k] if world w has a row of team teams[k]."""
+def mark_teams(world, team, teams, has_team):
+    """Set has_team[w, k] if world w has a row of team teams[k]."""
     for i in range(world.shape[0]):
         if i > 0 and world[i] == world[i - 1] and team[i] == team[i - 1]:
             continue
         for k in range(teams.shape[0]):
             if team[i] == teams[k]:
-                there[world[i], k] = True
+                has_team[world[i], k] = True
 
 
 @kernel("B i8 i8 (I I) (I I) I (Iw Iw) -> i8 b1")

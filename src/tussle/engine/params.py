@@ -16,7 +16,7 @@ from tussle.mission.spec import WORLD_VALUES
 
 
 class Overrides:
-    """Parameters set per world, by paths such as "prey.Boids.gain", "prey.speed" or "SimpleCapture.capture_range".
+    """Parameters set per world, by path: "prey.Boids.gain", "prey.speed", "SimpleCapture.capture_range".
 
     Attributes:
         columns: (owner, plugin path, parameter) -> values, (n_worlds,) or (n_worlds, k), valid where `given` is true.
@@ -38,7 +38,7 @@ class Overrides:
         Raises:
             ParameterError: A path does not exist, or a value is not allowed.
         """
-        checked = []  # all of them before any is set
+        checked = []  # check all values before setting any
         for path, value in values.items():
             key, column = self._find(path)
             is_many = isinstance(value, (list, np.ndarray)) and np.ndim(value) > len(column.shape)
@@ -82,11 +82,11 @@ class Overrides:
 
     def block_values(self, block: Block, names: Sequence[str], world: np.ndarray) -> np.ndarray:
         """Values of a block for entities of the worlds `world`, (k, m), or (k, 1) if all are equal."""
-        asked = block.name, tuple(names)
-        values = self._block_values.get(asked)
+        cache_key = block.name, tuple(names)
+        values = self._block_values.get(cache_key)
         if values is None:
             values = np.array([[getattr(block, name)] for name in names], float)
-            self._block_values[asked] = values
+            self._block_values[cache_key] = values
         keys = [(block.name, (), name) for name in names] if self.columns else []
         if any(key in self.columns for key in keys):
             values = np.repeat(values, len(world), axis=1)

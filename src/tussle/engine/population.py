@@ -36,15 +36,15 @@ class HandleRow:
 
     Attributes:
         world: Number of the world.
-        id: Of the entity.
-        team: Of the entity.
-        seed: Of the world.
+        id: Id of the entity.
+        team: Team of the entity.
+        seed: Seed of the world.
         pos: Position [m], (3,).
         dt: Length of a step of the plugin [s].
         plugin: The plugin as data.
         scene: Origin, ground, boundaries and bases.
-        shared: shared(key, make) returns the object of the simulation with this key. make() is called where there is none yet, and
-            the object's method `end` when the simulation is closed, after `close_one` for all handles.
+        shared: shared(key, make) returns the simulation's object with this key; the first call creates it by make(). The object's
+            method `end` is called when the simulation is closed, after `close_one` for all handles.
     """
 
     world: int
@@ -82,14 +82,14 @@ class Population:
         self.bodies.scans = self.is_sequential
         self.groups: list[Group] = []
         self._by_key: dict[Any, Group] = {}
-        self._asked: dict[tuple[int, int, int], Group] = {}
+        self._groups: dict[tuple[int, int, int], Group] = {}
         self._specs: dict[tuple[int, tuple[str, ...]], Any] = {}
         self._params: dict[Group, tuple[Params, Params]] = {}
         self._of_block = np.zeros(0, np.int64)  # number in `groups` of each block, if its entities share one
         self.on_new_group: Callable[[], None] = lambda: None
 
     def mass_properties(self) -> tuple[np.ndarray, np.ndarray]:
-        """Mass [kg], (n,), and inertia tensor [kg m^2], (9, n), of all rows; 0 for those that torques do not turn."""
+        """Mass [kg], (n,), and inertia tensor [kg m^2], (9, n), of all rows; the inertia is 0 if torques have no effect on the row."""
         mass, inertia = self.bodies.mass.copy(), np.zeros((9, self.bodies.n))
         for group in self.groups:
             found = group.motion.plugin.mass_properties() if group.n else None
@@ -103,10 +103,10 @@ class Population:
 
     def group_of(self, blocks: tuple[Block, ...], number: int, place: int) -> Group:
         """Return the group of an entity; it is created for the first entity of its kind."""
-        asked = (id(blocks), number, place if self.is_sequential else 0)
-        if asked not in self._asked:
-            self._asked[asked] = self._group_of(blocks[number], place)
-        return self._asked[asked]
+        key = (id(blocks), number, place if self.is_sequential else 0)
+        if key not in self._groups:
+            self._groups[key] = self._group_of(blocks[number], place)
+        return self._groups[key]
 
     def _group_of(self, block: Block, place: int) -> Group:
         shape = (tuple(p.structure() for p in block.autonomy), tuple(p.structure() for p in block.controller))
@@ -187,8 +187,8 @@ class Population:
         for number, group in enumerate(self.groups):
             fresh = np.flatnonzero(owner == number)
             out = rows, places = source[first:], np.empty(len(fresh), np.int64)
-            who = (old.world, old.id), (new.world, new.id)
-            n, stays = kernels.merge(gone, group.first, group.last, *who, fresh, out)
+            columns = (old.world, old.id), (new.world, new.id)
+            n, stays = kernels.merge(gone, group.first, group.last, *columns, fresh, out)
             if not stays:
                 moved.add(number)
                 group.rearrange(rows[:n])
@@ -219,7 +219,9 @@ class Population:
             bodies.floats[:, rows] = new.floats[:, mine]
             if (ints[:, rows] != new.ints[:, mine]).any():
                 if ints is bodies.ints:
-                    ints = ints.copy()  # a new array tells a recorder that the entities have changed
+                    ints = (
+                        ints.copy()
+                    )  # recorders compare arrays by identity to detect that entities have changed
                 ints[:, rows] = new.ints[:, mine]
         if ints is bodies.ints:
             bodies.touch(0, bodies.n)
@@ -346,7 +348,7 @@ class Population:
     def _close_one(self, group: Group, binding: Binding, held: Any) -> None:
         try:
             binding.plugin.close_one(held)
-        except Exception as error:  # the others must be closed too, and no result depends on this one
+        except Exception as error:  # the other handles must be closed too, and no result depends on this one
             raised = failure.raised(error, binding.plugin, where=group.name, step=0, world=None)
             text = (
                 f"{binding.spec.instance_name}, {group.name}: a handle could not be closed: {raised.message}"

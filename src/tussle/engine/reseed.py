@@ -1,4 +1,4 @@
-"""Another seed from a time on."""
+"""Switch to another seed at the mission's `reseed_time`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ DERIVED = np.uint64(stream_key("reseed"))
 
 
 def renew_keys(state: SimulationState) -> None:
-    """Set the random keys of all worlds for the step that begins; they depend on its time only."""
+    """Set the random keys of all worlds for the step that begins. The keys depend only on its time."""
     mission, context = state.mission, state.context
     if mission.reseed_time is None:
         return

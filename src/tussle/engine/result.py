@@ -8,7 +8,7 @@ from typing import Any
 
 @dataclass
 class WorldResult:
-    """Result of one world, final or so far.
+    """Result of one world: final, or up to now while it is running.
 
     Attributes:
         world: Number of the world in the stack.

@@ -47,8 +47,8 @@ def apply_moves(state: SimulationState, phase: float = 1.0) -> None:
     for group in state.population.groups:
         mine = rows[(rows >= group.first) & (rows < group.last)] - group.first
         if len(mine):
-            group.moving.begin(group.motion.plugin, phase)
+            group.motion_view.begin(group.motion.plugin, phase)
             try:
                 group.from_body(mine)
             except Exception as error:
-                raise failure.in_call(error, group.motion.plugin, group.moving, group) from error
+                raise failure.in_call(error, group.motion.plugin, group.motion_view, group) from error

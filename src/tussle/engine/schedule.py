@@ -65,7 +65,7 @@ def compose(state: SimulationState) -> list[Call]:
     if state.events:
         report = partial(state.events.messages, state.world_view)
         calls.append(Call("report captures and collisions", report))
-    # Always, since the world may publish on topics of its own.
+    # Always needed, since `Simulation.publish` may create topics.
     calls.append(Call("deliver messages", partial(deliver, state)))
     calls.append(Call("check, remove, end", partial(end_step, state)))
     return calls
@@ -79,8 +79,8 @@ def _motion(state: SimulationState, groups: list[Group]) -> list[Call]:
     dt, m = state.mission.dt, state.mission.motion_multiplier
     calls = [_advance_call(state, g, dt, m, 0.0) for g in groups if not g.controllers]
     steered = [g for g in groups if g.controllers]
-    apart = state.by_substep or (m > 1 and state.mission.compat)  # see `_entity_call`
-    steerings = [None if apart else steering_of(g) for g in steered]
+    is_split = state.by_substep or (m > 1 and state.mission.compat)  # see `_entity_call`
+    steerings = [None if is_split else steering_of(g) for g in steered]
     if None not in steerings:  # otherwise a controller may read other entities, which move in each substep
         return calls + [_steering_call(state, steering, dt / m, m) for steering in steerings if steering]
     for s in range(m if steered else 0):
@@ -107,7 +107,7 @@ def _due(
 
 
 def _advance_call(state: SimulationState, group: Group, dt: float, substeps: int, phase: float) -> Call:
-    view, plugin, await_ready = group.moving, group.motion.plugin, _waits_for(group, group.motion)
+    view, plugin, await_ready = group.motion_view, group.motion.plugin, _waits_for(group, group.motion)
 
     def run() -> None:
         if group.n:
@@ -125,7 +125,7 @@ def _advance_call(state: SimulationState, group: Group, dt: float, substeps: int
 
 def _steering_call(state: SimulationState, steering: Steering, dt: float, substeps: int) -> Call:
     group = steering.group
-    view, plugin, body = group.steering, group.controllers[0].plugin, group.moving
+    view, plugin, body = group.controller_view, group.controllers[0].plugin, group.motion_view
 
     def run() -> None:
         if group.n:
@@ -144,7 +144,7 @@ def _steering_call(state: SimulationState, steering: Steering, dt: float, subste
 def _entity_call(state: SimulationState, kind: str, group: Group, binding: Binding, substep: int = 0) -> Call:
     mission, path = state.mission, binding.path
     m = mission.motion_multiplier if kind == "controller" else 1
-    # SCRIMMAGE's calls all get the dt of a step, controllers in each substep.
+    # SCRIMMAGE passes the dt of a step to every call, also to controllers in each substep.
     grid_dt = mission.dt if mission.compat else mission.dt / m
     phase = substep / m if kind == "controller" else float(kind == "sensor")
     cadence: Cadence | TimerCadence | None = Cadence.of(
@@ -191,7 +191,7 @@ def _entity_call(state: SimulationState, kind: str, group: Group, binding: Bindi
             for inbox in inboxes:
                 inbox.clear(worlds)
 
-    def lean() -> None:
+    def run_plain() -> None:
         if group.n:
             view._caller, view.substep, view.phase, view.dt = plugin, substep, phase, grid_dt
             try:
@@ -200,7 +200,7 @@ def _entity_call(state: SimulationState, kind: str, group: Group, binding: Bindi
                 raise failure.in_call(error, plugin, view, group) from error
 
     is_plain = cadence is None and not (inboxes or await_ready or is_linked)
-    return Call(_label(state, kind, group, binding, substep), lean if is_plain else run)
+    return Call(_label(state, kind, group, binding, substep), run_plain if is_plain else run)
 
 
 def _waits_for(group: Group, binding: Binding) -> Callable[[], None] | None:
@@ -258,7 +258,7 @@ def _label(state: SimulationState, kind: str, group: Group, binding: Binding, su
 
 
 def steps(world_binding: WorldBinding) -> bool:
-    """Whether a world plugin has a `step` of its own."""
+    """Return True if a world plugin overrides `step`."""
     return type(world_binding.plugin).step is not WorldPlugin.step
 
 

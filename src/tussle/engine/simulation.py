@@ -31,14 +31,14 @@ if TYPE_CHECKING:
 class Simulation:
     """Simulate a mission in a stack of worlds, one world per seed.
 
-    Each world gives the same bits as it does alone, whatever the other worlds of the stack.
+    Each world gives bit-identical results alone and in any stack.
 
     Args:
         mission: The mission.
         seeds: Seed of each world; a single number for a stack of one world.
         params: Parameters by path ("prey.Boids.gain", "prey.speed", "SimpleCapture.capture_range"); one value, or one per world.
         threads: Number of threads a step may use; results do not depend on it.
-        on_error: What to do on an error of one world, such as a state that is not finite: "raise" raises it, "record" ends the world
+        on_error: Handling of an error of one world, for example a state that is not finite: "raise" raises it, "record" ends the world
             with the error in its result while the others continue. By default "raise" for one world and "record" for several.
             An exception in a plugin ends the whole stack: with an explicit "record", it is stored in the results of all running
             worlds; otherwise it is raised.
@@ -121,7 +121,7 @@ class Simulation:
 
     @property
     def is_over(self) -> bool:
-        """Whether all worlds have ended."""
+        """True if all worlds have ended."""
         return self.state.n_running == 0
 
     @property
@@ -165,7 +165,7 @@ class Simulation:
             state.world_view.moved = []
             remove_dead(state)
             return
-        # Without the engine's traceback, so that only the plugin's lines are printed.
+        # The engine's traceback is removed, so that only the plugin's lines are printed.
         raise error.with_traceback(None) from error.cause
 
     def run(self, until: float | None = None) -> list[WorldResult]:
@@ -232,7 +232,7 @@ class Simulation:
     # -- access between steps -----------------------------------------------------------------------------------------------------------
 
     def read(self, path: str) -> tuple[np.ndarray, np.ndarray]:
-        """Values of a column by path, and a mask of living entities.
+        """Return the values of a column by path, and a mask of living entities.
 
         "predator.pos" gives values (n_worlds, capacity, 3) and a mask (n_worlds, capacity), by place in block. The capacity is the
         block's count; it is larger only if plugins spawn more entities. Dead and unborn entities read NaN, -1 in integer columns and
@@ -282,7 +282,7 @@ class Simulation:
         buffer.add(batch.take(np.flatnonzero(running[chosen])))
 
     def snapshot(self) -> Snapshot:
-        """Copy all columns. After `restore`, the simulation continues with identical bits.
+        """Copy all columns. After `restore`, the simulation continues bit-identically.
 
         Raises:
             SnapshotError: A plugin holds objects outside the arrays and cannot save them.
@@ -307,8 +307,10 @@ class Simulation:
 
     def state_hash(self, world: int = 0) -> str:
         """Hash of all columns of one world. Equal states have equal hashes; different states have different ones."""
-        done, state = self.state.results[world], self.state
-        return done.state_hash if done is not None and not state.running[world] else state_hash(state, world)
+        result, state = self.state.results[world], self.state
+        return (
+            result.state_hash if result is not None and not state.running[world] else state_hash(state, world)
+        )
 
     @property
     def grade(self) -> str:
@@ -318,7 +320,7 @@ class Simulation:
         return max((type(p).grade for p in plugins), key=GRADES.index, default="portable")
 
     def describe(self) -> str:
-        """Text with the calls of a step, the channels with several writers, and the grade."""
+        """Return a text with the calls of a step, the channels with several writers, and the grade."""
         lines = [
             f"{self.mission.name or 'mission'}: {self.n_worlds} world(s), dt {self.mission.dt:g} s, update {self.mission.update}"
         ]

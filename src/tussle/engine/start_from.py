@@ -116,9 +116,9 @@ def blocks_of(table: FirstStates, blocks: Sequence[Block]) -> np.ndarray:
             continue
         fitting = [i for i, b in enumerate(blocks) if n_free[i] > 0 and team in (None, b.team)]
         if not fitting:
-            whose = "" if team is None else f" of team {team}"
+            of_team = "" if team is None else f" of team {team}"
             count = sum(b.count for b in blocks if team in (None, b.team))
-            raise MissionError(f"{entity} exceeds the {count} entities{whose} of the mission's blocks")
+            raise MissionError(f"{entity} exceeds the {count} entities{of_team} of the mission's blocks")
         block[row] = fitting[0]
         n_free[fitting[0]] -= 1
     return block

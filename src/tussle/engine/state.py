@@ -42,13 +42,13 @@ class Parked:
     tables: dict[Any, tuple[np.ndarray, Stored]]
 
 
-def _births(mission: Mission, given: tuple[Overrides, np.ndarray, float]) -> Births:
-    """Births by the laws of a mission."""
+def _births(mission: Mission, arguments: tuple[Overrides, np.ndarray, float]) -> Births:
+    """Return the births of a mission, according to its `compat`."""
     if not mission.compat:
-        return Births(*given)
+        return Births(*arguments)
     from tussle.engine.historic_births import HistoricBirths  # not loaded otherwise
 
-    return HistoricBirths(*given)
+    return HistoricBirths(*arguments)
 
 
 class SimulationState:
@@ -65,9 +65,11 @@ class SimulationState:
         events: Listeners of events.
         on_error: Whether an error of one world is raised ("raise") or ends only this world ("record").
         raises_when_all_fail: An error is raised if no world is left.
-        interactions: Bindings of interactions; likewise metrics, and networks by instance name.
-        running: Which worlds have not ended, (n_worlds,).
-        failed: Worlds in which a plugin has failed, (n_worlds,).
+        interactions: Bindings of the interactions.
+        metrics: Bindings of the metrics.
+        networks: Instance name -> binding of a network.
+        running: True for worlds that have not ended, (n_worlds,).
+        failed: True for worlds in which a plugin has failed, (n_worlds,).
         results: Result of each world that has ended or failed.
         parked: World -> its last rows, for those that have ended.
         has_failures: A world has failed since dead entities were last removed.
@@ -109,8 +111,8 @@ class SimulationState:
         self.events = Listeners(context)
         self.population = Population(context, self.overrides, advise_controllers)
         context.mass_properties = self.population.mass_properties
-        nobody = self.population.bodies
-        self.checked = nobody.pos, nobody.quat, nobody.health, np.empty(0, bool)
+        bodies = self.population.bodies
+        self.checked = bodies.pos, bodies.quat, bodies.health, np.empty(0, bool)
         view = self.world_view = WorldView(self.population.bodies, context)
         view.templates, view.publish_to, view.by_type = blocks, message_bus.publish_to, message_bus.by_type
 

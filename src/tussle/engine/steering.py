@@ -38,7 +38,9 @@ class Steering:
         table, ranged = group.table, self.ranged
         more = ranged.arrays(group.x, group.u, group.p) if ranged else ()
         least = ranged.rows_per_thread if ranged else ROWS_PER_THREAD
-        self.rows.run(group.steering, lambda dtype, row: table.arrays[dtype][row], dt, substeps, more, least)
+        self.rows.run(
+            group.controller_view, lambda dtype, row: table.arrays[dtype][row], dt, substeps, more, least
+        )
         group.publish()
 
 
@@ -49,25 +51,25 @@ def steering_of(group: Group) -> Steering | None:
     a controller reads body values that the law of the motion model does not return.
     """
     motion = group.motion
-    flies_in_ranges = _flies_in_ranges(group)
-    if not all(_is_law(b) for b in group.controllers) or not (flies_in_ranges or _flies_by_law(motion)):
+    in_ranges = _uses_range_kernel(group)
+    if not all(_is_law(b) for b in group.controllers) or not (in_ranges or _has_row_laws(motion)):
         return None
     calls = [placed(call, group, b) for b in group.controllers for call in laws_of(b.plugin, b.plugin.wired)]
     moves: list[RowCall | BlockCall]
-    if flies_in_ranges:
+    if in_ranges:
         commands = {Number((float, row)) for row in group.u_rows}
         given = [each for call in calls for each in numbers_of(call.results) if each in commands]
         moves = [replace(RANGE_CALL, arguments=tuple(dict.fromkeys(given))), TO_COLUMNS]
     else:
         moves = [placed(call, group, motion) for call in laws_of(motion.plugin)]
-    believed = set(group.belief) | ({*DERIVED} if "quat" in group.belief else set())
-    held = [Number(part) for part, (name, _) in BODY.items() if name in believed]
+    from_sensors = set(group.belief) | ({*DERIVED} if "quat" in group.belief else set())
+    held = [Number(part) for part, (name, _) in BODY.items() if name in from_sensors]
     changing = {Number(part) for part, (name, _) in BODY.items() if name in (*WRITABLE, *DERIVED)}
     returned = {each for call in moves for each in numbers_of(call.results)}
     read = {each for call in calls for each in numbers_of(call.arguments)}
     if (read & changing) - returned - set(held):
         return None
-    if flies_in_ranges:
+    if in_ranges:
         return Steering(group, Rows([*calls, *moves], held, MORE), group.range_kernel)
     return Steering(group, Rows([*calls, *moves], held))
 
@@ -78,13 +80,13 @@ def _is_law(binding: Binding) -> bool:
     return cls.step is Controller.step and bool(cls.row_laws) and binding.spec.rate is None and is_alone
 
 
-def _flies_by_law(binding: Binding) -> bool:
+def _has_row_laws(binding: Binding) -> bool:
     cls = type(binding.plugin)
     return bool(cls.row_laws) and cls.advance is MotionModel.advance and not cls.handles()
 
 
-def _flies_in_ranges(group: Group) -> bool:
-    """Whether the kernel over ranges can read the inputs and write the state where they are."""
+def _uses_range_kernel(group: Group) -> bool:
+    """Return True if the kernel over ranges can read the inputs and write the state in the group's table, without copies."""
     cls = type(group.motion.plugin)
     is_rigid_body = issubclass(cls, RigidBodyModel) and cls.to_body is RigidBodyModel.to_body
     return group.range_kernel is not None and is_rigid_body and not group.stacks_inputs and not cls.handles()

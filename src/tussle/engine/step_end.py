@@ -80,7 +80,7 @@ def _end_worlds(state: SimulationState) -> None:
     if "time" in state.mission.end_conditions:
         for world in np.flatnonzero(state.running & (state.context.clock.step >= state.n_steps)):
             over[int(world)] = "time"
-    # Entities were born or removed since the last check. Births count: the last one due may leave a single team.
+    # Births matter too: after the last birth, a single team may be left.
     if state.has_changed:
         state.has_changed = False
         for number, reason in _lost_teams(state):
@@ -94,10 +94,10 @@ def _lost_teams(state: SimulationState) -> Iterable[tuple[int, str]]:
     if "none" in conditions or not {"one_team", "all_dead"} & set(conditions):
         return
     bodies, teams = state.population.bodies, state.context.teams
-    there = np.zeros((state.n_worlds, len(teams)), bool)
-    mark_teams(bodies.world, bodies.team, teams, there)
-    left = there.sum(axis=1)
-    # SCRIMMAGE looks at the living only, not at births to come, nor at who began.
+    has_team = np.zeros((state.n_worlds, len(teams)), bool)
+    mark_teams(bodies.world, bodies.team, teams, has_team)
+    left = has_team.sum(axis=1)
+    # SCRIMMAGE considers only living entities: neither future births nor the teams at the start.
     is_historic = bool(state.mission.compat)
     for world in np.flatnonzero(state.running & (left <= 1)):
         if not (is_historic or state.births.is_over(int(world))):

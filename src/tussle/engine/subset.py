@@ -57,7 +57,7 @@ def _sub_group(group: Group, bodies: Bodies, first: int, rows: np.ndarray) -> Gr
     sub = copy.copy(group)
     sub.table = _sub_table(group.table, rows)
     views: dict[int, Any] = {}
-    for name in ("thinking", "steering", "sensing", "moving"):
+    for name in ("autonomy_view", "controller_view", "sensor_view", "motion_view"):
         view = copy.copy(getattr(group, name))
         view.is_subset = True
         view.own_cache()

@@ -16,7 +16,7 @@ BELIEF = {"belief_pos": ("pos", 3, "m"), "belief_vel": ("vel", 3, "m/s"), "belie
 
 @dataclass(slots=True)
 class Link:
-    """Location of a channel column. With `rows`, a separate array of the plugin: inputs are copied from these rows, outputs to them."""
+    """Location of a channel column. With `rows`, the plugin has its own array: inputs are copied from these rows, outputs to them."""
 
     place: ColumnPlace
     rows: tuple[int, ...] | None = None
@@ -116,7 +116,7 @@ class Wiring:
                     raise self._no_writer(following[0], channel, offered, controller.instance_name)
 
     def _bus(self, producers: Sequence[Any], consumers: Sequence[Any]) -> Bus:
-        """Rows for all channels. Those of the consumers come first, in order, so that inputs are contiguous slices where possible."""
+        """Allocate rows for all channels. Those of the consumers come first, in order, so that inputs are contiguous where possible."""
         bus = Bus()
         for plugin in consumers:
             for _, column in read_channels(plugin):
@@ -179,13 +179,13 @@ class Wiring:
                 if isinstance(bus, Bus) and all(c in bus.row for c in column.channels):
                     self.links[id(plugin), name] = self._link(column, bus)
                 else:
-                    self.links[id(plugin), name] = self.alone(column, (id(plugin), name))
+                    self.links[id(plugin), name] = self.unconnected(column, (id(plugin), name))
                 continue
             self._check_form(plugin, column, source)
             source.read.update(column.channels)
             self.links[id(plugin), name] = self._link(column, source)
 
-    def alone(self, column: Channel, key: Any) -> Link | int:
+    def unconnected(self, column: Channel, key: Any) -> Link | int:
         """Location of a channel column that is not connected."""
         if column.ragged:
             return self.table.add_list(column)
@@ -235,7 +235,7 @@ def sharing(plugin: Any) -> Iterator[Any]:
 
 
 def _nested(plugin: Any) -> Iterator[Any]:
-    """All plugins nested in a plugin that have private channels."""
+    """Yield all plugins nested in a plugin that have private channels."""
     for name, column in plugin.children().items():
         for child in () if column.shares_channels else plugin.values[name]:
             yield child

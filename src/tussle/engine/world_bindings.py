@@ -23,7 +23,7 @@ def offer(
 ) -> None:
     """Add a service of a world plugin by "plugin.service", and by its own name unless several plugins offer it.
 
-    A call by a name that several offer raises an error, which names them.
+    Calling a name that several plugins offer raises an error that lists them.
     """
     several = name in services
     services[f"{plugin}.{name}"] = function

@@ -1,6 +1,6 @@
 """The laws of SCRIMMAGE, where tussle's differ: plugins of the same names, which missions with `compat="scrimmage"` use.
 
-`from tussle.historic import SimpleAircraft` imports one of them. Each docstring says which lines differ, and why tussle's are otherwise.
+`from tussle.historic import SimpleAircraft` imports one of them. Each docstring says how the law differs from tussle's.
 """
 
 from __future__ import annotations

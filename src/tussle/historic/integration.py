@@ -23,7 +23,7 @@ def rk4_step(f: Derivative, x: np.ndarray, h: float) -> np.ndarray:
 
 
 def advance_by(model: MotionModel, step: Step) -> Callable[..., None]:
-    """The function `advance` of a motion model that advances all its rows by steps.
+    """Return the function `advance` of a motion model that advances all its rows by steps.
 
     Args:
         model: The model.
@@ -41,7 +41,7 @@ def advance_by(model: MotionModel, step: Step) -> Callable[..., None]:
 
 
 def columns_of(model: MotionModel, p: np.ndarray) -> dict[str, Any]:
-    """Row parameters of a motion model by name: (n,), or with fields (k, n).
+    """Return row parameters of a motion model by name: (n,), or with fields (k, n).
 
     Args:
         model: The model.

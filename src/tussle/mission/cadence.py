@@ -26,7 +26,7 @@ class Cadence:
 
     @classmethod
     def of(cls, plugin: Any, most: float, n_substeps: int, where: str) -> Self | None:
-        """The cadence of a plugin; None if it is called at every point.
+        """Return the cadence of a plugin; None if it is called at every point.
 
         Args:
             plugin: The plugin, with its `rate` [Hz].
@@ -51,7 +51,7 @@ class Cadence:
         return None if per_point == 1 else cls(per_point, n_substeps)
 
     def since(self, step: int, substep: int = 0) -> int:
-        """Grid points since the previous call if a call is due, else 0; the first call counts a full period."""
+        """Return the number of grid points since the previous call if a call is due, else 0. The first call counts a full period."""
         p, q = self.per_point.numerator, self.per_point.denominator
         k = step * self.n_substeps + substep
         number = k * p // q
@@ -74,7 +74,7 @@ class TimerCadence:
         self._timer, self._is_due = 0.0, list[bool]()
 
     def since(self, step: int, substep: int = 0) -> int:
-        """1 if a call is due, else 0."""
+        """Return 1 if a call is due, else 0."""
         k = step * self._n_substeps + substep
         while len(self._is_due) <= k:
             self._timer -= self._dt

@@ -33,24 +33,24 @@ KINDS: dict[str, type] = {
 
 @cache
 def historic() -> dict[str, Any]:
-    """Names and attributes of the existing system's plugins."""
+    """Return names and attributes of SCRIMMAGE's plugins."""
     return tomllib.loads((Path(stock.__file__).parent / "historic.toml").read_text(encoding="utf-8"))
 
 
 @cache
 def missing() -> dict[str, str]:
-    """Plugins of the existing system that are not here -> "not yet: needs ROS", "dropped: ..."."""
+    """Map each plugin of SCRIMMAGE that tussle lacks to the reason: "not yet: needs ROS", "dropped: ..."."""
     file = Path(stock.__file__).parents[1] / "historic" / "differences.toml"
     return dict(tomllib.loads(file.read_text(encoding="utf-8"))["missing"])
 
 
 class AbsentPluginError(MissionError):
-    """A plugin of the existing system that tussle does not have yet."""
+    """A plugin of SCRIMMAGE that tussle does not have yet."""
 
 
 @dataclass(frozen=True)
 class PluginSource:
-    """Where a plugin class comes from.
+    """Source of a plugin class.
 
     Attributes:
         place: Description for messages.
@@ -82,8 +82,8 @@ class Catalogue:
         for point in installed():
             place = f"of the package {point.dist.name if point.dist else '?'} ({point.value})"
             self._sources.setdefault(point.name, []).append(PluginSource(place, point.load))
-        for given in plugin_files:
-            file = given if isinstance(given, PluginFile) else PluginFile.of(given)
+        for item in plugin_files:
+            file = item if isinstance(item, PluginFile) else PluginFile.of(item)
             found = file.load()
             for name in found:
                 source = PluginSource(f"of {file.path}", partial(found.__getitem__, name))
@@ -92,10 +92,10 @@ class Catalogue:
         self.names = sorted(self._sources)
 
     def load(self, name: str) -> type[Plugin]:
-        """The plugin class with this name.
+        """Return the plugin class with this name.
 
         Raises:
-            AbsentPluginError: It is a plugin of the existing system that tussle does not have yet.
+            AbsentPluginError: It is a plugin of SCRIMMAGE that tussle does not have yet.
             MissionError: There is no such plugin, or it cannot be imported.
         """
         if name not in self._sources:
@@ -119,7 +119,7 @@ class Catalogue:
         return found
 
     def adapter(self, cls: type[Plugin], name: str) -> type[Plugin]:
-        """The plugin that runs a class or a function of a plugin file.
+        """Return the plugin that runs a class or a function of a plugin file.
 
         Args:
             cls: The plugin of the mission, such as PyAutonomy.
@@ -140,17 +140,17 @@ class Catalogue:
         )
 
     def hides(self, name: str) -> str:
-        """Note for a name that several plugins have: which of them is used; "" if there is only one."""
+        """Return a note on which of several plugins with this name is used; "" if there is only one."""
         *others, winner = (f"the one {source.place}" for source in self._sources[name])
         return f"{name} is {winner}; it hides {' and '.join(others)}" if others else ""
 
 
 def installed() -> tuple[EntryPoint, ...]:
-    """Entry points `tussle.plugins` of the installed packages; those of packages earlier on the import path come later."""
+    """Return the entry points `tussle.plugins` of installed packages, in reverse order of the import path, so that the first one wins."""
     return _installed(tuple(sys.path))
 
 
 @cache
 def _installed(_path: tuple[str, ...]) -> tuple[EntryPoint, ...]:
-    """The entry points, cached for an import path: searching the packages takes longer than reading a mission."""
+    """Return the entry points, cached per import path: searching the packages takes longer than reading a mission."""
     return tuple(reversed(tuple(entry_points(group="tussle.plugins"))))

@@ -42,7 +42,7 @@ def number(text: str, unit: str = "", text_unit: str = "") -> float:
     return value
 
 
-def whole(text: str, least: int = -MOST_INTEGER, most: int = MOST_INTEGER) -> int:
+def integer(text: str, least: int = -MOST_INTEGER, most: int = MOST_INTEGER) -> int:
     """Parse an integer.
 
     Raises:

@@ -37,18 +37,18 @@ def expand_entity_common(root: Node, problems: Problems, budget: Budget) -> None
             problems.error(node.place, "entity_common has no name; entities take it by its name")
         shared[name] = node
     for node in root.find_all("entity"):
-        wanted = node.attributes.pop("entity_common", None)
-        if wanted is None:
+        requested = node.attributes.pop("entity_common", None)
+        if requested is None:
             continue
-        if wanted not in shared:
-            problems.absent(node.where("entity_common"), "entity_common", wanted, shared)
+        if requested not in shared:
+            problems.absent(node.where("entity_common"), "entity_common", requested, shared)
             continue
-        node.children = _merged(shared[wanted].children, node.children, budget)
+        node.children = _merged(shared[requested].children, node.children, budget)
     root.children = [child for child in root.children if child.tag != "entity_common"]
 
 
 def _merged(common: Iterable[Node], own: list[Node], budget: Budget) -> list[Node]:
-    """The shared tags that the entity does not have itself, then its own; plugins of both are kept, the shared ones first."""
+    """Return the shared tags that the entity does not override, then its own. Plugins of both are kept, the shared ones first."""
     by_tag: dict[str, list[Node]] = {}
     for mine in own:
         by_tag.setdefault(mine.tag, []).append(mine)
@@ -68,7 +68,7 @@ def _merged(common: Iterable[Node], own: list[Node], budget: Budget) -> list[Nod
 
 
 def block_names(nodes: Iterable[Node]) -> list[str]:
-    """Name of each entity's block: its `tag`, else its name, else "team_ID". The second block of a name is called "NAME_2"."""
+    """Return the name of each entity's block: its `tag`, else its name, else "team_ID". A second block of a name is called "NAME_2"."""
     taken = {RUN}
     last: dict[str, int] = {}
     names = []
@@ -87,7 +87,7 @@ def block_names(nodes: Iterable[Node]) -> list[str]:
 
 @dataclass
 class Fields:
-    """The tags in a tag that hold one value each, read on demand.
+    """Reads the child tags that hold one value each.
 
     Attributes:
         node: The tag.
@@ -121,7 +121,7 @@ class Fields:
         return self.found[name].place if name in self.found else self.node.place
 
     def read(self, name: str, codec: Callable[[str], Any]) -> Any:
-        """Value of a tag; its default if the tag is missing or wrong."""
+        """Return the value of a tag; its default if the tag is missing or wrong."""
         if name in self.found:
             try:
                 return codec(self.found[name].text)
@@ -133,7 +133,7 @@ class Fields:
         return codec(default) if default and default != "none" else None
 
     def number(self, name: str, unit: str = "") -> float:
-        """A number in SI units, 0 without a valid value or default; a bare number is in the tag's unit."""
+        """Return a number in SI units, 0 without a valid value or default. A bare number is in the tag's unit."""
         text_unit, bound = self.known[name].unit, self.known[name].bound
 
         def codec(text: str) -> float:
@@ -148,7 +148,7 @@ class Fields:
         return tuple(self.number(name) for name in names)
 
     def angles(self, latitude: str, longitude: str) -> tuple[float, float]:
-        """Latitude and longitude [rad], within their ranges."""
+        """Return latitude and longitude [rad], within their ranges."""
         found = []
         for name, most in ((latitude, 90.0), (longitude, 360.0)):
             value = self.number(name, "rad")
@@ -160,7 +160,7 @@ class Fields:
         return found[0], found[1]
 
     def position(self, origin: Origin) -> tuple[float, ...]:
-        """Position [m] from latitude, longitude and altitude if all three are given, else from x, y, z."""
+        """Return the position [m] from latitude, longitude and altitude if all three are given, else from x, y, z."""
         geodetic = ("latitude", "longitude", "altitude")
         given = [name for name in geodetic if self.has(name)]
         if len(given) == len(geodetic):
@@ -201,7 +201,7 @@ class EntityReader:
     places: dict[str, Place] = field(default_factory=dict)
 
     def block(self, node: Node, name: str) -> Block | None:
-        """The block of one <entity>; None if it is wrong, which `problems` receives."""
+        """Make the block of one <entity>. Returns None if it has errors, which are added to `problems`."""
         for attribute in node.attributes:
             if attribute not in ENTITY_ATTRIBUTES:
                 self.problems.unknown(
@@ -210,7 +210,7 @@ class EntityReader:
         fields = Fields(node, ENTITY, self.problems)
         self.places[name] = node.place
         self._note_differences(fields)
-        team = fields.read("team_id", lambda text: codecs.whole(text, -MOST_TEAM, MOST_TEAM))
+        team = fields.read("team_id", lambda text: codecs.integer(text, -MOST_TEAM, MOST_TEAM))
         values: dict[str, Any] = {"name": name, "team": team, "count": self._count(fields)}
         values |= self._body(fields) | self._births(fields, values["count"])
         taken: set[str] = set()
@@ -250,7 +250,7 @@ class EntityReader:
                     self.problems.unknown(node.where(attribute), f"attribute of <{tag}>", attribute, ())
 
     def _count(self, fields: Fields) -> int:
-        count: int = fields.read("count", lambda text: codecs.whole(text, 0))
+        count: int = fields.read("count", lambda text: codecs.integer(text, 0))
         self.rows += count
         most = self.limits.most_rows(self.update)
         if self.rows > most >= self.rows - count:
@@ -263,7 +263,7 @@ class EntityReader:
         return min(count, most)
 
     def _body(self, fields: Fields) -> dict[str, Any]:
-        """Initial states, and the values of the body."""
+        """Return initial states, and the values of the body."""
         velocity = fields.vector("vx", "vy", "vz")
         box = fields.vector("box_x", "box_y", "box_z")
         return {
@@ -287,13 +287,13 @@ class EntityReader:
         }
 
     def _births(self, fields: Fields, count: int) -> dict[str, Any]:
-        """Times of birth; empty if all entities exist from the start."""
+        """Return the times of birth; empty if all entities exist from the start."""
         if not fields.has("generate_rate"):
             return {}
         rate = fields.read("generate_rate", lambda text: codecs.fraction(text, "1/s")) or 0.0
         slots = (
             fields.read(
-                "generate_count", lambda text: codecs.whole(text, -self.limits.rows, self.limits.rows)
+                "generate_count", lambda text: codecs.integer(text, -self.limits.rows, self.limits.rows)
             )
             or 0
         )
@@ -318,7 +318,7 @@ class EntityReader:
         return self.plugins.make(default, taken)
 
     def _add_script(self, fields: Fields, written: PluginTag) -> None:
-        """Make <script_name> an attribute of the motion model, if that reads it."""
+        """Make <script_name> an attribute of the motion model, if the model has this parameter."""
         with suppress(TussleError):  # `make` reports what is wrong with the name
             if "script_name" in self.plugins.catalogue.load(written.plugin).params():
                 written.attributes.setdefault("script_name", fields.found["script_name"].text)

@@ -1,4 +1,4 @@
-"""The laws by which a mission is played: tussle's own, or on request those of SCRIMMAGE where they differ."""
+"""Choice of laws for a mission: tussle's own, or with `compat` those of SCRIMMAGE where they differ."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ COMPAT = ("scrimmage",)
 
 
 def check_compat(compat: Any) -> None:
-    """Check a name of laws; "" is that of tussle's.
+    """Check the name of a set of laws; "" selects tussle's own.
 
     Raises:
         MissionError: There are no such laws.
@@ -34,13 +34,13 @@ def shipped(compat: str) -> dict[str, Callable[[], Any]]:
     check_compat(compat)
     if not compat:
         return {name: partial(stock.load, name) for name in stock.manifest()}
-    from tussle import historic  # nothing of it is loaded otherwise
+    from tussle import historic  # loaded only on demand
 
     return {name: partial(historic.load, name) for name in {**stock.manifest(), **historic.manifest()}}
 
 
 def with_laws(owner: Any, names: Iterable[str]) -> dict[str, Any]:
-    """The plugins of a block or mission by the names of its fields, those of tussle replaced where SCRIMMAGE's law differs."""
+    """Return the plugins of a block or mission by field, with tussle's replaced by SCRIMMAGE's where the laws differ."""
     found = {}
     for name in names:
         plugins = getattr(owner, name)
@@ -49,7 +49,7 @@ def with_laws(owner: Any, names: Iterable[str]) -> dict[str, Any]:
 
 
 def with_law(plugin: Plugin) -> Plugin:
-    """The plugin, with SCRIMMAGE's law if it is a stock plugin whose law differs; and so the plugins inside it."""
+    """Return the plugin with SCRIMMAGE's law if it is a stock plugin whose law differs. The plugins inside it are replaced likewise."""
     from tussle import historic
 
     cls, values = type(plugin), plugin.values

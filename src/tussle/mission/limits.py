@@ -11,14 +11,14 @@ class Limits:
 
     Attributes:
         text: Characters of one file, and of all files with their includes and replaced placeholders.
-        nodes: Tags of all files together, including the copies that are taken from <entity_common> and <param_common>.
+        nodes: Tags of all files together, including copies of the tags of <entity_common> and <param_common>.
         depth: Nesting of tags.
         blocks: <entity> tags.
         plugins: Plugins of one entity, and of the world.
         files: Files that one mission includes.
         include_depth: Nesting of includes.
         rows: Entities of all blocks together, unborn ones included; while running, entities of one world.
-        sequential: The same with update="sequential", where each entity that ever lived needs its own calls and columns.
+        sequential: The same with update="sequential", where each entity needs its own calls and columns, even after its removal.
         tries: Positions redrawn for the entities of one world that are born at the same time, where interactions reject them.
         substeps: motion_multiplier.
         steps: Steps until the end.

@@ -96,7 +96,7 @@ class Budget:
             )
 
     def spend_copy(self, node: Node) -> None:
-        """Count a tag and its content, which are copied from elsewhere in the file.
+        """Count a tag and its content, copied from another place of the file.
 
         Raises:
             MissionError: There are too many tags or characters.

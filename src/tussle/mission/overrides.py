@@ -43,7 +43,7 @@ class TreeEditor:
     Args:
         root: The tree; it is changed.
         catalogue: Finds the plugin classes, whose declarations give the units.
-        known: Names of the placeholders, which are set already.
+        known: Names of the placeholders, which are already replaced.
     """
 
     def __init__(self, root: Node, catalogue: Catalogue, known: Iterable[str]) -> None:
@@ -83,7 +83,7 @@ class TreeEditor:
         return text
 
     def _inside(self, node: Node) -> dict[str, Node]:
-        """Members of a node: run, blocks and world plugins of the root; plugins of a block; plugins inside a plugin."""
+        """Return the members of a node: run, blocks and world plugins of the root; plugins of a block; plugins inside a plugin."""
         if node is self.root:
             entities = list(node.find_all("entity"))
             blocks = dict(zip(block_names(entities), entities, strict=True))
@@ -105,7 +105,7 @@ class TreeEditor:
         return _named(node, inner)
 
     def _values(self, node: Node) -> Collection[str] | None:
-        """Names of the values of a node; None for a plugin, whose attributes are checked when it is read."""
+        """Return the names of a node's values; None for a plugin, whose attributes are checked when it is read."""
         if node is self.root:
             return ()
         tags = {
@@ -115,7 +115,7 @@ class TreeEditor:
         return tags.get(node.tag)
 
     def _units(self, node: Node, name: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """SI unit, and unit of a bare number, of each component of a value."""
+        """Return the SI unit, and the unit of a bare number, of each component of a value."""
         known = (PLUGIN | {"run": RUN_ATTRIBUTES, "entity": ENTITY}.get(node.tag, {})).get(name)
         if known is None:
             return _units_of(self.catalogue.load(node.text), name)

@@ -62,13 +62,13 @@ def _absent(path: str, owner: str, name: str, known: Collection[str]) -> Paramet
 
 
 class MissionRoot(NamedTuple):
-    """Owner that paths into a mission start from; the name "run" in it is the mission itself."""
+    """Start of all paths into a mission; the name "run" in it is the mission itself."""
 
     mission: Mission
 
 
 def inside(owner: Any) -> dict[str, Any]:
-    """Members of an owner: run, blocks and world plugins of the root; plugins of a block; plugins inside a plugin."""
+    """Return the members of an owner: run, blocks and world plugins of the root; plugins of a block; plugins inside a plugin."""
     if isinstance(owner, MissionRoot):
         mission = owner.mission
         return {
@@ -85,21 +85,21 @@ def inside(owner: Any) -> dict[str, Any]:
 
 
 def settable(owner: Any) -> tuple[str, ...]:
-    """Names that can be set in an owner: attributes of `Mission` and `Block`, parameters of plugins."""
+    """Return the names that can be set in an owner: attributes of `Mission` and `Block`, parameters of plugins."""
     if isinstance(owner, Plugin):
         return (*owner.params(), *owner.children(), *RESERVED)
     return () if isinstance(owner, MissionRoot) else tuple(f.name for f in fields(owner))
 
 
 def declared(owner: Any, name: str) -> Param | None:
-    """The declaration of a value; None if it is neither a number nor a text."""
+    """Return the declaration of a value; None if it is neither a number nor a text."""
     if isinstance(owner, Plugin):
         return owner.params().get(name)
     return (MISSION_VALUES if isinstance(owner, Mission) else BLOCK_VALUES).get(name)
 
 
 def with_value(mission: Mission, path: str, value: Any) -> Mission:
-    """A copy of a mission with one value changed: a number is SI, a text is read as in a mission file.
+    """Return a copy of a mission with one value changed: a number is SI, a text is read as in a mission file.
 
     Raises:
         ParameterError: The path does not exist, or the value is not allowed.
@@ -116,7 +116,7 @@ def with_value(mission: Mission, path: str, value: Any) -> Mission:
 
 
 def _with_member(outer: Any, old: Any, new: Any) -> Any:
-    """A copy of a mission, block or plugin with one member replaced."""
+    """Return a copy of a mission, block or plugin with one member replaced."""
     for name, value in (outer.values if isinstance(outer, Plugin) else vars(outer)).items():
         if value is old:
             return outer.replace(**{name: new})

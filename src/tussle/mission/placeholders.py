@@ -17,7 +17,7 @@ PLACEHOLDER = re.compile(r"\$\{([^=${}\s]{1,200})(?:=([^{}]*))?\}")
 
 @dataclass
 class Replaced:
-    """A text whose placeholders are replaced.
+    """A text after replacement of its placeholders.
 
     Attributes:
         text: The text to parse.

@@ -128,19 +128,19 @@ class PluginFile:
             is_package = name.endswith(f"/{INIT}.py")
             path = str(Path(self.folder, name))
             loaders[self._module(name)] = _Loader(path, text, digest, is_package, self.package)
-        gone = {self._module(name) for own, text in self.texts.items() for name in _imported(own, text)}
-        for module in (gone | loaders.keys()) & sys.modules.keys():
+        stale = {self._module(name) for own, text in self.texts.items() for name in _imported(own, text)}
+        for module in (stale | loaders.keys()) & sys.modules.keys():
             if module not in loaders or vars(sys.modules[module]).get(DIGEST) != loaders[module].digest:
                 del sys.modules[module]
                 parent, _, last = module.rpartition(".")
                 if parent in sys.modules:  # where `from . import` would find it
                     vars(sys.modules[parent]).pop(last, None)
-        for module in gone - loaders.keys():
+        for module in stale - loaders.keys():
             finder.loaders.pop(module, None)
         finder.loaders.update(loaders)
 
     def _line(self, error: BaseException) -> str:
-        """The last line of the file, or of a neighbour, in the error's traceback."""
+        """Return the last line of the file, or of a neighbour, in the error's traceback."""
         if isinstance(error, SyntaxError) and error.lineno:
             return f"{error.filename or self.path}:{error.lineno}"
         files = {str(Path(self.folder, name)) for name in self.texts}
@@ -210,7 +210,7 @@ def _imported(name: str, text: str) -> tuple[str, ...]:
 
 
 def _finder() -> _Finder:
-    """The finder of this process; installed on first use."""
+    """Return the finder of this process. It is installed on first use."""
     found = next((f for f in sys.meta_path if isinstance(f, _Finder)), None)
     if found is None:
         found = _Finder({})
@@ -242,7 +242,7 @@ class _Finder(MetaPathFinder):
 
 @dataclass(frozen=True)
 class _Loader(ExecutionLoader):
-    """Makes one module from its text.
+    """Executes the text of one module.
 
     Attributes:
         path: Path of the file, which need not exist.
@@ -282,7 +282,7 @@ class _Loader(ExecutionLoader):
         fromlist: Any = (),
         level: int = 0,
     ) -> Any:
-        """Import for the file's statements: a plain name is looked up in its folder first."""
+        """Import a module for the file's statements: a plain name is looked up in its folder first."""
         head = name.partition(".")[0]
         neighbour = f"{self.package}.{head}"
         if level == 0 and neighbour in _finder().loaders:

@@ -25,7 +25,7 @@ RATED = ("autonomy", "controller", "sensor", "behaviors")
 
 
 def free_name(wanted: str, taken: set[str]) -> str:
-    """The wanted name, with a number appended if it is taken; the name is added to `taken`."""
+    """Return the wanted name, with a number appended if it is taken, and add it to `taken`."""
     name, n = wanted, 2
     while name in taken:
         name, n = f"{wanted}_{n}", n + 1
@@ -75,7 +75,7 @@ class PluginReader:
     viewer: dict[str, str] = field(default_factory=dict)
 
     def many(self, nodes: Iterable[Node], taken: set[str] | None = None) -> list[Any]:
-        """The plugins of several tags, without those that are wrong.
+        """Make the plugins of several tags; tags with errors are left out.
 
         Args:
             nodes: The tags.
@@ -85,7 +85,7 @@ class PluginReader:
         return [plugin for plugin in made if plugin is not None]
 
     def make(self, written: PluginTag, taken: set[str], depth: int = 0) -> Plugin | None:
-        """The plugin of a tag; None if it is wrong, which `problems` receives."""
+        """Make the plugin of a tag. Returns None if it has errors, which are added to `problems`."""
         cls = self._class_of(written)
         if cls is None:
             return None
@@ -145,10 +145,10 @@ class PluginReader:
         elif hides := self.catalogue.hides(written.plugin):
             self.problems.note(place, hides)
         if not issubclass(cls, KINDS[written.tag]):
-            its = next(
+            right_tag = next(
                 (t for t, kind in KINDS.items() if issubclass(cls, kind) and t != "behaviors"), "no tag"
             )
-            self.problems.error(place, f"{written.plugin} is not allowed in {tag}; it belongs in {its}")
+            self.problems.error(place, f"{written.plugin} is not allowed in {tag}; it belongs in {right_tag}")
             return None
         return cls
 

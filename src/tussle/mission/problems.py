@@ -53,7 +53,7 @@ class Problems:
             self.check()
 
     def absent(self, place: Place, what: str, name: str, known: Collection[str]) -> None:
-        """Add an error about a name that the file does not define; the nearest name, which is slow to find, is searched once."""
+        """Add an error about a name that the file does not define. The slow search for the nearest name is done once per name."""
         if (what, name) not in self._absent:
             some = list(islice(known, MOST_GUESSED))
             more = ", ..." if len(known) > len(some) else ""
@@ -62,7 +62,7 @@ class Problems:
         self.error(place, self._absent[what, name])
 
     def note(self, place: Place, text: str) -> None:
-        """Add a note: something that the user should know."""
+        """Add a note, a message about the file that is not an error."""
         if len(self._notes) < MOST_LINES or text in self._notes:
             self._notes.setdefault(text, []).append(place)
         else:
@@ -103,13 +103,13 @@ class Problems:
 
 
 def _lines(found: dict[str, list[Place]]) -> list[str]:
-    """Each text once with its places, ordered by the line of the first."""
+    """Return one line per text with its places, ordered by the line of the first place."""
     order = sorted(found.items(), key=lambda item: item[1][0].line)
     return [f"{_places(places)}: {text}" for text, places in order]
 
 
 def _places(places: list[Place]) -> str:
-    """Places as text, such as "a.xml:12", or "a.xml:12, 40, 41" for several lines."""
+    """Return places as text: "a.xml:12", or "a.xml:12, 40, 41" for several lines."""
     first = places[0]
     lines = list(dict.fromkeys(p.line for p in places if p.file == first.file))
     rest = f", {', '.join(str(line) for line in lines[1:6])}" if len(lines) > 1 else ""

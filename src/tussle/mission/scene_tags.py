@@ -28,7 +28,7 @@ class SceneReader:
 
     Args:
         root: The mission's root tag.
-        folders: Folders in which files of surfaces may lie: the mission's own first.
+        folders: Folders that are searched for files of surfaces: the mission's own first.
         origin: Origin of the world frame.
         problems: Receives errors and notes.
     """
@@ -60,7 +60,7 @@ class SceneReader:
         }
 
     def _each(self, tag: str, attributes: Any, make: Callable[[Node, dict[str, str]], Any]) -> list[Any]:
-        """What is made of the tags of a name; errors are reported with their places."""
+        """Make an object of each tag with this name. Errors are reported with their places."""
         found = []
         for node in self.root.find_all(tag):
             for name in node.attributes:
@@ -103,10 +103,10 @@ class SceneReader:
         return replace(surface, tag=(("", name), *given.items()))
 
     def _find(self, name: str) -> Path | None:
-        """The file of a name in one of the folders; None if there is none.
+        """Return the file with this name in one of the folders; None if there is none.
 
         Raises:
-            MissionError: It lies outside of them.
+            MissionError: The file lies outside the folders.
         """
         for folder in self.folders:
             for candidate in (name, f"{name}.xml"):
@@ -150,7 +150,7 @@ def _building(_: Node, given: dict[str, str]) -> Prism:
 
 
 def _numbers(text: str, n: int, name: str, unit: str) -> tuple[float, ...]:
-    """Numbers separated by commas, or by blanks; bare angles are in degrees.
+    """Parse n numbers separated by commas or by blanks; bare angles are in degrees.
 
     Raises:
         MissionError: There are not n numbers.

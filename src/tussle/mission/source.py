@@ -52,7 +52,7 @@ def find_mission(source: str | Path, search: Sequence[str | Path] = ()) -> Path:
     for candidate in candidates:
         if _is_file(candidate):
             return candidate
-    is_folder = os.path.isdir(path)  # noqa: PTH112  it is False where Path.is_dir raises, as for a name too long
+    is_folder = os.path.isdir(path)  # noqa: PTH112  Path.is_dir raises for names that are too long
     why = "is a folder, not a mission file" if is_folder else "is neither a file nor a shipped mission"
     raise MissionError(
         f"{shown(str(source))} {why}{nearest_name(path.stem[:80], [*shipped, *stock.examples()])}; of shipped missions {listed(shipped)}"
@@ -69,7 +69,7 @@ def _expanded(path: str | Path) -> Path:
 def _is_file(path: Path) -> bool:
     try:
         return path.is_file()
-    except OSError:  # a name too long for the file system, or no right to look
+    except OSError:  # the name is too long for the file system, or the folder is not readable
         return False
 
 
@@ -206,7 +206,7 @@ class SourceReader:
         return self._selected(node, holder)
 
     def _target(self, node: Node, including: Path, roots: list[Path]) -> Path:
-        """The file that an include names, if it may be read.
+        """Return the file that an include names, if it may be read.
 
         Raises:
             MissionError: The file may not be included, or the include uses features that are not supported.
@@ -244,7 +244,7 @@ class SourceReader:
         raise MissionError(f"{place}: there is no file {shown(base + href)} to include")
 
     def _selected(self, node: Node, holder: Node) -> list[Node]:
-        """The tags that an include's xpointer selects; all tags without one."""
+        """Return the tags that an include's xpointer selects; all tags without one."""
         pointer = node.attributes.get("xpointer")
         if pointer is None:
             return holder.children

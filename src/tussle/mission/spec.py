@@ -136,7 +136,7 @@ class Block:
         half_width: Placement "uniform": largest distance of the other entities from it along each axis [m], (3,).
         placement: "normal" or "uniform".
         scatter_first: Whether the first entity is placed like the others.
-        heading: Counter-clockwise from East [rad]; a text with a unit, "180 deg", is accepted here as for all numbers with units.
+        heading: Heading, counter-clockwise from East [rad]. This and all other numbers with units may be texts: "180 deg".
         heading_variance: Variance of the heading [rad^2].
         climb: Elevation of the nose, up positive [rad].
         roll: Bank, right wing down positive [rad].
@@ -203,7 +203,7 @@ class Block:
         _refuse_rate(where, self.motion, "is integrated over every step")
 
     def replace(self, **changes: Any) -> Block:
-        """A copy with changed values."""
+        """Return a copy with changed values."""
         _check_names("Block", Block, changes)
         return dataclasses.replace(self, **changes)
 
@@ -237,7 +237,7 @@ BLOCK_VALUES = _declared(
     first_birth={"unit": "s"},
     interval_sd={"unit": "s", "ge": 0.0},
 )
-"""Declarations of a block's values, as of plugin parameters."""
+"""Declarations of a block's values, like those of plugin parameters."""
 WORLD_VALUES = ("heading", "climb", "roll", "speed", "health", "radius", "mass")
 """Values of a block that may differ between the worlds of a stack."""
 
@@ -261,10 +261,10 @@ class Mission:
         networks: Networks; GlobalNetwork and LocalNetwork are added if they are missing.
         scene: Origin, ground, walls, boundaries, bases.
         name: Title.
-        compat: Laws by which it is played: "" for tussle's, "scrimmage" for SCRIMMAGE's where they differ: stock plugins are replaced by
-            those of `tussle.historic`, with the same parameters.
+        compat: Laws of the game: "" for tussle's, "scrimmage" for SCRIMMAGE's where they differ. In the latter case stock plugins are
+            replaced by those of `tussle.historic`, with the same parameters.
         reseed_time: From the first step at or after this time on [s], random numbers are drawn with another seed; None for never.
-        reseed: That seed, of all worlds; None for a seed that depends on that of the world.
+        reseed: Seed from `reseed_time` on, the same for all worlds; None to derive it from the seed of each world.
         limits: Limits on the entities that a world may hold, and on the positions drawn for them. The blocks' own entities are
             always accepted; `Limits.large()` is for plugins that spawn very many more.
     """
@@ -284,7 +284,7 @@ class Mission:
     compat: str = ""
     reseed_time: float | None = None
     reseed: int | None = None
-    limits: Limits = field(default=Limits(), repr=False)  # not part of the game, so not of its repr
+    limits: Limits = field(default=Limits(), repr=False)  # no effect on the game
 
     def __post_init__(self) -> None:
         if not isinstance(self.blocks, Iterable):
@@ -348,7 +348,7 @@ class Mission:
             Cadence.of(plugin, 1.0 / self.dt, 1, "mission")
 
     def _check_needs(self) -> None:
-        """Check that there are the regions that plugins name and the services that they call."""
+        """Check that the regions that plugins name and the services that they call exist."""
         regions = [region for plugin in self.world_plugins for region in plugin.regions()]
         of_world = {service for plugin in self.world_plugins for service in plugin.services}
         owners = [("mission", self.world_plugins), *((f"block {b.name!r}", b.plugins) for b in self.blocks)]
@@ -385,12 +385,12 @@ class Mission:
         return (*(plugin for block in self.blocks for plugin in block.plugins), *self.world_plugins)
 
     def replace(self, **changes: Any) -> Mission:
-        """A copy with changed values."""
+        """Return a copy with changed values."""
         _check_names("Mission", Mission, changes)
         return dataclasses.replace(self, **changes)
 
     def ending_by_time(self) -> Mission:
-        """A copy with the end condition "time" in addition to its own."""
+        """Return a copy with the end condition "time" in addition to its own."""
         conditions = tuple(self.end_conditions)
         return self if "time" in conditions else self.replace(end_conditions=(*conditions, "time"))
 

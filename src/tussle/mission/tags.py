@@ -91,7 +91,7 @@ WORLD = {
     "entity": TagSpec("A block of entities with the same plugins; its tags are below.", reads="text"),
     "terrain": TagSpec(
         "Hills or a mesh that rays meet: a file beside the mission (.asc, .png, .tif, .vtk, .obj, .ply, .stl, .glb, .gltf, .off), or a "
-        "terrain .xml of the existing system. Attributes: `position` (x, y, z of its origin) [m]; of an image `cell`, a pixel's width [m], "
+        "terrain .xml of SCRIMMAGE. Attributes: `position` (x, y, z of its origin) [m]; of an image `cell`, a pixel's width [m], "
         "and `height` of white [m]; of a mesh `scale`.",
         reads="text",
     ),
@@ -106,7 +106,7 @@ WORLD = {
         reads="text",
     ),
     "multi_threaded": _log("Threads; results do not depend on them."),
-    "output_type": _log("Kinds of output of the existing system; a run directory has all of them."),
+    "output_type": _log("Kinds of output of SCRIMMAGE; a run directory has all of them."),
     "no_bin_logging": _log("Whether to leave out the trajectory.", "false", "truth"),
     "log_dir": _log(
         "Folder of the run directories; files are written only below the command line's `--out`."

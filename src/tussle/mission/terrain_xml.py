@@ -1,4 +1,4 @@
-"""Terrain XML of the existing system: poly data in UTM coordinates."""
+"""Terrain XML of SCRIMMAGE: poly data in UTM coordinates."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ CENTRAL_SCALE, FALSE_EASTING, FALSE_NORTHING = 0.9996, 500_000.0, 10_000_000.0
 
 
 def utm(origin: Origin, zone: int, is_south: bool) -> tuple[float, float]:
-    """Easting and northing of a point [m]. L. Krueger (1912), to the fourth order: within a micrometre inside of the zone."""
+    """Return easting and northing of a point [m]. L. Krueger (1912), fourth order: the error is below 1 um inside the zone."""
     n = FLATTENING / (2.0 - FLATTENING)
     radius = SEMI_MAJOR / (1.0 + n) * (1.0 + n**2 / 4.0 + n**4 / 64.0)
     alpha = (
@@ -82,7 +82,7 @@ def read_terrain_xml(
     check(inner)
     x, y, z = (codecs.number(given.get(name) or "0", "m") for name in OFFSETS)
     if given.get("zone"):
-        zone = codecs.whole(given["zone"], 1, 60)
+        zone = codecs.integer(given["zone"], 1, 60)
         east, north = utm(origin, zone, given.get("hemisphere", "north").lower().startswith("s"))
         x, y, z = x - east, y - north, z - origin.altitude
     a, b, c = numbers.get("position", (0.0, 0.0, 0.0))

@@ -22,7 +22,7 @@ from tussle.texts import shown
 
 NOWHERE = Place("", 0)
 SHIPPED = ("tussle.stock", "tussle.historic")
-"""Modules that have the plugins of their folders."""
+"""Packages from which plugins are imported by name."""
 COMPONENTS = {
     "position": ("x", "y", "z"),
     "velocity": ("vx", "vy", "vz"),
@@ -68,10 +68,10 @@ def to_xml(mission: Mission, seed: int | None = None) -> str:
     if mission.update != RUN["update"].default:
         run["update"] = mission.update
     root.children = [_node("run", run), _node("end_condition", text=", ".join(mission.end_conditions))]
-    again = {name: getattr(mission, name) for name in SEED_ATTRIBUTES}
-    again = {name: codecs.written(value) for name, value in again.items() if value is not None}
-    if seed is not None or again:
-        root.children.append(_node("seed", again, "" if seed is None else str(seed)))
+    reseed = {name: getattr(mission, name) for name in SEED_ATTRIBUTES}
+    reseed = {name: codecs.written(value) for name, value in reseed.items() if value is not None}
+    if seed is not None or reseed:
+        root.children.append(_node("seed", reseed, "" if seed is None else str(seed)))
     origin = mission.scene.origin
     for name in ("latitude", "longitude", "altitude"):
         root.children.append(_value(f"{name}_origin", getattr(origin, name), WORLD))
@@ -100,7 +100,7 @@ def to_xml(mission: Mission, seed: int | None = None) -> str:
 
 
 def _scene(scene: Scene) -> Iterator[Node]:
-    """Tags of ground, walls and surfaces.
+    """Yield tags of ground, walls and surfaces.
 
     Raises:
         MissionError: A part has no tag.
@@ -135,7 +135,7 @@ def _node(tag: str, attributes: dict[str, str] | None = None, text: str = "") ->
 
 
 def _value(tag: str, value: Any, tags: dict[str, TagSpec]) -> Node:
-    """A tag with a value in SI units; its unit is written where a bare number has another one."""
+    """Return a tag with a value in SI units. Its unit is written if a bare number has another unit."""
     unit = tags[tag].unit
     return _node(tag, text=codecs.written(value, (unit.replace("deg", "rad"),), (unit,)))
 
@@ -151,7 +151,7 @@ def _entity(block: Block) -> Node:
         given = getattr(block, name)
         values |= dict(zip(tags, given, strict=True)) if given is not None else {}
     if block.velocity is not None and not any(block.velocity):
-        values["speed"] = 0.0  # in a file, a velocity of 0 means that there is only a speed
+        values["speed"] = 0.0  # in a file, a velocity of 0 means that `speed` is used
     for name, tag in TAGS.items():
         values.setdefault(tag, getattr(block, name))
     values["pitch"] = -block.climb
@@ -187,15 +187,15 @@ def _plugin(tag: str, plugin: Plugin, where: str) -> Node:
 
 
 def _attributes(plugin: Plugin) -> dict[str, str]:
-    """Attributes of a plugin's tag: name, rate, and the parameters that differ from their defaults."""
+    """Return the attributes of a plugin's tag: name, rate, and the parameters that differ from their defaults."""
     found = {} if plugin.instance_name == type(plugin).__name__ else {"name": plugin.instance_name}
     if plugin.rate is not None:
         found["loop_rate"] = codecs.written(plugin.rate)
     if plugin.active_in:
         found["states"] = ", ".join(plugin.active_in)
-    # Without those whose default differs from the existing system's, the reader would note that.
-    said = {name: plugin.values[name] for name in plugin.historic_attributes.differs}
-    for name, value in (said | dict(plugin.given())).items():
+    # Parameters whose default differs from SCRIMMAGE's are always written; otherwise the reader adds a note.
+    always_written = {name: plugin.values[name] for name in plugin.historic_attributes.differs}
+    for name, value in (always_written | dict(plugin.given())).items():
         if name in plugin.children():
             if fields := plugin.children()[name].fields:
                 rows = (" ".join(each.values[field] for field in fields) for each in value)
@@ -224,7 +224,7 @@ def _add_base(base: Base, blocks: Sequence[Block], entities: Sequence[Node]) -> 
             entity.children.append(node)
             return
     raise MissionError(
-        f"mission: the base of team {base.team} has no block of this team, in whose <entity> it would stand"
+        f"mission: the base of team {base.team} cannot be written, as no block is of this team"
     )
 
 
@@ -262,7 +262,7 @@ def _import(module: str, names: Sequence[str]) -> str:
 
 
 def _code(value: Any, imports: dict[str, str]) -> list[str]:
-    """Lines of code of a value; `imports` receives the names that it needs, with their modules."""
+    """Return the lines of code of a value, and add the names that it needs to `imports`, with their modules."""
     if isinstance(value, str):
         return [json.dumps(value, ensure_ascii=False)]
     if isinstance(value, (tuple, list)) and any(map(_is_made, value)):
@@ -290,7 +290,7 @@ def _code(value: Any, imports: dict[str, str]) -> list[str]:
 
 
 def _is_made(value: Any) -> bool:
-    """Whether a value is made by calling its class."""
+    """Return True if a value is made by calling its class."""
     return isinstance(value, Plugin) or dataclasses.is_dataclass(value)
 
 
@@ -299,7 +299,7 @@ def _comma(lines: list[str]) -> list[str]:
 
 
 def _arguments(value: Any) -> Iterator[tuple[str, Any]]:
-    """Arguments that make a plugin or dataclass, as far as they differ from their defaults."""
+    """Yield the arguments of a plugin or dataclass that differ from their defaults."""
     if isinstance(value, Plugin):
         yield from value.given()
         yield from [("name", value.instance_name)] * (value.instance_name != type(value).__name__)
@@ -309,7 +309,7 @@ def _arguments(value: Any) -> Iterator[tuple[str, Any]]:
     for field in dataclasses.fields(value):
         given = getattr(value, field.name)
         default = field.default if field.default_factory is dataclasses.MISSING else field.default_factory()
-        if field.name == "networks":  # those that a mission adds by itself are first
+        if field.name == "networks":  # the networks that every mission adds come first
             added = tuple(stock.load(name)() for name in stock.ALWAYS_THERE)
             given = given[len(added) :] if given[: len(added)] == added else given
         is_one = isinstance(given, tuple) and len(given) == 1 and isinstance(given[0], Plugin)

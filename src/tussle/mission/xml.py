@@ -42,7 +42,7 @@ class Loaded:
         name: The mission's title, else the file's name.
         path: The file.
         text: The mission as one XML text: placeholders and settings replaced, includes resolved. Reading it gives the same mission.
-        notes: Notes about the file, one line each: what is unknown or ignored, and where tussle differs from the format.
+        notes: Notes about the file, one line each: unknown and ignored tags, and differences between tussle and the format.
         viewer: Settings for the viewer: attributes of <run> and tags by name, "entities" by block, "plugins" by "plugin@attribute".
         log: Settings of the output, by tag.
         placeholders: Names of the placeholders, with their defaults.
@@ -86,7 +86,7 @@ def read_mission(
         plugin_files: Python files with further plugins for the mission.
         search: Folders that are searched for missions and included files, besides the mission's own.
         allow_large: Raise the limits that keep a hostile file from taking all memory, for reading and for running.
-        compat: Laws by which it is played, as of `Mission`; None for those that the file names.
+        compat: As for `Mission`; None for the value in the file.
 
     Raises:
         MissionError: The mission cannot be read or is invalid. The message has one line for each error, with file and line.
@@ -112,7 +112,7 @@ def read_mission(
 
 
 def _catalogue(read: MissionSource, compat: str | None, plugin_files: Sequence[Any]) -> Catalogue:
-    """The catalogue for the laws that are asked for, or that the file names; the text of the mission names them from then on.
+    """Return the catalogue for `compat`, or for the laws that the file names. `compat` is written into the mission's text.
 
     Raises:
         MissionError: There are no such laws, or a plugin file cannot be imported.
@@ -214,7 +214,7 @@ class _WorldReader:
                 )
 
     def _last(self, tag: str) -> Node | None:
-        """The last tag of a name, which is the one in effect."""
+        """Return the last tag with this name, which is the one in effect."""
         return next((child for child in reversed(self.root.children) if child.tag == tag), None)
 
     def _run(self) -> dict[str, Any]:
@@ -232,7 +232,7 @@ class _WorldReader:
         # A wrong value has been reported and is replaced by its default.
         dt, start, end = fields.number("dt"), fields.number("start"), fields.number("end")
         most = self.limits.substeps
-        substeps = fields.read("motion_multiplier", lambda text: codecs.whole(text, 1, most))
+        substeps = fields.read("motion_multiplier", lambda text: codecs.integer(text, 1, most))
         if not abs((end - start) / dt) <= self.limits.steps:
             text = f"there are more than {self.limits.steps:,} steps of {dt:g} s from {start:g} to {end:g} s"
             self.problems.error(fields.place("end"), text)
@@ -252,7 +252,7 @@ class _WorldReader:
         return Origin(*fields.angles(names[0], names[1]), fields.number(names[2]))
 
     def _shared(self) -> dict[str, dict[str, str]]:
-        """<param_common> name -> attributes."""
+        """Map the name of each <param_common> to its attributes."""
         shared: dict[str, dict[str, str]] = {}
         for node in self.root.find_all("param_common"):
             name = node.attributes.get("name", "")

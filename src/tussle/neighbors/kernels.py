@@ -362,7 +362,7 @@ GROUP, SPANS = 1, 2
 
 @kernel("(I I2 I I I) (i8 i8) F2 (F F) (I2w I2w) F2w (i8 i8 i8 i8 i8) -> i8 i8 i8")
 def cut_blocks(index, rows, points, cells, arrays, out, part):
-    """The queries of rows [first, last) in blocks, where they stand, and the candidate runs of every block.
+    """Write the queries of rows [first, last) in blocks, their places, and the candidate runs of every block.
 
     index: order, strips, world_strip, world_start, keys. rows: first, last. points: positions by place [m], (3, n). cells: inverse_cell
     [1/m], reach [m], (n_worlds,). Written: arrays, that is cuts (queries, block_first, block_strip, span_first, span_last; 5, n + 1)

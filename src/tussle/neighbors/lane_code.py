@@ -391,5 +391,5 @@ class Writer:
 
 
 def has_return(node: ast.AST) -> bool:
-    """Whether a statement contains a `return`."""
+    """Return True if a statement contains a `return`."""
     return any(isinstance(each, ast.Return) for each in ast.walk(node))

@@ -43,7 +43,7 @@ class LaneFunction:
 
     @property
     def targetoptions(self) -> dict[str, str]:
-        """What the machine code depends on besides the Python code; part of the cache key of every kernel that uses the function."""
+        """Return the target's options; they are part of the cache key of every kernel that uses the function."""
         return {"generators": generators()}
 
     @property
@@ -156,8 +156,8 @@ def lanes_abs(lanes: Any) -> Any:
 @LaneFunction
 def tagged(lanes: Any, tag: int, n_bits: int) -> Any:
     """Replace the lowest n_bits bits of each number by `tag`; of numbers >= 0, the order stays but for these bits."""
-    whole = lanes.view(np.int64)
-    return ((whole >> n_bits << n_bits) | tag).view(np.float64)
+    integers = lanes.view(np.int64)
+    return ((integers >> n_bits << n_bits) | tag).view(np.float64)
 
 
 @LaneFunction

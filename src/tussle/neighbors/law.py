@@ -52,7 +52,7 @@ class Law:
 
     @property
     def lists(self) -> bool:
-        """Whether the law gives one value per pair instead of one per row."""
+        """True if the law gives one value per pair instead of one per row."""
         return "each" in self.reductions.values()
 
     @property

@@ -184,7 +184,7 @@ def least_square(x, y, z, mode, wanted, table, start, end, least):
 
 @device
 def too_far(cells, cell, worst):
-    """Whether everything `cells` cells away is farther than sqrt(worst) for any rounding error."""
+    """Return True if everything `cells` cells away is farther than sqrt(worst) for any rounding error."""
     gap = (cells - 1.0 - ROUNDING_CELLS) * cell
     return gap > 0.0 and gap * gap * (1.0 - 1e-12) > worst
 

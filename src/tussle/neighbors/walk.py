@@ -134,7 +134,7 @@ def make_walk(laws: Sequence[Law], where: Law | None, code_of: Callable[[str], s
 
     Args:
         laws: In the order of the results.
-        where: A law with one contribution that tells whether a pair counts for the laws.
+        where: A law with one contribution: True if the pair counts for the laws.
         code_of: Returns the signature code (F, I, B) of an own column.
 
     Raises:

@@ -187,7 +187,7 @@ def code_text(code: types.CodeType, doc: str | None) -> str:
 
 
 def is_fixed(function: types.FunctionType) -> bool:
-    """Whether a Python function belongs to a package whose version is part of every key."""
+    """Return True if a Python function belongs to a package whose version is part of every key."""
     if package(function) in {"numba", "llvmlite", "numpy"}:
         return True
     # Checks the file, because a user's module may have the name of a standard library module.

@@ -72,7 +72,7 @@ def codes() -> dict[str, Any]:
 
 @cache
 def environment() -> str:
-    """What the machine code of every kernel depends on besides its source: versions, processor, compiler settings."""
+    """Return everything that machine code depends on besides its source: versions, processor, compiler settings."""
     import llvmlite
     import numba
     import numba.core.config
@@ -122,7 +122,7 @@ def renamed(function: Any, key: str) -> types.FunctionType:
 
 
 def is_interpreted(function: Callable[..., Any]) -> bool:
-    """Whether NUMBA_DISABLE_JIT is set and the function runs as Python, for a debugger. Functions of tussle stay compiled."""
+    """Return True if NUMBA_DISABLE_JIT is set and the function runs as Python, for a debugger. Functions of tussle stay compiled."""
     if package(function) == "tussle":
         return False
     from numba.core import config
@@ -136,11 +136,11 @@ def compiling() -> Iterator[None]:
     from numba.core import config
 
     settings = vars(config)
-    asked, settings["DISABLE_JIT"] = settings["DISABLE_JIT"], 0
+    setting, settings["DISABLE_JIT"] = settings["DISABLE_JIT"], 0
     try:
         yield
     finally:
-        settings["DISABLE_JIT"] = asked
+        settings["DISABLE_JIT"] = setting
 
 
 def jitted(function: Callable[..., Any], **options: Any) -> Any:

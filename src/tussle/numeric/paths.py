@@ -8,7 +8,7 @@ from tussle.numeric.elementary import sincos, wrap
 from tussle.numeric.kernel import device
 
 GRAVITY = 9.81
-"""Standard gravity of the existing system [m/s^2]."""
+"""Standard gravity of SCRIMMAGE [m/s^2]."""
 STEEPEST_BANK = math.radians(89.0)
 """Largest bank of a coordinated turn [rad], a load of 57 g; at 90 degrees no lift is left to carry the weight."""
 

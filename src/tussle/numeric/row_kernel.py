@@ -125,7 +125,7 @@ class RowKernel:
                 own = call.function
                 scope[f"call_{place}"] = own if isinstance(own, Device) else device(own)
         text = [f"def row_kernel({arguments}):", *self._lines(given, kept, rows, times)]
-        exec("\n".join(text) + "\n", scope)  # noqa: S102 - written here; what authors wrote is in functions of its own
+        exec("\n".join(text) + "\n", scope)  # noqa: S102 - the text is written here; code of plugins is only called
         made = scope["row_kernel"]
         # A kernel with a function of a plugin author belongs to the author's module, and so may run as Python.
         made.__module__ = next((f for f in functions if package(f) != "tussle"), functions[0]).__module__
@@ -197,7 +197,7 @@ class RowKernel:
             wanted = shape_of(call.results[0] if len(call.results) == 1 else call.results)
             try:
                 found = shape_of(function(*ones))
-            except Exception:  # noqa: BLE001 - what it does with ones tells nothing then
+            except Exception:  # noqa: BLE001 - it may reject ones
                 found = wanted
             if found != wanted:
                 raise DeclarationError(

@@ -44,7 +44,7 @@ def directory() -> Path:
     )  # used by all workers of a batch
     with suppress(OSError):
         shared.mkdir(mode=0o700)
-    return shared if is_private(shared) and not shared.is_symlink() else _only_now()
+    return shared if is_private(shared) and not shared.is_symlink() else _temporary_folder()
 
 
 def _chosen() -> Path | None:
@@ -58,7 +58,7 @@ def _chosen() -> Path | None:
 
 
 @cache
-def _only_now() -> Path:
+def _temporary_folder() -> Path:
     """Temporary folder of this process, removed at exit."""
     folder = tempfile.mkdtemp(prefix="tussle-")
     atexit.register(shutil.rmtree, folder, ignore_errors=True)

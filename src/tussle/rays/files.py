@@ -1,4 +1,4 @@
-"""Surfaces from files, which are untrusted: what a file announces is checked before memory is taken for it."""
+"""Surfaces from files, which are untrusted: sizes in a file's header are checked before memory is allocated."""
 
 from __future__ import annotations
 

@@ -117,7 +117,7 @@ def read_image(path: Path, cell: float | None, white: float | None) -> HeightFie
         raise ParameterError(f"{path}: the terrain is no PNG or TIFF that can be read: {error}") from error
     if any(keys[i] == MODEL_TYPE and keys[i + 3] == GEOGRAPHIC for i in range(4, len(keys) - 3, 4)):
         raise ParameterError(
-            f"{path}: the GeoTIFF is in degrees; convert it to metres, such as with gdalwarp -t_srs EPSG:326XX"
+            f"{path}: the GeoTIFF is in degrees; convert it to metres, for example with gdalwarp -t_srs EPSG:326XX"
         )
     if cell is None and scale is not None:
         if scale[0] != scale[1]:

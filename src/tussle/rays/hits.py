@@ -1,4 +1,4 @@
-"""Rays into arrays, and what they hit."""
+"""Rays as arrays, and their hits."""
 
 from __future__ import annotations
 

@@ -458,7 +458,7 @@ def square_distance(items, k, x, y, z):
 
 @kernel("(F2 I2 I) F2 F2 F Bw")
 def touch(tree, items, points, radius, touches):
-    """Set where a sphere round a point touches a triangle of the only tree.
+    """Set where *a sphere around a point touches a triangle of the only tree.
 
     tree: bounds, links, roots; items (n, TRIANGLE). points [m], (3, m); radius [m], (m,). Written: touches (m,), where it was false.
     """
@@ -492,7 +492,7 @@ def touch(tree, items, points, radius, touches):
 
 @kernel("F2 F F2 F Bw")
 def touch_field(height, grid, points, radius, touches):
-    """Set where a sphere round a point touches a height field, or lies below it.
+    """Set where *a sphere around a point touches a height field, or lies below it.
 
     height, grid: as for `cast_field`. points [m], (3, m); radius [m], (m,). Written: touches (m,), where it was false.
     """

@@ -2,10 +2,36 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from tussle.numeric.quaternion import quat_from_euler, quat_multiply, quat_rotate
 from tussle.rays import kernels
+
+
+class ScanPattern(NamedTuple):
+    """How a lidar is mounted and how it scans.
+
+    Attributes:
+        pos: Position on the body [m], (3,), body frame.
+        quat: Attitude on the body, (4,).
+        angle_increment: Angle between two rays of one elevation, counter-clockwise [rad].
+        n_elevations: Number of elevations.
+        range_min: Smallest range [m].
+        range_max: Largest range [m].
+        scan_time: Time between two scans [s].
+        time: Of the last scan [s].
+    """
+
+    pos: np.ndarray
+    quat: np.ndarray
+    angle_increment: float
+    n_elevations: int
+    range_min: float
+    range_max: float
+    scan_time: float
+    time: float
 
 
 def aimed(

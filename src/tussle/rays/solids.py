@@ -13,7 +13,7 @@ from tussle.rays.surfaces import HeightField, TriangleMesh
 from tussle.shapes import FlatGround, Polyhedron, Sphere, Volume
 
 KINDS = ("nothing", "ground", "wall", "mesh", "entity")
-"""What a ray may hit, by number: ground and hills are ground, walls and buildings walls."""
+"""Kinds of solids that rays hit, by number; hills are "ground", buildings "wall"."""
 Split = Callable[[int, Callable[[int, int], Any]], Any]
 
 
@@ -139,7 +139,7 @@ class Solids:
         return normal
 
     def touches(self, points: object, radius: object) -> np.ndarray:
-        """Whether spheres round points [m], (3, n), touch a part or lie inside one, (n,)."""
+        """Return whether spheres round points [m], (3, n), touch a part or lie inside one, (n,)."""
         center = checked_vectors("points", points)
         reach = np.minimum(checked_numbers("radius", radius, center.shape[1]), FARTHEST_RAY)
         touches = np.zeros(center.shape[1], np.bool_)

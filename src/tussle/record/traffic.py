@@ -134,7 +134,7 @@ class Traffic:
 class TopicMonitor:
     """Counts the messages of some topics of a network, and writes one line per step and world to a CSV file.
 
-    The columns are those of the existing system: t, TOPIC_Pub_Count, TOPIC_Sub_Count; and the world.
+    The columns are those of SCRIMMAGE: t, TOPIC_Pub_Count, TOPIC_Sub_Count; and the world.
     """
 
     file: TextIO

@@ -15,21 +15,31 @@ from tussle.rl.observation import Component, Computed, Each, Means, NearestOther
 from tussle.rl.parallel import TaskParallelEnv, parallel_env
 from tussle.rl.policy_file import write_policy
 from tussle.rl.reward import Situation, Term, alive, captured, captures, collisions, died
-from tussle.rl.swarm import Swarm, make_swarm, record_episode
+from tussle.rl.robots import Coverage, FindWay, Formation, Hover, ReachPoint
+from tussle.rl.swarm import Swarm, evaluate, make_swarm, record_episode
 from tussle.rl.task import Task
+from tussle.rl.teams import Battle, CaptureTheFlag, Intercept
 
 __all__ = [
     "Act",
+    "Battle",
+    "CaptureTheFlag",
     "Component",
     "Computed",
     "Consensus",
+    "Coverage",
     "Each",
+    "FindWay",
+    "Formation",
+    "Hover",
+    "Intercept",
     "Means",
     "NearOrigin",
     "NearestOthers",
     "Own",
     "PredatorPrey",
     "PredatorTeam",
+    "ReachPoint",
     "Sectors",
     "Situation",
     "Swarm",
@@ -43,6 +53,7 @@ __all__ = [
     "captures",
     "collisions",
     "died",
+    "evaluate",
     "make",
     "make_swarm",
     "make_vec",
@@ -52,7 +63,18 @@ __all__ = [
     "write_policy",
 ]
 
-register("tussle/PredatorPrey-v0", PredatorPrey)
-register("tussle/PredatorTeam-v0", PredatorTeam)
+for _task in (
+    Battle,
+    CaptureTheFlag,
+    Coverage,
+    FindWay,
+    Formation,
+    Hover,
+    Intercept,
+    PredatorPrey,
+    PredatorTeam,
+    ReachPoint,
+):
+    register(f"tussle/{_task.__name__}-v0", _task)
 register("tussle/RLSimple-v0", NearOrigin)
 register("tussle/RLConsensus-v0", Consensus)

@@ -114,11 +114,13 @@ class Actor(Autonomy):
 
 
 def learned(block: Block, acts: Sequence[Act]) -> Block:
-    """A block whose channels are set by actions. Its autonomies stay if an action sets a parameter of one; else they are replaced.
+    """A block whose channels are set by actions. Its autonomies stay without actions, and if one sets a parameter of theirs.
 
     Raises:
         ParameterError: An action does not fit the block.
     """
+    if not acts:
+        return block
     for act in acts:
         act.check(block)
     names = [name for act in acts for name in act.names]
@@ -155,10 +157,10 @@ class Decoder:
         self.block = block
         self.free = [act for act in acts if act.value is None]
         self.constants = [act for act in acts if act.value is not None and "." in act.target]
-        kinds = {act.levels is None for act in self.free}
+        kinds = {act.levels is None for act in self.free} if acts else {True}
         if len(kinds) != 1:
             raise ParameterError(
-                f"action of {block}: all are ranges, or all have levels; at least one is needed"
+                f"action of {block}: all are ranges, or all have levels; at least one is free"
             )
         self.is_continuous = kinds.pop()
         sizes = [len(act.levels or ()) for act in self.free]

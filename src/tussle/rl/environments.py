@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import warnings
 from typing import Any
 
@@ -20,7 +21,7 @@ MODES = {
     "same_step": AutoresetMode.SAME_STEP,
     "disabled": AutoresetMode.DISABLED,
 }
-RENDER_MODES = ("rgb_array",)
+RENDER_MODES = ("rgb_array", "human")
 OPTIONS = ("params", "reset_mask")
 
 
@@ -48,35 +49,55 @@ def check_options(options: Any) -> dict[str, Any]:
     return given
 
 
-def check_render_mode(render_mode: str | None) -> str | None:
-    """The render mode.
+class Pictures:
+    """Shows world 0 of a swarm: as pictures, or in a browser while it plays. Starts at the first use.
+
+    Args:
+        swarm: The swarm.
+        render_mode: "rgb_array", "human" or None.
 
     Raises:
-        ParameterError: It is not known.
+        ParameterError: The mode is not known.
     """
-    if render_mode is not None and render_mode not in RENDER_MODES:
-        raise ParameterError(f"render_mode = {render_mode!r} is not allowed; {listed(RENDER_MODES)}")
-    return render_mode
 
-
-class Pictures:
-    """Pictures of world 0 of a swarm; the renderer is made for the first one."""
-
-    def __init__(self, swarm: Swarm) -> None:
-        self._swarm = swarm
+    def __init__(self, swarm: Swarm, render_mode: str | None) -> None:
+        if render_mode is not None and render_mode not in RENDER_MODES:
+            raise ParameterError(f"render_mode = {render_mode!r} is not allowed; {listed(RENDER_MODES)}")
+        self._swarm, self._mode = swarm, render_mode
         self._camera: Any = None
+        self._page: Any = None
 
     def picture(self) -> Any:
+        """The present state, (height, width, 3), in mode "rgb_array"; otherwise None."""
+        if self._mode != "rgb_array":
+            return None
         if self._camera is None:
             from tussle.rl.picture import WorldCamera  # needs the packages of tussle[view]
 
             self._camera = WorldCamera(self._swarm.simulation)
         return self._camera.picture()
 
+    def follow(self) -> None:
+        """In mode "human", show the present state in the browser, and wait while the game is paused there."""
+        if self._mode != "human":
+            return
+        if self._page is None:
+            from tussle.view import Live  # needs the packages of tussle[view]
+            from tussle.view.page.server import Page
+
+            self._page = Page(Live(self._swarm.simulation, is_followed=True))
+            sys.stderr.write(f"{self._page.game.name}: {self._page.url}\n")
+            self._page.open()
+        self._page.game.follow()
+
     def close(self) -> None:
+        """Free the renderer and end the page."""
         if self._camera is not None:
             self._camera.close()
-            self._camera = None
+        if self._page is not None:
+            self._page.stop()
+            self._page.game.stop()
+        self._camera = self._page = None
 
 
 def metadata_of(task: Task) -> dict[str, Any]:
@@ -95,12 +116,12 @@ class TaskVectorEnv(VectorEnv[Any, Any, Any]):
         mode = next((name for name, known in MODES.items() if known == autoreset), autoreset)
         self.swarm = Swarm(task, num_envs, autoreset=mode, threads=threads)
         self.task, self.num_envs, self.copy = self.swarm.task, self.swarm.n_worlds, copy
-        self.render_mode = check_render_mode(render_mode)
+        self.render_mode = render_mode
         self.metadata = {**metadata_of(self.task), "autoreset_mode": MODES[mode]}
         self.single_observation_space, self.single_action_space = world_spaces(self.task)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self._pictures = Pictures(self.swarm)
+        self._pictures = Pictures(self.swarm, render_mode)
 
     def _seen(self, array: np.ndarray) -> np.ndarray:
         shown = array[:, 0] if self.swarm.n_agents == 1 else array
@@ -128,6 +149,7 @@ class TaskVectorEnv(VectorEnv[Any, Any, Any]):
         else:
             super().reset(seed=seed)
             self.swarm.reset(seed, None if mask is None else np.asarray(mask, bool), given.get("params"))
+        self._pictures.follow()
         return self._seen(self.swarm.obs), self._info(np.ones(self.num_envs, bool))
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
@@ -151,11 +173,13 @@ class TaskVectorEnv(VectorEnv[Any, Any, Any]):
             if swarm.autoreset == "same_step":
                 info["final_obs"], info["_final_obs"] = self._seen(swarm.final_obs), over
         late = swarm.late & over
+        self._pictures.follow()
         return self._seen(obs), rewards.sum(axis=1, dtype=float), over & ~late, late, info
 
     def render(self) -> Any:
-        """A picture of each world is too dear: that of world 0, as a tuple of one."""
-        return (self._pictures.picture(),) if self.render_mode else None
+        """Pictures, (height, width, 3), of world 0 alone, since each costs much: a tuple of one."""
+        picture = self._pictures.picture()
+        return None if picture is None else (picture,)
 
     def close_extras(self, **kwargs: Any) -> None:
         self._pictures.close()
@@ -170,10 +194,10 @@ class TaskEnv(gymnasium.Env[Any, Any]):
     def __init__(self, task: Any, *, render_mode: str | None = None, threads: int = 1) -> None:
         self.swarm = Swarm(task, 1, autoreset="disabled", threads=threads)
         self.task = self.swarm.task
-        self.render_mode = check_render_mode(render_mode)
+        self.render_mode = render_mode
         self.metadata = metadata_of(self.task)
         self.observation_space, self.action_space = world_spaces(self.task)
-        self._pictures = Pictures(self.swarm)
+        self._pictures = Pictures(self.swarm, render_mode)
 
     def _seen(self, array: np.ndarray) -> np.ndarray:
         return np.array(array[0, 0]) if self.swarm.n_agents == 1 else np.array(array[0])
@@ -184,6 +208,7 @@ class TaskEnv(gymnasium.Env[Any, Any]):
         """Start a new episode; `options` may have "params", parameters by path."""
         super().reset(seed=seed)
         self.swarm.reset(seed, None, check_options(options).get("params"))
+        self._pictures.follow()
         return self._seen(self.swarm.obs), self._info()
 
     def _info(self) -> dict[str, Any]:
@@ -200,11 +225,12 @@ class TaskEnv(gymnasium.Env[Any, Any]):
         obs, rewards, _, _, _ = swarm.step(given.reshape(1, swarm.n_agents, -1))
         info = {**self._info(), **{name: float(term.sum()) for name, term in swarm.terms.items()}}
         over, late = bool(swarm.over[0]), bool(swarm.late[0])
+        self._pictures.follow()
         return self._seen(obs), float(rewards.sum(dtype=float)), over and not late, over and late, info
 
     def render(self) -> Any:
-        """A picture, (height, width, 3)."""
-        return self._pictures.picture() if self.render_mode else None
+        """A picture, (height, width, 3), in mode "rgb_array"."""
+        return self._pictures.picture()
 
     def state(self) -> dict[str, Any]:
         """A copy of everything, for `restore`."""
@@ -230,7 +256,7 @@ def make_vec(
         num_envs: Number of worlds.
         autoreset: "next_step", "same_step", "disabled", or Gymnasium's `AutoresetMode`.
         threads: Number of threads a step may use.
-        render_mode: "rgb_array" or None.
+        render_mode: "rgb_array"; "human", which shows world 0 in a browser while it plays; or None.
         copy: Return copies of the observations; otherwise the next step overwrites them.
     """
     return TaskVectorEnv(

@@ -9,7 +9,7 @@ import numpy as np
 from pettingzoo import ParallelEnv
 
 from tussle.errors import ParameterError, nearest_name
-from tussle.rl.environments import Pictures, check_options, check_render_mode, metadata_of
+from tussle.rl.environments import Pictures, check_options, metadata_of
 from tussle.rl.swarm import Swarm
 
 
@@ -21,7 +21,7 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
     def __init__(self, task: Any, *, render_mode: str | None = None, threads: int = 1) -> None:
         self.swarm = Swarm(task, 1, autoreset="disabled", threads=threads)
         self.task = self.swarm.task
-        self.render_mode = check_render_mode(render_mode)
+        self.render_mode = render_mode
         name = type(self.task).__name__
         self.metadata = {**metadata_of(self.task), "name": name, "is_parallelizable": True}
         self.possible_agents = list(self.task.agent_names)
@@ -36,7 +36,7 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
         self._actions = np.zeros((swarm.n_agents, swarm.action_width), kind)
         shapes = {space.shape for space in self.action_spaces.values()}
         self._shape = shapes.pop() if len(shapes) == 1 else None
-        self._pictures = Pictures(swarm)
+        self._pictures = Pictures(swarm, render_mode)
 
     def observation_space(self, agent: str) -> Any:
         return self.observation_spaces[agent]
@@ -58,6 +58,7 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
         """Start a new episode; `options` may have "params", parameters by path."""
         self.swarm.reset(seed, None, check_options(options).get("params"))
         self.agents = self._living()
+        self._pictures.follow()
         return self._observed(self.agents), {name: {} for name in self.agents}
 
     def _living(self) -> list[str]:
@@ -81,6 +82,7 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
         self._take(actions)
         swarm = self.swarm
         swarm.step(self._actions[None])
+        self._pictures.follow()
         dead = swarm.terminations[0]
         self.agents = [] if swarm.over[0] else self._living()
         numbers: Any = slice(None)
@@ -151,8 +153,8 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
         return parallel_env_of, (self.task, self.render_mode, self.swarm.simulation.state.context.threads)
 
     def render(self) -> Any:
-        """A picture, (height, width, 3)."""
-        return self._pictures.picture() if self.render_mode else None
+        """A picture, (height, width, 3), in mode "rgb_array"."""
+        return self._pictures.picture()
 
     def state(self) -> np.ndarray:
         """Observations of all agents side by side."""

@@ -306,7 +306,8 @@ class Swarm:
             self._look()
         self.now.actions = given
         flat = np.ascontiguousarray(
-            given.reshape(-1, self.action_width), float if self.is_continuous else np.int64
+            given.reshape(self.n_worlds * self.n_agents, self.action_width),
+            float if self.is_continuous else np.int64,
         )
         for part in self._parts:
             wrong = self._decoders[part.block].write(part, flat)
@@ -455,4 +456,36 @@ def record_episode(
     return sums
 
 
-__all__ = ["Swarm", "make_swarm", "record_episode", "task_of"]
+def evaluate(
+    task: Any, policy: Callable[[np.ndarray], Any] | None = None, n_episodes: int = 100, *, seed: int = 1, threads: int = 1
+) -> dict[str, np.ndarray]:  # fmt: skip
+    """Play episodes with a policy, or with the mission's own autonomies, and return what they earned.
+
+    Args:
+        task: A Task, or a class of one.
+        policy: Function of observations (n_episodes, A, n) that returns actions, as for `Swarm.step`; None plays `Task.scripted`.
+        n_episodes: Number of episodes.
+        seed: Seed of the first episode; the others have those that follow.
+        threads: Number of threads a step may use.
+
+    Returns:
+        Sum of each term over agents and decisions, by name, and of all terms as "return"; (n_episodes,) each.
+    """
+    task = task_of(task)
+    if policy is None:
+        task = task.replace(mission=task.scripted or task.mission, action=())
+        idle = np.zeros((n_episodes, len(task.agent_names), 0), task.dtype)
+        policy = lambda _: idle  # noqa: E731
+    with Swarm(task, n_episodes, autoreset="disabled", threads=threads) as swarm:
+        obs = swarm.reset(seed=seed)
+        sums = {name: np.zeros(n_episodes) for name in swarm.terms}
+        is_over = np.zeros(n_episodes, bool)
+        while not is_over.all():
+            obs, *_ = swarm.step(policy(obs))
+            for name, term in swarm.terms.items():
+                sums[name] += np.where(is_over, 0.0, term.sum(axis=1, dtype=float))
+            is_over |= swarm.over
+    return {**sums, "return": np.sum([*sums.values()], axis=0)}
+
+
+__all__ = ["Swarm", "evaluate", "make_swarm", "record_episode", "task_of"]

@@ -26,9 +26,11 @@ class Task:
 
     Attributes:
         mission: A Mission, or the file or name of one.
+        overrides: Values of the mission's file, as of `read_mission`.
+        scripted: The mission of `evaluate` without a policy, in which autonomies play the agents' blocks; by default `mission`.
         learners: Names of the blocks whose entities are agents, separated by spaces; the others play by their autonomies.
         observation: Components, in order; or one list per block.
-        action: What actions set; or one list per block.
+        action: What actions set; or one list per block. Blocks with an empty list play by their autonomies.
         reward: Terms by name.
         decide_every: Steps of the mission per decision. Terms are evaluated once per decision, on the last state; events of all its
             steps count.
@@ -42,6 +44,8 @@ class Task:
     """
 
     mission: ClassVar[Any] = None
+    overrides: ClassVar[Mapping[str, Any]] = {}
+    scripted: ClassVar[Any] = None
     learners: str = ""
     observation: ClassVar[Any] = ()
     action: ClassVar[Any] = ()
@@ -102,7 +106,7 @@ class Task:
             raise ParameterError(
                 f"{type(self).__name__} has no mission; set mission = a Mission, or the name of one"
             )
-        return read_mission(self.mission).mission
+        return read_mission(self.mission, self.overrides).mission
 
     @cached_property
     def blocks(self) -> list[Block]:
@@ -130,7 +134,7 @@ class Task:
         for item in items:
             if not isinstance(item, kind):
                 raise ParameterError(f"{type(self).__name__}: {what}: {item!r} is no {kind.__name__}")
-        if not items:
+        if not items and kind is Component:
             raise ParameterError(f"{type(self).__name__}: {what} of {block!r} is empty")
         return items
 

@@ -204,7 +204,7 @@ def _check_velocity(model: MotionModel, flight: Flight) -> None:
     if model.reads_all:
         return  # its states come from outside
     far, near = (_velocity_gap(model, flight, flight.dt / parts) for parts in (8, 512))
-    fastest = max(1e-3, float(np.abs(flight.group.moving.vel).max()))
+    fastest = max(1e-3, float(np.abs(flight.group.motion_view.vel).max()))
     stays = (near > 0.5 * far) & (near > VELOCITY * fastest)
     step, axis, row = (int(i) for i in np.unravel_index(np.argmax(np.where(stays, near, 0.0)), near.shape))
     if stays.any(axis=1).mean() > FEW:
@@ -214,7 +214,7 @@ def _check_velocity(model: MotionModel, flight: Flight) -> None:
 
 def _velocity_gap(model: MotionModel, flight: Flight, h: float) -> np.ndarray:
     """Gap between the rate of pos over h [s] and the mean of vel, after each step of a flight with constant inputs, (steps, 3, n)."""
-    group, body = flight.group, flight.group.moving
+    group, body = flight.group, flight.group.motion_view
     bound: Any = group.motion.plugin
     columns = group.table.arrays[float]
     gaps, kept, body.dt = [], columns.copy(), h
@@ -239,7 +239,7 @@ def _velocity_gap(model: MotionModel, flight: Flight, h: float) -> np.ndarray:
 
 def _check_bodies(flight: Flight) -> None:
     """A model reads back unchanged what it wrote to the body table, and continues from where it is placed."""
-    group, body = flight.group, flight.group.moving
+    group, body = flight.group, flight.group.motion_view
     bound: Any = group.motion.plugin
     rows = np.arange(group.n)
     before = {k: np.array(getattr(body, k)) for k in ("pos", "quat")}

@@ -46,12 +46,14 @@ class Live:
     describes the effects on recorders.
 
     Args:
-        simulation: The simulation; it must not be stepped by others.
+        simulation: The simulation; unless `is_followed`, it must not be stepped by others.
         world: Number of the world that is shown. The game ends with it.
         pace: Simulated seconds per second; None is as fast as possible.
         is_paused: Start paused.
         threaded: Play in a new thread. Otherwise the game stands still, controls are executed by the caller, and observations are
             always current.
+        is_followed: Others step the simulation and call `follow` after each step. The game can be paused, stepped and slowed down,
+            but not rewound, reset or sent messages.
         snapshot_every: Least simulated time between snapshots [s]; they are also limited to 1 % of the CPU time.
         memory: Memory for snapshots and past frames [MB], half of it for each.
         viewer: Viewer tags of the mission file, see `tussle.mission.Loaded`.
@@ -68,6 +70,7 @@ class Live:
         pace: float | None = 1.0,
         is_paused: bool = False,
         threaded: bool = True,
+        is_followed: bool = False,
         snapshot_every: float = 1.0,
         memory: float = 256.0,
         viewer: Mapping[str, Any] | None = None,
@@ -92,7 +95,8 @@ class Live:
         self._entities: dict[int, LatestValue[EntityState | None]] = {}
         self._renew(True)
         self._thread: threading.Thread | None = None
-        if threaded:
+        self._is_followed = is_followed
+        if threaded and not is_followed:
             self._thread = threading.Thread(target=self._playback.run, name="tussle live", daemon=True)
             self._thread.start()
 
@@ -100,8 +104,18 @@ class Live:
 
     def _give(self, do: Callable[[], None], *, is_seek: bool = False, may_cut_in: bool = False) -> None:
         self._playback.give(Order(do, is_seek, may_cut_in))
-        if self._thread is None:
+        if self._thread is None and not self._is_followed:
             self._playback.drain()
+
+    def _check_is_own(self) -> None:
+        if self._is_followed:
+            raise ParameterError(
+                "another program plays this game: it can be paused, stepped and slowed down, nothing else"
+            )
+
+    def follow(self) -> None:
+        """Show the state after steps that the caller made; return when the next one is due, which is not while the game is paused."""
+        self._playback.follow()
 
     def pause(self) -> None:
         """Pause after the present step."""
@@ -118,7 +132,13 @@ class Live:
         (self.resume if self.is_paused else self.pause)()
 
     def step(self, n: int = 1) -> None:
-        """Pause and make exactly n steps."""
+        """Pause and make exactly n steps.
+
+        Raises:
+            ParameterError: n < 0, in a game that is followed.
+        """
+        if n < 0:
+            self._check_is_own()
         self.pause()
         self._give(lambda: self._playback.move(n))
 
@@ -132,6 +152,7 @@ class Live:
         Raises:
             ParameterError: The time is not a number.
         """
+        self._check_is_own()
         step = self._step_at(t)
         self._give(lambda: self._playback.go(step), is_seek=True, may_cut_in=True)
 
@@ -141,6 +162,7 @@ class Live:
         Raises:
             ParameterError: The seed is not a whole number.
         """
+        self._check_is_own()
         if seed is not None and (isinstance(seed, bool) or not isinstance(seed, (int, np.integer))):
             raise ParameterError(f"seed = {seed!r} is not allowed; it takes a whole number")
         number = None if seed is None else int(seed)
@@ -148,6 +170,7 @@ class Live:
 
     def publish(self, type_: type[Message], *, network: str = "", topic: str = "", **fields: Any) -> None:
         """Publish a message to the plugins before the next step and its replays. Errors appear in `notes`."""
+        self._check_is_own()
         self._give(lambda: self._playback.say(type_, network, topic, fields))
 
     def publish_click(self, point: Any) -> None:
@@ -327,7 +350,7 @@ class Live:
 
     def _taken(self, latest: LatestValue[Any]) -> Any:
         value = latest.take()
-        if self._thread is None:
+        if self._thread is None and not self._is_followed:
             self._renew(True)
             value = latest.value
         return value

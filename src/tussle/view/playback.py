@@ -122,6 +122,39 @@ class PlaybackController:
         self._bell.wait(None if self._wait is None else min(self._wait, LONGEST_WAIT))
         self.player.rest(time.perf_counter() - began)
 
+    def follow(self) -> None:
+        """Show the state after steps that the caller made, execute orders, and wait while the game is paused or too fast."""
+        player, clock = self.player, self.player.simulation.state.context.clock
+        if player.catch_up():
+            self._goal = None
+            self.epoch += 1
+            self.collector.clear()
+            self.pace.restart()
+            self.speed.restart()
+        self._changed()
+        t = float(clock.start + player.step * clock.dt)
+        self.speed.read(t, player.step)
+        while not self._is_stopping:
+            self._bell.clear()
+            if self._orders:
+                self._carry_out(self._orders.popleft())
+            elif self._goal is not None and player.step < self._goal:
+                break
+            else:
+                self._goal, self._wait = None, None
+                if self.is_paused:
+                    self.pace.restart()
+                    self.speed.restart()
+                else:
+                    self._wait = self.pace.wait(t, clock.dt)
+                    if self._wait <= 0.0:
+                        break
+                self._on_moment(self.is_paused)
+                self._sleep()
+        self._on_moment(False)
+        if self.collector.is_open:
+            self.collector.begin_step()
+
     def drain(self) -> None:
         """Execute all queued orders."""
         while self.work(may_play=False):

@@ -71,6 +71,7 @@ class Player:
         self.events: list[Event] = []
         self.notes: list[str] = []
         self.is_broken = False
+        self._has_new_episode = False
         self.step = self._read_step()
         self.first_step = self._furthest_step = self.step
         self._add_first_births()
@@ -117,6 +118,22 @@ class Player:
             sim.events.is_replaying = False
         self.step = self._read_step()
         self._remember()
+
+    def catch_up(self) -> bool:
+        """Read the state after steps that others made; return whether they have reset the world since the last call."""
+        step = self._read_step()
+        if step < self.step:
+            self._begin_episode(step)
+        has_new_episode, self._has_new_episode = self._has_new_episode, False
+        self.step = self._furthest_step = step
+        self.history.offer(step)
+        return has_new_episode
+
+    def _begin_episode(self, step: int) -> None:
+        self._has_new_episode = True
+        self.events.clear()
+        self.history.clear()
+        self.step = self.first_step = step
 
     def rest(self, seconds: float) -> None:
         """Grant time for snapshots and history: the game has waited this long [s]."""
@@ -240,6 +257,8 @@ class Player:
             if len(self.events) >= MOST_EVENTS and reported.kind == "collision":
                 self.note(f"collisions after event {MOST_EVENTS} are not kept")
                 return
+            if reported.step[i] < self.step and not self.simulation.events.is_replaying:
+                self._begin_episode(int(reported.step[i]))
             t = float(clock.start + reported.step[i] * clock.dt)
             self.events.append(
                 Event(t, reported.kind, int(reported.id[i]), int(reported.other[i]), reported.text[i])

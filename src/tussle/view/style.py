@@ -41,7 +41,7 @@ class Style:
 
     A block has its `<color>`, else that of its team. A team has the colour of its first block with one, else a colour of the palette
     by its number. The model is the one nearest to `visual_model`, else one that suits the motion model. `visual_rpy` is ignored: it
-    turns the meshes of the existing system, and these point forward.
+    turns the meshes of SCRIMMAGE, and these point forward.
 
     Args:
         blocks: Names of the blocks.

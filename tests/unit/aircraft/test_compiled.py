@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tussle.aircraft.compile import CompiledAircraft, compile_aircraft
+from tussle.aircraft.compile import CompiledAircraft, GeneratedKernel, compile_aircraft
 from tussle.aircraft.initial import place, run_initial
 from tussle.aircraft.node import MOST_NODES, AircraftError, read_text
+from tussle.stock.motion.jsbsim_compiled.flightgear import PROPERTIES
 
 DT = 1.0 / 120.0
 START = {
@@ -38,8 +39,31 @@ def roll_along(t):
     }
 
 
+def pilot(t):
+    """The autopilot of c172x, its holds one after the other."""
+    return {"fcs/throttle-cmd-norm": 0.8, "fcs/mixture-cmd-norm": 0.9, "ap/attitude_hold": float(t >= 1.0),
+            "ap/altitude_hold": float(t >= 5.0), "ap/altitude_setpoint": 4100.0, "ap/heading_hold": float(t >= 20.0),
+            "ap/heading_setpoint": 90.0 if t < 40.0 else 60.0}  # fmt: skip
+
+
+def take_off(t):
+    elevator = 0.0 if t < 18.0 else -0.15 if t < 19.5 else -0.08
+    return {"fcs/throttle-cmd-norm": 1.0, "fcs/mixture-cmd-norm": 0.95, "fcs/elevator-cmd-norm": elevator,
+            "fcs/rudder-cmd-norm": -0.1, "fcs/aileron-cmd-norm": 0.1 if t > 18.0 else 0.0}  # fmt: skip
+
+
+def in_wind(t):
+    return {**controls(t), "atmosphere/wind-north-fps": 20.0, "atmosphere/wind-east-fps": -10.0, "atmosphere/wind-down-fps": 2.0,
+            "atmosphere/gust-east-fps": 8.0 * math.sin(t)}  # fmt: skip
+
+
 def apart(name, start, end, script, start_engines=True):
     """Largest distance between JSBSim's flight and the compiled one [m]."""
+    return both_flights(name, start, end, script, start_engines)[0]
+
+
+def both_flights(name, start, end, script, start_engines=True):
+    """Largest distance between JSBSim's flight and the compiled one [m], and JSBSim at the end."""
     jsbsim = pytest.importorskip("jsbsim")
     fdm = jsbsim.FGFDMExec(jsbsim.get_default_root_dir())
     fdm.set_debug_level(0)
@@ -48,7 +72,8 @@ def apart(name, start, end, script, start_engines=True):
     for key, value in start.items():
         fdm[key] = value
     fdm.run_ic()
-    aircraft = compile_aircraft(None, name)
+    # With what a FlightGear is sent, so that test_flightgear.py need not compile another.
+    aircraft = compile_aircraft(None, name, (), PROPERTIES if name == "c172p" else ())
     x = aircraft.first[:, None].copy()
     single = [
         np.array([fdm[key]])
@@ -74,7 +99,7 @@ def apart(name, start, end, script, start_engines=True):
         if step % 12 == 11:
             far = max(far, 0.3048 * math.dist([fdm[f"position/eci-{axis}-ft"] for axis in "xyz"], x[7:10, 0]))
     assert math.isfinite(far)
-    return far
+    return far, fdm
 
 
 def test_a_ball_falls_as_in_jsbsim():
@@ -85,8 +110,25 @@ def test_a_light_aircraft_flies_as_in_jsbsim_for_a_minute():
     assert apart("c172p", {**START, "ic/h-sl-ft": 5000.0, "ic/vt-fps": 180.0}, 60.0, controls) < 1e-6
 
 
+def test_a_light_aircraft_flies_in_wind_as_in_jsbsim():
+    assert apart("c172p", {**START, "ic/h-sl-ft": 5000.0, "ic/vt-fps": 180.0}, 60.0, in_wind) < 1e-6
+
+
 def test_a_light_aircraft_rolls_along_the_runway_as_in_jsbsim():
-    assert apart("c172p", GROUND, 12.0, roll_along) < 0.05
+    assert apart("c172p", GROUND, 12.0, roll_along) < 1e-3
+
+
+def test_a_take_off_from_standstill_is_that_of_jsbsim():
+    far, fdm = both_flights("c172p", GROUND, 27.0, take_off)
+    assert fdm["position/h-agl-ft"] > 50.0
+    assert not fdm["gear/wow"]
+    assert far < 1e-3
+
+
+def test_an_autopilot_flies_as_in_jsbsim_for_a_minute():
+    far, fdm = both_flights("c172x", {**START, "ic/h-sl-ft": 4000.0, "ic/vt-fps": 180.0}, 60.0, pilot)
+    assert math.cos(fdm["attitude/psi-rad"] - math.radians(60.0)) > 0.99  # it flies to where it was told
+    assert far < 1e-3
 
 
 def test_a_jet_flies_as_in_jsbsim_for_a_minute():
@@ -185,3 +227,26 @@ def test_unread_properties_are_not_computed(tmp_path):
     )
     assert "p_aero_qbar_psf = dynamic" in aircraft.source
     assert "density_altitude" not in aircraft.source
+
+
+def test_the_compiler_leaves_out_what_takes_seconds_for_generated_code():
+    from numba.core.event import install_recorder
+
+    def step(x, tables, begin, end, n_steps, dt, frozen_dt):
+        for row in range(begin, end):
+            y = x[0, row]
+            for _ in range(n_steps):
+                y = y + dt * tables[0] if y > frozen_dt else 0.0
+            x[0, row] = y
+
+    made = GeneratedKernel(step, "F2w F i8 i8 i8 f8 f8")
+    compiler = made._new_dispatcher("any")
+    with install_recorder("numba:run_pass") as passes:
+        compiler.compile(made.types)
+    names = " ".join(event.data["name"] for _, event in passes.buffer)
+    assert "native_lowering" in names
+    assert "ssa" not in names
+    assert "rewrite" not in names
+    x = np.full((1, 3), 2.0)
+    compiler(x, np.array([0.5]), 0, 2, 4, 0.25, 1.0)
+    assert x[0].tolist() == [2.5, 2.5, 2.0]

@@ -20,6 +20,7 @@ from tussle.stock.motion.jsbsim_compiled.plugin import ROWS_PER_THREAD
 HAWK = str(examples()["JSBSimModel"].with_name("hawk"))
 CONTROL = {
     "surfaces": (AircraftPIDController(), {"aircraft": "hawk"}),
+    "gusts": (AircraftPIDController(), {"aircraft": "hawk", "gusts": "dryden"}),
     "autopilot": (JSBSimModelControllerHeadingPID(), {"script_name": "patrol.xml", "commands": "autopilot"}),
 }
 
@@ -51,19 +52,19 @@ def everything(sim: Simulation) -> bytes:
 def test_controllers_and_aircraft_are_one_kernel_with_the_bits_of_the_substeps(kind):
     one, many = flown(swarm(kind, 9)), flown(swarm(kind, 9), by_substep=True)
     control = [call.label for call in one.schedule if "substeps in one" in call.label]
-    if kind == "surfaces":
+    if kind != "autopilot":
         assert control == ["control, move hawk: AircraftPIDController, JSBSimCompiled, 12 substeps in one"]
     assert len(many.schedule) > len(one.schedule) or not control
     assert everything(one) == everything(many)
     assert np.ptp(one.read("hawk.pos")[0][0], axis=0).min() > 10.0
 
 
-@pytest.mark.parametrize("by_substep", [False, True])
-def test_threads_share_the_aircraft_and_do_not_change_a_bit(by_substep, monkeypatch):
+@pytest.mark.parametrize(("kind", "by_substep"), [("surfaces", False), ("surfaces", True), ("gusts", False)])
+def test_threads_share_the_aircraft_and_do_not_change_a_bit(kind, by_substep, monkeypatch):
     n = 4 * ROWS_PER_THREAD + 7
-    plain = everything(flown(swarm("surfaces", n), 3, by_substep))
+    plain = everything(flown(swarm(kind, n), 3, by_substep))
     for threads in (2, 3):
-        sim = Simulation(swarm("surfaces", n), seeds=3, threads=threads, on_error="raise")
+        sim = Simulation(swarm(kind, n), seeds=3, threads=threads, on_error="raise")
         parts = []
         split = sim.state.context.split
         monkeypatch.setattr(

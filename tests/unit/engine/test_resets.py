@@ -51,7 +51,7 @@ def test_same_ids_keep_arrays_but_no_draws_and_reaches(of, params, update):
     game = mission(of, update=update)
     sim = Simulation(game, seeds=[1, 2, 3])
     sim.step(3)
-    bodies, view = sim.state.population.bodies, sim.state.population.groups[0].thinking
+    bodies, view = sim.state.population.bodies, sim.state.population.groups[0].autonomy_view
     held, pos = bodies.ints, view.pos
     sim.reset([1], [7], params)
     assert bodies.ints is held

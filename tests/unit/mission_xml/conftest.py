@@ -57,7 +57,7 @@ def files(tmp_path: Path) -> Writer:
 
 @pytest.fixture(scope="session")
 def existing() -> Callable[[str], Path]:
-    """Finds the existing system's missions: below $TUSSLE_RECORDINGS, else in a folder beside the repository; skips without."""
+    """Finds SCRIMMAGE's missions: below $TUSSLE_RECORDINGS, else in a folder beside the repository; skips without."""
     named = os.environ.get("TUSSLE_RECORDINGS")
     beside = sorted(Path(__file__).resolve().parents[4].iterdir())
     folders = (
@@ -68,7 +68,7 @@ def existing() -> Callable[[str], Path]:
 
     def find(name: str) -> Path:
         if not folders:
-            pytest.skip("the existing system's missions are not here")
+            pytest.skip("SCRIMMAGE's missions are not here")
         return folders[0] / "missions" / name
 
     return find

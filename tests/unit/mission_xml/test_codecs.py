@@ -36,7 +36,7 @@ def test_wrong_rates(text):
 @pytest.mark.parametrize("text", ["1.5", "1e30", "-1", "x", "", "3 m", "1e999"])
 def test_wrong_whole_numbers(text):
     with pytest.raises(TussleError):
-        codecs.whole(text, 0)
+        codecs.integer(text, 0)
 
 
 def test_a_row_of_numbers():

@@ -1,4 +1,4 @@
-"""The missions that ship, and those of the existing system."""
+"""The missions that ship, and those of SCRIMMAGE."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ PLAY = {
     "colliding_spheres.xml": 2, "fixed_wing_6dof.xml": 1, "multirotor-test.xml": 1, "rlsimple.xml": 1,
     "straight_include/straight_include.xml": 2,
 }  # fmt: skip
-"""Missions of the existing system that play as they are, and the number of blocks of each."""
+"""Missions of SCRIMMAGE that play as they are, and the number of blocks of each."""
 RASCAL = ("predator_prey_boids.xml", "straight_jsbsim.xml")
 """Those that fly the Rascal in JSBSim, which JSBSim's package doesn't have."""
 PARTS = {f"straight_include/{name}.xml" for name in ("entity1", "entity2", "run_tag", "sim_info")}
@@ -167,7 +167,7 @@ def test_prey_that_fly_as_aircraft_are_hunted():
 
 
 OTHERS = ("convoy", "auction_search", "underwater_survey")
-AIRCRAFT = ("straight_jsbsim", "fixed_wing_6dof", "predator_prey_jsbsim")
+AIRCRAFT = ("formation_flight", "straight_jsbsim", "fixed_wing_6dof", "predator_prey_jsbsim")
 
 
 def test_shipped_missions_have_titles_and_are_packaged():
@@ -216,8 +216,8 @@ def test_a_mission_that_flies_the_rascal_says_what_is_missing(existing, name):
 
 
 def test_missing_plugins_have_an_error_of_their_own():
-    with pytest.raises(catalogue.AbsentPluginError, match="MOOSAutonomy is not in tussle yet"):
-        catalogue.Catalogue().load("MOOSAutonomy")
+    with pytest.raises(catalogue.AbsentPluginError, match="ArduPilot is not in tussle yet"):
+        catalogue.Catalogue().load("ArduPilot")
 
 
 def test_only_plugins_that_do_not_ship_are_named_as_missing():

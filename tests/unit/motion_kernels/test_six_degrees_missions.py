@@ -1,4 +1,4 @@
-"""Vehicles with six degrees of freedom in mission files of the existing system."""
+"""Vehicles with six degrees of freedom in mission files of SCRIMMAGE."""
 
 from __future__ import annotations
 

@@ -405,7 +405,7 @@ def temporary(tmp_path, monkeypatch):
     """Where temporary folders are made."""
     (tmp_path / "temporary").mkdir()
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "temporary"))
-    store._only_now.cache_clear()
+    store._temporary_folder.cache_clear()
     return tmp_path / "temporary"
 
 

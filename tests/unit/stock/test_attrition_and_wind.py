@@ -10,8 +10,8 @@ import pytest
 from small_worlds import Drift, block, mission
 
 from tussle import Simulation
+from tussle.numeric import dryden
 from tussle.stock import Ballistic, ExternalForceField, RandomAttrit, Still
-from tussle.stock.interaction.external_force_field import dryden
 
 
 def test_a_team_shrinks_linearly_to_those_that_are_left_alive():
@@ -114,7 +114,7 @@ def test_gusts_have_the_correlations_of_dryden(h):
 
 def test_scales_and_intensities_of_the_military_specification():
     heights = dryden.FOOT * np.array([1.0, 10.0, 100.0, 1000.0, 5000.0])
-    scale, sd = dryden.low_altitude(heights, np.full(5, 7.7))
+    scale, sd = dryden.low_altitude(heights, np.full(5, 7.7)).reshape(2, 2, 5)
     for i, h in enumerate((10.0, 10.0, 100.0, 1000.0, 1000.0)):
         base = 0.177 + 0.000823 * h
         assert scale[:, i] / dryden.FOOT == pytest.approx([h / base**1.2, h], rel=1e-12)
@@ -130,7 +130,7 @@ def test_the_force_of_gusts_is_drawn_for_each_entity_along_the_wind():
     first = sim.read("a.force")[0][0].T
     sim.step()
     second = sim.read("a.force")[0][0].T
-    scale, sd = dryden.low_altitude(np.array([30.0]), np.array([7.7]))
+    scale, sd = dryden.low_altitude(np.array([30.0]), np.array([7.7])).reshape(2, 2, 1)
     expected = 2.0 * np.array([sd[0, 0], sd[0, 0], sd[1, 0]])
     assert first.std(axis=1) == pytest.approx(expected, rel=4 / math.sqrt(2 * 3000))
     x = 0.1 * 7.7 / scale[:, 0]  # the wind carries the gusts past those at rest

@@ -153,15 +153,15 @@ def consensus(seen, **values):
 
 def test_consensus_rewards_the_share_of_near_others():
     seen = []
-    result = Simulation(consensus(seen, radius=1.25)).run()[0]
+    result = Simulation(consensus(seen, radius=1.25, reward_type="others")).run()[0]
     assert result.metrics["OpenAIRewards"]["reward"] == {1: 0.25, 2: 0.5, 3: 0.25, 4: 0.0}
     assert seen == [[0, 1, 1.5, 9], [2, 0, 1, 1.5, 9], [0, 1, 1.5, 9], [0, 1, 1.5, 9]]
-    result = Simulation(consensus([], radius=2, reward_type="origin")).run()[0]
+    result = Simulation(consensus([], radius=2)).run()[0]
     assert result.metrics["OpenAIRewards"]["reward"] == {1: 1, 2: 1, 3: 0, 4: 0}
 
 
 def test_robots_of_other_worlds_are_not_near():
-    with Simulation(consensus([], radius=1.25), seeds=[1, 2, 3]) as sim:
+    with Simulation(consensus([], radius=1.25, reward_type="others"), seeds=[1, 2, 3]) as sim:
         results = sim.run()
     assert all(result.metrics["OpenAIRewards"]["reward"][2] == 0.5 for result in results)
 

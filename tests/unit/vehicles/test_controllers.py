@@ -75,7 +75,7 @@ def test_a_double_integrator_comes_to_a_point_critically_damped():
 
 
 def test_a_double_integrator_at_its_speed_turns_to_another_heading_and_settles_at_its_altitude():
-    """The existing system's law would fly on to the North, and oscillate about the altitude for ever."""
+    """SCRIMMAGE's law would fly on to the North, and oscillate about the altitude for ever."""
     motion = DoubleIntegrator(max_vel=20.0, max_acc=5.0, motion_model_sets_yaw=False)
     pos, vel, yaw, _ = flown(DoubleIntegratorControllerVelYaw(), motion, 120.0, dt=0.05, speed=5.0)
     assert vel == pytest.approx([5 * math.cos(2), 5 * math.sin(2), 0], abs=1e-3)
@@ -110,7 +110,7 @@ def test_the_point_ahead_of_a_unicycle_comes_at_the_rate_of_the_gain(pitches):
 
 
 def test_a_quadrotor_comes_to_a_point_beside_it_and_faces_its_heading():
-    """The existing system's law would fly along the heading, whatever the place of the point."""
+    """SCRIMMAGE's law would fly along the heading, whatever the place of the point."""
     pos, vel, yaw, _ = flown(SimpleQuadrotorControllerLQR(), SimpleQuadrotor(), 120.0, dt=0.02)
     assert pos == pytest.approx(POINT, abs=0.01)
     assert yaw == pytest.approx(2.0, abs=1e-6)

@@ -1,4 +1,4 @@
-"""Vehicles in mission files of the existing system: names and units of their attributes."""
+"""Vehicles in mission files of SCRIMMAGE: names and units of their attributes."""
 
 from __future__ import annotations
 

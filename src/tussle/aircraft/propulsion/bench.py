@@ -1,4 +1,4 @@
-"""Where an engine and its thruster emit their code: names, state, time step."""
+"""Context in which an engine and its thruster emit their code: names, state, time step."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class Bench:
     """The place of one engine in the generated code.
 
     Attributes:
-        code: What is emitted to.
+        code: The code to which they are added.
         index: Number of the engine, from 0.
         dt: Expression of the time step [s].
         throttle: Expression of the throttle's position.

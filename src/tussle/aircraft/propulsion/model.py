@@ -179,7 +179,7 @@ def read_propulsion(node: Element, find: Find) -> Propulsion:
 
     Args:
         node: The element.
-        find: Gives the content of a file by who asks, name and kind ("engine").
+        find: Returns the content of a file by the node that names it, its name and kind ("engine").
 
     Raises:
         AircraftError: Something is wrong or not supported.
@@ -213,7 +213,7 @@ def _unit(node: Element, index: int, n_tanks: int, find: Find) -> PowerUnit:
 
 
 def _content(node: Element, find: Find, tags: tuple[str, ...]) -> Element:
-    """The content of an engine or a thruster: its file's, or what stands in it."""
+    """Return the content of an engine or a thruster: that of its file, or its own."""
     if node.get("file"):
         return find(node, node.get("file"), "engine")
     found = next((each for each in node if each.tag in tags), None)

@@ -91,7 +91,7 @@ def read_rocket(node: Element) -> Rocket:
     """Read a <rocket_engine>.
 
     Raises:
-        AircraftError: It lacks its specific impulse, or has what is not supported.
+        AircraftError: It lacks its specific impulse, or has a part that is not supported.
     """
     for tag in ("propflowmax", "mixtureratio"):
         if node.find(tag) is not None:

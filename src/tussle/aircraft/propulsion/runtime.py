@@ -141,7 +141,7 @@ def indicated_power(
 
 @outlined
 def turbine_phase(dt, phase, running, starter, cutoff, starved, stalled, seized, n2, qbar):
-    """What a turbine does in this step: OFF, RUN, SPIN_UP, START, STALL, SEIZE or TRIM, the last where dt is 0."""
+    """Return the phase of a turbine in this step: OFF, RUN, SPIN_UP, START, STALL, SEIZE or TRIM, the last where dt is 0."""
     if running == 0.0 and cutoff != 0.0 and starter != 0.0 and phase == OFF:
         phase = SPIN_UP
     if (starter != 0.0 or qbar > 30.0) and running == 0.0 and cutoff == 0.0 and n2 > 15.0:
@@ -202,7 +202,7 @@ def spool_idle(tables, at, dt, phase, qbar, n1, n2):
 
 @outlined
 def turboprop_phase(dt, phase, running, starter, cutoff, starved, n1):
-    """What a turboprop does in this step: OFF, RUN, SPIN_UP, START or TRIM, the last where dt is 0."""
+    """Return the phase of a turboprop in this step: OFF, RUN, SPIN_UP, START or TRIM, the last where dt is 0."""
     if running == 0.0 and starter != 0.0 and phase == OFF:
         phase = SPIN_UP
     if running == 0.0 and cutoff == 0.0 and n1 > 15.0:

@@ -96,7 +96,7 @@ def read_tank(node: Element, index: int) -> Tank:
     """Read a <tank>.
 
     Raises:
-        AircraftError: Its type is unknown, or it has what is not supported.
+        AircraftError: Its type is unknown, or it has a part that is not supported.
     """
     kind = node.get("type").upper()
     if kind not in KINDS:
@@ -171,7 +171,7 @@ def count_fed(code: Code, tanks: Sequence[Tank], n_tanks: int, label: str) -> tu
 
 
 def drain(code: Code, tanks: Sequence[Tank], tests: Sequence[str], need: str, fed: str) -> None:
-    """Emit that tanks share what an engine needs [lb]."""
+    """Emit the shares of the tanks in an engine's need [lb]."""
     for tank, test in zip(tanks, tests, strict=True):
         contents = slot(code, tank.property, tank.contents)
         with code.block(f"if {test}"):

@@ -15,7 +15,7 @@ TABLES = ("C_THRUST", "C_POWER", "CT_MACH", "CP_MACH")
 
 @dataclass(frozen=True)
 class Mount:
-    """Where a thruster sits.
+    """Position and direction of a thruster.
 
     Attributes:
         location: In the structural frame [in].
@@ -45,7 +45,7 @@ class Mount:
         return f"{cp} * {cy}", f"{cp} * {sy}", f"-{sp}"
 
     def is_turned(self, bench: Bench) -> bool:
-        """Whether the thruster's frame is not that of the body."""
+        """Return True if the thruster's frame is not that of the body."""
         _, pitch, yaw = self.angles
         turns = [bench.given("pitch-angle-rad", pitch), bench.given("yaw-angle-rad", yaw)]
         return any(self.angles) or turns != [repr(pitch), repr(yaw)]
@@ -156,7 +156,7 @@ class Propeller:
 
     @property
     def is_variable(self) -> bool:
-        """Whether the blade angle can change."""
+        """True if the blade angle can change."""
         return self.pitch[0] != self.pitch[1]
 
     def rpm_of(self, bench: Bench) -> str:

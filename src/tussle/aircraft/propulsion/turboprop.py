@@ -142,7 +142,7 @@ else:
 """)
 
     def _emit_spool(self, bench: Bench, now: str) -> None:
-        """Emit the speed of the spool, at which the engine has its power, and whether a start is under way."""
+        """Emit the speed of the spool, at which the engine has its power, and whether it is starting."""
         n, n1, tau = bench.local, bench.slot("n1"), self.delay[0]
         bench.code.lines(f"""
 {n("n1_before")} = {n1}

@@ -94,7 +94,7 @@ def span(corners, n, way):
 
 @lean_routine
 def between(first, n_first, second, n_second, way):
-    """How far two bodies are apart along a unit vector [m], and whether the first lies towards its tip."""
+    """Return the gap between two bodies along a unit vector [m], and True if the first lies towards its tip."""
     low_a, high_a = span(first, n_first, way)
     low_b, high_b = span(second, n_second, way)
     return max(low_a - high_b, low_b - high_a), low_a - high_b >= low_b - high_a

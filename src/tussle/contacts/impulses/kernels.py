@@ -22,7 +22,7 @@ FEATURES = 64
 SETTLED = 1e-9
 """Change of the velocities [m/s] below which a world is solved."""
 SHARE = 0.3
-"""Share of a small overlap that is undone in a step: with all of it, piles tremble. What is deeper is undone at once."""
+"""Share of a small overlap that is undone in a step: if all of it were, piles would tremble. A deeper overlap is undone at once."""
 BODY = 16
 """Numbers of a body, two cache lines: velocity and angular velocity, inverse mass, inverse inertia tensor, world frame."""
 INVERSE = 6
@@ -30,7 +30,7 @@ NORMAL, ARM, OTHER_ARM, TANGENT, MASS, SOFT, GOAL, COUPLING, IMPULSE, PUSHED, OV
     0, 3, 6, 9, 12, 15, 16, 17, 19, 22, 23, 24, 25, 26,
 )  # fmt: skip
 """Numbers of a contact: normal; arms; first tangent; effective masses along normal and tangents, and the inverse of the first; goal of
-the normal speed; by how much impulses along the tangents change the normal speed; impulses; what undid the overlap; overlap that is
+the normal speed; by how much impulses along the tangents change the normal speed; impulses; impulses against the overlap; overlap that is
 left alone; 1 if it held during the whole step; 1 if a body turns."""
 
 

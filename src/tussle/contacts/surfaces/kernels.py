@@ -1,4 +1,4 @@
-"""Contacts of bodies with what does not move: half-spaces, triangles and height fields.
+"""Contacts of bodies with the static scene: half-spaces, triangles and height fields.
 
 The triangle of a wall, of a building or of terrain is solid behind its outward normal; that of a mesh has two sides.
 """
@@ -68,7 +68,7 @@ def ball_triangle_contact(place, radius, center, t, k, motion, found, n, feature
     elif distance < -radius:
         return n
     gap = dot(normal, minus(start, point)) - radius
-    # Of an edge within one surface, such as a floor of triangles, the face beside it is touched, not the edge.
+    # At an edge inside one surface, for example a floor of triangles, the contact is with the face beside it, not with the edge.
     for i in range(n):
         if found[i, 10] == feature:
             apart = minus(point, vector(found, i, 6))
@@ -130,7 +130,7 @@ def box_triangle_contacts(items, a, t, k, motion, found, n, scratch):
 
 @lean_routine
 def one_by_octant(found, n, size):
-    """Of the contacts of a box with one plane, keep one in each octant of the box; returns the number of contacts.
+    """Keep one contact of a box with one plane in each octant of the box; returns the number of contacts.
 
     Where a floor is made of triangles, its edges add contacts between the corners of the box, and redundant contacts take more
     iterations. The outermost is kept, or one that is deeper by more than the slack.

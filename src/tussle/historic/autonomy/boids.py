@@ -15,8 +15,8 @@ class Boids(boids.Boids):
     """Boids with SCRIMMAGE's averages, whatever `averaging` says, and with its output of the climb speed as the desired altitude.
 
     The sign of pitch_rate is opposite: SCRIMMAGE turned the pitch of its vehicles nose down in 2020, but not this command, so entities
-    that should climb dive, do half a loop, and fly on upside down, where the sign is right. Fields of view are whole degrees: the rest
-    is cut off. A neighbour exactly astern is outside of 360 degrees too.
+    that should climb dive, do half a loop, and fly on upside down, where the sign is right. Fields of view are cut to whole
+    degrees. A neighbour exactly astern is outside of a field of view of 360 degrees too.
     """
 
     half_view = State("az el", unit="rad", doc="Half the fields of view, of whole degrees.")
@@ -26,7 +26,7 @@ class Boids(boids.Boids):
         offset_x: float, offset_y: float, offset_z: float,
         quat_w: float, quat_x: float, quat_y: float, quat_z: float, half_view_az: float, half_view_el: float,
     ) -> bool:  # fmt: skip
-        """Whether azimuth and elevation of an offset [m] are smaller than half the fields of view, cut to whole degrees."""
+        """Return True if azimuth and elevation of an offset [m] are smaller than half the fields of view, cut to whole degrees."""
         w, i, j, k = quat_w, quat_x, quat_y, quat_z
         ahead = (
             (1 - 2 * (j * j + k * k)) * offset_x

@@ -10,8 +10,8 @@ from tussle.stock.autonomy import boundary_defense
 class BoundaryDefense(boundary_defense.BoundaryDefense):
     """BoundaryDefense that stands still in the first step.
 
-    In SCRIMMAGE it learns of its regions by messages that are delivered at the end of that step; in tussle all entities know the
-    regions of the mission at once. Entities born later never learn of them in SCRIMMAGE; here they do.
+    In SCRIMMAGE it receives its regions in messages, which are delivered at the end of that step; in tussle all entities have the
+    regions of the mission at once. In SCRIMMAGE entities born later never receive them; here they have them too.
     """
 
     def step(self, g: Any) -> None:

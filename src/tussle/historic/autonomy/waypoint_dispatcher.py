@@ -18,8 +18,8 @@ class WaypointDispatcher(waypoint_dispatcher.WaypointDispatcher):
     is published in every step within the tolerance of the last waypoint.
     """
 
-    def _start_lists(self, rows: np.ndarray, heard: Messages) -> None:
-        super()._start_lists(rows, heard)
+    def _start_lists(self, rows: np.ndarray, messages: Messages) -> None:
+        super()._start_lists(rows, messages)
         self.mode[rows] = np.where(self.mode[rows] == LOITER, FOLLOW_ONCE, self.mode[rows])
 
     def _advance(self, rows: np.ndarray) -> None:

@@ -11,7 +11,7 @@ from tussle.stock.controller.motion_battery.plugin import depletions
 
 
 class MotionBattery(motion_battery.MotionBattery):
-    """MotionBattery that takes rate times value whatever the type, and that removes the entity when it is empty.
+    """MotionBattery whose charge falls by rate times value for every type, and that removes the entity when it is empty.
 
     Negative values charge it. In tussle a channel takes charge while its value is not 0, or with its change, and an empty battery
     limits it.

@@ -8,10 +8,10 @@ from tussle.stock.interaction import boundary
 
 
 class Boundary(boundary.Boundary):
-    """Boundary that ignores the rotation of a cuboid, and tells of its shape in the first step only, even if nobody is there.
+    """Boundary that ignores the rotation of a cuboid, and publishes its shape in the first step only, even if no entity is there.
 
-    Entities that are born later never learn of it; in tussle it waits for the first entity. Planes and polyhedra are those of tussle:
-    a plane has sides in SCRIMMAGE, and a polyhedron ends it.
+    Entities that are born later never receive it; in tussle it waits for the first entity. Planes and polyhedra are those of tussle:
+    in SCRIMMAGE a plane has sides, and a polyhedron ends the run.
     """
 
     def region(self) -> Volume:

@@ -16,8 +16,9 @@ ALONG_X = np.array([[1.0], [0.0], [0.0]])
 class BulletCollision(bullet_collision.BulletCollision):
     """BulletCollision in which a contact sets the external force to 1 N along its normal, from the second step on.
 
-    All bodies are spheres. Of several contacts of a body, the last counts. Only with `remove_on_collision` are contacts told of, and
-    `enable_team_collisions` and `enable_non_team_collisions` say which pairs are removed. In tussle bodies bounce and slide.
+    All bodies are spheres. If a body has several contacts, the last one sets its force. Contacts are published only with
+    `remove_on_collision`; `enable_team_collisions` and `enable_non_team_collisions` select the pairs that are removed. In tussle
+    bodies bounce and slide.
     """
 
     enable_team_collisions = Param(False, doc="Remove team mates that touch, with remove_on_collision.")
@@ -43,8 +44,8 @@ class BulletCollision(bullet_collision.BulletCollision):
         contacts = found.find(
             shapes, self._near(w, shapes[1][0]), (w.vel, 0.0, w.world), self._scene(w), w.n_worlds
         )
-        is_known = w.step_count[w.world[contacts.row]] > 0  # bodies are entered at the end of the first step
-        here = np.flatnonzero((contacts.numbers[:, 9] <= 0.0) & is_known)
+        has_bodies = w.step_count[w.world[contacts.row]] > 0
+        here = np.flatnonzero((contacts.numbers[:, 9] <= 0.0) & has_bodies)
         row, other, normal = contacts.row[here], contacts.other[here], contacts.numbers[here, :3].T
         is_body = other >= 0
         way = w.pos[:, row] - w.pos[:, other]
@@ -58,11 +59,11 @@ class BulletCollision(bullet_collision.BulletCollision):
         removes = self.remove_on_collision[w.world[row]]
         is_body = other >= 0
         is_own, world = w.team[row] == w.team[other], w.world[row]
-        is_asked = np.where(
+        is_enabled = np.where(
             is_own, self.enable_team_collisions[world], self.enable_non_team_collisions[world]
         )
-        met = np.flatnonzero(removes & is_body & is_asked)
-        pair = np.unique(np.stack([row[met], other[met]]), axis=1)
+        removed = np.flatnonzero(removes & is_body & is_enabled)
+        pair = np.unique(np.stack([row[removed], other[removed]]), axis=1)
         first, second = pair
         w.publish(
             EntityCollided, w.world[first], first=w.id[first], second=w.id[second],

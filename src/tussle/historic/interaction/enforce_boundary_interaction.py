@@ -9,7 +9,7 @@ from tussle.stock.interaction import enforce_boundary_interaction
 
 
 class EnforceBoundaryInteraction(enforce_boundary_interaction.EnforceBoundaryInteraction):
-    """EnforceBoundaryInteraction that ignores ids without a boundary, and learns of its boundaries at the end of the first step.
+    """EnforceBoundaryInteraction that ignores ids without a boundary, and uses its boundaries from the end of the first step on.
 
     If none of the ids has a boundary, nobody is removed.
     """

@@ -7,7 +7,7 @@ from tussle.stock.interaction import ground_collision
 
 
 class GroundCollision(ground_collision.GroundCollision):
-    """GroundCollision that tells in every step which entities are on the ground, so that a metric counts each step."""
+    """GroundCollision that reports the entities on the ground in every step, so that a metric counts each step."""
 
     def step(self, w: WorldView) -> None:
         self.is_down[:] = False

@@ -12,8 +12,8 @@ from tussle.stock.interaction import simple_capture
 class SimpleCapture(simple_capture.SimpleCapture):
     """SimpleCapture that decides one step late, and only the first claim on each entity.
 
-    A claim of a step is decided after the motion of the next one; the claims of the last step are lost. Of several claims on an entity
-    the first is that of the smallest id. If it is out of range by then, the entity can never be captured: all later claims are
+    A claim of a step is decided after the motion of the next one; the claims of the last step are lost. If several claim an
+    entity, the smallest id counts. If it is out of range by then, the entity can never be captured: all later claims are
     ignored. A claim whose claimant is gone, at which SCRIMMAGE crashes, captures nobody.
     """
 
@@ -28,11 +28,11 @@ class SimpleCapture(simple_capture.SimpleCapture):
         self._decide(w, np.flatnonzero(self.claimant > 0))
         claims = w.inbox(CaptureEntity)
         target = w.rows_at(claims.world, claims.target)
-        known = np.flatnonzero(target >= 0)
-        known = known[~self.is_decided[target[known]]]
+        open_claims = np.flatnonzero(target >= 0)
+        open_claims = open_claims[~self.is_decided[target[open_claims]]]
         # inbox() orders by world and sender: the first claim on each target is that of the smallest id.
-        rows, first = np.unique(target[known], return_index=True)
-        self.claimant[rows] = claims.sender[known[first]]
+        rows, first = np.unique(target[open_claims], return_index=True)
+        self.claimant[rows] = claims.sender[open_claims[first]]
 
     def _decide(self, w: WorldView, target: np.ndarray) -> None:
         """Decide the claims on some rows, (m,)."""

@@ -10,7 +10,7 @@ from tussle.stock.interaction import simple_collision
 
 
 class SimpleCollision(simple_collision.SimpleCollision):
-    """SimpleCollision that takes pairs in the order of ids, and spares whoever meets only entities that have just been removed.
+    """SimpleCollision that takes pairs in the order of ids, and ignores pairs with an entity just removed.
 
     So of three that collide, the first pair is removed and the third flies on. Entities that an earlier interaction has removed in the
     step do not collide. In tussle all pairs collide. With `init_alt_deconflict`, positions at the range itself are rejected too.

@@ -35,7 +35,7 @@ class DubinsAirplane3D(dubins_airplane_3d.DubinsAirplane3D):
         return advance_by(self, _step)
 
     def body_inputs(self) -> list[str]:
-        """External force and torque."""
+        """Return external force and torque."""
         return list(LOADS)
 
     def from_body(self, body: MotionBody, rows: np.ndarray) -> None:

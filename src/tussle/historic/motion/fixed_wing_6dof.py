@@ -51,7 +51,7 @@ class FixedWing6DOF(fixed_wing_6dof.FixedWing6DOF):
         return advance_by(self, lambda x, u, p, h: _step(x, u, p, h, bool(self.use_ground_model)))
 
     def body_inputs(self) -> list[str]:
-        """None: external forces have no effect."""
+        """Return no inputs: external forces have no effect."""
         return []
 
 

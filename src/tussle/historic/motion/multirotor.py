@@ -45,7 +45,7 @@ class Multirotor(multirotor.Multirotor):
         return advance_by(self, lambda x, u, p, h: _step(x, u, p, h, rotors))
 
     def body_inputs(self) -> list[str]:
-        """The external force."""
+        """Return the external force."""
         return ["force_x", "force_y", "force_z"]
 
     def from_body(self, body: MotionBody, rows: np.ndarray) -> None:

@@ -35,7 +35,7 @@ class RigidBody6DOF(rigid_body_6dof.RigidBody6DOF):
         return advance_by(self, _step)
 
     def body_inputs(self) -> list[str]:
-        """None: external forces have no effect."""
+        """Return no inputs: external forces have no effect."""
         return []
 
     def from_body(self, body: MotionBody, rows: np.ndarray) -> None:

@@ -15,11 +15,11 @@ from tussle.stock.motion import simple_aircraft
 
 
 class SimpleAircraft(simple_aircraft.SimpleAircraft):
-    """SimpleAircraft whose roll, pitch and speed are put within their limits before a step, and leave them in it by up to a step's worth.
+    """SimpleAircraft whose roll, pitch and speed are put within their limits before a step, and can exceed them by one step's change.
 
-    In tussle a rate that would go beyond a limit is lowered so that it ends there, so what is published and flown keeps the limits.
-    Different are the three clips, RK4 over rates that ignore the limits, the sign of the published climb speed, and the velocity of the
-    start, which is level.
+    In tussle a rate that would exceed a limit is lowered so that it ends there, so the limits always hold. The differences are the
+    three clips, RK4 with rates that ignore the limits, the sign of the published climb speed, and the initial velocity, which is
+    level.
     """
 
     grade = "machine"

@@ -42,7 +42,7 @@ class SimpleCar(simple_car.SimpleCar):
         return advance_by(self, lambda x, u, p, h: _step(x, u, p, h, falls))
 
     def body_inputs(self) -> list[str]:
-        """The external force."""
+        """Return the external force."""
         return ["force_x", "force_y", "force_z"]
 
     def from_body(self, body: MotionBody, rows: np.ndarray) -> None:

@@ -32,7 +32,7 @@ class Unicycle3D(unicycle_3d.Unicycle3D):
         return advance_by(self, lambda x, u, p, h: _step(x, u, p, h, limit))
 
     def body_inputs(self) -> list[str]:
-        """External force and torque."""
+        """Return external force and torque."""
         return list(LOADS)
 
     def from_body(self, body: MotionBody, rows: np.ndarray) -> None:

@@ -53,7 +53,7 @@ class UUV6DOF(uuv_6dof.UUV6DOF):
         return advance_by(self, _step)
 
     def body_inputs(self) -> list[str]:
-        """None: external forces have no effect."""
+        """Return no inputs: external forces have no effect."""
         return []
 
     def from_body(self, body: MotionBody, rows: np.ndarray) -> None:

@@ -10,7 +10,7 @@ from tussle.stock.sensor import gps
 
 
 class GPS(gps.GPS):
-    """GPS that tells all entities what it measures, knows only the last boundary of the mission, and measures without a fix too.
+    """GPS that sends its measurements to all entities, uses only the last boundary, and measures without a fix too.
 
     The boundary is known from the end of the first step on. Ids without a boundary are ignored.
     """

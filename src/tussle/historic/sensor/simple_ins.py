@@ -12,7 +12,7 @@ ASSUMED_DT = 0.01  # [s]
 
 
 class SimpleINS(simple_ins.SimpleINS):
-    """SimpleINS whose error grows by the noise of a second in each step, and that listens to the GPS of every entity.
+    """SimpleINS whose error grows by the noise of a second in each step, and that uses the GPS of every entity.
 
     The acceleration is the change of the velocity over 0.01 s, whatever the step. The variance grows by the absolute value of another
     draw of the noise.

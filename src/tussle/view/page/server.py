@@ -5,7 +5,10 @@ from __future__ import annotations
 import asyncio
 import ipaddress
 import logging
+import os
+import sys
 import threading
+import webbrowser
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Self
 
@@ -196,6 +199,12 @@ class Page:
     def errors(self) -> list[str]:
         """Errors of the page itself, one line each; the page shows them."""
         return self._failures.texts
+
+    def open(self) -> None:
+        """Open the page in a browser; on Linux without a display, only in the one that the user names in BROWSER."""
+        names = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")
+        if not sys.platform.startswith("linux") or any(os.environ.get(name) for name in names):
+            webbrowser.open(self.url)
 
     def stop(self) -> None:
         """Stop serving. A second call does nothing."""

@@ -1,4 +1,4 @@
-"""An autonomy that auctions a task among the entities that hear of it."""
+"""An autonomy that auctions a task among the entities that receive its messages."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class StartAuction(Message):
 class BidAuction(Message):
     """A bid of the sender."""
 
-    auctioneer = EntityRef(doc="Auctioneer whom it is for.")
+    auctioneer = EntityRef(doc="Auctioneer that receives the bid.")
     bid = Field(doc="The bid.")
 
 
@@ -40,11 +40,11 @@ class ResultAuction(Message):
 
 
 class AuctionAssign(Autonomy):
-    """An auction by messages, such as those that assign tasks to robots (Gerkey and Mataric 2002).
+    """Runs an auction by messages, a method of task assignment for robots (Gerkey and Mataric 2002).
 
-    Each auctioneer starts one auction when it is created. Every entity that hears of it, itself included, bids a uniform random number
-    once. When `duration` has passed, the auctioneer publishes the highest bid; of equal ones, that of the smallest id. An entity that
-    is out of reach of the network neither bids nor learns the result. The entity does not move.
+    Each auctioneer starts one auction when it is created. Every entity that receives the start, including the auctioneer, bids a
+    uniform random number once. When `duration` has passed, the auctioneer publishes the highest bid; on ties, that of the smallest id.
+    An entity out of range of the network neither bids nor receives the result. The entity does not move.
     """
 
     grade = "portable"
@@ -59,7 +59,7 @@ class AuctionAssign(Autonomy):
     )
     has_started = State(dtype=bool, doc="Whether the own auction was started.")
     best_bid = State(default=NO_BID, doc="Highest bid received in the own auction.")
-    best_bidder = EntityRef(doc="Entity that made it.")
+    best_bidder = EntityRef(doc="Entity that made the highest bid.")
     winner = EntityRef(doc="Winner of the auction whose result was received last.")
     starts = Publish(StartAuction, network_param="network_name")
     bids = Publish(BidAuction, network_param="network_name")
@@ -71,8 +71,8 @@ class AuctionAssign(Autonomy):
 
     def step(self, g: GroupView) -> None:
         if self.heard_results:
-            rows, heard = self.heard_results.latest()
-            self.winner[rows] = heard.winner
+            rows, messages = self.heard_results.latest()
+            self.winner[rows] = messages.winner
         if self.heard_starts:
             self._bid(g)
         if self.heard_bids:
@@ -82,25 +82,25 @@ class AuctionAssign(Autonomy):
         self.deadline[opens] = g.t[opens] + self.duration[opens]
         self.starts.publish(opens)
         is_over = self.has_started & (self.deadline >= 0.0) & (g.t + 1e-6 * g.dt >= self.deadline)
-        told = np.flatnonzero(is_over & (self.best_bid > NO_BID))
+        announced = np.flatnonzero(is_over & (self.best_bid > NO_BID))
         self.deadline[is_over] = -1.0
-        self.results.publish(told, winner=self.best_bidder[told], bid=self.best_bid[told])
+        self.results.publish(announced, winner=self.best_bidder[announced], bid=self.best_bid[announced])
 
     def _bid(self, g: GroupView) -> None:
-        """Bid in the auctions that were heard of."""
-        rows, heard = self.heard_starts.pairs()
+        """Bid in the auctions that were announced by messages."""
+        rows, messages = self.heard_starts.pairs()
         rank = np.arange(len(rows)) - np.searchsorted(rows, rows)
         draws = g.uniform("bid", int(rank.max(initial=0)) + 1)[rank, rows]
         low, high = self.bid_range[:, rows]
-        self.bids.publish(rows, auctioneer=heard.sender, bid=low + (high - low) * draws)
+        self.bids.publish(rows, auctioneer=messages.sender, bid=low + (high - low) * draws)
 
     def _collect(self, g: GroupView) -> None:
         """Keep the highest bid of each auctioneer."""
-        rows, heard = self.heard_bids.pairs()
-        order = np.lexsort((heard.sender, -heard.bid, rows))
-        order = order[(heard.auctioneer[order] == g.id[rows[order]]) & (self.deadline[rows[order]] >= 0.0)]
+        rows, messages = self.heard_bids.pairs()
+        order = np.lexsort((messages.sender, -messages.bid, rows))
+        order = order[(messages.auctioneer[order] == g.id[rows[order]]) & (self.deadline[rows[order]] >= 0.0)]
         rows, first = np.unique(rows[order], return_index=True)
         best = order[first]
-        better = heard.bid[best] > self.best_bid[rows]
-        self.best_bid[rows[better]] = heard.bid[best[better]]
-        self.best_bidder[rows[better]] = heard.sender[best[better]]
+        better = messages.bid[best] > self.best_bid[rows]
+        self.best_bid[rows[better]] = messages.bid[best[better]]
+        self.best_bidder[rows[better]] = messages.sender[best[better]]

@@ -1,4 +1,4 @@
-"""AuctionSearch: shares out places to search by auctions."""
+"""AuctionSearch: distributes areas to search by auctions."""
 
 from tussle.stock.autonomy.auction_search.plugin import AreaAward, AreaBid, AreaOffer, AuctionSearch
 

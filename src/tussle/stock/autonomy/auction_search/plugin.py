@@ -1,4 +1,4 @@
-"""An autonomy that shares out places to search by auctions."""
+"""An autonomy that distributes areas to search by auctions."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ class AreaOffer(Message):
 
 
 class AreaBid(Message):
-    """What it costs the sender to search an area; the lowest bid wins."""
+    """Cost of searching an area, for the sender; the lowest bid wins."""
 
-    auctioneer = EntityRef(doc="Auctioneer whom it is for.")
+    auctioneer = EntityRef(doc="Auctioneer that receives the bid.")
     area = Field(dtype=int, doc="Number of the area.")
     cost = Field(doc="The bid.")
 
@@ -38,15 +38,15 @@ def length(v: np.ndarray) -> np.ndarray:
 
 
 class AuctionSearch(Autonomy):
-    """Auctions areas among all that hear of them, and visits those that it wins.
+    """Auctions areas among all entities that receive its offers, and visits the areas that it wins.
 
     Sequential single-item auctions (Lagoudakis and others 2005, "Auction-based multi-robot routing", Robotics: Science and Systems):
-    an entity with `areas` offers one after another, for `duration` each; the lowest bid wins, of equal ones that of the smallest id.
-    An area for which nobody bids is offered again. The rule `path` (there MINIMAX) bids the length of the own route with the area at
-    its end, so that the longest route is short; `nearest` the distance to the area only; `random` a random number.
+    an entity with `areas` offers one after another, for `duration` each. The lowest bid wins; on ties, that of the smallest id. An area
+    without bids is offered again. The rule `path` (MINIMAX in the paper) bids the length of the own route extended by the area, so that
+    the longest route is short. The rule `nearest` bids the distance to the area, `random` a random number.
 
-    The goal is published as a `Waypoint` on LocalNetwork, for a `GoTo` or `MoveToGoalMS`, and the texts "search" and "done" on its
-    topic `Event`, for a `GraphvizFSM`, when the entity has the first area and when it has visited all.
+    The goal is published as a `Waypoint` on LocalNetwork, for a `GoTo` or `MoveToGoalMS`. On the topic `Event` of that network, for a
+    `GraphvizFSM`, the text "search" is published when the entity wins its first area, and "done" when it has visited all.
     """
 
     grade = "portable"
@@ -54,14 +54,14 @@ class AuctionSearch(Autonomy):
     areas = Param((), fields="x y z", unit="m", ragged=True, doc="Centers of the areas that it auctions.")
     start_time = Param(0.0, unit="s", ge=0.0, doc="Time of the first auction.")
     duration = Param(1.0, unit="s", gt=0.0, doc="Time from an offer to its award.")
-    rule = Param("path", choices=("path", "nearest", "random"), doc="What is bid.")
+    rule = Param("path", choices=("path", "nearest", "random"), doc="Rule of the bids.")
     does_bid = Param(True, doc="Whether it bids.")
     tolerance = Param(10.0, unit="m", gt=0.0, doc="Distance at which an area is visited.")
     network_name = Param("CommsNetwork", doc="Network of the auctions.")
     offered = State(dtype=int, doc="Number of the area that is auctioned.")
     deadline = State(unit="s", default=-1.0, doc="End of the auction; negative if there is none.")
     best_cost = State(default=NO_BID, doc="Lowest bid received.")
-    best_bidder = EntityRef(doc="Entity that made it.")
+    best_bidder = EntityRef(doc="Entity that made the lowest bid.")
     route = State("x y z", unit="m", ragged=True, doc="Areas won and not visited, in order.")
     n_visited = State(dtype=int, doc="Areas visited.")
     offers = Publish(AreaOffer, network_param="network_name")
@@ -86,12 +86,12 @@ class AuctionSearch(Autonomy):
 
     def _extend(self, g: GroupView) -> None:
         """Append the areas that were won to the routes."""
-        rows, heard = self.heard_awards.pairs()
-        for k in np.flatnonzero(heard.winner == g.id[rows]):
-            self.route[rows[k]] = np.concatenate([self.route[rows[k]], heard.pos[:, k : k + 1]], axis=1)
+        rows, messages = self.heard_awards.pairs()
+        for k in np.flatnonzero(messages.winner == g.id[rows]):
+            self.route[rows[k]] = np.concatenate([self.route[rows[k]], messages.pos[:, k : k + 1]], axis=1)
 
     def _visit(self, g: GroupView, had_route: np.ndarray) -> None:
-        """Publish the first area of each route, or drop it where the entity is there."""
+        """Publish the first area of each route, after removal of areas that the entity has reached."""
         rows = np.flatnonzero(self.route.count)
         there = length(self.route.data[:, self.route.start[rows]] - g.pos[:, rows]) <= self.tolerance[rows]
         self.n_visited[rows[there]] += 1
@@ -104,21 +104,21 @@ class AuctionSearch(Autonomy):
         self.events.publish(changed, text=["search" if has_route[row] else "done" for row in changed])
 
     def _bid(self, g: GroupView) -> None:
-        """Bid in the auctions that were heard of."""
-        rows, heard = self.heard_offers.pairs()
+        """Bid in the auctions that were announced by messages."""
+        rows, messages = self.heard_offers.pairs()
         bids = self.does_bid[rows]
-        rows, heard = rows[bids], heard.take(np.flatnonzero(bids))
+        rows, messages = rows[bids], messages.take(np.flatnonzero(bids))
         count, end = self.route.count[rows], self.route.start[1:][rows] - 1
         if self.rule == "random":
             rank = np.arange(len(rows)) - np.searchsorted(rows, rows)
             cost = g.uniform("bid", int(rank.max(initial=0)) + 1)[rank, rows]
         elif self.rule == "nearest":
-            cost = length(heard.pos - g.pos[:, rows])
+            cost = length(messages.pos - g.pos[:, rows])
         else:
             at = g.pos[:, rows].copy()
             at[:, count > 0] = self.route.data[:, end[count > 0]]
-            cost = self._lengths(g)[rows] + length(heard.pos - at)
-        self.bids.publish(rows, auctioneer=heard.sender, area=heard.area, cost=cost)
+            cost = self._lengths(g)[rows] + length(messages.pos - at)
+        self.bids.publish(rows, auctioneer=messages.sender, area=messages.area, cost=cost)
 
     def _lengths(self, g: GroupView) -> np.ndarray:
         """Length of each route [m], from the entity on, (n,)."""
@@ -130,16 +130,16 @@ class AuctionSearch(Autonomy):
 
     def _collect(self, g: GroupView) -> None:
         """Keep the lowest bid of each auctioneer."""
-        rows, heard = self.heard_bids.pairs()
-        own = (heard.auctioneer == g.id[rows]) & (heard.area == self.offered[rows])
+        rows, messages = self.heard_bids.pairs()
+        own = (messages.auctioneer == g.id[rows]) & (messages.area == self.offered[rows])
         own &= self.deadline[rows] >= 0.0
-        order = np.lexsort((heard.sender, heard.cost, rows))
+        order = np.lexsort((messages.sender, messages.cost, rows))
         order = order[own[order]]
         rows, first = np.unique(rows[order], return_index=True)
         best = order[first]
-        lower = heard.cost[best] < self.best_cost[rows]
-        self.best_cost[rows[lower]] = heard.cost[best[lower]]
-        self.best_bidder[rows[lower]] = heard.sender[best[lower]]
+        lower = messages.cost[best] < self.best_cost[rows]
+        self.best_cost[rows[lower]] = messages.cost[best[lower]]
+        self.best_bidder[rows[lower]] = messages.sender[best[lower]]
 
     def _auction(self, g: GroupView) -> None:
         """Award the areas whose time is over, and offer the next ones."""

@@ -8,17 +8,17 @@ from tussle.api import Autonomy, Children, GroupView, HistoricAttributes, Param,
 
 
 class AutonomyExecutor(StateFollower):
-    """Runs those of its autonomies that act in the state of the entity, in their order; autonomies without `states` always run.
+    """Runs, in order, those of its autonomies that act in the entity's state. Autonomies without `states` always run.
 
-    The state is told by messages on the topic `state_topic_name`, for instance by GraphvizFSM. When the state makes an autonomy act
-    again, its memory is set to that of a new entity. Its outputs are those of the entity: if several autonomies write one channel, the
-    last one counts, and a channel that nobody writes keeps its value.
+    Messages on the topic `state_topic_name` set the state, for instance those of GraphvizFSM. When an autonomy becomes active again, its
+    memory is reset to that of a new entity. The autonomies write the channels of the entity: if several write one channel, the last one
+    wins, and a channel that none writes keeps its value.
     """
 
     grade = "portable"
     historic_attributes = HistoricAttributes(
         differs={
-            "autonomies": "AutonomyExecutor without autonomies does nothing; in the existing system it has Straight"
+            "autonomies": "AutonomyExecutor without autonomies does nothing; in SCRIMMAGE it has Straight"
         }
     )
 

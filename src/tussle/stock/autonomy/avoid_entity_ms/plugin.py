@@ -7,7 +7,7 @@ import numpy as np
 from tussle.api import Behavior, GroupView, Input, Param, neighbors
 
 TOUCHING = 1e10
-"""Magnitude of the repulsion at or below the minimum range, in place of infinity (value of the existing system)."""
+"""Magnitude of the repulsion at or below the minimum range, in place of infinity (value of SCRIMMAGE)."""
 
 
 class AvoidEntityMS(Behavior):

@@ -9,7 +9,7 @@ from tussle.numeric import atan2
 from tussle.numeric.quaternion import quat_rotate
 
 SLOW = 10.0
-"""Speed while it avoids walls [m/s], that of the existing system."""
+"""Speed while it avoids walls [m/s], that of SCRIMMAGE."""
 
 
 class AvoidWalls(Autonomy):
@@ -18,7 +18,7 @@ class AvoidWalls(Autonomy):
     Each of these points repels with `avoid_distance` - range; the car drives slowly in the direction of the sum. If all rays of the scan
     end near, it turns to its right. Potential fields: O. Khatib, IJRR 5 (1986), 90-98, with a linear law.
 
-    In the existing system a car that has been slow stays slow.
+    In SCRIMMAGE a car that has slowed down never accelerates again.
     """
 
     grade = "portable"
@@ -31,7 +31,7 @@ class AvoidWalls(Autonomy):
     desired_altitude = Output(unit="m")
 
     def spawn(self, g: GroupView, rows: np.ndarray) -> None:
-        """Begin at the speed of a free road."""
+        """Start at `initial_speed` with the current heading and altitude."""
         self.desired_speed[rows], self.desired_altitude[rows] = self.initial_speed[rows], g.pos[2][rows]
         self.desired_heading[rows] = g.yaw[rows]
 

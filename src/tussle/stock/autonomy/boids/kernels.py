@@ -16,7 +16,7 @@ from tussle.numeric import atan2, cos, sin, wrap
 from tussle.numeric.kernel import device, kernel
 
 TOUCHING = 1e10
-"""Magnitude of the repulsion at or below the minimum range, in place of infinity (value of the existing system)."""
+"""Magnitude of the repulsion at or below the minimum range, in place of infinity (value of SCRIMMAGE)."""
 
 # Rows of the neighbour sums, (13, n): offsets [m] and horizontal heading vectors of team mates, number of team mates and of
 # others, repulsion from team mates and from others.
@@ -37,9 +37,9 @@ def push(
 
 @kernel("(F F F) F2w")
 def historic_means(pos, seen):
-    """Convert the neighbour sums, (13, n), to the centroid and heading of the existing system, in place.
+    """Convert the neighbour sums, (13, n), to the centroid and heading of SCRIMMAGE, in place.
 
-    The existing system divides by the number of all neighbours, other teams included, which biases the centroid towards
+    SCRIMMAGE divides by the number of all neighbours, other teams included, which biases the centroid towards
     the world's origin and the heading towards East. It averages yaw as a plain number: on input, row `HEADING` is the
     sum of yaw [rad]. pos: own positions [m], (n,) each.
     """
@@ -91,7 +91,7 @@ def length(x, y, z):
 
 @kernel("F F -> b1")
 def sees_all(fov_az, fov_el):
-    """Whether the fields of view [rad], (n,) each, exclude no entity."""
+    """Return whether the fields of view [rad], (n,) each, exclude no entity."""
     for i in range(fov_az.shape[0]):
         if fov_az[i] < 2.0 * math.pi or fov_el[i] <= math.pi:
             return False
@@ -103,7 +103,7 @@ def law(pos, goal, seen, weights, wanted, part):
     """Compute the desired velocity.
 
     The weighted sum of the five unit or repulsion vectors, divided by the sum of their lengths, times max_speed. The length
-    of the heading enters the divisor without its weight, as in the existing system. Without neighbours the velocity is 1 m/s
+    of the heading enters the divisor without its weight, as in SCRIMMAGE. Without neighbours the velocity is 1 m/s
     in the direction of the goal.
 
     Args:

@@ -27,7 +27,7 @@ class Boids(Autonomy):
     which biases the centroid towards the world's origin and the heading towards East.
 
     The outputs fit a unicycle (speed, turn_rate, pitch_rate), an integrator (velocity) and heading controllers (desired_...). Only
-    outputs that are wired are computed. In the existing system the desired altitude was the climb speed; here it is the altitude one
+    outputs that are wired are computed. In SCRIMMAGE the desired altitude was the climb speed; here it is the altitude one
     second ahead.
     """
 
@@ -110,7 +110,7 @@ class Boids(Autonomy):
         offset_x: float, offset_y: float, offset_z: float, distance: float,
         quat_w: float, quat_x: float, quat_y: float, quat_z: float, fov_az: float, fov_el: float,
     ) -> bool:  # fmt: skip
-        """Whether azimuth and elevation of an offset [m] in body axes are inside the fields of view [rad].
+        """Return True if azimuth and elevation of an offset [m] in body axes are inside the fields of view [rad].
 
         For angles up to pi, |angle| < half is equivalent to cos(angle) > cos(half). A field of view of 2 pi has no edge: an entity
         exactly astern is seen.
@@ -143,14 +143,14 @@ class Boids(Autonomy):
         self.target[:, rows] = np.where(self.use_initial_heading[rows], ahead, self.goal[:, rows])
 
     def _neighbor_sums(self, g: GroupView) -> np.ndarray:
-        """Sums over the neighbours as `kernels.law` takes them, (13, n)."""
+        """Return the neighbour sums for `kernels.law`, (13, n)."""
         sees_all = g.once(kernels.sees_all, self.fov_az, self.fov_el)
         if self.averaging == "historic":
             return self._with_historic_means(g, self.historic if sees_all else self.historic_in_view)
         return np.asarray((self.seen if sees_all else self.seen_in_view)(g).values)
 
     def _with_historic_means(self, g: GroupView, law: Callable[[GroupView], Contributions]) -> np.ndarray:
-        """Sums of a law of yaw and others, (13, n), with the means of the paper's code."""
+        """Return the neighbour sums, (13, n), with the means of the paper's code."""
         seen = law(g).values
         kernels.historic_means(g.components("pos"), seen)
         return seen

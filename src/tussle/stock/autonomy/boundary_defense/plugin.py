@@ -11,7 +11,7 @@ class BoundaryDefense(Autonomy):
     """Flies to the nearest entity inside a boundary that is not of the boundary's team; without one, to the centre.
 
     It aims at the position of the intruder one step ahead. The desired velocity is the offset to that point, divided by 1 s; limit it
-    with `SingleIntegrator.max_speed`. In the existing system a defender learned of its boundary by a message at the end of the first
+    with `SingleIntegrator.max_speed`. In SCRIMMAGE a defender learned of its boundary by a message at the end of the first
     step, and stood still until then.
 
     Raises:

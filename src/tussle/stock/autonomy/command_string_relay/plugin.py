@@ -12,28 +12,28 @@ from tussle.messages import TextMessage
 class TopicRelay(Autonomy):
     """Publishes each text that the entity receives on a topic of one network on the same topic of another one.
 
-    A text for another entity (field `to`) is not passed on. So a command that was published on the network that reaches everyone, for
-    instance by `Simulation.publish`, reaches the other plugins of the entity on LocalNetwork one step later.
+    A text for another entity (field `to`) is not passed on. Example: a command that `Simulation.publish` sends on GlobalNetwork reaches
+    the other plugins of the entity on LocalNetwork one step later.
     """
 
     grade = "portable"
 
-    source = Param("GlobalNetwork", doc="Network that is listened to.")
+    source = Param("GlobalNetwork", doc="Network that the texts are received on.")
     topic = Param("State", doc="Topic on both networks.")
     target = Param("LocalNetwork", doc="Network that the texts are published on.")
     heard = Subscribe(TextMessage, network_param="source", topic_param="topic", from_outside=True)
     passed = Publish(TextMessage, network_param="target", topic_param="topic")
 
     def check_values(self) -> None:
-        """Check that no text comes back."""
+        """Check that the two networks differ."""
         if self.source == self.target:
             raise ParameterError(f"TopicRelay: source and target are both {self.source!r}; they must differ")
 
     def step(self, g: GroupView) -> None:
         if self.heard:
-            rows, heard = self.heard.pairs()
-            mine = np.flatnonzero((heard.to == 0) | (heard.to == g.id[rows]))
-            self.passed.publish(rows[mine], text=[heard.text[i] for i in mine], to=heard.to[mine])
+            rows, messages = self.heard.pairs()
+            mine = np.flatnonzero((messages.to == 0) | (messages.to == g.id[rows]))
+            self.passed.publish(rows[mine], text=[messages.text[i] for i in mine], to=messages.to[mine])
 
 
 class CommandStringRelay(Autonomy):

@@ -1,4 +1,4 @@
-"""Control3D: is steered from the viewer."""
+"""Control3D: an autonomy that is controlled from the viewer."""
 
 from tussle.stock.autonomy.control_3d.plugin import Control3D
 

@@ -1,4 +1,4 @@
-"""An autonomy that is steered from the viewer."""
+"""An autonomy that is controlled from the viewer."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from tussle.numeric import atan2
 
 
 class Control3D(Autonomy):
-    """Goes to the point that a user of the viewer clicked last, and stops there; the key for plugins, `;`, stops it and lets it go on.
+    """Goes to the point that was clicked last in the viewer, and stops there. The plugin key `;` stops it or makes it continue.
 
-    It keeps the altitude at which it was created. It slows down in proportion to the distance, with a time constant of 1 s. Before the
-    first click it stays where it is.
+    It keeps its initial altitude. It slows down in proportion to the distance, with a time constant of 1 s. Before the first click it
+    stays at its initial position.
     """
 
     grade = "portable"
 
     max_speed = Param(20.0, unit="m/s", ge=0.0, doc="Largest speed.")
-    goal = State("x y z", unit="m", doc="Where it goes.")
+    goal = State("x y z", unit="m", doc="Current goal.")
     is_stopped = State(dtype=bool, doc="Whether the key stopped it.")
     clicks = Subscribe(WorldPointClicked, from_outside=True)
     keys = Subscribe(CustomKeyPress, from_outside=True)
@@ -34,14 +34,14 @@ class Control3D(Autonomy):
 
     def step(self, g: GroupView) -> None:
         if self.clicks:
-            rows, heard = self.clicks.latest()
-            self.goal[:2, rows] = heard.pos[:2]
+            rows, messages = self.clicks.latest()
+            self.goal[:2, rows] = messages.pos[:2]
             self.is_stopped[rows] = False
         if self.keys:
             rows, _ = self.keys.pairs()
             self.is_stopped[:] ^= np.bincount(rows, minlength=g.n) % 2 == 1
         way = self.goal - g.pos
-        with np.errstate(over="ignore"):  # of entities that are beyond all goals
+        with np.errstate(over="ignore"):  # entities extremely far from their goals
             level = np.sqrt(way[0] * way[0] + way[1] * way[1])
             distance = np.sqrt(level * level + way[2] * way[2])
         speed = np.where(self.is_stopped, 0.0, np.minimum(distance, self.max_speed))

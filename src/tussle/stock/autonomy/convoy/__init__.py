@@ -1,4 +1,4 @@
-"""Convoy, Escort: a column of vehicles and its guards, which talk by radio."""
+"""Convoy, Escort: a column of vehicles and its guards, which communicate by radio."""
 
 from tussle.stock.autonomy.convoy.plugin import Convoy, ConvoyReport, Escort, IntruderAlarm
 

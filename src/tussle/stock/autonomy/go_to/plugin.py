@@ -20,8 +20,8 @@ def length(v: np.ndarray) -> np.ndarray:
 class GoTo(Autonomy):
     """Goes to waypoints in order; without any, it stays where it starts. A `Waypoint` message replaces them by one goal.
 
-    It works with every vehicle: it writes a heading, an altitude and a speed; a velocity; and a position. Of these only the
-    channels that the entity's controller or motion model takes are computed. A waypoint is reached when the path of the last step
+    It works with every vehicle: it writes a heading, an altitude and a speed; a velocity; and a position. Only
+    channels that the entity's controller or motion model reads are computed. A waypoint is reached when the path of the last step
     comes within `tolerance` of it; for a vehicle that cannot stop, the tolerance should be larger than its turn radius.
 
     It approaches the last goal with a speed in proportion to the distance below `slowing_distance` (Reynolds 1999, "Steering behaviors
@@ -45,7 +45,7 @@ class GoTo(Autonomy):
     current = State(dtype=int, doc="Index of the waypoint.")
     is_returning = State(dtype=bool, doc="Whether the waypoints are visited backwards.")
     is_told = State(dtype=bool, doc="Whether a message gave the goal.")
-    goal = State("x y z", unit="m", doc="Where it goes now.")
+    goal = State("x y z", unit="m", doc="Current goal.")
     heading = State(unit="rad", doc="Desired heading.")
     goals = Subscribe(Waypoint, network_param="network_name")
     desired_heading = Output(unit="rad")
@@ -62,8 +62,8 @@ class GoTo(Autonomy):
 
     def step(self, g: GroupView) -> None:
         if self.goals:
-            rows, heard = self.goals.latest()
-            self.goal[:, rows], self.is_told[rows] = heard.pos, True
+            rows, messages = self.goals.latest()
+            self.goal[:, rows], self.is_told[rows] = messages.pos, True
         flat = np.where(self.tolerance_in_2d, 0.0, 1.0)
         offset, way = self.goal - g.pos, g.vel * g.dt
         offset[2], way[2] = flat * offset[2], flat * way[2]
@@ -73,14 +73,14 @@ class GoTo(Autonomy):
 
     @staticmethod
     def _passes(offset: np.ndarray, way: np.ndarray) -> np.ndarray:
-        """Smallest distance [m] to a goal at `offset` on a straight path `way` to here, (3, n) each."""
+        """Return the smallest distance [m], (n,), to a goal at `offset` along the straight path `way` that ends here, (3, n) each."""
         square = length(way) ** 2
         along = -(offset[0] * way[0] + offset[1] * way[1] + offset[2] * way[2])
         back = np.clip(along / np.where(square > 0.0, square, 1.0), 0.0, 1.0)
         return length(offset + back * way)
 
     def _is_last(self) -> np.ndarray:
-        """Whether no waypoint follows, (n,)."""
+        """Return whether no waypoint follows, (n,)."""
         n_points = self.waypoints.count
         is_end = (n_points <= 1) | (self.mode == "stop") & (self.current + 1 >= n_points)
         return np.asarray(self.is_told | is_end)

@@ -27,7 +27,7 @@ def free_way(cosine, sine, points, first, last, room, limit):
 
 @kernel("F2 I (F F F) (F F F) Fw Fw")
 def choose(points, start, goal, limits, heading, free):
-    """Choose the direction of least cost: angle to the goal, turn against the last direction, and what is not free of the way.
+    """Choose the direction of least cost: angle to the goal, turn from the last direction, and blocked part of the path.
 
     Args:
         points: Obstacles relative to their entity, east and north [m], (2, m), entity after entity.
@@ -44,7 +44,7 @@ def choose(points, start, goal, limits, heading, free):
         reach = max(min(look, distance[i]), 1e-9)
         least, chosen, way = math.inf, bearing[i], look
         for k in range(N_WAYS):
-            # To the right first: of two that meet head on, each evades to its right.
+            # Right before left: two entities that meet head on both turn right.
             off = STEP * (-((k + 1) // 2) if k % 2 else k // 2)
             angle = wrap(bearing[i] + off)
             sine, cosine = sincos(angle)

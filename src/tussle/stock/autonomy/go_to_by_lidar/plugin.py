@@ -17,31 +17,32 @@ def length(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 
 class GoToByLidar(Autonomy):
-    """Flies at one height to a goal, round all that `RayTrace` sees, and stays there.
+    """Flies at constant height to a goal, around obstacles that `RayTrace` sees, and stays there.
 
-    Of 72 directions it takes the one of least cost: the angle to the goal, the turn against the last direction, and the part of the way,
-    of at most `look_ahead`, that is not free for a disc of radius `clearance` (VFH+: I. Ulrich and J. Borenstein, ICRA 1998, with the
-    scan in place of a grid). The speed is one from which it stops in the free way: v^2 / (2 `deceleration`) + v `reaction_time`. What
-    the scan does not show counts as free: so a lidar of short range is seen to be one by collisions. Points of the scan count if their
-    height differs by less than `half_height`, so that the ground is no obstacle to a tilted lidar.
+    It chooses the direction of least cost among 72. The cost has three terms: the angle to the goal, the turn from the last direction,
+    and the part of the path, of length `look_ahead` at most, that is blocked for a disc of radius `clearance` (VFH+: I. Ulrich and J.
+    Borenstein, ICRA 1998, with the scan in place of a grid). The speed lets it stop within the free path, whose length is
+    v^2 / (2 `deceleration`) + v `reaction_time`. Directions without scan points count as free, so a lidar with too short a range leads
+    to collisions. Points count if their height differs by less than `half_height`, so that a tilted lidar does not take the ground for
+    an obstacle.
 
-    `GoalReached` tells that it came within `tolerance` for the first time.
+    `GoalReached` is published when it comes within `tolerance` for the first time.
     """
 
     grade = "portable"
 
-    goal = Param((0.0, 0.0, 0.0), fields="x y z", unit="m", doc="Where to go, world frame.")
+    goal = Param((0.0, 0.0, 0.0), fields="x y z", unit="m", doc="Goal, world frame.")
     is_relative = Param(False, doc="Measure the goal from the initial position.")
     speed = Param(10.0, unit="m/s", ge=0.0, doc="Largest speed.")
     tolerance = Param(3.0, unit="m", gt=0.0, doc="Horizontal distance at which the goal is reached.")
     clearance = Param(2.0, unit="m", gt=0.0, doc="Distance to keep from obstacles.")
-    look_ahead = Param(50.0, unit="m", gt=0.0, doc="Length of the way that should be free.")
+    look_ahead = Param(50.0, unit="m", gt=0.0, doc="Length of the path that should be free.")
     half_height = Param(3.0, unit="m", gt=0.0, doc="Difference in height up to which a point is an obstacle.")
-    deceleration = Param(3.0, unit="m/s^2", gt=0.0, doc="With which it brakes.")
-    reaction_time = Param(0.5, unit="s", ge=0.0, doc="From a scan to the full deceleration.")
+    deceleration = Param(3.0, unit="m/s^2", gt=0.0, doc="Braking deceleration.")
+    reaction_time = Param(0.5, unit="s", ge=0.0, doc="Time from a scan to the full deceleration.")
     turn_weight = Param(0.3, ge=0.0, doc="Cost of a turn by one radian; that of the angle to the goal is 1.")
-    block_weight = Param(6.0, unit="rad", ge=0.0, doc="Cost of a way of which nothing is free.")
-    target = State("x y z", unit="m", doc="Where it goes.")
+    block_weight = Param(6.0, unit="rad", ge=0.0, doc="Cost of a path that is completely blocked.")
+    target = State("x y z", unit="m", doc="Current goal, world frame.")
     heading = State(unit="rad", doc="Direction of flight.")
     is_there = State(dtype=bool, doc="Whether it reached the goal.")
     reached = Publish(GoalReached)
@@ -62,7 +63,7 @@ class GoToByLidar(Autonomy):
         return np.asarray(atan2(self.target[1] - g.pos[1], self.target[0] - g.pos[0]))
 
     def _obstacles(self, g: GroupView) -> tuple[np.ndarray, np.ndarray]:
-        """Points of the scans at the height of flight, from each entity, (2, m) [m], and the first one of each entity, (n + 1,)."""
+        """Return scan points at flight height, relative to their entities, (2, m) [m], and each entity's first one, (n + 1,)."""
         x, y, z, _, in_range = self.points.data
         row = self.points.row
         east, north, up = quat_rotate(g.quat[:, row], np.stack([x, y, z]))

@@ -70,7 +70,7 @@ class GoToWaypoint(Autonomy):
     """Publishes a list of one waypoint for the entity itself, once, at the time of the waypoint; WaypointDispatcher flies to it.
 
     The literals X, Y and Z stand for the entity's own coordinates when it publishes the list: with the default it goes to the ground
-    below it. A negative tolerance accepts any distance. The existing system published the list in every step.
+    below it. A negative tolerance accepts any distance. SCRIMMAGE published the list in every step.
     """
 
     grade = "portable"

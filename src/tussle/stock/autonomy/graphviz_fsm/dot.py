@@ -1,7 +1,7 @@
 """Reader of directed graphs in the DOT language of Graphviz.
 
-It follows the grammar of https://graphviz.org/doc/info/lang.html without HTML texts. pydot, the library for this, prints the place
-of an error and returns None; a mission needs it in the error.
+It follows the grammar of https://graphviz.org/doc/info/lang.html without HTML texts. The library pydot is not used, because it prints
+the place of an error and returns None, while the error of a mission must contain the place.
 """
 
 from __future__ import annotations

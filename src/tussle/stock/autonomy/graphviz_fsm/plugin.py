@@ -105,8 +105,8 @@ class GraphvizFSM(Autonomy):
         self.is_started[:] = True
         if not self.events:
             return
-        rows, heard = self.events.pairs()
-        event = np.array([fsm.events.get(text, -1) for text in heard.text], np.int64)
+        rows, messages = self.events.pairs()
+        event = np.array([fsm.events.get(text, -1) for text in messages.text], np.int64)
         rank = np.arange(len(rows)) - np.searchsorted(rows, rows)
         for k in range(int(rank.max(initial=-1)) + 1):  # one after another for each entity
             now = np.flatnonzero(rank == k)
@@ -114,6 +114,6 @@ class GraphvizFSM(Autonomy):
 
     def _enter(self, fsm: Machine, rows: np.ndarray, node: np.ndarray, is_new: np.ndarray) -> None:
         """Set the states of rows, (m,), and publish those that differ from before or are new."""
-        told = np.flatnonzero((node != self.node[rows]) | is_new)
+        changed = np.flatnonzero((node != self.node[rows]) | is_new)
         self.node[rows] = node
-        self.states_entered.publish(rows[told], text=[fsm.names[i] for i in node[told]])
+        self.states_entered.publish(rows[changed], text=[fsm.names[i] for i in node[changed]])

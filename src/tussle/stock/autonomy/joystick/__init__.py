@@ -1,4 +1,4 @@
-"""JoystickAutonomy and JoystickController: commands by hand."""
+"""JoystickAutonomy and JoystickController: manual commands."""
 
 from tussle.stock.autonomy.joystick.plugin import JoystickAutonomy, JoystickButtons, JoystickController
 

@@ -1,4 +1,4 @@
-"""Commands by hand: the axes of a joystick as channels."""
+"""Manual commands: the axes of a joystick as channels."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class JoystickButtons(Message):
 
 
 class JoystickAxis(NamedTuple):
-    """How an axis gives a channel."""
+    """Mapping of a joystick axis to a channel."""
 
     channel: str
     axis: float
@@ -148,7 +148,7 @@ class JoystickAutonomy(Joystick, Autonomy):
     """Writes the axes of a joystick to channels, for controllers or a motion model.
 
     A row of `axis_map` is [channel axis input_min input_max output_min output_max factor]: the input range is mapped to the output
-    range, times the factor. All events since the last call are read (in the existing system, one per step).
+    range, times the factor. All events since the last call are read (in SCRIMMAGE, one per step).
 
     Raises:
         ParameterError: The device cannot be opened.

@@ -18,13 +18,13 @@ from tussle.numeric import atan2
 
 
 class MotorSchemas(StateFollower):
-    """Combines the velocities of its behaviours (Arkin 1989): their sum weighted by gain, over the gains of those that are not zero.
+    """Combines the velocities of its behaviours (Arkin 1989): their sum weighted by gain, over the sum of the gains of nonzero velocities.
 
-    A behaviour whose velocity is zero, such as avoidance with nobody near, therefore does not dilute the others. If all are zero, the
-    entity flies straight on at `max_speed`. The result is written as heading, altitude and speed, and as `velocity`.
+    A behaviour whose velocity is zero, for example avoidance without other entities nearby, therefore does not dilute the others. If
+    all are zero, the entity flies straight on at `max_speed`. The result is written as heading, altitude and speed, and as `velocity`.
 
-    A behaviour with `states` acts in these states of the entity only, which are told by messages on the topic `state_topic_name`; in
-    the others its memory does not change.
+    A behaviour with `states` acts only in these states of the entity, which messages on the topic `state_topic_name` set. In other
+    states its memory does not change.
     """
 
     grade = "portable"
@@ -32,7 +32,7 @@ class MotorSchemas(StateFollower):
         unread=("pub_vel_vec",),
         differs={
             "behaviors": "MotorSchemas without behaviors flies straight on; "
-            "in the existing system it avoids others and goes to (100, 0, 0)"
+            "in SCRIMMAGE it avoids others and goes to (100, 0, 0)"
         },
     )
 
@@ -63,8 +63,8 @@ class MotorSchemas(StateFollower):
             shorter = np.minimum(1.0, self.max_speed / np.where(length > 0.0, length, 1.0))
             total += gain * shorter * velocity
             weight += np.where(length > 0.0, gain, 0.0)
-        wished = weight > 0.0
-        v = np.where(wished, total / np.where(wished, weight, 1.0), self.max_speed * g.forward)
+        has_command = weight > 0.0
+        v = np.where(has_command, total / np.where(has_command, weight, 1.0), self.max_speed * g.forward)
         self.desired_heading[:] = atan2(v[1], v[0])
         self.desired_altitude[:] = g.pos[2] + v[2]
         self.desired_speed[:] = np.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])

@@ -42,8 +42,8 @@ class MoveToGoalMS(Behavior):
 
     def step(self, g: GroupView) -> None:
         if self.waypoints:
-            rows, heard = self.waypoints.latest()
-            self.target[:, rows] = heard.pos
+            rows, messages = self.waypoints.latest()
+            self.target[:, rows] = messages.pos
         offset = self.target - g.pos
         distance = length(offset)
         kp, ki, kd, band = self.distance_pid

@@ -1,4 +1,4 @@
-"""What plugin files import as `scrimmage` and `scrimmage.bindings`: the values that SCRIMMAGE's Python classes work with."""
+"""Module that plugin files import as `scrimmage` and `scrimmage.bindings`: the types of SCRIMMAGE's Python interface."""
 
 from __future__ import annotations
 
@@ -116,20 +116,20 @@ class ScrimmageState:
         return self.quat.rotate((1.0, 0.0, 0.0))
 
     def in_field_of_view(self, other: Any, width: float, height: float) -> bool:
-        """Whether a state or position is within a field of view, of a width and a height [rad]."""
+        """Return True if a state or position is within a field of view, of a width and a height [rad]."""
         x, y, z = self.rel_pos_local_frame(getattr(other, "pos", other))
         return abs(math.atan2(y, x)) < 0.5 * width and abs(math.atan2(z, math.hypot(x, y))) < 0.5 * height
 
 
 class ScrimmageID:
-    """Numbers of an entity."""
+    """Ids of an entity, its subswarm and its team."""
 
-    def __init__(self, id: int = 0, sub_swarm_id: int = 0, team_id: int = 0) -> None:  # noqa: A002 - its name there
+    def __init__(self, id: int = 0, sub_swarm_id: int = 0, team_id: int = 0) -> None:  # noqa: A002 - SCRIMMAGE's name
         self.id, self.sub_swarm_id, self.team_id = id, sub_swarm_id, team_id
 
 
 class ScrimmageContact:
-    """An entity as others see it."""
+    """State of another entity."""
 
     AIRCRAFT, QUADROTOR, SPHERE, MESH, UNKNOWN = range(5)
     ContactType: Any
@@ -148,10 +148,10 @@ ScrimmageContact.ContactType = ScrimmageContact
 
 
 class ScrimmageAutonomy:
-    """Base class that a class may have."""
+    """Optional base class of Python autonomies."""
 
 
-# Their names there.
+# Names in SCRIMMAGE.
 Quaternion = ScrimmageQuaternion
 State = ScrimmageState
 ID = ScrimmageID

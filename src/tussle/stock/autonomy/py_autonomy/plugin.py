@@ -28,7 +28,7 @@ class PythonAgent:
 
     Attributes:
         python: The object.
-        has_begun: Whether `init` was called, which is before the first step, so that it may read `state`.
+        has_begun: Whether `init` was called. It is called just before the first step, so that it may read `state`.
     """
 
     python: Any
@@ -36,7 +36,7 @@ class PythonAgent:
 
 
 class Contacts(Mapping[int, Contact]):
-    """Entities of a world by id, each made when it is asked for.
+    """Entities of a world by id. Each contact is created on access.
 
     Args:
         bodies: The body table.
@@ -61,7 +61,7 @@ class Contacts(Mapping[int, Contact]):
 
 
 def state_of(view: Any, row: int) -> State:
-    """State of a row of a view or of the body table."""
+    """Return the state of a row of a view or of the body table."""
     pos, vel, omega, quat = (getattr(view, name)[:, row] for name in ("pos", "vel", "omega", "quat"))
     return State(pos, vel, omega, Quaternion(*quat))
 
@@ -84,7 +84,7 @@ class PyAutonomy(Autonomy):
     python_class: ClassVar[type] = StraightClass
     """The class; without `class` in a mission it is an example that flies straight on."""
 
-    init_params = Param("{}", doc="What `init` takes: an object of texts in JSON.")
+    init_params = Param("{}", doc="Argument of `init`: a JSON object of texts.")
     agent = Handle(doc="The Python object.")
     position = Output("position_x position_y position_z", unit="m")
     velocity = Output("velocity_x velocity_y velocity_z", unit="m/s")
@@ -125,7 +125,7 @@ class PyAutonomy(Autonomy):
 
     @staticmethod
     def adapters(module: Mapping[str, Any]) -> list[type[PyAutonomy]]:
-        """A plugin for each Python class that a module, given by its names, defines."""
+        """Return a plugin for each Python class that a module, given by its names, defines."""
         return [
             adapted(value) for value in list(module.values()) if is_python_autonomy(value, module["__name__"])
         ]
@@ -163,13 +163,13 @@ class PyAutonomy(Autonomy):
 
 
 def is_python_autonomy(value: Any, module: str) -> bool:
-    """Whether a value of a module is a class that is defined there and has the methods of SCRIMMAGE's Python interface."""
+    """Return True if a value of a module is a class that is defined there and has the methods of SCRIMMAGE's Python interface."""
     is_own = isinstance(value, type) and value.__module__ == module and not issubclass(value, Autonomy)
     return is_own and all(callable(getattr(value, name, None)) for name in METHODS)
 
 
 def adapted(python_class: type) -> type[PyAutonomy]:
-    """The plugin that runs a Python class; it belongs to the module of the class."""
+    """Return the plugin that runs a Python class. It belongs to the module of the class."""
     name = PREFIX + python_class.__name__
     doc = f"Runs the Python class {python_class.__name__}, see PyAutonomy."
     members = {"__module__": python_class.__module__, "__doc__": doc, "python_class": python_class}

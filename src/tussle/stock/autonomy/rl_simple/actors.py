@@ -1,4 +1,4 @@
-"""Actors: what chooses actions from observations."""
+"""Actors, which choose actions from observations."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import numpy as np
 
 
 class Alternating:
-    """Goes to and fro: every component of the action is 1 in the first step, then 0 (discrete) or -1 (continuous), then 1 again.
+    """Alternates: every component of the action is 1 in the first step, then 0 (discrete) or -1 (continuous), then 1 again.
 
     Args:
         action_space: A space of Gymnasium; unused.
-        observation_space: Likewise.
+        observation_space: A space of Gymnasium; unused.
         params: The parameters of the plugin; unused.
     """
 
@@ -20,13 +20,13 @@ class Alternating:
         self.is_forward = False
 
     def __call__(self, observation: np.ndarray) -> int:
-        """The next action: 1 or -1, which stands for all components; for discrete ones -1 is 0."""
+        """Return the next action: 1 or -1 for all components; for discrete components -1 means 0."""
         self.is_forward = not self.is_forward
         return 1 if self.is_forward else -1
 
 
 def spaces_of(x_discrete: bool, y_discrete: bool | None, max_speed: float, observed: int) -> tuple[Any, Any]:
-    """Spaces of actions and observations, as SCRIMMAGE gives them to actors.
+    """Return the spaces of actions and observations that SCRIMMAGE passes to actors.
 
     Args:
         x_discrete: Whether the velocity along x has two values.

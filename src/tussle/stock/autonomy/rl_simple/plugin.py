@@ -1,4 +1,4 @@
-"""Robots that move as an actor says and earn rewards near the origin or near each other."""
+"""Robots that move by the actions of an actor and earn rewards near the origin or near each other."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Agent:
 
 
 class RLSimple(Autonomy):
-    """Moves as a Python actor says, and earns a reward of 1 in each step in which it is near the origin.
+    """Moves by the actions of a Python actor, and earns a reward of 1 in each step in which it is near the origin.
 
     The reward is published as `RewardGiven`, which `OpenAIRewards` sums: 1 where |x|, rounded to whole metres, is below `radius`. The actor
     gets the observation of `RLSimpleSensor` or `RLConsensusSensor`, (k,), and returns an action: first the discrete components, then the
@@ -41,9 +41,9 @@ class RLSimple(Autonomy):
     Actors come from plugin files (`--plugin-path`), since a mission names no code: a function whose first parameter is named
     `action_space`, such as `def actor_init_func(action_space, obs_space, params)`. It is called once for each entity, with spaces of
     Gymnasium (None without it) and the parameters as texts, and returns a callable or an object with `act`. A mission names it by
-    `actor_init_func`, the default being the function of that name. Without one, entities go to and fro.
+    `actor_init_func`, the default being the function of that name. Without one, entities move to and fro.
 
-    Differences from the existing system: it imports any module; a snapshot has the attributes of an actor that is an object of a
+    Differences from SCRIMMAGE: it imports any module; a snapshot has the attributes of an actor that is an object of a
     class, and no variables of functions.
     """
 
@@ -55,7 +55,7 @@ class RLSimple(Autonomy):
     actor_init: ClassVar[Callable[[Any, Any, dict[str, str]], Any]] = Alternating
     """Creates an actor."""
     is_own_actor: ClassVar[bool] = True
-    """Whether there is no function of a plugin file."""
+    """True for the built-in actor, False for a function of a plugin file."""
 
     radius = Param(
         2.0, unit="m", ge=0.0, doc="Distance from the origin along x below which there are rewards."
@@ -87,11 +87,11 @@ class RLSimple(Autonomy):
             )
 
     def open_one(self, row: Any) -> Agent:
-        """No actor before the first observation."""
+        """Return an agent without an actor, which is created at the first observation."""
         return Agent()
 
     def save_one(self, agent: Agent) -> Any:
-        """A copy of the actor."""
+        """Return a copy of the actor."""
         return copy.deepcopy(agent.actor)
 
     def load_one(self, row: Any, state: Any) -> Agent:
@@ -100,7 +100,7 @@ class RLSimple(Autonomy):
 
     @classmethod
     def adapters(cls, module: Mapping[str, Any]) -> list[type[RLSimple]]:
-        """A plugin for each function that a module, given by its names, defines to create actors."""
+        """Return a plugin for each function that a module, given by its names, defines to create actors."""
         return [
             adapted(cls, value) for value in list(module.values()) if is_actor_init(value, module["__name__"])
         ]
@@ -127,7 +127,7 @@ class RLSimple(Autonomy):
         return np.where(np.floor(np.abs(g.pos[0]) + 0.5) < self.radius, 1.0, 0.0)
 
     def _actor(self, row: int, spaces: tuple[Any, Any]) -> Any:
-        """A new actor."""
+        """Create an actor."""
         values = {name: np.asarray(getattr(self, name)) for name in self.params()}
         texts = {name: str(value[row] if value.ndim == 1 else value) for name, value in values.items()}
         actor = type(self).actor_init(*spaces, texts)
@@ -169,18 +169,18 @@ class RLSimple(Autonomy):
 
 
 class RLConsensus(RLSimple):
-    """Moves as a Python actor says, and earns rewards near others; see `RLSimple` for actors and actions.
+    """Moves by the actions of a Python actor, and earns rewards near others; see `RLSimple` for actors and actions.
 
-    The reward of a step is the share of the world's entities that are other ones with |x - own x| below `radius`; with
-    `reward_type="origin"` it is that of `RLSimple`.
+    With `reward_type="others"`, the reward of a step is the share of the world's entities that are other ones with
+    |x - own x| below `radius`; with "origin", the default, it is that of `RLSimple`.
 
-    Differences from the existing system: it divides rewards by the duration of the mission [s].
+    Differences from SCRIMMAGE: it divides rewards by the duration of the mission [s].
     """
 
     grade = "external"
 
     reward_type = Param(
-        "others", choices=("others", "origin"), doc="What is rewarded: to be near others, or near the origin."
+        "origin", choices=("origin", "others"), doc="Reward for being near the origin, or near others."
     )
 
     def reward(self, g: GroupView) -> np.ndarray:
@@ -198,14 +198,14 @@ class RLConsensus(RLSimple):
 
 
 def is_actor_init(value: Any, module: str) -> bool:
-    """Whether a value of a module is a function that is defined there and creates actors."""
+    """Return True if a value of a module is a function that is defined there and creates actors."""
     if not isinstance(value, types.FunctionType) or value.__module__ != module:
         return False
     return next(iter(inspect.signature(value).parameters), "") == "action_space"
 
 
 def adapted(base: type[RLSimple], function: Callable[..., Any]) -> type[RLSimple]:
-    """The plugin that plays with the actors of a function; it belongs to the module of the function."""
+    """Return the plugin that uses the actors of a function. It belongs to the module of the function."""
     name = f"{base.__name__}_{function.__name__}"
     members = {
         "__module__": function.__module__, "__doc__": f"{base.__name__} with the actors of {function.__name__}.",

@@ -8,7 +8,7 @@ from tussle.api import Autonomy, GroupView, HistoricAttributes, Param
 
 
 class ShapeDraw(Autonomy):
-    """Draws one shape of each kind around the entity, for a viewer; it does not move. See the code for how plugins draw."""
+    """Draws one shape of each kind around the entity, for a viewer; it does not move. Its code is an example of drawing by plugins."""
 
     grade = "portable"
     historic_attributes = HistoricAttributes(unread=("initial_speed",))

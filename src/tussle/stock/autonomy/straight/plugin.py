@@ -69,8 +69,8 @@ class Straight(Autonomy):
 
     def _turn_back(self, g: GroupView) -> None:
         if self.fences:
-            rows, heard = self.fences.latest()
-            for row, shape in zip(rows, heard.shape, strict=True):
+            rows, messages = self.fences.latest()
+            for row, shape in zip(rows, messages.shape, strict=True):
                 self.fence[row] = shape
                 self.is_fenced[row] = True
         for row in np.flatnonzero(self.is_fenced):

@@ -1,4 +1,4 @@
-"""TakeFlag: runs for a flag and brings it home."""
+"""TakeFlag: fetches a flag and brings it to a region."""
 
 from tussle.stock.autonomy.take_flag.plugin import TakeFlag
 

@@ -11,8 +11,8 @@ from tussle.messages import FlagTaken
 class TakeFlag(Autonomy):
     """Flies to a flag until it has taken it, then to the region to which the flag must be brought.
 
-    The desired velocity is the offset to the centre of the region, divided by 1 s; limit it with `SingleIntegrator.max_speed`. In the
-    existing system an entity learned of the regions by a message at the end of the first step, and stood still until then.
+    The desired velocity is the offset to the centre of the region, divided by 1 s; limit it with `SingleIntegrator.max_speed`. In
+    SCRIMMAGE an entity learned of the regions by a message at the end of the first step, and stood still until then.
 
     Raises:
         MissionError: An id is not that of exactly one boundary of the mission.
@@ -32,8 +32,8 @@ class TakeFlag(Autonomy):
 
     def step(self, g: GroupView) -> None:
         if self.taken:
-            rows, told = self.taken.pairs()
-            is_mine = (told.entity == g.id[rows]) & (told.boundary == self.flag_boundary_id)
+            rows, messages = self.taken.pairs()
+            is_mine = (messages.entity == g.id[rows]) & (messages.boundary == self.flag_boundary_id)
             self.has_flag[rows[is_mine]] = True
         flag, home = (
             np.array(g.region(i).center)[:, None] for i in (self.flag_boundary_id, self.capture_boundary_id)

@@ -51,14 +51,14 @@ class TrailMS(Behavior):
         self.desired_velocity[:, rows] = point - g.pos[:, rows] + vel
 
     def _leaders(self, g: GroupView) -> tuple[np.ndarray, ...]:
-        """Rows that have a leader, (m,), and its true position, velocity (3, m) and attitude (4, m)."""
+        """Return the rows that have a leader, (m,), and its true position [m], velocity [m/s], (3, m) each, and attitude, (4, m)."""
         leader = g.rows_of(np.maximum(self.trail_id, 0))
         rows = np.flatnonzero(leader >= 0)
-        there = leader[rows]
-        return rows, g.bodies.pos[:, there], g.bodies.vel[:, there], g.bodies.quat[:, there]
+        leaders = leader[rows]
+        return rows, g.bodies.pos[:, leaders], g.bodies.vel[:, leaders], g.bodies.quat[:, leaders]
 
     def _seen_leaders(self) -> tuple[np.ndarray, ...]:
-        """The same as measured."""
+        """Return the same for the measured contacts."""
         data = self.seen.data
         is_leader = data[0] == self.trail_id[self.seen.row]
         item = self.seen.argmin(np.where(is_leader, 0.0, 1.0))

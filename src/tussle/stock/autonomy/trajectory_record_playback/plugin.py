@@ -19,7 +19,7 @@ class TrajectoryRecordPlayback(Autonomy):
 
     The file is a table in CSV with the columns of a recorded run, as `tussle export --csv` writes it. Before the first recorded time
     the first state is desired. After the last one the entity is removed, or the last state persists. Without `enable_playback` the
-    plugin does nothing, since every run can be recorded. The existing system then wrote the file itself.
+    plugin does nothing, since every run can be recorded; SCRIMMAGE's plugin then records the file.
     """
 
     grade = "portable"

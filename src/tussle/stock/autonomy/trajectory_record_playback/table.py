@@ -1,4 +1,4 @@
-"""TrajectoryTable trajectories, read from a table."""
+"""Recorded trajectories, read from a table."""
 
 from __future__ import annotations
 
@@ -29,7 +29,11 @@ class TrajectoryTable(NamedTuple):
     values: np.ndarray
 
     def at(self, ids: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Last state of each entity, (n,), not after a time, or its first one: its number, and the time of its last state."""
+        """Find the states of entities at times [s], (n,) each.
+
+        Returns:
+            For each entity, the index of its last state not after the time, else of its first state; and the time of its last state.
+        """
         place = np.searchsorted(self.id, ids)
         first, end = self.start[place], self.start[place + 1]
         low, high = first.copy(), end.copy()

@@ -28,7 +28,7 @@ class WaypointDispatcher(Autonomy):
     counter-clockwise at `loiter_radius`: the point lies `lead_distance` ahead on the tangent of that circle. A new list starts at its
     first waypoint. Until that is reached, and at the end of a list, the line starts at the entity itself.
 
-    The existing system published its status in every step at the end of a list, stayed one step longer at the turning points of
+    SCRIMMAGE published its status in every step at the end of a list, stayed one step longer at the turning points of
     back_and_forth, and had no loiter.
     """
 
@@ -87,17 +87,17 @@ class WaypointDispatcher(Autonomy):
         radius, lead = self.loiter_radius[rows], self.lead_distance[rows]
         return np.stack([center[0] + radius * x - lead * y, center[1] + radius * y + lead * x, center[2]])
 
-    def _start_lists(self, rows: np.ndarray, heard: Messages) -> None:
+    def _start_lists(self, rows: np.ndarray, messages: Messages) -> None:
         """Start the lists that the rows received."""
         for number, row in enumerate(rows):
-            points = heard.points[number]
+            points = messages.points[number]
             kept: list[int] = []
             for i in range(points.shape[1]):
                 offset = points[:3, i] - points[:3, kept[-1]] if kept else None
                 if offset is None or np.sqrt((offset * offset).cumsum()[-1]) >= self.filter_dist[row]:
                     kept.append(i)
             self.points[row] = points[[0, 1, 2, 6]][:, kept]
-        self.mode[rows] = heard.mode
+        self.mode[rows] = messages.mode
         self.current[rows] = self.previous[rows] = 0
         self.is_returning[rows] = self.is_done[rows] = False
 

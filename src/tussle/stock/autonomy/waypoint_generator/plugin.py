@@ -16,7 +16,7 @@ class WaypointGenerator(Autonomy):
 
     A waypoint is a publication time, a position, roll, pitch and yaw, and the tolerances of position and turn; a negative tolerance
     accepts any distance. Positions are in the world frame. A mission file may give them as latitude, longitude and altitude, which are
-    converted with the mission's origin. The third default waypoint lies at the origin; in the existing system it was a place in
+    converted with the mission's origin. The third default waypoint lies at the origin; in SCRIMMAGE it was a place in
     California.
     """
 

@@ -23,7 +23,7 @@ class AircraftPIDController(Controller):
     `tussle.numeric.pid.slope_error`) to elevator; speed to throttle. Surfaces and throttle are clamped to [-1, 1]. The integral of a
     loop is zero while its error exceeds `band`.
 
-    Differences from the existing system: there the altitude error times the gain was an elevation, so that the default of 0.1 rad/m
+    Differences from SCRIMMAGE: there the altitude error times the gain was an elevation, so that the default of 0.1 rad/m
     made a fast aircraft pitch from -45 to 45 degrees for ever; here it is a climb speed, and the trim is integrated. The time
     step of each loop is that of the call; the first call has no derivative kick.
     """

@@ -6,7 +6,7 @@ from tussle.api import Controller, Input, Output, row_law
 from tussle.numeric import sincos
 
 RATE = 1.0
-"""Rate of decay of the altitude error [1/s]: of the existing system."""
+"""Rate of decay of the altitude error [1/s]: of SCRIMMAGE."""
 
 
 class AircraftToSingleIntegratorController(Controller):

@@ -10,8 +10,8 @@ from tussle.api import Controller
 class DirectController(Controller):
     """Passes every channel from the autonomies to the motion model unchanged.
 
-    It declares no channels and is never called: the inputs of the motion model are the outputs of the autonomies. The
-    existing system copied the values in every substep, with the same result.
+    It declares no channels and is never called: the inputs of the motion model are the outputs of the autonomies.
+    SCRIMMAGE copied the values in every substep, with the same result.
     """
 
     grade = "portable"

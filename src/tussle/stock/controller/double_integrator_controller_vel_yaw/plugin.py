@@ -20,7 +20,7 @@ class DoubleIntegratorControllerVelYaw(Controller):
     The altitude error commands a climb speed; the errors of the three components of the velocity command the acceleration, all with
     `speed_pid`. The integral of a loop is zero while its error exceeds `band`.
 
-    In the existing system the speed error acts along the desired heading only, so a vehicle at its desired speed never turns to another
+    In SCRIMMAGE the speed error acts along the desired heading only, so a vehicle at its desired speed never turns to another
     heading; the altitude error commands the acceleration, which with the default gains oscillates for ever; and the first call
     has a derivative kick.
     """

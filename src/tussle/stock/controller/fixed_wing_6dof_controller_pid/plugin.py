@@ -27,7 +27,7 @@ class FixedWing6DOFControllerPID(Controller):
     elevator 2 times that of the elevation (see `tussle.numeric.pid.slope_error`). The integral of a loop is zero while its error
     exceeds `band`.
 
-    In the existing system it is a stub that moves rudder and aileron at fixed times.
+    In SCRIMMAGE it is a stub that moves rudder and aileron at fixed times.
     """
 
     grade = "portable"

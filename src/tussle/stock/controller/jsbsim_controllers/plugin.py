@@ -28,7 +28,7 @@ class JSBSimModelControllerHeadingPID(Controller):
 
     The integral of the loop is zero while its error exceeds `band`.
 
-    Differences from the existing system: the error is that of the heading, also after a large change (there, the desired heading was
+    Differences from SCRIMMAGE: the error is that of the heading, also after a large change (there, the desired heading was
     delayed by a filter whose gain depended on the step); the first call has no derivative kick.
     """
 
@@ -63,7 +63,7 @@ class JSBSimControlControllerHeadingPID(Controller):
 
     The integral of a loop is zero while its error exceeds `band`. For altitude and speed take AircraftPIDController or GoTo.
 
-    Differences from the existing system: desired and flown heading are both counter-clockwise from East (there, one was a compass
+    Differences from SCRIMMAGE: desired and flown heading are both counter-clockwise from East (there, one was a compass
     heading); the throttle is written (there, never); commands are limited to [-1, 1].
     """
 

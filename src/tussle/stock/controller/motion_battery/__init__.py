@@ -1,4 +1,4 @@
-"""MotionBattery: a battery that commands empty."""
+"""MotionBattery: a battery that commands discharge."""
 
 from tussle.stock.controller.motion_battery.plugin import MotionBattery
 

@@ -1,4 +1,4 @@
-"""A battery that commands empty."""
+"""A battery that commands discharge."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ DEPLETION = """[ desired_speed, 1.0, NonZero, true, 0.0 ]
 
 
 class Depletion(NamedTuple):
-    """How one channel takes charge."""
+    """Discharge by one channel."""
 
     channel: str
     rate: float
@@ -69,14 +69,14 @@ class DepletionParam(Param):
 
 
 class MotionBattery(Controller):
-    """Passes channels on, and takes charge from a battery for them; when it is empty, it replaces the values of limited channels.
+    """Passes channels on and discharges a battery by them. When the battery is empty, the values of limited channels are replaced.
 
-    A row of `depletion_map` is [channel, rate, type, limit, value]. A channel of type NonZero takes `rate` per second while its value
-    is not 0; one of type Delta takes `rate` times the change of its value. When the charge is at `charge_min`, channels with limit true
-    have the value of their row. Only the channels in the map are passed. A `ChargeAdded` message charges the battery; the service
+    A row of `depletion_map` is [channel, rate, type, limit, value]. A channel of type NonZero discharges `rate` per second while its
+    value is not 0; one of type Delta discharges `rate` times the change of its value. At `charge_min`, channels with limit true have the
+    value of their row. Only the channels in the map are passed. A `ChargeAdded` message charges the battery; the service
     `get_battery_charge` returns the charge of each row, (n,).
 
-    Differences from the existing system: there the type was ignored and the charge taken was rate times value, so that negative values
+    Differences from SCRIMMAGE: there the type was ignored and the charge taken was rate times value, so that negative values
     charged the battery; an empty battery removed the entity, whose limited values were then useless. The charge starts at charge_initial
     within its limits, so at 1 with the defaults.
     """
@@ -112,7 +112,7 @@ class MotionBattery(Controller):
         self.charge[rows] = np.clip(self.charge_initial[rows], self.charge_min[rows], self.charge_max[rows])
 
     def step(self, g: GroupView) -> None:
-        """Take the charge, and pass or limit the channels."""
+        """Discharge the battery, and pass or limit the channels."""
         taken = np.zeros(g.n)
         rows, messages = self.charged.pairs()
         is_own = messages.entity == g.id[rows]
@@ -139,6 +139,6 @@ class MotionBattery(Controller):
 
     @service
     def get_battery_charge(self, g: GroupView) -> np.ndarray:
-        """Charge of each row, (n,)."""
+        """Return the charge of each row, (n,)."""
         charge: np.ndarray = self.charge
         return charge

@@ -15,7 +15,7 @@ class MultirotorControllerOmega(Controller):
 
     A pulse width in [pwm_min, pwm_max] gives linearly a speed in [omega_min, omega_max] of the motion model.
 
-    In the existing system it takes them from a state object of the autonomy, and is not connected to the motion model.
+    In SCRIMMAGE it takes them from a state object of the autonomy, and is not connected to the motion model.
     """
 
     grade = "portable"
@@ -23,7 +23,7 @@ class MultirotorControllerOmega(Controller):
 
     pwm_min = Param(1000.0, doc="Pulse width of omega_min [us].")
     pwm_max = Param(2000.0, doc="Pulse width of omega_max [us].")
-    command = Param("pwm", choices=("pwm", "omega"), doc="What is commanded.")
+    command = Param("pwm", choices=("pwm", "omega"), doc="Quantity that is commanded.")
     for _i in ROTORS:
         vars()[f"pwm_{_i}"] = Input(optional=_i > 0, doc=f"Pulse width of rotor {_i} [us].")
         vars()[f"omega_{_i}"] = Input(unit="rad/s", optional=_i > 0, doc=f"Speed of rotor {_i}.")

@@ -54,7 +54,7 @@ class MultirotorControllerPID(Controller):
     those of the motion model. Without writers of the inputs the vehicle hovers and faces East. The integral of a loop is zero while its
     error exceeds `band`.
 
-    In the existing system it is a stub that sets the hover speed and is not connected to the motion model.
+    In SCRIMMAGE it is a stub that sets the hover speed and is not connected to the motion model.
 
     Raises:
         ParameterError: The rotors cannot give every thrust and moment.

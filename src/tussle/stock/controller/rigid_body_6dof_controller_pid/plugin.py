@@ -25,7 +25,7 @@ class RigidBody6DOFControllerPID(Controller):
     and bank are followed with a time constant of 1 s, rates with 0.5 s at an inertia of 1 kg m^2. The integral of a loop is zero while
     its error exceeds `band`.
 
-    In the existing system its outputs are in another order than the model's inputs, and not connected to them.
+    In SCRIMMAGE its outputs are in another order than the model's inputs, and not connected to them.
     """
 
     grade = "portable"

@@ -21,7 +21,7 @@ class SimpleAircraftControllerPID(Controller):
     integral of a loop is zero while its error exceeds `band`. desired_roll is right wing down, desired_glide_slope is
     positive downwards.
 
-    Differences from the existing system: a positive pitch_rate raises the nose; the measured slope is that of the true
+    Differences from SCRIMMAGE: a positive pitch_rate raises the nose; the measured slope is that of the true
     velocity (there the sign of its z was wrong, so the loops act as before); the time step of each loop is that of the
     call (there, the full step even when called once per substep); the first call has no derivative kick, which there
     rolled every aircraft at its largest rate at the start; and the derivative of the heading error does not jump where

@@ -11,7 +11,7 @@ from tussle.numeric.pid import pid_angle_loop
 class SimpleCarControllerHeading(Controller):
     """Steers a car to a heading with a PID loop, and passes the desired speed through.
 
-    The integral of the loop is zero while its error exceeds `i_lim`. The existing system's first call has a derivative kick, and its
+    The integral of the loop is zero while its error exceeds `i_lim`. SCRIMMAGE's first call has a derivative kick, and its
     derivative jumps where the error passes from pi to -pi; there the steering angle is the channel `turn_rate`.
     """
 

@@ -12,7 +12,7 @@ from tussle.numeric.pid import pid_loop
 DAMPING = math.sqrt(2.0)
 """Gain of the rate of a double integrator whose regulator minimizes the integral of error^2 + command^2; that of the error is 1."""
 SLOWING = 10.0
-"""Distance per speed at which it approaches a point [s]: of the existing system."""
+"""Distance per speed at which it approaches a point [s]: of SCRIMMAGE."""
 
 
 class SimpleQuadrotorControllerLQR(Controller):
@@ -22,7 +22,7 @@ class SimpleQuadrotorControllerLQR(Controller):
     horizontal velocity goes to one towards the point, of a tenth of the distance per second and at most max_vel, with a PID loop for
     each axis of the heading's frame; its integral is zero while the error exceeds vel_i_lim.
 
-    The existing system commands the speed along the nose only, wherever the point is, and coasts within 10 m of it.
+    SCRIMMAGE commands the speed along the nose only, wherever the point is, and coasts within 10 m of it.
     """
 
     grade = "portable"

@@ -18,7 +18,7 @@ class UnicycleControllerPoint(Controller):
     pitch_rate = e_up / l (input-output linearization: Siciliano et al. 2009, Robotics, equation 11.76, here with pitch). A unicycle
     that does not pitch takes velocity_z = gain (z error) instead.
 
-    The existing system takes the vehicle's own position instead of the point ahead, with which the distance need not decay to 0, and
+    SCRIMMAGE takes the vehicle's own position instead of the point ahead, with which the distance need not decay to 0, and
     pitch_rate 0.
     """
 

@@ -21,7 +21,7 @@ class UnicyclePID(Controller):
     vehicle that flies backwards. The desired speed is passed through as `speed`; the speed loop commands `acceleration_x`
     for models that take an acceleration. The integral of a loop is zero while its error exceeds `band`.
 
-    Other than in the existing system, elevation is nose up and a positive pitch_rate raises the nose; each loop's
+    Other than in SCRIMMAGE, elevation is nose up and a positive pitch_rate raises the nose; each loop's
     time step is that of the call (there, the full step even when called once per substep); the first call has no
     derivative kick; the derivative of an angle's error does not jump where the error passes from +pi to -pi; and a loop
     does not run if no plugin reads its output.

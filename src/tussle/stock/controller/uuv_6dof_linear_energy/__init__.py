@@ -1,4 +1,4 @@
-"""UUV6DOFLinearEnergy: a battery that the throttle empties."""
+"""UUV6DOFLinearEnergy: a battery discharged by the throttle."""
 
 from tussle.stock.controller.uuv_6dof_linear_energy.plugin import UUV6DOFLinearEnergy
 

@@ -1,4 +1,4 @@
-"""A battery that the throttle empties."""
+"""A battery discharged by the throttle."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from tussle.api import Controller, GroupView, Input, Output, Param, State, row_l
 
 
 class UUV6DOFLinearEnergy(Controller):
-    """Passes throttle, elevator and rudder on; the size of the throttle times time is taken from the battery.
+    """Passes throttle, elevator and rudder on; the battery loses the absolute value of the throttle times the time.
 
     When the energy is at energy_min, the throttle is 0.
 
-    Differences from the existing system: a negative throttle takes energy too (there, it charged the battery); the time step is that of
+    Differences from SCRIMMAGE: a negative throttle takes energy too (there, it charged the battery); the time step is that of
     the call; the energy starts within its limits and does not fall below them.
     """
 
@@ -34,7 +34,7 @@ class UUV6DOFLinearEnergy(Controller):
     @row_law("passed", "energy")
     @staticmethod
     def deplete(command: Any, energy_min: float, energy: float, dt: float) -> Any:
-        """Pass the commands, and take the energy."""
+        """Pass the commands, and reduce the energy."""
         throttle, elevator, rudder = command
         throttle = throttle if energy > energy_min else 0.0
         return (throttle, elevator, rudder), max(energy - abs(throttle) * dt, min(energy, energy_min))

@@ -24,7 +24,7 @@ class UUV6DOFPIDController(Controller):
     The integral of a loop is zero while its error exceeds `band`. Rates of turn and pitch are damped by fixed gains. With the
     defaults the speed loop has no integral, so a speed error remains, and a buoyant vehicle remains above the desired altitude.
 
-    Differences from the existing system: the time step of each loop is that of the call; the first call has no derivative kick; angles
+    Differences from SCRIMMAGE: the time step of each loop is that of the call; the first call has no derivative kick; angles
     are wrapped; rates are damped, which the hull needs (there, it was stable, because forces of inertia were missing).
     """
 

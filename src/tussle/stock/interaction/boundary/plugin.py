@@ -25,7 +25,7 @@ class Boundary(Interaction):
 
     Publishes its shape once (`BoundaryShape`) and each entry and exit (`BoundaryCrossed`).
 
-    The existing system ignored the rotation, and could not use a polyhedron.
+    SCRIMMAGE ignored the rotation, and could not use a polyhedron.
     """
 
     grade = "portable"
@@ -117,7 +117,7 @@ def _volume(
     shape: str, center: Vector, lengths: Vector, rpy: Vector, radius: float, normal: Vector,
     polyhedron: tuple[Vector, ...], polygon: tuple[tuple[float, float], ...],
 ) -> Volume:  # fmt: skip
-    """A region as a shape of the scene; kept, because finding its faces takes longer than a step."""
+    """Return a region as a shape of the scene. Cached, because finding its faces takes longer than a step."""
     if shape == "sphere":
         return Sphere(center=center, radius=radius)
     if shape == "plane":

@@ -1,4 +1,4 @@
-"""BulletCollision: bodies that push each other, and the scene, apart."""
+"""BulletCollision: contact forces between bodies, and between bodies and the scene."""
 
 from tussle.stock.interaction.bullet_collision.plugin import BulletCollision
 

@@ -12,13 +12,13 @@ from tussle.messages import EntityCollided, EntityHitGround
 from tussle.numeric.quaternion import quat_multiply, quat_normalize
 
 MOST_FOLLOWED = 2.0
-"""Relative motion in a step up to which pairs are followed, in sizes of the largest body: beyond, all pairs would be near each other."""
+"""Largest relative motion per step for which pairs are followed, in sizes of the largest body. Beyond it all pairs would be candidates."""
 FAST = 1e150
 """Speed beyond which a body is not followed [m/s]: the square of a velocity would overflow."""
 
 
 class BulletCollision(Interaction):
-    """Keeps bodies from passing into each other, into walls, meshes, terrain and ground: they bounce, slide, and rest on each other.
+    """Prevents overlaps of bodies with each other, and with walls, meshes, terrain and ground: bodies bounce, slide and rest.
 
     A body is a sphere of its block's radius, a box where the block has one, or a capsule inside that box for the blocks in `capsules`.
     Sequential impulses (Catto 2005) at the contacts change the velocities; Coulomb friction, Newton's restitution. Bodies with an
@@ -28,7 +28,7 @@ class BulletCollision(Interaction):
     Fast spheres and capsules are followed within the step, so that they do not pass through others; a box that moves by more than
     its own size in a step may. `EntityCollided` and `EntityHitGround` are published when a contact begins.
 
-    In the existing system all bodies are spheres; a contact sets the external force to 1 N along the normal, so that a SimpleCar stops.
+    In SCRIMMAGE all bodies are spheres; a contact sets the external force to 1 N along the normal, so that a SimpleCar stops.
     """
 
     grade = "portable"
@@ -86,7 +86,7 @@ class BulletCollision(Interaction):
         return other_id
 
     def start(self, w: WorldView) -> None:
-        self._shapes(w)  # so that a wrong name is told of before the first step
+        self._shapes(w)  # reports unknown names of blocks before the first step
         self._blocks(w, "fixed")
 
     def step(self, w: WorldView) -> None:
@@ -100,7 +100,7 @@ class BulletCollision(Interaction):
         if len(contacts):
             self._respond(w, contacts, sizes, (impulses, is_new))
         touches = found.remembered(contacts, w.id, sizes, impulses, self.memory)
-        self._tell(w, contacts, touches, is_new)
+        self._report(w, contacts, touches, is_new)
 
     def _near(self, w: WorldView, far: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Rows of the pairs that may touch, ordered by ids, (m,) each."""
@@ -114,14 +114,14 @@ class BulletCollision(Interaction):
         x, y, z = np.where(high > low, high - low, 0.0)
         motion = np.minimum(w.dt * np.sqrt(x * x + y * y + z * z), MOST_FOLLOWED * size[0])
         reach = np.maximum(2.02 * size[0] + motion, 1e-6)
-        self.reach[w.world] = reach[w.world]  # of worlds without bodies nothing changes
+        self.reach[w.world] = reach[w.world]  # unchanged in worlds without bodies
         listed_pairs = self.pairs(w)
         row, other = listed_pairs.row, listed_pairs.other
         order = np.argsort((w.id[row] << 32) + w.id[other], kind="stable")
         return row[order], other[order]
 
     def _shapes(self, w: WorldView) -> np.ndarray:
-        """Radius, negative for that of the body, and half lengths of each block [m], (n_blocks, 4)."""
+        """Return radius (negative to use the body's) and half lengths of the shape of each block [m], (n_blocks, 4)."""
         half = 0.5 * w.context.boxes
         is_box = half[:, 0] > 0.0
         shapes = np.concatenate([np.where(is_box, 0.0, -1.0)[:, None], half], axis=1)
@@ -174,7 +174,7 @@ class BulletCollision(Interaction):
         )
         vel, omega, turns = state[:, :3].T, state[:, 3:6].T, state[:, 7] > 0.0
         is_moved = (vel != w.vel).any(axis=0) | (omega != w.omega).any(axis=0) | (shifts != 0.0).any(axis=1)
-        # A state that is not finite is not this plugin's to tell of.
+        # The engine reports states that are not finite.
         rows = np.flatnonzero(is_moved & np.isfinite(vel + omega).all(axis=0))
         if not len(rows):
             return
@@ -186,15 +186,15 @@ class BulletCollision(Interaction):
             quat = quat_normalize(quat_multiply(small, w.quat[:, own]))
             w.move(own, quat=quat, omega=omega[:, own])
 
-    def _tell(
+    def _report(
         self, w: WorldView, contacts: found.ContactList, touches: np.ndarray, is_new: np.ndarray
     ) -> None:
-        """Publish the contacts that begin, and remove entities where that is asked for."""
+        """Publish the contacts that begin, and remove entities with `remove_on_collision`."""
         is_body = contacts.other >= 0
         removes = self.remove_on_collision[w.world]
-        met = np.flatnonzero(touches & is_new & is_body)
-        if len(met):
-            pair = np.stack([contacts.row[met], contacts.other[met]])
+        began = np.flatnonzero(touches & is_new & is_body)
+        if len(began):
+            pair = np.stack([contacts.row[began], contacts.other[began]])
             pair = pair[:, np.lexsort((w.id[pair[1]], w.id[pair[0]], w.world[pair[0]]))]
             is_first = np.append(True, (pair[:, 1:] != pair[:, :-1]).any(axis=0))
             first, second = pair = pair[:, is_first]

@@ -12,7 +12,7 @@ class CaptureInBoundaryInteraction(Interaction):
     """Entities of a boundary's team capture others within `capture_range`, if both are inside the boundary.
 
     Each intruder is captured by its nearest defender (on ties the smaller id). Without a cool-down, a defender captures all of these
-    in one step; with one, the nearest, and then nobody until the cool-down has passed. In the existing system distances were measured
+    in one step; with one, the nearest, and then nobody until the cool-down has passed. In SCRIMMAGE distances were measured
     at the positions of the start of the step.
 
     Raises:
@@ -58,7 +58,7 @@ class CaptureInBoundaryInteraction(Interaction):
 
 
 def _first_of(values: np.ndarray) -> np.ndarray:
-    """Whether each value, (m,), occurs for the first time."""
+    """Return whether each value, (m,), occurs for the first time."""
     is_first = np.zeros(len(values), bool)
     is_first[np.unique(values, return_index=True)[1]] = True
     return is_first

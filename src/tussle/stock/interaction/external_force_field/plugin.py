@@ -6,8 +6,8 @@ import numpy as np
 
 from tussle.api import Interaction, Param, State, WorldView
 from tussle.numeric import cos, sin
+from tussle.numeric.dryden import at_start, gust, low_altitude, passed
 from tussle.numeric.quaternion import quat_rotate
-from tussle.stock.interaction.external_force_field.dryden import at_start, gust, low_altitude, passed
 
 TAU = 6.283185307179586
 
@@ -15,10 +15,13 @@ TAU = 6.283185307179586
 class ExternalForceField(Interaction):
     """Pushes all entities with a force that is constant, changes at random, or follows from Dryden gusts, and turns them near the ground.
 
-    constant: `constant_force`. variable: one force for all entities of a world, drawn anew after times that are drawn too. dryden: `drag`
-    times the gust velocity, which has the spectra of MIL-F-8785C (1980) section 3.7.3 and is drawn for each entity; its intensity and
-    scales follow from the height, held between 10 and 1000 ft, and from the wind at 20 ft. A gust is convected at the speed of the
-    entity relative to the wind.
+    The values of `force_type` are:
+
+    * constant: `constant_force`.
+    * variable: one force for all entities of a world, redrawn after random times.
+    * dryden: `drag` times the gust velocity of each entity, with the spectra of MIL-F-8785C (1980) section 3.7.3. Intensity and length
+      scales follow from the height, clamped to 10 to 1000 ft, and from the wind at 20 ft. An entity flies through the gusts at its speed
+      relative to the wind.
 
     Between two heights moments about the body axes act, amplitude times sin(2 pi t / period). Motion models without forces ignore
     all of this.
@@ -82,13 +85,13 @@ class ExternalForceField(Interaction):
         c, s = c[w.world], s[w.world]
         x, y, z = w.vel - np.array([wind * c, wind * s, np.zeros(w.n)])
         path = w.dt * np.sqrt(x * x + y * y + z * z)
-        scale, sd = low_altitude(w.pos[2], wind)
+        scale_uv, scale_w, sd_uv, sd_w = low_altitude(w.pos[2], wind)
         draw = w.normal_by("gust", w.world, w.id, np.zeros(w.n, np.int64), 5)
         self.filters[:] = np.where(
-            self.is_known, passed(self.filters, path / scale[0], path / scale[1], draw), at_start(draw)
+            self.is_known, passed(self.filters, path / scale_uv, path / scale_w, draw), at_start(draw)
         )
         self.is_known[:] = True
-        along, across, up = gust(self.filters) * sd[[0, 0, 1]]
+        along, across, up = gust(self.filters) * np.array([sd_uv, sd_uv, sd_w])
         return np.array([c * along - s * across, s * along + c * across, up])
 
     def _turn(self, w: WorldView) -> None:

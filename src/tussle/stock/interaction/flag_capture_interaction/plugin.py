@@ -11,10 +11,10 @@ from tussle.messages import FlagCaptured, FlagTaken
 class FlagCaptureInteraction(Interaction):
     """A flag in one region, and the region to which opponents must bring it.
 
-    An entity that is not of the flag's team takes the flag by entering its boundary; of several in one step, the nearest to the
-    centre (on ties the smaller id). It captures the flag, once per game, by entering the capture boundary. When the carrier is
-    removed, the flag is free again, at its place. Publishes `FlagTaken` and `FlagCaptured`. In the existing system, of several
-    entities that took a flag in one step each published it and the last one had it.
+    An entity of another team takes the flag by entering its boundary. If several enter in one step, the nearest to the centre takes it
+    (on ties the smaller id). The carrier captures the flag, once per game, by entering the capture boundary. When the carrier is
+    removed, the flag returns to its place and is free again. Publishes `FlagTaken` and `FlagCaptured`. In SCRIMMAGE, if several entities
+    enter in one step, each publishes `FlagTaken`, and the last one has the flag.
 
     Raises:
         MissionError: An id is not that of exactly one boundary of the mission.
@@ -46,7 +46,7 @@ class FlagCaptureInteraction(Interaction):
         self._publish(w, FlagCaptured, rows)
 
     def _takers(self, w: WorldView, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Of those that enter, (m,), the rows of those that carry the flag, and of those that tell that they took it."""
+        """Return, of the entering rows, (m,), those that get the flag, and those for which `FlagTaken` is published."""
         x, y, z = w.pos[:, rows] - np.array(w.region(self.flag_boundary_id).center)[:, None]
         rows = rows[np.lexsort((w.id[rows], x * x + y * y + z * z))]
         _, first = np.unique(w.world[rows], return_index=True)

@@ -55,7 +55,7 @@ class GraphInteraction(Interaction):
 
 
 def _read(path: str, origin: Origin) -> Any:
-    """The graph of a file, with the attribute "pos" [m], (3,), world frame, of each node."""
+    """Read the graph of a file, and add the attribute "pos" [m], (3,), world frame, to each node."""
     try:
         import networkx as nx
     except ImportError:
@@ -79,7 +79,7 @@ def _read(path: str, origin: Origin) -> Any:
 
 
 def _position(values: dict[str, Any], has_crs: bool, origin: Origin) -> tuple[float, ...] | None:
-    """Position of a node [m], (3,), from its attributes; None if they hold no finite coordinates."""
+    """Return the position of a node [m], (3,), from its attributes; None if they hold no finite coordinates."""
     for east, north, up in COORDINATES:
         if east in values and north in values:
             try:

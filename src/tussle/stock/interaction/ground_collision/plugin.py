@@ -15,7 +15,7 @@ GRAVITY = 9.81  # [m/s^2]
 class GroundCollision(Interaction):
     """Removes entities that reach the ground level, or supports them by an upward force equal to their weight.
 
-    Publishes `EntityHitGround` when an entity touches the ground; the existing system published it in every step on the ground. It
+    Publishes `EntityHitGround` when an entity touches the ground; SCRIMMAGE published it in every step on the ground. It
     also rejects initial positions at or below the ground.
     """
 

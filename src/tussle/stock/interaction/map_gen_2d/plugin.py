@@ -14,7 +14,7 @@ MOST_WALLS = 20_000
 class MapGen2D(Interaction):
     """Walls where the image of a map is dark: boxes on which rays of the scene end. The upper edge of the image is north.
 
-    It needs Pillow, which `pip install 'tussle[maps]'` installs. The existing system looked the map up in its own folders.
+    It needs Pillow, which `pip install 'tussle[maps]'` installs. SCRIMMAGE looked the map up in its own folders.
     Entities collide with the walls where the mission has `BulletCollision` or `SceneCollision`.
 
     Raises:
@@ -69,7 +69,7 @@ class MapGen2D(Interaction):
 
 
 def _boxes(is_wall: np.ndarray) -> list[tuple[int, int, int, int]]:
-    """First and end row, first and end column of boxes: runs of pixels, joined with equal runs in the rows below."""
+    """Return first and end row, first and end column of boxes: runs of pixels, joined with equal runs in the rows below."""
     found, growing = [], dict[tuple[int, int], int]()
     for row in range(len(is_wall) + 1):
         runs = set()

@@ -13,7 +13,7 @@ class RandomAttrit(Interaction):
     """Removes entities of a team at random, so that their number decreases linearly to zero within `duration`.
 
     With n entities at `start_after`, ceil(n (1 - t / duration)) are left after another t seconds; all of the team are equally likely
-    to be removed, except those of `leave_alive`. The existing system removed at most one per step, and its draws had no seed.
+    to be removed, except those of `leave_alive`. SCRIMMAGE removed at most one per step, and its draws had no seed.
     """
 
     grade = "portable"

@@ -7,14 +7,14 @@ import numpy as np
 from tussle.api import Interaction, Param, State, WorldView
 
 FAR = 1e150
-"""Coordinate beyond which nobody collides [m]: the square of a distance would overflow."""
+"""Coordinate beyond which collisions are not checked [m]: the square of a distance would overflow."""
 
 
 class SceneCollision(Interaction):
     """Removes entities whose sphere of `radius` touches the scene: walls, buildings, meshes, hills, ground.
 
-    The straight path of the centre since the last step counts too, so that nobody passes through a thin wall. Initial positions in the
-    scene are rejected.
+    The straight path of the centre since the last step must be free too, so that fast entities do not pass through thin walls. Initial
+    positions in the scene are rejected.
     """
 
     grade = "portable"
@@ -34,7 +34,7 @@ class SceneCollision(Interaction):
         self.step(w)
 
     def step(self, w: WorldView) -> None:
-        """Remove who collides."""
+        """Remove colliding entities."""
         team = self.team[w.world]
         is_near = (np.abs(w.pos) < FAR).all(axis=0)
         rows = np.flatnonzero(((team == 0) | (team == w.team)) & is_near)
@@ -47,5 +47,5 @@ class SceneCollision(Interaction):
         self.last[:, rows], self.is_known[rows] = pos, True
 
     def rejects(self, w: WorldView, world: int, pos: np.ndarray, taken: np.ndarray) -> bool:
-        """Whether a point is in the scene."""
+        """Return True if a point is in the scene."""
         return not w.scene.free(pos[:, None], self.margin[world])[0]

@@ -12,7 +12,7 @@ class SimpleCapture(Interaction):
     """Decides capture claims (`CaptureEntity`) at the end of the step in which they are made. A claim is valid within `capture_range`.
 
     By default each capture is credited once, to the nearest claimant (on ties the smaller id). With `credit="each"` every valid claim
-    counts, as in the code of the 2018 paper: a prey claimed by k predators in one step scores k. The existing system decided one step
+    counts, as in the code of the 2018 paper: a prey claimed by k predators in one step scores k. SCRIMMAGE decided one step
     late and made a target immune for the rest of the run after a failed claim; here it can be claimed again.
     """
 

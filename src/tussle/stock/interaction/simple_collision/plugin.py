@@ -62,7 +62,7 @@ class SimpleCollision(Interaction):
         w.kill(np.unique(np.concatenate([met.row[k], met.other[k]])), "collision")
 
     def _colliding(self, w: WorldView, met: Listed) -> Any:
-        """Index of the pairs that collide, of those within the range."""
+        """Return the indices of the pairs within range that collide."""
         return slice(None)
 
     def rejects(self, w: WorldView, world: int, pos: np.ndarray, taken: np.ndarray) -> bool:

@@ -11,7 +11,7 @@ class TerrainGenerator(Interaction):
     """Adds random hills to the scene, the same in all worlds of a stack; rays meet them, and the viewer shows them.
 
     With RANDOM_WALK each height is the mean of its neighbours to the west, south and south-west plus a normal draw of `z_std`; LINEAR is an
-    inclined plane with random slopes; LINEAR_WALK is the sum of both. The mean height is that of `center`. The existing system draws
+    inclined plane with random slopes; LINEAR_WALK is the sum of both. The mean height is that of `center`. SCRIMMAGE draws
     with the mission's seed if `seed` is negative; here this is seed 0, because all worlds of a stack share the scene.
 
     Raises:

@@ -9,9 +9,9 @@ from tussle.messages import GoalReached
 
 
 class Arrivals(Metric):
-    """Counts by team who reached the goal (`GoalReached`), and their mean time of arrival [s]; the score is the count.
+    """Counts the entities that reached their goals (`GoalReached`), by team, with their mean arrival time [s]. The score is the count.
 
-    The mean is NaN for a team of which nobody arrived.
+    The mean is NaN for a team without arrivals.
     """
 
     grade = "portable"
@@ -21,10 +21,10 @@ class Arrivals(Metric):
 
     def step(self, w: WorldView) -> None:
         """Count the messages of this step."""
-        told = w.inbox(GoalReached)
-        teams = w.team_numbers(told.team)
-        np.add.at(self.arrived, (teams, told.world), 1)
-        np.add.at(self.total, (teams, told.world), told.t)
+        messages = w.inbox(GoalReached)
+        teams = w.team_numbers(messages.team)
+        np.add.at(self.arrived, (teams, messages.world), 1)
+        np.add.at(self.total, (teams, messages.world), messages.t)
 
     def result(self, w: WorldView) -> dict[str, np.ndarray]:
         """Return counts and mean times."""

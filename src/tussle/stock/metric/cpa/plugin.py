@@ -11,9 +11,9 @@ class CPA(Metric):
     """Closest point of approach of each team: the smallest distance to another entity in the run, the two entities, and the time.
 
     Distances are measured after the motion of each step. With `team_cpa` or a `team_id` only distances to team mates count, with a
-    `team_id` only entities of that team. The existing system wrote the smallest distance of each entity to a file and reported no
-    metric; here the columns `closest`, `other` and `when` hold it for living entities. Times are those of the measurement (in the
-    existing system, of the start of the step).
+    `team_id` only entities of that team. SCRIMMAGE wrote the smallest distance of each entity to a file and reported no
+    metric; here the columns `closest`, `other` and `when` hold it for living entities. Times are those of the measurement (in
+    SCRIMMAGE, of the start of the step).
     """
 
     grade = "portable"

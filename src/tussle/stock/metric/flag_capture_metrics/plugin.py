@@ -20,8 +20,8 @@ class FlagCaptureMetrics(Metric):
 
     def step(self, w: WorldView) -> None:
         for event, count in ((FlagTaken, self.flags_taken), (FlagCaptured, self.flags_captured)):
-            told = w.inbox(event)
-            np.add.at(count, (w.team_numbers(told.team), told.world), 1)
+            messages = w.inbox(event)
+            np.add.at(count, (w.team_numbers(messages.team), messages.world), 1)
 
     def result(self, w: WorldView) -> dict[str, np.ndarray]:
         score = self.flags_taken_w * self.flags_taken + self.flags_captured_w * self.flags_captured

@@ -11,7 +11,7 @@ from tussle.messages import RewardGiven
 class OpenAIRewards(Metric):
     """Sums the rewards (`RewardGiven`) of each team, and in the column `earned` those of each living entity.
 
-    The existing system wrote the sum of each entity to a file.
+    SCRIMMAGE wrote the sum of each entity to a file.
     """
 
     grade = "portable"
@@ -21,10 +21,10 @@ class OpenAIRewards(Metric):
     earned = State(per="entity", doc="Sum of the rewards of the entity.")
 
     def step(self, w: WorldView) -> None:
-        told = w.inbox(RewardGiven)
-        np.add.at(self.reward, (w.team_numbers(told.team), told.world), told.reward)
-        row = w.rows_at(told.world, told.entity)
-        np.add.at(self.earned, row[row >= 0], told.reward[row >= 0])
+        messages = w.inbox(RewardGiven)
+        np.add.at(self.reward, (w.team_numbers(messages.team), messages.world), messages.reward)
+        row = w.rows_at(messages.world, messages.entity)
+        np.add.at(self.earned, row[row >= 0], messages.reward[row >= 0])
 
     def result(self, w: WorldView) -> dict[str, np.ndarray]:
         return {"reward": self.reward}

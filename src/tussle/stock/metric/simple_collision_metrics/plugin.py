@@ -15,7 +15,7 @@ class SimpleCollisionMetrics(Metric):
     with the run; flight_time_norm is the team's sum divided by the time since the first entity appeared. The score is the weighted
     sum of flight_time_norm, team collisions and non-team collisions.
 
-    In the existing system survivors were not credited beyond the last removal of the run, flight times ended one step early, and
+    In SCRIMMAGE survivors were not credited beyond the last removal of the run, flight times ended one step early, and
     a team that appeared after the first step scored NaN.
     """
 

@@ -11,8 +11,8 @@ from tussle.numeric.paths import GRAVITY
 class Ballistic(MotionModel):
     """A mass in free fall without drag: x'' = F / m - (0, 0, g), Newton's second law with g = 9.81 m/s^2.
 
-    F is the external force, such as that of the ground. Parabolas are integrated exactly. The attitude does not change. In the
-    existing system gravity is the rate of the acceleration, and the attitude is that of the world frame.
+    F is the external force, such as that of the ground. Parabolas are integrated exactly. The attitude does not change. In
+    SCRIMMAGE gravity is the rate of the acceleration, and the attitude is that of the world frame.
     """
 
     grade = "portable"

@@ -21,7 +21,7 @@ class DoubleIntegrator(MotionModel):
     The attitude follows the direction of motion (`motion_model_sets_yaw`), or the yaw rate; in the second case
     `sim_copter_orientation` adds the tilt of a multirotor, proportional to the velocity. External forces are ignored.
 
-    The existing system advanced the position with the old velocity (no a dt^2 / 2), limited each component of the velocity, and
+    SCRIMMAGE advanced the position with the old velocity (no a dt^2 / 2), limited each component of the velocity, and
     wrote the yaw rate as the yaw angle; max_yaw_acc limited the yaw rate.
     """
 

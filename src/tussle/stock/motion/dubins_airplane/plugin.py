@@ -19,9 +19,9 @@ class DubinsAirplane(MotionModel):
 
     x' = V cos(pitch) cos(yaw), y' = V cos(pitch) sin(yaw), z' = V sin(pitch), yaw' = -(g / V) tan(roll), with pitch nose up and roll
     right wing down (Owen, Beard, McLain 2015, "Implementing Dubins airplane paths on fixed-wing UAVs", equation 5). Helices are exact.
-    A command keeps its value within its two limits; a bank beyond 89 degrees turns like one of 89 degrees.
+    Commands are clamped to their limits. A bank beyond 89 degrees turns like one of 89 degrees.
 
-    In the existing system a positive desired_pitch lowers the nose, and `vel` is the mean over the last substep.
+    In SCRIMMAGE a positive desired_pitch lowers the nose, and `vel` is the mean over the last substep.
     """
 
     grade = "portable"

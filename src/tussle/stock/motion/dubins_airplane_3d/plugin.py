@@ -21,7 +21,7 @@ class DubinsAirplane3D(MotionModel):
     with limits of the speed only, by default none. Elevation and bank stay within 90 degrees; a bank beyond 89 degrees turns like one
     of 89 degrees.
 
-    The existing system turns a banked body about its own z axis, at (g / V) tan(roll) there, so that its heading turns at
+    SCRIMMAGE turns a banked body about its own z axis, at (g / V) tan(roll) there, so that its heading turns at
     (g / V) sin(roll) / cos(pitch); a positive desired_pitch lowers the nose; and a force gives a velocity of force over mass.
     """
 

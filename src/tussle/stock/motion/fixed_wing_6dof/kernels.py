@@ -38,7 +38,7 @@ def flow_of(air):
 def air_force(air, flow, omega, surfaces, alpha_rate, wing, drag, lift, side_force):
     """Aerodynamic force [N] (x, y, z): lift and drag in the plane of symmetry, side force along the y axis.
 
-    Lift approaches that at 26 degrees, see `attached`.
+    Lift saturates at its value for an angle of attack of 26 degrees, see `attached`.
     C_D = C_D0 + C_D_alpha |alpha| + C_L^2 / (pi AR e) + C_D_delta_elevator |delta_e| with AR = b^2 / S; C_L and C_Y are linear in
     alpha, beta, the surfaces and the rates (Nelson 1998, chapter 3; Stevens and Lewis 2003, section 2.3).
 
@@ -116,7 +116,7 @@ def alpha_rate_of(air, omega, force, mass, wing, lift):
     Args:
         air: Velocity relative to the air.
         omega: Angular velocity.
-        force: All forces [N] but the part of the lift that is proportional to the rate, which acts along the opposite of w'.
+        force: All forces [N] except the part of the lift that is proportional to the rate, which acts opposite to w'.
         mass: Mass [kg].
         wing: As in `air_force`.
         lift: As in `air_force`.

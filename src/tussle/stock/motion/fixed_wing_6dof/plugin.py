@@ -29,13 +29,13 @@ RASCAL = tuple(SLUG_FT_SQ * i for i in (1.95, 0.0, 0.0, 0.0, 1.55, 0.0, 0.0, 0.0
 class FixedWing6DOF(RigidBodyModel):
     """A fixed-wing aircraft: Newton's and Euler's equations with linear aerodynamic derivatives, thrust along the body x axis.
 
-    m v' = R (air force + thrust) - m g, I w' = air moment - w x I w. The rate of the angle of attack is that of the state, not a
-    difference. Lift approaches that at an angle of attack of 26 degrees; up to 11 degrees it is linear within 1 %. throttle in
-    [throttle_input_min, throttle_input_max] gives thrust in [thrust_min, thrust_max]; the surfaces are clamped to their limits.
+    m v' = R (air force + thrust) - m g, I w' = air moment - w x I w. The rate of the angle of attack is computed from the
+    state, not as a difference. Lift saturates at its value for an angle of attack of 26 degrees; up to 11 degrees it is linear within
+    1 %. A throttle in [throttle_input_min, throttle_input_max] gives a thrust in [thrust_min, thrust_max]; surfaces are clamped.
     Positive elevator lowers the nose, positive aileron the right wing; rudder by C_n_delta_rudder. The defaults are the A-4D
     Skyhawk (Nelson 1998, "Flight stability and automatic control", appendix B), also called FixedWing6DOF-A-4D.
 
-    Differences from the existing system: air loads, weight and gyroscopic moment are those of each stage of the integration
+    Differences from SCRIMMAGE: air loads, weight and gyroscopic moment are those of each stage of the integration
     (there, of the start of the step); the rate of the angle of attack is used (there, 0); the wind is subtracted (there, added);
     the aspect ratio is span^2 / area (there, span / chord); lift is limited (there, it grew up to backward flight); the side
     force acts along the body y axis; drag by the elevator is read; the throttle is clamped to its range (there, to [-1, 1], which
@@ -104,7 +104,7 @@ class FixedWing6DOF(RigidBodyModel):
     launch_speed = Param(20.0, unit="m/s", ge=0.0, doc="Speed at which the launcher releases it.")
     launch_time = Param(30.0, unit="s", ge=0.0, doc="Time from its birth to the launch.")
     born = State(unit="s", doc="Time of its birth, with use_launcher.")
-    on_rail = State(unit="m", doc="Way on the launcher so far.")
+    on_rail = State(unit="m", doc="Distance travelled on the launcher.")
     throttle = Input(doc="Throttle.")
     elevator = Input(doc="Elevator [rad], nose down positive.")
     aileron = Input(doc="Aileron [rad], right wing down positive.")
@@ -180,13 +180,13 @@ class FixedWing6DOF(RigidBodyModel):
         self.born[rows] = g.t[rows]
 
     def to_body(self, body: MotionBody) -> None:
-        """Write the state; that of an aircraft on its launcher is the launcher's."""
+        """Write the states. Aircraft on their launchers have the state of the launcher."""
         if self.use_launcher.any():
             self._launch(body)
         super().to_body(body)
 
     def _launch(self, body: MotionBody) -> None:
-        """Move those on their launchers from where they were before this substep; `body.t` is the time of its start."""
+        """Move aircraft on their launchers, from their positions before this substep; `body.t` is the time of its start."""
         pushed = body.t - self.born - self.launch_time
         rows = np.flatnonzero((self.use_launcher != 0) & (pushed * self.launch_accel < self.launch_speed))
         since, push = np.maximum(pushed[rows], 0.0), self.launch_accel[rows]

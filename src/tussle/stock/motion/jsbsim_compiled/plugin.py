@@ -20,8 +20,9 @@ from tussle.api.range_kernel import RangeKernel
 from tussle.errors import ParameterError, listed, nearest_name
 from tussle.geodesy import Origin
 from tussle.numeric import cos, sin
+from tussle.numeric.dryden import at_start
 from tussle.numeric.quaternion import quat_conjugate, quat_multiply, quat_rotate, quat_rotate_inverse
-from tussle.stock.motion.jsbsim_compiled import flying
+from tussle.stock.motion.jsbsim_compiled import flightgear, flying
 from tussle.stock.motion.jsbsim_compiled.flying import BODY, FOOT, SLOTS
 from tussle.stock.motion.jsbsim_compiled.script import Script, read_script
 
@@ -32,9 +33,11 @@ SURFACES = "fcs/elevator-cmd-norm", "fcs/aileron-cmd-norm", "fcs/rudder-cmd-norm
 SETPOINTS = "ap/bank_setpoint", "ap/altitude_setpoint", "ap/airspeed_setpoint"
 ALTITUDE = "position/geod-alt-ft"
 WIND = "atmosphere/wind-north-fps", "atmosphere/wind-east-fps", "atmosphere/wind-down-fps"
+GUST = "atmosphere/gust-north-fps", "atmosphere/gust-east-fps", "atmosphere/gust-down-fps"
 GROUND = "position/terrain-elevation-asl-ft"
 FORWARD_RIGHT_DOWN = np.array([[0.0], [1.0], [0.0], [0.0]])
 """Rotation between body axes forward, left, up and forward, right, down."""
+TWO_TO_53 = 2.0**53
 MIRRORED = np.array([[1.0], [-1.0], [-1.0]])
 
 
@@ -42,7 +45,7 @@ TRIMS = "none", "longitudinal", "full"
 
 
 class SteadyFlightParam(Param):
-    """A trim. The conformance kit does not try all, as it tries `choices`: in its games no aircraft is in trim."""
+    """Name of a trim. It has no `choices`, because the conformance kit would try all, and its aircraft cannot be trimmed."""
 
     def convert(self, value: Any, where: str = "", from_geodetic: Callable[..., Any] | None = None) -> Any:
         """Check the name.
@@ -74,7 +77,7 @@ class Flown:
         self.altitude = at[ALTITUDE]
 
     def commands(self) -> tuple[np.ndarray, np.ndarray]:
-        """The constants of `flying.flight`: numbers and whole numbers; throttle and surfaces are kept within their limits.
+        """Return the constants of `flying.flight`, floats and integers. Throttle and surfaces are clamped to their limits.
 
         An autopilot takes bank [rad], altitude above the ellipsoid [ft] and airspeed [knot].
         """
@@ -98,8 +101,8 @@ class Flown:
 
 
 @cache
-def compiled(root: str, aircraft: str, script: str, is_autopilot: bool) -> Flown:
-    """The aircraft of a plugin, compiled once a process.
+def compiled(root: str, aircraft: str, script: str, is_autopilot: bool, is_shown: bool) -> Flown:
+    """Return the aircraft of a plugin, compiled once per process.
 
     Raises:
         ParameterError: It cannot be read or compiled.
@@ -108,7 +111,7 @@ def compiled(root: str, aircraft: str, script: str, is_autopilot: bool) -> Flown
     chosen = read_script(folder or package_root(), script) if script else Script(aircraft, ())
     keep = [ALTITUDE, *(name for name, _ in chosen.settings), *(SETPOINTS if is_autopilot else ())]
     try:
-        made = compile_aircraft(folder, chosen.aircraft, keep)
+        made = compile_aircraft(folder, chosen.aircraft, keep, flightgear.PROPERTIES if is_shown else ())
     except AircraftError as error:
         raise ParameterError(
             f"JSBSimCompiled: {error}; --set motion=JSBSimControl flies it by JSBSim itself"
@@ -120,9 +123,20 @@ class JSBSimCompiled(RigidBodyModel):
     """An aircraft of JSBSim's file format, compiled to one kernel for all its entities.
 
     Its equations, models and integrators are those of JSBSim (J. S. Berndt 2004, "JSBSim: an open source flight dynamics model in
-    C++") in their order, so that a flight is JSBSim's; one step per substep of the mission, 1/120 s is usual. Parameters and inputs
+    C++") in their order, so that flights equal JSBSim's; one step per substep of the mission, 1/120 s is usual. Parameters and inputs
     are those of JSBSimControl, and with commands="autopilot" those of JSBSimModel. Commands of surfaces are in [-1, 1], the throttle of
-    all engines in [0, 1]. Engines run from the start. What is not compiled is refused by name; JSBSimControl flies it.
+    all engines in [0, 1]. Engines run from the start. Parts that cannot be compiled are refused by name; JSBSimControl flies such aircraft.
+
+    Gusts have the spectra of MIL-F-8785C (1980) section 3.7, along and across the flight through the air, and change in each substep.
+    Below 1000 ft above the origin's tangent plane their scales and intensity follow from the height and the wind at 20 ft, above 2000 ft
+    the scales are 1750 ft, and between they change linearly. Gusts do not turn the air.
+
+    A FlightGear receives the packets that JSBSim would send, without temperatures of engines and angles of wheels; each aircraft
+    sends its own, so let one have the address.
+
+    `source()` writes the generated Python, which can be read, to the folder of compiled kernels, and returns its path:
+    `python -c "from tussle.stock import JSBSimCompiled; print(JSBSimCompiled(aircraft='c172p').source().read_text())"` prints it;
+    see [Six degrees of freedom](../six-degrees.md#generated-code).
 
     Raises:
         ParameterError: The aircraft cannot be read, or has something that is not compiled.
@@ -140,8 +154,34 @@ class JSBSimCompiled(RigidBodyModel):
         "none",
         doc="Trim at the start: none; longitudinal, by pitch, throttle and elevator trim; or full, by bank and the other surfaces too.",
     )
-    commands = Param("surfaces", choices=["surfaces", "autopilot"], doc="What is commanded.")
-    wind = Param((0.0, 0.0, 0.0), fields="east north up", unit="m/s", doc="Velocity of the air, world frame.")
+    commands = Param(
+        "surfaces",
+        choices=["surfaces", "autopilot"],
+        doc="Commands: control surfaces, or setpoints of the autopilot.",
+    )
+    wind = Param(
+        (0.0, 0.0, 0.0), fields="east north up", unit="m/s", doc="Mean velocity of the air, world frame."
+    )
+    gusts = Param("none", choices=["none", "dryden"], doc="Gusts, drawn for each aircraft.")
+    gust_wind_speed = Param(
+        7.7,
+        unit="m/s",
+        ge=0.0,
+        le=30.0,
+        doc="Wind at 20 ft (6.1 m) that makes gusts below 2000 ft (610 m); 7.7 m/s is light turbulence.",
+    )
+    gust_deviation = Param(
+        1.5,
+        unit="m/s",
+        ge=0.0,
+        le=30.0,
+        doc="Standard deviation of each component of gusts above 2000 ft (610 m).",
+    )
+    flightgear_output_enable = Param(
+        False, structural=True, doc="Send the states to a FlightGear, by UDP, at most 30 times a second."
+    )
+    flightgear_ip = Param("localhost", doc="Its address.")
+    flightgear_port = Param(5600, structural=True, ge=1, le=65535, doc="Its port.")
     throttle = Input(doc="Throttle.")
     elevator = Input(doc="Elevator, nose down positive.")
     aileron = Input(doc="Aileron, right wing down positive.")
@@ -162,23 +202,24 @@ class JSBSimCompiled(RigidBodyModel):
         if bool(own["script_name"]) == bool(own["aircraft"]):
             raise ParameterError("JSBSimCompiled takes script_name or aircraft, one of them")
         return compiled(
-            own["jsbsim_root"], own["aircraft"], own["script_name"], own["commands"] == "autopilot"
-        )
+            own["jsbsim_root"], own["aircraft"], own["script_name"], own["commands"] == "autopilot",
+            own["flightgear_output_enable"],
+        )  # fmt: skip
 
     def source(self) -> Path:
         """Write the generated Python of the aircraft's kernels to the cache folder, to be read; return its path."""
         return save_source(self.flown.aircraft)
 
     def steady_flight(self, speed: float, altitude: float) -> TrimPoint:
-        """Steady level flight at a speed [m/s] and an altitude [m], in calm air.
+        """Return steady level flight at a speed [m/s] and an altitude [m], in calm air.
 
         Raises:
-            ParameterError: There is none, or the aircraft cannot be compiled.
+            ParameterError: Steady flight is impossible, or the aircraft cannot be compiled.
         """
         return level_flight(self.flown.aircraft, speed, altitude)
 
     def linearize(self, speed: float, altitude: float) -> LinearModel:
-        """The matrices of the linear model of steady level flight, e.g. for a linear-quadratic regulator.
+        """Return the matrices of the linear model of steady level flight, e.g. for a linear-quadratic regulator.
 
         Raises:
             ParameterError: As `steady_flight`.
@@ -186,16 +227,21 @@ class JSBSimCompiled(RigidBodyModel):
         return linearize(self.flown.aircraft, self.steady_flight(speed, altitude))
 
     def active_inputs(self) -> list[str]:
-        """The inputs of surfaces, or of the autopilot."""
+        """Return the inputs of the surfaces, or of the autopilot."""
         is_autopilot = self.values["commands"] == "autopilot"
         return [name for name in type(self).inputs() if (name in self.by_autopilot) == is_autopilot]
 
     def state_size(self, name: str) -> int:
-        """The rigid body, the world frame, and all slots of the aircraft."""
-        return SLOTS + len(self.flown.aircraft.slots)
+        """Return the number of components: rigid body, world frame, all slots of the aircraft, and the state of gusts."""
+        return SLOTS + len(self.flown.aircraft.slots) + (flying.GUSTS if self.is_gusty else 0)
+
+    @property
+    def is_gusty(self) -> bool:
+        """True if there are gusts."""
+        return bool(self.values["gusts"] == "dryden")
 
     def from_body(self, body: MotionBody, rows: np.ndarray) -> None:
-        """Start the aircraft of some rows at their place, with their velocity and rates, engines running."""
+        """Start the aircraft of some rows at their positions, with their velocities and rates, engines running."""
         flown, n = self.flown, len(rows)
         aircraft, origin = flown.aircraft, body.scene.origin
         frame, center = earth_frame(origin)
@@ -227,30 +273,56 @@ class JSBSimCompiled(RigidBodyModel):
             body.quat[:, rows], body.omega[:, rows] = attitude, 0.0
         state = self.rigid_body
         state[BODY:SLOTS, rows] = np.concatenate([frame, np.array(center)[:, None]])
-        state[SLOTS:, rows] = x
+        state[SLOTS : SLOTS + len(x), rows] = x
+        if self.is_gusty:
+            filters = at_start(body.normal("gusts", 5)[:, rows])
+            seeds = np.floor(TWO_TO_53 * body.uniform("seeds of gusts")[rows])
+            own = [seeds, 0.0 * seeds, self.gust_wind_speed[rows], self.gust_deviation[rows]]
+            state[SLOTS + len(x) :, rows] = np.concatenate([filters, own])
         super().from_body(body, rows)
 
     @property
-    def range_kernel(self) -> RangeKernel:
+    def kernel(self) -> RangeKernel:
         """The kernel that makes steps of all aircraft."""
         numbers, wholes = self.flown.commands()
-        return RangeKernel(flying.flight(), numbers, wholes, ROWS_PER_THREAD)
+        if not self.is_gusty:
+            return RangeKernel(flying.flight(), numbers, wholes, ROWS_PER_THREAD)
+        slots = self.flown.aircraft.slots
+        places = [SLOTS + len(slots), *(SLOTS + slots[name] for name in (ALTITUDE, GROUND, *WIND, *GUST))]
+        wholes = np.concatenate([wholes, np.array(places)])
+        return RangeKernel(flying.gusty_flight(), numbers, wholes, ROWS_PER_THREAD)
+
+    @property
+    def range_kernel(self) -> RangeKernel | None:
+        """The kernel, None if states are sent after steps."""
+        return None if self.values["flightgear_output_enable"] else self.kernel
 
     @property
     def advance(self) -> Any:
         """The function that makes steps of all aircraft."""
-        return self.range_kernel.advance
+        fly = self.kernel.advance
+        if not self.values["flightgear_output_enable"]:
+            return fly
+        viewer = self.values["flightgear_ip"], self.values["flightgear_port"]
+        aircraft = self.flown.aircraft
+
+        def advance(x: np.ndarray, u: np.ndarray, p: np.ndarray, dt: float, substeps: int) -> None:
+            """Make steps of all aircraft, and send their states."""
+            fly(x, u, p, dt, substeps)
+            flightgear.send(x[SLOTS:], aircraft.slots, aircraft.n_engines, dt, *viewer)
+
+        return advance
 
 
 def earth_frame(origin: Origin) -> tuple[np.ndarray, tuple[float, float, float]]:
-    """Quaternion from the world frame to Earth-centred axes, (4, 1), and the origin in these [m]."""
+    """Return the quaternion from the world frame to Earth-centred axes, (4, 1), and the origin in these axes [m]."""
     half = np.sqrt(0.5)
     local = local_frame(np.array([origin.latitude]), np.array([origin.longitude]))
     return quat_multiply(local, np.array([[0.0], [half], [half], [0.0]])), origin.earth_centred
 
 
 def local_frame(latitude: np.ndarray, longitude: np.ndarray) -> np.ndarray:
-    """Quaternions from axes north, east, down at geodetic places [rad] to Earth-centred ones, (4, n)."""
+    """Return quaternions from axes north, east, down at geodetic positions [rad], (n,), to Earth-centred axes, (4, n)."""
     zero, a, b = np.zeros_like(latitude), 0.5 * longitude, 0.5 * (-0.5 * np.pi - latitude)
     return np.asarray(
         quat_multiply(np.stack([cos(a), zero, zero, sin(a)]), np.stack([cos(b), zero, sin(b), zero]))

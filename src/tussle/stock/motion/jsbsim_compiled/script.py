@@ -1,4 +1,4 @@
-"""Scripts of JSBSim, as far as they name an aircraft and set properties when they start."""
+"""Reader of JSBSim scripts that name an aircraft and set properties at the start."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def read_script(root: Path, name: str) -> Script:
     """Read a script.
 
     Raises:
-        AircraftError: It cannot be read, or does more than to set properties at the start.
+        AircraftError: It cannot be read, or does anything but set properties at the start.
     """
     if not NAME.fullmatch(name):
         raise AircraftError(f"script_name {name[:80]!r} is no name of a file below {root / 'scripts'}")

@@ -19,7 +19,7 @@ Flown = tuple[np.ndarray, dict[int, str]]
 
 
 class Fleet:
-    """Aircraft by number. One that fails flies no more, and its error is in all further results."""
+    """Aircraft by number. An aircraft that fails is not flown any more; its error is part of all later results."""
 
     def __init__(self) -> None:
         self.numbers = itertools.count()
@@ -32,7 +32,7 @@ class Fleet:
 
     def load(self, number: int, saved: SavedFlight) -> None:
         """Repeat a flight."""
-        self._add(number, lambda: JSBSimFlight.again(saved))
+        self._add(number, lambda: JSBSimFlight.replay(saved))
 
     def close(self, number: int) -> None:
         """Release an aircraft."""
@@ -40,7 +40,7 @@ class Fleet:
         self.errors.pop(number, None)
 
     def save(self, number: int) -> SavedFlight | tuple[()]:
-        """Return all that was done to an aircraft, nothing if it has failed."""
+        """Return the record of an aircraft's flight; empty if it has failed."""
         return self.flights[number].save() if number in self.flights else ()
 
     def place(self, numbers: Sequence[int], places: np.ndarray, origin: Origin) -> Flown:
@@ -79,6 +79,6 @@ class Fleet:
         return np.array(read).reshape(len(numbers), len(STATE)), failed
 
     def _fail(self, number: int, error: Exception) -> None:
-        is_told = isinstance(error, ParameterError)
-        self.errors[number] = str(error) if is_told else f"JSBSim: {type(error).__name__}: {error}"
+        is_own = isinstance(error, ParameterError)
+        self.errors[number] = str(error) if is_own else f"JSBSim: {type(error).__name__}: {error}"
         self.flights.pop(number, None)

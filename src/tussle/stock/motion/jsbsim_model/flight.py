@@ -27,17 +27,17 @@ PLACE = (
 )  # fmt: skip
 MOTION = "ic/vn-fps", "ic/ve-fps", "ic/vd-fps", "ic/p-rad_sec", "ic/q-rad_sec", "ic/r-rad_sec"
 THROTTLES = "fcs/throttle-cmd-norm"
-"""Stands for those of all engines."""
+"""Stands for the throttles of all engines."""
 WIND = "atmosphere/wind-north-fps", "atmosphere/wind-east-fps", "atmosphere/wind-down-fps"
 TRIMS = {"none": -1, "longitudinal": 0, "full": 1, "ground": 2}
 Placing = tuple[Sequence[float], Origin]
 """Arguments of `JSBSimFlight.place`."""
 SavedFlight = tuple["Aircraft", float, list[tuple[Placing, "array[float]"]]]
-"""What `JSBSimFlight.save` returns."""
+"""Record of a flight, as `JSBSimFlight.save` returns it."""
 
 
 class Aircraft(NamedTuple):
-    """What is loaded, and how it starts.
+    """Aircraft to load, and its start.
 
     Attributes:
         root: Folder of aircraft, engine, systems and scripts; empty for that of the package.
@@ -45,7 +45,7 @@ class Aircraft(NamedTuple):
         script: File name of the script, or empty.
         trim: A key of TRIMS.
         flightgear: Address, port and protocol of a FlightGear that shows the aircraft, if any.
-        commanded: Properties that are set before each step; THROTTLES stands for those of all engines.
+        commanded: Properties that are set before each step; THROTTLES stands for the throttles of all engines.
         needed: Properties that the aircraft must have.
     """
 
@@ -59,10 +59,10 @@ class Aircraft(NamedTuple):
 
 
 class JSBSimFlight:
-    """An aircraft of JSBSim, with all that was done to it: JSBSim cannot save its state, but repeats a flight bit for bit.
+    """An aircraft of JSBSim and the record of its flight. JSBSim cannot save its state, but a replay of the flight is bit-identical.
 
     Args:
-        aircraft: What to load.
+        aircraft: Aircraft to load.
         dt: Length of a step [s].
 
     Raises:
@@ -88,8 +88,8 @@ class JSBSimFlight:
         """Set the state.
 
         Args:
-            values: Of the properties PLACE, MOTION and WIND. Without a velocity, an aircraft starts with that of its script.
-            origin: Of the world frame; the ground is level with it.
+            values: Values of the properties PLACE, MOTION and WIND. Without a velocity, an aircraft starts with that of its script.
+            origin: Origin of the world frame; the ground has its altitude.
 
         Raises:
             ParameterError: The aircraft cannot be trimmed.
@@ -137,12 +137,12 @@ class JSBSimFlight:
         return [read() for read in self.read]
 
     def save(self) -> SavedFlight:
-        """Return all that was done to the aircraft."""
+        """Return the record of the flight."""
         return self.aircraft, self.dt, self.history
 
     @classmethod
-    def again(cls, saved: SavedFlight) -> Self:
-        """Repeat a flight.
+    def replay(cls, saved: SavedFlight) -> Self:
+        """Load the aircraft and repeat its flight.
 
         Raises:
             ParameterError: JSBSim is not installed, or cannot load the aircraft.
@@ -158,7 +158,7 @@ class JSBSimFlight:
         return flight
 
 
-def load(wanted: Aircraft, dt: float) -> Any:
+def load(aircraft: Aircraft, dt: float) -> Any:
     """Return an executive of JSBSim with the aircraft, without outputs except for FlightGear.
 
     Raises:
@@ -168,17 +168,17 @@ def load(wanted: Aircraft, dt: float) -> Any:
         import jsbsim
     except ImportError:
         raise ParameterError("JSBSim is not installed: pip install 'tussle[jsbsim]'") from None
-    root = Path(wanted.root or jsbsim.get_default_root_dir())
+    root = Path(aircraft.root or jsbsim.get_default_root_dir())
     key, name, folder = (
-        ("script_name", wanted.script, "scripts")
-        if wanted.script
-        else ("aircraft", wanted.aircraft, "aircraft")
+        ("script_name", aircraft.script, "scripts")
+        if aircraft.script
+        else ("aircraft", aircraft.aircraft, "aircraft")
     )
     file = root / folder / name / f"{name}.xml" if folder == "aircraft" else root / folder / name
     if not file.is_file():
-        there = sorted(p.name for p in (root / folder).glob("*" if folder == "aircraft" else "*.xml"))
+        names = sorted(p.name for p in (root / folder).glob("*" if folder == "aircraft" else "*.xml"))
         raise ParameterError(
-            f"{key} = {name!r}: {root / folder} has no such file{nearest_name(name, there)}; jsbsim_root names the folder with "
+            f"{key} = {name!r}: {root / folder} has no such file{nearest_name(name, names)}; jsbsim_root names the folder with "
             "aircraft, engine, systems and scripts"
         )
     log = messages()
@@ -187,7 +187,7 @@ def load(wanted: Aircraft, dt: float) -> Any:
     fdm.set_debug_level(0)
     fdm.set_dt(dt)
     try:
-        is_loaded = fdm.load_script(f"scripts/{name}", dt, "") if wanted.script else fdm.load_model(name)
+        is_loaded = fdm.load_script(f"scripts/{name}", dt, "") if aircraft.script else fdm.load_model(name)
     except (OSError, RuntimeError) as error:
         log.lines.append(str(error))
         is_loaded = False
@@ -195,20 +195,20 @@ def load(wanted: Aircraft, dt: float) -> Any:
         raise ParameterError(
             f"{key} = {name!r}: JSBSim cannot load {file}: {' '.join(' '.join(log.lines).split())}"
         )
-    for each in wanted.needed:
+    for each in aircraft.needed:
         if "No matches" in fdm.query_property_catalog(each):
             raise ParameterError(
                 f"{key} = {name!r}: {fdm.get_model_name()} has no property {each}, which JSBSimModel sets; "
                 "take an aircraft with such an autopilot, or JSBSimControl"
             )
-    # Aircraft and scripts may ask for files of their own; nothing is written where the user did not ask for it.
+    # Aircraft and scripts may declare output files; none are written, because the user did not request them.
     n_outputs = 0
     while fdm.set_output_filename(n_outputs, os.devnull):
         n_outputs += 1
     fdm.disable_output()
     fdm.disable_input()
-    if wanted.flightgear:
-        _show(fdm, wanted.flightgear, dt)
+    if aircraft.flightgear:
+        _show(fdm, aircraft.flightgear, dt)
     return fdm
 
 

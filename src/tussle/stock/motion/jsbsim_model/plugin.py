@@ -32,7 +32,7 @@ MIRRORED = np.array([[1.0], [-1.0], [-1.0]])
 
 
 class TrimParam(Param):
-    """A trim of JSBSim. The conformance kit does not try all, as it tries `choices`: in its games no aircraft is in trim."""
+    """Name of a trim of JSBSim. It has no `choices`, because the conformance kit would try all, and its aircraft cannot be trimmed."""
 
     def convert(self, value: Any, where: str = "", from_geodetic: Callable[..., Any] | None = None) -> Any:
         """Check the name.
@@ -53,9 +53,9 @@ class FlightHandle:
 
     Attributes:
         fleet: The aircraft of all entities.
-        number: In the fleet.
-        origin: Of the world frame.
-        failure: Why it flies no more, or empty.
+        number: Number in the fleet.
+        origin: Origin of the world frame.
+        failure: Error that ended the flight, or empty.
     """
 
     def __init__(self, fleet: Fleet | FleetProcesses, origin: Origin) -> None:
@@ -117,10 +117,10 @@ class JSBSimAircraft(RigidBodyModel):
         return flight
 
     def save_one(self, flight: FlightHandle) -> SavedFlight:
-        """Return all that was done to the aircraft.
+        """Return the record of the flight.
 
         Raises:
-            SnapshotError: It has failed.
+            SnapshotError: The aircraft has failed.
         """
         saved = flight.fleet.save(flight.number)
         if not saved:
@@ -229,7 +229,7 @@ class JSBSimControl(JSBSimAircraft):
 
     Positive elevator lowers the nose, positive aileron the right wing; positive rudder turns the nose to the left in most aircraft.
 
-    Differences from the existing system: the attitude and velocity of the entity count at the start; an aircraft can be named without
+    Differences from SCRIMMAGE: the attitude and velocity of the entity count at the start; an aircraft can be named without
     a script and trimmed; the throttle counts from the start on (there, after 0.05 s); latitudes are geodetic.
 
     Raises:
@@ -253,7 +253,7 @@ class JSBSimModel(JSBSimAircraft):
     It sets the properties ap/bank_setpoint [rad], ap/altitude_setpoint [ft] and ap/airspeed_setpoint [knot]; the script switches the
     autopilot on. None of the aircraft of the package has a bank setpoint: `jsbsim_root` names the folder with yours.
 
-    Differences from the existing system: latitudes are geodetic, positions are not rounded, the entity has not flown a step when it
+    Differences from SCRIMMAGE: latitudes are geodetic, positions are not rounded, the entity has not flown a step when it
     is born, and it starts with its own velocity, if it has one.
 
     Raises:

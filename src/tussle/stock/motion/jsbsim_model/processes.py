@@ -53,16 +53,16 @@ class FleetProcesses:
         """Release an aircraft."""
         process = self.process_of.pop(number, None)
         if process is not None:
-            with self._whole():
+            with self._ended_on_error():
                 process.n_flights -= 1
                 process.send("close", number)
 
     def save(self, number: int) -> SavedFlight | tuple[()]:
-        """Return all that was done to an aircraft, nothing if it has failed or its process has ended."""
+        """Return the record of an aircraft's flight; empty if it has failed or its process has ended."""
         process = self.process_of.get(number)
         if process is None:
             return ()
-        with self._whole():
+        with self._ended_on_error():
             process.send("save", number)
             try:
                 return cast(SavedFlight, process.receive())
@@ -72,11 +72,11 @@ class FleetProcesses:
 
     def place(self, numbers: Sequence[int], places: np.ndarray, origin: Origin) -> Flown:
         """Set the states of some aircraft; places are as in `JSBSimFlight.place`, (m, 15)."""
-        return self._ask("place", numbers, places, origin)
+        return self._call("place", numbers, places, origin)
 
     def fly(self, numbers: Sequence[int], commands: np.ndarray, n_steps: int) -> Flown:
         """Make some steps of some aircraft with these commands, (m, k)."""
-        return self._ask("fly", numbers, commands, n_steps)
+        return self._call("fly", numbers, commands, n_steps)
 
     def end(self) -> None:
         """End the processes, before the simulation ends or after an exception."""
@@ -85,7 +85,7 @@ class FleetProcesses:
             self.processes.pop().end()
 
     def _send_new(self, number: int, call: str, *values: Any) -> None:
-        with self._whole():
+        with self._ended_on_error():
             if len(self.processes) < self.n:
                 self.processes.append(FleetProcess())
             process = min(self.processes, key=lambda each: each.n_flights)
@@ -93,14 +93,14 @@ class FleetProcesses:
             process.n_flights += 1
             process.send(call, number, *values)
 
-    def _ask(self, call: str, numbers: Sequence[int], values: np.ndarray, *more: Any) -> Flown:
+    def _call(self, call: str, numbers: Sequence[int], values: np.ndarray, *more: Any) -> Flown:
         parts: dict[FleetProcess, list[int]] = {}
         lost: list[int] = []
         for k, number in enumerate(numbers):
             process = self.process_of.get(number)
             (lost if process is None else parts.setdefault(process, [])).append(k)
         read, errors = np.empty((len(numbers), len(NOWHERE))), dict[int, str]()
-        with self._whole():
+        with self._ended_on_error():
             for process, mine in parts.items():
                 process.send(call, [numbers[k] for k in mine], values[mine], *more)
             for process, mine in parts.items():
@@ -120,8 +120,8 @@ class FleetProcesses:
         process.end()
 
     @contextmanager
-    def _whole(self) -> Iterator[None]:
-        """After an exception between question and answer, the answer would be taken for that of the next question."""
+    def _ended_on_error(self) -> Iterator[None]:
+        """End all processes on an exception; otherwise a pending answer would be taken for the answer to the next call."""
         try:
             yield
         except BaseException:
@@ -149,7 +149,7 @@ class FleetProcess:
 
     def send(self, call: str, *values: Any) -> None:
         """Send the name of a method of `Fleet` and its arguments."""
-        with suppress(OSError):  # it has died; `receive` says so
+        with suppress(OSError):  # the process has died; `receive` raises
             pickle.dump((call, values), self.input, pickle.HIGHEST_PROTOCOL)
             self.input.flush()
 
@@ -174,8 +174,8 @@ class FleetProcess:
 
 
 def serve() -> None:
-    """In the process: call methods of a fleet until the input ends."""
-    # What JSBSim or a library prints must not get among the results.
+    """Main function of a fleet's process: call methods of a fleet until the input ends."""
+    # Output that JSBSim or a library prints must not mix with the results.
     results: BinaryIO = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     fleet = Fleet()

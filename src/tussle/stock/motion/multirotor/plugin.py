@@ -45,7 +45,7 @@ class Multirotor(RigidBodyModel):
     to the left), else -1. Bouabdallah 2007, "Design and control of quadrotors with application to autonomous flying", chapter 2,
     without hub forces. At most eight rotors.
 
-    Differences from the existing system: a rotor at omega_min has thrust; height and tilt of rotors are used; body velocity and world
+    Differences from SCRIMMAGE: a rotor at omega_min has thrust; height and tilt of rotors are used; body velocity and world
     velocity are one state, which starts at the velocity of the entity; weight, drag and gyroscopic moment are those of each stage of
     the integration, not of the start of the step; external forces are forces, not the test of a contact with the ground.
     """
@@ -125,7 +125,7 @@ class Multirotor(RigidBodyModel):
 
     @service
     def airframe(self, g: GroupView) -> dict[str, np.ndarray]:
-        """Weight per mass, mass, inertia, rotor coefficients and limits of each row, (n,) or (9, n), for controllers of this model.
+        """Return gravity, mass, inertia, rotor coefficients and limits of each row, (n,) or (9, n), for controllers of this model.
 
         `rotor_config` is (rotors, 7).
         """

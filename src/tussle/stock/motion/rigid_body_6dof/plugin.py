@@ -18,7 +18,7 @@ class RigidBody6DOF(RigidBodyModel):
     does not pass them; velocity along the body y and z axes decays with a time constant of 0.2 s, as if by lift and side force.
     The mass is that of the block. External forces and torques act on it.
 
-    Differences from the existing system: there the rates were overwritten by 0.001 rad/s before each step, so that the model could not
+    Differences from SCRIMMAGE: there the rates were overwritten by 0.001 rad/s before each step, so that the model could not
     be steered, and the velocity of the body was never written.
     """
 

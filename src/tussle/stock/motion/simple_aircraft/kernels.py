@@ -1,4 +1,4 @@
-"""SimpleAircraft's law: RK4 with what repeats left out, and the state made public.
+"""SimpleAircraft's law, RK4 without repeated evaluations, and the output of the state to the body table.
 
 Rows go through scratch arrays in blocks, because LLVM vectorises loops over few arrays only.
 """

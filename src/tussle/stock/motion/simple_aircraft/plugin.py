@@ -15,11 +15,11 @@ class SimpleAircraft(MotionModel):
 
     x' = V cos(pitch) cos(yaw), y' = V cos(pitch) sin(yaw), z' = V sin(pitch), yaw' = V tan(roll) / L with the radius
     L = turning_radius + radius_slope_per_speed (V - speed_target), roll' = roll_rate, pitch' = pitch_rate, V' =
-    throttle / 5; pitch is nose up. As in the existing system, a positive roll (and roll_rate) turns to the left. The
+    throttle / 5; pitch is nose up. As in SCRIMMAGE, a positive roll (and roll_rate) turns to the left. The
     roll of the body attitude is positive right wing down, so it has the opposite sign.
 
     Limits hold at the end of every substep: a rate that would exceed a limit is reduced so that the substep ends at it.
-    The existing system clamped before each step, so its state could exceed a limit by one step. There, the z velocity
+    SCRIMMAGE clamped before each step, so its state could exceed a limit by one step. There, the z velocity
     had the wrong sign, a positive pitch_rate lowered the nose, and the initial velocity was horizontal for any pitch.
     """
 

@@ -9,7 +9,7 @@ from tussle.numeric.kernel import device
 from tussle.numeric.paths import GRAVITY, arc, clamp
 
 STEERING_MAX = 0.25 * math.pi - 1e-4
-"""Largest steering angle of the existing system [rad]."""
+"""Largest steering angle of SCRIMMAGE [rad]."""
 
 
 @device

@@ -16,7 +16,7 @@ class SimpleCar(MotionModel):
     v = speed within [0, max_velocity] and a steering angle of at most 45 degrees. Arcs are exact. With `enable_gravity` the car falls
     until a force bears its weight, such as that of `GroundCollision`. Other forces are ignored.
 
-    The existing system calls the steering angle `turn_rate`, falls with 9.8 m/s^2 times the mass, sets the initial velocity to 0 and
+    SCRIMMAGE calls the steering angle `turn_rate`, falls with 9.8 m/s^2 times the mass, sets the initial velocity to 0 and
     stops the car along each axis with a force. Its parameter `mass` is that of the block here.
     """
 

@@ -26,7 +26,7 @@ def flown(x, y, z, vx, vy, vz, yaw, yaw_rate, x_thrust, y_thrust, z_thrust, turn
     fx, fy = vx + sixth * (ax_0 + 4.0 * ax_m + ax_1), vy + sixth * (ay_0 + 4.0 * ay_m + ay_1)
     fz = vz + dt * z_thrust
     vx_1, vy_1, vz_1 = shortened(fx, fy, fz, max_vel)
-    # A velocity that is shortened loses what it is shortened by at a constant rate.
+    # A limited velocity loses its excess at a constant rate.
     px = x + dt * (vx + sixth * (ax_0 + 2.0 * ax_m) + 0.5 * (vx_1 - fx))
     py = y + dt * (vy + sixth * (ay_0 + 2.0 * ay_m) + 0.5 * (vy_1 - fy))
     pz = z + dt * 0.5 * (vz + vz_1)

@@ -18,7 +18,7 @@ class SimpleQuadrotor(MotionModel):
     2012, "Trajectory generation and control for precise aggressive maneuvers with quadrotors", section 3.2. Gravity is compensated.
     The attitude is tilted in proportion to the velocity, nose down forwards, at most max_pitch. External forces are ignored.
 
-    In the existing system the velocity turns with the nose, and y_thrust and the velocity to the left have no effect; the speed counts
+    In SCRIMMAGE the velocity turns with the nose, and y_thrust and the velocity to the left have no effect; the speed counts
     up to 15 m/s forwards and 10 m/s upwards only.
     """
 

@@ -12,10 +12,10 @@ class SingleIntegrator(MotionModel):
     """A point that moves at the commanded velocity and faces its direction of motion.
 
     x' = v. A constant velocity is integrated exactly, for any number of substeps. With `max_speed` >= 0 every nonzero
-    command is scaled to max_speed, as in the existing system.
+    command is scaled to max_speed, as in SCRIMMAGE.
 
     In a climb the nose is up. At rest the attitude does not change, and in vertical motion the heading does not change.
-    In the existing system a climb lowered the nose, and at rest the heading was East. Some of its missions set `vel_max`,
+    In SCRIMMAGE a climb lowered the nose, and at rest the heading was East. Some of its missions set `vel_max`,
     which its model did not read.
     """
 

@@ -10,7 +10,7 @@ from tussle.api import MotionBody, MotionModel, State
 class Still(MotionModel):
     """A body that does not move: a ground station, a target, a landmark. It has no inputs.
 
-    Missions of the existing system name no motion model for such entities.
+    Missions of SCRIMMAGE name no motion model for such entities.
     """
 
     grade = "portable"

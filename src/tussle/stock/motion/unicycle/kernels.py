@@ -1,4 +1,4 @@
-"""The unicycle's laws: RK4 over any number of substeps in closed form, and the state made public.
+"""The unicycle's laws, RK4 over any number of substeps in closed form, and the output of the state to the body table.
 
 With constant speed and rates the derivative depends on time only, so RK4 is Simpson's rule, and its sum over N substeps
 of length h is geometric. For an angle a with rate w and delta = h w / 2:
@@ -10,8 +10,8 @@ and the same for sin. With pitch, cos(pitch) cos(yaw) is split into the angles y
 equals RK4 up to rounding (with smaller rounding errors), and 12 substeps cost as much as one. The alternative, rotating
 cosine and sine once per substep, is as accurate, but its cost grows with the number of substeps.
 
-What is made public goes in blocks of rows through one scratch array each for angles, sines and cosines, because LLVM vectorises
-loops over few arrays only; at fixed distances in one array it sees that columns do not overlap.
+The output is computed in blocks of rows, with one scratch array each for angles, sines and cosines: LLVM vectorises only loops over
+few arrays, and it recognizes that columns at fixed distances in one array do not overlap.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def clamp(value, limit):
 
 @device
 def fold(delta):
-    """(delta - k pi in [-pi/2, pi/2], 1.0 if k is odd else 0.0), which avoids 0/0 in sin(N d)/sin(d) near multiples of pi."""
+    """Return delta - k pi in [-pi/2, pi/2], and 1.0 if k is odd else 0.0. This avoids 0/0 in sin(N d)/sin(d) near multiples of pi."""
     k = (delta * INVERSE_PI + ROUNDER) - ROUNDER
     odd = abs(k - 2.0 * ((0.5 * k + ROUNDER) - ROUNDER))
     return (delta - k * PI_HIGH) - k * PI_LOW, odd
@@ -47,7 +47,7 @@ def fold(delta):
 
 @device
 def simpson_gain(delta, n, is_even):
-    """g(delta) of the module's docstring; n, the substeps, and 1.0 where they are even, else 0.0."""
+    """Return g(delta) of the module's docstring; n: number of substeps; is_even: 1.0 if it is even, else 0.0."""
     folded, odd = fold(delta)
     sine, cosine = sincos(folded)
     sine_n, _ = sincos(n * folded)
@@ -79,7 +79,7 @@ def flown(yaw, pitch, turn, rise, dt, substeps):
 
 @device
 def attitude(yaw, pitch, bank):
-    """Heading, elevation and bank as a body has them, the elevation within a quarter turn, of any yaw, pitch and bank [rad]."""
+    """Return equivalent heading, elevation within [-pi/2, pi/2], and bank of any yaw, pitch and bank [rad]."""
     folded, odd = fold(pitch)
     return wrap(yaw + odd * math.pi), folded - 2.0 * odd * folded, wrap(bank + odd * math.pi)
 

@@ -17,9 +17,9 @@ class Unicycle(MotionModel):
     DeMarco, Squires, Day, Pippin 2018, equation (1): x' = v cos(pitch) cos(yaw), y' = v cos(pitch) sin(yaw), z' = v
     sin(pitch), yaw' = turn_rate, pitch' = pitch_rate, with pitch nose up and every command clamped to its limit.
     Without `use_pitch` the pitch does not change and z' = velocity_z. `vel` is the displacement of the last substep over
-    its duration, as in the existing system; it lags the heading by half a substep of turn.
+    its duration, as in SCRIMMAGE; it lags the heading by half a substep of turn.
 
-    Differences from the existing system: there the sign of z' was changed in May 2020 but not in the behaviours, so
+    Differences from SCRIMMAGE: there the sign of z' was changed in May 2020 but not in the behaviours, so
     pursuers dived, looped and flew upside down; here a climb is nose up everywhere. There `use_pitch` is false by
     default; here the model of the paper is the default. Here an entity that another plugin moves (teleport, wall)
     continues from its new position, and `omega` is written.
@@ -29,7 +29,7 @@ class Unicycle(MotionModel):
     historic_attributes = HistoricAttributes(
         differs={
             "use_pitch": "Unicycle follows pitch_rate unless use_pitch='false'; "
-            "in the existing system only with use_pitch='true'"
+            "in SCRIMMAGE only with use_pitch='true'"
         }
     )
 

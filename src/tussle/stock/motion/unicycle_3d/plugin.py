@@ -17,7 +17,7 @@ class Unicycle3D(MotionModel):
     turn_rate is the rate of the heading and pitch_rate that of the elevation; in a bank they are not, as in an aircraft. With
     `accel_max` >= 0 the speed is a state and `acceleration_x` is commanded; else `speed` is commanded.
 
-    Differences from the existing system: the rates are about the body axes (there, about axes that rotate with the vehicle but
+    Differences from SCRIMMAGE: the rates are about the body axes (there, about axes that rotate with the vehicle but
     coincide with the world axes at the start, wrong for a vehicle that starts banked or climbing); a positive pitch_rate raises the
     nose; `accel_max` limits the acceleration in both directions (there, the lower limit was read from the key of the upper one, so
     every command gave the same acceleration), and the speed stays within speed_max. Limits are symmetric; there is no `speed_min`

@@ -22,7 +22,7 @@ class UUV6DOF(RigidBodyModel):
     elevator and rudder are clamped to [-1, 1]; no throttle is no thrust. A positive elevator lowers the nose, a positive rudder turns
     left. Above `surface_height` less half of the hull's diameter buoyancy falls linearly to zero, so that the vehicle floats.
 
-    Differences from the existing system: there the forces of inertia of the rigid body were missing, added mass acted twice, the velocity
+    Differences from SCRIMMAGE: there the forces of inertia of the rigid body were missing, added mass acted twice, the velocity
     of the body followed another equation than its position, no throttle gave thrust, damping in roll was a hundredth of Prestero's, and
     the surface was a wall.
     """

@@ -1,4 +1,4 @@
-"""When each message is on the air, and whether its signal is strong enough."""
+"""Transmission times of messages, and fading of their signals."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from tussle.numeric.kernel import kernel
 FADING, JAMMED = 3, 4
 """Outcomes of links, one more than the places of the reasons in `RadioNetwork.losses`."""
 NEAREST = 1e-3
-"""Distance below which powers do not grow any more [m]."""
+"""Distance below which the received power is constant [m]."""
 
 
 @kernel("I I F (F F F) F (Fw Fw) (Fw Fw) (Fw Fw Bw)")

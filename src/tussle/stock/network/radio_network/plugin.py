@@ -41,7 +41,7 @@ class RadioNetwork(Network):
         1.0, ge=0.0, le=1.0, doc="Probability that a receiver gets a message, besides all other losses."
     )
     blocked_by = Param(
-        "nothing", choices=BLOCKS, doc="What blocks a message where it stands between sender and receiver."
+        "nothing", choices=BLOCKS, doc="Obstacles between sender and receiver that block a message."
     )
     filter_comms_plane = Param(
         False, doc="Block messages across a horizontal plane, such as the water surface."
@@ -83,11 +83,11 @@ class RadioNetwork(Network):
             is_busy = (first < end[message]) & (start[message] < last)
             links.lose(HALF_DUPLEX, self.half_duplex[world] & is_busy)
         links.lose_by_chance(w, CHANCE, "chance", self.prob_transmit)
-        late = np.maximum(0.0, end - w.t[links.world])[message]
+        delay = np.maximum(0.0, end - w.t[links.world])[message]
         if self.is_stochastic_delay.any():
             jitter = np.where(self.is_stochastic_delay, self.delay_jitter, 0.0)[world]
-            late += jitter * (2.0 * links.uniform(w, "delay") - 1.0)
-        links.delay = late
+            delay += jitter * (2.0 * links.uniform(w, "delay") - 1.0)
+        links.delay = delay
         return links
 
     def _fade(self, w: WorldView, links: Links, world: np.ndarray) -> None:
@@ -102,7 +102,7 @@ class RadioNetwork(Network):
         kernels.fade((links.receiver, world), links.distance, draw, noise, limits, fades, links.outcome)
 
     def _noise(self, w: WorldView, is_jammer: np.ndarray) -> np.ndarray:
-        """Power of noise and jammers at each row, (n,)."""
+        """Return the power of noise and jammers at each row, (n,); the noise alone is 1."""
         near = w.near(np.where(is_jammer, self.jammer_range[w.world], 0.0))
         world = w.world[near.row]
         ratio = self.jammer_range[world] / np.maximum(near.distance, kernels.NEAREST)

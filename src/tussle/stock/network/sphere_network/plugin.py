@@ -11,7 +11,7 @@ from tussle.api.links import BLOCKS
 class SphereNetwork(Network):
     """Delivers a message to each entity nearer than `range` with probability `prob_transmit`, and always to the sender.
 
-    Distances are measured at the end of the step in which the message is sent. The existing system measured from the sender's new
+    Distances are measured at the end of the step in which the message is sent. SCRIMMAGE measured from the sender's new
     position to the old positions of the others, and could lose messages of an entity to itself.
     """
 
@@ -26,7 +26,7 @@ class SphereNetwork(Network):
     comms_boundary_epsilon = Param(0.0, unit="m", ge=0.0, doc="Distance by which both sides overlap.")
 
     blocked_by = Param(
-        "nothing", choices=BLOCKS, doc="What blocks a message where it stands between sender and receiver."
+        "nothing", choices=BLOCKS, doc="Obstacles between sender and receiver that block a message."
     )
 
     losses = ("plane", "chance", "blocked")

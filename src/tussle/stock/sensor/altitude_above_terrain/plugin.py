@@ -10,8 +10,8 @@ from tussle.api import GroupView, Output, Param, Sensor
 class AltitudeAboveTerrain(Sensor):
     """Measures the height of an entity above the highest surface of the scene at its place: roof, mesh, terrain or ground.
 
-    Where the scene has no surface, it is the height above z = 0. The existing system knows the terrain of TerrainGenerator only, at the
-    corner of the cell instead of below the entity.
+    Where the scene has no surface, it is the height above z = 0. SCRIMMAGE measures only the terrain of TerrainGenerator,
+    at the corner of the cell instead of below the entity.
     """
 
     grade = "portable"

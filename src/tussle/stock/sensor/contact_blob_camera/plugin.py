@@ -23,7 +23,7 @@ class ContactBlobCamera(Sensor):
     false positive has id 0; the other ids are true, for scoring. The camera looks along the body's x axis, turned by `rpy`. With
     `occlusion`, an entity whose centre is hidden is not seen. Set `rate` for a lower frame rate than that of the steps.
 
-    In the existing system the size is the widest chord's, and each detected entity brings its own false positives of its own size,
+    In SCRIMMAGE the size is the widest chord's, and each detected entity brings its own false positives of its own size,
     one more than `max_false_positives_per_frame`, and none come without one. Its focal length cancels.
     """
 
@@ -132,7 +132,7 @@ def _extent(
         draws: Standard normal draws for both, (2, m).
     """
     slope, square = offset / x, x * x + offset * offset - radius * radius
-    # Tangent of the half angle of the sphere; a camera inside of it sees it everywhere.
+    # Tangent of the sphere's half angle. A camera inside the sphere sees it in all directions.
     tangent = radius / np.sqrt(np.maximum(square, 1e-12))
     low, high = (_turned(slope, sign * tangent, sign * np.inf) for sign in (-1.0, 1.0))
     low, high = (0.5 * size * (1.0 + np.clip(edge / half, -1.0, 1.0)) for edge in (low, high))

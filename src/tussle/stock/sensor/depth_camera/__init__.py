@@ -1,4 +1,4 @@
-"""DepthCamera: small images of depth, and of what the pixels show."""
+"""DepthCamera: small depth and segmentation images."""
 
 from tussle.stock.sensor.depth_camera.plugin import DepthCamera
 

@@ -1,4 +1,4 @@
-"""A camera whose images are depths, and what the pixels show."""
+"""A camera with depth and segmentation images."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tussle.rays.solids import KINDS
 
 
 class DepthCamera(Sensor):
-    """Takes small images by a pinhole camera: the depth of each pixel, and what it shows of the scene and of other entities.
+    """Takes small images with a pinhole camera: depth, and a segmentation by parts of the scene and entities.
 
     One ray goes through the centre of each pixel. Pixels are listed row by row from the upper left corner of the image, so
     `np.reshape(image, (..., img_height, img_width))` is the image. The depth is measured along the optical axis, not along the ray; it is
@@ -50,7 +50,10 @@ class DepthCamera(Sensor):
     sees_entities = Param(True, structural=True, doc="Whether entities are in the images.")
     depth = Output("depth_image", unit="m", ragged=True, doc="Depth of each pixel.")
     segmentation = Output(
-        "segmentation_image", fields="kind id team solid", ragged=True, doc="What each pixel shows."
+        "segmentation_image",
+        fields="kind id team solid",
+        ragged=True,
+        doc="Part of the scene, or entity, in each pixel.",
     )
 
     def step(self, g: GroupView) -> None:

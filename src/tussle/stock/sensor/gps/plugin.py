@@ -13,7 +13,7 @@ class GPS(Sensor):
     """Measures latitude, longitude and altitude; inside the boundaries `gps_denied_ids` there is no fix.
 
     Without a fix the coordinates are those of the last one, and `gps_time` is its time. `GPSStatus` is published on the network of
-    the entity itself; the existing system sent it to all entities, so that a receiver without a fix disturbed the navigation of others,
+    the entity itself; SCRIMMAGE sent it to all entities, so that a receiver without a fix disturbed the navigation of others,
     knew only the boundary that was published last, and sent true coordinates without a fix.
     """
 

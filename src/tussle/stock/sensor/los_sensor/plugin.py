@@ -18,7 +18,7 @@ class LOSSensor(Sensor):
     A range has an error with standard deviation `range_sd_min` + `range_sd_per_unit` * range, and with `probability_of_error` another
     one of `error_sd`.
 
-    The existing system uses the limits only if `probability_oor_error` is not 0, and does not repeat its draws. `use_flat_earth`
+    SCRIMMAGE uses the limits only if `probability_oor_error` is not 0, and does not repeat its draws. `use_flat_earth`
     is true there by its file, which spells it otherwise.
     """
 

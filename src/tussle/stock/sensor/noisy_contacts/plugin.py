@@ -17,8 +17,8 @@ class NoisyContacts(Sensor):
     """Measures the state of every other entity within range, with normal noise.
 
     The noise is drawn for each pair at each call. Draws are keyed by the measuring entity and the id of the measured
-    one, so adding entities does not change other measurements; the existing system drew them in the order of a hash
-    table. The existing system also published a covariance, a constant 5 on the diagonal whatever the noise. It is
+    one, so adding entities does not change other measurements; SCRIMMAGE drew them in the order of a hash
+    table. SCRIMMAGE also published a covariance, a constant 5 on the diagonal whatever the noise. It is
     left out here, because the standard deviations are parameters. `max_range` is new. By default the range is
     infinite, and the total length of the lists grows with the square of the number of entities.
     """

@@ -15,7 +15,7 @@ class NoisyState(Sensor):
     belief. Its autonomies and controllers read the belief; motion models, other entities, interactions and metrics
     read the true state. Before the first call the belief is the initial state; between calls it does not change.
 
-    Differences from the existing system: draws are counter-based, so other entities and plugins do not affect them,
+    Differences from SCRIMMAGE: draws are counter-based, so other entities and plugins do not affect them,
     and in the first step the belief has the heading and speed that the motion model starts from.
     """
 

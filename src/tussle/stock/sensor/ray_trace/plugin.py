@@ -3,27 +3,28 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
-from tussle.api import GroupView, HistoricAttributes, Output, Param, Publish, Sensor, State
+from tussle.api import GroupView, HistoricAttributes, Output, Param, Publish, Sensor, State, service
 from tussle.messages import PointCloud
 from tussle.numeric import cos, sin
 from tussle.numeric.quaternion import quat_from_euler, quat_rotate
-from tussle.rays.patterns import aimed
+from tussle.rays.patterns import ScanPattern, aimed
 from tussle.stock.sensor.ray_trace import kernels
 
 FIELDS, UNITS = "x y z range in_range", "m m m m 1"
 
 
 class RayTrace(Sensor):
-    """Measures distances along a pattern of rays, which the scene and other entities stop: a lidar.
+    """A lidar: measures distances along a pattern of rays, which end at the scene and at other entities.
 
     The rays of a scan spread evenly about the sensor's x axis: `num_rays_horiz` angles, `angle_res_horiz` apart, for each of
     `num_rays_vert` elevations, from the highest down. The sensor is mounted at `xyz` on the body, turned by `rpy`. A ray that meets nothing
     between `min_range` and `max_range`, or whose return is lost (`dropout`), ends at `max_range` and is not in range.
 
-    The existing system leaves the casting to BulletCollision, whose points are in the sensor's frame and begin at the body's centre
+    SCRIMMAGE leaves the casting to BulletCollision, whose points are in the sensor's frame and begin at the body's centre
     whatever `xyz` is; it reads a position noise and does not apply it.
     """
 
@@ -47,7 +48,7 @@ class RayTrace(Sensor):
     max_range = Param(30.0, unit="m", gt=0.0, doc="Largest range.")
     min_range = Param(0.0, unit="m", ge=0.0, doc="Smallest range.")
     max_sample_rate = Param(
-        0.1, unit="s", ge=0.0, doc="Time between two scans; the name is that of the existing system."
+        0.1, unit="s", ge=0.0, doc="Time between two scans; the name is that of SCRIMMAGE."
     )
     xyz = Param((0.0, 0.0, 0.0), fields="x y z", unit="m", doc="Place of the sensor on the body.")
     rpy = Param(
@@ -74,7 +75,7 @@ class RayTrace(Sensor):
     next_scan = State(default=-math.inf, unit="s", doc="Time of the next scan.")
 
     def step(self, g: GroupView) -> None:
-        """Scan where it is time."""
+        """Scan in the rows whose next scan is due."""
         rows = np.flatnonzero(g.t >= self.next_scan - 1e-9)
         if not len(rows):
             return
@@ -95,6 +96,21 @@ class RayTrace(Sensor):
         self.points.set(k * np.arange(g.n + 1), scan)
         if self.publish_on_local_networks:
             self.cloud.publish(rows, points=[scan[:, row * k : (row + 1) * k] for row in rows])
+
+    @service
+    def scan_pattern(self, g: GroupView) -> Callable[[int], ScanPattern]:
+        """Return a function that tells how the lidar of a row scans, for plugins that pass scans on."""
+        quats = quat_from_euler(*self.rpy)
+
+        def of(row: int) -> ScanPattern:
+            period = float(self.max_sample_rate[row])
+            return ScanPattern(
+                self.xyz[:, row], quats[:, row], self.angle_res_horiz, self.num_rays_vert,
+                float(self.min_range[row]), float(self.max_range[row]), period,
+                min(float(g.t[row]), float(self.next_scan[row]) - period),
+            )  # fmt: skip
+
+        return of
 
     def _pattern(self) -> np.ndarray:
         """Unit directions of the rays, sensor frame, (3, k)."""

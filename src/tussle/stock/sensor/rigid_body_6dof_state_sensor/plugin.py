@@ -20,7 +20,7 @@ class RigidBody6DOFStateSensor(Sensor):
 
     Accelerations are the change of the velocities since the last call over its time; gravity is not added. It measures any entity.
 
-    Differences from the existing system: the noise is applied (there, the parameters were read and not used); the values are channels
+    Differences from SCRIMMAGE: the noise is applied (there, the parameters were read and not used); the values are channels
     (there, a message on LocalNetwork), without the wind.
     """
 

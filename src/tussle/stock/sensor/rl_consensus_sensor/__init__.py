@@ -1,4 +1,4 @@
-"""RLConsensusSensor: what RLConsensus observes."""
+"""RLConsensusSensor: observations for RLConsensus."""
 
 from tussle.stock.sensor.rl_consensus_sensor.plugin import RLConsensusSensor
 

@@ -1,4 +1,4 @@
-"""A sensor of the positions of all along x."""
+"""A sensor of the positions of all entities along x."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ class RLConsensusSensor(Sensor):
     observation = Output(fields="value", ragged=True, doc="Numbers of an observation.")
 
     def spawn(self, g: GroupView, rows: np.ndarray) -> None:
-        """Observe the initial states, which actors see first; the others keep what they saw."""
+        """Observe the initial states, which actors see first. Other rows keep their observations."""
         self._observe(g, rows)
 
     def step(self, g: GroupView) -> None:
         self._observe(g, np.arange(g.n))
 
     def _observe(self, g: GroupView, rows: np.ndarray) -> None:
-        """Observe in some rows."""
+        """Set the observations of some rows."""
         bodies, parts = g.bodies, [self.observation[row] for row in range(g.n)]
         with_id = np.broadcast_to(self.include_id, g.n)
         for world in np.unique(g.world[rows]):
-            there = np.flatnonzero(bodies.world == world)
-            x = bodies.pos[0, there[np.argsort(bodies.id[there])]]
+            members = np.flatnonzero(bodies.world == world)
+            x = bodies.pos[0, members[np.argsort(bodies.id[members])]]
             for row in rows[g.world[rows] == world]:
                 parts[row] = np.concatenate([[float(g.id[row])], x] if with_id[row] else [x])[None]
         self.observation.set(

@@ -1,4 +1,4 @@
-"""RLSimpleSensor: what RLSimple observes."""
+"""RLSimpleSensor: observations for RLSimple."""
 
 from tussle.stock.sensor.rl_simple_sensor.plugin import RLSimpleSensor
 

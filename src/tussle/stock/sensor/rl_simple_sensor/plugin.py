@@ -16,14 +16,14 @@ class RLSimpleSensor(Sensor):
     observation = Output(fields="value", ragged=True, doc="Numbers of an observation.")
 
     def spawn(self, g: GroupView, rows: np.ndarray) -> None:
-        """Observe the initial states, which actors see first; the others keep what they saw."""
+        """Observe the initial states, which actors see first. Other rows keep their observations."""
         self._observe(g, rows)
 
     def step(self, g: GroupView) -> None:
         self._observe(g, np.arange(g.n))
 
     def _observe(self, g: GroupView, rows: np.ndarray) -> None:
-        """Observe in some rows."""
+        """Set the observations of some rows."""
         parts = [self.observation[row] for row in range(g.n)]
         with_id, t = np.broadcast_to(self.include_id, g.n), np.broadcast_to(g.t, g.n)
         for row in rows:

@@ -20,11 +20,11 @@ class SimpleINS(Sensor):
 
     The position error is a random walk: in a second it grows by noise with mean and standard deviation `pos_noise`, times the
     acceleration along the axis in m/s^2, at most 1. After a GPS of the entity has had a fix for the surface time, error and variance
-    start again; that time is drawn when the fix is lost. Velocity and attitude have independent noise at each call, the attitude about
+    are reset; the surface time is drawn when the fix is lost. Velocity and attitude have independent noise at each call, the attitude about
     the body's x, then y, then z axis. `ins_cep` is the radius of the circle around the belief that holds the position with a
     probability of 50 %, from the standard deviations of the horizontal error, 1 m after a correction; the approximation is within 1.5 %.
 
-    The existing system added the noise in each step, whatever its length; took the change of velocity over 0.01 s for the acceleration;
+    SCRIMMAGE added the noise in each step, whatever its length; took the change of velocity over 0.01 s for the acceleration;
     and grew the variance by the absolute value of noise that was not that of the error.
     """
 
@@ -83,9 +83,9 @@ class SimpleINS(Sensor):
         self.variance[:] += (accel * sd * root)[:2] ** 2
 
     def _correct(self, g: GroupView) -> None:
-        """Start the error again where GPS has had a fix for long enough."""
-        rows, heard = self.status.latest()
-        self.has_fix[rows] = heard.has_fix
+        """Reset the error of entities whose GPS has had a fix for the surface time."""
+        rows, messages = self.status.latest()
+        self.has_fix[rows] = messages.has_fix
         wait = SURFACE_TIMES[(4.0 * g.uniform("surface")).astype(np.int64)]
         wait += np.where(self.sea_state_gps > 1.0, ROUGH, 0.0)
         self.waited[:] = np.where(self.has_fix, self.waited + g.dt, 0.0)

@@ -1,0 +1,1 @@
+"""Programs that run plugins beside other systems than tussle's simulation."""

@@ -1,0 +1,202 @@
+"""Robots that are driven by nodes of ROS 1."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, ClassVar
+
+import numpy as np
+
+from tussle.api import Autonomy, GroupView, Handle, Input, Output, Param
+from tussle.numeric.quaternion import quat_from_euler, quat_rotate, quat_rotate_inverse
+from tussle.ros.link import RosLink
+from tussle.ros.robot import RobotTopics
+
+
+class CommandedByROS(Autonomy):
+    """Columns and methods of both plugins; abstract."""
+
+    grade = "external"
+    publishes: ClassVar[bool] = False
+    """Whether it publishes the states of robots."""
+
+    watchdog_timeout = Param(
+        0.0,
+        unit="s",
+        ge=0.0,
+        doc="Simulated time after which a robot stops without a new command; 0 for never.",
+    )
+    speed = Output(unit="m/s", doc="linear.x of the last command.")
+    turn_rate = Output(unit="rad/s", doc="angular.z.")
+    steering = Output(unit="rad", doc="angular.z, for cars, whose steering angle it is.")
+    pitch_rate = Output(unit="rad/s", doc="-angular.y: nose up positive.")
+    roll_rate = Output(unit="rad/s", doc="angular.x.")
+    velocity = Output(
+        "velocity_x velocity_y velocity_z",
+        unit="m/s",
+        doc="linear, turned by the heading to the world frame.",
+    )
+    robot = Handle(max_worlds=1, doc="Topics of the robot.")
+
+    def namespace(self, row: Any) -> str:
+        """Return the namespace of the robot of a handle's row."""
+        raise TypeError(f"{type(self).__name__} has no namespace")
+
+    def open_one(self, row: Any) -> RobotTopics:
+        """Subscribe to the commands.
+
+        Raises:
+            MissingExtraError: rospy is not installed.
+            RosError: The master does not answer.
+            ParameterError: The namespace is no name of ROS.
+        """
+        return RobotTopics(RosLink.of(row.shared), self.namespace(row), self.publishes)
+
+    def await_peers(self, g: GroupView) -> None:
+        """Wait for nodes before the first step; only `ROSAutonomy` does, in lockstep."""
+
+    def publish_state(self, g: GroupView) -> list[Any]:
+        """Publish the states of all robots, and return their transforms; only `ROSAutonomy` does."""
+        return []
+
+    def spawn(self, g: GroupView, rows: np.ndarray) -> None:
+        """Let the link publish the states of this group."""
+        robots: Any = self.robot
+        for robot in [robots[row] for row in rows]:
+            robot.link.groups[id(self)] = self, g
+            if self.publishes and "scan_pattern" in g.services:
+                robot.advertise_scan()
+
+    def step(self, g: GroupView) -> None:
+        """Publish the states, and write the newest commands to the channels."""
+        robots: Any = self.robot
+        if not g.n:  # no master
+            return
+        link: RosLink = robots[0].link
+        link.begin_step(g)
+        self._await_commands(g)
+        commands = np.empty((6, g.n))
+        for row, (robot, t, timeout) in enumerate(zip(robots, g.t, self.watchdog_timeout, strict=True)):
+            if fault := robot.inbox.fault or link.lost:
+                g.fail(row, fault)
+            commands[:, row] = robot.inbox.at(t, timeout)
+        self.speed[:], self.turn_rate[:], self.steering[:] = commands[0], commands[5], commands[5]
+        self.roll_rate[:], self.pitch_rate[:] = commands[3], -commands[4]
+        # By the heading only: a body that pitches or banks when it moves would otherwise climb or sink.
+        self.velocity[:] = quat_rotate(quat_from_euler(0.0 * g.yaw, 0.0 * g.yaw, g.yaw), commands[:3])
+
+    def _await_commands(self, g: GroupView) -> None:
+        """Wait for the commands of this step; only `ROSAutonomy` does, in lockstep."""
+
+
+class ROSAutonomy(CommandedByROS):
+    """Connects a robot to ROS 1 as Stage does: cmd_vel moves it; odom, base_pose_ground_truth, base_scan and tf are published.
+
+    Its topics are in the namespace `namespace_prefix` followed by its id, such as entity1/cmd_vel, and so are its frames: odom,
+    base_footprint, base_link, base_laser_link. At the beginning of each step it publishes the states at that time and takes the newest
+    command; a robot without any stands still. odom is its belief, base_pose_ground_truth its true state, both relative to the
+    world frame's origin. base_scan is the scan of a `RayTrace` with one elevation. Stamps are simulated time with
+    `ROSClockServer` or the ROS parameter use_sim_time, and the wall clock's otherwise. [ROS](../ros.md) tells more.
+
+    With `lockstep`, each step waits until each robot has received a command after its odom of that step.
+
+    Raises:
+        MissingExtraError: rospy is not installed.
+        RosError: No ROS master answers.
+    """
+
+    publishes = True
+    namespace_prefix = Param("entity", doc="Beginning of the namespace; the id follows.")
+    lockstep = Param(
+        0.0, unit="s", ge=0.0, structural=True,
+        doc="Longest wait in each step, in wall time, for a command to each robot; 0: take those that are there.",
+    )  # fmt: skip
+    points = Input(
+        "raytrace", fields="x y z range in_range", unit="m m m m 1", ragged=True, optional=True, doc="Scan."
+    )
+
+    def namespace(self, row: Any) -> str:
+        """Return the namespace of the robot of a handle's row."""
+        return f"{row.plugin.values['namespace_prefix']}{row.id}"
+
+    def publish_state(self, g: GroupView) -> list[Any]:
+        """Publish the states of all robots, and return their transforms."""
+        robots: Any = self.robot
+        link: RosLink = robots[0].link
+        truth, rows = g.bodies, slice(g.first, g.last)
+        true = [np.asarray(getattr(truth, name)[:, rows]) for name in ("pos", "quat", "vel", "omega")]
+        states = _body_states(g.pos, g.quat, g.vel, true[3]), _body_states(*true)
+        stamp = link.stamp(float(g.t[0]))
+        pattern = g.call("scan_pattern") if "scan_pattern" in g.services else None
+        transforms: list[Any] = []
+        for row, robot in enumerate(robots):
+            robot.n_before = robot.inbox.n_received  # before publishing: the answer may be quick
+            for topic, state in zip(("odom", "base_pose_ground_truth"), states, strict=True):
+                robot.publish_odometry(topic, state[:, row], stamp)
+            laser = None
+            if pattern is not None:
+                about = pattern(row)
+                laser = about.pos, about.quat
+                self._publish_scan(g, row, robot, about)
+            transforms += robot.transforms(states[0][:, row], stamp, laser)
+        return transforms
+
+    def _publish_scan(self, g: GroupView, row: int, robot: RobotTopics, about: Any) -> None:
+        """Publish the scan of a row if it is new."""
+        points: Any = self.points
+        begin, end = points.start[row : row + 2]
+        if about.n_elevations > 1:
+            g.fail(
+                row,
+                f"/{robot.namespace}/base_scan takes one elevation; RayTrace has num_rays_vert = {about.n_elevations}",
+            )
+        elif end > begin and about.time != robot.last_scan:
+            robot.last_scan = about.time
+            robot.publish_scan(points.data[3, begin:end], about, robot.link.stamp(about.time))
+
+    def await_peers(self, g: GroupView) -> None:
+        """In lockstep, before the first step: wait until each robot has somebody who hears of its state and can answer."""
+        robots: Any = self.robot
+        if self.lockstep and not all(robot.inbox.n_received for robot in robots):
+            self._await(
+                g, RobotTopics.has_peer, "nobody has subscribed to /{0}/odom and publishes /{0}/cmd_vel"
+            )
+
+    def _await_commands(self, g: GroupView) -> None:
+        def has_news(robot: RobotTopics) -> bool:
+            return robot.inbox.n_received > robot.n_before or bool(robot.inbox.fault)
+
+        if self.lockstep:
+            self._await(g, has_news, "no message on /{0}/cmd_vel")
+
+    def _await(self, g: GroupView, is_there: Callable[[RobotTopics], bool], why: str) -> None:
+        """Wait until something holds for all robots; end the world if that takes too long."""
+        robots: Any = self.robot
+        link, is_interrupted = robots[0].link, g.context.is_interrupted
+        if not link.wait_for(lambda: all(map(is_there, robots)), self.lockstep, is_interrupted):
+            for row, robot in enumerate(robots):
+                if not (is_there(robot) or link.lost or is_interrupted()):
+                    limit = f"within {self.lockstep:g} s, as lockstep needs"
+                    g.fail(row, f"{why.format(robot.namespace)} {limit}")
+
+
+class ROSControl(CommandedByROS):
+    """Lets cmd_vel of ROS 1 move a robot, and publishes nothing; see `ROSAutonomy`.
+
+    The existing system writes a desired state of 30 m/s which no controller reads.
+
+    Raises:
+        MissingExtraError: rospy is not installed.
+        RosError: No ROS master answers.
+    """
+
+    ros_namespace_prefix = Param("robot", doc="Beginning of the namespace; the id follows.")
+
+    def namespace(self, row: Any) -> str:
+        """Return the namespace of the robot of a handle's row."""
+        return f"{row.plugin.values['ros_namespace_prefix']}{row.id}"
+
+
+def _body_states(pos: np.ndarray, quat: np.ndarray, vel: np.ndarray, omega: np.ndarray) -> np.ndarray:
+    """Position, attitude, and both velocities turned into the body frame, (13, n)."""
+    return np.concatenate([pos, quat, quat_rotate_inverse(quat, vel), quat_rotate_inverse(quat, omega)])

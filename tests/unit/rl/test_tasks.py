@@ -1,0 +1,58 @@
+"""The tasks that come with tussle can be learned: who plays them by rule does better than who acts at random."""
+
+import gymnasium
+import numpy as np
+import pytest
+
+from tussle import rl
+from tussle.rl import evaluate
+
+TASKS = ("Battle", "CaptureTheFlag", "Coverage", "FindWay", "Formation", "Hover", "Intercept", "ReachPoint")
+N = 8
+
+
+def at_random(task):
+    chance, space = np.random.default_rng(1), task.action_space(0)
+    shape = (N, len(task.agent_names), *space.shape)
+    return lambda obs: chance.uniform(-1, 1, shape).astype(np.float32)
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_rules_play_better_than_chance(name):
+    task = getattr(rl, name)()
+    by_rule, chance = evaluate(task, n_episodes=N), evaluate(task, at_random(task), N)
+    gain = by_rule["return"] - chance["return"]
+    assert gain.mean() > 2.0 * gain.std() / np.sqrt(N)
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_gymnasium_makes_it(name):
+    with gymnasium.make(f"tussle/{name}-v0", disable_env_checker=True) as env:
+        obs, _ = env.reset(seed=1)
+        assert env.observation_space.shape == obs.shape
+        assert np.isfinite(env.step(env.action_space.sample())[0]).all()
+
+
+def test_an_episode_does_not_depend_on_the_others():
+    alone = [evaluate(rl.Intercept, n_episodes=1, seed=seed) for seed in (1, 2, 3)]
+    together = evaluate(rl.Intercept, n_episodes=3)
+    assert sorted(together) == ["captures", "flag", "return"]
+    for name, values in together.items():
+        assert values.tolist() == [float(one[name][0]) for one in alone]
+
+
+def test_a_flag_ends_the_episode_and_is_counted_once():
+    idle = evaluate(rl.Intercept, lambda obs: np.zeros((2, 5, 2), np.float32), 2)
+    assert idle["flag"].tolist() == [-5.0, -5.0]
+
+
+def test_coverage_counts_what_linked_robots_see():
+    swarm = rl.make_swarm(rl.Coverage(decide_every=1), 1)
+    swarm.reset(seed=1)
+    pos = np.full((1, 12, 3), 0.0)
+    pos[0, :6, 0], pos[0, 6:, 0] = 50.0, -90.0
+    swarm.simulation.write("robot.pos", pos)
+    swarm.step(np.zeros((1, 12, 2), np.float32))
+    offset = np.arange(-95.0, 100.0, 10.0)
+    seen = ((offset[:, None] - 50.0) ** 2 + offset[None] ** 2 < 625.0).sum()
+    assert swarm.terms["covered"][0, 0] == pytest.approx(0.01 * seen / 400.0)
