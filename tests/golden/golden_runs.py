@@ -20,6 +20,8 @@ EXTRAS = {"interaction/graph_interaction": "networkx", "interaction/map_gen_2d":
 """Package that an example needs, of those that `import tussle` does not."""
 JSBSIM = ("controller/jsbsim_controllers", "motion/jsbsim_model")
 """Folders whose examples are flown by JSBSim, so that their hashes depend on the machine; tests/unit/jsbsim plays them."""
+LEARNED = ("autonomy/learned",)
+"""Likewise by a policy in onnxruntime; tests/unit/stock/test_learned.py plays it."""
 SERVED = (
     "autonomy/moos", "autonomy/ros_autonomy", "controller/ros_controllers", "interaction/ros_clock_server",
     "interaction/ros_shape_viz", "sensor/ros_compass",
@@ -33,7 +35,9 @@ def examples() -> tuple[str, ...]:
     """Folders of the plugins whose examples can be played with the installed packages."""
     names = sorted({path.parent.relative_to(STOCK).as_posix() for path in stock.examples().values()})
     return tuple(
-        n for n in names if n not in (*JSBSIM, *SERVED) and (n not in EXTRAS or find_spec(EXTRAS[n]))
+        n
+        for n in names
+        if n not in (*JSBSIM, *LEARNED, *SERVED) and (n not in EXTRAS or find_spec(EXTRAS[n]))
     )
 
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from golden_runs import (
     JSBSIM,
+    LEARNED,
     SERVED,
     STOCK,
     examples,
@@ -45,7 +46,7 @@ def test_all_missions_are_kept():
     assert list(golden()) == list(NAMES)
     every = [one for mission_ in golden().values() for hashes in mission_.values() for one in hashes]
     assert len(set(every)) == len(every) == 2 * len(SEEDS) * len(NAMES)
-    assert {STOCK / name / "example.xml" for name in (*kept_examples(), *JSBSIM, *SERVED)} == {
+    assert {STOCK / name / "example.xml" for name in (*kept_examples(), *JSBSIM, *LEARNED, *SERVED)} == {
         *stock.examples().values()
     }
 

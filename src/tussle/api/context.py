@@ -39,6 +39,7 @@ class Context:
         threads: Number of threads that `split` may use.
         draw: Receives the shapes that plugins draw.
         fail: Ends one world with an error; the others continue.
+        simulation: Returns the simulation, for code above the engine that a plugin calls.
         shared: Objects that handles of several entities use; their method `end` is called when the simulation is closed.
         boxes: Lengths of the boxes of each block for rays [m], (n_blocks, 3); 0 for spheres.
         mass_properties: Returns mass [kg], (n,), and inertia tensor [kg m^2], (9, n), of all rows of the body table.
@@ -58,6 +59,7 @@ class Context:
     draw: Draw = field(default_factory=Draw)
     keys: np.ndarray = field(init=False)
     fail: Callable[[int, PluginError], None] = field(init=False)
+    simulation: Callable[[], Any] = field(init=False)
     boxes: np.ndarray = field(init=False)
     mass_properties: Callable[[], tuple[np.ndarray, np.ndarray]] = field(init=False)
     shared: dict[Hashable, Any] = field(default_factory=dict)

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 import tussle
-from tussle.cli import batch_options, export_options, play_options
+from tussle.cli import batch_options, export_options, play_options, train_options
 from tussle.cli.options import EPILOG, MissionOptions, PluginOptions, add_command
 from tussle.cli.ros_node import RosNodeOptions
 from tussle.cli.terminal import OK, out, run_guarded
@@ -29,6 +29,7 @@ COMMANDS = {
     "analyze": (batch_options.AnalyzeOptions, "tussle.cli.analyze:analyze"),
     "report": (batch_options.ReportOptions, "tussle.cli.analyze:report"),
     "optimize": (batch_options.OptimizeOptions, "tussle.cli.optimize:optimize"),
+    "train": (train_options.TrainOptions, "tussle.cli.train:train"),
     "ros-node": (RosNodeOptions, "tussle.cli.ros_node:ros_node"),
     "doctor": (play_options.DoctorOptions, "tussle.cli.doctor:doctor"),
 }

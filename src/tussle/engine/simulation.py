@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import warnings
+import weakref
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Self
 
@@ -74,6 +75,7 @@ class Simulation:
         self._resumed = threading.Event()
         self._resumed.set()
         self.state = SimulationState(mission, numbers, params or {}, threads, on_error, start_from)
+        self.state.context.simulation = weakref.ref(self)
         self.events = self.state.events
         self.events.on_change = self.state.population.on_new_group = self._forget_schedule
         try:

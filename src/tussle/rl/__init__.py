@@ -10,9 +10,10 @@ except ImportError:
 
 from tussle.rl.action import Act
 from tussle.rl.environments import TaskEnv, TaskVectorEnv, make, make_vec, register
-from tussle.rl.games import Consensus, NearOrigin, PredatorPrey
+from tussle.rl.games import Consensus, NearOrigin, PredatorPrey, PredatorTeam
 from tussle.rl.observation import Component, Computed, Each, Means, NearestOthers, Own, Sectors
 from tussle.rl.parallel import TaskParallelEnv, parallel_env
+from tussle.rl.policy_file import write_policy
 from tussle.rl.reward import Situation, Term, alive, captured, captures, collisions, died
 from tussle.rl.robots import Coverage, FindWay, Formation, Hover, ReachPoint
 from tussle.rl.swarm import Swarm, evaluate, make_swarm, record_episode
@@ -37,6 +38,7 @@ __all__ = [
     "NearestOthers",
     "Own",
     "PredatorPrey",
+    "PredatorTeam",
     "ReachPoint",
     "Sectors",
     "Situation",
@@ -58,6 +60,7 @@ __all__ = [
     "parallel_env",
     "record_episode",
     "register",
+    "write_policy",
 ]
 
 for _task in (
@@ -69,6 +72,7 @@ for _task in (
     Hover,
     Intercept,
     PredatorPrey,
+    PredatorTeam,
     ReachPoint,
 ):
     register(f"tussle/{_task.__name__}-v0", _task)

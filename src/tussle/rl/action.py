@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -173,27 +173,42 @@ class Decoder:
 
     def write(self, part: AgentRows, actions: np.ndarray) -> int:
         """Set the columns of a part's agents from actions, (agents, numbers). Returns the first agent with a wrong action, or -1."""
-        group, who = part.group, (part.rows, part.agents)
+        group, at = part.group, part.rows - part.group.first
         for act in self.constants:
-            self._column(group, act.target)[part.rows - group.first] = act.value
-        if self.is_continuous:
-            for c, act in enumerate(self.free):
-                column = self._column(group, act.target)
-                wrong = kernels.act(actions, who, group.first, c, act.low, act.high, column)
-                if wrong >= 0:
-                    return int(wrong)
-        else:
-            chosen, at = actions[part.agents][:, : len(self.free)], part.rows - group.first
-            wrong = (chosen < 0) | (chosen >= self.sizes)
-            if wrong.any():
-                return int(part.agents[np.flatnonzero(wrong.any(axis=1))[0]])
-            for c, act in enumerate(self.free):
-                values = act.table[chosen[:, c]]
-                for k, name in enumerate(act.names):
-                    self._column(group, name)[at] = values[:, k]
+            self._column(group, act.target)[at] = act.value
+        wrong = self.decode(actions, part.agents, at, lambda target: self._column(group, target))
+        if wrong >= 0:
+            return wrong
         if any("." in name for act in (*self.free, *self.constants) for name in act.names):
             for view in group.views:  # they keep what follows from parameters
                 view.kept.clear()
+        return -1
+
+    def decode(
+        self, actions: np.ndarray, agents: np.ndarray, at: np.ndarray, column: Callable[[str], np.ndarray]
+    ) -> int:
+        """Set columns[at] from actions[agents]. Returns the first agent with a wrong action, or -1.
+
+        Args:
+            actions: Actions, (agents, numbers).
+            agents: Rows of `actions`, (m,).
+            at: Places in the columns, (m,).
+            column: Returns the column of a target.
+        """
+        if self.is_continuous:
+            for c, act in enumerate(self.free):
+                wrong = kernels.act(actions, (at, agents), 0, c, act.low, act.high, column(act.target))
+                if wrong >= 0:
+                    return int(wrong)
+            return -1
+        chosen = actions[agents][:, : len(self.free)]
+        is_wrong = ((chosen < 0) | (chosen >= self.sizes)).any(axis=1)
+        if is_wrong.any():
+            return int(agents[np.flatnonzero(is_wrong)[0]])
+        for c, act in enumerate(self.free):
+            values = act.table[chosen[:, c]]
+            for k, name in enumerate(act.names):
+                column(name)[at] = values[:, k]
         return -1
 
     def _column(self, group: Any, target: str) -> np.ndarray:

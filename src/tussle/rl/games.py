@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 
 from tussle.engine.simulation import Simulation
 from tussle.mission import Block, Mission
 from tussle.rl.action import Act
 from tussle.rl.observation import Computed, NearestOthers, Own
-from tussle.rl.reward import Situation, Term, alive, captured
+from tussle.rl.reward import Situation, Term, alive, captured, captures
 from tussle.rl.task import Task
-from tussle.stock import SingleIntegrator
+from tussle.stock import Predator, SingleIntegrator
 
 RADIUS = 2.0
 """Distance along x below which robots are near [m]."""
@@ -32,6 +34,59 @@ class PredatorPrey(Task):
         Act("pitch_rate", -1.0, 1.0),
     )
     reward = {"alive": Term(alive, 0.01), "captured": Term(captured, -1.0)}  # noqa: RUF012 - declared as ClassVar in Task
+
+
+def closing_speed(now: Situation) -> np.ndarray:
+    """Speed at which the distance to the nearest prey decreases [m/s], (W, A); 0 without prey."""
+    (pos, there), (vel, _) = now.simulation.read("prey.pos"), now.simulation.read("prey.vel")
+    offset = np.where(there[:, None, :, None], pos[:, None] - now.pos[:, :, None], np.inf)
+    distance = np.sqrt((offset * offset).sum(axis=-1))
+    near = distance.argmin(axis=-1)
+    length = np.take_along_axis(distance, near[..., None], -1)
+    relative = now.vel - np.take_along_axis(vel[:, None], near[..., None, None], -2)[:, :, 0]
+    with np.errstate(invalid="ignore"):  # where no prey is left
+        towards = np.take_along_axis(offset, near[..., None, None], -2)[:, :, 0] / length
+        return np.where(np.isfinite(length[..., 0]), (relative * towards).sum(axis=-1), 0.0)
+
+
+class PredatorTeam(Task):
+    """The paper's game for one team of five predators, against the other one, which pursues, and 100 prey, which flock.
+
+    The learner flies; prey are claimed as by `Predator`.
+    """
+
+    mission = "predator_prey"
+    learners = "switchers"
+    decide_every = 2
+    observation = (
+        Own("vel", scale=35.0, frame="heading"),
+        NearestOthers(
+            3,
+            "direction distance relative_vel present",
+            of=1,
+            scale={"distance": 300.0, "relative_vel": 35.0},
+            frame="body",
+        ),
+        NearestOthers(1, "direction distance present", of="own", scale={"distance": 300.0}, frame="body"),
+    )
+    action = (
+        Act("speed", value=35.0),
+        Act("turn_rate", -2.0, 2.0),
+        Act("pitch_rate", -1.5, 1.5),
+        Act("Predator.capture_range", value=5.0),
+    )
+    reward = {"captures": Term(captures), "closing": Term(closing_speed, 0.0005)}  # noqa: RUF012 - declared as ClassVar in Task
+
+    @cached_property
+    def given(self) -> Mission:
+        """The mission, in which the predators of the learner only claim."""
+        mission = super().given
+        claims = Predator(max_speed=35.0, capture_range=5.0, pursue=False)
+        return mission.replace(
+            blocks=[
+                b.replace(autonomy=claims) if b.name in self.learners.split() else b for b in mission.blocks
+            ]
+        )
 
 
 def robots(count: int, spread: float) -> Mission:
@@ -91,4 +146,4 @@ class Consensus(Task):
     reward = {"near": Term(near_others)}  # noqa: RUF012 - declared as ClassVar in Task
 
 
-__all__ = ["Consensus", "NearOrigin", "PredatorPrey"]
+__all__ = ["Consensus", "NearOrigin", "PredatorPrey", "PredatorTeam"]

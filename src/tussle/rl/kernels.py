@@ -19,8 +19,9 @@ from tussle.neighbors.search import TABLE, in_range, nearest_places, table_of
 from tussle.numeric import atan2
 from tussle.numeric.kernel import device, kernel
 
-SCALAR, PLANE, SPACE, DISTANCE, SAME_TEAM, PRESENT, FORWARD = range(7)
-"""Kinds of features: a number, a vector of two or three numbers, and what is known of a neighbour; the direction of the nose."""
+SCALAR, PLANE, SPACE, DISTANCE, SAME_TEAM, PRESENT, FORWARD, DIRECTION = range(8)
+"""Kinds of features: a number, a vector of two or three numbers, and what is known of a neighbour; the direction of the nose; the
+direction of a neighbour."""
 WORLD, HEADING, BODY = range(3)
 """Frames of vectors: the world's, turned by the heading, turned by the whole attitude."""
 QUAT = 6
@@ -77,13 +78,17 @@ def put_others(floats, team, row, near, n, spec, turn, a, column, width, out):
                 put_vector(kind, scale, dx, dy, dz, turn, a, at, out)
             elif kind == SCALAR:
                 out[a, at] = scale * floats[k, other]
-            elif kind == DISTANCE:
+            elif kind == DISTANCE or kind == DIRECTION:
                 dx, dy = floats[0, other] - floats[0, row], floats[1, other] - floats[1, row]
                 dz = floats[2, other] - floats[2, row]
-                out[a, at] = scale * math.sqrt(dx * dx + dy * dy + dz * dz)
+                length = math.sqrt(dx * dx + dy * dy + dz * dz)
+                if kind == DISTANCE:
+                    out[a, at] = scale * length
+                else:
+                    put_vector(SPACE, scale / max(length, 1e-9), dx, dy, dz, turn, a, at, out)
             else:
                 out[a, at] = scale if kind == PRESENT or team[other] == team[row] else 0.0
-        column += (2 if kind == PLANE else 3) if is_vector else 1
+        column += 2 if kind == PLANE else 3 if kind == SPACE or kind == DIRECTION else 1
 
 
 def own(floats, table, shift, who, spec, mode, column, out):

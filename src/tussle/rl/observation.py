@@ -26,7 +26,12 @@ if TYPE_CHECKING:
 FRAMES = {"world": kernels.WORLD, "heading": kernels.HEADING, "body": kernels.BODY}
 VECTORS = ("pos", "vel", "omega", "force", "torque")
 OWN = ("forward", *FLOATS)
-OTHERS = {"distance": kernels.DISTANCE, "same_team": kernels.SAME_TEAM, "present": kernels.PRESENT}
+OTHERS = {
+    "distance": kernels.DISTANCE,
+    "direction": kernels.DIRECTION,
+    "same_team": kernels.SAME_TEAM,
+    "present": kernels.PRESENT,
+}
 RELATIVE = {"offset": "pos", "relative_vel": "vel"}
 WHOLE_WORLD = 500
 """Up to this many entities, the nearest others are looked for among all of a world."""
@@ -118,7 +123,7 @@ def _of_others(names: Sequence[str], scale: Scale, planar: bool) -> tuple[Spec, 
         factor = _factor(scale, name)
         if name in OTHERS:
             lines.append((OTHERS[name], 0, factor, 0, 0, 0))
-            width += 1
+            width += 3 if name == "direction" else 1
         elif source in VECTORS:
             kind, k = (kernels.PLANE, 2) if planar else (kernels.SPACE, 3)
             lines.append((kind, OFFSETS[source], factor, name in RELATIVE, 0, 0))
@@ -295,8 +300,8 @@ class NearestOthers(_Search):
 
     Attributes:
         k: How many.
-        columns: Names, separated by spaces: "offset" and "relative_vel", relative to the agent; "distance"; "same_team" and
-            "present", 1 or 0; body columns.
+        columns: Names, separated by spaces: "offset" and "relative_vel", relative to the agent; "distance"; "direction", the unit
+            vector to it; "same_team" and "present", 1 or 0; body columns.
         of: Whom: "own" or "other" team, a team number, or None for all.
         radius: Those further away do not count [m].
         scale: As in `Own`, like frame and planar.

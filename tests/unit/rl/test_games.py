@@ -6,7 +6,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from tussle.rl import Consensus, make_swarm
+from tussle.rl import Consensus, PredatorTeam, make_swarm
 
 
 @pytest.mark.parametrize(
@@ -54,3 +54,24 @@ def test_consensus_rewards_the_share_of_near_others():
         np.testing.assert_allclose(reward, wanted, atol=1e-6)
         actions = np.where(x < 0, 1, 0)
     assert np.asarray(reward).mean() > 0.5
+
+
+def test_the_team_observes_the_direction_of_prey_and_earns_captures():
+    task = PredatorTeam(time_limit=20.0)
+    start = [
+        b.replace(position=(0.0, 0.0, 200.0), half_width=(300.0, 300.0, 50.0)) if b.team == 3 else b
+        for b in task.given.blocks
+    ]
+    with make_swarm(PredatorTeam(mission=task.given.replace(blocks=start), time_limit=20.0), 4) as swarm:
+        obs = swarm.reset(seed=1)
+        earned = 0.0
+        for _ in range(100):
+            directions = obs[..., 3:27].reshape(4, 5, 3, 8)[..., :3]
+            lengths = np.linalg.norm(directions, axis=-1)
+            np.testing.assert_allclose(lengths[lengths > 0], 1.0, rtol=1e-5)
+            actions = np.clip(1.5 * directions[..., 0, 1:], -1, 1)  # turn and pitch towards the nearest
+            obs, *_ = swarm.step(actions)
+            earned += swarm.terms["captures"].sum()
+        pos, _ = swarm.simulation.read("switchers.pos")
+    assert earned > 3
+    assert np.isfinite(pos).any()

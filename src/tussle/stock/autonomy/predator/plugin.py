@@ -13,7 +13,7 @@ class Predator(Autonomy):
     """Pursues the nearest prey (pure pursuit) and claims every entity of another team within `capture_range`.
 
     Without `allow_prey_switching` a target is kept until it is removed. Claims include rival predators, as in the paper's code.
-    When no prey is left, the last commands persist.
+    When no prey is left, the last commands persist. Without `pursue` it only claims, and another autonomy of the entity flies.
     """
 
     grade = "portable"
@@ -24,6 +24,7 @@ class Predator(Autonomy):
     )
     allow_prey_switching = Param(True, doc="Choose the nearest prey in every step.")
     prey_team_id = Param(1, doc="Team that is hunted.")
+    pursue = Param(True, structural=True, doc="Write commands; otherwise only claim.")
     target = EntityRef(doc="Prey being hunted.")
     speed = Output(unit="m/s")
     turn_rate = Output(unit="rad/s")
@@ -31,6 +32,10 @@ class Predator(Autonomy):
     desired_heading = Output(unit="rad")
     desired_speed = Output(unit="m/s")
     capture = Publish(CaptureEntity)
+
+    def offered_outputs(self) -> list[str]:
+        """Return the commands, if it pursues."""
+        return list(self.outputs()) if self.pursue else []
 
     def step(self, g: GroupView) -> None:
         index = g.any_index()

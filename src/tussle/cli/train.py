@@ -1,0 +1,71 @@
+"""`tussle train`: train a policy, show its progress, and draw its curve."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from tussle.cli.interrupt import Interrupt
+from tussle.cli.progress import compiling
+from tussle.cli.terminal import OK, out, say
+from tussle.cli.train_options import TrainOptions
+from tussle.errors import ParameterError
+from tussle.mission.plugin_files import load_plugin_file
+
+
+def train(options: TrainOptions) -> int:
+    """Train, or continue.
+
+    Returns:
+        The exit code.
+
+    Raises:
+        MissingExtraError: PyTorch is not installed.
+        ParameterError: The task is unknown, or the directory has a checkpoint that would be overwritten, or none to continue from.
+    """
+    from tussle.rl.flight import registered_task
+    from tussle.rl.train import Settings, Trainer  # needs the packages of tussle[train]
+
+    for path in options.plugin_files:
+        load_plugin_file(path)
+    task = registered_task(options.task, "the command line")
+    folder = options.directory or Path("training") / options.task.rpartition("/")[2]
+    if (folder / "checkpoint.pt").exists() and not options.resume:
+        raise ParameterError(f"{folder} has a checkpoint; continue it with --resume, or choose another --out")
+    with compiling():
+        trainer = Trainer(task, options.task, folder, options.seed, Settings(worlds=options.worlds))
+    if options.resume:
+        trainer.resume()
+    with Interrupt() as interrupt:
+
+        def tell(line: dict[str, float]) -> bool:
+            out().print(
+                f"{line['minutes']:6.1f} min  {line['decisions']:>13,.0f} decisions  {line['episodes']:>6,.0f} episodes  "
+                f"return {line['episode_return']:10.2f}  reward {line['reward_per_decision']:10.5f}"
+            )
+            return bool(interrupt.code)
+
+        trainer.train(options.minutes, tell)
+    draw_curve(trainer.curve, folder / "curve.png", options.task)
+    say(
+        "trained",
+        f'{folder / "policy.onnx"}: <autonomy policy="{folder / "policy.onnx"}">Learned</autonomy>',
+        "bold green",
+    )
+    return interrupt.code or OK
+
+
+def draw_curve(curve: Sequence[Sequence[float]], path: Path, title: str) -> None:
+    """Draw reward per decision and returns of episodes over decisions."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7, 5), layout="constrained")
+    FigureCanvasAgg(figure)
+    upper, lower = figure.subplots(2, sharex=True)
+    decisions = [line[1] for line in curve]
+    upper.plot(decisions, [line[4] for line in curve])
+    lower.plot(decisions, [line[3] for line in curve], ".-")
+    upper.set(title=title, ylabel="reward per decision")
+    lower.set(xlabel="decisions", ylabel="return of an episode")
+    figure.savefig(path, dpi=120)

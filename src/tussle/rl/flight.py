@@ -1,0 +1,269 @@
+"""Policies from ONNX files: checked, and applied to the rows of a simulation as the task's agents."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from tussle.api import GroupView
+from tussle.errors import MissingExtraError, ParameterError, listed, nearest_name
+from tussle.rl.action import Actor, Decoder, learned
+from tussle.rl.observation import AgentRows, Computed
+from tussle.rl.policy_file import TASK_KEY
+from tussle.rl.swarm import task_of
+from tussle.rl.task import Task
+
+BATCH = 64
+"""Rows per inference. Runtimes may sum in another order in a batch of another size, so the last one is filled up."""
+MOST_BYTES = 256 * 2**20
+"""Largest policy: a perceptron with layers of 4096 has 64 MiB."""
+
+
+class Policy:
+    """An inference session of an ONNX file, which is one network without loops from (n, width) to (n, outputs).
+
+    Args:
+        path: The file. Weights in other files are read from its folder only.
+
+    Attributes:
+        task: Name of the task in the metadata, or "".
+        width: Numbers of an observation that it takes; n_out: numbers that it returns.
+
+    Raises:
+        MissingExtraError: onnxruntime or onnx is not installed.
+        ParameterError: The file cannot be used.
+    """
+
+    def __init__(self, path: str) -> None:
+        try:
+            import onnxruntime
+        except ImportError:
+            raise MissingExtraError("Learned needs onnxruntime: pip install 'tussle[policy]'") from None
+        self.path = path
+        model = self._model()
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = options.inter_op_num_threads = 1
+        options.use_deterministic_compute = True
+        options.log_severity_level = 4
+        try:
+            session = onnxruntime.InferenceSession(
+                model.SerializeToString(), options, providers=["CPUExecutionProvider"]
+            )
+        except Exception as error:  # noqa: BLE001 - the runtime has a class for each of its codes
+            raise self._refused(f"onnxruntime refuses it: {str(error).splitlines()[0][:200]}") from None
+        self._session = session
+        self.task = session.get_modelmeta().custom_metadata_map.get(TASK_KEY, "")
+        self.width, self.n_out = self._checked(session.get_inputs()), self._checked(session.get_outputs())
+        self._names = session.get_inputs()[0].name, session.get_outputs()[0].name
+
+    def _refused(self, why: str) -> ParameterError:
+        return ParameterError(f"Learned.policy = {self.path!r}: {why}")
+
+    def _model(self) -> Any:
+        """The file's content, with the weights from other files."""
+        try:
+            import onnx
+        except ImportError:
+            raise MissingExtraError("Learned needs onnx: pip install 'tussle[policy]'") from None
+        path = Path(self.path)
+        if not path.is_file():
+            raise self._refused("there is no such file; it takes an ONNX file")
+        if path.stat().st_size > MOST_BYTES:
+            raise self._refused(f"it has more than {MOST_BYTES // 2**20} MiB")
+        try:
+            model = onnx.load_model(path, format="protobuf", load_external_data=False)
+        except Exception:  # noqa: BLE001 - a class of protobuf, which onnx does not export
+            model = None
+        if model is None or not model.graph.node:
+            raise self._refused("it is not an ONNX file")
+        folder = path.parent.resolve()
+        for tensor in tensors_of(model.graph, self._refused):
+            if tensor.data_location == onnx.TensorProto.EXTERNAL:
+                location = next((e.value for e in tensor.external_data if e.key == "location"), "")
+                other = (folder / location).resolve()
+                if not (
+                    other.is_relative_to(folder) and other.is_file() and other.stat().st_size <= MOST_BYTES
+                ):
+                    raise self._refused(
+                        f"weights in {location!r} are not allowed; they are in the file itself, or in a file of at most "
+                        f"{MOST_BYTES // 2**20} MiB in its folder"
+                    )
+        try:
+            onnx.load_external_data_for_model(model, str(folder))
+        except Exception as error:  # noqa: BLE001 - onnx raises errors of several bases
+            raise self._refused(f"weights cannot be read: {str(error)[:200]}") from None
+        return model
+
+    def _checked(self, ends: list[Any]) -> int:
+        """Width of the only input or output."""
+        shapes = [(end.type, end.shape) for end in ends]
+        if len(ends) == 1:
+            kind, shape = shapes[0]
+            if (
+                kind == "tensor(float)"
+                and len(shape) == 2
+                and not isinstance(shape[0], int)
+                and isinstance(shape[1], int)
+            ):
+                return int(shape[1])
+        raise self._refused(
+            f"its inputs or outputs are {str(shapes)[:200]}; a policy has one each, tensor(float) of a free number of rows and a "
+            "fixed number of columns"
+        )
+
+    def __call__(self, obs: np.ndarray) -> np.ndarray:
+        """Outputs of observations, (n, width), as (n, n_out)."""
+        n = len(obs)
+        out = np.empty((n, self.n_out), np.float32)
+        rows = np.zeros((BATCH, self.width), np.float32)
+        for first in range(0, n, BATCH):
+            some = min(BATCH, n - first)
+            rows[:some], rows[some:] = obs[first : first + some], 0.0
+            out[first : first + some] = self._session.run([self._names[1]], {self._names[0]: rows})[0][:some]
+        return out
+
+
+def tensors_of(graph: Any, refused: Callable[[str], ParameterError]) -> Iterator[Any]:
+    """All tensors of a graph; refuses nodes with graphs of their own, such as loops, which need not end."""
+    yield from graph.initializer
+    for node in graph.node:
+        for attribute in node.attribute:
+            if attribute.HasField("g") or attribute.graphs:
+                raise refused(f"{node.op_type} is not allowed; a policy has no loops and branches")
+            yield from [attribute.t] if attribute.HasField("t") else []
+            yield from attribute.tensors
+
+
+class LearnedFlight:
+    """A policy as the agents of one block of a task.
+
+    Attributes:
+        channels: Channels that it sets.
+    """
+
+    def __init__(self, policy: Policy, task: Task, name: str, block: str) -> None:
+        self.policy, self.task = policy, task
+        blocks = {b.name: b for b in task.blocks}
+        if block not in blocks and (block or len(blocks) > 1):
+            raise ParameterError(
+                f"Learned.block = {block!r}: {name} has no such block{nearest_name(block, blocks)}; {listed(blocks)}"
+            )
+        self.block = block or next(iter(blocks))
+        acts = task.acts(self.block)
+        for act in acts:
+            if act.value is None and "." in act.target:
+                raise ParameterError(
+                    f"Learned: {name} sets {act.target}; a policy flies where the actions of its task set channels"
+                )
+        played = learned(blocks[self.block], acts)
+        actor = next(type(p) for p in played.autonomy if isinstance(p, Actor))
+        self.channels, self._constants = tuple(actor.outputs()), actor.constants
+        self._decoder = Decoder(self.block, acts, np.float32)
+        width, sizes = sum(task.widths[self.block]), self._decoder.sizes
+        n_out = len(sizes) if self._decoder.is_continuous else int(sizes.sum())
+        if (policy.width, policy.n_out) != (width, n_out):
+            raise ParameterError(
+                f"Learned.policy = {policy.path!r} takes {policy.width} and returns {policy.n_out} numbers; agents of {name} observe "
+                f"{width} and decide by {n_out}"
+            )
+        if len(blocks) > 1 and any(isinstance(c, Computed) for c in task.components(self.block)):
+            raise ParameterError(
+                f"Learned: {name} has Computed observations of several blocks; give each block its own task"
+            )
+
+    def decide(self, g: GroupView, columns: Mapping[str, np.ndarray]) -> None:
+        """Set the channels of the rows whose decision is due, by name."""
+        simulation = g.context.simulation()
+        interval = self.task.given.dt * self.task.decide_every
+        every = round(interval / simulation.mission.dt)
+        if abs(every * simulation.mission.dt - interval) > 1e-9 * interval:
+            raise ParameterError(
+                f"Learned: the policy decides every {interval:g} s, which is no multiple of the mission's dt = {simulation.mission.dt:g} s"
+            )
+        due = np.flatnonzero(g.step_count % every == 0)
+        if not len(due):
+            return
+        for name, value in self._constants.items():
+            columns[name][due] = value
+        out = self.policy(self.observe(simulation, g)[due])
+        if not self._decoder.is_continuous:
+            edges = np.cumsum(self._decoder.sizes)[:-1]
+            actions = np.stack([part.argmax(axis=1) for part in np.split(out, edges, axis=1)], axis=1)
+        else:
+            actions = out.astype(float)
+        wrong = self._decoder.decode(actions, np.arange(len(due)), due, columns.__getitem__)
+        if wrong >= 0:
+            g.fail(int(due[wrong]), f"the policy {self.policy.path} returned a value that is not a number")
+
+    def observe(self, simulation: Any, g: GroupView) -> np.ndarray:
+        """Observations of all rows, (n, numbers): the task's components write them, as in a swarm."""
+        rows = g.first + np.arange(g.n)
+        group = next(
+            group for group in simulation.state.population.groups if group.first <= g.first < group.last
+        )
+        width = self.policy.width
+        seen = np.zeros((g.n, width), self.task.dtype)
+        for number in np.unique(g.block):
+            mine = np.flatnonzero(g.block == number)
+            place = g.block_index[mine]
+            count = max(simulation.mission.blocks[number].count, int(place.max()) + 1)
+            agents = g.world[mine] * count + place
+            out = np.zeros((simulation.n_worlds * count, width), self.task.dtype)
+            span = int(rows[mine[0]]), int(rows[mine[-1]]) + 1
+            part = AgentRows(self.block, group, rows[mine], agents, g.team[mine].astype(float), {}, span)
+            column = 0
+            for component, n in zip(
+                self.task.components(self.block), self.task.widths[self.block], strict=True
+            ):
+                component.write(simulation, part, column, out)
+                column += n
+            seen[mine] = out[agents]
+        return seen
+
+
+def registered_task(name: str, path: str) -> Task:
+    """The task that is registered under a name.
+
+    Raises:
+        ParameterError: There is none.
+    """
+    known = {
+        key: spec.kwargs["task"]
+        for key, spec in gymnasium.registry.items()
+        if spec.entry_point == "tussle.rl.environments:TaskEnv"
+    }
+    if name not in known:
+        what = (
+            f"there is no task {name!r}{nearest_name(name, known)}"
+            if name
+            else f"{path} names no task; set it"
+        )
+        raise ParameterError(f"Learned.task: {what}; {listed(known)}; `tussle.rl.register` adds others")
+    return task_of(known[name])
+
+
+def load_flight(path: str, task: str, block: str) -> LearnedFlight:
+    """A policy with its task; read once per version of the file.
+
+    Raises:
+        MissingExtraError: A package is not installed.
+        ParameterError: File, task or block cannot be used.
+    """
+    file = Path(path)
+    stamp = file.stat().st_mtime_ns if file.is_file() else 0
+    return _flight(path, task, block, stamp)
+
+
+@lru_cache(maxsize=64)
+def _flight(path: str, task: str, block: str, stamp: int) -> LearnedFlight:
+    policy = Policy(path)
+    name = task or policy.task
+    return LearnedFlight(policy, registered_task(name, path), name, block)
+
+
+__all__ = ["LearnedFlight", "Policy", "load_flight", "registered_task"]

@@ -1,0 +1,49 @@
+"""`tussle train` trains, continues, and writes a policy that flies."""
+
+from __future__ import annotations
+
+import sys
+
+import pytest
+from cli_process import call
+
+
+def test_without_torch_it_says_what_to_install(monkeypatch):
+    pytest.importorskip("onnxruntime", reason="onnxruntime is not installed: pip install 'tussle[policy]'")
+    monkeypatch.setitem(sys.modules, "torch", None)
+    monkeypatch.delitem(sys.modules, "tussle.rl.train", raising=False)
+    done = call("train", "tussle/RLSimple-v0")
+    assert done.returncode != 0
+    assert "pip install 'tussle[train]'" in done.stderr
+
+
+def test_a_robot_learns_to_stay_near_the_origin(tmp_path, monkeypatch):
+    torch = pytest.importorskip("torch", reason="PyTorch is not installed: pip install 'tussle[train]'")
+    monkeypatch.chdir(tmp_path)
+    done = call("train", "tussle/RLSimple-v1")
+    assert "did you mean 'tussle/RLSimple-v0'" in done.stderr
+    command = "train", "tussle/RLSimple-v0", "--out", "robot", "--worlds", 16
+    done = call(*command, "--minutes", 0.25)
+    assert done.returncode == 0, done.stderr
+    curve = (tmp_path / "robot" / "curve.csv").read_text().splitlines()
+    rewards = [float(line.split(",")[-1]) for line in curve[1:]]
+    assert max(rewards[-3:]) > rewards[0] + 0.2
+    assert (tmp_path / "robot" / "curve.png").read_bytes()[:4] == b"\x89PNG"
+    assert "has a checkpoint; continue it with --resume" in call(*command).stderr
+    before = torch.load(tmp_path / "robot" / "checkpoint.pt", weights_only=True)
+    assert call(*command, "--resume", "--minutes", 0.25).returncode == 0
+    after = torch.load(tmp_path / "robot" / "checkpoint.pt", weights_only=True)
+    assert after["counts"][1] == before["counts"][1] + 16 * 128
+    assert len(after["curve"]) == len(before["curve"]) + 1
+
+    from tussle import Simulation
+    from tussle.rl import NearOrigin
+    from tussle.stock import Learned
+
+    mission = NearOrigin().given
+    policy = Learned(policy=str(tmp_path / "robot" / "policy.onnx"))
+    mission = mission.replace(blocks=[mission.blocks[0].replace(autonomy=policy)])
+    with Simulation(mission, seeds=range(1, 9)) as simulation:
+        simulation.step(60)
+        near = abs(simulation.read("robot.pos")[0][..., 0]) < 2.5
+    assert near.mean() > 0.7

@@ -1,0 +1,210 @@
+"""Policies from ONNX files fly in any mission as they do in a swarm; other files are refused."""
+
+from __future__ import annotations
+
+import pickle
+import sys
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+pytest.importorskip("onnxruntime", reason="onnxruntime is not installed: pip install 'tussle[policy]'")
+pytest.importorskip("onnx", reason="onnx is not installed: pip install 'tussle[policy]'")
+pytest.importorskip("gymnasium", reason="gymnasium is not installed: pip install 'tussle[rl]'")
+
+import onnx
+from onnx import TensorProto, helper, numpy_helper
+
+from tussle import Simulation, stock
+from tussle.errors import MissingExtraError, ParameterError, PluginError
+from tussle.mission import read_mission
+from tussle.rl import NearOrigin, PredatorTeam, make_swarm, write_policy
+from tussle.rl.flight import BATCH, Policy
+from tussle.stock import Learned
+
+WIDTH = 3 + 3 * 8 + 5
+
+
+def team_policy(path, n_in=WIDTH, n_out=2, task="tussle/PredatorTeam-v0", width=24):
+    chance = np.random.default_rng(3)
+    sizes = [n_in, width, n_out]
+    layers = [(chance.normal(0, 0.4, (b, a)), chance.normal(0, 0.1, b)) for a, b in pairwise(sizes)]
+    write_policy(path, layers, task=task)
+    return str(path)
+
+
+def with_policy(mission, owner, **values):
+    """The mission, in which a policy flies a block beside the autonomies that the task keeps."""
+    blocks = [
+        b.replace(autonomy=(*b.autonomy, Learned(**values))) if b.name == owner else b for b in mission.blocks
+    ]
+    return mission.replace(blocks=blocks)
+
+
+def test_a_policy_flies_as_in_the_swarm_of_its_task(tmp_path):
+    path = team_policy(tmp_path / "team.onnx")
+    task, policy = PredatorTeam(), Policy(path)
+    swarm = make_swarm(task, 2)
+    obs = swarm.reset(seed=5)
+    for _ in range(40):
+        obs, *_ = swarm.step(policy(obs.reshape(-1, WIDTH)).reshape(2, 5, 2))
+    mission = with_policy(task.given, "switchers", policy=path)
+    with Simulation(pickle.loads(pickle.dumps(mission)), seeds=[5, 6]) as simulation:
+        simulation.step(80)
+        for path in ("switchers.pos", "keepers.pos", "prey.vel"):
+            np.testing.assert_array_equal(simulation.read(path)[0], swarm.simulation.read(path)[0])
+
+        assert np.ptp(simulation.read("switchers.vel")[0]) > 10
+
+
+def test_worlds_are_the_same_in_any_stack(tmp_path):
+    """25 worlds of five policies fill more than one batch, so that a row stands at another place in it than alone."""
+    mission = with_policy(PredatorTeam().given, "switchers", policy=team_policy(tmp_path / "team.onnx"))
+    seeds = list(range(1, 26))
+    assert 5 * len(seeds) > BATCH
+    with Simulation(mission, seeds=seeds) as many, Simulation(mission, seeds=[25]) as alone:
+        many.step(60)
+        alone.step(60)
+        assert many.state_hash(24) == alone.state_hash(0)
+
+
+@pytest.mark.parametrize("width", [5, 64, 100])
+def test_a_row_does_not_depend_on_its_batch(tmp_path, width):
+    policy = Policy(team_policy(tmp_path / "p.onnx", n_in=33, n_out=7, width=width))
+    obs = np.random.default_rng(1).normal(0, 2, (150, 33)).astype(np.float32)
+    together = policy(obs)
+    order = np.random.default_rng(2).permutation(150)
+    np.testing.assert_array_equal(policy(obs[order]), together[order])
+    for row in range(0, 150, 7):
+        np.testing.assert_array_equal(policy(obs[row : row + 1])[0], together[row])
+
+
+def test_levels_are_chosen_by_the_greatest_output_and_computed_observations_are_the_tasks(tmp_path):
+    """A policy that goes towards the origin: level 1, to the right, where x < 0."""
+    write_policy(tmp_path / "home.onnx", [([[0.0, 0.0], [-1.0, 0.0]], [0.0, 0.0])], task="tussle/RLSimple-v0")
+    mission = NearOrigin().given
+    mission = mission.replace(
+        blocks=[mission.blocks[0].replace(autonomy=Learned(policy=str(tmp_path / "home.onnx")))]
+    )
+    with Simulation(mission, seeds=[1, 2, 3]) as simulation:
+        assert np.abs(simulation.read("robot.pos")[0][..., 0]).max() > 2
+        simulation.step(15)
+        assert np.abs(simulation.read("robot.pos")[0][..., 0]).max() <= 1
+
+
+def test_a_policy_has_the_form_of_its_task(tmp_path):
+    path = team_policy(tmp_path / "p.onnx", n_in=4)
+    mission = PredatorTeam().given
+    for values, message in (
+        ({}, r"takes 4 and returns 2 numbers; agents of tussle/PredatorTeam-v0 observe 32 and decide by 2"),
+        ({"task": "tussle/PredatorTeam-v1"}, r"no task 'tussle/PredatorTeam-v1' [(]did you mean .*v0"),
+        ({"block": "swichers"}, r"no such block [(]did you mean 'switchers'"),
+    ):
+        with pytest.raises((ParameterError, PluginError), match=message):
+            Simulation(with_policy(mission, "switchers", policy=path, **values))
+    bare = team_policy(tmp_path / "bare.onnx", task="")
+    with pytest.raises((ParameterError, PluginError), match=r"bare.onnx names no task"):
+        Simulation(with_policy(mission, "switchers", policy=bare))
+    with (
+        Simulation(
+            with_policy(mission.replace(dt=0.15), "switchers", policy=team_policy(path))
+        ) as simulation,
+        pytest.raises(PluginError, match=r"every 0.2 s, which is no multiple of the mission's dt = 0.15 s"),
+    ):
+        simulation.step(1)
+
+
+def save(path, nodes, inputs, outputs, tensors=()):
+    graph = helper.make_graph(nodes, "g", inputs, outputs, tensors)
+    onnx.save_model(
+        helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8), str(path)
+    )
+
+
+def end(name, *shape):
+    return helper.make_tensor_value_info(name, TensorProto.FLOAT, shape)
+
+
+def test_files_that_are_no_policies_are_refused(tmp_path):
+    path = tmp_path / "x.onnx"
+    with pytest.raises(ParameterError, match=r"x.onnx': there is no such file"):
+        Policy(str(path))
+    for content in (b"", b"\xff\x00hello" * 99, b"<xml/>"):
+        path.write_bytes(content)
+        with pytest.raises(ParameterError, match=r"x.onnx': it is not an ONNX file"):
+            Policy(str(path))
+    relu = [helper.make_node("Relu", ["a"], ["b"])]
+    for shape in (("n", 2, 3), (7, 2), ("n", "m")):
+        save(path, relu, [end("a", *shape)], [end("b", *shape)])
+        with pytest.raises(ParameterError, match=r"one each, tensor\(float\) of a free number of rows"):
+            Policy(str(path))
+    save(path, [helper.make_node("Nonsense", ["a"], ["b"])], [end("a", "n", 2)], [end("b", "n", 2)])
+    with pytest.raises(ParameterError, match=r"x.onnx': onnxruntime refuses it"):
+        Policy(str(path))
+    body = helper.make_graph(relu, "body", [end("a", "n", 2)], [end("b", "n", 2)])
+    save(
+        path,
+        [helper.make_node("Loop", ["", "", "a"], ["b"], body=body)],
+        [end("a", "n", 2)],
+        [end("b", "n", 2)],
+    )
+    with pytest.raises(ParameterError, match=r"Loop is not allowed; a policy has no loops"):
+        Policy(str(path))
+
+
+def test_weights_in_other_files_are_read_from_the_same_folder_only(tmp_path):
+    (tmp_path / "in").mkdir()
+    weight = np.eye(2, dtype=np.float32)
+    for place, is_allowed in (("w.bin", True), ("../w.bin", False), (str(tmp_path / "w.bin"), False)):
+        (tmp_path / "in" / "w.bin").write_bytes(weight.tobytes())
+        (tmp_path / "w.bin").write_bytes(weight.tobytes())
+        tensor = numpy_helper.from_array(weight, "w")
+        tensor.ClearField("raw_data")
+        tensor.data_location = TensorProto.EXTERNAL
+        for key, value in (("location", place), ("offset", "0"), ("length", "16")):
+            tensor.external_data.add(key=key, value=value)
+        path = tmp_path / "in" / "x.onnx"
+        graph = helper.make_graph(
+            [helper.make_node("MatMul", ["a", "w"], ["b"])],
+            "g",
+            [end("a", "n", 2)],
+            [end("b", "n", 2)],
+            [tensor],
+        )
+        model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8)
+        path.write_bytes(model.SerializeToString())
+        if is_allowed:
+            assert Policy(str(path))(np.array([[3.0, 4.0]])).tolist() == [[3.0, 4.0]]
+        else:
+            with pytest.raises(ParameterError, match=r"x.onnx': weights in .*w.bin' are not allowed"):
+                Policy(str(path))
+
+
+def test_a_missing_runtime_is_named(tmp_path, monkeypatch):
+    path = team_policy(tmp_path / "p.onnx")
+    monkeypatch.setitem(sys.modules, "onnxruntime", None)
+    with pytest.raises(MissingExtraError, match=r"pip install 'tussle\[policy\]'"):
+        Policy(path)
+
+
+def test_weights_that_do_not_fit_are_refused(tmp_path):
+    with pytest.raises(ParameterError, match=r"\(outputs, inputs\)"):
+        write_policy(tmp_path / "p.onnx", [(np.ones((3, 2)), np.ones(3)), (np.ones((1, 2)), np.ones(1))])
+    with pytest.raises(ParameterError, match=r"activation = 'tanh' is not allowed"):
+        write_policy(tmp_path / "p.onnx", [(np.ones((1, 2)), np.ones(1))], activation="tanh")
+
+
+def test_an_output_that_is_no_number_ends_its_world(tmp_path):
+    write_policy(tmp_path / "p.onnx", [(np.zeros((2, WIDTH)), [np.nan, 0.0])], task="tussle/PredatorTeam-v0")
+    mission = with_policy(PredatorTeam().given, "switchers", policy=str(tmp_path / "p.onnx"))
+    with Simulation(mission) as simulation, pytest.raises(PluginError, match=r"a value that is not a number"):
+        simulation.step(1)
+
+
+def test_the_example_is_played_with_the_policy_that_ships():
+    """Its hash depends on the machine, so that it is not among the golden ones."""
+    mission = read_mission(stock.examples()["Learned"]).mission
+    with Simulation(mission, seeds=range(1, 5)) as simulation:
+        scores = np.array([[result.scores[2], result.scores[3]] for result in simulation.run()])
+    assert scores[:, 1].sum() > scores[:, 0].sum()
