@@ -162,7 +162,7 @@ class Param(Numbers):
 
     @property
     def is_row_data(self) -> bool:
-        """Whether there is one number (or tuple) per row, stored as a column of the group's table."""
+        """True if there is one number (or tuple) per row, stored as a column of the group's table."""
         return not self.structural and not self.ragged
 
     def allowed(self) -> str:
@@ -252,7 +252,7 @@ class Param(Numbers):
         return number
 
     def is_within(self, number: float) -> bool:
-        """Whether a number is within the bounds and one of the choices."""
+        """Return True if a number is within the bounds and one of the choices."""
         return (
             (self.ge is None or number >= self.ge)
             and (self.gt is None or number > self.gt)

@@ -183,7 +183,7 @@ def _scalar_problem(value: Any, rule: Rule, where: str) -> str:
 
 
 def _has_surrogates(text: str) -> bool:
-    """Whether a text holds surrogates, which JSON can escape but UTF-8 cannot encode."""
+    """Return True if a text holds surrogates, which JSON can escape but UTF-8 cannot encode."""
     return any("\ud800" <= letter <= "\udfff" for letter in text)
 
 

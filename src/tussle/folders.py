@@ -32,14 +32,14 @@ def user_folder(variable: str, usual: str) -> Path | None:
 
 
 def is_own(found: os.stat_result) -> bool:
-    """Whether a file belongs to the user and no other user can write it."""
+    """Return True if a file belongs to the user and no other user can write it."""
     if not hasattr(os, "geteuid"):  # Windows: the access lists of the user's folders keep other users out
         return True
     return found.st_uid == os.geteuid() and not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
 
 
 def is_private(folder: Path) -> bool:
-    """Whether a path is a folder that belongs to the user and that no other user can write to."""
+    """Return True if a path is a folder that belongs to the user and that no other user can write to."""
     try:
         found = folder.stat()
     except OSError:

@@ -21,7 +21,7 @@ class Segments:
 
     start: np.ndarray
     items: ClassVar[str] = "items"
-    """What the items are called in messages."""
+    """Name of the items in error messages."""
 
     def _each(self, reduce: Callable[..., None], values: Any, dtype: type, *rest: float) -> np.ndarray:
         n, m = len(self.start) - 1, int(self.start[-1])

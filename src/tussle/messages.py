@@ -333,7 +333,7 @@ class WaypointStatus(Message):
 
 
 class GPSStatus(Message):
-    """What a satellite receiver measures."""
+    """Measurements of a satellite receiver."""
 
     geodetic = Field("latitude longitude altitude", unit="rad rad m", doc="Position of the last fix, WGS84.")
     has_fix = Field(dtype=bool, doc="Whether there is a fix now.")

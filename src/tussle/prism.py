@@ -58,7 +58,7 @@ class Prism(Volume):
         return inside
 
     def _over(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Whether points, (n,) each, lie over the polygon: a ray to the East crosses an odd number of sides."""
+        """Return True if points, (n,) each, lie over the polygon: a ray to the East crosses an odd number of sides."""
         east, north, dx, dy = self._sides
         crosses = (north > y) != (north + dy > y)
         at = east + (y - north) * dx / np.where(dy == 0.0, 1.0, dy)

@@ -180,7 +180,7 @@ class Scene:
         return tuple(base for base in self.bases if base.team == team)
 
     def contains(self, boundary: int | str, pos: np.ndarray) -> np.ndarray:
-        """Whether positions [m], (3, n), lie inside a region, (n,).
+        """Return True if positions [m], (3, n), lie inside a region, (n,).
 
         Raises:
             ParameterError: There is no such region.
@@ -245,7 +245,7 @@ class Scene:
         return np.asarray(np.where(is_place, surface, -np.inf))
 
     def free(self, points: Any, radius: Any) -> np.ndarray:
-        """Whether spheres round points [m], (3, n), with a radius [m], one or (n,), neither touch nor lie inside a solid, (n,).
+        """Return True if spheres round points [m], (3, n), with a radius [m], one or (n,), neither touch nor lie inside a solid, (n,).
 
         A mesh is a surface: a point that it surrounds is free.
 
@@ -255,7 +255,7 @@ class Scene:
         return ~self.caster.touches(points, radius)
 
     def line_of_sight(self, a: Any, b: Any) -> np.ndarray:
-        """Whether nothing of the scene lies between points a and b [m], (3, n) each; (n,).
+        """Return True if nothing of the scene lies between points a and b [m], (3, n) each; (n,).
 
         Raises:
             ParameterError: A shape does not fit, or a value is not finite.

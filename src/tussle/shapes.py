@@ -31,7 +31,7 @@ class Volume(ABC):
 
     @abstractmethod
     def contains(self, pos: np.ndarray) -> np.ndarray:
-        """Whether positions [m], (3, n), lie inside, (n,); NaN counts as outside."""
+        """Return True if positions [m], (3, n), lie inside, (n,); NaN counts as outside."""
 
     @abstractmethod
     def inward(self, pos: np.ndarray) -> np.ndarray:
@@ -58,7 +58,7 @@ class Volume(ABC):
         return -_unit(self.inward(pos))
 
     def touches(self, center: np.ndarray, radius: np.ndarray) -> np.ndarray:
-        """Whether spheres with centres outside [m], (3, n), and radii [m], (n,), reach the inside, (n,)."""
+        """Return True if spheres with centres outside [m], (3, n), and radii [m], (n,), reach the inside, (n,)."""
         return self.contains(center + radius * _unit(self.inward(center)))
 
 

@@ -241,7 +241,7 @@ def spellings(unit: str) -> list[str]:
 
 
 def compatible(unit_a: str, unit_b: str) -> bool:
-    """Whether a channel may connect two units: same dimension and same size, since channels do not convert.
+    """Return True if a channel may connect two units: same dimension and same size, since channels do not convert.
 
     Raises:
         UnitError: A text is not a unit.
@@ -281,7 +281,7 @@ def split_units(text: str, n: int) -> tuple[str, ...]:
 
 
 def is_si(unit: str) -> bool:
-    """Whether a unit is coherent SI, as used inside tussle: "m/s" and "" are, "kt", "deg" and "%" are not.
+    """Return True if a unit is coherent SI, as used inside tussle: "m/s" and "" are, "kt", "deg" and "%" are not.
 
     Raises:
         UnitError: The text is not a unit.

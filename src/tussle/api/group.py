@@ -290,7 +290,7 @@ class GroupView:
 
     @property
     def one_per_world(self) -> bool:
-        """Whether each row is in a different world, since entities move one after another."""
+        """True if each row is in a different world, since entities move one after another."""
         return self._bodies.scans
 
     def by_place(self, index: Index, name: str) -> tuple[np.ndarray, ...]:
@@ -350,7 +350,7 @@ class GroupView:
         return cast(self.context, self._bodies, (origins, directions, max_range), world, own, entities)
 
     def line_of_sight(self, row: np.ndarray, other: np.ndarray, entities: bool = True) -> np.ndarray:
-        """Whether nothing lies between entities: on the line between their centres, outside of their spheres of `radius`.
+        """Return True if nothing lies between entities: on the line between their centres, outside of their spheres of `radius`.
 
         Args:
             row: Rows of the view, (m,), as `near.row`.

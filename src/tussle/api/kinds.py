@@ -87,7 +87,7 @@ class WorldPlugin(Plugin):
 
     kind: ClassVar[str] = "world plugin"
     reads_start_positions: ClassVar[bool] = False
-    """Whether `step` reads `w.start_pos`."""
+    """Return True if `step` reads `w.start_pos`."""
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -134,7 +134,7 @@ class Interaction(WorldPlugin):
     kind = "interaction"
 
     def rejects(self, w: WorldView, world: int, pos: np.ndarray, taken: np.ndarray) -> bool:
-        """Whether an entity must not be placed at `pos` [m], (3,), in world number `world`, with others at `taken` [m], (3, m)."""
+        """Return True if an entity must not be placed at `pos` [m], (3,), in world number `world`, with others at `taken` [m], (3, m)."""
         return False
 
 
@@ -155,7 +155,7 @@ class Network(WorldPlugin):
     losses: ClassVar[tuple[str, ...]] = ()
     """Reasons for which a message to an entity within reach may be lost; see `Links`."""
     waits_for_traffic: ClassVar[bool] = False
-    """Whether a delayed message also waits until another one is published on its topic."""
+    """Return True if a delayed message also waits until another one is published on its topic."""
     historic_attributes = HistoricAttributes(least_zero=("comm_delay",))
     comm_delay = Param(0.0, unit="s", ge=0.0, doc="Time from sending to the earliest delivery.")
     monitor_publisher_topics = Param(

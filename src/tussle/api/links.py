@@ -12,7 +12,7 @@ from tussle.messages import Messages
 from tussle.numeric.segments import order_by_row
 
 BLOCKS = ("nothing", "scene", "scene and entities")
-"""What may stand between a sender and a receiver."""
+"""Kinds of obstacles between a sender and a receiver."""
 
 
 class Links:

@@ -41,5 +41,5 @@ class RangeKernel:
         self.kernel(x, u, p, self.numbers, self.wholes, begin, end, dt, substeps)
 
     def arrays(self, x: np.ndarray, u: np.ndarray, p: np.ndarray) -> tuple[Any, ...]:
-        """What a kernel of another signature passes on: the address of this one, and its arrays."""
+        """Return the arguments for a kernel of another signature: the address of this one, and its arrays."""
         return self.kernel.address, x, u, p, self.numbers, self.wholes

@@ -32,12 +32,12 @@ class StateFollower(Autonomy):
         """Update `state` with the messages received; call it once in each step."""
         names = self._names()
         if names and self.told_state:
-            rows, heard = self.told_state.latest()
+            rows, received = self.told_state.latest()
             number = {name: i for i, name in enumerate(names)}
-            self.state[rows] = [number.get(text, -1) for text in heard.text]
+            self.state[rows] = [number.get(text, -1) for text in received.text]
 
     def acts(self, plugin: Any, state: np.ndarray | None = None) -> np.ndarray | None:
-        """Whether an inner plugin acts in each row, (n,), for `g.step`; None if it always acts.
+        """Return True if an inner plugin acts in each row, (n,), for `g.step`; None if it always acts.
 
         Args:
             plugin: The inner plugin.

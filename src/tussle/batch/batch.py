@@ -321,7 +321,7 @@ class Batch:
         return Path("batches") / f"{plain[:80]}-{self.fingerprint[:8]}"
 
     def is_played_in(self, directory: str | Path, until: Until | None = None) -> bool:
-        """Whether a directory has all runs of the batch.
+        """Return True if a directory has all runs of the batch.
 
         Raises:
             BatchError: The directory holds another batch, or cannot be read.

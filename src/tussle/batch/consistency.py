@@ -22,7 +22,7 @@ MOST_METRICS = 10_000
 MOST_VALUE = 1e100
 """Of a metric that is finite: sums of squares of larger ones, as variances take them, are not."""
 ALWAYS_ALLOWED = 1_000_000
-"""As many cells as any batch may have."""
+"""Largest number of cells of a batch."""
 
 
 def check_design(design: pa.Table, info: Mapping[str, Any], file: Path) -> None:

@@ -19,7 +19,7 @@ from tussle.batch.tasks import BatchRun, Finished, Heartbeat, Package
 from tussle.errors import BatchError, MissingExtraError, ParameterError
 
 Client = Any
-"""That of `distributed`, which annotates a part of itself."""
+"""A class of `distributed`, which is annotated in part."""
 
 LOOK_EVERY = 0.5
 """Time between two questions which workers there are [s]."""

@@ -1,4 +1,4 @@
-"""What a Dask worker does for a batch. A worker outlives batches, and may have several threads: nothing here relies on a new process."""
+"""Tasks of a Dask worker. A worker outlives batches and may have several threads: nothing here relies on a new process."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def play_chunk(
 
 
 def code_of(mission: Mission) -> dict[str, str]:
-    """What results of a mission depend on in this process: versions, and hashes of the source of tussle and of packages with plugins.
+    """Return the facts on which results depend: versions, and hashes of the source of tussle and of packages with plugins.
 
     Plugin files and scripts are left out: they are sent with the mission.
     """

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from multiprocessing.connection import Connection
 
 OVERDUE = "it took longer"
-"""How the error of a run begins that took longer than `run_timeout`."""
+"""Start of the error message of a run that took longer than `run_timeout`."""
 
 ENVIRONMENT = {"OMP_WAIT_POLICY": "passive", "NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 """Of processes that play: each uses one core. Numba and OpenMP read these settings when they load."""

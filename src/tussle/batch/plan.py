@@ -79,7 +79,7 @@ class BatchPlan:
 
 
 def _column(values: list[Any]) -> pa.Array:
-    """Whole numbers, real numbers, or else texts."""
+    """Return the values as integers, real numbers, or texts."""
     numbers = [v for v in values if v is not None]
     if all(isinstance(v, int) and not isinstance(v, bool) for v in numbers):
         return pa.array(values, pa.int64())

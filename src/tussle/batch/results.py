@@ -41,7 +41,7 @@ FIRST = ("wins", "ties", "score", "alive", "lost", "start", "t", "steps")
 
 
 class Results:
-    """What came of the runs of a batch: of those that are finished, where it goes on.
+    """Results of the runs of a batch; of an unfinished batch, those of its finished runs.
 
     Failed runs are in no share, mean or comparison; `n_failed` says how many there are. Where several points are taken together,
     the runs of a seed count as one block if there are 20 seeds or more: they share their random numbers.
@@ -108,7 +108,7 @@ class Results:
 
     @cached_property
     def variables(self) -> list[Variable]:
-        """What was varied."""
+        """The variables of the batch."""
         return [variable_of(entry) for entry in self.info["variables"]]
 
     @cached_property
@@ -267,7 +267,7 @@ class Results:
         return [name for name in [*names, "t"] if name in self._columns]
 
     def compare(self, expression: str, a: int | str, b: int | str) -> PairedComparison:
-        """What b has more than a, in pairs of runs with the same seed; of a batch with independent seeds, in their order.
+        """Differences b - a of pairs of runs with the same seed; with independent seeds, in order of the runs.
 
         Args:
             expression: The quantity.
@@ -325,7 +325,7 @@ class Results:
         return select_points(self.variables, self.points, text)
 
     def sensitivity(self, expression: str) -> list[Effect]:
-        """What each variable does to a quantity.
+        """Influence of each variable on a quantity.
 
         Raises:
             ParameterError: There is no such quantity.
@@ -334,7 +334,7 @@ class Results:
         return effects(self.variables, self.points, self.by_seed(expression), self._step)
 
     def rank_correlations(self, expression: str) -> list[Effect]:
-        """As `sensitivity`, without parts of the variance: for which no further package is needed."""
+        """Same as `sensitivity` without parts of the variance; it needs no optional package."""
         return rank_effects(self.variables, self.points, self.by_seed(expression), self._step)
 
     @property
@@ -396,7 +396,7 @@ class Results:
     # -- rows -------------------------------------------------------------------------------------------------------------
 
     def _rows(self, point: int | None) -> np.ndarray:
-        """Which runs are of a point, (n_runs,)."""
+        """Return True for each run of a point, (n_runs,)."""
         return np.ones(self.n_runs, bool) if point is None else self._point == known_point(self.points, point)
 
     def _blocks(self, rows: np.ndarray, point: int | None) -> np.ndarray | None:

@@ -52,7 +52,7 @@ def floats(column: pa.ChunkedArray) -> np.ndarray:
 
 
 def is_failed(runs: pa.Table) -> np.ndarray:
-    """Which runs failed, (n_runs,)."""
+    """Return True for each failed run, (n_runs,)."""
     has_error = pc.fill_null(pc.not_equal(runs["error"], ""), False)
     failed: np.ndarray = pc.or_(has_error, pc.equal(runs["end"], "error")).to_numpy()
     return failed

@@ -40,7 +40,7 @@ IDENTITY = (
 
 
 class Playable(Protocol):
-    """What this module needs of a `Batch`, which it cannot import."""
+    """The interface of `Batch` that this module uses; importing it would make a circle."""
 
     plan: BatchPlan
     package: Package

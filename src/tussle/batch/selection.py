@@ -84,7 +84,7 @@ def paired_points(
 
 
 def is_number(side: int | str) -> bool:
-    """Whether a point is given by its number."""
+    """Return True if a point is given by its number."""
     return not isinstance(side, str) or (side.strip().isascii() and side.strip().isdigit())
 
 
@@ -126,7 +126,7 @@ def _values(variables: Sequence[Variable], text: str) -> list[tuple[Variable, st
 
 
 def _agree(value: Any, shown: str, variable: Variable) -> bool:
-    """Whether a text names a value; numbers are compared to six digits."""
+    """Return True if a text names a value; numbers are compared to six digits."""
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         try:
             number = float(shown)

@@ -37,7 +37,7 @@ SEED = 20180101
 
 @dataclass(frozen=True)
 class Share:
-    """How many of the runs had one outcome.
+    """Return the share of runs with one outcome.
 
     Attributes:
         name: Of the team, or "ties".

@@ -62,7 +62,7 @@ class Until:
         return Until(quantity, half_width)
 
     def is_met(self, columns_by_point: Iterable[Columns]) -> bool:
-        """Whether the interval is narrow enough at every point.
+        """Return True if the interval is narrow enough at every point.
 
         Args:
             columns_by_point: For each point, name -> value for each of its runs, (n,); NaN where a run failed.

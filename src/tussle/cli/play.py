@@ -225,7 +225,7 @@ def planned_by(options: RunOptions) -> PlannedRun:
 
 
 def _may_run(code: DirectoryCode, is_trusted: bool) -> bool:
-    """Whether plugin code of a batch directory may run: the user's own, and other code if the user says so."""
+    """Return True if plugin code of a batch directory may run: the user's own, and other code if the user says so."""
     if code.is_own:
         return True
     is_asked = not is_trusted and sys.stdin.isatty() and sys.stderr.isatty()

@@ -74,7 +74,7 @@ class TopicBuffer:
         return self._joined
 
     def is_receiver(self, n: int) -> np.ndarray:
-        """Whether each of the n rows of the body table subscribes to the topic, (n,)."""
+        """Return True if each of the n rows of the body table subscribes to the topic, (n,)."""
         found = np.zeros(n, bool)
         for inbox in self.inboxes:
             found[inbox.view.first : inbox.view.last] = True

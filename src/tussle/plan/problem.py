@@ -1,4 +1,4 @@
-"""What a planner is asked, and what it answers."""
+"""Planning problems and plans."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ class Problem:
         return self.motion.rollout(x, np.broadcast_to(u, (n_steps, *u.shape)), self.dt, self.substeps)
 
     def is_allowed(self, x: np.ndarray) -> np.ndarray:
-        """Whether states (m, n) are finite, within the bounds and free of obstacles, (n,)."""
+        """Return True if states (m, n) are finite, within the bounds and free of obstacles, (n,)."""
         rows, low, high = self.bounded
         inside = (x[rows] >= low[:, None]) & (x[rows] <= high[:, None])
         allowed: np.ndarray = inside.all(axis=0) & np.isfinite(x).all(axis=0)

@@ -27,7 +27,7 @@ class Tree:
     """The nodes, and the cheapest node of each cell.
 
     Args:
-        problem: What is asked.
+        problem: The planning problem.
         sizes: Size of a cell by bounded field.
         room: Largest number of nodes.
     """
@@ -100,7 +100,7 @@ def solve(
     """Search the fastest way to the goal; the longer the search, the better the plan.
 
     Args:
-        problem: What is asked.
+        problem: The planning problem.
         seed: Seed; equal seeds give equal plans.
         branches: Number of commands to try.
         batch: Number of commands that are propagated at once.

@@ -20,7 +20,7 @@ def solve_with_ompl(problem: Problem, planner: str = "RRT", *, seed: int = 1, se
     checked, without parents.
 
     Args:
-        problem: What is asked.
+        problem: The planning problem.
         planner: "RRT", "KPIECE1" or "EST".
         seed: Seed of OMPL's random numbers, > 0.
         seconds: Limit of the computing time [s].
@@ -101,7 +101,7 @@ def _bounds(base: Any, ranges: list[tuple[float, float]]) -> Any:
 
 
 class _Calls:
-    """What OMPL calls.
+    """Callbacks for OMPL.
 
     Attributes:
         n_steps: Number of steps that were propagated.
@@ -126,7 +126,7 @@ class _Calls:
             result[k] = value
 
     def is_valid(self, state: Any) -> bool:
-        """Whether a state is allowed."""
+        """Return True if a state is allowed."""
         x = self.values(state)
         self.seen.append(x[self.problem.position, 0].tolist())
         return bool(self.problem.is_allowed(x)[0])

@@ -112,7 +112,7 @@ class Run:
 
     @property
     def is_complete(self) -> bool:
-        """Whether the run was played to its end and no part of it is missing."""
+        """True if the run was played to its end and no part of it is missing."""
         return bool(self.info.get("is_complete")) and not self.notes
 
     @cached_property

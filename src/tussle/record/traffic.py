@@ -67,7 +67,7 @@ class Traffic:
             self._monitors[network].add("Pub", topic, count)
 
     def counts_received(self, network: str, topic: str) -> bool:
-        """Whether the messages received on a topic are counted."""
+        """Return True if the messages received on a topic are counted."""
         return network in self._monitors and self._monitors[network].has("Sub", topic)
 
     def received(self, network: str, topic: str, count: np.ndarray) -> None:
@@ -155,7 +155,7 @@ class TopicMonitor:
         self._lines.writerow(["t", "world", *(f"{topic}_{kind}_Count" for kind, topic in self.counts)])
 
     def has(self, kind: str, topic: str) -> bool:
-        """Whether messages of a topic are counted; `kind` is "Pub" or "Sub"."""
+        """Return True if messages of a topic are counted; `kind` is "Pub" or "Sub"."""
         return any(True for _ in self._counted(kind, topic))
 
     def _counted(self, kind: str, topic: str) -> Iterator[np.ndarray]:

@@ -1,4 +1,4 @@
-"""What an agent decides: channels and parameters that actions set, and the autonomy that holds them."""
+"""Actions of agents: the channels and parameters that they set, and the autonomy that holds them."""
 
 from __future__ import annotations
 

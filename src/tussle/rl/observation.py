@@ -1,4 +1,4 @@
-"""What an agent observes: components of an observation, each a few numbers side by side."""
+"""Observations of agents: components, each a few numbers side by side."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ class Component(ABC):
 
     @abstractmethod
     def width(self, mission: Mission, block: str) -> int:
-        """How many numbers agents of a block observe; checks the declaration.
+        """Return the number of values that agents of a block observe; check the declaration.
 
         Raises:
             ParameterError: A name or value is not allowed.
@@ -167,7 +167,7 @@ class Own(Component):
 
     @cached_property
     def _parts(self) -> list[tuple[str, Spec, int]]:
-        """What is written with one call each: a plugin's column, or "" for body columns side by side; their spec, number of columns."""
+        """Return the parts that are written with one call: a plugin's column, or "" for adjacent body columns; spec; number of columns."""
         parts: list[tuple[str, Spec, int]] = []
         for is_plugin, names in groupby(self.columns.split(), lambda name: "." in name):
             if is_plugin:
@@ -255,7 +255,7 @@ class _Others(Component):
 
 
 def _split_of(simulation: Simulation) -> Any:
-    """What calls a function for parts of the rows in several threads; None with one thread."""
+    """Return the function that splits rows over several threads; None with one thread."""
     state = simulation.state
     return None if state.context.threads == 1 else state.world_view.split_rows
 

@@ -87,24 +87,24 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
         self.agents = [] if swarm.over[0] else self._living()
         numbers: Any = slice(None)
         if self.agents == before:
-            told = before
+            reported = before
         else:
-            told = before + [name for name in self.agents if name not in set(before)]
+            reported = before + [name for name in self.agents if name not in set(before)]
             self.agents = [name for name in self.agents if not dead[self._number[name]]]
-        if len(told) < len(self.possible_agents) or told is not before:
-            numbers = [self._number[name] for name in told]
+        if len(reported) < len(self.possible_agents) or reported is not before:
+            numbers = [self._number[name] for name in reported]
         rewards, deaths, ends = (
-            dict(zip(told, values[0, numbers].tolist(), strict=True))
+            dict(zip(reported, values[0, numbers].tolist(), strict=True))
             for values in (swarm.rewards, swarm.terminations, swarm.truncations)
         )
-        infos: dict[str, dict[str, Any]] = {name: {} for name in told}
-        if len(self.agents) < len(told):
-            for name in set(told).difference(self.agents):
+        infos: dict[str, dict[str, Any]] = {name: {} for name in reported}
+        if len(self.agents) < len(reported):
+            for name in set(reported).difference(self.agents):
                 infos[name]["episode"] = {
                     "r": float(swarm.returns[0, self._number[name]]),
                     "l": int(swarm.lengths[0]),
                 }
-        return self._observed(told), rewards, deaths, ends, infos
+        return self._observed(reported), rewards, deaths, ends, infos
 
     def _take(self, actions: Mapping[str, Any]) -> None:
         """Write the actions to one array."""

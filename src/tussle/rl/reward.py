@@ -66,7 +66,7 @@ class Situation:
             self._events.append(events)
 
     def count(self, kind: str, ids: str = "id", text: str | None = None) -> np.ndarray:
-        """How many events of a kind concern each agent in this decision, (W, A).
+        """Return the number of events of a kind that concern each agent in this decision, (W, A).
 
         Args:
             kind: "capture", "collision" or "death".

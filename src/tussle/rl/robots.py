@@ -27,7 +27,7 @@ from tussle.stock import (
 )  # fmt: skip
 
 GOAL = (100.0, 0.0, 0.0)
-"""Where robots that find their way go [m]."""
+"""Goal of `FindWay` [m]."""
 SPACING = (5.0, 20.0)
 """Distances of the nearest other in a flock that are neither too small nor too large [m]."""
 SENSED, HEARD, FIELD = 25.0, 60.0, 100.0

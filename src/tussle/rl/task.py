@@ -22,7 +22,7 @@ TIMELESS = 1e9
 
 
 class Task:
-    """What a learner plays. Subclasses set the attributes; arguments of the same names set them for one instance.
+    """A game for learners. Subclasses set the attributes; arguments of the same names set them for one instance.
 
     Attributes:
         mission: A Mission, or the file or name of one.

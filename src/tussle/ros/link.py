@@ -151,7 +151,7 @@ class RosLink:
             self.gate.enter(g.context.is_interrupted)
 
     def has_reader(self, topics: Iterable[str]) -> bool:
-        """Whether somebody has subscribed to one of these topics."""
+        """Return True if somebody has subscribed to one of these topics."""
         return any(self._topics[topic].get_num_connections() for topic in topics)
 
     def wait_for(

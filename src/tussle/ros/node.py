@@ -18,7 +18,7 @@ from typing import Any
 from tussle.errors import MissingExtraError, ParameterError, RosError
 
 DEBIAN = "/usr/lib/python3/dist-packages"
-"""Where Debian and Ubuntu install rospy."""
+"""Folder in which Debian and Ubuntu install rospy."""
 DEFAULT_URI = "http://localhost:11311"
 MASTER_TIMEOUT = 2.0
 """Longest wait for an answer of the master [s]."""

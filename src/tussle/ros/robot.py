@@ -98,7 +98,7 @@ class RobotTopics:
             self._scan.header.frame_id = frames[3]
 
     def has_peer(self) -> bool:
-        """Whether somebody listens to its odometry and somebody can command it."""
+        """Return True if somebody listens to its odometry and somebody can command it."""
         return bool(self.inbox.subscriber.get_num_connections()) and self.link.has_reader(self.topics)
 
     def publish_odometry(self, topic: str, state: np.ndarray, stamp: Any) -> None:

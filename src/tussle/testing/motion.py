@@ -18,7 +18,7 @@ EPS = float(np.finfo(float).eps)
 STEPS = 10
 ORDER = 4.0
 SLACK = 0.5
-"""How far the observed order may be below the nominal one, at a step where higher-order terms are not yet small."""
+"""Tolerance of the observed order below the nominal one, at a step where higher-order terms are not yet small."""
 WORST_ANGLE = 64.0 * EPS
 """Error of an attitude converted to three angles and back: a dozen functions and products, each with an error up to 2 ulp of pi."""
 

@@ -84,7 +84,7 @@ def row_signal(values: Any) -> np.ndarray:
 
 
 def can_fill(message: type[Message]) -> bool:
-    """Whether the kit can fill messages of this type: not if they hold opaque objects."""
+    """Return True if the kit can fill messages of this type: not if they hold opaque objects."""
     return not any(isinstance(column, Handle) for column in message.fields.values())
 
 

@@ -165,7 +165,7 @@ class Watch:
 
 
 def _own(group: Group, binding: Binding, hook: str) -> Own:
-    """What an entity's plugin may write."""
+    """The arrays that an entity's plugin may write."""
     own: Own = {
         key: slice(None)
         for b in binding.walk()
@@ -179,7 +179,7 @@ def _own(group: Group, binding: Binding, hook: str) -> Own:
 
 
 def _own_of_world(sim: Simulation, world_binding: WorldBinding, hook: str) -> Own:
-    """What a world plugin may write: its states; an interaction also health, forces, and the bodies that it moves by `w.move`."""
+    """The arrays that a world plugin may write: its states; an interaction also health, forces, and bodies moved by `w.move`."""
     if hook not in {"start", "step", "transmit"}:
         return {}
     places = [world_binding.places[name] for name in type(world_binding.spec).states()]

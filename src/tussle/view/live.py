@@ -291,7 +291,7 @@ class Live:
 
     @property
     def notes(self) -> list[str]:
-        """What the user should know, one line each."""
+        """Notes for the user, one line each."""
         return list(self._player.notes)
 
     @property

@@ -103,7 +103,7 @@ class Allowance:
         self._saved = min(self._saved + self.share * seconds, 4.0 * self.cost + self.share)
 
     def allows(self) -> bool:
-        """Whether the last cost has been saved."""
+        """Return True if the last cost has been saved."""
         # The thread's clock takes longer to read than the wall clock.
         wall = time.perf_counter()
         if wall < self._look_at:

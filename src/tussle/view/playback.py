@@ -103,7 +103,7 @@ class PlaybackController:
 
     @property
     def is_seeking(self) -> bool:
-        """Whether steps are being replayed on the way to another time."""
+        """True if steps are being replayed on the way to another time."""
         return self._is_going and self.player.step < self.player.last_step
 
     # -- the loop -----------------------------------------------------------------------------------------------------------------

@@ -347,7 +347,7 @@ class Recording:
 
     @property
     def has_shapes(self) -> bool:
-        """Whether shapes that plugins drew were recorded."""
+        """True if shapes that plugins drew were recorded."""
         return len(self._shapes) > 0
 
     @cached_property

@@ -67,7 +67,7 @@ def reader(name: str, column: Column) -> Read:
 
 
 def is_list(column: Column) -> bool:
-    """Whether the column holds a list of any length per row."""
+    """Return True if the column holds a list of any length per row."""
     return isinstance(column, Numbers) and column.ragged
 
 

@@ -223,7 +223,7 @@ def in_rows(
 
 
 def effect_strengths(effects: Sequence[Effect]) -> Figure:
-    """How strongly a quantity follows each variable: rank correlation, and parts of its variance where they are known."""
+    """Plot the influence of each variable on a quantity: rank correlation, and parts of the variance if they are known."""
     parts = [
         series_of("alone", INK, "s", [(e.first_order, e.first_low, e.first_high) for e in effects]),
         series_of("with others", MUTED, "D", [(e.total, e.total_low, e.total_high) for e in effects]),

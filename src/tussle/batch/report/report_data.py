@@ -103,7 +103,7 @@ class Axis:
 
     @property
     def is_log(self) -> bool:
-        """Whether the axis is logarithmic."""
+        """True if the axis is logarithmic."""
         if isinstance(self.variable, Range):
             return self.variable.is_log
         low, high = float(self.position.min()), float(self.position.max())
@@ -278,7 +278,7 @@ class ReportData:
 
     @cached_property
     def method(self) -> str:
-        """How the points were sampled."""
+        """Description of the sampling of the points."""
         return method_for(self.results.variables, str(self.results.info.get("sample") or ""))
 
     @property
@@ -364,7 +364,7 @@ class ReportData:
 
     @cached_property
     def variables(self) -> tuple[Variable, ...]:
-        """What really varies over the points."""
+        """Variables with more than one value over the points."""
         return tuple(v for v in self.results.variables if len({repr(p[v.name]) for p in self.points}) > 1)
 
     def by_strength(self, *measures: Measure) -> list[Variable]:

@@ -117,7 +117,7 @@ def numbers(*names: str) -> list[tuple[str, str]]:
 
 
 def won(data: ReportData) -> Section:
-    """Who won how often, and by how much."""
+    """The section on wins and margins."""
     if not data.wins:
         return Section("won", "Who won")
     shares = [s for s in data.results.shares() if s.team is None or s.team in data.rivals]
@@ -151,7 +151,7 @@ def _outside(values: np.ndarray) -> str:
 
 
 def scores(data: ReportData) -> Section:
-    """How much each team scored, and the means of all quantities."""
+    """The section on the scores of teams and the means of all quantities."""
     found = []
     for measures in (data.scores, *((measure,) for measure in data.more)):
         varied = [m for m in measures if varies(data.known(m.expression))]
@@ -180,7 +180,7 @@ def _means(data: ReportData) -> ReportTable:
     results = data.results
 
     def is_score_again(name: str) -> bool:
-        """Whether a metric repeats the team's score."""
+        """Return True if a metric repeats the team's score."""
         plugin, _, score = name.rpartition(".")
         return (
             bool(plugin)
@@ -212,7 +212,7 @@ def _means(data: ReportData) -> ReportTable:
 
 
 def left(data: ReportData) -> Section:
-    """How many of each team were left over time."""
+    """The section on the number of survivors of each team over time."""
     losses = {t: data.known(f"lost[{t}]") for t in data.results.teams}
     teams = [t for t, lost in losses.items() if np.any(lost > 0.0)]
     if not teams:
@@ -260,7 +260,7 @@ def _curve(
 
 
 def networks(data: ReportData) -> Section:
-    """What became of the messages of networks that lose some."""
+    """The section on messages of lossy networks."""
     means = {
         m.name: m.value
         for m in data.results.means(list(filter(is_of_network(data), data.results.quantities)))
@@ -366,7 +366,7 @@ def look_at(data: ReportData) -> Section:
 
 
 def making(data: ReportData) -> Section:
-    """How the batch was made."""
+    """The section on the settings of the batch."""
     results, info = data.results, data.results.info
     facts = [(name, text) for name, text in _facts(info) if text]
     rows = [(v.name, _values_of(v)) for v in results.variables]

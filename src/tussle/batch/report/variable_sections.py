@@ -180,7 +180,7 @@ def _maps_of(
 
 
 def strengths(data: ReportData) -> Section:
-    """How strongly the quantities follow each variable."""
+    """The section on the influence of each variable on the quantities."""
     found, remarks = [], dict[str, None]()
     for measure in data.measures if data.variables else ():
         known = [e for e in _effects(data, measure) if _strength(e) is not None]

@@ -125,7 +125,7 @@ class Study:
 
 
 def is_better(trial: Trial, than: Trial, is_minimized: bool) -> bool:
-    """Whether a complete trial has the better objective."""
+    """Return True if a complete trial has the better objective."""
     return trial.objective < than.objective if is_minimized else trial.objective > than.objective
 
 

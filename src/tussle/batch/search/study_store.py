@@ -49,7 +49,7 @@ STUDY = Document(
     },
     BatchError,
 )
-"""What `study.json` says."""
+"""Fields of `study.json`."""
 _MEAN = Maybe(Real(-MOST_VALUE, MOST_VALUE))
 TRIAL = {
     "value": _MEAN,
@@ -59,11 +59,11 @@ TRIAL = {
     "error": str,
     "by_seed": [Maybe(Real())],
 }
-"""What the journal says of a trial, beside its parameters."""
+"""Fields of a trial in the journal, besides its parameters."""
 COMPARED = (
     "tussle", "name", "mission", "objective", "direction", "variables", "runs", "first_seed", "sampler", "sample_seed", "per_round",
 )  # fmt: skip
-"""What tells searches apart, in the order in which differences are named."""
+"""Settings that identify a search, in the order in which differences are reported."""
 PROPOSED_BY = ("optuna", "cmaes", "numpy", "scipy")
 """Packages on whose versions the proposals depend."""
 MOST_JOURNAL = 1 << 28

@@ -206,7 +206,7 @@ def trials_table(trials: Sequence[Trial], variables: Sequence[Variable]) -> pa.T
 
 
 def _type(variable: Variable) -> pa.DataType:
-    """Whole numbers, real numbers, or else texts."""
+    """Return the column as integers, real numbers, or texts."""
     if isinstance(variable, Range):
         return pa.int64() if variable.is_int else pa.float64()
     kinds = {type(value) for value in variable.values}

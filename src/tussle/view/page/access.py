@@ -14,13 +14,13 @@ LOOPBACK_NAMES = ("127.0.0.1", "localhost", "[::1]")
 EVERYWHERE = ("0.0.0.0", "::")  # noqa: S104 - they are compared, not bound
 TOKEN_BYTES = 16
 MOST_BROWSERS = 32
-"""That are connected at once."""
+"""Largest number of connected browsers."""
 MOST_BYTES = 16 * 1024
 """Of one message from a browser; the longest that a control sends has some hundred."""
 MOST_UNSENT = 64 * 1024
 """Bytes that a browser has not taken yet when sending to it pauses."""
 PORT = 8123
-"""Where it is served when no port is asked for and this one is free; else at one of the next."""
+"""Default port; if it is taken, the next free one is used."""
 MOST_PORTS = 100
 HEADERS = {
     "Referrer-Policy": "no-referrer",

@@ -198,7 +198,7 @@ def rounded_positions(pos: np.ndarray, grain: Grain) -> np.ndarray:
 
 
 def rounded_attitudes(quat: np.ndarray) -> np.ndarray:
-    """Which component is largest, and the three others in steps, (n, 4).
+    """Return the number of the largest component, and the three others in steps, (n, 4).
 
     The largest is taken as positive, for q and -q are the same attitude, and follows from the others, none of which is above
     sqrt(1/2).

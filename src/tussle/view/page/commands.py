@@ -15,7 +15,7 @@ FARTHEST = 1e12
 """Of any coordinate [m] and time [s]."""
 LARGEST_ID = 2**31 - 1
 REACH = 1e3
-"""How far off a point of the world may be, in sizes of the scene."""
+"""Largest distance of a point of the world, in sizes of the scene."""
 CUSTOM_KEY = ";"
 """The key that is kept for the plugins, as in SCRIMMAGE."""
 SHOWN = 40

@@ -139,7 +139,7 @@ class Comparison:
 
     @cached_property
     def scenery(self) -> Scenery:
-        """That of the first run, that of the second where it stands beside it, and room for both."""
+        """Return the scenery of the first run, with that of the second if they are shown side by side."""
         one, other = self.a.scenery, self.b.scenery
         low, high = np.minimum(one.low, other.low + self.shift), np.maximum(one.high, other.high + self.shift)
         if not self.shift.any():
@@ -203,7 +203,7 @@ class Comparison:
 
     @property
     def has_shapes(self) -> bool:
-        """Whether shapes that plugins drew were recorded of one of the runs."""
+        """True if shapes that plugins drew were recorded of one of the runs."""
         return self.a.has_shapes or self.b.has_shapes
 
     def shapes(self, i: int) -> tuple[Shape, ...]:
@@ -264,7 +264,7 @@ def _paler(colour: Colour) -> Colour:
 
 
 def _place_beside(a: Recording, b: Recording) -> np.ndarray:
-    """How far the second run is moved so that it stands east of the first [m], (3,)."""
+    """Return the offset that moves the second run east of the first [m], (3,)."""
     width = max(float(a.scenery.high[0] - a.scenery.low[0]), float(b.scenery.high[0] - b.scenery.low[0]))
     return np.array([float(a.scenery.high[0] - b.scenery.low[0]) + GAP * width, 0.0, 0.0])
 

@@ -218,7 +218,7 @@ def terrain_bytes(scenery: Scenery) -> bytes | None:
 
 
 def terrain_note(scenery: Scenery) -> str:
-    """What of the terrain is left out; "" where nothing is."""
+    """Return a note on the part of the terrain that is not shown, or ""."""
     terrain = scenery.terrain
     thin = None if terrain is None else terrain.thinned(MOST_HEIGHTS)
     if terrain is None or thin is None or thin.height.size == terrain.height.size:

@@ -23,7 +23,7 @@ ATTRIBUTES: Mapping[str, tuple[str, ...]] = {
     "text": ("pos", "text"),
     "mesh": ("vertices", "faces", "pos", "quat"),
 }
-"""What each kind of shape is drawn with, beside what all have; the first is needed."""
+"""Attributes of each kind of shape besides the common ones; the first is required."""
 
 DRAWN = (230, 60, 160)
 """Colour of what is drawn without one: none of the teams'."""

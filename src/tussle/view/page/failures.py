@@ -10,7 +10,7 @@ from pathlib import Path
 from tussle.errors import TussleError
 
 MOST_FAILURES = 20
-"""That are listed."""
+"""Largest number of listed failures."""
 LONGEST = 300
 """Characters of one."""
 

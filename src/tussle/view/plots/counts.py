@@ -76,12 +76,12 @@ def captures(tracks: Trajectories) -> Figure:
 
 
 def has_captures(tracks: Trajectories) -> bool:
-    """Whether the plot of captures has data."""
+    """Return True if the plot of captures has data."""
     return bool(_captures(tracks) or _collisions(tracks))
 
 
 def _is_chosen(tracks: Trajectories, who: int) -> bool:
-    """Whether an entity is selected by id and team, at any time."""
+    """Return True if an entity is selected by id and team, at any time."""
     selection = tracks.selection
     return (not selection.entities or who in selection.entities) and (
         not selection.teams or tracks.team_of.get(who) in selection.teams

@@ -257,7 +257,7 @@ def _draw_scenery(axes: Axes, tracks: Trajectories) -> list[Handle]:
 
 
 def _is_in_picture(low: np.ndarray, high: np.ndarray, corners: np.ndarray) -> bool:
-    """Whether a box, each (2,), reaches into a map whose limits are (2 axes, 2)."""
+    """Return True if a box, each (2,), reaches into a map whose limits are (2 axes, 2)."""
     return bool((high >= corners[:, 0]).all() and (low <= corners[:, 1]).all())
 
 
@@ -282,7 +282,7 @@ def _edges(low: float, high: float, step: float) -> np.ndarray:
 
 
 def _durations(tracks: Trajectories) -> np.ndarray:
-    """How long each frame of the span stands for [s], (T,): until the next one; the last as long as they usually do."""
+    """Return the time from each frame of the span to the next [s], (T,); for the last frame, the usual time."""
     lasts = np.diff(tracks.frame_times)
     usual = float(np.median(lasts)) if len(lasts) else tracks.recording.dt
     return np.append(lasts, usual)

@@ -101,7 +101,7 @@ class Trajectories:
 
     @cached_property
     def is_breaking(self) -> np.ndarray:
-        """Whether a state begins a new line: another entity, or missing frames before it, (m,)."""
+        """True if a state begins a new line: another entity, or missing frames before it, (m,)."""
         breaks = np.append(True, np.diff(self.frame) != 1)
         breaks[self.first[:-1]] = True
         return breaks

@@ -67,7 +67,7 @@ def find_window() -> str:
 
 
 def is_installed(library: str) -> bool:
-    """Whether a shared library can be loaded."""
+    """Return True if a shared library can be loaded."""
     with suppress(OSError):
         ctypes.CDLL(library)
         return True
