@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import aiohttp
@@ -59,7 +60,8 @@ def talk(server, conversation, **headers):
         ):
             return await conversation(Talk(socket))
 
-    return asyncio.run(run())
+    with ThreadPoolExecutor(1) as executor:  # in this thread, a browser of another test may have a loop
+        return executor.submit(lambda: asyncio.run(run())).result()
 
 
 def test_a_game_is_the_same_as_played_here(server):

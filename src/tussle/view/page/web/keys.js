@@ -35,7 +35,7 @@ const KEYS = [
     [['c'], 'save the picture', 'save'],
   ]],
   ['Live game', [
-    [['p'], 'pick a point of the ground, which plugins are told', 'pick'],
+    [['p'], 'pick a point of the ground, which is sent to the plugins', 'pick'],
     [[';'], 'a key for the plugins', 'customKey'],
   ]],
   ['Page', [
