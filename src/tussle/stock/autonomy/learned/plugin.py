@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,7 @@ from tussle import stock
 from tussle.api import Autonomy, GroupView, Output, Param
 from tussle.api.channels import CHANNEL_UNITS
 
-EXAMPLE = Path(__file__).with_name("predator_team.onnx")
+EXAMPLE = Path(str(files("tussle.stock.autonomy.learned"))) / "predator_team.onnx"
 """A team of predators, trained by `tussle train tussle/PredatorTeam-v0`."""
 
 
