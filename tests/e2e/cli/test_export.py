@@ -45,7 +45,9 @@ def test_all_outputs_at_once_lie_in_the_run(process, played):
     )
     assert re.fullmatch(r"played/picture.png: 96×64, [\d.]+ k?B", next(x for x in lines if "png" in x))
     assert any(re.fullmatch(r"played/states.csv: 3\d\d states, [\d.]+ kB", line) for line in lines)
-    assert said.stderr == ""
+    assert all(
+        re.match(r"film: \d+/32 pictures, ", line) for line in said.stderr.splitlines()
+    )  # on a busy machine
     ffmpeg = imageio_ffmpeg.get_ffmpeg_exe()
     about = subprocess.run(
         [ffmpeg, "-i", str(played / "film.mp4")], check=False, capture_output=True, text=True

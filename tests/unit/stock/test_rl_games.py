@@ -166,6 +166,14 @@ def test_robots_of_other_worlds_are_not_near():
     assert all(result.metrics["OpenAIRewards"]["reward"][2] == 0.5 for result in results)
 
 
+def test_a_block_without_living_robots_observes_nothing():
+    with Simulation(consensus([]).replace(end=3)) as sim:
+        sim.step()
+        sim.write("r2.health", [[0.0]])
+        sim.step(2)
+        assert sim.read("r1.RLConsensusSensor.observation")[0][0, 0].size == 3
+
+
 def test_modules_of_missions_are_those_of_the_plugin(game):
     with pytest.raises(ParameterError, match="names no code"):
         RLConsensus(module="mine")

@@ -28,7 +28,7 @@ class Learned(Autonomy):
 
     grade = "machine"
 
-    policy = Param(str(EXAMPLE), doc="The ONNX file; by default a team of predators.")
+    policy = Param("", doc="The ONNX file; by default that of the team of predators that ships.")
     task = Param(
         "", doc="Registered id of the task, tussle/PredatorTeam-v0; by default that in the file's metadata."
     )
@@ -41,7 +41,7 @@ class Learned(Autonomy):
     def _flight(self) -> Any:
         """The policy and its task, from the file."""
         load = stock.import_class("tussle.rl.flight:load_flight")  # `tussle.rl` is above this package
-        return load(self.policy, self.task, self.block)
+        return load(self.policy or str(EXAMPLE), self.task, self.block)
 
     def offered_outputs(self) -> list[str]:
         """Return the channels that the actions of the task set."""

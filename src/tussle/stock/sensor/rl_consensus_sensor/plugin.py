@@ -32,5 +32,6 @@ class RLConsensusSensor(Sensor):
             for row in rows[g.world[rows] == world]:
                 parts[row] = np.concatenate([[float(g.id[row])], x] if with_id[row] else [x])[None]
         self.observation.set(
-            np.cumsum([0, *(part.shape[1] for part in parts)]), np.concatenate(parts, axis=1)
+            np.cumsum([0, *(part.shape[1] for part in parts)]),
+            np.concatenate([np.zeros((1, 0)), *parts], axis=1),
         )
