@@ -1,4 +1,4 @@
-"""Rays of entities: they meet the scene, and the other entities of their world."""
+"""Queries of entities: rays, free space and heights among the scene and the other entities of their world."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from tussle.api.bodies import Bodies
 from tussle.api.context import Context
 from tussle.errors import ParameterError
 from tussle.rays import kernels
-from tussle.rays.hits import Hits, new_rays
+from tussle.rays.hits import FARTHEST_RAY, Hits, checked_numbers, checked_vectors, new_rays
 
 RAYS_PER_THREAD = 1024
 
@@ -39,13 +39,7 @@ def cast(
     solids = context.scene.caster
     start, way, distance, code = new_rays(*_of_finite(*rays))
     n = start.shape[1]
-    if world.shape != (n,):
-        raise ParameterError(
-            f"there are {n} rays and {len(world)} rows or worlds; their numbers must be equal"
-        )
-    wrong = world[(world < 0) | (world >= bodies.n_worlds)]
-    if len(wrong):
-        raise ParameterError(f"world {wrong[0]} is not allowed; there are worlds 0 to {bodies.n_worlds - 1}")
+    _check_worlds(world, n, bodies)
 
     def split(m: int, run: Any) -> None:
         context.split(m, run, RAYS_PER_THREAD)
@@ -68,6 +62,49 @@ def cast(
         return found
 
     return Hits(hits.distance, hits.id, hits.solid, start, way, normal, code, hits.team)
+
+
+def free(
+    context: Context, bodies: Bodies, points: Any, radius: Any, world: np.ndarray, own: np.ndarray
+) -> np.ndarray:
+    """Return True if spheres round points neither touch nor lie inside the scene or a body, (m,); see `Group.free`."""
+    center = checked_vectors("points", points)
+    n = center.shape[1]
+    _check_worlds(world, n, bodies)
+    reach = np.minimum(checked_numbers("radius", radius, n), FARTHEST_RAY)
+    touches = context.scene.caster.touches(center, reach)
+    if bodies.n:
+        tree = bodies.tree(context.boxes)
+        around = center, reach, np.ascontiguousarray(world, np.int64), np.ascontiguousarray(own, np.int64)
+        kernels.touch_bodies(tree.tree, tree.places, around, touches)
+    return ~touches
+
+
+def height(
+    context: Context, bodies: Bodies, x: Any, y: Any, world: np.ndarray, own: np.ndarray
+) -> np.ndarray:
+    """Height of the highest surface of the scene or a body [m], (m,); see `Group.height`."""
+    east, north = np.broadcast_arrays(np.asarray(x, float), np.asarray(y, float))
+    _check_worlds(world, east.size, bodies)
+    half = 0.5 * context.boxes[bodies.block]
+    size = np.where(half[:, 0] > 0.0, np.sqrt((half * half).sum(axis=1)), bodies.radius)
+    tops, top = np.full(bodies.n_worlds, context.scene.caster.top), bodies.pos[2] + size
+    is_sane = np.isfinite(top)
+    np.maximum.at(tops, bodies.world[is_sane], top[is_sane])
+    start = tops[world] + 1.0
+    down = np.repeat([[0.0], [0.0], [-1.0]], len(start), axis=1)
+    origins = np.stack([east.ravel(), north.ravel(), start])
+    return start - cast(context, bodies, (origins, down, np.inf), world, own, entities=True).distance
+
+
+def _check_worlds(world: np.ndarray, n: int, bodies: Bodies) -> None:
+    if world.shape != (n,):
+        raise ParameterError(
+            f"there are {n} rays or places and {len(world)} rows or worlds; their numbers must be equal"
+        )
+    wrong = world[(world < 0) | (world >= bodies.n_worlds)]
+    if len(wrong):
+        raise ParameterError(f"world {wrong[0]} is not allowed; there are worlds 0 to {bodies.n_worlds - 1}")
 
 
 def _of_finite(origins: Any, directions: Any, max_range: Any) -> tuple[Any, Any, Any]:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tussle import rng
-from tussle.api import kernels
+from tussle.api import casting, kernels
 from tussle.api.acting import restart, step_some
 from tussle.api.bodies import (
     DERIVED,
@@ -22,7 +22,6 @@ from tussle.api.bodies import (
     derived_from,
     read_only,
 )
-from tussle.api.casting import cast
 from tussle.api.context import Context, stream
 from tussle.api.draw import Draw
 from tussle.api.pairs import Nearest, Pairs, find_nearest, find_pairs
@@ -341,13 +340,60 @@ class GroupView:
         Raises:
             ParameterError: A shape does not fit, or a value is not allowed.
         """
+        rays = origins, directions, max_range
+        return casting.cast(self.context, self._bodies, rays, *self._askers(row, world), entities)
+
+    def _askers(self, row: np.ndarray | None, world: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+        """World of each ray or place, and row of the entity that it does not meet, -1 for none."""
         if world is None:
             rows = np.arange(self.n) if row is None else np.asarray(row)
-            world, own = self.world[rows], self.first + rows
-        else:
-            world = np.asarray(world)
-            own = np.full(len(world), -1)
-        return cast(self.context, self._bodies, (origins, directions, max_range), world, own, entities)
+            return self.world[rows], self.first + rows
+        return np.asarray(world), np.full(len(world), -1)
+
+    def height(
+        self, x: Any, y: Any, *, row: np.ndarray | None = None, world: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Height of the highest surface at places x, y [m], (m,): of the scene, or of another entity; -inf where there is none.
+
+        `row` and `world` are as for `cast`.
+
+        Raises:
+            ParameterError: A shape does not fit, or a value is not allowed.
+        """
+        return casting.height(self.context, self._bodies, x, y, *self._askers(row, world))
+
+    def free(
+        self, points: Any, radius: Any, *, row: np.ndarray | None = None, world: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Return True if spheres round points [m], (3, m), touch neither the scene nor another entity, and lie inside of none, (m,).
+
+        A mesh of the scene is a surface: a point that it surrounds is free. `row` and `world` are as for `cast`.
+
+        Args:
+            points: Centres, world frame.
+            radius: One number or (m,) [m].
+            row: Row of the entity that does not count.
+            world: Instead of `row`: world of each point.
+
+        Raises:
+            ParameterError: A shape does not fit, or a value is not allowed.
+        """
+        return casting.free(self.context, self._bodies, points, radius, *self._askers(row, world))
+
+    def is_clear(
+        self, a: Any, b: Any, *, row: np.ndarray | None = None, world: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Return True if neither the scene nor another entity lies between points a and b [m], (3, m) each; (m,).
+
+        `row` and `world` are as for `cast`.
+
+        Raises:
+            ParameterError: A shape does not fit, or a value is not allowed.
+        """
+        way = np.asarray(b, float) - np.asarray(a, float)
+        x, y, z = way
+        hits = self.cast(a, way, np.sqrt(x * x + y * y + z * z), row=row, world=world)
+        return np.asarray(hits.distance == np.inf)
 
     def line_of_sight(self, row: np.ndarray, other: np.ndarray, entities: bool = True) -> np.ndarray:
         """Return True if nothing lies between entities: on the line between their centres, outside of their spheres of `radius`.

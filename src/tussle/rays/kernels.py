@@ -490,6 +490,58 @@ def touch(tree, items, points, radius, touches):
                     depth = 0
 
 
+@device
+def square_distance_of_body(items, k, x, y, z):
+    """Squared distance of a point to a body, 0 inside [m^2]."""
+    x, y, z = x - items[k, 0], y - items[k, 1], z - items[k, 2]
+    if items[k, 3] > 0.0:
+        away = max(math.sqrt(x * x + y * y + z * z) - items[k, 3], 0.0)
+        return away * away
+    square = 0.0
+    for i in range(3):
+        r = 7 + 3 * i
+        along = x * items[k, r] + y * items[k, r + 1] + z * items[k, r + 2]
+        away = max(abs(along) - items[k, 4 + i], 0.0)
+        square += away * away
+    return square
+
+
+@kernel("(F2 I2 I I) F2 (F2 F I I) Bw")
+def touch_bodies(tree, items, around, touches):
+    """Set where *a sphere around a point touches a body of its world.
+
+    tree: bounds, links, roots, rows by place; items by place (n, BODY). around: points [m], (3, m); radius [m], world, and row of the
+    body that does not count, -1 for none, (m,). Written: touches (m,), where it was false.
+    """
+    bounds, links, roots, row = tree
+    points, radius, world, own = around
+    stack = np.empty(STACK, np.int64)
+    for i in range(touches.shape[0]):
+        depth = 0
+        if not touches[i] and roots[world[i]] >= 0:
+            stack[0], depth = roots[world[i]], 1
+        square = radius[i] * radius[i]
+        while depth > 0:
+            depth -= 1
+            node = stack[depth]
+            away = 0.0
+            for a in range(3):
+                p = points[a, i]
+                out = max(bounds[node, a] - p, p - bounds[node, 3 + a], 0.0)
+                away += out * out
+            if not away <= square:
+                continue
+            if links[node, 1] < 0:
+                stack[depth], stack[depth + 1] = links[node, 0], links[node, 0] + 1
+                depth += 2
+                continue
+            for k in range(links[node, 0], links[node, 0] + links[node, 1]):
+                near = square_distance_of_body(items, k, points[0, i], points[1, i], points[2, i]) <= square
+                if near and row[k] != own[i]:
+                    touches[i] = True
+                    depth = 0
+
+
 @kernel("F2 F F2 F Bw")
 def touch_field(height, grid, points, radius, touches):
     """Set where *a sphere around a point touches a height field, or lies below it.

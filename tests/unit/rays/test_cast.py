@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from tussle.api import Metric, Output, Sensor, State
 from tussle.errors import ParameterError
 from tussle.numeric.quaternion import quat_rotate_inverse
 from tussle.scene import Cuboid, FlatGround, HeightField, Plane, Prism, Scene, Sphere, TriangleMesh
-from tussle.stock import SingleIntegrator
+from tussle.stock import SingleIntegrator, Still
 
 
 def brute(triangles, origin, direction):
@@ -214,6 +215,72 @@ def test_entities_against_brute_force(box):
     assert len(seen) > 20
 
 
+class Probe(Metric):
+    """Asks for heights, free space and sight at random places of each world."""
+
+    answers: ClassVar[list] = []
+
+    def step(self, w):
+        rng = np.random.default_rng(7)
+        world = np.repeat(np.arange(w.n_worlds), 300)
+        a, b = (np.tile(rng.uniform(-20, 20, (3, 300)), w.n_worlds) for _ in range(2))
+        self.answers.append(
+            np.stack([w.height(a[0], a[1], world=world), w.free(a, 1.5, world=world), w.is_clear(a, b, world=world)])
+        )  # fmt: skip
+
+
+@pytest.mark.parametrize("box", [None, (9.0, 5.0, 3.0)])
+def test_height_free_and_sight_among_the_boxes_of_each_world(box):
+    crates = Block(
+        name="crate", count=25, radius=2.0, box=box, variance=(120.0, 120.0, 30.0), heading_variance=3.0, roll=0.3,
+        climb=0.2, motion=Still(),
+    )  # fmt: skip
+    game = mission(
+        crates, metrics=[Probe()], scene=Scene(ground=FlatGround(-12.0), walls=[Sphere((3.0, 3.0, 0.0), 4.0)])
+    )
+    rng = np.random.default_rng(7)
+    a, b = rng.uniform(-20, 20, (3, 300)), rng.uniform(-20, 20, (3, 300))
+    Probe.answers.clear()
+    with Simulation(game, seeds=[5, 6]) as sim:
+        sim.step()
+        pos, quat = sim.read("crate.pos")[0], sim.read("crate.quat")[0]
+    found = Probe.answers.pop().reshape(3, 2, 300)
+    for world in range(2):
+        with Simulation(game, seeds=[5 + world]) as alone:
+            alone.step()
+        assert np.array_equal(Probe.answers.pop(), found[:, world])
+        height, free = game.scene.height(a[0], a[1]), game.scene.free(a, 1.5)
+        clear = game.scene.line_of_sight(a, b)
+        start, down = (
+            np.stack([a[0], a[1], np.full(300, 90.0)]),
+            np.repeat([[0.0], [0.0], [-1.0]], 300, axis=1),
+        )
+        way = b - a
+        for center, turn in zip(pos[world], quat[world], strict=True):
+            shape = Sphere((0, 0, 0), 2.0) if box is None else Cuboid((0, 0, 0), box)
+            turned = np.repeat(turn[:, None], 300, axis=1)
+
+            def local(vector, turned=turned):
+                return quat_rotate_inverse(turned, vector)
+
+            own = local(a - center[:, None])
+            if box is None:
+                gap = np.sqrt((own * own).sum(axis=0)) - 2.0
+            else:
+                out = np.maximum(np.abs(own) - np.array(box)[:, None] / 2, 0.0)
+                gap = np.sqrt((out * out).sum(axis=0))
+            free &= gap > 1.5
+            height = np.maximum(height, 90.0 - shape.ray(local(start - center[:, None]), local(down)))
+            length = np.sqrt((way * way).sum(axis=0))
+            clear &= shape.ray(own, local(way / length)) > length
+        np.testing.assert_allclose(found[0, world], height, rtol=1e-9)
+        assert np.array_equal(found[1, world], free)
+        assert np.array_equal(found[2, world], clear)
+        assert 20 < free.sum() < 280
+        assert 20 < clear.sum() < 280
+    assert not np.array_equal(found[:, 0], found[:, 1])
+
+
 def test_rays_do_not_depend_on_stack_and_threads():
     alone = [Simulation(crowd(), seeds=[seed]) for seed in (1, 2, 3)]
     together = Simulation(crowd(), seeds=[3, 1, 2], threads=2)
@@ -265,7 +332,7 @@ def looking(rows=None, world=None):
             lambda s: s.line_of_sight(np.zeros((3, 1)), np.zeros((3, 2))),
             r"a has shape \(3, 1\) and b \(3, 2\)",
         ),
-        (lambda s: looking(rows=np.zeros(3, int)), "there are 1 rays and 3 rows or worlds"),
+        (lambda s: looking(rows=np.zeros(3, int)), "there are 1 rays or places and 3 rows or worlds"),
         (lambda s: looking(world=np.ones(1, int)), "world 1 is not allowed; there are worlds 0 to 0"),
         (lambda s: Scene(walls=[3]), "Scene.walls has 3; it takes Volume"),
         (lambda s: Scene(terrain=s), "Scene.terrain has .*; it takes HeightField"),
