@@ -160,7 +160,7 @@ class SceneEntities:
         self._recording, self._scale = recording, scale
         self._blocks = {event.id: event.text for event in recording.events if event.kind == "birth"}
         self._removed = self._find_removals(kept)
-        self._mesh = cache(lambda model, length, rgb: triangles(MODELS[model].placed(length), rgb))
+        self._mesh = cache(lambda model, lengths, rgb: triangles(MODELS[model].placed(lengths), rgb))
         self._written: set[int] = set()
         self._is_complete, self._last_complete = True, -math.inf
 
@@ -192,15 +192,16 @@ class SceneEntities:
         models, labels = [], []
         for row in rows:
             style, who, block = self._recording.style, int(frame.id[row]), int(frame.block[row])
-            rgb, length = style.block_colour(block), self._scale * style.scale(block)
+            scale = 1.0 if style.is_true_box(block) else self._scale
+            rgb, (x, y, z) = style.block_colour(block), style.lengths(block)
             # It ends just before the time at which it does not exist any more.
             lifetime = ns(self._removed[who]) - now - 1 if who in self._removed else 0
             name = names[row]
             notes = {"id": who, "block": self._recording.blocks[block], "team": int(frame.team[row])}
             about = [(key, str(value)) for key, value in notes.items()]
-            surface = self._mesh(style.model(block), length, rgb)
+            surface = self._mesh(style.model(block), (scale * x, scale * y, scale * z), rgb)
             models.append(entity(name, name, now, lifetime, about, triangles=[surface]))
-            label = text(str(who), rgb, (0.0, 0.0, 0.7 * length))
+            label = text(str(who), rgb, (0.0, 0.0, 0.7 * scale * z))
             labels.append(entity(name, name, now, lifetime, texts=[label]))
         return models, labels
 

@@ -75,7 +75,7 @@ def game_document(
                 "team": game.block_teams[i],
                 "colour": list(style.block_colour(i)),
                 "model": style.model(i),
-                "scale": style.scale(i),
+                "lengths": style.lengths(i),
             }
             for i, name in enumerate(game.blocks)
         ],

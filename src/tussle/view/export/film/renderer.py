@@ -301,8 +301,8 @@ class _Model:
             mapper.SetSourceData(source)
             mapper.SetOrientationArray("quat")
             mapper.SetOrientationModeToQuaternion()
-            mapper.SetScaleArray("length")
-            mapper.SetScaleModeToScaleByMagnitude()
+            mapper.SetScaleArray("lengths")
+            mapper.SetScaleModeToScaleByVectorComponents()
             mapper.SetScalarModeToUsePointFieldData()
             mapper.SelectColorArray("rgb")
             mapper.SetColorModeToDirectScalars()
@@ -317,7 +317,7 @@ class _Model:
         renderer._ground.AddActor(self._shadow)
 
     def place(self, frame: Frame, rows: np.ndarray, least: float) -> None:
-        """Draw the entities in these rows, none shorter than this [m]."""
+        """Draw the entities in these rows, none shorter than this [m] unless it is a box of known lengths."""
         self._actor.visibility = len(rows) > 0
         self._shadow.visibility = 0 < len(rows) <= MAX_SHADOWS
         if not len(rows):
@@ -326,7 +326,11 @@ class _Model:
         n_blocks = int(block.max()) + 1
         points = self._renderer._pyvista.PolyData(frame.pos[rows].astype(np.float32))
         points.point_data["quat"] = frame.quat[rows]
-        points.point_data["length"] = np.array([max(style.scale(b), least) for b in range(n_blocks)])[block]
+        lengths = [
+            np.multiply(style.lengths(b), 1.0 if style.is_true_box(b) else max(1.0, least / style.scale(b)))
+            for b in range(n_blocks)
+        ]
+        points.point_data["lengths"] = np.array(lengths)[block]
         points.point_data["rgb"] = np.array([style.block_colour(b) for b in range(n_blocks)], np.uint8)[block]
         for mapper in self._mappers:
             mapper.SetInputData(points)

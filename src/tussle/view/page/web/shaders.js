@@ -28,7 +28,8 @@ vec3 turned(vec3 v) {
 }
 void main() {
   float depth = (clip * vec4(place, 1.0)).w;
-  vec3 grown = max(scale * size, vec3(least * depth));
+  vec3 grown = scale * size;
+  grown *= max(1.0, least * depth / max(1e-9, max(grown.x, max(grown.y, grown.z))));
   gl_Position = clip * vec4(place + turned(grown * corner), 1.0);
   towards = turned(normal / grown);
   paint = colour;

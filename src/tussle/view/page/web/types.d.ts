@@ -6,7 +6,7 @@ export type Colour = ArrayLike<number>;
 /** Numbers of the corners of triangles, and the corners. */
 export interface Mesh { vertices: number[]; faces: number[]; }
 export interface Team { id: number; name: string; colour: number[]; }
-export interface Block { name: string; team: number; colour: number[]; model: string; scale: number; }
+export interface Block { name: string; team: number; colour: number[]; model: string; lengths: number[]; }
 /** Values of each team at some times. */
 export interface Curves { t: number[]; n: number[][]; }
 export interface GameEvent { t: number; kind: string; id: number; other: number; text: string; }
