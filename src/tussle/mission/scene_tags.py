@@ -12,13 +12,13 @@ from tussle.mission import codecs
 from tussle.mission.node import Node
 from tussle.mission.problems import Problems
 from tussle.mission.terrain_xml import read_terrain_xml
-from tussle.rays.files import SUFFIXES, read_surface
+from tussle.rays.files import SUFFIXES, read_surface, read_texture
 from tussle.scene import Cuboid, FlatGround, HeightField, Origin, Prism, TriangleMesh, Volume
 from tussle.texts import shown
 
 SCENE_TAGS = ("terrain", "ground", "wall", "building")
 MOST_WALLS = 20_000
-TERRAIN = {"position": "m", "scale": "", "cell": "m", "height": "m"}
+TERRAIN = {"position": "m", "scale": "", "cell": "m", "height": "m", "texture": ""}
 WALL = {"center": "m", "lengths": "m", "rpy": "rad"}
 BUILDING = {"corners": "m", "low": "m", "high": "m"}
 
@@ -96,11 +96,27 @@ class SceneReader:
             numbers["position"] = _numbers(given["position"], 3, "position", "m")
         self.files.append(path)
         if path.suffix.lower() == ".xml":
-            surface, inner = read_terrain_xml(path, self._inside, self.origin, numbers)
+            surface, inner, texture = read_terrain_xml(path, self._inside, self.origin, numbers)
             self.files.append(inner)
         else:
-            surface = read_surface(path, **numbers)
-        return replace(surface, tag=(("", name), *given.items()))
+            surface, texture = read_surface(path, **numbers), None
+        surface = replace(surface, tag=(("", name), *given.items()))
+        if "texture" in given:
+            texture = self._find(given["texture"]) or path.parent / given["texture"]
+        return surface if texture is None else self._textured(node, surface, texture)
+
+    def _textured(
+        self, node: Node, surface: HeightField | TriangleMesh, texture: Path
+    ) -> HeightField | TriangleMesh:
+        """Return a surface with an image over it; without one that does not exist, which is noted."""
+        self._inside(texture)
+        if not texture.exists():
+            self.problems.note(
+                node.place, f"<terrain>: there is no {shown(texture.name)}, so the terrain has no texture"
+            )
+            return surface
+        self.files.append(texture)
+        return surface.draped(read_texture(texture))
 
     def _find(self, name: str) -> Path | None:
         """Return the file with this name in one of the folders; None if there is none.

@@ -14,6 +14,7 @@ import numpy as np
 from tussle.errors import MissingExtraError, ParameterError, listed, nearest_name
 from tussle.rays.grids import read_ascii_grid, read_image
 from tussle.rays.surfaces import MOST_FACES, HeightField, TriangleMesh
+from tussle.rays.textures import decoded
 from tussle.rays.vtk import read_vtk
 
 MOST_BYTES = 64_000_000
@@ -66,6 +67,16 @@ def read_surface(
         x, y, z = position
         return HeightField(found.height + z, found.west + x, found.south + y, found.cell)
     return found
+
+
+def read_texture(path: Path | str) -> np.ndarray:
+    """Read an image (.png, .jpg, .tif) that is draped over a surface: red, green, blue, (height, width, 3), uint8.
+
+    Raises:
+        MissingExtraError: Pillow is not installed.
+        ParameterError: The file cannot be read, is too large, or is no image.
+    """
+    return decoded(str(path), _bytes(Path(path)))
 
 
 def _bytes(path: Path) -> bytes:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tussle.event_texts import event_text
+from tussle.rays.surfaces import MeshPart
 from tussle.view.frame import Event, Frame
 from tussle.view.recording import Recording
 from tussle.view.shapes import MODELS, Mesh
@@ -92,6 +93,16 @@ def triangles(mesh: Mesh, rgb: Colour, opacity: float = 1.0) -> fg.TriangleListP
     )  # fmt: skip
 
 
+def coloured_triangles(part: MeshPart) -> fg.TriangleListPrimitive:
+    """A surface in the colours of its corners: these primitives have no images."""
+    from foxglove.messages import Color, TriangleListPrimitive
+
+    colours = [Color(r=r, g=g, b=b, a=1.0) for r, g, b in (part.corner_colours() / 255.0).tolist()]
+    return TriangleListPrimitive(
+        pose=pose(), points=points(part.vertices), colors=colours, indices=part.faces.ravel().tolist()
+    )
+
+
 def lines(ends: np.ndarray, rgb: Colour) -> fg.LinePrimitive:
     """Lines between ends (k, 2, 3) [m], two pixels wide."""
     from foxglove import messages as fg
@@ -126,10 +137,13 @@ def scenery_entities(recording: Recording, ns: int) -> list[fg.SceneEntity]:
         found.append(entity(f"base {i}", WORLD, ns, notes=[("team", str(base.team))], spheres=[sphere]))
     for region in scenery.boundaries:
         rgb = style.colour(region.team) if region.team else NO_TEAM
-        surface = triangles(region.mesh, rgb, 0.3 if region.is_wall else 0.06)
-        found.append(entity(region.name, WORLD, ns, triangles=[surface], lines=[lines(region.outline, rgb)]))
+        surfaces = [coloured_triangles(part) for part in region.parts] or [
+            triangles(region.mesh, rgb, 0.3 if region.is_wall else 0.06)
+        ]
+        found.append(entity(region.name, WORLD, ns, triangles=surfaces, lines=[lines(region.outline, rgb)]))
     if scenery.terrain is not None:
-        surface = triangles(scenery.terrain.mesh(MAX_HEIGHTS), GROUND)
+        part = scenery.terrain.part(MAX_HEIGHTS)
+        surface = coloured_triangles(part) if part else triangles(scenery.terrain.mesh(MAX_HEIGHTS), GROUND)
         found.append(entity("terrain", WORLD, ns, triangles=[surface]))
     return found
 

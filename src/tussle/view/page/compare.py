@@ -150,6 +150,7 @@ class Comparison:
                 r,
                 mesh=r.mesh.placed(at=self.shift.tolist()),
                 outline=r.outline + self.shift.astype(np.float32),
+                parts=tuple(replace(part, vertices=part.vertices + self.shift) for part in r.parts),
             )
             for r in other.boundaries
         ]

@@ -1,0 +1,154 @@
+"""The scene is shown with its textures: on the page, in films and in MCAP files. Hostile images are refused."""
+
+from __future__ import annotations
+
+import io
+import struct
+import zlib
+
+import numpy as np
+import pytest
+from page_reader import PageReader
+from PIL import Image
+from recorded_games import record
+
+from tussle import Simulation
+from tussle.errors import MissionError, ParameterError
+from tussle.mission import read_mission
+from tussle.rays.textures import MOST_SIDE, decoded
+from tussle.view import Recording
+from tussle.view.export.film.cameras import View
+from tussle.view.export.film.renderer import Renderer
+from tussle.view.export.html import write_html
+from tussle.view.frame import empty_frame
+
+MISSION = """<runscript name="hilly"><run dt="0.1" end="0.2"/><terrain {}>hills.asc</terrain>
+<entity><team_id>1</team_id><motion_model>Still</motion_model></entity></runscript>
+"""
+GRID = "ncols 5\nnrows 5\ncellsize 10\n" + "1 1 1 1 1\n" * 5
+RED, BLUE = (220, 0, 0), (0, 0, 220)
+
+
+def photo() -> np.ndarray:
+    """An image whose north is red, (8, 8, 3)."""
+    image = np.zeros((8, 8, 3), np.uint8)
+    image[:4], image[4:] = RED, BLUE
+    return image
+
+
+def png(image: np.ndarray) -> bytes:
+    file = io.BytesIO()
+    Image.fromarray(image).save(file, "PNG")
+    return file.getvalue()
+
+
+@pytest.fixture
+def hilly(tmp_path):
+    """Write a mission with a height field and an image; returns its path."""
+
+    def write(attributes='texture="photo.png"', folder=tmp_path):
+        (folder / "hills.asc").write_text(GRID)
+        (folder / "photo.png").write_bytes(png(photo()))
+        (folder / "hilly.xml").write_text(MISSION.format(attributes))
+        return folder / "hilly.xml"
+
+    return write
+
+
+@pytest.fixture
+def recorded(hilly, tmp_path):
+    (tmp_path / "run").mkdir()
+    hilly(folder=tmp_path / "run").unlink()
+    loaded = read_mission(hilly())
+    return Recording(record(loaded.mission, tmp_path / "run", mission_text=loaded.text))
+
+
+def from_above(style, scenery) -> np.ndarray:
+    """A picture from above, 4 pixels to 10 m, (64, 64, 3)."""
+    view = View(
+        np.array([25.0, 25.0, 500.0]),
+        np.array([25.0, 25.0, 0.0]),
+        np.array([0.0, 1.0, 0.0]),
+        40.0,
+        is_parallel=True,
+    )
+
+    with Renderer(style, scenery, (64, 64)) as renderer:
+        renderer.show(empty_frame(0.0, 0), view)
+        return renderer.picture().astype(int)
+
+
+def is_red_over_blue(picture: np.ndarray) -> bool:
+    red = (picture[..., 0] > 80) & (picture[..., 1:].max(axis=2) < 40)
+    blue = (picture[..., 2] > 80) & (picture[..., :2].max(axis=2) < 40)
+    if min(red.sum(), blue.sum()) < 100:
+        return False
+    return np.flatnonzero(red.any(axis=1)).max() <= np.flatnonzero(blue.any(axis=1)).min()
+
+
+def test_a_recorded_terrain_has_its_texture_on_the_page(recorded, tmp_path):
+    write_html(recorded, tmp_path / "page.html")
+    page = PageReader(tmp_path / "page.html")
+    assert page.document["scenery"]["terrain"]["hasTexture"]
+    shown = np.asarray(Image.open(io.BytesIO(page.blob("texture"))), int)
+    assert np.abs(shown - photo()).mean() < 12  # it is a JPEG file
+
+
+def test_a_picture_shows_the_texture_with_its_upper_edge_in_the_north(recorded):
+    assert is_red_over_blue(from_above(recorded.style, recorded.scenery))
+
+
+def test_foxglove_gets_the_colours_of_the_texture(recorded):
+    colours = recorded.scenery.terrain.part().corner_colours().reshape(5, 5, 3)
+    assert (colours[0].tolist(), colours[-1].tolist()) == ([[*BLUE]] * 5, [[*RED]] * 5)
+
+
+def test_rays_and_hashes_are_the_same_without_it(hilly):
+    hashes = []
+    for attributes in ("", 'texture="photo.png"'):
+        simulation = Simulation(read_mission(hilly(attributes)).mission, 1)
+        simulation.run()
+        hashes.append((simulation.state_hash(), simulation.mission.scene.height([11.0], [13.0]).tolist()))
+    assert hashes[0] == hashes[1]
+
+
+def test_a_missing_texture_is_noted_and_one_outside_the_folder_refused(hilly, tmp_path):
+    loaded = read_mission(hilly('texture="nothing.png"'))
+    assert loaded.mission.scene.terrain.texture is None
+    assert any("no 'nothing.png', so the terrain has no texture" in note for note in loaded.notes)
+    inner = tmp_path / "inner"
+    inner.mkdir()
+    hilly()
+    with pytest.raises(MissionError, match=r"only files in the mission's folder or below it are read"):
+        read_mission(hilly('texture="../photo.png"', folder=inner))
+
+
+def test_what_is_no_image_is_refused_with_its_place(hilly, tmp_path):
+    path = hilly('texture="hills.asc"')
+    with pytest.raises(
+        MissionError, match=r"hilly\.xml:1.*hills\.asc: it is no PNG, JPEG or TIFF that can be read"
+    ):
+        read_mission(path)
+
+
+@pytest.mark.parametrize(
+    ("side", "message"),
+    [(8_000, r"8,000 x 8,000 pixels; it takes at most 32,000,000"), (40_000, "exceeds limit")],
+)
+def test_an_image_with_too_many_pixels_is_refused_before_it_is_decoded(side, message):
+    def chunk(kind: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    head = struct.pack(">IIBBBBB", side, side, 8, 2, 0, 0, 0)
+    bomb = (
+        b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(b"")) + chunk(b"IEND", b"")
+    )
+    with pytest.raises(ParameterError, match=rf"bomb\.png: .*{message}"):
+        decoded("bomb.png", bomb)
+    with pytest.raises(ParameterError, match=r"cut\.png: it is no PNG"):
+        decoded("cut.png", png(photo())[:60])
+
+
+def test_large_images_are_made_smaller():
+    shape = decoded("a.png", png(np.zeros((10, MOST_SIDE + 100, 3), np.uint8))).shape
+    assert shape[1] == MOST_SIDE
