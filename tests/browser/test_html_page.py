@@ -440,7 +440,9 @@ def test_bases_boundaries_and_terrain_are_drawn(watched, tmp_path):
 
 
 def test_the_terrain_has_its_texture(watched, tmp_path):
-    recording = Recording(record(Mission(blocks=[Block(motion=Still())], end=0.2), tmp_path / "run"))
+    recording = Recording(
+        record(Mission(blocks=[Block(name="robot", motion=Still())], end=0.2), tmp_path / "run")
+    )
     x = np.linspace(-300.0, 300.0, 20)
     image = np.zeros((64, 64, 3), np.uint8)
     image[:32], image[32:] = (220, 0, 0), (0, 0, 220)  # the north is red

@@ -13,6 +13,7 @@ from tussle.mission.node import Node
 from tussle.mission.problems import Problems
 from tussle.mission.terrain_xml import read_terrain_xml
 from tussle.rays.files import SUFFIXES, read_surface, read_texture
+from tussle.rays.mesh_parts import read_parts
 from tussle.scene import Cuboid, FlatGround, HeightField, Origin, Prism, TriangleMesh, Volume
 from tussle.texts import shown
 
@@ -100,10 +101,24 @@ class SceneReader:
             self.files.append(inner)
         else:
             surface, texture = read_surface(path, **numbers), None
+            if isinstance(surface, TriangleMesh) and "texture" not in given:
+                surface = self._coloured(node, surface, path, numbers)
         surface = replace(surface, tag=(("", name), *given.items()))
         if "texture" in given:
             texture = self._find(given["texture"]) or path.parent / given["texture"]
         return surface if texture is None else self._textured(node, surface, texture)
+
+    def _coloured(self, node: Node, mesh: TriangleMesh, path: Path, numbers: dict[str, Any]) -> TriangleMesh:
+        """Return a mesh with the colours and textures of its file."""
+        place = {key: numbers[key] for key in ("scale", "position") if key in numbers}
+        parts, files, missing = read_parts(path, self._inside, **place)
+        self.files += files
+        for name in missing:
+            self.problems.note(
+                node.place,
+                f"<terrain>: {shown(path.name)} names {shown(name)}, which is not there or is no .mtl, .png, .jpg or .tif",
+            )
+        return replace(mesh, parts=parts)
 
     def _textured(
         self, node: Node, surface: HeightField | TriangleMesh, texture: Path

@@ -52,7 +52,7 @@ def read_surface(
         raise ParameterError(
             f"{path}: scale = {scale!r} at {position!r} is not allowed; it takes a scale > 0 and finite numbers"
         )
-    data = _bytes(path)
+    data = bytes_of(path)
     try:
         if suffix == ".asc":
             found: HeightField | TriangleMesh = read_ascii_grid(path, data)
@@ -76,10 +76,15 @@ def read_texture(path: Path | str) -> np.ndarray:
         MissingExtraError: Pillow is not installed.
         ParameterError: The file cannot be read, is too large, or is no image.
     """
-    return decoded(str(path), _bytes(Path(path)))
+    return decoded(str(path), bytes_of(Path(path)))
 
 
-def _bytes(path: Path) -> bytes:
+def bytes_of(path: Path) -> bytes:
+    """Content of a regular file of at most `MOST_BYTES`.
+
+    Raises:
+        ParameterError: It is no such file.
+    """
     try:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode):  # opening a pipe or a device can block forever

@@ -34,19 +34,31 @@ def decoded(where: str, data: bytes) -> np.ndarray:
         raise MissingExtraError(f"{where}: images need Pillow: pip install 'tussle[maps]'") from None
     try:
         with Image.open(io.BytesIO(data), formats=FORMATS) as image:
-            width, height = image.size  # of the header, before pixels are decoded
-            if width * height > MOST_PIXELS:
-                raise ParameterError(
-                    f"{where}: the image has {width:,} x {height:,} pixels; it takes at most {MOST_PIXELS:,}"
-                )
-            image.thumbnail((MOST_SIDE, MOST_SIDE))
-            return np.asarray(image.convert("RGB"))
+            return reduced(where, image)
     except ParameterError:
         raise
     except Exception as error:  # decoders of damaged data raise errors of many kinds
         raise ParameterError(
             f"{where}: it is no PNG, JPEG or TIFF that can be read: {str(error)[:200]}"
         ) from error
+
+
+def reduced(where: str, image: Any) -> np.ndarray:
+    """Pixels of an image of Pillow, as `decoded` returns them.
+
+    Raises:
+        ParameterError: It has too many pixels, or cannot be decoded.
+    """
+    width, height = image.size
+    if width * height > MOST_PIXELS:
+        raise ParameterError(
+            f"{where}: the image has {width:,} x {height:,} pixels; it takes at most {MOST_PIXELS:,}"
+        )
+    try:
+        image.thumbnail((MOST_SIDE, MOST_SIDE))
+        return np.asarray(image.convert("RGB"))
+    except Exception as error:  # decoders of damaged data raise errors of many kinds
+        raise ParameterError(f"{where}: the image cannot be read: {str(error)[:200]}") from error
 
 
 def jpeg(pixels: np.ndarray) -> bytes:

@@ -8,6 +8,7 @@ import zlib
 
 import numpy as np
 import pytest
+import trimesh
 from page_reader import PageReader
 from PIL import Image
 from recorded_games import record
@@ -15,12 +16,14 @@ from recorded_games import record
 from tussle import Simulation
 from tussle.errors import MissionError, ParameterError
 from tussle.mission import read_mission
+from tussle.rays.files import read_surface
 from tussle.rays.textures import MOST_SIDE, decoded
-from tussle.view import Recording
+from tussle.view import Live, Recording
 from tussle.view.export.film.cameras import View
 from tussle.view.export.film.renderer import Renderer
 from tussle.view.export.html import write_html
 from tussle.view.frame import empty_frame
+from tussle.view.page.document import scenery_blobs
 
 MISSION = """<runscript name="hilly"><run dt="0.1" end="0.2"/><terrain {}>hills.asc</terrain>
 <entity><team_id>1</team_id><motion_model>Still</motion_model></entity></runscript>
@@ -145,10 +148,112 @@ def test_an_image_with_too_many_pixels_is_refused_before_it_is_decoded(side, mes
     )
     with pytest.raises(ParameterError, match=rf"bomb\.png: .*{message}"):
         decoded("bomb.png", bomb)
-    with pytest.raises(ParameterError, match=r"cut\.png: it is no PNG"):
+    with pytest.raises(ParameterError, match=r"cut\.png: the image cannot be read: image file is truncated"):
         decoded("cut.png", png(photo())[:60])
 
 
 def test_large_images_are_made_smaller():
     shape = decoded("a.png", png(np.zeros((10, MOST_SIDE + 100, 3), np.uint8))).shape
     assert shape[1] == MOST_SIDE
+
+
+SQUARE = "mtllib a.mtl\nv 0 0 0\nv 40 0 0\nv 40 40 0\nv 0 40 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl m\nf 1/1 2/2 3/3 4/4\n"
+MESHES = """<runscript><run dt="0.1" end="0.2"/><terrain position="5 5 0">{}</terrain>
+<entity><motion_model>Still</motion_model></entity></runscript>
+"""
+
+
+@pytest.fixture
+def meshed(tmp_path):
+    """Read a mission with a mesh from a file."""
+
+    def read(name, **files):
+        (tmp_path / "photo.png").write_bytes(png(photo()))
+        (tmp_path / "a.mtl").write_text(files.pop("mtl", "newmtl m\nKd 1 1 1\nmap_Kd photo.png\n"))
+        (tmp_path / "a.obj").write_text(SQUARE)
+        (tmp_path / "meshes.xml").write_text(MESHES.format(name))
+        return read_mission(tmp_path / "meshes.xml")
+
+    return read
+
+
+def test_an_obj_with_mtl_is_shown_with_its_texture(meshed, tmp_path):
+    loaded = meshed("a.obj")
+    assert {file.name for file in loaded.files} >= {"a.obj", "a.mtl", "photo.png"}
+    live = Live(Simulation(loaded.mission), threaded=False)
+    picture = from_above(live.style, live.scenery)
+    assert is_red_over_blue(picture)
+    (part,) = live.scenery.boundaries[0].parts
+    assert (part.vertices.min(axis=0).tolist(), part.vertices.max(axis=0).tolist()) == (
+        [5, 5, 0],
+        [45, 45, 0],
+    )
+    blobs = scenery_blobs(live.scenery)
+    assert np.frombuffer(blobs["part-0"][:12], "<u4").tolist() == [len(part.vertices), 2, 1]
+    assert Image.open(io.BytesIO(blobs["image-0"])).size == (8, 8)
+    assert part.corner_colours()[part.vertices[:, 1] > 40].tolist() == [[*RED]] * 2
+
+
+@pytest.mark.parametrize("suffix", ["glb", "ply"])
+def test_colours_of_corners_and_faces_are_shown(meshed, tmp_path, suffix):
+    square = trimesh.Trimesh(
+        [(0, 0, 0), (40, 0, 0), (40, 40, 0), (0, 40, 0)], [(0, 1, 2), (0, 2, 3)], process=False
+    )
+    if suffix == "glb":
+        square.visual.vertex_colors = [(*RED, 255)] * 4
+    else:
+        square.visual.face_colors = [(*RED, 255), (*BLUE, 255)]
+    square.export(tmp_path / f"b.{suffix}")
+    (mesh,) = meshed(f"b.{suffix}").mission.scene.meshes
+    (part,) = mesh.parts
+    colours = {tuple(row) for row in part.colours.tolist()}
+    assert colours == ({RED} if suffix == "glb" else {RED, BLUE})
+
+
+def test_a_mesh_without_colours_has_no_parts(meshed, tmp_path):
+    trimesh.creation.box().export(tmp_path / "b.stl")
+    assert meshed("b.stl").mission.scene.meshes[0].parts == ()
+    (tmp_path / "c.obj").write_text(SQUARE.partition("\n")[2].replace("usemtl m\n", ""))
+    assert meshed("c.obj").mission.scene.meshes[0].parts == ()
+
+
+def test_a_gltf_shows_its_image_and_one_with_too_many_pixels_is_refused(meshed, tmp_path):
+    def export(image):
+        uv = [(0, 0), (1, 0), (1, 1), (0, 1)]
+        material = trimesh.visual.material.PBRMaterial(baseColorTexture=Image.fromarray(image))
+        visual = trimesh.visual.TextureVisuals(uv=uv, material=material)
+        corners = [(0, 0, 0), (40, 0, 0), (40, 40, 0), (0, 40, 0)]
+        trimesh.Trimesh(corners, [(0, 1, 2), (0, 2, 3)], visual=visual, process=False).export(
+            tmp_path / "b.glb"
+        )
+
+    export(photo())
+    (part,) = meshed("b.glb").mission.scene.meshes[0].parts
+    assert part.corner_colours()[part.vertices[:, 1] > 40].tolist() == [[*RED]] * 2
+    export(np.zeros((5000, 7000, 3), np.uint8))
+    with pytest.raises(
+        MissionError, match=r"b\.glb: the image has 7,000 x 5,000 pixels; it takes at most 32,000,000"
+    ):
+        meshed("b.glb")
+
+
+def test_files_that_a_mesh_names_are_checked(meshed, tmp_path):
+    (tmp_path.parent / "outside.png").write_bytes(png(photo()))
+    with pytest.raises(
+        MissionError, match=r"outside\.png: only files in the mission's folder or below it are read"
+    ):
+        meshed("a.obj", mtl="newmtl m\nmap_Kd ../outside.png\n")
+    (tmp_path / "text.png").write_text("no image")
+    with pytest.raises(MissionError, match=r"text\.png: it is no PNG, JPEG or TIFF that can be read"):
+        meshed("a.obj", mtl="newmtl m\nmap_Kd text.png\n")
+    assert any(
+        "names 'gone.png', which is not there" in note
+        for note in meshed("a.obj", mtl="newmtl m\nmap_Kd gone.png\n").notes
+    )
+
+
+def test_rays_meet_a_mesh_with_texture_as_one_without(meshed):
+    with_texture = meshed("a.obj").mission.scene
+    without = read_surface(meshed("a.obj").path.parent / "a.obj", position=(5.0, 5.0, 0.0))
+    assert with_texture.meshes[0].parts
+    np.testing.assert_array_equal(with_texture.meshes[0].triangles(), without.triangles())
