@@ -60,6 +60,16 @@ class SceneReader:
             "meshes": meshes,
         }
 
+    def files_by_name(self) -> dict[str, Path]:
+        """Return the files that were read, by their paths from the folder in which they are."""
+        found = {}
+        for file in map(Path.absolute, self.files):
+            folder = next(
+                (f.absolute() for f in self.folders if file.is_relative_to(f.absolute())), file.parent
+            )
+            found[str(file.relative_to(folder))] = file
+        return found
+
     def _each(self, tag: str, attributes: Any, make: Callable[[Node, dict[str, str]], Any]) -> list[Any]:
         """Make an object of each tag with this name. Errors are reported with their places."""
         found = []

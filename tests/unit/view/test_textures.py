@@ -60,10 +60,11 @@ def hilly(tmp_path):
 
 @pytest.fixture
 def recorded(hilly, tmp_path):
-    (tmp_path / "run").mkdir()
-    hilly(folder=tmp_path / "run").unlink()
     loaded = read_mission(hilly())
-    return Recording(record(loaded.mission, tmp_path / "run", mission_text=loaded.text))
+    files = {"mission_text": loaded.text, "scene_files": loaded.scene_files}
+    found = Recording(record(loaded.mission, tmp_path / "run", **files))
+    (tmp_path / "photo.png").unlink()  # the run has its own
+    return found
 
 
 def from_above(style, scenery) -> np.ndarray:
