@@ -232,8 +232,7 @@ def texture(browser: Browser) -> None:
         loaded = read_mission(Path(folder, "hills.xml"))
         live = Live(Simulation(loaded.mission, 3), viewer=loaded.viewer, is_paused=True)
         with live, shown(browser, Page(live, viewer=loaded.viewer)) as watched:
-            watched.wait("player.isDrawn")
-            save(watched.tab, "view-texture")
+            shoot(watched, "view-texture")
 
 
 HILLS = """<runscript name="Crates on hills"><run dt="0.1" end="60"/>

@@ -443,12 +443,11 @@ def test_the_terrain_has_its_texture(watched, tmp_path):
     recording = Recording(
         record(Mission(blocks=[Block(name="robot", motion=Still())], end=0.2), tmp_path / "run")
     )
-    x = np.linspace(-300.0, 300.0, 20)
+    x = np.linspace(-4.0, 4.0, 20)
     image = np.zeros((64, 64, 3), np.uint8)
     image[:32], image[32:] = (220, 0, 0), (0, 0, 220)  # the north is red
     hills = Terrain(x, x, np.zeros((20, 20)), image)
-    low, high = np.full(3, -300.0), np.full(3, 300.0)
-    recording.__dict__["scenery"] = replace(recording.scenery, terrain=hills, low=low, high=high)
+    recording.__dict__["scenery"] = replace(recording.scenery, terrain=hills)
     page = opened(watched, write_html(recording, tmp_path / "page.html").path)
     page.keyboard.press("v")  # from above, north up
     wait_until(page, "player.isDrawn")

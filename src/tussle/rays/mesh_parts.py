@@ -52,7 +52,7 @@ def read_parts(
     if path.suffix.lower() in (".glb", ".gltf"):
         for image in _embedded(data):  # trimesh would decode them whatever their size
             decoded(str(path), image)
-    beside = _FilesBeside(path, check)
+    beside: Any = _FilesBeside(path, check)
     scene: Any = trimesh.load_scene(
         io.BytesIO(data), file_type=path.suffix.lower()[1:], process=False, resolver=beside
     )

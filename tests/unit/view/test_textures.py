@@ -258,3 +258,15 @@ def test_rays_meet_a_mesh_with_texture_as_one_without(meshed):
     without = read_surface(meshed("a.obj").path.parent / "a.obj", position=(5.0, 5.0, 0.0))
     assert with_texture.meshes[0].parts
     np.testing.assert_array_equal(with_texture.meshes[0].triangles(), without.triangles())
+
+
+def test_the_texture_of_a_terrain_xml_is_laid_over_it(meshed, tmp_path):
+    (tmp_path / "t.xml").write_text(
+        "<terrain><polydata>a.obj</polydata><texture>photo.png</texture></terrain>"
+    )
+    loaded = meshed("t.xml")
+    (part,) = loaded.mission.scene.meshes[0].parts
+    assert part.corner_colours()[part.vertices[:, 1] > 40].tolist() == [[*RED]] * 2
+    assert {"t.xml", "a.obj", "photo.png"} <= set(loaded.scene_files)
+    (tmp_path / "t.xml").write_text("<terrain><polydata>a.obj</polydata><texture>no.png</texture></terrain>")
+    assert meshed("t.xml").mission.scene.meshes[0].parts == ()
