@@ -46,6 +46,19 @@ def read_parts(
     """
     if path.suffix.lower() not in BY_TRIMESH:
         return (), [], []
+    try:
+        return _parts(path, check, scale, position)
+    except TussleError:
+        raise
+    except Exception as error:  # readers of damaged data raise errors of many kinds
+        raise ParameterError(
+            f"{path}: its colours cannot be read: {type(error).__name__}: {str(error)[:200]}"
+        ) from error
+
+
+def _parts(
+    path: Path, check: Callable[[Path], None], scale: float, position: tuple[float, float, float]
+) -> tuple[tuple[MeshPart, ...], list[Path], list[str]]:
     import trimesh
 
     data = bytes_of(path)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import struct
 import zlib
 
@@ -270,3 +271,16 @@ def test_the_texture_of_a_terrain_xml_is_laid_over_it(meshed, tmp_path):
     assert {"t.xml", "a.obj", "photo.png"} <= set(loaded.scene_files)
     (tmp_path / "t.xml").write_text("<terrain><polydata>a.obj</polydata><texture>no.png</texture></terrain>")
     assert meshed("t.xml").mission.scene.meshes[0].parts == ()
+
+
+def test_a_gltf_whose_image_lies_nowhere_is_refused(meshed, tmp_path):
+    trimesh.creation.box().export(tmp_path / "b.glb")
+    data = (tmp_path / "b.glb").read_bytes()
+    n = int.from_bytes(data[12:16], "little")
+    content = json.loads(data[20 : 20 + n]) | {"images": [{"bufferView": 99}]}
+    text = json.dumps(content).encode()
+    text += b" " * (-len(text) % 4)
+    body = struct.pack("<I", len(text)) + b"JSON" + text + data[20 + n :]
+    (tmp_path / "b.glb").write_bytes(data[:8] + struct.pack("<I", 12 + len(body)) + body)
+    with pytest.raises(MissionError, match=r"b\.glb: its colours cannot be read: IndexError"):
+        meshed("b.glb")
