@@ -215,6 +215,37 @@ def shapes(browser: Browser) -> None:
         shoot(watched, "view-shapes")
 
 
+def texture(browser: Browser) -> None:
+    """Robots among boxes, on hills with an image over them."""
+    with tempfile.TemporaryDirectory() as folder:
+        side = np.linspace(0.0, 1.0, 121)
+        x, y = np.meshgrid(side, side)
+        height = 0.45 + 0.22 * np.sin(7.0 * x + 1.0) * np.cos(5.0 * y) + 0.18 * np.sin(11.0 * y - 3.0 * x)
+        fields = 0.5 + 0.5 * np.sign(np.sin(24.0 * x + 6.0 * y) * np.sin(18.0 * y))
+        colours = np.array([(0.35, 0.47, 0.22), (0.62, 0.57, 0.30)])
+        image = colours[fields.astype(int)] + 0.25 * (height - 0.45)[..., None]
+        image[np.abs(y - 0.5 - 0.12 * np.sin(6.0 * x)) < 0.02] = (0.72, 0.70, 0.66)  # a road
+        image[height < 0.22] = (0.25, 0.42, 0.58)
+        matplotlib.image.imsave(f"{folder}/hills.png", height, cmap="gray", vmin=0.0, vmax=1.0)
+        matplotlib.image.imsave(f"{folder}/photo.png", np.clip(image, 0.0, 1.0))
+        Path(folder, "hills.xml").write_text(HILLS)
+        loaded = read_mission(Path(folder, "hills.xml"))
+        live = Live(Simulation(loaded.mission, 3), viewer=loaded.viewer, is_paused=True)
+        with live, shown(browser, Page(live, viewer=loaded.viewer)) as watched:
+            shoot(watched, "view-texture")
+
+
+HILLS = """<runscript name="Crates on hills"><run dt="0.1" end="60"/>
+<terrain cell="1.5" height="30" texture="photo.png">hills.png</terrain><show_origin>false</show_origin>
+<camera pos="90, -70, 95" focal_point="90, 85, 10"/>
+<entity><name>crate</name><team_id>2</team_id><count>14</count><x>90</x><y>85</y><z>24</z><color>190 120 60</color>
+  <box_x>10</box_x><box_y>6</box_y><box_z>14</box_z><heading_variance>3</heading_variance>
+  <placement>uniform</placement><half_width_x>70</half_width_x><half_width_y>70</half_width_y><motion_model>Still</motion_model></entity>
+<entity><name>drone</name><team_id>1</team_id><count>6</count><x>90</x><y>85</y><z>38</z><visual_model>iris</visual_model><visual_scale>5</visual_scale>
+  <placement>uniform</placement><half_width_x>60</half_width_x><half_width_y>60</half_width_y><motion_model>Still</motion_model></entity>
+</runscript>
+"""
+
 PICTURES: dict[str, Callable[[Browser], None]] = {
     "chase": chase,
     "two-runs": two_runs,
@@ -224,6 +255,7 @@ PICTURES: dict[str, Callable[[Browser], None]] = {
     "formation": formation,
     "offline": offline,
     "shapes": shapes,
+    "texture": texture,
 }
 
 

@@ -439,6 +439,26 @@ def test_bases_boundaries_and_terrain_are_drawn(watched, tmp_path):
     assert 0.02 < changed.mean() < 0.98
 
 
+def test_the_terrain_has_its_texture(watched, tmp_path):
+    recording = Recording(
+        record(Mission(blocks=[Block(name="robot", motion=Still())], end=0.2), tmp_path / "run")
+    )
+    x = np.linspace(-4.0, 4.0, 20)
+    image = np.zeros((64, 64, 3), np.uint8)
+    image[:32], image[32:] = (220, 0, 0), (0, 0, 220)  # the north is red
+    hills = Terrain(x, x, np.zeros((20, 20)), image)
+    recording.__dict__["scenery"] = replace(recording.scenery, terrain=hills)
+    page = opened(watched, write_html(recording, tmp_path / "page.html").path)
+    page.keyboard.press("v")  # from above, north up
+    wait_until(page, "player.isDrawn")
+    seen = picture(page)
+    is_red = (seen[..., 0] > 0.5) & (seen[..., 1:].max(axis=2) < 0.3)
+    is_blue = (seen[..., 2] > 0.5) & (seen[..., :2].max(axis=2) < 0.3)
+    assert is_red.mean() > 0.03
+    assert is_blue.mean() > 0.03
+    assert np.flatnonzero(is_red.any(axis=1)).mean() < np.flatnonzero(is_blue.any(axis=1)).mean()
+
+
 def test_two_fingers_come_nearer_on_a_narrow_screen(watched, hunted):
     page = opened(watched, hunted[1].path, viewport={"width": 400, "height": 800}, has_touch=True)
     assert page.evaluate("() => document.documentElement.scrollWidth") == 400

@@ -32,7 +32,7 @@ export function chunkBytes(first, times, tracks) {
 /** A page of one team with one block. @param {Partial<PageData>} more @returns {PageData} */
 export function pageData(more = {}) {
   return (({
-    blocks: [{ name: 'drone', team: 1, colour: [1, 2, 3], model: 'sphere', scale: 1 }], teams: [{ id: 1, name: 'drones', colour: [1, 2, 3] }],
+    blocks: [{ name: 'drone', team: 1, colour: [1, 2, 3], model: 'sphere', lengths: [1, 1, 1] }], teams: [{ id: 1, name: 'drones', colour: [1, 2, 3] }],
     scenery: { low: [0, 0, 0], high: [400, 0, 0] }, attitudeUnit: 2047, healthSteps: 255, idShift: 0, ...more,
   }));
 }

@@ -63,7 +63,8 @@ def record(
     from tussle.record import Recorder
 
     return Recorder(
-        simulation, directory, period=period, mission_text=loaded.text, parameters=loaded.settings, shapes=shapes
+        simulation, directory, period=period, mission_text=loaded.text, parameters=loaded.settings, shapes=shapes,
+        scene_files=loaded.scene_files,
     )  # fmt: skip
 
 

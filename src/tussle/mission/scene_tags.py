@@ -12,13 +12,14 @@ from tussle.mission import codecs
 from tussle.mission.node import Node
 from tussle.mission.problems import Problems
 from tussle.mission.terrain_xml import read_terrain_xml
-from tussle.rays.files import SUFFIXES, read_surface
+from tussle.rays.files import SUFFIXES, read_surface, read_texture
+from tussle.rays.mesh_parts import read_parts
 from tussle.scene import Cuboid, FlatGround, HeightField, Origin, Prism, TriangleMesh, Volume
 from tussle.texts import shown
 
 SCENE_TAGS = ("terrain", "ground", "wall", "building")
 MOST_WALLS = 20_000
-TERRAIN = {"position": "m", "scale": "", "cell": "m", "height": "m"}
+TERRAIN = {"position": "m", "scale": "", "cell": "m", "height": "m", "texture": ""}
 WALL = {"center": "m", "lengths": "m", "rpy": "rad"}
 BUILDING = {"corners": "m", "low": "m", "high": "m"}
 
@@ -59,6 +60,16 @@ class SceneReader:
             "meshes": meshes,
         }
 
+    def files_by_name(self) -> dict[str, Path]:
+        """Return the files that were read, by their paths from the folder in which they are."""
+        found = {}
+        for file in map(Path.absolute, self.files):
+            folder = next(
+                (f.absolute() for f in self.folders if file.is_relative_to(f.absolute())), file.parent
+            )
+            found[str(file.relative_to(folder))] = file
+        return found
+
     def _each(self, tag: str, attributes: Any, make: Callable[[Node, dict[str, str]], Any]) -> list[Any]:
         """Make an object of each tag with this name. Errors are reported with their places."""
         found = []
@@ -96,11 +107,41 @@ class SceneReader:
             numbers["position"] = _numbers(given["position"], 3, "position", "m")
         self.files.append(path)
         if path.suffix.lower() == ".xml":
-            surface, inner = read_terrain_xml(path, self._inside, self.origin, numbers)
+            surface, inner, texture = read_terrain_xml(path, self._inside, self.origin, numbers)
             self.files.append(inner)
         else:
-            surface = read_surface(path, **numbers)
-        return replace(surface, tag=(("", name), *given.items()))
+            surface, texture = read_surface(path, **numbers), None
+            if isinstance(surface, TriangleMesh) and "texture" not in given:
+                surface = self._coloured(node, surface, path, numbers)
+        surface = replace(surface, tag=(("", name), *given.items()))
+        if "texture" in given:
+            texture = self._find(given["texture"]) or path.parent / given["texture"]
+        return surface if texture is None else self._textured(node, surface, texture)
+
+    def _coloured(self, node: Node, mesh: TriangleMesh, path: Path, numbers: dict[str, Any]) -> TriangleMesh:
+        """Return a mesh with the colours and textures of its file."""
+        place = {key: numbers[key] for key in ("scale", "position") if key in numbers}
+        parts, files, missing = read_parts(path, self._inside, **place)
+        self.files += files
+        for name in missing:
+            self.problems.note(
+                node.place,
+                f"<terrain>: {shown(path.name)} names {shown(name)}, which is not there or is no .mtl, .png, .jpg or .tif",
+            )
+        return replace(mesh, parts=parts)
+
+    def _textured(
+        self, node: Node, surface: HeightField | TriangleMesh, texture: Path
+    ) -> HeightField | TriangleMesh:
+        """Return a surface with an image over it; without one that does not exist, which is noted."""
+        self._inside(texture)
+        if not texture.exists():
+            self.problems.note(
+                node.place, f"<terrain>: there is no {shown(texture.name)}, so the terrain has no texture"
+            )
+            return surface
+        self.files.append(texture)
+        return surface.draped(read_texture(texture))
 
     def _find(self, name: str) -> Path | None:
         """Return the file with this name in one of the folders; None if there is none.

@@ -92,7 +92,7 @@ WORLD = {
     "terrain": TagSpec(
         "Hills or a mesh that rays meet: a file beside the mission (.asc, .png, .tif, .vtk, .obj, .ply, .stl, .glb, .gltf, .off), or a "
         "terrain .xml of SCRIMMAGE. Attributes: `position` (x, y, z of its origin) [m]; of an image `cell`, a pixel's width [m], "
-        "and `height` of white [m]; of a mesh `scale`.",
+        "and `height` of white [m]; of a mesh `scale`. `texture`: an image that is draped over it, which only pictures show.",
         reads="text",
     ),
     "ground": TagSpec("Flat ground at this height, which rays meet (addition to the format).", "none", "m"),

@@ -49,8 +49,8 @@ def utm(origin: Origin, zone: int, is_south: bool) -> tuple[float, float]:
 
 def read_terrain_xml(
     path: Path, check: Callable[[Path], None], origin: Origin, numbers: dict[str, Any]
-) -> tuple[HeightField | TriangleMesh, Path]:
-    """Read the surface that a terrain XML names. Its texture and extrusion are left out.
+) -> tuple[HeightField | TriangleMesh, Path, Path | None]:
+    """Read the surface that a terrain XML names. Its extrusion is left out.
 
     Poly data are shifted by the UTM coordinates of the mission's origin, if the file has a <zone>, and by its offsets.
 
@@ -61,7 +61,7 @@ def read_terrain_xml(
         numbers: Further arguments of `read_surface`.
 
     Returns:
-        The surface, and its file.
+        The surface, its file, and that of its texture, which may not exist.
 
     Raises:
         MissionError: The XML is damaged, or has a tag or value that is not allowed.
@@ -86,4 +86,8 @@ def read_terrain_xml(
         east, north = utm(origin, zone, given.get("hemisphere", "north").lower().startswith("s"))
         x, y, z = x - east, y - north, z - origin.altitude
     a, b, c = numbers.get("position", (0.0, 0.0, 0.0))
-    return read_surface(inner, **numbers | {"position": (x + a, y + b, z + c)}), inner
+    return (
+        read_surface(inner, **numbers | {"position": (x + a, y + b, z + c)}),
+        inner,
+        (path.parent / given["texture"] if given.get("texture") else None),
+    )

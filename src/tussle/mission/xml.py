@@ -48,6 +48,7 @@ class Loaded:
         placeholders: Names of the placeholders, with their defaults.
         places: Block name -> "file:line", for messages about it.
         files: All files that were read: the mission's and those it includes.
+        scene_files: Files of surfaces and their textures, by their paths from the folder in which they were found.
         settings: Values set from outside, as texts of the file.
     """
 
@@ -62,6 +63,7 @@ class Loaded:
     placeholders: dict[str, str] = field(default_factory=dict)
     places: dict[str, str] = field(default_factory=dict)
     files: tuple[Path, ...] = ()
+    scene_files: dict[str, Path] = field(default_factory=dict)
     settings: dict[str, str] = field(default_factory=dict)
 
 
@@ -193,7 +195,7 @@ class _WorldReader:
         places = {block: str(place) for block, place in entities.places.items()}
         return Loaded(
             mission, seed, name or self.source.path.stem, self.source.path, self.source.text, problems.notes, self.viewer, self.log,
-            self.source.placeholders, places, (*self.source.files, *scene.files),
+            self.source.placeholders, places, (*self.source.files, *scene.files), scene.files_by_name(),
         )  # fmt: skip
 
     def _count_tags(self, entities: list[Node]) -> None:

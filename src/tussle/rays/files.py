@@ -14,6 +14,7 @@ import numpy as np
 from tussle.errors import MissingExtraError, ParameterError, listed, nearest_name
 from tussle.rays.grids import read_ascii_grid, read_image
 from tussle.rays.surfaces import MOST_FACES, HeightField, TriangleMesh
+from tussle.rays.textures import decoded
 from tussle.rays.vtk import read_vtk
 
 MOST_BYTES = 64_000_000
@@ -51,7 +52,7 @@ def read_surface(
         raise ParameterError(
             f"{path}: scale = {scale!r} at {position!r} is not allowed; it takes a scale > 0 and finite numbers"
         )
-    data = _bytes(path)
+    data = bytes_of(path)
     try:
         if suffix == ".asc":
             found: HeightField | TriangleMesh = read_ascii_grid(path, data)
@@ -68,7 +69,22 @@ def read_surface(
     return found
 
 
-def _bytes(path: Path) -> bytes:
+def read_texture(path: Path | str) -> np.ndarray:
+    """Read an image (.png, .jpg, .tif) that is draped over a surface: red, green, blue, (height, width, 3), uint8.
+
+    Raises:
+        MissingExtraError: Pillow is not installed.
+        ParameterError: The file cannot be read, is too large, or is no image.
+    """
+    return decoded(str(path), bytes_of(Path(path)))
+
+
+def bytes_of(path: Path) -> bytes:
+    """Content of a regular file of at most `MOST_BYTES`.
+
+    Raises:
+        ParameterError: It is no such file.
+    """
     try:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode):  # opening a pipe or a device can block forever

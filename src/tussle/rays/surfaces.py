@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -19,6 +19,43 @@ TECHNIQUES = ("RANDOM_WALK", "LINEAR", "LINEAR_WALK")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
+class MeshPart:
+    """A part of a mesh in its colours, for pictures; rays do not see it.
+
+    Args:
+        vertices: Corners [m], (n, 3), world frame.
+        faces: Three corners of each triangle, by number, (m, 3).
+        colours: Red, green, blue of each corner, (n, 3), uint8; those of the image are multiplied by them.
+        uv: Place of each corner in the image, (n, 2), from its lower left corner to (1, 1) at its upper right one; None without an image.
+        image: Red, green, blue, (height, width, 3), uint8, from its upper left corner; None for none.
+    """
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    colours: np.ndarray
+    uv: np.ndarray | None = None
+    image: np.ndarray | None = None
+
+    @classmethod
+    def draped(cls, vertices: np.ndarray, faces: np.ndarray, image: np.ndarray) -> MeshPart:
+        """A surface with an image laid over it from above, with the upper edge in the north."""
+        low, high = vertices[:, :2].min(axis=0), vertices[:, :2].max(axis=0)
+        uv = (vertices[:, :2] - low) / np.maximum(high - low, 1e-9)
+        return cls(vertices, faces, np.full((len(vertices), 3), 255, np.uint8), uv, image)
+
+    def corner_colours(self) -> np.ndarray:
+        """Red, green, blue of each corner with those of the image there, (n, 3), 0 to 255."""
+        if self.image is None or self.uv is None:
+            return self.colours
+        height, width = self.image.shape[:2]
+        column, row = self.uv[:, 0] % 1.000001 * (width - 1), (1.0 - self.uv[:, 1]) % 1.000001 * (height - 1)
+        found: np.ndarray = (
+            self.image[np.rint(row).astype(int), np.rint(column).astype(int)] / 255.0 * self.colours
+        )
+        return found
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class HeightField:
     """Ground whose heights are given on a grid. Each cell has two triangles, divided from its south-western to its north-eastern corner.
 
@@ -28,6 +65,7 @@ class HeightField:
         south: y of the first row [m].
         cell: Distance between columns and between rows [m].
         tag: Text and attributes of the mission's tag that it was read from; () for none.
+        texture: Image that pictures show on it, red, green, blue, (height, width, 3), uint8, from its north-western corner; None for none.
 
     Raises:
         ParameterError: A value is not finite or too large, the cell is not positive, or there are fewer than 2 x 2 or more than
@@ -39,6 +77,7 @@ class HeightField:
     south: float = 0.0
     cell: float = 1.0
     tag: tuple[tuple[str, str], ...] = ()
+    texture: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         height = np.ascontiguousarray(self.height, np.float64)
@@ -98,6 +137,10 @@ class HeightField:
             cell,
         )
 
+    def draped(self, image: np.ndarray) -> HeightField:
+        """The field with an image over it, see `texture`."""
+        return replace(self, texture=image)
+
     @property
     def grid(self) -> np.ndarray:
         """For kernels: west, south, width and depth of a cell, least and greatest height [m], (6,)."""
@@ -144,6 +187,7 @@ class TriangleMesh:
         vertices: Corners [m], (n, 3), world frame.
         faces: Three corners of each triangle, by number, (m, 3).
         tag: Text and attributes of the mission's tag that it was read from; () for none.
+        parts: The mesh in its own colours and textures, for pictures; () where it has none.
 
     Raises:
         ParameterError: A coordinate is not finite or too large, a corner does not exist, or there are no triangles, or more than 2,000,000.
@@ -152,6 +196,7 @@ class TriangleMesh:
     vertices: np.ndarray
     faces: np.ndarray
     tag: tuple[tuple[str, str], ...] = ()
+    parts: tuple[MeshPart, ...] = ()
     normals: np.ndarray = field(init=False)
 
     def __post_init__(self) -> None:
@@ -181,6 +226,11 @@ class TriangleMesh:
         for name, array in found.items():
             array.flags.writeable = False
             object.__setattr__(self, name, array)
+
+    def draped(self, image: np.ndarray) -> TriangleMesh:
+        """The mesh with an image laid over it from above, with the upper edge in the north."""
+        part = MeshPart.draped(self.vertices, self.faces, image)
+        return TriangleMesh(self.vertices, self.faces, self.tag, (part,))
 
     def triangles(self) -> np.ndarray:
         """Corners of the triangles [m], (m, 3, 3)."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import time
 import warnings
 from collections.abc import Mapping
@@ -67,6 +68,8 @@ class Recorder:
         parameters: Values that were set in addition to the mission, for `run.json`.
         flush_every: Wall time between flushes [s].
         shapes: Whether the shapes that plugins draw are recorded, too; of every step, whatever the period.
+        scene_files: Files of terrain, meshes and textures that the mission's text names, which are copied, by name: see
+            `tussle.mission.Loaded`.
 
     Raises:
         RecordError: The directory holds a run, or cannot be written.
@@ -83,6 +86,7 @@ class Recorder:
         parameters: Mapping[str, Any] | None = None,
         flush_every: float = 1.0,
         shapes: bool = False,
+        scene_files: Mapping[str, Path] | None = None,
     ) -> None:
         for name, value in (("period", period), ("flush_every", flush_every)):
             if value is not None and not 0.0 < value < float("inf"):
@@ -104,11 +108,11 @@ class Recorder:
         self._rows: RowSelection
         self._common_step = -1
         self._steps = np.full(sim.n_worlds, -1, np.int64)
-        self._open(mission_text, shapes)
+        self._open(mission_text, shapes, scene_files or {})
         self._flush_at = time.monotonic() + flush_every
         self._begin()
 
-    def _open(self, mission_text: str | None, shapes: bool) -> None:
+    def _open(self, mission_text: str | None, shapes: bool, scene_files: Mapping[str, Path]) -> None:
         try:
             self.directory.mkdir(parents=True, exist_ok=True)
             held = [name for name in FILES if (self.directory / name).exists()]
@@ -119,6 +123,11 @@ class Recorder:
             mission_text = mission_text or self._written_back()
             if mission_text:
                 (self.directory / MISSION_FILE).write_text(mission_text, encoding="utf-8")
+            for name, file in scene_files.items():
+                place = self.directory / name
+                if place.resolve().is_relative_to(self.directory.resolve()) and name not in FILES:
+                    place.parent.mkdir(parents=True, exist_ok=True)
+                    shutil.copyfile(file, place)
         except OSError as error:
             raise RecordError(
                 f"{self.directory}: cannot record a run there: {error.strerror or error}"

@@ -44,7 +44,8 @@ class WorldCamera:
     def __init__(self, simulation: Simulation, world: int = 0, size: tuple[int, int] = SIZE) -> None:
         blocks = simulation.mission.blocks
         plugins = [[type(p).__name__ for p in b.plugins] for b in blocks]
-        style = Style([b.name for b in blocks], [b.team for b in blocks], plugins)
+        boxes = [b.box for b in blocks]
+        style = Style([b.name for b in blocks], [b.team for b in blocks], plugins, boxes=boxes)
         self._lens, self._aspect = Lens(simulation, world), size[0] / size[1]
         self._renderer = Renderer(style, scenery_of(simulation.mission), size)
         flat = math.cos(ELEVATION)

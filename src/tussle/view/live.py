@@ -417,7 +417,8 @@ class Live:
     def style(self) -> Style:
         """Colours and models of the entities."""
         plugins = [[type(p).__name__ for p in b.plugins] for b in self.simulation.mission.blocks]
-        return Style(self.blocks, self.block_teams, plugins, self.viewer)
+        boxes = [b.box for b in self.simulation.mission.blocks]
+        return Style(self.blocks, self.block_teams, plugins, self.viewer, boxes)
 
     @cached_property
     def scenery(self) -> Scenery:

@@ -416,7 +416,9 @@ class Recording:
     @cached_property
     def style(self) -> Style:
         """Colours and models of the entities."""
-        return Style(self.blocks, self.block_teams, self._plugins, self.viewer)
+        box_of = {block.name: block.box for block in self.mission.blocks} if self.mission else {}
+        boxes = [box_of.get(name) for name in self.blocks]
+        return Style(self.blocks, self.block_teams, self._plugins, self.viewer, boxes)
 
     @cached_property
     def scenery(self) -> Scenery:

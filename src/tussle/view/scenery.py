@@ -12,6 +12,7 @@ import numpy as np
 from tussle.errors import TussleError
 from tussle.geodesy import Origin
 from tussle.mission import Block, Mission
+from tussle.rays.surfaces import MeshPart
 from tussle.scene import Base, Cuboid, HeightField, Plane, Polyhedron, Prism, Sphere, TriangleMesh, Volume
 from tussle.view.shapes import Mesh
 from tussle.view.solids import MOST_FACES, mesh_of, outline_of
@@ -34,6 +35,7 @@ class Region:
         is_wall: Whether it stops rays.
         mesh: Its surface; of a plane, a square as wide as the visible box.
         outline: Its edges, or circles of a sphere, (k, 2, 3): ends of each line [m].
+        parts: Its surface in its own colours and textures, which is drawn in place of `mesh`; () for none.
     """
 
     name: str
@@ -42,6 +44,7 @@ class Region:
     is_wall: bool
     mesh: Mesh
     outline: np.ndarray
+    parts: tuple[MeshPart, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +119,15 @@ def scenery_of(
         grid_step=float(spacing) if spacing > 0.0 else _grid_step(low, high),
         bases=list(scene.bases) if scene else [],
         boundaries=[
-            Region(name, team, shape, is_wall, mesh_of(shape, low, high), outline_of(shape, low, high))
+            Region(
+                name,
+                team,
+                shape,
+                is_wall,
+                mesh_of(shape, low, high),
+                outline_of(shape, low, high),
+                shape.parts if isinstance(shape, TriangleMesh) else (),
+            )
             for name, team, shape, is_wall in shapes
         ],
         terrain=None if hills is None else Terrain.of(hills),

@@ -211,6 +211,13 @@ class _Models(Mapping[str, Mesh]):
 
 
 MODELS: Mapping[str, Mesh] = _Models(
-    {"aircraft": _aircraft, "quadrotor": _quadrotor, "car": _car, "boat": _boat, "sphere": lambda: ball(2)}
+    {
+        "aircraft": _aircraft,
+        "quadrotor": _quadrotor,
+        "car": _car,
+        "boat": _boat,
+        "sphere": lambda: ball(2),
+        "box": lambda: box((-0.5, -0.5, -0.5), (0.5, 0.5, 0.5)),
+    }
 )
 """Models by name."""

@@ -24,6 +24,7 @@ _WORDS: Mapping[str, tuple[str, ...]] = {
         *("wamv", "torpedo", "heron"),
     ),
     "sphere": ("sphere", "ball", "point", "marble", "oscillator"),
+    "box": ("box", "cube", "crate", "brick", "container"),
 }  # fmt: skip
 """Words in names of visual models."""
 
@@ -40,14 +41,15 @@ class Style:
     """Colours and models of a mission's entities.
 
     A block has its `<color>`, else that of its team. A team has the colour of its first block with one, else a colour of the palette
-    by its number. The model is the one nearest to `visual_model`, else one that suits the motion model. `visual_rpy` is ignored: it
-    turns the meshes of SCRIMMAGE, and these point forward.
+    by its number. The model is the one nearest to `visual_model`, else a box of its own lengths for entities that are boxes, else one that
+    suits the motion model. `visual_rpy` is ignored: it turns the meshes of SCRIMMAGE, and these point forward.
 
     Args:
         blocks: Names of the blocks.
         teams: Team of each block.
         plugins: Names of the classes of each block's plugins, which choose the model of a block without `visual_model`.
         viewer: Viewer tags of the mission file, see `tussle.mission.Loaded`.
+        boxes: Lengths of each block's entities along their axes [m], (3,); None where they are no boxes.
 
     Attributes:
         notes: Viewer tags that were not followed, one line each.
@@ -59,6 +61,7 @@ class Style:
         teams: Sequence[int],
         plugins: Sequence[Sequence[str]] = (),
         viewer: Mapping[str, Any] | None = None,
+        boxes: Sequence[Sequence[float] | None] = (),
     ) -> None:
         self.notes: list[str] = []
         self._teams = list(teams)
@@ -68,8 +71,11 @@ class Style:
         self._scales = [
             self._read_scale(name, s.get("visual_scale")) for name, s in zip(blocks, own, strict=True)
         ]
+        self._boxes = [*boxes, *[None] * (len(blocks) - len(boxes))]
         self._models = [
-            self._read_model(name, s.get("visual_model"), plugins[i] if i < len(plugins) else ())
+            self._read_model(
+                name, s.get("visual_model"), plugins[i] if i < len(plugins) else (), self._boxes[i]
+            )
             for i, (name, s) in enumerate(zip(blocks, own, strict=True))
         ]
         self._by_team: dict[int, Colour] = {}
@@ -89,9 +95,19 @@ class Style:
         """Name of the model of a block by its number, in `MODELS`."""
         return self._models[block]
 
+    def lengths(self, block: int) -> tuple[float, float, float]:
+        """Lengths of an entity of a block along its axes [m]: factors by which its model, 1 m long, is enlarged."""
+        scale = self._scales[block]
+        x, y, z = self._boxes[block] if self.is_true_box(block) else (1.0, 1.0, 1.0)  # type: ignore[misc]
+        return scale * x, scale * y, scale * z
+
     def scale(self, block: int) -> float:
-        """Factor by which the model of a block is enlarged."""
-        return self._scales[block]
+        """The longest of `lengths` [m]."""
+        return max(self.lengths(block))
+
+    def is_true_box(self, block: int) -> bool:
+        """Whether the entities of a block are drawn as the boxes that they are, and so not enlarged to be seen."""
+        return self._models[block] == "box" and self._boxes[block] is not None
 
     def _read_colour(self, block: str, text: str | None) -> Colour | None:
         if text is None:
@@ -115,8 +131,12 @@ class Style:
         self.notes.append(f"block {block!r}: visual_scale {text!r} is not a number > 0; 1 is used")
         return 1.0
 
-    def _read_model(self, block: str, asked: str | None, plugins: Sequence[str]) -> str:
-        suitable = next((m for p in plugins if (m := _model_by_words(p, _MOTION_WORDS))), "sphere")
+    def _read_model(
+        self, block: str, asked: str | None, plugins: Sequence[str], box: Sequence[float] | None
+    ) -> str:
+        suitable = (
+            "box" if box else next((m for p in plugins if (m := _model_by_words(p, _MOTION_WORDS))), "sphere")
+        )
         if not asked:
             return suitable
         found = _model_by_words(asked, _WORDS) or _model_by_likeness(asked)

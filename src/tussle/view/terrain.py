@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tussle.rays.surfaces import MeshPart
 from tussle.scene import HeightField
 from tussle.view.shapes import Mesh
 
@@ -21,26 +22,27 @@ class Terrain:
         x: East of the columns [m], (nx,), ascending.
         y: North of the rows [m], (ny,), ascending.
         height: z of the ground [m], (ny, nx).
+        texture: Image over it, red, green, blue, (h, w, 3), uint8, from its north-western corner; None for none.
     """
 
     x: np.ndarray
     y: np.ndarray
     height: np.ndarray
+    texture: np.ndarray | None = None
 
     @classmethod
     def of(cls, field: HeightField) -> Terrain:
         """The terrain of a height field."""
         ny, nx = field.height.shape
-        return cls(
-            field.west + field.cell * np.arange(nx), field.south + field.cell * np.arange(ny), field.height
-        )
+        x, y = field.west + field.cell * np.arange(nx), field.south + field.cell * np.arange(ny)
+        return cls(x, y, field.height, field.texture)
 
     def thinned(self, most: int = MOST_DRAWN) -> Terrain:
         """Every k-th column and row, with the least k that leaves at most this number of heights."""
         stride = 1
         while len(self.x[::stride]) * len(self.y[::stride]) > most:
             stride += 1
-        return Terrain(self.x[::stride], self.y[::stride], self.height[::stride, ::stride])
+        return Terrain(self.x[::stride], self.y[::stride], self.height[::stride, ::stride], self.texture)
 
     def mesh(self, most: int = MOST_DRAWN) -> Mesh:
         """Two triangles between each four neighbours, of at most this number of heights."""
@@ -52,3 +54,10 @@ class Terrain:
         above = np.stack([corner, corner + nx + 1, corner + nx], 1)
         vertices = np.stack([east.ravel(), north.ravel(), thin.height.ravel()], 1)
         return Mesh(vertices, np.concatenate([below, above]))
+
+    def part(self, most: int = MOST_DRAWN) -> MeshPart | None:
+        """The surface with its image, of at most this number of heights; None without an image."""
+        if self.texture is None:
+            return None
+        mesh = self.mesh(most)
+        return MeshPart.draped(mesh.vertices, mesh.faces, self.texture)

@@ -288,7 +288,7 @@ def test_bases_boundaries_and_looks_are_those_of_the_mission(harbour, tmp_path):
     assert len(quay["outline"]) == 12 * 6
     assert scenery["terrain"] is None
     [block] = layer["blocks"]
-    assert (block["colour"], block["model"], block["scale"]) == ([1, 2, 3], "quadrotor", 0.05)
+    assert (block["colour"], block["model"], block["lengths"]) == ([1, 2, 3], "quadrotor", [0.05, 0.05, 0.05])
     assert layer["teams"] == [{"id": 1, "name": "patrol", "colour": [1, 2, 3]}]
     assert set(page.document["models"]) == {"quadrotor", "sphere"}
     # The smallest body is twenty steps long.

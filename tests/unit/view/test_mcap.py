@@ -11,10 +11,12 @@ import pytest
 from mcap.reader import make_reader
 from recorded_games import hunt, record
 
+from tussle import Block, Mission
 from tussle.errors import MissingExtraError, ParameterError, ViewError
 from tussle.event_texts import event_text
 from tussle.geodesy import Origin
 from tussle.scene import Base, Cuboid
+from tussle.stock import Still
 from tussle.view import MODELS, Recording
 from tussle.view.export.mcap_file import default_scale, write_mcap
 from tussle.view.scenery import Region, Scenery
@@ -300,6 +302,21 @@ def test_what_stands_is_in_the_scene(hunted, tmp_path, monkeypatch):
     assert blue != grey
     assert len(found["terrain"]["triangles"][0]["indices"]) == 3 * 2 * 3 * 4
     assert ("latitude [deg]", "29") in [(n["key"], n["value"]) for n in found["origin"]["metadata"]]
+
+
+def test_boxes_have_their_lengths_and_others_are_enlarged(tmp_path):
+    blocks = [
+        Block(name="crate", team=1, box=(8.0, 4.0, 2.0), motion=Still()),
+        Block(name="robot", team=2, position=(0, 30, 0), motion=Still()),
+    ]
+    stood = Recording(record(Mission(blocks=blocks, end=1.0), tmp_path / "run"))
+    write_mcap(stood, tmp_path / "a.mcap", scale=5.0 / default_scale(stood))
+    extents = []
+    for entity in Opened(tmp_path / "a.mcap").messages["/models"][0][1]["entities"]:
+        points = entity["triangles"][0]["points"]
+        extents.append([np.ptp([point.get(axis, 0.0) for point in points]) for axis in "xyz"])
+    assert extents[0] == pytest.approx([8.0, 4.0, 2.0])
+    assert extents[1] == pytest.approx([5.0] * 3, rel=0.1)
 
 
 def test_what_cannot_be_is_refused_and_leaves_nothing(hunted, tmp_path, monkeypatch):

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tussle.event_texts import event_text
+from tussle.rays.surfaces import MeshPart
 from tussle.view.frame import Event, Frame
 from tussle.view.recording import Recording
 from tussle.view.shapes import MODELS, Mesh
@@ -92,6 +93,16 @@ def triangles(mesh: Mesh, rgb: Colour, opacity: float = 1.0) -> fg.TriangleListP
     )  # fmt: skip
 
 
+def coloured_triangles(part: MeshPart) -> fg.TriangleListPrimitive:
+    """A surface in the colours of its corners: these primitives have no images."""
+    from foxglove.messages import Color, TriangleListPrimitive
+
+    colours = [Color(r=r, g=g, b=b, a=1.0) for r, g, b in (part.corner_colours() / 255.0).tolist()]
+    return TriangleListPrimitive(
+        pose=pose(), points=points(part.vertices), colors=colours, indices=part.faces.ravel().tolist()
+    )
+
+
 def lines(ends: np.ndarray, rgb: Colour) -> fg.LinePrimitive:
     """Lines between ends (k, 2, 3) [m], two pixels wide."""
     from foxglove import messages as fg
@@ -126,10 +137,13 @@ def scenery_entities(recording: Recording, ns: int) -> list[fg.SceneEntity]:
         found.append(entity(f"base {i}", WORLD, ns, notes=[("team", str(base.team))], spheres=[sphere]))
     for region in scenery.boundaries:
         rgb = style.colour(region.team) if region.team else NO_TEAM
-        surface = triangles(region.mesh, rgb, 0.3 if region.is_wall else 0.06)
-        found.append(entity(region.name, WORLD, ns, triangles=[surface], lines=[lines(region.outline, rgb)]))
+        surfaces = [coloured_triangles(part) for part in region.parts] or [
+            triangles(region.mesh, rgb, 0.3 if region.is_wall else 0.06)
+        ]
+        found.append(entity(region.name, WORLD, ns, triangles=surfaces, lines=[lines(region.outline, rgb)]))
     if scenery.terrain is not None:
-        surface = triangles(scenery.terrain.mesh(MAX_HEIGHTS), GROUND)
+        part = scenery.terrain.part(MAX_HEIGHTS)
+        surface = coloured_triangles(part) if part else triangles(scenery.terrain.mesh(MAX_HEIGHTS), GROUND)
         found.append(entity("terrain", WORLD, ns, triangles=[surface]))
     return found
 
@@ -160,7 +174,7 @@ class SceneEntities:
         self._recording, self._scale = recording, scale
         self._blocks = {event.id: event.text for event in recording.events if event.kind == "birth"}
         self._removed = self._find_removals(kept)
-        self._mesh = cache(lambda model, length, rgb: triangles(MODELS[model].placed(length), rgb))
+        self._mesh = cache(lambda model, lengths, rgb: triangles(MODELS[model].placed(lengths), rgb))
         self._written: set[int] = set()
         self._is_complete, self._last_complete = True, -math.inf
 
@@ -192,15 +206,16 @@ class SceneEntities:
         models, labels = [], []
         for row in rows:
             style, who, block = self._recording.style, int(frame.id[row]), int(frame.block[row])
-            rgb, length = style.block_colour(block), self._scale * style.scale(block)
+            scale = 1.0 if style.is_true_box(block) else self._scale
+            rgb, (x, y, z) = style.block_colour(block), style.lengths(block)
             # It ends just before the time at which it does not exist any more.
             lifetime = ns(self._removed[who]) - now - 1 if who in self._removed else 0
             name = names[row]
             notes = {"id": who, "block": self._recording.blocks[block], "team": int(frame.team[row])}
             about = [(key, str(value)) for key, value in notes.items()]
-            surface = self._mesh(style.model(block), length, rgb)
+            surface = self._mesh(style.model(block), (scale * x, scale * y, scale * z), rgb)
             models.append(entity(name, name, now, lifetime, about, triangles=[surface]))
-            label = text(str(who), rgb, (0.0, 0.0, 0.7 * length))
+            label = text(str(who), rgb, (0.0, 0.0, 0.7 * scale * z))
             labels.append(entity(name, name, now, lifetime, texts=[label]))
         return models, labels
 

@@ -150,6 +150,7 @@ class Comparison:
                 r,
                 mesh=r.mesh.placed(at=self.shift.tolist()),
                 outline=r.outline + self.shift.astype(np.float32),
+                parts=tuple(replace(part, vertices=part.vertices + self.shift) for part in r.parts),
             )
             for r in other.boundaries
         ]
@@ -254,8 +255,11 @@ class _Both:
     def model(self, block: int) -> str:
         return self._a.model(block) if block < self._n else self._b.model(block - self._n)
 
+    def lengths(self, block: int) -> tuple[float, float, float]:
+        return self._a.lengths(block) if block < self._n else self._b.lengths(block - self._n)
+
     def scale(self, block: int) -> float:
-        return self._a.scale(block) if block < self._n else self._b.scale(block - self._n)
+        return max(self.lengths(block))
 
 
 def _paler(colour: Colour) -> Colour:

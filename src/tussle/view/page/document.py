@@ -10,10 +10,13 @@ import numpy as np
 
 from tussle import __version__
 from tussle.mission import Mission
+from tussle.rays.surfaces import MeshPart
+from tussle.rays.textures import jpeg
 from tussle.view.frame import Event
 from tussle.view.page.packing import ints
 from tussle.view.scenery import Scenery
 from tussle.view.shapes import MODELS, Mesh
+from tussle.view.solids import MOST_FACES
 from tussle.view.style import Style
 from tussle.view.terrain import Terrain
 
@@ -75,7 +78,7 @@ def game_document(
                 "team": game.block_teams[i],
                 "colour": list(style.block_colour(i)),
                 "model": style.model(i),
-                "scale": style.scale(i),
+                "lengths": style.lengths(i),
             }
             for i, name in enumerate(game.blocks)
         ],
@@ -167,7 +170,7 @@ def event_rows(events: Iterable[Event]) -> list[list[Any]]:
 
 
 def scenery_data(scenery: Scenery) -> dict[str, Any]:
-    """Extent, grid, axes, bases, regions and background; of the terrain, what `terrain_bytes` leaves out."""
+    """Extent, grid, axes, bases, regions and background; of the terrain, what `scenery_blobs` adds."""
     digits = digits_for(scenery.size)
     return {
         "low": rounded(scenery.low, digits),
@@ -187,6 +190,7 @@ def scenery_data(scenery: Scenery) -> dict[str, Any]:
                 "isWall": r.is_wall,
                 "mesh": mesh_data(r.mesh, digits),
                 "outline": rounded(r.outline.ravel(), digits),
+                "nParts": len(r.parts),
             }
             for r in scenery.boundaries
         ],
@@ -204,14 +208,41 @@ def _terrain_data(terrain: Terrain) -> dict[str, Any]:
         "y": rounded(terrain.y, 3),
         "low": low,
         "step": (high - low) / HEIGHT_STEPS,
+        "hasTexture": terrain.texture is not None,
     }
 
 
-def terrain_bytes(scenery: Scenery) -> bytes | None:
-    """Heights in steps above the lowest, row by row as differences to the point before; None without a terrain."""
-    if scenery.terrain is None:
-        return None
-    height = scenery.terrain.thinned(MOST_HEIGHTS).height
+def scenery_blobs(scenery: Scenery) -> dict[str, bytes]:
+    """Heights and texture of the terrain, and the coloured parts of meshes with their images, by name."""
+    blobs: dict[str, bytes] = {}
+    if scenery.terrain is not None:
+        blobs["terrain"] = _height_bytes(scenery.terrain)
+        if scenery.terrain.texture is not None:
+            blobs["texture"] = jpeg(scenery.terrain.texture)
+    middle = 0.5 * (scenery.low + scenery.high)
+    for i, part in enumerate(part for region in scenery.boundaries for part in region.parts):
+        blobs[f"part-{i}"] = _part_bytes(part, np.array(rounded(middle, digits_for(scenery.size))))
+        if part.image is not None:
+            blobs[f"image-{i}"] = jpeg(part.image)
+    return blobs
+
+
+def _part_bytes(part: MeshPart, middle: np.ndarray) -> bytes:
+    """A part as arrays: head, corners and triangles.
+
+    The head is the numbers of corners and of triangles and whether there is an image, uint32; a corner is its place from the middle [m],
+    uv and colour, float32; triangles are uint32.
+    """
+    faces = part.faces[:MOST_FACES]
+    uv = np.zeros((len(part.vertices), 2)) if part.uv is None else part.uv
+    corners = np.hstack([part.vertices - middle, uv, part.colours / 255.0])
+    head = np.array([len(corners), len(faces), part.image is not None], "<u4")
+    return head.tobytes() + corners.astype("<f4").tobytes() + faces.astype("<u4").tobytes()
+
+
+def _height_bytes(terrain: Terrain) -> bytes:
+    """Heights in steps above the lowest, row by row as differences to the point before."""
+    height = terrain.thinned(MOST_HEIGHTS).height
     low, high = float(height.min()), float(height.max())
     steps = np.rint((height - low) * (HEIGHT_STEPS / (high - low) if high > low else 0.0)).astype(np.int64)
     return ints(np.diff(steps.ravel(), prepend=np.int64(0)))

@@ -13,7 +13,7 @@ from tussle.errors import ParameterError, ViewError
 from tussle.mission import Mission
 from tussle.view.page.chunks import ANGLE_ERROR, FULL_HEALTH, UNIT, pack, position_error, step_of
 from tussle.view.page.compare import Comparison
-from tussle.view.page.document import event_rows, game_document, terrain_bytes
+from tussle.view.page.document import event_rows, game_document, scenery_blobs
 from tussle.view.page.drawing import drawing_message
 from tussle.view.page.packing import message, reals
 from tussle.view.recording import Recording
@@ -79,7 +79,7 @@ class RecordedData:
         self.step = step_of(low, high, smallest)
         self._title, self._mission = title, mission or game.mission
         self._viewer = game.viewer if viewer is None else viewer
-        self._terrain = terrain_bytes(game.scenery)
+        self._scenery = scenery_blobs(game.scenery)
 
     @property
     def n_entities(self) -> int:
@@ -136,9 +136,14 @@ class RecordedData:
     @property
     def names(self) -> list[str]:
         """Names of all blobs."""
-        terrain = [] if self._terrain is None else ["terrain"]
         chunks = (f"chunk-{i}" for i in range(len(self.chunks)))
-        return ["times", "events", *terrain, *chunks, *(f"shapes-{i}" for i in range(self._n_shape_blobs))]
+        return [
+            "times",
+            "events",
+            *self._scenery,
+            *chunks,
+            *(f"shapes-{i}" for i in range(self._n_shape_blobs)),
+        ]
 
     @property
     def _n_shape_blobs(self) -> int:
@@ -150,8 +155,8 @@ class RecordedData:
             return reals(self._game.t[self.kept])
         if name == "events":
             return compact_json(event_rows(self._game.events)).encode()
-        if name == "terrain":
-            return self._terrain
+        if name in self._scenery:
+            return self._scenery[name]
         kind, _, number = name.partition("-")
         n_blobs = {"chunk": len(self.chunks), "shapes": self._n_shape_blobs}.get(kind, 0)
         if not number.isdecimal() or len(number) > 9 or int(number) >= n_blobs:

@@ -18,7 +18,7 @@ from tussle.view.live import Live
 from tussle.view.page.access import HEADERS, MOST_BROWSERS, MOST_BYTES, MOST_UNSENT, Access, bound_socket
 from tussle.view.page.assemble import page_html
 from tussle.view.page.compare import Comparison
-from tussle.view.page.document import game_document, terrain_bytes
+from tussle.view.page.document import game_document, scenery_blobs
 from tussle.view.page.failures import Failures
 from tussle.view.page.publisher import FramePublisher
 from tussle.view.page.recorded import RecordedData
@@ -87,7 +87,7 @@ class Page:
             document = (
                 game_document(game, mission or game.simulation.mission, viewer) | self.publisher.document()
             )
-            self._terrain = terrain_bytes(game.scenery)
+            self._scenery = scenery_blobs(game.scenery)
         else:
             self._data = RecordedData(game, is_file=False, mission=mission, viewer=viewer)
             begins = (
@@ -170,8 +170,8 @@ class Page:
         try:
             if self._data is not None:
                 data = await asyncio.to_thread(self._data.blob, name)
-            elif name == "terrain":
-                data = self._terrain
+            else:
+                data = self._scenery.get(name)
         except Exception as error:  # noqa: BLE001 - whatever it is, whoever watches reads it, and the page goes on
             return web.Response(status=500, text=self._failures.tell(error))
         if data is None:

@@ -15,6 +15,7 @@ from typing import Any, Self
 import numpy as np
 
 from tussle.errors import MissingExtraError, ViewError
+from tussle.rays.surfaces import MeshPart
 from tussle.view.export.film.cameras import VIEW_ANGLE, View
 from tussle.view.export.film.ground import Tints, grid_lines, ground_width
 from tussle.view.frame import Frame
@@ -210,7 +211,10 @@ class Renderer:
             self._add(circle, on_ground=True, color=rgb, opacity=0.86, line_width=2.0 * self._line_width)
         for region in scenery.boundaries:
             rgb = style.colour(region.team) if region.team else NO_TEAM
-            self._add(self._surface(region.mesh), color=rgb, opacity=0.24 if region.is_wall else 0.05)
+            for part in region.parts:
+                self._add_part(part)
+            if not region.parts:
+                self._add(self._surface(region.mesh), color=rgb, opacity=0.24 if region.is_wall else 0.05)
             self._add_outline(region.outline.reshape(-1, 3), rgb, 0.75, 1.4)
         if scenery.terrain is not None:
             self._add_terrain(scenery.terrain)
@@ -224,7 +228,20 @@ class Renderer:
         if len(ends):
             self._add_lines(width, on_ground, (ends, np.tile((*rgb, 255.0 * opacity), (len(ends), 1))))
 
+    def _add_part(self, part: MeshPart) -> None:
+        surface = self._surface(Mesh(part.vertices, part.faces))
+        if part.image is None:
+            opaque = np.full((len(part.colours), 1), 255, np.uint8)
+            surface.point_data["rgba"] = np.hstack([part.colours, opaque])
+            self._add(surface, is_lit=True)
+        else:
+            surface.active_texture_coordinates = np.asarray(part.uv, np.float32)
+            self._add(surface, is_lit=True, texture=self._pyvista.numpy_to_texture(part.image))
+
     def _add_terrain(self, terrain: Terrain) -> None:
+        if (part := terrain.part()) is not None:
+            self._add_part(part)
+            return
         mesh = terrain.mesh()
         height = mesh.vertices[:, 2]
         share = (height - height.min()) / max(float(np.ptp(height)), 1e-9)
@@ -301,8 +318,8 @@ class _Model:
             mapper.SetSourceData(source)
             mapper.SetOrientationArray("quat")
             mapper.SetOrientationModeToQuaternion()
-            mapper.SetScaleArray("length")
-            mapper.SetScaleModeToScaleByMagnitude()
+            mapper.SetScaleArray("lengths")
+            mapper.SetScaleModeToScaleByVectorComponents()
             mapper.SetScalarModeToUsePointFieldData()
             mapper.SelectColorArray("rgb")
             mapper.SetColorModeToDirectScalars()
@@ -317,7 +334,7 @@ class _Model:
         renderer._ground.AddActor(self._shadow)
 
     def place(self, frame: Frame, rows: np.ndarray, least: float) -> None:
-        """Draw the entities in these rows, none shorter than this [m]."""
+        """Draw the entities in these rows, none shorter than this [m] unless it is a box of known lengths."""
         self._actor.visibility = len(rows) > 0
         self._shadow.visibility = 0 < len(rows) <= MAX_SHADOWS
         if not len(rows):
@@ -326,7 +343,11 @@ class _Model:
         n_blocks = int(block.max()) + 1
         points = self._renderer._pyvista.PolyData(frame.pos[rows].astype(np.float32))
         points.point_data["quat"] = frame.quat[rows]
-        points.point_data["length"] = np.array([max(style.scale(b), least) for b in range(n_blocks)])[block]
+        lengths = [
+            np.multiply(style.lengths(b), 1.0 if style.is_true_box(b) else max(1.0, least / style.scale(b)))
+            for b in range(n_blocks)
+        ]
+        points.point_data["lengths"] = np.array(lengths)[block]
         points.point_data["rgb"] = np.array([style.block_colour(b) for b in range(n_blocks)], np.uint8)[block]
         for mapper in self._mappers:
             mapper.SetInputData(points)

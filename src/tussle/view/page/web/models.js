@@ -107,7 +107,7 @@ export class Entities {
     const found = new Map(blocks.map(({ model }) => [model, new Model(renderer, models[model])]));
     this.models = [...found.values()];
     this.modelOf = blocks.map(({ model }) => found.get(model));
-    this.sizeOf = blocks.map(({ scale }) => scale);
+    this.sizeOf = blocks.map(({ lengths }) => lengths);
   }
 
   /** Place all that are shown. @param {Vector} anchor @param {Set<number>} hidden teams @param {number} chosen */

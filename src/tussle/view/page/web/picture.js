@@ -90,7 +90,7 @@ export class Picture {
 
   /** Length of an entity [m]. @param {number} slot */
   sizeOf(slot) {
-    return this.scale * this.player.page.blocks[this.player.layer.shown.block[slot]].scale;
+    return this.scale * Math.max(...this.player.page.blocks[this.player.layer.shown.block[slot]].lengths);
   }
 
   /** Length of an entity so far before the eye [pixels of the window]. @param {number} slot @param {number} depth */

@@ -65,7 +65,7 @@ export class Player {
 
   async start() {
     const { page, layer, source, drawn } = this;
-    await this.picture.scenery.readTerrain(source);
+    await this.picture.scenery.read(source);
     if (layer instanceof Live) await this.join(layer);
     else await layer.read();
     this.clock = layer instanceof Live ? new LiveClock(layer, source) : new RecordedClock(layer, page);

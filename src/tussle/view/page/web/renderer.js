@@ -3,11 +3,12 @@
 
 import {
   GROUND_CORNERS, GROUND_PAINT, LINE_CORNERS, LINE_PAINT, MODEL_CORNERS, MODEL_PAINT, SKY_CORNERS, SKY_PAINT, TERRAIN_CORNERS, TERRAIN_PAINT,
+  PART_CORNERS, PART_PAINT,
 } from './shaders.js';
 
 const PROGRAMS = {
   model: [MODEL_CORNERS, MODEL_PAINT], line: [LINE_CORNERS, LINE_PAINT], ground: [GROUND_CORNERS, GROUND_PAINT],
-  terrain: [TERRAIN_CORNERS, TERRAIN_PAINT], sky: [SKY_CORNERS, SKY_PAINT],
+  terrain: [TERRAIN_CORNERS, TERRAIN_PAINT], part: [PART_CORNERS, PART_PAINT], sky: [SKY_CORNERS, SKY_PAINT],
 };
 
 /** The canvas with its programs. */
@@ -85,6 +86,19 @@ export class Renderer {
     this.buffer(corners);
     this.attribute(0, 3, this.gl.FLOAT, 24, 0);
     this.attribute(1, 3, this.gl.FLOAT, 24, 12);
+  }
+
+  /** A texture of a JPEG file; white without one. @param {Uint8Array<ArrayBuffer> | null} file */
+  async texture(file) {
+    const { gl } = this;
+    const image = file && (await createImageBitmap(new Blob([file], { type: 'image/jpeg' })));
+    const texture = gl.createTexture();
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+    if (image) gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, gl.RGBA, gl.UNSIGNED_BYTE, image);
+    else gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, 1, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array([255, 255, 255, 255]));
+    gl.generateMipmap(gl.TEXTURE_2D);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR_MIPMAP_LINEAR);
+    return texture;
   }
 
   drawSquare() {

@@ -28,11 +28,11 @@ export class Scenery {
     const colourOf = (team) => teams.find(({ id }) => id === team)?.colour || NOBODY;
     this.layAxes(scenery.originLength);
     this.outlines.begin(this.anchor);
-    this.regions = scenery.regions.map(({ mesh: { vertices, faces }, outline, team, isWall, name }) => {
+    this.regions = scenery.regions.map(({ mesh: { vertices, faces }, outline, team, isWall, name, nParts }) => {
       const colour = colourOf(team);
       for (let i = 0; i + 6 <= outline.length; i += 6) this.outlines.segment(outline.slice(i, i + 3), outline.slice(i + 3, i + 6), colour);
       const model = new Model(renderer, { vertices: vertices.map((v, i) => v - this.anchor[i % 3]), faces });
-      return { model, colour, name, opacity: isWall ? 0.4 : 0.07, top: topOf(vertices) };
+      return { model, colour, name, opacity: nParts ? 0 : isWall ? 0.4 : 0.07, top: topOf(vertices) };
     });
     const ball = new Model(renderer, models.sphere);
     this.bases = scenery.bases.filter(({ opacity }) => opacity > 0).map(({ pos, radius, team, opacity }) => {
@@ -43,6 +43,8 @@ export class Scenery {
     this.outlines.upload();
     /** @type {TerrainMesh | null} */
     this.terrain = null;
+    /** @type {MeshPart[]} */
+    this.parts = [];
   }
 
   /** @param {number} length */
@@ -56,7 +58,21 @@ export class Scenery {
     this.axes.upload();
   }
 
-  /** Bring in the heights, which are unpacked after the page is there. @param {Source} source */
+  /** Bring in heights, images and coloured parts, which are unpacked after the page is there. @param {Source} source */
+  async read(source) {
+    await this.readTerrain(source);
+    const nParts = this.data.regions.reduce((sum, region) => sum + region.nParts, 0);
+    for (let i = 0; i < nParts; i++) {
+      const bytes = await source.blob(`part-${i}`);
+      const [nCorners, nFaces, hasImage] = new Uint32Array(bytes.slice(0, 12).buffer);
+      const corners = new Float32Array(bytes.slice(12, 12 + 32 * nCorners).buffer);
+      const faces = new Uint32Array(bytes.slice(12 + 32 * nCorners, 12 + 32 * nCorners + 12 * nFaces).buffer);
+      const image = await this.renderer.texture(hasImage ? await source.blob(`image-${i}`) : null);
+      this.parts.push(new MeshPart(this.renderer, corners, faces, image, this.anchor));
+    }
+  }
+
+  /** @param {Source} source */
   async readTerrain(source) {
     const { terrain } = this.data;
     if (!terrain) return;
@@ -64,6 +80,7 @@ export class Scenery {
     const steps = new Reader(await source.blob('terrain')).ints(n);
     for (let i = 1; i < n; i++) steps[i] += steps[i - 1];
     this.terrain = new TerrainMesh(this.renderer, terrain, Float32Array.from(steps, (step) => terrain.low + terrain.step * step), this.anchor);
+    if (terrain.hasTexture) this.terrain.image = await this.renderer.texture(await source.blob('texture'));
   }
 
   /** Distance of the narrowest grid lines, and how clearly they are seen, 0 to 1. @param {View} view */
@@ -87,6 +104,7 @@ export class Scenery {
   drawTerrain(view, { lightness }, isGridShown) {
     const { spacing, nearer } = this.cell(view);
     this.terrain?.draw(view, spacing, isGridShown ? nearer : 0, lightness);
+    for (const part of this.parts) part.draw(view);
   }
 
   /** The ground's grid, where there is no terrain, and the axes. @param {View} view @param {{ grid: number[] }} colours @param {Vector} target */
@@ -103,7 +121,7 @@ export class Scenery {
 
   /** @param {View} view */
   drawRegions(view) {
-    for (const { model, colour, opacity } of this.regions) model.drawAt(view, this.anchor, colour, 1, { opacity, flatness: 0.5 });
+    for (const { model, colour, opacity } of this.regions) if (opacity) model.drawAt(view, this.anchor, colour, 1, { opacity, flatness: 0.5 });
     for (const { model, pos, radius, colour, opacity } of this.bases) model.drawAt(view, pos, colour, 2 * radius, { opacity, flatness: 0.5 });
     this.outlines.draw(view, 1.3, 0.7);
   }
@@ -130,6 +148,10 @@ class TerrainMesh {
     this.renderer = renderer;
     this.anchor = anchor;
     this.heights = [low, low + 65535 * step];
+    this.corner = [x[0] - anchor[0], y[0] - anchor[1]];
+    this.extent = [x[x.length - 1] - x[0], y[y.length - 1] - y[0]];
+    /** Image over it. @type {WebGLTexture | null} */
+    this.image = null;
     const [nRows, nColumns] = [y.length, x.length];
     const corners = new Float32Array(6 * heights.length);
     const faces = new Uint32Array(6 * (nColumns - 1) * (nRows - 1));
@@ -162,7 +184,37 @@ class TerrainMesh {
     const contour = 10 ** Math.ceil(Math.log10(Math.max(high - low, 1e-3) / 20));
     this.renderer.use('terrain', {
       clip: view.clip, offset: [east, north, -view.anchor[2]], heights: this.heights, contour, spacing, nearer, shift: gridShift(this.anchor, spacing), lightness,
+      corner: this.corner, extent: this.extent, textured: this.image ? 1 : 0,
     });
+    gl.bindTexture(gl.TEXTURE_2D, this.image);
+    gl.bindVertexArray(this.array);
+    gl.drawElements(gl.TRIANGLES, this.n, gl.UNSIGNED_INT, 0);
+  }
+}
+
+/** A part of a mesh in its own colours. */
+class MeshPart {
+  /** @param {Renderer} renderer @param {Float32Array<ArrayBuffer>} corners @param {Uint32Array<ArrayBuffer>} faces @param {WebGLTexture} image @param {Vector} anchor */
+  constructor(renderer, corners, faces, image, anchor) {
+    const { gl } = renderer;
+    this.renderer = renderer;
+    this.image = image;
+    this.anchor = anchor;
+    this.n = faces.length;
+    this.array = renderer.array(() => {
+      renderer.buffer(corners);
+      renderer.attribute(0, 3, gl.FLOAT, 32, 0);
+      renderer.attribute(1, 2, gl.FLOAT, 32, 12);
+      renderer.attribute(2, 3, gl.FLOAT, 32, 20);
+      renderer.buffer(faces, gl.ELEMENT_ARRAY_BUFFER);
+    });
+  }
+
+  /** @param {View} view */
+  draw(view) {
+    const { gl } = this.renderer;
+    this.renderer.use('part', { clip: view.clip, offset: minus(this.anchor, view.anchor) });
+    gl.bindTexture(gl.TEXTURE_2D, this.image);
     gl.bindVertexArray(this.array);
     gl.drawElements(gl.TRIANGLES, this.n, gl.UNSIGNED_INT, 0);
   }

@@ -28,7 +28,8 @@ vec3 turned(vec3 v) {
 }
 void main() {
   float depth = (clip * vec4(place, 1.0)).w;
-  vec3 grown = max(scale * size, vec3(least * depth));
+  vec3 grown = scale * size;
+  grown *= max(1.0, least * depth / max(1e-9, max(grown.x, max(grown.y, grown.z))));
   gl_Position = clip * vec4(place + turned(grown * corner), 1.0);
   towards = turned(normal / grown);
   paint = colour;
@@ -155,6 +156,10 @@ uniform float spacing;
 uniform float nearer;
 uniform vec2 shift;
 uniform float lightness;
+uniform vec2 corner;
+uniform vec2 extent;
+uniform float textured;
+uniform sampler2D image;
 out vec4 result;
 ${LIGHT}
 ${GRID_LINES}
@@ -164,12 +169,41 @@ void main() {
   vec3 middle = vec3(0.45, 0.43, 0.33);
   vec3 high = vec3(0.72, 0.70, 0.67);
   vec3 colour = mix(mix(low, middle, min(1.0, 2.0 * share)), high, max(0.0, 2.0 * share - 1.0)) * lightness;
-  colour = lit(colour, normalize(towards));
+  vec2 share2 = (at.xy - corner) / extent;
+  colour = lit(mix(colour, texture(image, vec2(share2.x, 1.0 - share2.y)).rgb, textured), normalize(towards));
   float level = at.z / contour;
   float line = 1.0 - min(abs(fract(level - 0.5) - 0.5) / max(fwidth(level), 1e-9), 1.0);
-  colour *= 1.0 - 0.3 * line * (1.0 - smoothstep(0.2, 0.6, fwidth(level)));
+  colour *= 1.0 - 0.3 * (1.0 - textured) * line * (1.0 - smoothstep(0.2, 0.6, fwidth(level)));
   colour = mix(colour, vec3(1.0), 0.18 * grid(at.xy + shift, spacing, nearer));
   result = vec4(colour, 1.0);
+}`;
+
+/** Parts of meshes in their own colours, flat between edges. */
+export const PART_CORNERS = `${HEADER}
+layout(location = 0) in vec3 corner;
+layout(location = 1) in vec2 place;
+layout(location = 2) in vec3 colour;
+uniform mat4 clip;
+uniform vec3 offset;
+out vec3 at;
+out vec2 uv;
+out vec3 paint;
+void main() {
+  at = corner;
+  uv = vec2(place.x, 1.0 - place.y);
+  paint = colour;
+  gl_Position = clip * vec4(corner + offset, 1.0);
+}`;
+export const PART_PAINT = `${HEADER}
+in vec3 at;
+in vec2 uv;
+in vec3 paint;
+uniform sampler2D image;
+out vec4 result;
+${LIGHT}
+void main() {
+  vec3 normal = normalize(cross(dFdx(at), dFdy(at)));
+  result = vec4(min(lit(paint * texture(image, uv).rgb, normal), 1.0), 1.0);
 }`;
 
 /** The sky: a little lighter at the horizon. */

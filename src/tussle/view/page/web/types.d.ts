@@ -6,17 +6,17 @@ export type Colour = ArrayLike<number>;
 /** Numbers of the corners of triangles, and the corners. */
 export interface Mesh { vertices: number[]; faces: number[]; }
 export interface Team { id: number; name: string; colour: number[]; }
-export interface Block { name: string; team: number; colour: number[]; model: string; scale: number; }
+export interface Block { name: string; team: number; colour: number[]; model: string; lengths: number[]; }
 /** Values of each team at some times. */
 export interface Curves { t: number[]; n: number[][]; }
 export interface GameEvent { t: number; kind: string; id: number; other: number; text: string; }
 export type EventRow = [t: number, kind: string, id: number, other: number, text: string];
 
-export interface Terrain { x: number[]; y: number[]; low: number; step: number; }
+export interface Terrain { x: number[]; y: number[]; low: number; step: number; hasTexture: boolean; }
 export interface SceneryData {
   low: number[]; high: number[]; ground: number; gridStep: number; originLength: number; background: number[] | null;
   bases: { team: number; pos: number[]; radius: number; opacity: number }[];
-  regions: { name: string; team: number | null; isWall: boolean; mesh: Mesh; outline: number[] }[];
+  regions: { name: string; team: number | null; isWall: boolean; mesh: Mesh; outline: number[]; nParts: number }[];
   terrain: Terrain | null;
 }
 

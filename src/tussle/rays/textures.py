@@ -1,0 +1,70 @@
+"""Images over surfaces, which only pictures show: rays do not see them. They come from untrusted files."""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+import numpy as np
+
+from tussle.errors import MissingExtraError, ParameterError
+
+MOST_PIXELS = 32_000_000
+"""Pixels of an image that is decoded: 128 MB."""
+MOST_SIDE = 2048
+"""Pixels of the longer side that are kept: every WebGL 2 browser takes them."""
+FORMATS = ("PNG", "JPEG", "TIFF")
+JPEG_QUALITY = 88
+
+
+def decoded(where: str, data: bytes) -> np.ndarray:
+    """Red, green, blue of an image from its upper left corner, (height, width, 3), uint8, at most `MOST_SIDE` wide and high.
+
+    Args:
+        where: File that has it, for messages.
+        data: Its bytes.
+
+    Raises:
+        MissingExtraError: Pillow is not installed.
+        ParameterError: It is no image, or has too many pixels.
+    """
+    try:
+        from PIL import Image
+    except ImportError:
+        raise MissingExtraError(f"{where}: images need Pillow: pip install 'tussle[maps]'") from None
+    try:
+        with Image.open(io.BytesIO(data), formats=FORMATS) as image:
+            return reduced(where, image)
+    except ParameterError:
+        raise
+    except Exception as error:  # decoders of damaged data raise errors of many kinds
+        raise ParameterError(
+            f"{where}: it is no PNG, JPEG or TIFF that can be read: {str(error)[:200]}"
+        ) from error
+
+
+def reduced(where: str, image: Any) -> np.ndarray:
+    """Pixels of an image of Pillow, as `decoded` returns them.
+
+    Raises:
+        ParameterError: It has too many pixels, or cannot be decoded.
+    """
+    width, height = image.size
+    if width * height > MOST_PIXELS:
+        raise ParameterError(
+            f"{where}: the image has {width:,} x {height:,} pixels; it takes at most {MOST_PIXELS:,}"
+        )
+    try:
+        image.thumbnail((MOST_SIDE, MOST_SIDE))
+        return np.asarray(image.convert("RGB"))
+    except Exception as error:  # decoders of damaged data raise errors of many kinds
+        raise ParameterError(f"{where}: the image cannot be read: {str(error)[:200]}") from error
+
+
+def jpeg(pixels: np.ndarray) -> bytes:
+    """An image, (height, width, 3), uint8, as a JPEG file."""
+    from PIL import Image
+
+    file: Any = io.BytesIO()
+    Image.fromarray(pixels).save(file, "JPEG", quality=JPEG_QUALITY)
+    return bytes(file.getvalue())
