@@ -2,9 +2,9 @@
 
     python3 navigate.py __ns:=/entity1 _goals:="[[66, 66]]"
 
-It knows nothing of the simulator. In the namespace it hears odom and base_scan, builds a map, plans a path with A* and follows it by cmd_vel, a speed
-and a steering angle. It plans again when the lidar sees something in the way. Goals come from the parameter goals or from the topic
-move_base_simple/goal; the map is published on map (nav_msgs/OccupancyGrid). Each odom is answered with a cmd_vel.
+It knows nothing of the simulator. In the namespace it hears odom and base_scan, builds a map, plans a path with A* and follows it by
+cmd_vel, a speed and a steering angle. It plans again when the lidar sees something in the way. Goals come from the parameter goals or from
+the topic move_base_simple/goal; the map is published on map (nav_msgs/OccupancyGrid). Each odom is answered with a cmd_vel.
 """
 
 import heapq
