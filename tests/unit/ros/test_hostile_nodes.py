@@ -192,7 +192,7 @@ def test_rosbag_records_what_a_robot_publishes(roscore, tmp_path):
 def test_ctrl_c_ends_a_game_that_waits_for_a_node_and_nothing_is_left(roscore):
     before = registered(roscore)
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
-    command = [sys.executable, "-m", "tussle.cli", "run", str(MAZE), "--no-log"]
+    command = [sys.executable, "-m", "tussle.cli", "run", str(MAZE), "lockstep=600", "--no-log"]
     with ExitStack() as stack:
         game = started(stack, command, env=environment, stderr=subprocess.DEVNULL)
         while not {"/entity4/cmd_vel", "/entity4/odom", "/tussle/step"} <= registered(roscore):
