@@ -22,8 +22,10 @@ from tussle import Block, Mission, Simulation, stock
 from tussle.errors import MissingExtraError, ParameterError, PluginError, RosError
 from tussle.mission import read_mission
 from tussle.ros import link as ros_link
+from tussle.ros.altitude import altitude_type
 from tussle.ros.link import RosLink, StepGate
 from tussle.ros.node import load_rospy
+from tussle.scene import FlatGround, Origin, Scene
 from tussle.stock import (
     External,
     FixedWing6DOF,
@@ -31,6 +33,7 @@ from tussle.stock import (
     RayTrace,
     RigidBody6DOF,
     RigidBody6DOFControllerROS,
+    ROSAltimeter,
     ROSAutonomy,
     ROSClockServer,
     ROSCompass,
@@ -319,6 +322,41 @@ def test_a_compass_shows_north_in_the_body_frame(roscore):
     field = message.magnetic_field
     assert [field.x, field.y, field.z] == pytest.approx([0.5, math.sqrt(0.75), 0.0])
     assert message.header.frame_id == "tug/base_link"
+
+
+@pytest.mark.parametrize("errors", [{}, {"bias": 50.0, "noise": 0.5}])
+def test_an_altimeter_measures_altitudes_with_its_errors(roscore, errors):
+    ros, heard, n = load_rospy(), queue.Queue(), 30
+    assert altitude_type()._md5sum == "1296a05dc5b6160be0ae04ba9ed3a3fa"  # so MAVROS's own nodes take it
+    subscriber = ros.rospy.Subscriber("/tug/altimeter", altitude_type(), heard.put)
+    block = Block(
+        name="kite",
+        position=(0.0, 0.0, 20.0),
+        motion=External(),
+        sensor=ROSAltimeter(vehicle_name="tug", **errors),
+    )
+    scene = Scene(ground=FlatGround(5.0), origin=Origin(latitude=0.5, altitude=300.0))
+    with Simulation(Mission(blocks=[block], dt=DT, end=1e6, scene=scene)) as simulation:
+        topic = link_of(simulation).advertise("tug/altimeter", altitude_type())
+        while not topic.get_num_connections():
+            time.sleep(0.01)
+        found = []
+        for k in range(1, n + 1):
+            simulation.write("kite.pos", [[[0.0, 0.0, 20.0 + k]]])
+            simulation.step()
+            message = heard.get()
+            assert message.header.frame_id == "tug/base_link"
+            assert message.monotonic == pytest.approx(320.0, abs=1e-3)
+            now = [message.amsl, message.local, message.relative, message.terrain, message.bottom_clearance]
+            found.append(np.array(now) - k)
+    subscriber.unregister()
+    wrong = np.array(found) - [320.0, 20.0, 0.0, 15.0, 15.0]
+    assert np.ptp(wrong, axis=1).max() < 1e-3  # the same error in all fields
+    if errors:
+        assert 0.25 < wrong[:, 0].std() < 1.0
+        assert 0.1 < abs(wrong.mean()) < 250.0
+    else:
+        assert np.abs(wrong).max() < 1e-3
 
 
 def test_markers_are_drawn_until_they_are_deleted_and_entities_are_published(roscore):
