@@ -184,6 +184,7 @@ class EntityReader:
         origin: Geographic origin of the mission.
         limits: Limits on the number of entities.
         update: The mission's update order; the limit is lower for "sequential".
+        mesh_lengths: Lengths of the bounds of a mesh file [m].
         rows: Entities so far.
         bases: Bases so far.
         viewer: Block name -> settings for the viewer.
@@ -195,6 +196,7 @@ class EntityReader:
     origin: Origin
     limits: Limits
     update: str
+    mesh_lengths: Callable[[str], tuple[float, ...]]
     rows: int = 0
     bases: list[Base] = field(default_factory=list)
     viewer: dict[str, dict[str, str]] = field(default_factory=dict)
@@ -266,6 +268,8 @@ class EntityReader:
         """Return initial states, and the values of the body."""
         velocity = fields.vector("vx", "vy", "vz")
         box = fields.vector("box_x", "box_y", "box_z")
+        if fields.has("box_mesh"):
+            box = fields.read("box_mesh", lambda text: self.mesh_lengths(text.strip())) or box
         return {
             "health": fields.number("health"),
             "radius": fields.number("radius"),

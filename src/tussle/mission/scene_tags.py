@@ -12,7 +12,7 @@ from tussle.mission import codecs
 from tussle.mission.node import Node
 from tussle.mission.problems import Problems
 from tussle.mission.terrain_xml import read_terrain_xml
-from tussle.rays.files import SUFFIXES, read_surface, read_texture
+from tussle.rays.files import MESHES, SUFFIXES, read_surface, read_texture
 from tussle.rays.mesh_parts import read_parts
 from tussle.scene import Cuboid, FlatGround, HeightField, Origin, Prism, TriangleMesh, Volume
 from tussle.texts import shown
@@ -59,6 +59,22 @@ class SceneReader:
             "terrain": fields[0] if fields else None,
             "meshes": meshes,
         }
+
+    def mesh_lengths(self, name: str) -> tuple[float, ...]:
+        """Lengths of the bounds of a mesh file [m], (3,), for the box of an entity.
+
+        Raises:
+            MissionError: There is no such file in the mission's folders.
+            ParameterError: It cannot be read, or holds no mesh.
+        """
+        path = self._find(name)
+        surface = None if path is None else read_surface(path)
+        if path is None or not isinstance(surface, TriangleMesh):
+            raise MissionError(
+                f"{shown(name)} is no mesh beside the mission; it takes a file of {', '.join(MESHES)}"
+            )
+        self.files.append(path)
+        return tuple((surface.vertices.max(axis=0) - surface.vertices.min(axis=0)).tolist())
 
     def files_by_name(self) -> dict[str, Path]:
         """Return the files that were read, by their paths from the folder in which they are."""

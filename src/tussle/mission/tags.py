@@ -148,6 +148,10 @@ ENTITY = {
     ),
     "box_y": TagSpec("Its width.", "0", "m", bound=">= 0"),
     "box_z": TagSpec("Its height.", "0", "m", bound=">= 0"),
+    "box_mesh": TagSpec(
+        "Instead of the three: a mesh file beside the mission, whose bounds are the box; the entity is at their middle (addition).",
+        reads="text",
+    ),
     "x": TagSpec("Start position of the first entity, East.", "0", "m"),
     "y": TagSpec("North.", "0", "m"),
     "z": TagSpec("Up.", "0", "m"),

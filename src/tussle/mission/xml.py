@@ -164,12 +164,12 @@ class _WorldReader:
         origin = self._origin()
         plugins = PluginReader(self.catalogue, problems, self.budget, self._shared(), origin.from_geodetic)
         world = self._world_plugins(plugins)
-        entities = EntityReader(plugins, problems, origin, self.limits, times["update"])
+        scene = SceneReader(root, self.folders, origin, problems)
+        entities = EntityReader(plugins, problems, origin, self.limits, times["update"], scene.mesh_lengths)
         nodes = list(root.find_all("entity"))
         self._count_tags(nodes)
         blocks = [entities.block(node, name) for node, name in zip(nodes, block_names(nodes), strict=True)]
         conditions, seed, reseed = self._end_conditions(), self._seed(), self._reseed()
-        scene = SceneReader(root, self.folders, origin, problems)
         parts = scene.parts()
         self._settings()
         if entities.viewer:

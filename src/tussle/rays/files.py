@@ -20,7 +20,8 @@ from tussle.rays.vtk import read_vtk
 MOST_BYTES = 64_000_000
 IMAGES = (".png", ".tif", ".tiff")
 BY_TRIMESH = (".obj", ".ply", ".stl", ".glb", ".gltf", ".off")
-SUFFIXES = (".asc", *IMAGES, ".vtk", *BY_TRIMESH)
+MESHES = (".vtk", *BY_TRIMESH)
+SUFFIXES = (".asc", *IMAGES, *MESHES)
 ELEMENT = re.compile(rb"^element\s+\w+\s+(\d+)", re.MULTILINE)
 
 

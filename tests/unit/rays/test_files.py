@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from tussle import Simulation
-from tussle.errors import MissingExtraError, MissionError, ParameterError
+from tussle.errors import MissingExtraError, MissionError, ParameterError, TussleError
 from tussle.mission import read_mission, to_python, to_xml
 from tussle.mission.terrain_xml import utm
 from tussle.rays.files import read_surface
@@ -324,6 +324,41 @@ def test_tags_of_the_scene(folder, monkeypatch):
     assert shown.terrain.height.max() == 6.0
     with pytest.raises(MissionError, match=r"HeightField\(3 x 2.*cannot be written as code"):
         to_python(loaded.mission)
+
+
+def crates(folder, text):
+    path = folder / "m.xml"
+    path.write_text(MISSION.format(tags="").replace("</entity>", f"<box_mesh>{text}</box_mesh></entity>"))
+    return read_mission(path)
+
+
+def test_entities_with_the_bounds_of_a_mesh(folder):
+    mesh = read_surface(folder / "tent.vtk")
+    loaded = crates(folder, "tent.vtk")
+    assert loaded.mission.blocks[0].box == tuple(np.ptp(mesh.vertices, axis=0))
+    assert loaded.mission.blocks[0].box != (4.0, 2.0, 1.0)
+    assert loaded.scene_files == {"tent.vtk": folder / "tent.vtk"}
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("tnet.vtk", "m.xml:2: box_mesh: 'tnet.vtk' is no mesh beside the mission"),
+        ("hills.asc", "box_mesh: 'hills.asc' is no mesh beside the mission; it takes a file of .vtk, .obj"),
+        ("../hills.asc", "only files in the mission's folder"),
+        ("bad.vtk", "box_mesh: .*bad.vtk"),
+        ("flat.vtk", "box = 0.0 is not allowed"),
+    ],
+)
+def test_meshes_that_are_no_shape_of_an_entity(folder, name, message):
+    inner = folder / "inner"
+    inner.mkdir()
+    (inner / "hills.asc").write_text(GRID)
+    (inner / "bad.vtk").write_text(VTK[:60])
+    flat = "POINTS 3 float\n0 0 1 2 0 1 0 1 1\nPOLYGONS 1 4\n3 0 1 2\n"
+    (inner / "flat.vtk").write_text(VTK[: VTK.index("POINTS")] + flat)
+    with pytest.raises(TussleError, match=message):
+        crates(inner, name)
 
 
 @pytest.mark.parametrize(
