@@ -52,17 +52,6 @@ def place(
     return items, sizes
 
 
-def filled(guess: int, run: Callable[[np.ndarray, np.ndarray], int]) -> tuple[np.ndarray, np.ndarray]:
-    """Row and other row, (m, 3), and numbers of contacts, from a kernel that is called again where there was no place for all."""
-    size = guess
-    while True:
-        ints, numbers = np.empty((size, 3), np.int64), np.empty((size, CONTACT))
-        n = run(ints, numbers)
-        if n <= size:
-            return ints[:n], numbers[:n]
-        size = n
-
-
 def find(
     shapes: tuple[np.ndarray, np.ndarray],
     pairs: tuple[np.ndarray, np.ndarray],
@@ -83,29 +72,25 @@ def find(
     (items, sizes), n, moving = shapes, len(world), motion
     if len(scene.balls):
         shapes, pairs, vel = _with_balls(shapes, pairs, (vel, dt), scene.balls)
-    ints, numbers = filled(
-        2 * len(pairs[0]) + 16, lambda *out: bodies_kernels.find_pairs(shapes, pairs, (vel, dt), *out)
-    )
-    ints[:, 1] = np.where(ints[:, 1] < n, ints[:, 1], -1)
-    found = [(ints, numbers)]
-    if not scene.is_empty:
-        bodies = items, np.ascontiguousarray(sizes[0])
-        found.append(
-            filled(
-                4 * n + 16,
-                lambda *out: surfaces_kernels.find_surfaces(
-                    bodies, moving, scene.planes, scene.tree, scene.field, *out
-                ),
+    bodies = items, np.ascontiguousarray(sizes[0])
+    size, m, space = 0, 2 * len(pairs[0]) + 16, 4 * n
+    while size < m:  # until there is room for all
+        size = m + space
+        ints, numbers = np.empty((size, 3), np.int64), np.empty((size, CONTACT))
+        m = n_pairs = bodies_kernels.find_pairs(shapes, pairs, (vel, dt), ints, numbers)
+        if m <= size and not scene.is_empty:
+            m += surfaces_kernels.find_surfaces(
+                bodies, moving, scene.planes, scene.tree, scene.field, ints[m:], numbers[m:]
             )
-        )
-    ints, numbers = (np.concatenate(part) for part in zip(*found, strict=True))
+    ints, numbers = ints[:m], numbers[:m]
+    ints[:n_pairs, 1] = np.where(ints[:n_pairs, 1] < n, ints[:n_pairs, 1], -1)
     own = world[ints[:, 0]]
     if n_worlds > 1:
         order = np.argsort(own, kind="stable")
         ints, numbers, own = ints[order], numbers[order], own[order]
     starts = np.searchsorted(own, np.arange(n_worlds + 1))
     row, other = np.ascontiguousarray(ints[:, 0]), np.ascontiguousarray(ints[:, 1])
-    return ContactList(row, other, np.ascontiguousarray(numbers), starts)
+    return ContactList(row, other, numbers, starts)
 
 
 def _with_balls(
