@@ -167,11 +167,8 @@ class TaskVectorEnv(VectorEnv[Any, Any, Any]):
         for name, term in swarm.terms.items():
             info[name], info[f"_{name}"] = term.sum(axis=1), np.ones(self.num_envs, bool)
         over = swarm.over.copy()
-        if over.any():
-            info["episode"] = {"r": swarm.returns.sum(axis=1), "l": swarm.lengths.copy()}
-            info["_episode"] = over
-            if swarm.autoreset == "same_step":
-                info["final_obs"], info["_final_obs"] = self._seen(swarm.final_obs), over
+        if over.any() and swarm.autoreset == "same_step":
+            info["final_obs"], info["_final_obs"] = self._seen(swarm.final_obs), over
         late = swarm.late & over
         self._pictures.follow()
         return self._seen(obs), rewards.sum(axis=1, dtype=float), over & ~late, late, info

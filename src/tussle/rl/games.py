@@ -36,17 +36,51 @@ class PredatorPrey(Task):
     reward = {"alive": Term(alive, 0.01), "captured": Term(captured, -1.0)}  # noqa: RUF012 - declared as ClassVar in Task
 
 
-def closing_speed(now: Situation) -> np.ndarray:
-    """Speed at which the distance to the nearest prey decreases [m/s], (W, A); 0 without prey."""
-    (pos, there), (vel, _) = now.simulation.read("prey.pos"), now.simulation.read("prey.vel")
+def _closing(now: Situation, blocks: str) -> np.ndarray:
+    """Speed at which the distance to the nearest entity of some blocks decreases [m/s], (W, A); 0 without any."""
+    found = [
+        [now.simulation.read(f"{name}.{column}") for name in blocks.split()] for column in ("pos", "vel")
+    ]
+    pos, vel = (np.concatenate([values for values, _ in parts], axis=1) for parts in found)
+    there = np.concatenate([is_there for _, is_there in found[0]], axis=1)
     offset = np.where(there[:, None, :, None], pos[:, None] - now.pos[:, :, None], np.inf)
     distance = np.sqrt((offset * offset).sum(axis=-1))
     near = distance.argmin(axis=-1)
     length = np.take_along_axis(distance, near[..., None], -1)
     relative = now.vel - np.take_along_axis(vel[:, None], near[..., None, None], -2)[:, :, 0]
-    with np.errstate(invalid="ignore"):  # where no prey is left
+    with np.errstate(invalid="ignore"):  # where none is left
         towards = np.take_along_axis(offset, near[..., None, None], -2)[:, :, 0] / length
         return np.where(np.isfinite(length[..., 0]), (relative * towards).sum(axis=-1), 0.0)
+
+
+def closing_speed(now: Situation) -> np.ndarray:
+    """Speed at which the distance to the nearest prey decreases [m/s], (W, A); 0 without prey."""
+    return _closing(now, "prey")
+
+
+def opening_speed(now: Situation) -> np.ndarray:
+    """Speed at which the distance to the nearest predator increases [m/s], (W, A); 0 without predators."""
+    return -_closing(now, "keepers switchers")
+
+
+class PreyEscape(Task):
+    """The paper's game for the prey, in a form that is learned in minutes: each decides every 0.5 s by the five nearest predators."""
+
+    mission = "predator_prey"
+    learners = "prey"
+    decide_every = 5
+    observation = (
+        Own("vel forward", scale={"vel": 30.0}, frame="heading"),
+        NearestOthers(
+            5,
+            "direction distance relative_vel present",
+            of="other",
+            scale={"distance": 1000.0, "relative_vel": 30.0},
+            frame="body",
+        ),
+    )
+    action = (Act("speed", value=30.0), Act("turn_rate", -1.0, 1.0), Act("pitch_rate", -1.0, 1.0))
+    reward = {"captured": Term(captured, -1.0), "opening": Term(opening_speed, 0.001)}  # noqa: RUF012 - declared as ClassVar in Task
 
 
 class PredatorTeam(Task):
@@ -146,4 +180,4 @@ class Consensus(Task):
     reward = {"near": Term(near_others)}  # noqa: RUF012 - declared as ClassVar in Task
 
 
-__all__ = ["Consensus", "NearOrigin", "PredatorPrey", "PredatorTeam"]
+__all__ = ["Consensus", "NearOrigin", "PredatorPrey", "PredatorTeam", "PreyEscape"]

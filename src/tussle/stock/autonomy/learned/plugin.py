@@ -10,8 +10,16 @@ from tussle import stock
 from tussle.api import Autonomy, GroupView, Output, Param
 from tussle.api.channels import CHANNEL_UNITS
 
-EXAMPLE = Path(str(files("tussle.stock.autonomy.learned"))) / "predator_team.onnx"
+SHIPPED = Path(str(files("tussle.stock.autonomy.learned")))
+"""Folder of the policies that ship; docs/learning.md tells how each was trained."""
+EXAMPLE = SHIPPED / "predator_team.onnx"
 """A team of predators, trained by `tussle train tussle/PredatorTeam-v0`."""
+
+
+def policy_path(policy: str) -> str:
+    """The file that a mission names, or of a policy that ships, "prey_escape"; by default the team of predators."""
+    shipped = SHIPPED / f"{policy}.onnx"
+    return str(shipped) if policy.isidentifier() and shipped.is_file() else policy or str(EXAMPLE)
 
 
 class Learned(Autonomy):
@@ -28,7 +36,9 @@ class Learned(Autonomy):
 
     grade = "machine"
 
-    policy = Param("", doc="The ONNX file; by default that of the team of predators that ships.")
+    policy = Param(
+        "", doc="The ONNX file, or the name of one that ships, such as prey_escape; by default predator_team."
+    )
     task = Param(
         "", doc="Registered id of the task, tussle/PredatorTeam-v0; by default that in the file's metadata."
     )
@@ -41,7 +51,7 @@ class Learned(Autonomy):
     def _flight(self) -> Any:
         """The policy and its task, from the file."""
         load = stock.import_class("tussle.rl.flight:load_flight")  # `tussle.rl` is above this package
-        return load(self.policy or str(EXAMPLE), self.task, self.block)
+        return load(policy_path(self.policy), self.task, self.block)
 
     def offered_outputs(self) -> list[str]:
         """Return the channels that the actions of the task set."""
