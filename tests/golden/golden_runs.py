@@ -25,7 +25,7 @@ LEARNED = ("autonomy/learned",)
 SERVED = (
     "autonomy/moos", "autonomy/ros_autonomy", "controller/ros_controllers", "interaction/ros_clock_server",
     "interaction/ros_shape_viz", "sensor/ros_compass",
-    "sensor/ros_imu_sensor",
+    "sensor/ros_altimeter", "sensor/ros_imu_sensor",
 )  # fmt: skip
 """Folders whose examples need a server; tests of their own play them."""
 

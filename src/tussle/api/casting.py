@@ -94,7 +94,8 @@ def height(
     start = tops[world] + 1.0
     down = np.repeat([[0.0], [0.0], [-1.0]], len(start), axis=1)
     origins = np.stack([east.ravel(), north.ravel(), start])
-    return start - cast(context, bodies, (origins, down, np.inf), world, own, entities=True).distance
+    hits = cast(context, bodies, (origins, down, np.inf), world, own, entities=True)
+    return np.asarray(start - hits.distance)
 
 
 def _check_worlds(world: np.ndarray, n: int, bodies: Bodies) -> None:
