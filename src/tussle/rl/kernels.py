@@ -50,10 +50,11 @@ def frame_of(floats, row, mode):
 @device
 def put_vector(kind, scale, x, y, z, turn, a, column, out):
     """Write a vector of the world in the frame `turn`: two numbers if kind is PLANE, else three."""
-    out[a, column] = scale * (turn[0] * x + turn[1] * y + turn[2] * z)
-    out[a, column + 1] = scale * (turn[3] * x + turn[4] * y + turn[5] * z)
+    a = np.uint64(a)  # unsigned: without the test whether an index counts from the end
+    out[a, np.uint64(column)] = scale * (turn[0] * x + turn[1] * y + turn[2] * z)
+    out[a, np.uint64(column + 1)] = scale * (turn[3] * x + turn[4] * y + turn[5] * z)
     if kind != PLANE:
-        out[a, column + 2] = scale * (turn[6] * x + turn[7] * y + turn[8] * z)
+        out[a, np.uint64(column + 2)] = scale * (turn[6] * x + turn[7] * y + turn[8] * z)
 
 
 @device
@@ -70,14 +71,14 @@ def put_others(floats, team, row, near, n, spec, turn, a, column, width, out):
         if is_vector and numbers[f, 1] != 0.0:
             x, y, z = floats[k, row], floats[k + 1, row], floats[k + 2, row]
         for j in range(n):
-            other, at = near[j], column + j * width
-            if other < 0:
+            if near[j] < 0:
                 continue
+            other, at = np.uint64(near[j]), np.uint64(column + j * width)
             if is_vector:
                 dx, dy, dz = floats[k, other] - x, floats[k + 1, other] - y, floats[k + 2, other] - z
                 put_vector(kind, scale, dx, dy, dz, turn, a, at, out)
             elif kind == SCALAR:
-                out[a, at] = scale * floats[k, other]
+                out[np.uint64(a), at] = scale * floats[k, other]
             elif kind == DISTANCE or kind == DIRECTION:
                 dx, dy = floats[0, other] - floats[0, row], floats[1, other] - floats[1, row]
                 dz = floats[2, other] - floats[2, row]
@@ -87,7 +88,7 @@ def put_others(floats, team, row, near, n, spec, turn, a, column, width, out):
                 else:
                     put_vector(SPACE, scale / max(length, 1e-9), dx, dy, dz, turn, a, at, out)
             else:
-                out[a, at] = scale if kind == PRESENT or team[other] == team[row] else 0.0
+                out[np.uint64(a), at] = scale if kind == PRESENT or team[other] == team[row] else 0.0
         column += 2 if kind == PLANE else 3 if kind == SPACE or kind == DIRECTION else 1
 
 
