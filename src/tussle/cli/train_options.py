@@ -37,6 +37,14 @@ class TrainOptions(PluginOptions):
             "--out",
         ),
     ] = None
+    against: Annotated[
+        str | None,
+        option(
+            "POOL",
+            "Who plays the other side, instead of its rules; each episode draws one of latest (the policy in training), past (earlier "
+            "ones) and ONNX files or folders: latest=4,past=4,best.onnx=2, where the numbers are shares.",
+        ),
+    ] = None
     resume: Annotated[bool, flag("--resume", "Continue from the checkpoint of the directory.")] = False
 
     def __post_init__(self) -> None:

@@ -28,7 +28,10 @@ class Learned(Autonomy):
 
     grade = "machine"
 
-    policy = Param("", doc="The ONNX file; by default that of the team of predators that ships.")
+    policy = Param(
+        "",
+        doc="The ONNX file, or a folder of them, of which the seed of each world draws one; by default the team of predators that ships.",
+    )
     task = Param(
         "", doc="Registered id of the task, tussle/PredatorTeam-v0; by default that in the file's metadata."
     )
