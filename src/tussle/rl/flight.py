@@ -271,9 +271,13 @@ def load_flight(path: str, task: str, block: str) -> LearnedFlight:
         files = sorted(files[0].glob("*.onnx"))[: MOST_POLICIES + 1]
         if not 0 < len(files) <= MOST_POLICIES:
             n = f"more than {MOST_POLICIES}" if files else "no"
-            raise ParameterError(f"Learned.policy = {path!r}: the folder has {n} ONNX files; it takes 1 to {MOST_POLICIES}")
+            raise ParameterError(
+                f"Learned.policy = {path!r}: the folder has {n} ONNX files; it takes 1 to {MOST_POLICIES}"
+            )
     stats = [(file, file.stat() if file.is_file() else None) for file in files]
-    stamps = tuple((str(file), (found.st_mtime_ns, found.st_ino) if found else (0, 0)) for file, found in stats)
+    stamps = tuple(
+        (str(file), (found.st_mtime_ns, found.st_ino) if found else (0, 0)) for file, found in stats
+    )
     return _flight(stamps, task, block)
 
 

@@ -6,7 +6,6 @@ import hashlib
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from functools import cached_property
 from itertools import combinations, product
 from pathlib import Path
 from typing import Any
@@ -15,11 +14,11 @@ import numpy as np
 
 from tussle.batch.batch import Batch
 from tussle.batch.results import Results
-from tussle.batch.statistics import LEVEL
+from tussle.batch.statistics import LEVEL, scipy_package
 from tussle.errors import MissingExtraError, ParameterError, nearest_name
 from tussle.mission import Mission
 from tussle.mission.plugin_files import load_plugin_file
-from tussle.rl.flight import Policy, registered_task
+from tussle.rl.flight import Policy, load_flight, registered_task
 from tussle.rl.opponents import other_side, with_policy
 
 RULES = "rules"
@@ -132,6 +131,9 @@ class League:
         plugin_files: Python files with plugins and tasks.
 
     Attributes:
+        sides: Registered id and task of the learners, and of their opponents.
+        is_symmetric: One policy plays both.
+        players: Players by name; `pairs`, who play each other.
         batch: The games, as points of a batch: "first" plays the learners, "second" their opponents.
         margin: Quantity by which the learners win.
 
@@ -151,19 +153,17 @@ class League:
         for file in plugin_files:
             load_plugin_file(file)
         self.name, own = task, registered_task(task, "the league")
-        self._sides = ((task, own), (own.opponents, other_side(task, own)))
+        self.sides = ((task, own), (own.opponents, other_side(task, own)))
         self.is_symmetric = own.is_symmetric
         self.players = self._players(players)
         self.pairs = self._pairs()
-        self.margin = own.margin or "-".join(f"score[{t.blocks[0].team}]" for _, t in self._sides)
-        digests = {p.name: _digest(p.path) for p in self.players.values()}
+        self.margin = own.margin or "-".join(f"score[{t.blocks[0].team}]" for _, t in self.sides)
         self.batch = Batch(
             self.mission,
-            points=[{"first": a, "second": b} for pair in self.pairs for a, b in self._orders(pair)],
+            points=[self._point(a, b) for pair in self.pairs for a, b in self._orders(pair)],
             runs=math.ceil(games / 2) if self.is_symmetric else games,
             first_seed=seed,
             independent=True,
-            settings={"policies": digests},  # the results of other files are other results
             plugin_files=plugin_files,
         )
 
@@ -177,7 +177,9 @@ class League:
                 )
             found[player.name] = player
         if len(found) > MOST_PLAYERS:
-            raise ParameterError(f"{len(found)} players are not allowed; a league takes at most {MOST_PLAYERS}")
+            raise ParameterError(
+                f"{len(found)} players are not allowed; a league takes at most {MOST_PLAYERS}"
+            )
         return found
 
     def _named(self, text: str) -> list[Player]:
@@ -185,7 +187,7 @@ class League:
         if text == RULES:
             if self.is_symmetric:
                 return [Player(RULES, "", (0, 1))]
-            return [Player(f"{RULES} of {t.learners}", "", (i,)) for i, (_, t) in enumerate(self._sides)]
+            return [Player(f"{RULES} of {t.learners}", "", (i,)) for i, (_, t) in enumerate(self.sides)]
         name, equals, file = text.partition("=")
         path = Path(file if equals else text)
         if not path.is_file():
@@ -194,12 +196,15 @@ class League:
             )
         stem = path.resolve().parent.name if path.stem == "policy" else path.stem
         made_for = Policy(str(path)).task or self.name
-        tasks = [name for name, _ in self._sides]
+        tasks = [name for name, _ in self.sides]
         if made_for not in tasks:
             raise ParameterError(
                 f"player {text!r} plays {made_for}; this league takes policies of {' and '.join(tasks)}"
             )
         sides = (0, 1) if self.is_symmetric else (tasks.index(made_for),)
+        for side in sides:
+            for block in self.sides[side][1].blocks:
+                load_flight(str(path), tasks[side], block.name)  # it fits
         return [Player(name if equals else stem, str(path.resolve()), sides)]
 
     def _pairs(self) -> list[tuple[str, str]]:
@@ -210,7 +215,7 @@ class League:
             of = [[p.name for p in self.players.values() if side in p.sides] for side in (0, 1)]
             pairs = list(product(*of))
         if not pairs:
-            sides = " and ".join(t.learners for _, t in self._sides)
+            sides = " and ".join(t.learners for _, t in self.sides)
             raise ParameterError(
                 f"there is no game with the players {', '.join(self.players)}; {sides} need one each"
             )
@@ -219,20 +224,24 @@ class League:
     def _orders(self, pair: tuple[str, str]) -> list[tuple[str, str]]:
         return [pair, pair[::-1]] if self.is_symmetric else [pair]
 
-    def mission(self, first: str, second: str, policies: Any = None) -> Mission:
+    def _point(self, first: str, second: str) -> dict[str, str]:
+        """A game as a point of the batch; with hashes of the files, as other files are another game."""
+        files = " ".join(_digest(self.players[name].path) for name in (first, second))
+        return {"first": first, "second": second, "files": files}
+
+    def mission(self, first: str, second: str, files: str = "") -> Mission:
         """The game of two players.
 
         Args:
             first: Name of who plays the learners.
             second: Name of who plays their opponents.
-            policies: Hashes of the files, which are part of what a batch is.
+            files: Hashes of their files.
         """
-        own = self._sides[0][1]
-        rules = own.replace(mission=own.scripted or own.mission) if own.scripted else own
-        mission = rules.given
+        own = self.sides[0][1]
+        mission = (own.replace(mission=own.scripted) if own.scripted else own).given
         if own.time_limit is not None:
             mission = mission.replace(end=mission.start + own.time_limit).ending_by_time()
-        for name, (task_name, task) in zip((first, second), self._sides, strict=True):
+        for name, (task_name, task) in zip((first, second), self.sides, strict=True):
             if path := self.players[name].path:
                 mission = with_policy(mission, task_name, task, path)
         return mission
@@ -253,10 +262,17 @@ class League:
         for number, pair in enumerate(self.pairs):
             mine = (points // n_orders == number) & np.isfinite(margin)
             changed = points[mine] % n_orders == 1
-            pairings.append(self._pairing(pair, runs[mine], changed, np.where(changed, -1.0, 1.0) * margin[mine]))
+            pairings.append(
+                self._pairing(pair, runs[mine], changed, np.where(changed, -1.0, 1.0) * margin[mine] + 0.0)
+            )
         n_good = int(np.isfinite(margin).sum())
         return Standings(
-            self.name, self.margin, ratings_of(list(self.players), pairings), tuple(pairings), n_good, len(margin) - n_good
+            self.name,
+            self.margin,
+            ratings_of(list(self.players), pairings),
+            tuple(pairings),
+            n_good,
+            len(margin) - n_good,
         )
 
     def _pairing(
@@ -272,7 +288,7 @@ class League:
         at = int(is_over.argmax()) if is_over.any() else n - 1
         share = score / n if n else math.nan
         low, high = _wilson(score, n)
-        side = self._sides[int(changed[at])][1].learners if n else ""
+        side = self.sides[int(changed[at])][1].learners if n else ""
         return Pairing(
             *pair, wins, n - wins - losses, losses, share, low, high,
             int(runs[at]) if n else -1, side, float(margin[at]) if n else math.nan,
@@ -280,7 +296,7 @@ class League:
 
 
 def _digest(path: str) -> str:
-    return hashlib.blake2b(Path(path).read_bytes(), digest_size=16).hexdigest() if path else ""
+    return hashlib.blake2b(Path(path).read_bytes(), digest_size=16).hexdigest() if path else RULES
 
 
 def _statsmodels() -> Any:
@@ -312,24 +328,28 @@ def ratings_of(names: Sequence[str], pairings: Sequence[Pairing]) -> tuple[Ratin
     """
     place = {name: i for i, name in enumerate(names)}
     played = [p for p in pairings if p.wins + p.draws + p.losses]
-    design, won = np.zeros((len(played), len(names))), np.zeros((len(played), 2))
+    design, points = np.zeros((len(played), len(names))), np.zeros((2, len(played)))
     for row, p in enumerate(played):
         design[row, place[p.a]], design[row, place[p.b]] = 1.0, -1.0
-        won[row] = p.wins + 0.5 * p.draws + 0.5, p.losses + 0.5 * p.draws + 0.5
+        points[:, row] = p.wins + 0.5 * p.draws + 0.5, p.losses + 0.5 * p.draws + 0.5
     centre = np.eye(len(names)) - 1.0 / len(names)
     elo, half = np.zeros(len(names)), np.full(len(names), math.nan)
     if played:
         api = _statsmodels().api
-        fit = api.GLM(won, design[:, 1:], family=api.families.Binomial()).fit()  # the first player has 0
+        is_won = np.repeat([1.0, 0.0], len(played))
+        rows = np.tile(design[:, 1:], (2, 1))  # the first player has 0
+        fit = api.GLM(is_won, rows, family=api.families.Binomial(), freq_weights=points.ravel()).fit()
         turn = centre[:, 1:]
         elo = ELO * (turn @ fit.params)
         variance = np.diag(turn @ fit.cov_params() @ turn.T)
-        half = ELO * 1.959964 * np.sqrt(variance)
+        half = ELO * float(scipy_package().stats.norm.ppf(0.5 + LEVEL / 2.0)) * np.sqrt(variance)
     found = []
     for name, rating, width in zip(names, elo.tolist(), half.tolist(), strict=True):
         mine = [(p.wins, p.draws, p.losses) for p in pairings if p.a == name]
         mine += [(p.losses, p.draws, p.wins) for p in pairings if p.b == name]
-        found.append(Rating(name, rating, rating - width, rating + width, *(sum(c) for c in zip(*mine, strict=True))))
+        found.append(
+            Rating(name, rating, rating - width, rating + width, *(sum(c) for c in zip(*mine, strict=True)))
+        )
     return tuple(sorted(found, key=lambda r: -r.elo))
 
 

@@ -95,7 +95,7 @@ class Pool:
         folder.mkdir(parents=True, exist_ok=True)
         for file in set(folder.glob("*.onnx")) - {file for _, file in self._files}:
             file.unlink()
-        for (_, file), (kind, source) in zip(self._files, slots, strict=True):
+        for (_, file), (_, source) in zip(self._files, slots, strict=True):
             given = source or first
             if given.is_file():
                 if source or not file.exists():
