@@ -30,6 +30,7 @@ COMMANDS = {
     "report": (batch_options.ReportOptions, "tussle.cli.analyze:report"),
     "optimize": (batch_options.OptimizeOptions, "tussle.cli.optimize:optimize"),
     "train": (train_options.TrainOptions, "tussle.cli.train:train"),
+    "league": (train_options.LeagueOptions, "tussle.cli.league:league"),
     "ros-node": (RosNodeOptions, "tussle.cli.ros_node:ros_node"),
     "doctor": (play_options.DoctorOptions, "tussle.cli.doctor:doctor"),
 }

@@ -24,6 +24,7 @@ def train(options: TrainOptions) -> int:
         ParameterError: The task is unknown, or the directory has a checkpoint that would be overwritten, or none to continue from.
     """
     from tussle.rl.flight import registered_task
+    from tussle.rl.opponents import Pool
     from tussle.rl.train import Settings, Trainer  # needs the packages of tussle[train]
 
     for path in options.plugin_files:
@@ -32,6 +33,11 @@ def train(options: TrainOptions) -> int:
     folder = options.directory or Path("training") / options.task.rpartition("/")[2]
     if (folder / "checkpoint.pt").exists() and not options.resume:
         raise ParameterError(f"{folder} has a checkpoint; continue it with --resume, or choose another --out")
+    pool = None
+    if options.against is not None:
+        entries = options.against.split(",")
+        pool = Pool(options.task, task, folder / "pool", entries, options.seed, folder / "policy.onnx")
+        task = pool.task
     with compiling():
         trainer = Trainer(task, options.task, folder, options.seed, Settings(worlds=options.worlds))
     if options.resume:
@@ -43,6 +49,8 @@ def train(options: TrainOptions) -> int:
                 f"{line['minutes']:6.1f} min  {line['decisions']:>13,.0f} decisions  {line['episodes']:>6,.0f} episodes  "
                 f"return {line['episode_return']:10.2f}  reward {line['reward_per_decision']:10.5f}"
             )
+            if pool is not None:
+                pool.add(trainer.model.layers(), len(trainer.curve))
             return bool(interrupt.code)
 
         trainer.train(options.minutes, tell)

@@ -1,4 +1,4 @@
-"""Options of `tussle train`."""
+"""Options of `tussle train` and `tussle league`."""
 
 from __future__ import annotations
 
@@ -37,7 +37,71 @@ class TrainOptions(PluginOptions):
             "--out",
         ),
     ] = None
+    against: Annotated[
+        str | None,
+        option(
+            "POOL",
+            "Who plays the other side, instead of its rules; each episode draws one of latest (the policy in training), past (earlier "
+            "ones) and ONNX files or folders: latest=4,past=4,best.onnx=2, where the numbers are shares.",
+        ),
+    ] = None
     resume: Annotated[bool, flag("--resume", "Continue from the checkpoint of the directory.")] = False
 
     def __post_init__(self) -> None:
         check_positive(minutes=self.minutes)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LeagueOptions(PluginOptions):
+    """Let rules and policies play each other at a task, and rate them: a table, and a page with replays of the deciding games."""
+
+    task: Annotated[
+        str,
+        argument(
+            "TASK",
+            "Registered id of a task with two sides, such as tussle/Battle-v0; --plugin-path adds yours.",
+        ),
+    ]
+    players: Annotated[
+        str,
+        option(
+            "PLAYERS",
+            "Who plays, separated by commas: rules (the autonomies of the mission), ONNX files, and NAME=FILE.",
+        ),
+    ]
+    games: Annotated[
+        int,
+        option(
+            "N",
+            "Games of each pair, half on each side where one policy can play both.",
+            min=1,
+            shows_default=True,
+        ),
+    ] = 40
+    seed: Annotated[
+        int,
+        option(
+            "N",
+            "Seed of the first game; the others follow it.",
+            min=0,
+            max=LARGEST_SEED // 2,
+            shows_default=True,
+        ),
+    ] = 1
+    processes: Annotated[int | None, option("N", "Number of processes; by default one per core.", min=1)] = (
+        None
+    )
+    stack: Annotated[
+        int | None,
+        option("N", "Games played side by side in each process; by default chosen by the mission.", min=1),
+    ] = None
+    directory: Annotated[
+        Path | None,
+        option(
+            "DIR",
+            "Gets the games, league.html, league.json and the replays; by default leagues/NAME. Its games are not repeated.",
+            "--out",
+            "-o",
+        ),
+    ] = None
+    as_json: Annotated[bool, flag("--json", "Print everything as JSON.")] = False

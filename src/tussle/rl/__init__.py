@@ -18,12 +18,14 @@ from tussle.rl.reward import Situation, Term, alive, captured, captures, collisi
 from tussle.rl.robots import Coverage, FindWay, Formation, Hover, ReachPoint
 from tussle.rl.swarm import Swarm, evaluate, make_swarm, record_episode
 from tussle.rl.task import Task
-from tussle.rl.teams import Battle, CaptureTheFlag, Intercept
+from tussle.rl.teams import Battle, BattleBlue, CaptureTheFlag, CaptureTheFlagRed, Intercept
 
 __all__ = [
     "Act",
     "Battle",
+    "BattleBlue",
     "CaptureTheFlag",
+    "CaptureTheFlagRed",
     "Component",
     "Computed",
     "Consensus",
@@ -66,7 +68,9 @@ __all__ = [
 
 for _task in (
     Battle,
+    BattleBlue,
     CaptureTheFlag,
+    CaptureTheFlagRed,
     Coverage,
     FindWay,
     Formation,

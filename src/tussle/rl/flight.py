@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -10,6 +10,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
+from tussle import rng
 from tussle.api import GroupView
 from tussle.errors import MissingExtraError, ParameterError, listed, nearest_name
 from tussle.rl.action import Actor, Decoder, learned
@@ -22,6 +23,9 @@ BATCH = 64
 """Rows per inference. Runtimes may sum in another order in a batch of another size, so the last one is filled up."""
 MOST_BYTES = 256 * 2**20
 """Largest policy: a perceptron with layers of 4096 has 64 MiB."""
+
+MOST_POLICIES = 64
+"""Policies of a folder."""
 
 
 class Policy:
@@ -140,14 +144,15 @@ def tensors_of(graph: Any, refused: Callable[[str], ParameterError]) -> Iterator
 
 
 class LearnedFlight:
-    """A policy as the agents of one block of a task.
+    """Policies of one form as the agents of one block of a task; in each world one of them flies, which the world's seed draws.
 
     Attributes:
-        channels: Channels that it sets.
+        channels: Channels that they set.
     """
 
-    def __init__(self, policy: Policy, task: Task, name: str, block: str) -> None:
-        self.policy, self.task = policy, task
+    def __init__(self, policies: Sequence[Policy], task: Task, name: str, block: str) -> None:
+        self.policies, self.task = policies, task
+        self._draw = rng.stream_key("Learned", name)
         blocks = {b.name: b for b in task.blocks}
         if block not in blocks and (block or len(blocks) > 1):
             raise ParameterError(
@@ -166,11 +171,12 @@ class LearnedFlight:
         self._decoder = Decoder(self.block, acts, np.float32)
         width, sizes = sum(task.widths[self.block]), self._decoder.sizes
         n_out = len(sizes) if self._decoder.is_continuous else int(sizes.sum())
-        if (policy.width, policy.n_out) != (width, n_out):
-            raise ParameterError(
-                f"Learned.policy = {policy.path!r} takes {policy.width} and returns {policy.n_out} numbers; agents of {name} observe "
-                f"{width} and decide by {n_out}"
-            )
+        for policy in policies:
+            if (policy.width, policy.n_out) != (width, n_out):
+                raise ParameterError(
+                    f"Learned.policy = {policy.path!r} takes {policy.width} and returns {policy.n_out} numbers; agents of {name} "
+                    f"observe {width} and decide by {n_out}"
+                )
         if len(blocks) > 1 and any(isinstance(c, Computed) for c in task.components(self.block)):
             raise ParameterError(
                 f"Learned: {name} has Computed observations of several blocks; give each block its own task"
@@ -190,7 +196,12 @@ class LearnedFlight:
             return
         for name, value in self._constants.items():
             columns[name][due] = value
-        out = self.policy(self.observe(simulation, g)[due])
+        share = rng.uniform(g.context.seeds, self._draw, 0, 0)[0]
+        which = (share * len(self.policies)).astype(int)[g.world[due]]
+        obs = self.observe(simulation, g)[due]
+        out = np.empty((len(due), self.policies[0].n_out), np.float32)
+        for k in np.unique(which):
+            out[which == k] = self.policies[k](obs[which == k])
         if not self._decoder.is_continuous:
             edges = np.cumsum(self._decoder.sizes)[:-1]
             actions = np.stack([part.argmax(axis=1) for part in np.split(out, edges, axis=1)], axis=1)
@@ -198,7 +209,8 @@ class LearnedFlight:
             actions = out.astype(float)
         wrong = self._decoder.decode(actions, np.arange(len(due)), due, columns.__getitem__)
         if wrong >= 0:
-            g.fail(int(due[wrong]), f"the policy {self.policy.path} returned a value that is not a number")
+            path = self.policies[which[wrong]].path
+            g.fail(int(due[wrong]), f"the policy {path} returned a value that is not a number")
 
     def observe(self, simulation: Any, g: GroupView) -> np.ndarray:
         """Observations of all rows, (n, numbers): the task's components write them, as in a swarm."""
@@ -206,7 +218,7 @@ class LearnedFlight:
         group = next(
             group for group in simulation.state.population.groups if group.first <= g.first < group.last
         )
-        width = self.policy.width
+        width = self.policies[0].width
         seen = np.zeros((g.n, width), self.task.dtype)
         for number in np.unique(g.block):
             mine = np.flatnonzero(g.block == number)
@@ -248,22 +260,37 @@ def registered_task(name: str, path: str) -> Task:
 
 
 def load_flight(path: str, task: str, block: str) -> LearnedFlight:
-    """A policy with its task; read once per version of the file.
+    """A policy, or those of a folder, with their task; read once per version of each file.
 
     Raises:
         MissingExtraError: A package is not installed.
         ParameterError: File, task or block cannot be used.
     """
-    file = Path(path)
-    stamp = file.stat().st_mtime_ns if file.is_file() else 0
-    return _flight(path, task, block, stamp)
+    files = [Path(path)]
+    if files[0].is_dir():
+        files = sorted(files[0].glob("*.onnx"))[: MOST_POLICIES + 1]
+        if not 0 < len(files) <= MOST_POLICIES:
+            n = f"more than {MOST_POLICIES}" if files else "no"
+            raise ParameterError(
+                f"Learned.policy = {path!r}: the folder has {n} ONNX files; it takes 1 to {MOST_POLICIES}"
+            )
+    stats = [(file, file.stat() if file.is_file() else None) for file in files]
+    stamps = tuple(
+        (str(file), (found.st_mtime_ns, found.st_ino) if found else (0, 0)) for file, found in stats
+    )
+    return _flight(stamps, task, block)
 
 
 @lru_cache(maxsize=64)
-def _flight(path: str, task: str, block: str, stamp: int) -> LearnedFlight:
-    policy = Policy(path)
-    name = task or policy.task
-    return LearnedFlight(policy, registered_task(name, path), name, block)
+def _flight(stamps: tuple[tuple[str, tuple[int, int]], ...], task: str, block: str) -> LearnedFlight:
+    policies = [_policy(*stamp) for stamp in stamps]
+    name = task or policies[0].task
+    return LearnedFlight(policies, registered_task(name, policies[0].path), name, block)
+
+
+@lru_cache(maxsize=2 * MOST_POLICIES)
+def _policy(path: str, stamp: tuple[int, int]) -> Policy:
+    return Policy(path)
 
 
 __all__ = ["LearnedFlight", "Policy", "load_flight", "registered_task"]

@@ -95,8 +95,8 @@ def _check(where: str, frame: str, names: Sequence[str], allowed: Sequence[str],
     for name, value in scale.items() if isinstance(scale, Mapping) else [("", scale)]:
         if name and name not in names:
             raise ParameterError(f"{where}: scale of {name!r}{nearest_name(name, names)}; {listed(names)}")
-        if not value > 0.0:
-            raise ParameterError(f"{where}: scale = {value!r} is not allowed; it takes numbers > 0")
+        if not abs(value) > 0.0:
+            raise ParameterError(f"{where}: scale = {value!r} is not allowed; it takes numbers other than 0")
 
 
 def _factor(scale: Scale, name: str) -> float:

@@ -38,6 +38,10 @@ class Task:
         vary: Variables that each episode draws anew, by path as in a batch: "prey.Unicycle.vel_max=20:30".
         room: Agents per block, for blocks that gain entities by births of plugins; by default the block's count.
         dtype: Type of observations, rewards and actions.
+        opponents: Registered id of the task of the other side, whose learners play against these.
+        is_symmetric: The other side observes and acts as these learners do, seen from its place, so one policy plays both sides.
+        margin: Quantity of a game, in the words of a batch, by which the learners win where it is positive, and the opponents where it
+            is negative; by default their team's score less that of the opponents.
 
     Raises:
         ParameterError: An attribute is unknown, or a value is not allowed.
@@ -55,6 +59,9 @@ class Task:
     vary: Sequence[str] = ()
     room: ClassVar[Mapping[str, int]] = {}
     dtype: Any = np.float32
+    opponents: str = ""
+    is_symmetric: bool = False
+    margin: str = ""
 
     def __init__(self, **values: Any) -> None:
         known = [k for k in Task.__annotations__ if not k.startswith("_")]

@@ -95,6 +95,7 @@ class CaptureTheFlag(Task):
         "blue_defenders": 1, "blue_runners": 2, "red_defenders": 1, "red_runners": 2, "end": 150,
     }  # fmt: skip
     learners = "blue_defenders blue_runners"
+    opponents, is_symmetric = "tussle/CaptureTheFlagRed-v0", True
     observation = (
         Own("pos", scale=300.0, origin=(0.0, 0.0, 100.0)),
         NearestOthers(5, scale={"offset": 300.0, "relative_vel": 10.0}),
@@ -111,6 +112,19 @@ class CaptureTheFlag(Task):
 
     def ends(self, now: Situation) -> Any:
         return flag_balance(now)[:, 0] != 0.0
+
+
+class CaptureTheFlagRed(CaptureTheFlag):
+    """The red ones of `CaptureTheFlag`, which see and fly the field reflected in its centre, so that the blue ones' policy fits."""
+
+    learners = "red_defenders red_runners"
+    opponents = "tussle/CaptureTheFlag-v0"
+    observation = (
+        Own("pos", scale=-300.0, origin=(0.0, 0.0, 100.0)),
+        NearestOthers(5, scale={"offset": -300.0, "relative_vel": -10.0}),
+    )
+    action = tuple(Act(f"velocity_{axis}", 10.0, -10.0) for axis in "xyz")
+    reward = {**CaptureTheFlag.reward, "flag": Term(flag_balance, -1.0)}  # noqa: RUF012
 
 
 class Fire(Interaction):
@@ -162,6 +176,8 @@ class Battle(Task):
 
     mission = armies(100)
     learners = "red"
+    opponents, is_symmetric = "tussle/BattleBlue-v0", True
+    margin = "alive[1]-alive[2]"
     observation = (
         Own("vel", scale=10.0, planar=True, frame="heading"),
         Own("health"),
@@ -171,4 +187,13 @@ class Battle(Task):
     reward = {"balance": Term(balance, 0.01), "died": Term(died, -0.1)}  # noqa: RUF012
 
 
-__all__ = ["Battle", "CaptureTheFlag", "Intercept"]
+class BattleBlue(Battle):
+    """The blue army of `Battle` learns, the red one attacks by rule."""
+
+    learners = "blue"
+    opponents = "tussle/Battle-v0"
+    margin = "alive[2]-alive[1]"
+    reward = {**Battle.reward, "balance": Term(balance, -0.01)}  # noqa: RUF012
+
+
+__all__ = ["Battle", "BattleBlue", "CaptureTheFlag", "CaptureTheFlagRed", "Intercept"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
@@ -55,19 +55,17 @@ def write_report(results: Results, directory: str | Path, quantities: Sequence[s
         data = ReportData(results, quantities)
         sections = sections_of(data)
         pictures = {p.name: pictured(p.draw(), f"plot-{p.name}", p.title) for s in sections for p in s.plots}
-    html = _page(data, sections, pictures)
-    place = Path(directory)
-    try:
-        place.mkdir(parents=True, exist_ok=True)
-        for name, picture in pictures.items():
-            (place / f"{name}.svg").write_text(picture.svg, encoding="utf-8")
-            (place / f"{name}.png").write_bytes(picture.png)
-        (place / INDEX).write_text(html, encoding="utf-8")
-    except OSError as error:
-        raise RecordError(f"{place}: the report cannot be written: {error.strerror or error}") from error
+    from tussle.batch.report.sections import answer, notes
+
+    page = write_page(
+        Path(directory) / INDEX, sections, pictures,
+        title=str(results.info.get("name") or "A batch of games"), version=str(results.info.get("tussle", "")),
+        source="a batch in memory" if results.path is None else f"the batch {results.path.resolve().name}",
+        answer=answer(data), notes=notes(data),
+    )  # fmt: skip
     missing = "".join(sorted({letter for picture in pictures.values() for letter in picture.missing}))
     note = f"the font of the PNG files has no {missing}; the page and the SVG files show it"
-    return Report(place / INDEX, tuple(pictures), (note,) if missing else ())
+    return Report(page, tuple(pictures), (note,) if missing else ())
 
 
 def sections_of(data: ReportData) -> list[Section]:
@@ -108,7 +106,35 @@ def _with_own_names(sections: Sequence[Section]) -> list[Section]:
     return [replace(section, plots=list(map(own, section.plots))) for section in sections]
 
 
-def _page(data: ReportData, sections: Sequence[Section], pictures: dict[str, Picture]) -> str:
+def write_page(
+    path: Path,
+    sections: Sequence[Section],
+    pictures: Mapping[str, Picture],
+    *,
+    title: str,
+    version: str,
+    source: str,
+    answer: str,
+    notes: Sequence[str] = (),
+    needs: str = "The page needs no other file",
+) -> Path:
+    """Write a page of sections, and its plots beside it. Returns the page.
+
+    Args:
+        path: The page.
+        sections: Its sections.
+        pictures: Each plot by name.
+        title: Its heading.
+        version: Of tussle.
+        source: What it was made from.
+        answer: The result, as a sentence under the heading.
+        notes: What the reader should know, one line each.
+        needs: What else the page needs, for its last line.
+
+    Raises:
+        MissingExtraError: Jinja is not installed.
+        RecordError: The directory cannot be written.
+    """
     try:
         import jinja2
     except ImportError as error:
@@ -116,19 +142,23 @@ def _page(data: ReportData, sections: Sequence[Section], pictures: dict[str, Pic
             f"the report needs jinja2, which cannot be imported ({error}); pip install 'tussle[batch]' brings it"
         ) from None
     from tussle.batch.report.drawing import printable
-    from tussle.batch.report.sections import answer, notes
 
-    folder, results = files("tussle.batch.report"), data.results
+    folder = files("tussle.batch.report")
     environment = jinja2.Environment(
         autoescape=True, finalize=lambda value: value if hasattr(value, "__html__") else printable(str(value))
     )
-    return environment.from_string(folder.joinpath("page.html.j2").read_text(encoding="utf-8")).render(
-        title=str(results.info.get("name") or "A batch of games"),
-        version=str(results.info.get("tussle", "")),
-        source="a batch in memory" if results.path is None else f"the batch {results.path.resolve().name}",
-        style=folder.joinpath("page.css").read_text(encoding="utf-8"),
-        answer=answer(data),
-        notes=notes(data),
-        sections=sections,
-        pictures=pictures,
-    )
+    html = environment.from_string(folder.joinpath("page.html.j2").read_text(encoding="utf-8")).render(
+        title=title, version=version, source=source, answer=answer, notes=notes, needs=needs, sections=sections,
+        pictures=pictures, style=folder.joinpath("page.css").read_text(encoding="utf-8"),
+    )  # fmt: skip
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        for name, picture in pictures.items():
+            path.with_name(f"{name}.svg").write_text(picture.svg, encoding="utf-8")
+            path.with_name(f"{name}.png").write_bytes(picture.png)
+        path.write_text(html, encoding="utf-8")
+    except OSError as error:
+        raise RecordError(
+            f"{path.parent}: the report cannot be written: {error.strerror or error}"
+        ) from error
+    return path

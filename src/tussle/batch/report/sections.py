@@ -72,14 +72,14 @@ class ReportTable:
 
     Args:
         title: What it shows; empty if the title of the section says it.
-        columns: Name and kind of each column: "text", "number" (aligned right) or "code".
-        rows: Cells as they are shown, row by row.
+        columns: Name and kind of each column: "text", "number" (aligned right), "code" or "link".
+        rows: Cells as they are shown, row by row; of a link, its text and its address.
         caption: How to read it.
     """
 
     title: str
     columns: Sequence[tuple[str, str]]
-    rows: Sequence[Sequence[str]]
+    rows: Sequence[Sequence[str | tuple[str, str]]]
     caption: str = ""
 
 

@@ -37,7 +37,9 @@ class Learned(Autonomy):
     grade = "machine"
 
     policy = Param(
-        "", doc="The ONNX file, or the name of one that ships, such as prey_escape; by default predator_team."
+        "",
+        doc="The ONNX file, or a folder of them, of which the seed of each world draws one; or the name of one that ships, such as "
+        "prey_escape; by default predator_team.",
     )
     task = Param(
         "", doc="Registered id of the task, tussle/PredatorTeam-v0; by default that in the file's metadata."
