@@ -212,8 +212,8 @@ class League:
         if self.is_symmetric:
             pairs = list(combinations(self.players, 2))
         else:
-            of = [[p.name for p in self.players.values() if side in p.sides] for side in (0, 1)]
-            pairs = list(product(*of))
+            one, two = ([p.name for p in self.players.values() if side in p.sides] for side in (0, 1))
+            pairs = list(product(one, two))
         if not pairs:
             sides = " and ".join(t.learners for _, t in self.sides)
             raise ParameterError(

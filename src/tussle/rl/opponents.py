@@ -145,7 +145,8 @@ def _slots(entry: str) -> list[tuple[str, Path | None]]:
         raise ParameterError(
             f"opponent {entry!r}: there is no ONNX file {given}; it takes latest, past, or an ONNX file or a folder of them"
         )
-    return [(file.stem, file) for file in files] * int(number)
+    found: list[tuple[str, Path | None]] = [(file.stem, file) for file in files]
+    return found * int(number)
 
 
 __all__ = ["Pool", "other_side", "with_policy"]

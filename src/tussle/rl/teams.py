@@ -123,7 +123,7 @@ class CaptureTheFlagRed(CaptureTheFlag):
         Own("pos", scale=-300.0, origin=(0.0, 0.0, 100.0)),
         NearestOthers(5, scale={"offset": -300.0, "relative_vel": -10.0}),
     )
-    action = tuple(Act(f"velocity_{axis}", 10.0, -10.0) for axis in "xyz")
+    action = (Act("velocity_x", 10.0, -10.0), Act("velocity_y", 10.0, -10.0), Act("velocity_z", 10.0, -10.0))
     reward = {**CaptureTheFlag.reward, "flag": Term(flag_balance, -1.0)}  # noqa: RUF012
 
 
