@@ -9,7 +9,7 @@ import numpy as np
 from tussle.api.bodies import Bodies
 from tussle.api.context import Context
 from tussle.errors import ParameterError
-from tussle.rays import kernels
+from tussle.rays import kernels, touching
 from tussle.rays.hits import FARTHEST_RAY, Hits, checked_numbers, checked_vectors, new_rays
 
 RAYS_PER_THREAD = 1024
@@ -76,7 +76,7 @@ def free(
     if bodies.n:
         tree = bodies.tree(context.boxes)
         around = center, reach, np.ascontiguousarray(world, np.int64), np.ascontiguousarray(own, np.int64)
-        kernels.touch_bodies(tree.tree, tree.places, around, touches)
+        touching.touch_bodies(tree.tree, tree.places, around, touches)
     return ~touches
 
 

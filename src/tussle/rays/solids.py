@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tussle.rays import kernels
+from tussle.rays import kernels, touching
 from tussle.rays.hits import FARTHEST_RAY, Hits, checked_numbers, checked_vectors, new_rays
 from tussle.rays.surfaces import HeightField, TriangleMesh
 from tussle.shapes import FlatGround, Polyhedron, Sphere, Volume
@@ -144,10 +144,10 @@ class Solids:
         reach = np.minimum(checked_numbers("radius", radius, center.shape[1]), FARTHEST_RAY)
         touches = np.zeros(center.shape[1], np.bool_)
         if self.n_triangles:
-            kernels.touch(self._tree, self._items, center, reach, touches)
+            touching.touch(self._tree, self._items, center, reach, touches)
         for part in self.parts:
             if isinstance(part, HeightField):
-                kernels.touch_field(part.height, part.grid, center, reach, touches)
+                touching.touch_field(part.height, part.grid, center, reach, touches)
             elif isinstance(part, Volume):
                 touches |= part.contains(center) | part.touches(center, reach)
         return touches

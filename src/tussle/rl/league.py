@@ -28,7 +28,7 @@ ELO = 400.0 / math.log(10.0)
 
 
 @dataclass(frozen=True)
-class Player:
+class Contestant:
     """Who takes part.
 
     Attributes:
@@ -167,9 +167,9 @@ class League:
             plugin_files=plugin_files,
         )
 
-    def _players(self, texts: Sequence[str]) -> dict[str, Player]:
+    def _players(self, texts: Sequence[str]) -> dict[str, Contestant]:
         """Players by name."""
-        found: dict[str, Player] = {}
+        found: dict[str, Contestant] = {}
         for player in (p for text in texts for p in self._named(text.strip())):
             if player.name in found:
                 raise ParameterError(
@@ -182,12 +182,12 @@ class League:
             )
         return found
 
-    def _named(self, text: str) -> list[Player]:
+    def _named(self, text: str) -> list[Contestant]:
         """The player of a text; rules are two where the sides differ."""
         if text == RULES:
             if self.is_symmetric:
-                return [Player(RULES, "", (0, 1))]
-            return [Player(f"{RULES} of {t.learners}", "", (i,)) for i, (_, t) in enumerate(self.sides)]
+                return [Contestant(RULES, "", (0, 1))]
+            return [Contestant(f"{RULES} of {t.learners}", "", (i,)) for i, (_, t) in enumerate(self.sides)]
         name, equals, file = text.partition("=")
         path = Path(file if equals else text)
         if not path.is_file():
@@ -205,7 +205,7 @@ class League:
         for side in sides:
             for block in self.sides[side][1].blocks:
                 load_flight(str(path), tasks[side], block.name)  # it fits
-        return [Player(name if equals else stem, str(path.resolve()), sides)]
+        return [Contestant(name if equals else stem, str(path.resolve()), sides)]
 
     def _pairs(self) -> list[tuple[str, str]]:
         """Names of those who play each other, of the learners' side first."""
@@ -353,4 +353,4 @@ def ratings_of(names: Sequence[str], pairings: Sequence[Pairing]) -> tuple[Ratin
     return tuple(sorted(found, key=lambda r: -r.elo))
 
 
-__all__ = ["RULES", "League", "Pairing", "Player", "Rating", "Standings", "ratings_of"]
+__all__ = ["RULES", "Contestant", "League", "Pairing", "Rating", "Standings", "ratings_of"]
