@@ -48,7 +48,7 @@ export interface ShapesHeader {
 
 export interface Source {
   isLive: boolean;
-  blob(name: string): Promise<Uint8Array>;
+  blob(name: string): Promise<Uint8Array<ArrayBuffer>>;
   connect?(hear: MessageHandlers): void;
   send?(command: string, fields?: object): void;
 }
