@@ -174,9 +174,14 @@ class Decoder:
     def write(self, part: AgentRows, actions: np.ndarray) -> int:
         """Set the columns of a part's agents from actions, (agents, numbers). Returns the first agent with a wrong action, or -1."""
         group, at = part.group, part.rows - part.group.first
+        key = self.block, part.span
+        if key not in part.kept:
+            names = {name for act in (*self.constants, *self.free) for name in act.names}
+            part.kept[key] = {name: self._place(group, name) for name in names}
+        places = part.kept[key]
         for act in self.constants:
-            self._column(group, act.target)[at] = act.value
-        wrong = self.decode(actions, part.agents, at, lambda target: self._column(group, target))
+            group.table.array(places[act.target])[at] = act.value
+        wrong = self.decode(actions, part.agents, at, lambda target: group.table.array(places[target]))
         if wrong >= 0:
             return wrong
         if any("." in name for act in (*self.free, *self.constants) for name in act.names):
@@ -211,11 +216,13 @@ class Decoder:
                 column(name)[at] = values[:, k]
         return -1
 
-    def _column(self, group: Any, target: str) -> np.ndarray:
+    @staticmethod
+    def _place(group: Any, target: str) -> Any:
+        """Place of a target in the table of the group."""
         plugin, _, name = target.rpartition(".")
         binding = next(
             b
             for b in group.autonomies
             if (b.spec.instance_name == plugin if plugin else isinstance(b.spec, Actor))
         )
-        return group.table.array(binding.places[name])  # type: ignore[no-any-return]
+        return binding.places[name]

@@ -349,6 +349,17 @@ class NearestOthers(_Search):
         write, spec = WRITERS[out.dtype]["nearest_apart"], self._features[0]
         write(floats, who, wanted, places, arrays, spec, numbers, self.radius, team, out)
 
+    def _by_row(self, part: AgentRows, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Agent, or -1, and wanted team of each row of the part's span; kept while rows stay."""
+        key = part.block, part.span, self.of
+        rows, *known = part.kept.get(key, (None,))
+        if rows is not part.rows:
+            first, last = part.span
+            agent, teams = np.full(last - first, -1), np.zeros(last - first)
+            agent[part.rows - first], teams[part.rows - first] = part.agents, wanted
+            rows, *known = part.kept[key] = part.rows, agent, teams
+        return known[0], known[1]
+
     def _write_blocks(
         self,
         simulation: Simulation,
@@ -365,8 +376,7 @@ class NearestOthers(_Search):
         world_start, keys, strips, _, _, points = index.table
         places = index.members, strips[1], index.order, world_start, keys, points
         table = *places, bodies.by_place(index, "team", split)[0]
-        agent, teams = np.full(last - first, -1), np.zeros(last - first)
-        agent[part.rows - first], teams[part.rows - first] = part.agents, wanted
+        agent, teams = self._by_row(part, wanted)
         who, found = (agent, first, bodies.team), (blocks.cuts, blocks.spans, blocks.points)
         write, spec = WRITERS[out.dtype]["nearest"], self._features[0]
         simulation.state.context.split(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,8 @@ from pettingzoo import ParallelEnv
 from tussle.errors import ParameterError, nearest_name
 from tussle.rl.environments import Pictures, check_options, metadata_of
 from tussle.rl.swarm import Swarm
+
+DTYPE, SHAPE = attrgetter("dtype"), attrgetter("shape")
 
 
 class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # PettingZoo has no types
@@ -26,16 +29,17 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
         self.metadata = {**metadata_of(self.task), "name": name, "is_parallelizable": True}
         self.possible_agents = list(self.task.agent_names)
         self.agents: list[str] = []
+        self._at: Any = []  # their numbers
         self._number = {name: a for a, name in enumerate(self.possible_agents)}
         self.observation_spaces = {name: self.task.observation_space(a) for name, a in self._number.items()}
         self.action_spaces = {name: self.task.action_space(a) for name, a in self._number.items()}
-        self._widths = [self.observation_spaces[name].shape[0] for name in self.possible_agents]
-        self._is_same_width = len(set(self._widths)) == 1
+        self._width = {name: space.shape[0] for name, space in self.observation_spaces.items()}
+        self._is_same_width = len(set(self._width.values())) == 1
         swarm = self.swarm
         kind = self.task.dtype if swarm.is_continuous else np.int64
         self._actions = np.zeros((swarm.n_agents, swarm.action_width), kind)
-        shapes = {space.shape for space in self.action_spaces.values()}
-        self._shape = shapes.pop() if len(shapes) == 1 else None
+        self._shapes = {space.shape for space in self.action_spaces.values()}
+        self._none = dict.fromkeys(self.possible_agents, False)
         self._pictures = Pictures(swarm, render_mode)
 
     def observation_space(self, agent: str) -> Any:
@@ -44,13 +48,11 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
     def action_space(self, agent: str) -> Any:
         return self.action_spaces[agent]
 
-    def _observed(self, agents: list[str]) -> dict[str, np.ndarray]:
-        obs = self.swarm.obs[0].copy()
+    def _observed(self, agents: list[str], numbers: Any) -> dict[str, np.ndarray]:
+        obs = self.swarm.obs[0][numbers]
         if self._is_same_width:
-            if len(agents) == len(obs):
-                return dict(zip(agents, obs, strict=True))
-            return {name: obs[self._number[name]] for name in agents}
-        return {name: obs[a, : self._widths[a]] for name in agents for a in [self._number[name]]}
+            return dict(zip(agents, obs.copy() if isinstance(numbers, slice) else obs, strict=True))
+        return {name: row[: self._width[name]].copy() for name, row in zip(agents, obs, strict=True)}
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
@@ -58,8 +60,9 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
         """Start a new episode; `options` may have "params", parameters by path."""
         self.swarm.reset(seed, None, check_options(options).get("params"))
         self.agents = self._living()
+        self._at = self._numbers(self.agents)
         self._pictures.follow()
-        return self._observed(self.agents), {name: {} for name in self.agents}
+        return self._observed(self.agents, self._at), {name: {} for name in self.agents}
 
     def _living(self) -> list[str]:
         alive = self.swarm.alive[0]
@@ -85,16 +88,13 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
         self._pictures.follow()
         dead = swarm.terminations[0]
         self.agents = [] if swarm.over[0] else self._living()
-        numbers: Any = slice(None)
-        if self.agents == before:
-            reported = before
-        else:
+        reported, numbers = before, self._at
+        if self.agents != before:
             reported = before + [name for name in self.agents if name not in set(before)]
             self.agents = [name for name in self.agents if not dead[self._number[name]]]
-        if len(reported) < len(self.possible_agents) or reported is not before:
-            numbers = [self._number[name] for name in reported]
+            numbers, self._at = self._numbers(reported), self._numbers(self.agents)
         rewards, deaths, ends = (
-            dict(zip(reported, values[0, numbers].tolist(), strict=True))
+            self._by_name(reported, values[0, numbers])
             for values in (swarm.rewards, swarm.terminations, swarm.truncations)
         )
         infos: dict[str, dict[str, Any]] = {name: {} for name in reported}
@@ -104,11 +104,20 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
                     "r": float(swarm.returns[0, self._number[name]]),
                     "l": int(swarm.lengths[0]),
                 }
-        return self._observed(reported), rewards, deaths, ends, infos
+        return self._observed(reported, numbers), rewards, deaths, ends, infos
+
+    def _by_name(self, agents: list[str], values: np.ndarray) -> dict[str, Any]:
+        if len(agents) == len(self._none) and values.dtype == bool and not values.any():
+            return self._none.copy()
+        return dict(zip(agents, values.tolist(), strict=True))
+
+    def _numbers(self, agents: list[str]) -> Any:
+        """Index of these agents in arrays."""
+        return slice(None) if agents == self.possible_agents else [self._number[name] for name in agents]
 
     def _take(self, actions: Mapping[str, Any]) -> None:
         """Write the actions to one array."""
-        if actions.keys() != set(self.agents):
+        if list(actions) != self.agents and actions.keys() != set(self.agents):
             for name in actions:
                 if name not in self.agents:
                     known = name in self._number
@@ -121,22 +130,21 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
             missing = next(name for name in self.agents if name not in actions)
             raise ParameterError(f"the action of {missing!r} is missing")
         many = [actions[name] for name in self.agents]
-        numbers: Any = slice(None)
-        if len(many) < len(self._actions):
-            numbers = [self._number[name] for name in self.agents]
+        if not (many and self._take_rows(many)):
+            self._take_each(many)
+
+    def _take_rows(self, many: list[Any]) -> bool:
+        """Write actions of the space's type and shape; return False if these differ."""
+        if len(self._shapes) > 1:
+            return False
         try:
-            dtypes, given = {value.dtype for value in many}, np.array(many)
-        except (AttributeError, ValueError):  # numbers of Python, or shapes that differ
-            self._take_each(many)
-            return
-        if (
-            dtypes != {given.dtype}
-            or given.dtype.kind != self._actions.dtype.kind
-            or given.shape[1:] != self._shape
-        ):
-            self._take_each(many)
-        else:
-            self._actions[numbers] = given.reshape(len(many), -1)
+            if set(map(DTYPE, many)) != {self._actions.dtype} or set(map(SHAPE, many)) != self._shapes:
+                return False
+            rows = np.frombuffer(b"".join(many), self._actions.dtype)  # faster than np.array(many)
+        except (AttributeError, BufferError):
+            return False
+        self._actions[self._at] = rows.reshape(len(many), -1)
+        return True
 
     def _take_each(self, many: list[Any]) -> None:
         """Write actions that differ in shape or type, and say which is wrong."""
