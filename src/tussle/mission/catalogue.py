@@ -72,7 +72,7 @@ class Catalogue:
         names: Names of all plugins, sorted.
 
     Raises:
-        MissionError: A file cannot be imported, or defines no plugin; or there are no such laws.
+        MissionError: A file cannot be imported, or defines no plugin and no Task; or there are no such laws.
     """
 
     def __init__(self, plugin_files: Iterable[str | Path | PluginFile] = (), compat: str = "") -> None:

@@ -32,6 +32,8 @@ PREFIX = "tussle_plugins_"
 DIGEST = "__plugin_file_digest__"
 """Attribute of a file's module: hash of the texts that it was made from, its own and those that it imports."""
 INIT = "__init__"
+STANDS_ALONE = "_stands_alone"
+"""Attribute of classes, such as tasks of learners, that a file may define without a plugin."""
 BINDINGS = "scrimmage"
 """Module of SCRIMMAGE's Python interface, which plugin files import from tussle."""
 
@@ -88,7 +90,7 @@ class PluginFile:
         disk, so the plugins can be loaded on a machine that does not have the files.
 
         Raises:
-            MissionError: It cannot be imported, or defines no plugin; the message has the file's line.
+            MissionError: It cannot be imported, or defines no plugin and no Task; the message has the file's line.
         """
         self._register()
         try:
@@ -98,14 +100,15 @@ class PluginFile:
             raise MissionError(
                 f"{self._line(error)}: it cannot be imported: {type(error).__name__}: {error}"
             ) from error
-        found = {
+        classes = {
             key: value
             for key, value in vars(module).items()
-            if isinstance(value, type) and issubclass(value, Plugin) and value.__module__ == self.module
+            if isinstance(value, type) and value.__module__ == self.module
         }
-        if not found:
+        found = {key: value for key, value in classes.items() if issubclass(value, Plugin)}
+        if not found and not any(hasattr(value, STANDS_ALONE) for value in classes.values()):
             raise MissionError(
-                f"{self.path}: it defines no plugin (a class derived from Autonomy, MotionModel, ...)"
+                f"{self.path}: it defines no plugin (a class derived from Autonomy, MotionModel, ...) and no Task"
             )
         return found
 
@@ -152,7 +155,7 @@ def load_plugin_file(path: str | Path) -> dict[str, type[Plugin]]:
     """Import a Python file and return the plugins that it defines, by class name (see `PluginFile.load`).
 
     Raises:
-        MissionError: It cannot be read or imported, or defines no plugin.
+        MissionError: It cannot be read or imported, or defines no plugin and no Task.
     """
     return PluginFile.of(path).load()
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,8 @@ BATCH = 64
 MOST_BYTES = 256 * 2**20
 """Largest policy: a perceptron with layers of 4096 has 64 MiB."""
 
+MOST_MEMORY = 4 * 2**30
+"""Memory of the weights and layers of all policies in a process: a few nodes could otherwise ask for any amount."""
 MOST_POLICIES = 64
 """Policies of a folder."""
 
@@ -53,6 +55,8 @@ class Policy:
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads = options.inter_op_num_threads = 1
         options.use_deterministic_compute = True
+        if has_limited_memory():
+            options.add_session_config_entry("session.use_env_allocators", "1")
         options.log_severity_level = 4
         try:
             session = onnxruntime.InferenceSession(
@@ -64,6 +68,7 @@ class Policy:
         self.task = session.get_modelmeta().custom_metadata_map.get(TASK_KEY, "")
         self.width, self.n_out = self._checked(session.get_inputs()), self._checked(session.get_outputs())
         self._names = session.get_inputs()[0].name, session.get_outputs()[0].name
+        self._run(np.zeros((BATCH, self.width), np.float32))
 
     def _refused(self, why: str) -> ParameterError:
         return ParameterError(f"Learned.policy = {self.path!r}: {why}")
@@ -128,8 +133,31 @@ class Policy:
         for first in range(0, n, BATCH):
             some = min(BATCH, n - first)
             rows[:some], rows[some:] = obs[first : first + some], 0.0
-            out[first : first + some] = self._session.run([self._names[1]], {self._names[0]: rows})[0][:some]
+            out[first : first + some] = self._run(rows)[:some]
         return out
+
+    def _run(self, rows: np.ndarray) -> Any:
+        try:
+            return self._session.run([self._names[1]], {self._names[0]: rows})[0]
+        except Exception as error:  # noqa: BLE001 - the runtime has a class for each of its codes
+            raise self._refused(f"onnxruntime cannot apply it: {str(error).splitlines()[0][:200]}") from None
+
+
+@cache
+def has_limited_memory() -> bool:
+    """Limit the memory of the policies of this process; false where onnxruntime does not let us."""
+    import onnxruntime
+
+    memory = onnxruntime.OrtMemoryInfo(
+        "Cpu", onnxruntime.OrtAllocatorType.ORT_ARENA_ALLOCATOR, 0, onnxruntime.OrtMemType.DEFAULT
+    )
+    try:
+        onnxruntime.create_and_register_allocator(
+            memory, onnxruntime.OrtArenaCfg({"max_mem": MOST_MEMORY, "arena_extend_strategy": 1})
+        )
+    except Exception:  # noqa: BLE001 - another library of this process has registered one
+        return False
+    return True
 
 
 def tensors_of(graph: Any, refused: Callable[[str], ParameterError]) -> Iterator[Any]:

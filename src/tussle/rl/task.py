@@ -62,6 +62,7 @@ class Task:
     opponents: str = ""
     is_symmetric: bool = False
     margin: str = ""
+    _stands_alone: ClassVar[bool] = True  # a file of --plugin-path may define tasks only
 
     def __init__(self, **values: Any) -> None:
         known = [k for k in Task.__annotations__ if not k.startswith("_")]

@@ -1,15 +1,8 @@
 """A game of two equal sides, as a file of plugins: each side's predators catch the other side; who flies by a policy catches nobody."""
 
-from tussle.api import Autonomy
 from tussle.mission import Block, Mission
 from tussle.rl import Act, NearestOthers, Own, Task, Term, alive, register
 from tussle.stock import Boids, Predator, SimpleCapture, Unicycle
-
-
-class Waits(Autonomy):
-    """A file of plugins has a plugin."""
-
-    grade = "portable"
 
 
 def side(name, team, x, autonomy=None):

@@ -153,6 +153,19 @@ def test_files_that_are_no_policies_are_refused(tmp_path):
         Policy(str(path))
 
 
+def test_a_small_file_cannot_ask_for_all_memory(tmp_path):
+    path, size = tmp_path / "x.onnx", numpy_helper.from_array(np.array([10**10]), "size")
+    nodes = [
+        helper.make_node("ReduceMax", ["a"], ["most"], keepdims=0),
+        helper.make_node("Expand", ["most", "size"], ["many"]),
+        helper.make_node("ReduceMax", ["many"], ["one"], keepdims=0),
+        helper.make_node("Add", ["a", "one"], ["b"]),
+    ]
+    save(path, nodes, [end("a", "n", 2)], [end("b", "n", 2)], [size])
+    with pytest.raises(ParameterError, match=r"x.onnx': onnxruntime cannot apply it: .*Expand"):
+        Policy(str(path))
+
+
 def test_weights_in_other_files_are_read_from_the_same_folder_only(tmp_path):
     (tmp_path / "in").mkdir()
     weight = np.eye(2, dtype=np.float32)
