@@ -10,7 +10,7 @@ except ImportError:
 
 from tussle.rl.action import Act
 from tussle.rl.environments import TaskEnv, TaskVectorEnv, make, make_vec, register
-from tussle.rl.games import Consensus, NearOrigin, PredatorPrey, PredatorTeam, PreyEscape
+from tussle.rl.games import Consensus, NearOrigin, PredatorPrey, PredatorsAndPrey, PredatorTeam, PreyEscape
 from tussle.rl.observation import Component, Computed, Each, Means, NearestOthers, Own, Sectors
 from tussle.rl.parallel import TaskParallelEnv, parallel_env
 from tussle.rl.policy_file import write_policy
@@ -41,6 +41,7 @@ __all__ = [
     "Own",
     "PredatorPrey",
     "PredatorTeam",
+    "PredatorsAndPrey",
     "PreyEscape",
     "ReachPoint",
     "Sectors",
@@ -78,6 +79,7 @@ for _task in (
     Intercept,
     PredatorPrey,
     PredatorTeam,
+    PredatorsAndPrey,
     PreyEscape,
     ReachPoint,
 ):

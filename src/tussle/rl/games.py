@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from tussle.engine.simulation import Simulation
 from tussle.mission import Block, Mission
 from tussle.rl.action import Act
 from tussle.rl.observation import Computed, NearestOthers, Own
-from tussle.rl.reward import Situation, Term, alive, captured, captures
+from tussle.rl.reward import Situation, Term, alive, captured, captures, closing
 from tussle.rl.task import Task
 from tussle.stock import Predator, SingleIntegrator
 
@@ -36,31 +37,14 @@ class PredatorPrey(Task):
     reward = {"alive": Term(alive, 0.01), "captured": Term(captured, -1.0)}  # noqa: RUF012 - declared as ClassVar in Task
 
 
-def _closing(now: Situation, blocks: str) -> np.ndarray:
-    """Speed at which the distance to the nearest entity of some blocks decreases [m/s], (W, A); 0 without any."""
-    found = [
-        [now.simulation.read(f"{name}.{column}") for name in blocks.split()] for column in ("pos", "vel")
-    ]
-    pos, vel = (np.concatenate([values for values, _ in parts], axis=1) for parts in found)
-    there = np.concatenate([is_there for _, is_there in found[0]], axis=1)
-    offset = np.where(there[:, None, :, None], pos[:, None] - now.pos[:, :, None], np.inf)
-    distance = np.sqrt((offset * offset).sum(axis=-1))
-    near = distance.argmin(axis=-1)
-    length = np.take_along_axis(distance, near[..., None], -1)
-    relative = now.vel - np.take_along_axis(vel[:, None], near[..., None, None], -2)[:, :, 0]
-    with np.errstate(invalid="ignore"):  # where none is left
-        towards = np.take_along_axis(offset, near[..., None, None], -2)[:, :, 0] / length
-        return np.where(np.isfinite(length[..., 0]), (relative * towards).sum(axis=-1), 0.0)
-
-
 def closing_speed(now: Situation) -> np.ndarray:
     """Speed at which the distance to the nearest prey decreases [m/s], (W, A); 0 without prey."""
-    return _closing(now, "prey")
+    return closing(now, "prey")
 
 
 def opening_speed(now: Situation) -> np.ndarray:
     """Speed at which the distance to the nearest predator increases [m/s], (W, A); 0 without predators."""
-    return -_closing(now, "keepers switchers")
+    return -closing(now, "keepers switchers")
 
 
 class PreyEscape(Task):
@@ -92,7 +76,7 @@ class PredatorTeam(Task):
     mission = "predator_prey"
     learners = "switchers"
     decide_every = 2
-    observation = (
+    observation: ClassVar[Any] = (
         Own("vel", scale=35.0, frame="heading"),
         NearestOthers(
             3,
@@ -103,7 +87,7 @@ class PredatorTeam(Task):
         ),
         NearestOthers(1, "direction distance present", of="own", scale={"distance": 300.0}, frame="body"),
     )
-    action = (
+    action: ClassVar[Any] = (
         Act("speed", value=35.0),
         Act("turn_rate", -2.0, 2.0),
         Act("pitch_rate", -1.5, 1.5),
@@ -116,11 +100,27 @@ class PredatorTeam(Task):
         """The mission, in which the predators of the learner only claim."""
         mission = super().given
         claims = Predator(max_speed=35.0, capture_range=5.0, pursue=False)
+        hunters = set(self.learners.split()) & {"keepers", "switchers"}
         return mission.replace(
-            blocks=[
-                b.replace(autonomy=claims) if b.name in self.learners.split() else b for b in mission.blocks
-            ]
+            blocks=[b.replace(autonomy=claims) if b.name in hunters else b for b in mission.blocks]
         )
+
+
+class PredatorsAndPrey(PredatorTeam):
+    """The paper's game in which all learn: 100 prey, and two teams of five predators."""
+
+    learners = "prey keepers switchers"
+    observation = {  # noqa: RUF012
+        "prey": PreyEscape.observation,
+        "keepers": PredatorTeam.observation,
+        "switchers": PredatorTeam.observation,
+    }
+    action = {  # noqa: RUF012
+        "prey": PreyEscape.action,
+        "keepers": PredatorTeam.action,
+        "switchers": PredatorTeam.action,
+    }
+    reward = {"captures": Term(captures), "captured": Term(captured, -1.0)}  # noqa: RUF012 - declared as ClassVar in Task
 
 
 def robots(count: int, spread: float) -> Mission:
@@ -180,4 +180,4 @@ class Consensus(Task):
     reward = {"near": Term(near_others)}  # noqa: RUF012 - declared as ClassVar in Task
 
 
-__all__ = ["Consensus", "NearOrigin", "PredatorPrey", "PredatorTeam", "PreyEscape"]
+__all__ = ["Consensus", "NearOrigin", "PredatorPrey", "PredatorTeam", "PredatorsAndPrey", "PreyEscape"]

@@ -111,6 +111,23 @@ def collisions(now: Situation) -> np.ndarray:
     return np.asarray(now.count("collision") + now.count("collision", "other"))
 
 
+def closing(now: Situation, blocks: str) -> np.ndarray:
+    """Speed at which the distance to the nearest entity of some blocks decreases [m/s], (W, A); 0 without any."""
+    found = [
+        [now.simulation.read(f"{name}.{column}") for name in blocks.split()] for column in ("pos", "vel")
+    ]
+    pos, vel = (np.concatenate([values for values, _ in parts], axis=1) for parts in found)
+    there = np.concatenate([is_there for _, is_there in found[0]], axis=1)
+    offset = np.where(there[:, None, :, None], pos[:, None] - now.pos[:, :, None], np.inf)
+    distance = np.sqrt((offset * offset).sum(axis=-1))
+    near = distance.argmin(axis=-1)
+    length = np.take_along_axis(distance, near[..., None], -1)
+    relative = now.vel - np.take_along_axis(vel[:, None], near[..., None, None], -2)[:, :, 0]
+    with np.errstate(invalid="ignore"):  # where none is left
+        towards = np.take_along_axis(offset, near[..., None, None], -2)[:, :, 0] / length
+        return np.where(np.isfinite(length[..., 0]), (relative * towards).sum(axis=-1), 0.0)
+
+
 USES_EVENTS = (captures, captured, collisions)
 
 
@@ -154,4 +171,4 @@ class Term:
             out *= now.was_alive
 
 
-__all__ = ["Situation", "Term", "alive", "captured", "captures", "collisions", "died"]
+__all__ = ["Situation", "Term", "alive", "captured", "captures", "closing", "collisions", "died"]

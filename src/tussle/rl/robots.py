@@ -28,6 +28,8 @@ from tussle.stock import (
 
 GOAL = (100.0, 0.0, 0.0)
 """Goal of `FindWay` [m]."""
+HOVER = (0.0, 0.0, 10.0)
+"""Place of `Hover` [m]."""
 SPACING = (5.0, 20.0)
 """Distances of the nearest other in a flock that are neither too small nor too large [m]."""
 SENSED, HEARD, FIELD = 25.0, 60.0, 100.0
@@ -68,7 +70,18 @@ class ReachPoint(Task):
 
 def hovering(now: Situation) -> np.ndarray:
     """Nearness to the point 10 m above the origin: 1 there, 1/e at 10 m, (W, A)."""
-    return np.asarray(np.exp(-np.linalg.norm(now.pos - (0.0, 0.0, 10.0), axis=-1) / 10.0))
+    return np.asarray(np.exp(-np.linalg.norm(now.pos - HOVER, axis=-1) / 10.0))
+
+
+def towards(now: Situation, goal: tuple[float, float, float]) -> np.ndarray:
+    """Speed at which the distance to a point decreases [m/s], (W, A)."""
+    offset = goal - now.pos
+    return np.asarray((offset * now.vel).sum(axis=-1) / np.maximum(np.linalg.norm(offset, axis=-1), 1e-9))
+
+
+def approaching(now: Situation) -> np.ndarray:
+    """Speed towards the point 10 m above the origin [m/s], (W, A)."""
+    return towards(now, HOVER)
 
 
 class Hover(Task):
@@ -87,10 +100,10 @@ class Hover(Task):
     action = (
         Act("x_thrust", -5.0, 5.0),
         Act("y_thrust", -5.0, 5.0),
-        Act("z_thrust", 9.81 - 5.0, 9.81 + 5.0),
+        Act("z_thrust", -5.0, 5.0),
         Act("turn_force", value=0.0),
     )
-    reward = {"near": Term(hovering, 0.01)}  # noqa: RUF012
+    reward = {"near": Term(hovering, 0.01), "approach": Term(approaching, 0.001)}  # noqa: RUF012
 
 
 def way(**plugins: Any) -> Mission:
@@ -108,10 +121,7 @@ def way(**plugins: Any) -> Mission:
 
 def progress(now: Situation) -> np.ndarray:
     """Speed towards the goal [m/s]; 0 within 10 m of it, (W, A)."""
-    offset = GOAL - now.pos
-    distance = np.linalg.norm(offset, axis=-1)
-    closing = (offset * now.vel).sum(axis=-1) / np.maximum(distance, 1e-9)
-    return np.where(now.alive & (distance > 10.0), closing, 0.0)
+    return np.where(now.alive & (np.linalg.norm(GOAL - now.pos, axis=-1) > 10.0), towards(now, GOAL), 0.0)
 
 
 def there(now: Situation) -> np.ndarray:
@@ -194,13 +204,23 @@ def linked(now: Situation) -> np.ndarray:
         found = more
 
 
-def covered(now: Situation) -> np.ndarray:
-    """Share of the field within the sensors of linked robots, on a grid of 10 m, (W, 1)."""
+def seen(now: Situation) -> np.ndarray:
+    """Places of the field, on a grid of 10 m, that each linked robot senses, (W, A, n)."""
     places = np.arange(-FIELD + 5.0, FIELD, 10.0)
-    reach = SENSED * SENSED
     x, y = ((now.pos[..., k, None] - places) ** 2 for k in (0, 1))
-    sees = (x[..., :, None] + y[..., None, :] < reach) & linked(now)[..., None, None]
-    return np.asarray(sees.any(axis=1).mean(axis=(1, 2))[:, None])
+    sees = (x[..., :, None] + y[..., None, :] < SENSED * SENSED) & linked(now)[..., None, None]
+    return np.asarray(sees.reshape(*now.alive.shape, -1))
+
+
+def covered(now: Situation) -> np.ndarray:
+    """Share of the field within the sensors of linked robots, (W, 1)."""
+    return np.asarray(seen(now).any(axis=1).mean(axis=-1)[:, None])
+
+
+def covered_alone(now: Situation) -> np.ndarray:
+    """Share of the field that only this robot sees: the difference reward of Wolpert and Tumer (2002), but for its links, (W, A)."""
+    sees = seen(now)
+    return np.asarray((sees & (sees.sum(axis=1, keepdims=True) == 1)).mean(axis=-1))
 
 
 class Coverage(Task):
@@ -224,7 +244,7 @@ class Coverage(Task):
         NearestOthers(6, radius=HEARD, planar=True, columns="offset present", scale={"offset": HEARD}),
     )
     action = (Act("velocity_x", -5.0, 5.0), Act("velocity_y", -5.0, 5.0))
-    reward = {"covered": Term(covered, 0.01)}  # noqa: RUF012
+    reward = {"covered": Term(covered, 0.01), "alone": Term(covered_alone, 0.1)}  # noqa: RUF012
     decide_every = 5
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from tussle.api import Interaction, Param, neighbors
 from tussle.mission import Block, Mission
 from tussle.rl.action import Act
 from tussle.rl.observation import NearestOthers, Own
-from tussle.rl.reward import Situation, Term, captured, captures, died
+from tussle.rl.reward import Situation, Term, captured, captures, closing, died
 from tussle.rl.task import Task
 from tussle.stock import (
     Boundary,
@@ -64,6 +65,11 @@ def are_at_flag(now: Situation) -> np.ndarray:
     return np.asarray((is_alive & (np.linalg.norm(pos, axis=-1) <= FLAG_RADIUS)).any(axis=1)[:, None])
 
 
+def closing_in(now: Situation) -> np.ndarray:
+    """Speed at which the distance to the nearest raider decreases [m/s], (W, A); 0 without raiders."""
+    return closing(now, "raiders")
+
+
 class Intercept(Task):
     """Five defenders catch five raiders before one of them takes the flag; who caught one cannot catch for 5 s."""
 
@@ -75,7 +81,10 @@ class Intercept(Task):
         NearestOthers(4, of="own", planar=True, scale={"offset": 100.0, "relative_vel": 15.0}),
     )
     action = (Act("velocity_x", -15.0, 15.0), Act("velocity_y", -15.0, 15.0), Act("velocity_z", value=0.0))
-    reward = {"captures": Term(captures, 1.0), "flag": Term(are_at_flag, -1.0)}  # noqa: RUF012
+    reward = {  # noqa: RUF012
+        "captures": Term(captures, 1.0), "flag": Term(are_at_flag, -1.0), "closing": Term(closing_in, 0.001),
+    }  # fmt: skip
+    decide_every = 5
 
     def ends(self, now: Situation) -> Any:
         return are_at_flag(now)[:, 0]
@@ -171,6 +180,14 @@ def balance(now: Situation) -> np.ndarray:
     return np.asarray(red - blue)[:, None]
 
 
+def hits(now: Situation, enemy: str) -> np.ndarray:
+    """Enemies within reach, which the agent hits and which hit it, (W, A)."""
+    pos, there = now.simulation.read(f"{enemy}.pos")
+    squares = ((now.pos[..., None, k] - pos[:, None, :, k]) ** 2 for k in range(3))
+    reach: Any = Fire.reach.default
+    return np.asarray(((sum(squares) < reach * reach) & there[:, None]).sum(axis=-1))
+
+
 class Battle(Task):
     """100 against 100: the red army learns, the blue one attacks by rule. Each damages all enemies within 6 m."""
 
@@ -184,7 +201,9 @@ class Battle(Task):
         NearestOthers(8, radius=60.0, planar=True, columns="offset same_team present", scale={"offset": 60.0}, frame="heading"),
     )  # fmt: skip
     action = (Act("turn_rate", -2.0, 2.0), Act("speed", 0.0, 10.0), Act("pitch_rate", value=0.0))
-    reward = {"balance": Term(balance, 0.01), "died": Term(died, -0.1)}  # noqa: RUF012
+    reward = {  # noqa: RUF012
+        "balance": Term(balance, 0.05), "hits": Term(partial(hits, enemy="blue"), 0.01), "died": Term(died, -0.1),
+    }  # fmt: skip
 
 
 class BattleBlue(Battle):
@@ -193,7 +212,9 @@ class BattleBlue(Battle):
     learners = "blue"
     opponents = "tussle/Battle-v0"
     margin = "alive[2]-alive[1]"
-    reward = {**Battle.reward, "balance": Term(balance, -0.01)}  # noqa: RUF012
+    reward = {  # noqa: RUF012
+        **Battle.reward, "balance": Term(balance, -0.05), "hits": Term(partial(hits, enemy="red"), 0.01),
+    }  # fmt: skip
 
 
 __all__ = ["Battle", "BattleBlue", "CaptureTheFlag", "CaptureTheFlagRed", "Intercept"]

@@ -6,7 +6,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from tussle.rl import Consensus, PredatorTeam, make_swarm
+from tussle.rl import Consensus, PredatorsAndPrey, PredatorTeam, make_swarm
 
 
 @pytest.mark.parametrize(
@@ -75,3 +75,29 @@ def test_the_team_observes_the_direction_of_prey_and_earns_captures():
         pos, _ = swarm.simulation.read("switchers.pos")
     assert earned > 3
     assert np.isfinite(pos).any()
+
+
+def test_policies_of_either_side_play_where_all_learn():
+    pytest.importorskip("onnxruntime", reason="onnxruntime is not installed: pip install 'tussle[policy]'")
+    pytest.importorskip("onnx", reason="onnx is not installed: pip install 'tussle[policy]'")
+    from tussle.rl.flight import Policy
+    from tussle.stock.autonomy.learned.plugin import policy_path
+
+    hunt, flee = Policy(policy_path("predator_team")), Policy(policy_path("prey_escape"))
+
+    def captures(flees):
+        with make_swarm(PredatorsAndPrey(time_limit=60.0), 2) as swarm:
+            obs, n_captures, n_prey = swarm.reset(seed=1), 0.0, swarm.task.capacities[0]
+            actions = np.zeros((2, swarm.n_agents, swarm.action_width), np.float32)
+            sides = [(hunt, slice(n_prey, None)), *([(flee, slice(n_prey))] if flees else [])]
+            for _ in range(300):
+                for policy, who in sides:
+                    seen = obs[:, who, : policy.width]
+                    out = policy(seen.reshape(-1, policy.width)).clip(-1.0, 1.0)
+                    actions[:, who] = out.reshape(*seen.shape[:2], -1)
+                obs, *_ = swarm.step(actions)
+                n_captures += swarm.terms["captures"].sum()
+                assert swarm.terms["captures"].sum() == -swarm.terms["captured"].sum()
+            return n_captures
+
+    assert captures(flees=False) > captures(flees=True) + 5.0

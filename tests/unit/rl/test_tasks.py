@@ -36,7 +36,7 @@ def test_gymnasium_makes_it(name):
 def test_an_episode_does_not_depend_on_the_others():
     alone = [evaluate(rl.Intercept, n_episodes=1, seed=seed) for seed in (1, 2, 3)]
     together = evaluate(rl.Intercept, n_episodes=3)
-    assert sorted(together) == ["captures", "flag", "return"]
+    assert sorted(together) == ["captures", "closing", "flag", "return"]
     for name, values in together.items():
         assert values.tolist() == [float(one[name][0]) for one in alone]
 
