@@ -10,6 +10,7 @@ import numpy as np
 
 from tussle.api import Autonomy
 from tussle.engine.simulation import Simulation
+from tussle.engine.wiring import written_channels
 from tussle.errors import ParameterError, RosError
 from tussle.mission import Block, Mission
 from tussle.numeric.quaternion import quat_from_euler, quat_rotate, quat_rotate_inverse, quat_to_yaw
@@ -42,7 +43,7 @@ class AutonomyHost:
         self.simulation = Simulation(mission, seed)
         self._paths = {
             channel: (f"robot.{plugin.instance_name}.{name}", i if len(column.channels) > 1 else None)
-            for name, column in plugin.outputs().items()
+            for name, column in written_channels(plugin).items()
             for i, channel in enumerate(column.channels)
         }
         if not set(DRIVES) & set(self._paths):

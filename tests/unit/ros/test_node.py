@@ -12,7 +12,7 @@ from tussle import Block, Mission, Simulation
 from tussle.api import EasyAutonomy, Output, Param, State
 from tussle.bridges.ros_node import AutonomyHost, set_twist, state_of
 from tussle.errors import ParameterError, RosError
-from tussle.stock import ShapeDraw, Unicycle
+from tussle.stock import Learned, ShapeDraw, Unicycle
 
 COLUMNS = "pos", "vel", "quat", "omega"
 
@@ -64,6 +64,27 @@ def test_the_outputs_of_a_node_are_those_of_the_simulation_bit_for_bit():
         }
         assert host.step(state) == expected
     assert expected["turn_rate"] != 0.0
+
+
+def test_a_policy_flies_a_robot_as_it_flies_in_a_simulation(tmp_path):
+    rl = pytest.importorskip("tussle.rl", reason="gymnasium is not installed: pip install 'tussle[rl]'")
+    for package in ("onnx", "onnxruntime"):
+        pytest.importorskip(package, reason=f"{package} is not installed: pip install 'tussle[policy]'")
+    task, path = rl.ReachPoint(), tmp_path / "policy.onnx"
+    weights = np.random.default_rng(1).normal(size=(2, sum(task.widths["robot"])))
+    rl.write_policy(path, [(weights, [0.1, 0.2])], task="tussle/ReachPoint-v0")
+    blocks = [task.given.blocks[0].replace(autonomy=Learned(policy=str(path)))]
+    simulation = Simulation(task.given.replace(blocks=blocks), seeds=3)
+    host = AutonomyHost(Learned(policy=str(path)), task.given.dt)
+    for _ in range(20):
+        state = {name: simulation.read(f"robot.{name}")[0][0, 0] for name in COLUMNS}
+        simulation.step()
+        outputs = host.step(state)
+        expected = [simulation.read(f"robot.Learned.{name}")[0][0, 0] for name in ("speed", "turn_rate")]
+        assert [outputs["speed"], outputs["turn_rate"]] == expected
+    twist = SimpleNamespace(linear=vector([0.0] * 3), angular=vector([0.0] * 3))
+    set_twist(twist, outputs, state["quat"])
+    assert twist.linear.x == expected[0] != 0.0
 
 
 def test_an_odom_gives_the_state_in_the_world_frame():
