@@ -6,10 +6,12 @@ import io
 import json
 import struct
 import zlib
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import trimesh
+from mcap.reader import make_reader
 from page_reader import PageReader
 from PIL import Image
 from recorded_games import record
@@ -22,7 +24,9 @@ from tussle.rays.textures import MOST_SIDE, decoded
 from tussle.view import Live, Recording
 from tussle.view.export.film.cameras import View
 from tussle.view.export.film.renderer import Renderer
+from tussle.view.export.foxglove_scene import textured_model
 from tussle.view.export.html import write_html
+from tussle.view.export.mcap_file import write_mcap
 from tussle.view.frame import empty_frame
 from tussle.view.page.document import scenery_blobs
 
@@ -103,9 +107,31 @@ def test_a_picture_shows_the_texture_with_its_upper_edge_in_the_north(recorded):
     assert is_red_over_blue(from_above(recorded.style, recorded.scenery))
 
 
-def test_foxglove_gets_the_colours_of_the_texture(recorded):
-    colours = recorded.scenery.terrain.part().corner_colours().reshape(5, 5, 3)
-    assert (colours[0].tolist(), colours[-1].tolist()) == ([[*BLUE]] * 5, [[*RED]] * 5)
+def test_foxglove_gets_the_surface_with_its_image(recorded):
+    part = replace(recorded.scenery.terrain.part(), colours=np.full((25, 3), (255, 128, 0), np.uint8))
+    message = textured_model(part).encode()
+    model = message[message.index(b"glTF") :]
+    model = model[: struct.unpack_from("<I", model, 8)[0]]
+    (shown,) = trimesh.load_scene(io.BytesIO(model), file_type="glb").geometry.values()
+    # In glTF, y is up and z is south.
+    assert np.allclose(shown.vertices * (1, 1, -1), part.vertices[:, [0, 2, 1]])
+    image, uv = np.asarray(shown.visual.material.baseColorTexture), np.asarray(shown.visual.uv)
+    assert image.tolist() == photo().tolist()
+    assert uv[part.vertices[:, 1] == part.vertices[:, 1].max(), 1].tolist() == [1.0] * 5
+    content = json.loads(model[20 : 20 + struct.unpack_from("<I", model, 12)[0]])
+    assert "COLOR_0" in content["meshes"][0]["primitives"][0]["attributes"]
+
+
+def test_an_mcap_file_has_the_image_of_the_terrain(recorded, tmp_path):
+    write_mcap(recorded, tmp_path / "run.mcap")
+    with (tmp_path / "run.mcap").open("rb") as file:
+        scenes = [
+            message.data
+            for _, channel, message in make_reader(file).iter_messages()
+            if b"glTF" in message.data
+        ]
+    assert len(scenes) == 1
+    assert b"model/gltf-binary" in scenes[0]
 
 
 def test_rays_and_hashes_are_the_same_without_it(hilly):

@@ -94,13 +94,43 @@ def triangles(mesh: Mesh, rgb: Colour, opacity: float = 1.0) -> fg.TriangleListP
 
 
 def coloured_triangles(part: MeshPart) -> fg.TriangleListPrimitive:
-    """A surface in the colours of its corners: these primitives have no images."""
+    """A surface in the colours of its corners."""
     from foxglove.messages import Color, TriangleListPrimitive
 
     colours = [Color(r=r, g=g, b=b, a=1.0) for r, g, b in (part.corner_colours() / 255.0).tolist()]
     return TriangleListPrimitive(
         pose=pose(), points=points(part.vertices), colors=colours, indices=part.faces.ravel().tolist()
     )
+
+
+def textured_model(part: MeshPart) -> fg.ModelPrimitive:
+    """A surface with its image, as binary glTF."""
+    from foxglove import messages as fg
+    from PIL import Image
+    from trimesh import Trimesh  # whoever has read an image has the packages of tussle[scene]
+    from trimesh.visual.material import PBRMaterial
+    from trimesh.visual.texture import TextureVisuals
+
+    image = Image.fromarray(np.asarray(part.image))
+    material = PBRMaterial(  # type: ignore[no-untyped-call]
+        baseColorTexture=image, metallicFactor=0.0, roughnessFactor=1.0
+    )
+    visual = TextureVisuals(uv=part.uv, material=material)  # type: ignore[no-untyped-call]
+    visual.vertex_attributes["color"] = np.pad(part.colours, [(0, 0), (0, 1)], constant_values=255)
+    vertices = part.vertices[:, [0, 2, 1]] * (1.0, 1.0, -1.0)  # y is up in glTF
+    data: Any = Trimesh(vertices, part.faces, visual=visual, process=False).export(file_type="glb")
+    return fg.ModelPrimitive(
+        pose=pose(), scale=fg.Vector3(x=1.0, y=1.0, z=1.0), media_type="model/gltf-binary", data=data
+    )
+
+
+def surfaces(parts: Iterable[MeshPart]) -> dict[str, Any]:
+    """Primitives of parts of a mesh, by kind."""
+    there = list(parts)
+    return {
+        "models": [textured_model(part) for part in there if part.image is not None],
+        "triangles": [coloured_triangles(part) for part in there if part.image is None],
+    }
 
 
 def lines(ends: np.ndarray, rgb: Colour) -> fg.LinePrimitive:
@@ -137,14 +167,14 @@ def scenery_entities(recording: Recording, ns: int) -> list[fg.SceneEntity]:
         found.append(entity(f"base {i}", WORLD, ns, notes=[("team", str(base.team))], spheres=[sphere]))
     for region in scenery.boundaries:
         rgb = style.colour(region.team) if region.team else NO_TEAM
-        surfaces = [coloured_triangles(part) for part in region.parts] or [
-            triangles(region.mesh, rgb, 0.3 if region.is_wall else 0.06)
-        ]
-        found.append(entity(region.name, WORLD, ns, triangles=surfaces, lines=[lines(region.outline, rgb)]))
+        shown = surfaces(region.parts)
+        if not region.parts:
+            shown["triangles"] = [triangles(region.mesh, rgb, 0.3 if region.is_wall else 0.06)]
+        found.append(entity(region.name, WORLD, ns, lines=[lines(region.outline, rgb)], **shown))
     if scenery.terrain is not None:
         part = scenery.terrain.part(MAX_HEIGHTS)
-        surface = coloured_triangles(part) if part else triangles(scenery.terrain.mesh(MAX_HEIGHTS), GROUND)
-        found.append(entity("terrain", WORLD, ns, triangles=[surface]))
+        plain: dict[str, Any] = {"triangles": [triangles(scenery.terrain.mesh(MAX_HEIGHTS), GROUND)]}
+        found.append(entity("terrain", WORLD, ns, **(surfaces([part]) if part else plain)))
     return found
 
 
