@@ -17,12 +17,14 @@ from typing import Any
 import numpy as np
 from tag import Tag
 
-from tussle import Block, Mission
+from tussle import Block, Mission, Simulation
+from tussle.mission import read_mission
 from tussle.rl import (
     Act,
     NearestOthers,
     Own,
     PredatorPrey,
+    PredatorTeam,
     Swarm,
     Task,
     Term,
@@ -33,7 +35,7 @@ from tussle.rl import (
     parallel_env,
 )
 from tussle.rl.teams import Fire
-from tussle.stock import Unicycle
+from tussle.stock import Learned, Unicycle
 
 EPISODE = 100
 
@@ -138,7 +140,12 @@ def parallel_case(task: Any, seconds: float) -> dict[str, Any]:
             env.reset()
 
     cpu = timed(step, seconds)
-    return {"agents": 100, "worlds": 1, "floats": env.swarm.obs.shape[-1], "M/s": np.mean(n_agents) / cpu / 1e6}
+    return {
+        "agents": 100,
+        "worlds": 1,
+        "floats": env.swarm.obs.shape[-1],
+        "M/s": np.mean(n_agents) / cpu / 1e6,
+    }
 
 
 def resets(seconds: float) -> float:
@@ -150,6 +157,46 @@ def resets(seconds: float) -> float:
         actions = actions_of(swarm)
         cpu.append(timed(lambda s=swarm, a=actions: s.step(a), seconds, 50))
     return cpu[1] / cpu[0]
+
+
+def two_threads(seconds: float) -> float:
+    """Wall time of one thread over that of two."""
+    wall = []
+    for threads in (1, 2):
+        swarm = make_swarm(Prey, 64, threads=threads)
+        swarm.reset(seed=1)
+        actions = actions_of(swarm)
+        begin, n = time.perf_counter(), 0
+        while time.perf_counter() - begin < seconds:
+            swarm.step(actions)
+            n += 1
+        wall.append(seconds / n)
+    return wall[0] / wall[1]
+
+
+def policies(seconds: float) -> dict[str, float]:
+    """CPU time per step of 64 worlds of the paper's game with policies that ship, over that of the scripted game."""
+    scripted, team = read_mission("predator_prey").mission, PredatorTeam().given
+    learned = {
+        "predator_team": (team, "switchers", Learned(policy="predator_team")),
+        "prey_escape": (scripted, "prey", Learned(policy="prey_escape")),
+    }
+    cpu = {}
+    for name, mission in [("", scripted), *((n, with_policy(*given)) for n, given in learned.items())]:
+        with Simulation(mission, seeds=range(1, 65)) as simulation:
+            cpu[name] = timed(simulation.step, seconds, 30)
+    return {name: cpu[name] / cpu[""] for name in learned}
+
+
+def with_policy(mission: Mission, owner: str, policy: Learned) -> Mission:
+    return mission.replace(
+        blocks=[
+            b.replace(autonomy=(*(b.autonomy if b.name == "switchers" else ()), policy))
+            if b.name == owner
+            else b
+            for b in mission.blocks
+        ]
+    )
 
 
 def main() -> None:
@@ -173,8 +220,15 @@ def main() -> None:
         )
     ratio = resets(s)
     print(f"speed with resets every 50 steps over that without: {ratio:.2f}")
+    threads = two_threads(s)
+    print(f"speed with two threads over that with one, wall time: {threads:.2f}")
+    shares = policies(s)
+    for name, share in shares.items():
+        print(f"game of 64 worlds with the policy {name} over the scripted game: {share:.2f}")
     if options.json:
-        options.json.write_text(json.dumps({**rows, "resets": ratio}, indent=1))
+        options.json.write_text(
+            json.dumps({**rows, "resets": ratio, "threads": threads, "policies": shares}, indent=1)
+        )
 
 
 if __name__ == "__main__":
