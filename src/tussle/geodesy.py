@@ -15,6 +15,7 @@ import numpy as np
 
 from tussle.errors import ParameterError
 from tussle.numeric import atan2, cos, sin
+from tussle.numeric.quaternion import quat_from_euler, quat_multiply, quat_rotate, quat_rotate_inverse
 
 # NGA.STND.0036, Department of Defense World Geodetic System 1984 (2014), table 3.1: both are defining and exact.
 SEMI_MAJOR = 6378137.0
@@ -121,6 +122,20 @@ class Origin:
     def earth_centred(self) -> tuple[float, float, float]:
         """Its position in Earth-centred axes: equator at longitude 0, at 90 degrees east, north pole [m]."""
         return self._frame[1]
+
+    @cached_property
+    def quat(self) -> np.ndarray:
+        """Rotation from the world frame to Earth-centred axes, a quaternion (w, x, y, z), (4,)."""
+        turned = quat_from_euler(0.0, 0.0, self.longitude + 0.5 * math.pi)
+        return np.asarray(quat_multiply(turned, quat_from_euler(0.5 * math.pi - self.latitude, 0.0, 0.0)))
+
+    def to_earth_centred(self, pos: np.ndarray) -> np.ndarray:
+        """Convert world positions [m], (3, n), to positions in Earth-centred axes [m], (3, n)."""
+        return np.asarray(quat_rotate(self.quat, pos) + np.array(self.earth_centred)[:, None])
+
+    def from_earth_centred(self, pos: np.ndarray) -> np.ndarray:
+        """Convert positions in Earth-centred axes [m], (3, n), to world positions [m], (3, n)."""
+        return np.asarray(quat_rotate_inverse(self.quat, pos - np.array(self.earth_centred)[:, None]))
 
     @cached_property
     def _frame(self) -> tuple[tuple[float, float, float, float], tuple[float, float, float]]:
