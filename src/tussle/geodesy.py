@@ -27,6 +27,8 @@ SECOND_ECCENTRICITY_SQUARED = ECCENTRICITY_SQUARED / (1.0 - ECCENTRICITY_SQUARED
 # Bowring's first step is accurate to 1e-9 rad from 100 km below the ground to far above it; each further step gains more digits
 # than that, so the second reaches rounding error and the third is a margin for orbits.
 LATITUDE_STEPS = 3
+FORWARD_RIGHT_DOWN = 0.0, 1.0, 0.0, 0.0
+"""Rotation from forward-right-down to forward-left-up body axes, and back: half a turn about the axis forward."""
 
 
 @dataclass(frozen=True)
@@ -129,6 +131,14 @@ class Origin:
         turned = quat_from_euler(0.0, 0.0, self.longitude + 0.5 * math.pi)
         return np.asarray(quat_multiply(turned, quat_from_euler(0.5 * math.pi - self.latitude, 0.0, 0.0)))
 
+    def earth_attitude(self, quat: np.ndarray) -> np.ndarray:
+        """Attitudes of bodies as DIS and FlightGear define them: from forward-right-down body axes to Earth-centred axes, (4, n).
+
+        Args:
+            quat: From forward-left-up body axes to the world frame, (4, n).
+        """
+        return np.asarray(quat_multiply(quat_multiply(self.quat, quat), FORWARD_RIGHT_DOWN))
+
     def to_earth_centred(self, pos: np.ndarray) -> np.ndarray:
         """Convert world positions [m], (3, n), to positions in Earth-centred axes [m], (3, n)."""
         return np.asarray(quat_rotate(self.quat, pos) + np.array(self.earth_centred)[:, None])
@@ -143,6 +153,11 @@ class Origin:
         angles = sin(self.latitude), cos(self.latitude), sin(self.longitude), cos(self.longitude)
         x, y, z = _earth_centred(*angles, self.altitude)
         return angles, (float(x), float(y), float(z))
+
+
+def to_forward_right_down(quat: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    """Vectors of the world frame, (3, n), in forward-right-down axes, (3, n), of bodies with the attitudes quat, (4, n)."""
+    return np.asarray(quat_rotate_inverse(quat_multiply(quat, FORWARD_RIGHT_DOWN), vector))
 
 
 def _earth_centred(

@@ -471,6 +471,8 @@ def test_random_entities_come_and_go_without_a_fault():
     ("values", "error", "text"),
     [
         ({"address": "no.such.host.invalid"}, ParameterError, "address = 'no.such.host.invalid' is no known host"),
+        ({"types": ((1, 1, 2, 225, 256, 0, 0, 0),)}, ParameterError, "category = 256 of team 1 is not allowed"),
+        ({"types": ((1, 1.5, 2, 225, 0, 0, 0, 0),)}, ParameterError, "kind = 1.5 of team 1 is not allowed"),
         ({"listen_port": 4000}, ParameterError, "listen_port = 4000 needs remote"),
         ({"remote": "gest"}, MissionError, "remote = 'gest' names no block .did you mean 'guest'"),
     ],

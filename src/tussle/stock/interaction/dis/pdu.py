@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from tussle.geodesy import Origin
+from tussle.geodesy import FORWARD_RIGHT_DOWN, Origin, to_forward_right_down
 from tussle.numeric.quaternion import (
     quat_from_euler,
     quat_multiply,
@@ -42,8 +42,6 @@ LAYOUT = np.dtype(
     ]
 )  # fmt: skip
 """The 144 bytes before the articulation parameters."""
-FRD = (0.0, 1.0, 0.0, 0.0)
-"""Rotation between the body axes of DIS (forward, right, down) and those of tussle (forward, left, up)."""
 ROTATING, ACCELERATED, IN_BODY_AXES = (3, 4, 7, 8), (4, 5, 8, 9), (6, 7, 8, 9)
 """Dead reckoning algorithms by what they do; 1 is static, 2 is constant velocity."""
 STATIC, CONSTANT_RATES = 1, 3
@@ -68,20 +66,14 @@ def encode(
         omega: Angular velocity.
     """
     out = np.zeros(pos.shape[1], LAYOUT)
-    attitude = quat_multiply(quat_multiply(origin.quat, quat), FRD)
+    attitude = origin.earth_attitude(quat)
     out["pdu_type"], out["family"], out["length"] = ENTITY_STATE, ENTITY_INFORMATION, LAYOUT.itemsize
     out["location"] = origin.to_earth_centred(pos).T
     out["velocity"] = quat_rotate(origin.quat, vel).T
     out["orientation"] = np.stack([quat_to_yaw(attitude), quat_to_pitch(attitude), quat_to_roll(attitude)]).T
     out["algorithm"], out["character_set"] = CONSTANT_RATES, ASCII
-    out["angular_velocity"] = to_body(quat, omega).T
+    out["angular_velocity"] = to_forward_right_down(quat, omega).T
     return out
-
-
-def to_body(quat: np.ndarray, vector: np.ndarray) -> np.ndarray:
-    """Vectors (3, n) of the world frame in body axes of DIS, (3, n), of bodies with these attitudes, (4, n)."""
-    turned = quat_multiply(quat, FRD)
-    return np.asarray(quat_rotate(turned * np.array([1.0, -1.0, -1.0, -1.0])[:, None], vector))
 
 
 def split(datagram: bytes, exercise: int) -> tuple[list[bytes], int]:
@@ -89,7 +81,8 @@ def split(datagram: bytes, exercise: int) -> tuple[list[bytes], int]:
 
     A datagram may bundle several PDUs. PDUs of other types are passed over.
     """
-    found, n_refused, first = [], 0, 0
+    found: list[bytes] = []
+    n_refused = first = 0
     while first < len(datagram):
         head = datagram[first : first + HEADER_BYTES]
         length = int.from_bytes(head[8:10], "big")
@@ -131,7 +124,7 @@ def reckon(records: np.ndarray, age: np.ndarray, origin: Origin) -> tuple[np.nda
     )  # fmt: skip
     pos, vel, attitude, omega = moved
     back = origin.quat * np.array([1.0, -1.0, -1.0, -1.0])
-    quat = quat_multiply(quat_multiply(back, attitude), FRD)
+    quat = quat_multiply(quat_multiply(back, attitude), FORWARD_RIGHT_DOWN)
     omega = quat_rotate(quat_multiply(back, attitude), omega)
     return origin.from_earth_centred(pos), quat_rotate(back, vel), quat, omega
 
@@ -179,7 +172,9 @@ def extrapolate(
 def _integrals(w: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, ...]:
     """t^2 / 2, and the weights of w x v and w x (w x v) in the integrals of exp([w] s) v and of s exp([w] s) v over s from 0 to t."""
     x = w * t
-    is_small = x < 0.03  # here the next term of the series and the lost digits of the formulas are both 1e-9 of the whole
+    is_small = (
+        x < 0.03
+    )  # here the next term of the series and the lost digits of the formulas are both 1e-9 of the whole
     safe = np.where(is_small, 1.0, w)
     y = np.where(is_small, 1.0, x)
     sine, cosine = np.sin(y), np.cos(y)
@@ -187,7 +182,9 @@ def _integrals(w: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, ...]:
     p1 = np.where(is_small, t2 * (1 / 2 - x * x / 24), (1.0 - cosine) / safe**2)
     p2 = np.where(is_small, t2 * t * (1 / 6 - x * x / 120), (y - sine) / safe**3)
     q1 = np.where(is_small, t2 * t * (1 / 3 - x * x / 30), (sine - y * cosine) / safe**3)
-    q2 = np.where(is_small, t2 * t2 * (1 / 8 - x * x / 144), (0.5 * y * y - y * sine - cosine + 1.0) / safe**4)
+    q2 = np.where(
+        is_small, t2 * t2 * (1 / 8 - x * x / 144), (0.5 * y * y - y * sine - cosine + 1.0) / safe**4
+    )
     return 0.5 * t2, p1, p2, q1, q2
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from tussle.api import Interaction, Param, State, WorldView
 from tussle.errors import MissionError, ParameterError, listed, nearest_name
+from tussle.numeric.quaternion import quat_rotate_inverse
 from tussle.stock.interaction.dis import pdu
 from tussle.stock.interaction.dis.link import Link, Remote
 
@@ -31,7 +32,7 @@ class DIS(Interaction):
     part. HLA, fire, detonation and emission PDUs are not there.
 
     Raises:
-        ParameterError: An address is not known, the port is taken, or a type names no team.
+        ParameterError: An address is not known, the port is taken, or a type is no type.
         MissionError: There is no block `remote`.
     """
 
@@ -72,7 +73,17 @@ class DIS(Interaction):
     sent_pos = State("x y z", unit="m", doc="Position in that.")
     sent_vel = State("x y z", unit="m/s", doc="Velocity in that.")
     sent_quat = State("w qx qy qz", default=1.0, doc="Attitude in that.")
-    sent_omega = State("x y z", unit="rad/s", doc="Angular velocity in that, body axes of DIS.")
+    sent_omega = State("x y z", unit="rad/s", doc="Angular velocity in that, body axes.")
+
+    def check_values(self) -> None:
+        """Check the types of entities."""
+        for row in self.values["types"]:
+            for field, value in zip(pdu.TYPE_FIELDS, row[1:], strict=True):
+                most = np.iinfo(pdu.TYPE[field]).max
+                if not (value == int(value) and 0 <= value <= most):
+                    raise ParameterError(
+                        f"DIS.types: {field} = {value:g} of team {row[0]:g} is not allowed; it takes a whole number from 0 to {most}"
+                    )
 
     def start(self, w: WorldView) -> None:
         """Open the socket."""
@@ -139,8 +150,10 @@ class DIS(Interaction):
         n = len(there)
         w.move(list(there.values()), pos=pos[:, :n], vel=vel[:, :n], quat=quat[:, :n], omega=omega[:, :n])
         if born:
-            team = np.array([team for _, team in born])
-            w.spawn(self.remote, np.zeros(len(born)), pos=pos[:, n:], vel=vel[:, n:], quat=quat[:, n:], team=team)
+            teams = [team for _, team in born]
+            w.spawn(
+                self.remote, [0] * len(born), pos=pos[:, n:], vel=vel[:, n:], quat=quat[:, n:], team=teams
+            )
 
     def _team(self, w: WorldView, remote: Remote) -> int:
         force = int(remote.record["force"])
@@ -164,7 +177,11 @@ class DIS(Interaction):
             return
         pos, vel, quat, omega = (x[:, rows] for x in (w.pos, w.vel, w.bodies.quat, w.omega))
         records = pdu.encode(w.scene.origin, pos, vel, quat, omega)
-        records["version"], records["exercise"], records["timestamp"] = self.version, self.exercise, link.stamp
+        records["version"], records["exercise"], records["timestamp"] = (
+            self.version,
+            self.exercise,
+            link.stamp,
+        )
         records["site"], records["application"], records["entity"] = self.site, self.application, w.id[rows]
         records["force"] = np.where((w.team[rows] >= 0) & (w.team[rows] <= 255), w.team[rows], 0)
         types = {int(row[0]): tuple(map(int, row[1:])) for row in self.values["types"]}
@@ -173,7 +190,7 @@ class DIS(Interaction):
         records["marking"] = [self._marking(w, int(row)) for row in rows]
         link.send(records)
         self.sent_time[rows], self.sent_pos[:, rows], self.sent_vel[:, rows] = t, pos, vel
-        self.sent_quat[:, rows], self.sent_omega[:, rows] = quat, records["angular_velocity"].T
+        self.sent_quat[:, rows], self.sent_omega[:, rows] = quat, quat_rotate_inverse(quat, omega)
 
     def _is_due(self, w: WorldView, rows: np.ndarray, t: float) -> np.ndarray:
         """Whether each entity, (m,), is to be sent: the others have waited for long, or are wrong about it."""
@@ -182,7 +199,7 @@ class DIS(Interaction):
         age = np.where(is_due, 0.0, age)
         pos, _, quat, _ = pdu.extrapolate(
             np.full(len(rows), pdu.CONSTANT_RATES), self.sent_pos[:, rows], self.sent_vel[:, rows],
-            np.zeros((3, len(rows))), self.sent_quat[:, rows], _to_flu(self.sent_omega[:, rows]), age,
+            np.zeros((3, len(rows))), self.sent_quat[:, rows], self.sent_omega[:, rows], age,
         )  # fmt: skip
         error = w.pos[:, rows] - pos
         cosine = np.abs((quat * w.bodies.quat[:, rows]).sum(axis=0))
@@ -205,8 +222,3 @@ class DIS(Interaction):
             return {}
         link = self._link(w)
         return {"sent": link.n_sent, "received": link.n_received, "refused": link.n_refused}
-
-
-def _to_flu(vector: np.ndarray) -> np.ndarray:
-    """Vectors (3, n) of body axes of DIS in those of tussle, (3, n)."""
-    return vector * np.array([1.0, -1.0, -1.0])[:, None]
