@@ -159,3 +159,67 @@ def test_without_grpcio_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "grpc", None)
     with pytest.raises(MissingExtraError, match=r"X needs grpcio and protobuf: pip install 'tussle\[grpc\]'"):
         load_grpc("X")
+
+
+# -- actors -----------------------------------------------------------------------------------------------------------------------
+
+ROBOT = """<runscript><run end="8" dt="1"/>
+<entity><team_id>1</team_id><x>{x}</x><motion_model>SingleIntegrator</motion_model>
+<controller>SingleIntegratorControllerSimple</controller><sensor>RLSimpleSensor</sensor>
+<autonomy ctrl_y="true" module="my_module" grpc_mode="true" grpc_address="127.0.0.1" port="{port}">RLSimple</autonomy>
+</entity></runscript>"""
+
+
+@pytest.fixture
+def actors(tmp_path, port):
+    server = Path(__file__).with_name("actor_server.py")
+    process = subprocess.Popen(
+        [sys.executable, server, tmp_path, str(port)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )  # fmt: skip
+    assert process.stdout.readline() == "ready\n"
+    yield process
+    process.communicate()
+
+
+def robot(tmp_path, port, x=6):
+    path = tmp_path / "robot.xml"
+    path.write_text(ROBOT.format(port=port, x=x))
+    return read_mission(path).mission
+
+
+def test_a_server_of_actors_moves_the_robot(actors, tmp_path, port):
+    with Simulation(robot(tmp_path, port)) as sim:
+        sim.step(3)
+        saved = sim.snapshot()
+        sim.run()
+        pos = sim.read(f"{sim.mission.blocks[0].name}.pos")[0][0, 0]
+        # x = 6, 5, ..., 0, -1, then 0; north by 3 m/s, which the server chose.
+        np.testing.assert_allclose(pos, [0.0, 24.0, 0.0])
+        sim.restore(saved)
+        sim.run()
+        np.testing.assert_allclose(sim.read(f"{sim.mission.blocks[0].name}.pos")[0][0, 0], pos)
+    told, _ = actors.communicate()
+    # Once, and again after the snapshot is restored.
+    assert told == 2 * "[2] [(-10.0, 10.0)] [(-inf, inf), (-inf, inf)] -inf inf 10.0\n"
+
+
+def test_an_error_of_the_server_is_told(actors, tmp_path, port):
+    with (
+        Simulation(robot(tmp_path, port, 2000)) as sim,
+        pytest.raises(
+            PluginError,
+            match=f"server of actors at 127.0.0.1:{port} .grpc_address, port. has no answer to GetAction .*INTERNAL too far",
+        ),
+    ):
+        sim.run()
+
+
+def test_a_server_that_is_not_there_is_named(tmp_path, port, monkeypatch):
+    monkeypatch.setattr("tussle.stock.autonomy.rl_simple.remote.TIMEOUT", 0.2)
+    with (
+        Simulation(robot(tmp_path, port)) as sim,
+        pytest.raises(
+            PluginError, match=f"127.0.0.1:{port} .* has no answer to SendEnvironment after 0.2 s: "
+        ),
+    ):
+        sim.run()
