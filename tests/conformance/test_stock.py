@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 from pathlib import Path
 
 import pytest
@@ -79,6 +80,12 @@ def test_plugin_meets_the_contract(
         params = {**aircraft, "jsbsim_root": str(stock.examples()["JSBSimModel"].with_name("hawk"))}
     if name == "JSBSimCompiled":
         params = {"aircraft": "hawk", "jsbsim_root": str(stock.examples()["JSBSimModel"].with_name("hawk"))}
+    if name == "DIS":
+        params = {"time_warp": 0.0}  # no wait for the clock
+    if name == "GRPCCommandString":
+        pytest.importorskip("grpc")
+        with socket.create_server(("127.0.0.1", 0)) as server:
+            params = {"ip": "127.0.0.1", "port": server.getsockname()[1]}
     companions = [stock.load(other)() for other in NEEDED.get(name, ())]
     if name == "MOOSAutonomy":
         return check_with_helms(stock.load(name))

@@ -223,3 +223,13 @@ def test_a_server_that_is_not_there_is_named(tmp_path, port, monkeypatch):
         ),
     ):
         sim.run()
+
+
+def test_actions_that_do_not_fit_end_the_game(actors, tmp_path, port):
+    path = tmp_path / "robot.xml"
+    path.write_text(ROBOT.format(port=port, x=6).replace('ctrl_y="true"', 'ctrl_y="false"'))
+    with (
+        Simulation(read_mission(path).mission) as sim,
+        pytest.raises(PluginError, match="an action has 1 finite numbers"),
+    ):
+        sim.run()
