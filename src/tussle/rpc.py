@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
-from importlib import import_module
 from types import MappingProxyType
 from typing import Any
 
@@ -28,10 +27,11 @@ def load_grpc(where: str) -> Any:
         MissingExtraError: grpcio or protobuf are not installed.
     """
     try:
-        import_module("google.protobuf.descriptor_pb2")
-        return import_module("grpc")
+        import google.protobuf  # noqa: F401
+        import grpc
     except ImportError:
         raise MissingExtraError(f"{where} needs grpcio and protobuf: pip install 'tussle[grpc]'") from None
+    return grpc
 
 
 @cache

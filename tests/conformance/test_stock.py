@@ -6,6 +6,7 @@ import socket
 from pathlib import Path
 
 import pytest
+from actor_process import actor_server
 from moos_database import MoosDatabase
 from moos_helm import MoosHelm
 
@@ -82,10 +83,13 @@ def test_plugin_meets_the_contract(
         params = {"aircraft": "hawk", "jsbsim_root": str(stock.examples()["JSBSimModel"].with_name("hawk"))}
     if name == "DIS":
         params = {"time_warp": 0.0}  # no wait for the clock
-    if name == "GRPCCommandString":
-        pytest.importorskip("grpc")
+    if name in ("GRPCCommandString", "RLSimple", "RLConsensus"):
+        pytest.importorskip("grpc_tools")
         with socket.create_server(("127.0.0.1", 0)) as server:
-            params = {"ip": "127.0.0.1", "port": server.getsockname()[1]}
+            params = {"port": server.getsockname()[1]}
+    if name in ("RLSimple", "RLConsensus"):
+        with actor_server(tmp_path, params["port"]):
+            return check_plugin(stock.load(name), **params)
     companions = [stock.load(other)() for other in NEEDED.get(name, ())]
     if name == "MOOSAutonomy":
         return check_with_helms(stock.load(name))

@@ -1,6 +1,6 @@
-"""A server of actors, with code that protoc generates; it flies north, and east while x is negative.
+"""A server of actors, with code that protoc generates: discrete actions are 1 while x is negative, continuous ones are 3.
 
-Arguments: folder for the code, port. Prints a line when it serves, and one for each environment.
+Arguments: folder for the code, port, and "wrong" for one number too many. Prints a line when it serves, and one for each environment.
 """
 
 import sys
@@ -22,7 +22,8 @@ message Action { repeated int32 discrete = 1; repeated double continuous = 2; bo
 message Empty {}
 """
 
-folder, port = sys.argv[1:]
+folder, port, *words = sys.argv[1:]
+is_wrong = "wrong" in words
 (Path(folder) / "Actors.proto").write_text(PROTO)
 arguments = ["protoc", f"-I{folder}", f"--python_out={folder}", f"--grpc_python_out={folder}", "Actors.proto"]
 assert protoc.main(arguments) == 0
@@ -33,8 +34,11 @@ import Actors_pb2_grpc as services  # noqa: E402
 
 
 class Actors(services.OpenAIServicer):
+    def __init__(self):
+        self.spaces = {}
+
     def SendEnvironment(self, environment, context):
-        space = environment.action
+        space = self.spaces[self.who(context)] = environment.action
         ranges = [(one.min, one.max) for one in space.continuous]
         seen = [(one.min, one.max) for one in environment.observation.continuous]
         print(
@@ -48,10 +52,18 @@ class Actors(services.OpenAIServicer):
         return messages.Empty()
 
     def GetAction(self, observation, context):
-        x, _t = observation.continuous
+        x, space = (*observation.continuous, 0.0)[0], self.spaces[self.who(context)]
         if x > 1000:
             context.abort(grpc.StatusCode.INTERNAL, "too far")
-        return messages.Action(discrete=[int(x < 0)], continuous=[3.0])
+        return messages.Action(
+            discrete=[int(x < 0)] * len(space.discrete), continuous=[3.0] * (len(space.continuous) + is_wrong)
+        )
+
+    @staticmethod
+    def who(context):
+        """World and id of the entity that asks."""
+        told = dict(context.invocation_metadata())
+        return int(told["world"]), int(told["entity"])
 
 
 server = grpc.server(ThreadPoolExecutor(2))

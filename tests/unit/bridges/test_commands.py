@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from actor_process import actor_server
 
 from tussle import Simulation, stock
 from tussle.errors import MissingExtraError, ParameterError, PluginError
@@ -172,13 +173,8 @@ ROBOT = """<runscript><run end="8" dt="1"/>
 
 @pytest.fixture
 def actors(tmp_path, port):
-    server = Path(__file__).with_name("actor_server.py")
-    process = subprocess.Popen(
-        [sys.executable, server, tmp_path, str(port)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    )  # fmt: skip
-    assert process.stdout.readline() == "ready\n"
-    yield process
-    process.communicate()
+    with actor_server(tmp_path, port) as process:
+        yield process
 
 
 def robot(tmp_path, port, x=6):
@@ -225,11 +221,10 @@ def test_a_server_that_is_not_there_is_named(tmp_path, port, monkeypatch):
         sim.run()
 
 
-def test_actions_that_do_not_fit_end_the_game(actors, tmp_path, port):
-    path = tmp_path / "robot.xml"
-    path.write_text(ROBOT.format(port=port, x=6).replace('ctrl_y="true"', 'ctrl_y="false"'))
+def test_actions_that_do_not_fit_end_the_game(tmp_path, port):
     with (
-        Simulation(read_mission(path).mission) as sim,
-        pytest.raises(PluginError, match="an action has 1 finite numbers"),
+        actor_server(tmp_path, port, "wrong"),
+        Simulation(robot(tmp_path, port)) as sim,
+        pytest.raises(PluginError, match="an action has 2 finite numbers"),
     ):
         sim.run()

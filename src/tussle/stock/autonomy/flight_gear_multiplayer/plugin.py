@@ -29,7 +29,7 @@ MOST_CALLSIGN, MOST_MODEL = 7, 95
 
 
 class Senders:
-    """The socket of a simulation, and which block has which callsign."""
+    """The socket of a simulation, and the id of the entity that has a callsign as it is."""
 
     def __init__(self, address: str, port: int) -> None:
         try:
@@ -50,14 +50,14 @@ class FlightGearMultiplayer(Autonomy):
     """Sends the entity to a FlightGear, or to a server of its multiplayer protocol, which shows it as the aircraft of another player.
 
     One packet per call, by UDP; FlightGear itself sends ten in a second (`rate="10"`). It expects that simulated time passes as the
-    clock does. The first entity of a block has the callsign as it is, the others with their number at its end. In a stack of worlds,
+    clock does. The first entity with a callsign has it as it is, the others with their id at its end. In a stack of worlds,
     those of the first one are sent.
 
-    Differences from the existing system: velocities are sent, there 0; the callsign has a number, there all of a block have one; the
+    Differences from the existing system: velocities are sent, there 0; the callsign has the id, there all of a block have one; the
     lag is 0, there the time.
 
     Raises:
-        ParameterError: The server is no known host or cannot be reached, a text is too long, or two blocks have one callsign.
+        ParameterError: The server is no known host or cannot be reached, or a text is too long.
     """
 
     grade = "external"
@@ -101,7 +101,7 @@ class FlightGearMultiplayer(Autonomy):
         out = np.zeros(len(rows), LAYOUT)
         out["magic"], out["protocol"], out["message"] = MAGIC, PROTOCOL, POSITION
         out["length"], out["range"] = LAYOUT.itemsize, RANGE
-        out["callsign"] = [self._callsign(g, int(row), senders) for row in rows]
+        out["callsign"] = [self._callsign(int(id_), senders) for id_ in g.id[rows]]
         out["model"], out["time"] = self.aircraft_model.encode(), g.t[rows]
         out["position"] = origin.to_earth_centred(g.pos[:, rows]).T
         out["orientation"] = (2.0 * half * unit(attitude[1:])).T
@@ -109,12 +109,7 @@ class FlightGearMultiplayer(Autonomy):
         out["angular_velocity"] = to_forward_right_down(quat, g.omega[:, rows]).T
         return out
 
-    def _callsign(self, g: GroupView, row: int, senders: Senders) -> bytes:
-        block, index = int(g.block[row]), int(g.block_index[row])
-        if senders.owners.setdefault(self.callsign, block) != block:
-            raise ParameterError(
-                f"FlightGearMultiplayer.callsign = {self.callsign!r} is that of block "
-                f"{g.context.block_names[senders.owners[self.callsign]]!r} too; give each block its own"
-            )
-        number = str(index + 1) if index else ""
-        return f"{self.callsign[: MOST_CALLSIGN - len(number)]}{number}".encode()
+    def _callsign(self, id_: int, senders: Senders) -> bytes:
+        if senders.owners.setdefault(self.callsign, id_) == id_:
+            return str(self.callsign).encode()
+        return f"{self.callsign[: MOST_CALLSIGN - len(str(id_))]}{id_}".encode()

@@ -45,7 +45,7 @@ class RLSimple(Autonomy):
     `actor_init_func`, the default being the function of that name. Without one, entities move to and fro.
 
     With `grpc_mode`, a server is asked for actions by gRPC, with the service `OpenAI` of SCRIMMAGE: `SendEnvironment` when an entity
-    appears, `GetAction` in each step. Each call may take 10 s.
+    appears, `GetAction` in each step. Each call may take 10 s, and has the number of the world and the id of the entity as metadata.
 
     Differences from SCRIMMAGE: it imports any module; a snapshot has the attributes of an actor that is an object of a
     class, and no variables of functions and nothing of a server; `done` of a server's action has no effect.
@@ -140,7 +140,10 @@ class RLSimple(Autonomy):
         if self.grpc_mode:
             address = f"{self.grpc_address}:{self.port}"
             server = g.context.share((RLSimple, address), lambda: ActorServer(address))
-            return RemoteActor(server, [k for k in kinds if k is not None], limit, n_observed, texts)
+            is_discrete = [kind for kind in kinds if kind is not None]
+            return RemoteActor(
+                server, is_discrete, limit, n_observed, texts, int(g.world[row]), int(g.id[row])
+            )
         actor = type(self).actor_init(*spaces_of(*kinds, limit, n_observed), texts)
         if not callable(getattr(actor, "act", actor)):
             raise ParameterError(

@@ -38,8 +38,8 @@ class ActorServer:
         self.types = message_types("scrimmage_proto", **MESSAGES)
         self._channel = self._grpc.insecure_channel(address)
 
-    def ask(self, method: str, request: Any, answer: str) -> Any:
-        """Call a method and return its answer, a message of that type.
+    def ask(self, method: str, request: Any, answer: str, of: tuple[tuple[str, str], ...]) -> Any:
+        """Call a method and return its answer, a message of that type; `of` goes as metadata.
 
         Raises:
             ParameterError: The server does not answer, or answers with an error.
@@ -48,7 +48,7 @@ class ActorServer:
             SERVICE + method, lambda message: message.SerializeToString(), self.types[answer].FromString
         )
         try:
-            return call(request, timeout=TIMEOUT, wait_for_ready=True)
+            return call(request, timeout=TIMEOUT, wait_for_ready=True, metadata=of)
         except self._grpc.RpcError as error:
             raise ParameterError(
                 f"the server of actors at {self.address} (grpc_address, port) has no answer to {method} after {TIMEOUT:g} s: "
@@ -69,12 +69,16 @@ class RemoteActor:
         limit: Of continuous components [m/s].
         n_observed: Numbers of an observation.
         params: The parameters of the plugin, as texts.
+        world: World of the entity; it goes with each call as metadata.
+        entity: Its id, likewise.
     """
 
     def __init__(
-        self, server: ActorServer, is_discrete: list[bool], limit: float, n_observed: int, params: Mapping[str, str]
+        self, server: ActorServer, is_discrete: list[bool], limit: float, n_observed: int, params: Mapping[str, str],
+        world: int, entity: int,
     ) -> None:  # fmt: skip
         self._server, types = server, server.types
+        self._of = ("world", str(world)), ("entity", str(entity))
         space, extrema = types["ActionSpace"], types["ContExtrema"]
         n = sum(is_discrete)
         actions = space(
@@ -85,10 +89,10 @@ class RemoteActor:
             action_spaces=actions, observation_spaces=seen, min_reward=-math.inf, max_reward=math.inf,
             params=[types["Parameter"](key=key, value=value) for key, value in params.items()],
         )  # fmt: skip
-        server.ask("SendEnvironment", environment, "Empty")
+        server.ask("SendEnvironment", environment, "Empty", self._of)
 
     def act(self, observation: np.ndarray) -> tuple[list[int], list[float]]:
         """Discrete and continuous components of the action for an observation, (k,)."""
         observed = self._server.types["Obs"](continuous=observation.tolist())
-        action = self._server.ask("GetAction", observed, "Action")
+        action = self._server.ask("GetAction", observed, "Action", self._of)
         return list(action.discrete), list(action.continuous)

@@ -41,7 +41,7 @@ class Remote:
     is_here: bool = False
 
 
-class Link:
+class ExerciseLink:
     """A UDP socket, the remote entities, and what was sent last.
 
     Args:

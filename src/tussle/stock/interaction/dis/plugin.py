@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from tussle.api import Interaction, Param, State, WorldView
 from tussle.errors import MissionError, ParameterError, listed, nearest_name
 from tussle.numeric.quaternion import quat_rotate_inverse
 from tussle.stock.interaction.dis import pdu
-from tussle.stock.interaction.dis.link import Link, Remote
+from tussle.stock.interaction.dis.link import ExerciseLink, Remote
 
 MOST_PORT = 65535
 
@@ -115,14 +114,14 @@ class DIS(Interaction):
             self._move(w, link, np.flatnonzero(is_remote & (w.world == 0)), t)
         self._send(w, link, np.flatnonzero(~is_remote & (w.world == 0)), t)
 
-    def _link(self, w: WorldView) -> Link:
+    def _link(self, w: WorldView) -> ExerciseLink:
         places = self.address, self.port, self.listen_address, self.listen_port
-        link: Link = w.context.share((DIS, self.instance_name), partial(Link, *places))
+        link: ExerciseLink = w.context.share((DIS, self.instance_name), partial(ExerciseLink, *places))
         return link
 
     # -- entities of other simulators -----------------------------------------------------------------------------------------------
 
-    def _move(self, w: WorldView, link: Link, rows: np.ndarray, t: float) -> None:
+    def _move(self, w: WorldView, link: ExerciseLink, rows: np.ndarray, t: float) -> None:
         """Give each remote entity a row, request rows for new ones, remove those that are gone, and move all."""
         remotes, origin = link.remotes, w.scene.origin
         row_of = {int(key): int(row) for key, row in zip(self.key[rows], rows, strict=True) if key}
@@ -163,7 +162,7 @@ class DIS(Interaction):
 
     # -- own entities ---------------------------------------------------------------------------------------------------------------
 
-    def _send(self, w: WorldView, link: Link, rows: np.ndarray, t: float) -> None:
+    def _send(self, w: WorldView, link: ExerciseLink, rows: np.ndarray, t: float) -> None:
         """Send the entities that are due, and say which are gone."""
         for row in rows[w.id[rows] > pdu.MOST_ENTITY]:
             w.fail(row, f"DIS has no number for entity {w.id[row]}; the largest is {pdu.MOST_ENTITY}")
@@ -216,9 +215,8 @@ class DIS(Interaction):
         name = w.context.block_names[int(w.bodies.block[row])]
         return f"{name[: pdu.MARKING_CHARACTERS - len(number)]}{number}".encode("ascii", "replace")
 
-    def result_of(self, w: WorldView, world: int) -> dict[str, Any]:
+    def result(self, w: WorldView) -> dict[str, np.ndarray]:
         """PDUs of the first world: sent, received and refused."""
-        if world:
-            return {}
-        link = self._link(w)
-        return {"sent": link.n_sent, "received": link.n_received, "refused": link.n_refused}
+        link, first = self._link(w), np.arange(w.n_worlds) == 0
+        counts = {"sent": link.n_sent, "received": link.n_received, "refused": link.n_refused}
+        return {name: count * first for name, count in counts.items()}
