@@ -209,6 +209,15 @@ def test_an_entity_that_is_gone_is_said_to_be(peer):
     assert [(each["id"][2], each["appearance"]) for each in got] == [(1, 0), (2, 0), (2, DEACTIVATED)]
 
 
+def test_more_entities_than_dis_has_numbers_for_are_refused():
+    many = Block(name="m", team=1, count=65534, motion=External())
+    with (
+        Simulation(mission(many)) as sim,
+        pytest.raises(PluginError, match="DIS has no number for entity 65534; the largest is 65533"),
+    ):
+        sim.step()
+
+
 # -- what comes -------------------------------------------------------------------------------------------------------------------
 
 
@@ -280,7 +289,21 @@ def test_who_is_removed_here_stays_away(peer):
         assert len(guests(sim)) == 1
         sim.reset([0])
         sim.step(3)
-        assert len(guests(sim)) == 1
+        assert len(guests(sim)) == 1  # of the last PDU
+        sim.step(130)
+        assert not len(guests(sim))
+
+
+def test_a_snapshot_without_a_guest_gets_it_again(peer):
+    port, scene = listening()
+    with Simulation(scene) as sim:
+        saved = sim.snapshot()
+        peer.ask(port=port, send=[{"id": [7, 8, 9], "llarpy": [*place(300, 400, 60), 0, 0, 0]}])
+        until(sim, lambda: len(guests(sim)))
+        sim.restore(saved)
+        assert not len(guests(sim))
+        sim.step(3)
+        np.testing.assert_allclose(guests(sim), [[300, 400, 60]], atol=1e-3)
 
 
 @pytest.mark.parametrize("algorithm", range(11))
@@ -341,9 +364,18 @@ def test_two_simulations_see_each_other_and_not_themselves():
         until(a, lambda: not len(guests(a)), 20)
 
 
-def test_simulations_of_a_multicast_group_share_its_port():
+@pytest.mark.parametrize(
+    ("address", "listen_address"), [("239.255.77.3", "127.0.0.1"), ("127.255.255.255", "127.255.255.255")]
+)
+def test_simulations_of_a_group_or_a_network_share_a_port(address, listen_address):
     port = free_port()
-    common = {"address": "239.255.77.3", "port": port, "listen_port": port, "remote": "guest"}
+    common = {
+        "address": address,
+        "port": port,
+        "listen_address": listen_address,
+        "listen_port": port,
+        "remote": "guest",
+    }
     with (
         Simulation(mission(application=1, **common)) as a,
         Simulation(mission(application=2, **common)) as b,
@@ -496,9 +528,7 @@ def test_a_port_that_is_taken_is_named_and_one_that_is_left_is_free():
 
 def test_the_clock_is_waited_for(monkeypatch):
     waits = []
-    monkeypatch.setattr(
-        "tussle.stock.interaction.dis.link.select.select", lambda *args: waits.append(args[3])
-    )
+    monkeypatch.setattr("tussle.stock.interaction.dis.link.time.sleep", waits.append)
     with Simulation(mission(time_warp=1.0)) as sim:
         sim.step(5)
     assert waits

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ipaddress
-import select
+import math
 import socket
 import time
 from collections.abc import Callable
@@ -18,6 +18,7 @@ from tussle.stock.interaction.dis import pdu
 MOST_DATAGRAMS = 20_000
 """Read at once; with more, a flood would hold the simulation up."""
 RECEIVE_BUFFER = 4 * 1024 * 1024  # [byte] the system may give less
+BROADCAST = ".255"
 NAP = 0.05  # [s] longest wait before Ctrl-C is noticed
 CATCH_UP = 0.25  # [s] a larger delay is not caught up with
 MOST_BYTES = 65536
@@ -47,7 +48,7 @@ class ExerciseLink:
     Args:
         address: Where PDUs are sent: a host, a broadcast or a multicast address.
         port: Its port.
-        listen_address: Own address on which PDUs are received; with a multicast address, that of the interface.
+        listen_address: Address on which PDUs are received: an own one, a broadcast address, or with multicast that of the interface.
         listen_port: Port on which they are received; 0 for none.
 
     Attributes:
@@ -64,7 +65,7 @@ class ExerciseLink:
         self.remotes: dict[int, Remote] = {}
         self.sent: dict[int, np.ndarray] = {}
         self.n_sent = self.n_received = self.n_refused = 0
-        self.stamp, self._due = 0, 0.0
+        self.stamp, self._due, self._t = 0, 0.0, -math.inf
         self._listens = bool(listen_port)
         self._place = (_resolved("address", address), port)
         own = _resolved("listen_address", listen_address)
@@ -75,9 +76,9 @@ class ExerciseLink:
                 self.socket.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton(own))
             if self._listens:
                 self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
-                if group:
-                    # All simulators of a group share its port.
+                if group or own.endswith(BROADCAST):  # a port that all simulators of a machine share
                     self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+                if group:
                     member = socket.inet_aton(self._place[0]) + socket.inet_aton(own)
                     self.socket.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, member)
                 self.socket.bind((self._place[0] if group else own, listen_port))
@@ -86,6 +87,13 @@ class ExerciseLink:
             raise ParameterError(
                 f"DIS: listen_port = {listen_port} of {listen_address}: {reason.strerror}"
             ) from None
+
+    def begin(self, t: float) -> None:
+        """Begin a step that ends at time t [s]. When that is before the last one, after a reset, all remote entities come anew."""
+        if t < self._t:
+            for remote in self.remotes.values():
+                remote.t, remote.is_here = min(remote.t, t), False
+        self._t, self.stamp = t, pdu.timestamp(t)
 
     def receive(self, t: float, exercise: int, own: int, origin: Origin, reach: float, most: int) -> None:
         """Take what has come until time t [s].
@@ -167,7 +175,7 @@ class ExerciseLink:
         now = time.monotonic()
         self._due = max(self._due + dt, now - CATCH_UP) if self._due else now
         while (left := self._due - time.monotonic()) > 0.0 and not is_interrupted():
-            select.select([], [], [], min(left, NAP))
+            time.sleep(min(left, NAP))
 
     def end(self) -> None:
         """Say that all entities are gone, and close the socket; called when the simulation is closed."""

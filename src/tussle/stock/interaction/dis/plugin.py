@@ -40,7 +40,7 @@ class DIS(Interaction):
     address = Param("127.0.0.1", doc="Where PDUs are sent: a host, a broadcast or a multicast address.")
     port = Param(3000, structural=True, ge=1, le=MOST_PORT, doc="Its port.")
     listen_address = Param(
-        "127.0.0.1", doc="Own address that PDUs are received on; for multicast, that of the interface."
+        "127.0.0.1", doc="Address that PDUs are received on; for multicast, that of the interface."
     )
     listen_port = Param(
         0, structural=True, ge=0, le=MOST_PORT, doc="Port that they are received on; 0 for none."
@@ -95,16 +95,14 @@ class DIS(Interaction):
                 f"{self.instance_name}.remote = {self.remote!r} names no block{nearest_name(self.remote, w.templates)}; "
                 f"{listed(w.templates)}"
             )
-        link = self._link(w)
-        if 0 in w.active_worlds():
-            for remote in link.remotes.values():
-                remote.is_here = False
+        self._link(w)
 
     def step(self, w: WorldView) -> None:
         """Move the remote entities, and send the own ones."""
         link, t = self._link(w), float(w.t[0])
         if self.time_warp:
             link.await_clock(w.dt / self.time_warp, w.context.is_interrupted)
+        link.begin(t)
         own = self.site << 16 | self.application
         link.receive(t, self.exercise, own, w.scene.origin, self.reach, self.most_remote)
         link.forget(t - self.timeout)
@@ -167,7 +165,6 @@ class DIS(Interaction):
         for row in rows[w.id[rows] > pdu.MOST_ENTITY]:
             w.fail(row, f"DIS has no number for entity {w.id[row]}; the largest is {pdu.MOST_ENTITY}")
         rows = rows[w.id[rows] <= pdu.MOST_ENTITY]
-        link.stamp = pdu.timestamp(t)
         here = set(w.id[rows].tolist())
         if gone := [number for number in link.sent if number not in here]:
             link.leave(gone)
