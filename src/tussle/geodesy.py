@@ -15,6 +15,7 @@ import numpy as np
 
 from tussle.errors import ParameterError
 from tussle.numeric import atan2, cos, sin
+from tussle.numeric.quaternion import quat_from_euler, quat_multiply, quat_rotate, quat_rotate_inverse
 
 # NGA.STND.0036, Department of Defense World Geodetic System 1984 (2014), table 3.1: both are defining and exact.
 SEMI_MAJOR = 6378137.0
@@ -26,6 +27,8 @@ SECOND_ECCENTRICITY_SQUARED = ECCENTRICITY_SQUARED / (1.0 - ECCENTRICITY_SQUARED
 # Bowring's first step is accurate to 1e-9 rad from 100 km below the ground to far above it; each further step gains more digits
 # than that, so the second reaches rounding error and the third is a margin for orbits.
 LATITUDE_STEPS = 3
+FORWARD_RIGHT_DOWN = 0.0, 1.0, 0.0, 0.0
+"""Rotation from forward-right-down to forward-left-up body axes, and back: half a turn about the axis forward."""
 
 
 @dataclass(frozen=True)
@@ -123,11 +126,38 @@ class Origin:
         return self._frame[1]
 
     @cached_property
+    def quat(self) -> np.ndarray:
+        """Rotation from the world frame to Earth-centred axes, a quaternion (w, x, y, z), (4,)."""
+        turned = quat_from_euler(0.0, 0.0, self.longitude + 0.5 * math.pi)
+        return np.asarray(quat_multiply(turned, quat_from_euler(0.5 * math.pi - self.latitude, 0.0, 0.0)))
+
+    def earth_attitude(self, quat: np.ndarray) -> np.ndarray:
+        """Attitudes of bodies as DIS and FlightGear define them: from forward-right-down body axes to Earth-centred axes, (4, n).
+
+        Args:
+            quat: From forward-left-up body axes to the world frame, (4, n).
+        """
+        return np.asarray(quat_multiply(quat_multiply(self.quat, quat), FORWARD_RIGHT_DOWN))
+
+    def to_earth_centred(self, pos: np.ndarray) -> np.ndarray:
+        """Convert world positions [m], (3, n), to positions in Earth-centred axes [m], (3, n)."""
+        return np.asarray(quat_rotate(self.quat, pos) + np.array(self.earth_centred)[:, None])
+
+    def from_earth_centred(self, pos: np.ndarray) -> np.ndarray:
+        """Convert positions in Earth-centred axes [m], (3, n), to world positions [m], (3, n)."""
+        return np.asarray(quat_rotate_inverse(self.quat, pos - np.array(self.earth_centred)[:, None]))
+
+    @cached_property
     def _frame(self) -> tuple[tuple[float, float, float, float], tuple[float, float, float]]:
         """Sine and cosine of latitude and longitude, and the Earth-centred position [m]."""
         angles = sin(self.latitude), cos(self.latitude), sin(self.longitude), cos(self.longitude)
         x, y, z = _earth_centred(*angles, self.altitude)
         return angles, (float(x), float(y), float(z))
+
+
+def to_forward_right_down(quat: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    """Vectors of the world frame, (3, n), in forward-right-down axes, (3, n), of bodies with the attitudes quat, (4, n)."""
+    return np.asarray(quat_rotate_inverse(quat_multiply(quat, FORWARD_RIGHT_DOWN), vector))
 
 
 def _earth_centred(

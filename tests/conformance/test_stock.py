@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import socket
 from pathlib import Path
 
 import pytest
+from actor_process import actor_server
 from moos_database import MoosDatabase
 from moos_helm import MoosHelm
 
@@ -79,6 +81,15 @@ def test_plugin_meets_the_contract(
         params = {**aircraft, "jsbsim_root": str(stock.examples()["JSBSimModel"].with_name("hawk"))}
     if name == "JSBSimCompiled":
         params = {"aircraft": "hawk", "jsbsim_root": str(stock.examples()["JSBSimModel"].with_name("hawk"))}
+    if name == "DIS":
+        params = {"time_warp": 0.0}  # no wait for the clock
+    if name in ("GRPCCommandString", "RLSimple", "RLConsensus"):
+        pytest.importorskip("grpc_tools")
+        with socket.create_server(("127.0.0.1", 0)) as server:
+            params = {"port": server.getsockname()[1]}
+    if name in ("RLSimple", "RLConsensus"):
+        with actor_server(tmp_path, params["port"]):
+            return check_plugin(stock.load(name), **params)
     companions = [stock.load(other)() for other in NEEDED.get(name, ())]
     if name == "MOOSAutonomy":
         return check_with_helms(stock.load(name))

@@ -93,8 +93,6 @@ def test_a_mission_names_no_code(game):
         game('module="actors"', files=())
     with pytest.raises(MissionError, match="did you mean 'northward'"):
         game('actor_init_func="northwards"')
-    with pytest.raises(MissionError, match="grpc_mode = true is not allowed: actors are Python functions"):
-        game('grpc_mode="true"')
 
 
 def test_wrong_actors_and_actions_are_told(game):

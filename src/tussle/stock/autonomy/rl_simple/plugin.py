@@ -15,6 +15,7 @@ from tussle.api import Autonomy, GroupView, Handle, HistoricAttributes, Input, O
 from tussle.errors import ParameterError
 from tussle.messages import RewardGiven
 from tussle.stock.autonomy.rl_simple.actors import Alternating, spaces_of
+from tussle.stock.autonomy.rl_simple.remote import ActorServer, RemoteActor
 
 DEFAULT_MODULE = "scrimmage.openai.tests.test_openai"
 DEFAULT_FUNCTION = "actor_init_func"
@@ -43,13 +44,16 @@ class RLSimple(Autonomy):
     Gymnasium (None without it) and the parameters as texts, and returns a callable or an object with `act`. A mission names it by
     `actor_init_func`, the default being the function of that name. Without one, entities move to and fro.
 
+    With `grpc_mode`, a server is asked for actions by gRPC, with the service `OpenAI` of SCRIMMAGE: `SendEnvironment` when an entity
+    appears, `GetAction` in each step. Each call may take 10 s, and has the number of the world and the id of the entity as metadata.
+
     Differences from SCRIMMAGE: it imports any module; a snapshot has the attributes of an actor that is an object of a
-    class, and no variables of functions.
+    class, and no variables of functions and nothing of a server; `done` of a server's action has no effect.
     """
 
     grade = "external"
     historic_attributes = HistoricAttributes(
-        unread=("port", "grpc_address", "server_address", "library"), chosen_by="actor_init_func",
+        unread=("server_address", "library"), chosen_by="actor_init_func",
         chosen_default=DEFAULT_FUNCTION, chosen_kind="function {} whose first parameter is action_space",
     )  # fmt: skip
     actor_init: ClassVar[Callable[[Any, Any, dict[str, str]], Any]] = Alternating
@@ -67,7 +71,9 @@ class RLSimple(Autonomy):
     module = Param(
         DEFAULT_MODULE, doc="Module of the actor in the mission file; the actor itself is in a plugin file."
     )
-    grpc_mode = Param(False, doc="Ask a server for actions; refused.")
+    grpc_mode = Param(False, structural=True, doc="Ask a server for actions.")
+    grpc_address = Param("127.0.0.1", doc="Where that is.")
+    port = Param(50051, structural=True, ge=1, le=65535, doc="Its port.")
     agent = Handle(doc="The actor.")
     observation = Input(fields="value", ragged=True)
     rewards = Publish(RewardGiven)
@@ -76,11 +82,7 @@ class RLSimple(Autonomy):
     def check_values(self) -> None:
         """Check that there is an actor."""
         name = type(self).__name__
-        if self.grpc_mode:
-            raise ParameterError(
-                f"{name}.grpc_mode = true is not allowed: actors are Python functions of a file given by --plugin-path, not servers"
-            )
-        if self.is_own_actor and self.module != DEFAULT_MODULE:
+        if self._is_alternating() and self.module != DEFAULT_MODULE:
             raise ParameterError(
                 f"{name}.module = {self.module[:80]!r}: a mission names no code; give the actor's file with --plugin-path, in which a "
                 f"function such as {DEFAULT_FUNCTION}(action_space, obs_space, params) returns the actor, or omit module"
@@ -91,8 +93,8 @@ class RLSimple(Autonomy):
         return Agent()
 
     def save_one(self, agent: Agent) -> Any:
-        """Return a copy of the actor."""
-        return copy.deepcopy(agent.actor)
+        """Return a copy of the actor; None for that of a server, which is told the environment again."""
+        return None if isinstance(agent.actor, RemoteActor) else copy.deepcopy(agent.actor)
 
     def load_one(self, row: Any, state: Any) -> Agent:
         """Recreate the actor."""
@@ -117,7 +119,7 @@ class RLSimple(Autonomy):
             kinds = (bool(x_discrete[row]), bool(y_discrete[row]) if ctrl_y[row] else None)
             limit = float(max_speed[row])
             if agent.actor is None:
-                agent.actor = self._actor(row, spaces_of(*kinds, limit, len(seen)))
+                agent.actor = self._actor(g, row, kinds, limit, len(seen))
             self.velocity[:, row] = self._velocity(
                 getattr(agent.actor, "act", agent.actor)(seen), kinds, limit
             )
@@ -126,11 +128,23 @@ class RLSimple(Autonomy):
         """Rewards of this step, (n,)."""
         return np.where(np.floor(np.abs(g.pos[0]) + 0.5) < self.radius, 1.0, 0.0)
 
-    def _actor(self, row: int, spaces: tuple[Any, Any]) -> Any:
+    def _is_alternating(self) -> bool:
+        return self.is_own_actor and not self.grpc_mode
+
+    def _actor(
+        self, g: GroupView, row: int, kinds: tuple[bool, bool | None], limit: float, n_observed: int
+    ) -> Any:
         """Create an actor."""
         values = {name: np.asarray(getattr(self, name)) for name in self.params()}
         texts = {name: str(value[row] if value.ndim == 1 else value) for name, value in values.items()}
-        actor = type(self).actor_init(*spaces, texts)
+        if self.grpc_mode:
+            address = f"{self.grpc_address}:{self.port}"
+            server = g.context.share((RLSimple, address), lambda: ActorServer(address))
+            is_discrete = [kind for kind in kinds if kind is not None]
+            return RemoteActor(
+                server, is_discrete, limit, n_observed, texts, int(g.world[row]), int(g.id[row])
+            )
+        actor = type(self).actor_init(*spaces_of(*kinds, limit, n_observed), texts)
         if not callable(getattr(actor, "act", actor)):
             raise ParameterError(
                 f"{type(self).__name__}: {self._function()} returned {str(actor)[:80]!r}; it returns a callable or an object with act"
@@ -153,7 +167,7 @@ class RLSimple(Autonomy):
             numbers = np.concatenate([np.ravel(np.asarray(part, float)) for part in parts])
         except (TypeError, ValueError):
             numbers = np.empty(0)
-        if self.is_own_actor:
+        if self._is_alternating():
             numbers = np.repeat(numbers, len(order))
         if len(numbers) != len(order) or not np.isfinite(numbers).all():
             raise ParameterError(
