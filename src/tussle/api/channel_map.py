@@ -87,7 +87,8 @@ def channel_outputs(text: str) -> list[str]:
     return [f"{row.channel}_out" for row in channel_rows(text)]
 
 
-def write_channels(plugin: Any, text: str, row: int, inputs: Callable[[int], float]) -> None:
-    """Write the channels of an entity from its inputs, a function of their index."""
+def write_channels(plugin: Any, text: str, row: int, inputs: Callable[[int], float | None]) -> None:
+    """Write the channels of an entity from its inputs, a function of their index; a channel without input is 0."""
     for channel in channel_rows(text):
-        getattr(plugin, f"{channel.channel}_out")[0, row] = channel.value(inputs(channel.index))
+        x = inputs(channel.index)
+        getattr(plugin, f"{channel.channel}_out")[0, row] = 0.0 if x is None else channel.value(x)

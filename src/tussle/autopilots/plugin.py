@@ -42,8 +42,8 @@ class Autopilot(Autonomy):
         """Open the sockets of a vehicle."""
 
     @abstractmethod
-    def input_of(self, commands: Any, index: int) -> float:
-        """The input of the map that an output of the autopilot is."""
+    def input_of(self, commands: Any, index: int) -> float | None:
+        """The input of the map that an output of the autopilot is; None if it drives nothing."""
 
     def offered_outputs(self) -> list[str]:
         """Return the channels of the map."""

@@ -69,9 +69,9 @@ class ArduPilot(Autopilot):
         """The rows that map outputs to channels."""
         return self.servo_map
 
-    def input_of(self, commands: Sequence[int], index: int) -> float:
-        """The pulse of an output [us]."""
-        return float(commands[index]) if index < len(commands) else 0.0
+    def input_of(self, commands: Sequence[int], index: int) -> float | None:
+        """The pulse of an output [us]; None without pulses."""
+        return (commands[index] or None) if index < len(commands) else None
 
     def open_one(self, row: Any) -> UdpLink:
         """Open the sockets of a vehicle.
