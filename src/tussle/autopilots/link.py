@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Sequence
 from tussle.autopilots.frames import VehicleState
 from tussle.errors import ParameterError
 
-NAP = 0.05
+NAP = 0.01
 """Longest wait before the clock, an interruption and the connections are looked at [s]."""
 PAUSE = 1.0
 """Time between two steps from which on the simulation counts as paused [s]."""
