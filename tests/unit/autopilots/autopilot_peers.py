@@ -155,3 +155,45 @@ class ScrimmageServant(Thread):
                     key.fileobj.sendto(answer, ("127.0.0.1", key.data))
 
     close = JsonServant.close
+
+
+class Px4Crowd(Thread):
+    """A PX4 for each of some ports, which connects again whenever the simulator has closed the connection."""
+
+    def __init__(self, *ports):
+        sys.path.insert(0, str(EXAMPLES))
+        import px4_peer
+
+        sys.path.remove(str(EXAMPLES))
+        self.px4, self.free = px4_peer, set(ports)
+        self.selector = selectors.DefaultSelector()
+
+    def run(self):
+        while not self.is_over.is_set():
+            for port in [*self.free]:
+                made = socket.socket()
+                if made.connect_ex(("127.0.0.1", port)):
+                    made.close()
+                else:
+                    self.free.discard(port)
+                    self.selector.register(made, selectors.EVENT_READ, (port, bytearray()))
+            for key, _ in self.selector.select(0.005):
+                if not self.served(key.fileobj, key.data[1]):
+                    self.selector.unregister(key.fileobj)
+                    key.fileobj.close()
+                    self.free.add(key.data[0])
+
+    def served(self, connection, received):
+        try:
+            data = connection.recv(65536)
+            received += data
+            for number, payload in self.px4.take_messages(received):
+                if number == self.px4.HIL_SENSOR:
+                    time_us = int.from_bytes(payload[:8].ljust(8, b"\0"), "little")
+                    answer = self.px4.CONTROLS.pack(time_us, 1, *[0.5] * 16, 129)
+                    connection.sendall(self.px4.packet(self.px4.HIL_CONTROLS, 0, answer))
+        except OSError:
+            return False
+        return bool(data)
+
+    close = JsonServant.close

@@ -15,6 +15,8 @@ from tussle.stock.autonomy.px4.sensors import SensorSuite
 
 MOST_BYTES = 1 << 20
 """Bytes in one step beyond which nothing more is read, and unsent bytes beyond which the autopilot counts as stuck."""
+SEND_BUFFER = 1 << 16
+"""Bytes that the system keeps for an autopilot that does not read."""
 FREEWHEEL_STEP = 4000
 """PX4's time between two messages while it starts [us]: its usual 250 Hz."""
 LOCKSTEP_FLAG = 1
@@ -131,6 +133,7 @@ class Px4Link(AutopilotLink):
         self._socket, self._is_connected = connection, True
         connection.setblocking(False)
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)
         self.autopilot = f"PX4 at {place[0]}:{place[1]}, port {self._port}"
         self.heard = time.monotonic()
 
