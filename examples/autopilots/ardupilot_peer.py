@@ -88,7 +88,13 @@ class ScrimmagePeer:
         self.home = self.home or (latitude, longitude, altitude)
         north = math.radians(latitude - self.home[0]) * EARTH_RADIUS
         east = math.radians(longitude - self.home[1]) * EARTH_RADIUS * math.cos(math.radians(latitude))
-        return time_us * 1e-6, (north, east, self.home[2] - altitude), values[4:7], values[13:16], values[10:13]
+        return (
+            time_us * 1e-6,
+            (north, east, self.home[2] - altitude),
+            values[4:7],
+            values[13:16],
+            values[10:13],
+        )
 
 
 def main():
@@ -113,7 +119,7 @@ def main():
         heard = time.monotonic()
         t, position, velocity, euler, rate = peer.read(data)
         start = start or (*position[:2], position[2] - climb, euler[2])
-        offset = [a - b for a, b in zip(position, start)]
+        offset = [a - b for a, b in zip(position, start[:3], strict=True)]
         height = climb - offset[2]
         peer.send(pulses(hover(offset, velocity, euler, rate, start[3])))
     print(f"at {t:.2f} s: {height:.2f} m above the start", flush=True)

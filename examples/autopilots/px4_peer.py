@@ -84,13 +84,15 @@ class Estimator:
         if updated & 0x200:
             # Height above the place of the first measurement, by the barometric formula of a standard atmosphere.
             self.pressure = self.pressure or pressure
-            height = 288.15 / 0.0065 * ((self.pressure / 1013.25) ** 0.190263 - (pressure / 1013.25) ** 0.190263)
+            height = (
+                288.15 / 0.0065 * ((self.pressure / 1013.25) ** 0.190263 - (pressure / 1013.25) ** 0.190263)
+            )
             self.offset[2] += 0.05 * (-height - self.offset[2])
         return time_us
 
     def integrate(self, dt, acceleration):
         """Move the estimate by dt [s] with the measured rates and specific force."""
-        (roll, pitch, yaw), (p, q, r) = self.euler, self.rate
+        (roll, pitch, _), (p, q, r) = self.euler, self.rate
         turn = q * math.sin(roll) + r * math.cos(roll)
         self.euler[0] += dt * (p + math.tan(pitch) * turn)
         self.euler[1] += dt * (q * math.cos(roll) - r * math.sin(roll))

@@ -29,7 +29,9 @@ def hover(offset, velocity, euler, rate, heading):
         rate: About forward, right, down [rad/s].
         heading: Yaw to hold [rad].
     """
-    wanted = [clamp(-0.6 * x - 1.4 * v, most) for x, v, most in zip(offset, velocity, (2.0, 2.0, 4.0))]
+    wanted = [
+        clamp(-0.6 * x - 1.4 * v, most) for x, v, most in zip(offset, velocity, (2.0, 2.0, 4.0), strict=True)
+    ]
     roll, pitch, yaw = euler
     forward = math.cos(yaw) * wanted[0] + math.sin(yaw) * wanted[1]
     right = math.cos(yaw) * wanted[1] - math.sin(yaw) * wanted[0]
@@ -37,7 +39,7 @@ def hover(offset, velocity, euler, rate, heading):
     gains = (40.0, 12.0), (40.0, 12.0), (4.0, 4.0)
     torque = [
         inertia * (kp * math.remainder(goal - angle, 2.0 * math.pi) - kd * omega)
-        for inertia, (kp, kd), goal, angle, omega in zip(INERTIA, gains, attitude, euler, rate)
+        for inertia, (kp, kd), goal, angle, omega in zip(INERTIA, gains, attitude, euler, rate, strict=True)
     ]
     lift = MASS * (GRAVITY - wanted[2]) / max(math.cos(roll) * math.cos(pitch), 0.5) / 4.0
     x, y, z = torque[0] / (2.0 * ARM), torque[1] / (2.0 * ARM), torque[2] * THRUST / (4.0 * TORQUE)

@@ -105,8 +105,11 @@ def check_with_autopilots(name: str, n: int = 40) -> None:
         pytest.importorskip("pymavlink")
         port = free_ports(n, 1, socket.SOCK_STREAM)
         with Px4Crowd(*range(port, port + n)):
-            return check_plugin(stock.load(name), port=port, **how)
-    port = free_ports(3 * n)  # for the id k: 3 k - 3 of JSON; 3 k - 2 and 3 k - 1 of the protocol of SCRIMMAGE
+            check_plugin(stock.load(name), port=port, **how)
+        return
+    port = free_ports(
+        3 * n
+    )  # for the id k: 3 k - 3 of JSON; 3 k - 2 and 3 k - 1 of the protocol of SCRIMMAGE
     ports = [range(port + k, port + 3 * n, 3) for k in range(3)]
     how |= {"json_port": port, "ardupilot_port_base": port - 2, "port_instance_multiplier": 3}
     with JsonServant(*ports[0]), ScrimmageServant(*zip(ports[2], ports[1], strict=True)):

@@ -23,7 +23,8 @@ JSBSIM = ("controller/jsbsim_controllers", "motion/jsbsim_model")
 LEARNED = ("autonomy/learned",)
 """Likewise by a policy in onnxruntime; tests/unit/stock/test_learned.py plays it."""
 SERVED = (
-    "autonomy/ardupilot", "autonomy/moos", "autonomy/px4", "autonomy/ros_autonomy", "controller/ros_controllers", "interaction/ros_clock_server",
+    "autonomy/ardupilot", "autonomy/moos", "autonomy/px4", "autonomy/ros_autonomy",
+    "controller/ros_controllers", "interaction/ros_clock_server",
     "interaction/ros_shape_viz", "sensor/ros_compass",
     "sensor/ros_altimeter", "sensor/ros_imu_sensor",
 )  # fmt: skip

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -11,14 +11,14 @@ from tussle.api.channels import DRIVEN_CHANNELS
 from tussle.columns import Param
 from tussle.errors import ParameterError, listed, nearest_name
 
-NUMBERS = "index", "input_min", "input_max", "output_min", "output_max", "factor"
+NUMBERS = "number", "input_min", "input_max", "output_min", "output_max", "factor"
 
 
 class ChannelRow(NamedTuple):
     """How an input drives a channel: the input range is mapped linearly to the output range, times the factor."""
 
     channel: str
-    index: int
+    number: int
     input_min: float
     input_max: float
     output_min: float
@@ -33,7 +33,7 @@ class ChannelRow(NamedTuple):
 
 @cache
 def channel_rows(text: str) -> tuple[ChannelRow, ...]:
-    """Parse rows [channel index input_min input_max output_min output_max factor].
+    """Parse rows [channel number input_min input_max output_min output_max factor].
 
     Raises:
         ParameterError: A row has another form, or a channel is unknown or written twice.
@@ -44,12 +44,14 @@ def channel_rows(text: str) -> tuple[ChannelRow, ...]:
         if channel not in DRIVEN_CHANNELS:
             near = nearest_name(channel, DRIVEN_CHANNELS)
             raise ParameterError(f"there is no channel {channel!r}{near}; {listed(DRIVEN_CHANNELS)}")
-        index, *limits = texts.row(rest, [(name, "", "") for name in NUMBERS])
-        if index != int(index) or index < 0.0:
-            raise ParameterError(f"{texts.shown(row)}: index = {index:g}; it takes a whole number from 0 on")
+        number, *limits = texts.row(rest, [(name, "", "") for name in NUMBERS])
+        if number != int(number) or number < 0.0:
+            raise ParameterError(
+                f"{texts.shown(row)}: number = {number:g}; it takes a whole number from 0 on"
+            )
         if limits[0] == limits[1]:
             raise ParameterError(f"{texts.shown(row)}: input_min and input_max are equal")
-        found.append(ChannelRow(channel, int(index), *limits))
+        found.append(ChannelRow(channel, int(number), *limits))
     if len({row.channel for row in found}) != len(found) or not found:
         raise ParameterError(f"{texts.shown(text)} names no channel, or one twice")
     return tuple(found)
@@ -73,9 +75,9 @@ class ChannelMapParam(Param):
         text = super().convert(value, where, from_geodetic)
         try:
             for row in channel_rows(text):
-                if self.n_inputs is not None and row.index >= self.n_inputs:
+                if self.n_inputs is not None and row.number >= self.n_inputs:
                     raise ParameterError(
-                        f"{row.channel} has the index {row.index}; it takes 0 to {self.n_inputs - 1}"
+                        f"{row.channel} has the number {row.number}; it takes 0 to {self.n_inputs - 1}"
                     )
         except ParameterError as error:
             raise ParameterError(f"{self._place(where)}: {error}") from None
@@ -87,8 +89,13 @@ def channel_outputs(text: str) -> list[str]:
     return [f"{row.channel}_out" for row in channel_rows(text)]
 
 
-def write_channels(plugin: Any, text: str, row: int, inputs: Callable[[int], float | None]) -> None:
-    """Write the channels of an entity from its inputs, a function of their index; a channel without input is 0."""
+def write_channels(
+    plugin: Any, text: str, row: int, inputs: Mapping[int, float], missing: float | None = None
+) -> None:
+    """Write the channels of an entity from its inputs by number.
+
+    A channel whose input is not there is 0, or follows the input `missing`.
+    """
     for channel in channel_rows(text):
-        x = inputs(channel.index)
+        x = inputs.get(channel.number, missing)
         getattr(plugin, f"{channel.channel}_out")[0, row] = 0.0 if x is None else channel.value(x)

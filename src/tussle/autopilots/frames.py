@@ -64,7 +64,9 @@ def to_ned_frd(quat: np.ndarray) -> np.ndarray:
 def vehicle_states(g: GroupView, last_vel: np.ndarray) -> list[VehicleState]:
     """The true states of the rows of a view. Accelerations are the change since `last_vel`, (3, n), over the step."""
     rows = slice(g.first, g.last)
-    pos, vel, quat, omega = (np.asarray(getattr(g.bodies, k)[:, rows]) for k in ("pos", "vel", "quat", "omega"))
+    pos, vel, quat, omega = (
+        np.asarray(getattr(g.bodies, k)[:, rows]) for k in ("pos", "vel", "quat", "omega")
+    )
     acceleration = (vel - last_vel) / g.dt
     force = acceleration + np.array([[0.0], [0.0], [GRAVITY]])
     roll, climb, yaw = (np.asarray(getattr(g.bodies, k)[rows]) for k in ("roll", "climb", "yaw"))
@@ -77,5 +79,5 @@ def vehicle_states(g: GroupView, last_vel: np.ndarray) -> list[VehicleState]:
         g.scene.origin.to_geodetic(pos),
     )
     lists = zip(*(map(tuple, column.T.tolist()) for column in columns), strict=True)
-    times = g.t.tolist()
-    return [VehicleState(t, *parts, speed=math.hypot(*parts[1])) for t, parts in zip(times, lists, strict=True)]
+    times, speeds = g.t.tolist(), [math.hypot(*v) for v in columns[1].T.tolist()]
+    return [VehicleState._make((t, *parts, v)) for t, parts, v in zip(times, lists, speeds, strict=True)]

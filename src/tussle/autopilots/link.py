@@ -31,18 +31,16 @@ class AutopilotLink(ABC):
         release: Called after the connection has been closed.
 
     Attributes:
-        commands: The newest commands, or none.
+        commands: The newest commands by number of the output; None before the first ones.
         failure: Why it cannot go on; empty if all is well.
         is_done: Whether the step may go on: the autopilot has answered its state, or without lockstep has been heard.
         heard: When the autopilot was heard last [s of `time.monotonic`].
     """
 
-    def __init__(
-        self, autopilot: str, lockstep: bool, timeout: float, release: Callable[[], object]
-    ) -> None:
+    def __init__(self, autopilot: str, lockstep: bool, timeout: float, release: Callable[[], object]) -> None:
         self.autopilot, self.lockstep, self.timeout = autopilot, lockstep, timeout
         self._release = release
-        self.commands: Sequence[float] = ()
+        self.commands: dict[int, float] | None = None
         self.failure = ""
         self.is_done = False
         self.heard = self._left = time.monotonic()
@@ -125,9 +123,7 @@ def resolved(host: str, what: str) -> str:
     try:
         return socket.gethostbyname(host)
     except (OSError, UnicodeError) as error:
-        raise ParameterError(
-            f"{what} = {host!r} is no host: {getattr(error, 'strerror', error)}"
-        ) from None
+        raise ParameterError(f"{what} = {host!r} is no host: {getattr(error, 'strerror', error)}") from None
 
 
 def bound(kind: socket.SocketKind, host: str, port: int, what: str) -> socket.socket:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,9 @@ class Autopilot(Autonomy):
 
     grade = "external"
 
-    lockstep = Param(True, structural=True, doc="Wait in each step for the autopilot's answer, not for the clock.")
+    lockstep = Param(
+        True, structural=True, doc="Wait in each step for the autopilot's answer, not for the clock."
+    )
     time_warp = Param(
         1.0, structural=True, gt=0.0, le=1000.0, doc="Simulated time over time, without lockstep."
     )
@@ -41,15 +43,11 @@ class Autopilot(Autonomy):
     def open_one(self, row: Any) -> AutopilotLink:
         """Open the sockets of a vehicle."""
 
-    @abstractmethod
-    def input_of(self, commands: Any, index: int) -> float | None:
-        """The input of the map that an output of the autopilot is; None if it drives nothing."""
-
     def offered_outputs(self) -> list[str]:
         """Return the channels of the map."""
         return channel_outputs(self.channel_map())
 
-    def claim(self, row: Any, ports: tuple[int, ...], advice: str) -> Callable[[], None]:
+    def claim(self, row: Any, ports: Iterable[int], advice: str) -> Callable[[], None]:
         """Reserve ports for the vehicle of a handle's row; see `OwnedPorts.claim`."""
         owner = f"entity {row.id} of world {row.world}"
         more = f"{advice}, and for several worlds world_step"
@@ -84,5 +82,5 @@ class Autopilot(Autonomy):
             link.leave()
             if link.failure:
                 g.fail(row, link.failure)
-            elif link.commands:
-                write_channels(self, self.channel_map(), row, lambda i, c=link.commands: self.input_of(c, i))
+            elif link.commands is not None:
+                write_channels(self, self.channel_map(), row, link.commands)

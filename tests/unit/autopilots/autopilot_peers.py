@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import os
 import selectors
 import socket
@@ -29,19 +30,28 @@ def open_sockets():
     return found
 
 
+FIRST_PORT, PORTS_EACH = 20_000, 1_000
+"""Ports of tests, below those that systems give to clients, and their number for each worker of pytest."""
+COUNTER = itertools.count(os.getpid() % PORTS_EACH)
+
+
 def free_ports(n=1, step=1, kind=socket.SOCK_DGRAM):
-    """The first of n free ports, each `step` after the one before."""
+    """The first of n free ports, each `step` after the one before; others than those of the calls before."""
+    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
+    length = (n - 1) * step + 1
     while True:
+        first = FIRST_PORT + worker * PORTS_EACH + next(COUNTER) % (PORTS_EACH - length)
         with contextlib.ExitStack() as stack:
-            first = 0
             try:
-                for k in range(n):
+                for port in range(first, first + length, step):
                     made = stack.enter_context(socket.socket(socket.AF_INET, kind))
-                    made.bind(("127.0.0.1", first + k * step if first else 0))
-                    first = first or made.getsockname()[1]
-                return first
-            except (OSError, OverflowError):
+                    made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, kind == socket.SOCK_STREAM)
+                    made.bind(("127.0.0.1", port))
+            except OSError:
                 continue
+        for _ in range(length):
+            next(COUNTER)
+        return first
 
 
 class Process:

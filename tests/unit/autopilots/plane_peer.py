@@ -1,6 +1,6 @@
 """Flies the FixedWing6DOFRascal of tussle in the place of ArduPilot, with the packets of its model scrimmage.
 
-    python plane_peer.py 5003 5002 120      # climb to an altitude of 120 m and hold it and the heading
+python plane_peer.py 5003 5002 120      # climb to an altitude of 120 m and hold it and the heading
 """
 
 import math

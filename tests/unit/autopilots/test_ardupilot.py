@@ -22,7 +22,6 @@ from autopilot_peers import LONG, JsonServant, Process, ScrimmageServant, free_p
 
 from tussle import Block, Mission, Simulation
 from tussle.errors import ParameterError, PluginError
-from tussle.mission import read_mission
 from tussle.scene import Scene
 from tussle.stock import ArduPilot, DirectController, FixedWing6DOFRascal, Multirotor
 
@@ -32,7 +31,9 @@ PLANE = Path(__file__).with_name("plane_peer.py")
 
 def copter(port, count=1, end=10.0, motion=None, block=None, protocol="json", dt=0.01, **values):
     own = {"json_port": port} if protocol == "json" else {}
-    autonomy = ArduPilot(protocol=protocol, servo_map=MOTORS, **{"timeout": LONG, "resend_period": LONG, **own, **values})
+    autonomy = ArduPilot(
+        protocol=protocol, servo_map=MOTORS, **{"timeout": LONG, "resend_period": LONG, **own, **values}
+    )
     where = {"position": (3.0, -4.0, 10.0), "heading": "90 deg", **(block or {})}
     return Mission(
         blocks=[
@@ -61,7 +62,9 @@ def test_a_multirotor_reaches_its_altitude_and_a_thousand_steps_give_the_same_bi
     hashes = []
     for _ in range(2):
         port = free_ports(2)
-        ports, mission = ((port,), copter(port)) if protocol == "json" else ((port + 1, port), by_scrimmage(port))
+        ports, mission = (
+            ((port,), copter(port)) if protocol == "json" else ((port + 1, port), by_scrimmage(port))
+        )
         with Process("ardupilot_peer.py", protocol, *ports, 30) as peer, Simulation(mission) as sim:
             (result,) = sim.run()
             pos = sim.read("copter.pos")[0][0, 0]
@@ -93,13 +96,17 @@ def test_several_vehicles_and_worlds_have_an_autopilot_each_and_fly_as_alone():
     mission = copter(port, count=3, end=2.0, block={"variance": (400.0, 400.0, 0.0)}, world_step=30)
     with contextlib.ExitStack() as stack:
         for k in range(6):
-            stack.enter_context(Process("ardupilot_peer.py", "json", port + 10 * k, 5 + k, "--patience", LONG))
+            stack.enter_context(
+                Process("ardupilot_peer.py", "json", port + 10 * k, 5 + k, "--patience", LONG)
+            )
         with Simulation(mission, seeds=[1, 2]) as sim:
             sim.run()
             stacked = sim.read("copter.pos")[0]
     with contextlib.ExitStack() as stack:
         for k in range(3):
-            stack.enter_context(Process("ardupilot_peer.py", "json", port + 10 * k, 8 + k, "--patience", LONG))
+            stack.enter_context(
+                Process("ardupilot_peer.py", "json", port + 10 * k, 8 + k, "--patience", LONG)
+            )
         with Simulation(mission, seeds=[2]) as sim:
             sim.run()
             assert np.array_equal(sim.read("copter.pos")[0][0], stacked[1])
@@ -109,7 +116,11 @@ def test_several_vehicles_and_worlds_have_an_autopilot_each_and_fly_as_alone():
 def test_lost_packets_are_sent_again_and_it_still_reaches_its_altitude():
     port = free_ports()
     mission = copter(port, end=8.0, resend_period=0.05)
-    with Relay(port) as relay, Process("ardupilot_peer.py", "json", relay.port, 10), Simulation(mission) as sim:
+    with (
+        Relay(port) as relay,
+        Process("ardupilot_peer.py", "json", relay.port, 10),
+        Simulation(mission) as sim,
+    ):
         assert sim.run()[0].end == "time"
         assert abs(sim.read("copter.pos")[0][0, 0, 2] - 20.0) < 0.5
     assert relay.n_lost > 10
@@ -163,7 +174,10 @@ def test_a_state_in_json_is_in_north_east_down_and_forward_right_down():
     port = free_ports()
     block = {"position": (100.0, 200.0, 50.0), "heading": "30 deg", "velocity": (3.0, 4.0, 5.0)}
     still = Multirotor(omega_min=0.0, c_D=0.0)  # it falls: no pulses
-    with JsonServant(port, act=lambda *_: [0] * 16) as servant, Simulation(copter(port, motion=still, block=block, dt=0.5)) as sim:
+    with (
+        JsonServant(port, act=lambda *_: [0] * 16) as servant,
+        Simulation(copter(port, motion=still, block=block, dt=0.5)) as sim,
+    ):
         sim.step(2)
     first, second = map(json.loads, servant.states[port])
     assert first["timestamp"] == 0.0
@@ -171,11 +185,18 @@ def test_a_state_in_json_is_in_north_east_down_and_forward_right_down():
     assert first["position"] == [200.0, 100.0, -50.0]
     assert first["velocity"] == [4.0, 3.0, -5.0]
     yaw = math.radians(90.0 - 30.0)
-    assert first["quaternion"] == pytest.approx([math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw)], abs=1e-12)
-    assert first["imu"] == {"gyro": pytest.approx([0.0] * 3), "accel_body": pytest.approx([0.0, 0.0, -9.80665])}
+    assert first["quaternion"] == pytest.approx(
+        [math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw)], abs=1e-12
+    )
+    assert first["imu"] == {
+        "gyro": pytest.approx([0.0] * 3),
+        "accel_body": pytest.approx([0.0, 0.0, -9.80665]),
+    }
     assert second["velocity"] == pytest.approx([4.0, 3.0, -5.0 + 9.81 * 0.5])
     assert second["imu"]["accel_body"] == pytest.approx([0.0, 0.0, 9.81 - 9.80665])
-    assert second["position"] == pytest.approx([200.0 + 4 * 0.5, 100.0 + 3 * 0.5, -50.0 - 5 * 0.5 + 0.5 * 9.81 * 0.25])
+    assert second["position"] == pytest.approx(
+        [200.0 + 4 * 0.5, 100.0 + 3 * 0.5, -50.0 - 5 * 0.5 + 0.5 * 9.81 * 0.25]
+    )
     assert servant.states[port][0][:1] == servant.states[port][0][-1:] == b"\n"
 
 
@@ -192,7 +213,9 @@ def test_a_state_by_the_protocol_of_scrimmage_has_its_units_and_order():
     assert (first[0], second[0]) == (0, 500_000)
     # Radii of curvature of WGS84 at this latitude: 6356.9 km along the meridian, 6385.2 km along the parallel.
     assert first[1] == pytest.approx(-35.0 + math.degrees(200.0 / 6356.9e3), abs=1e-6)
-    assert first[2] == pytest.approx(149.0 + math.degrees(100.0 / (6385.2e3 * math.cos(math.radians(35.0)))), abs=1e-6)
+    assert first[2] == pytest.approx(
+        149.0 + math.degrees(100.0 / (6385.2e3 * math.cos(math.radians(35.0)))), abs=1e-6
+    )
     assert first[3] == pytest.approx(634.0, abs=0.01)
     assert first[4] == pytest.approx(math.radians(60.0))
     assert first[5:8] == (4.0, 3.0, 0.0)
@@ -207,8 +230,13 @@ def test_pulses_are_mapped_linearly_to_channels(n):
     port = free_ports()
     pulses = [1000 + 10 * k for k in range(n)]
     pulses[3] = 0
-    servo_map = f"[ motor_0 0 1000 2000 100 200 1 ] [ motor_1 5 1000 2000 0 1000 -2 ] [ motor_2 {n - 1} 1000 +2000 0 1 1 ] [ motor_3 3 1000 2000 0 500 1 ]"
-    autonomy = ArduPilot(protocol="json", servo_map=servo_map, json_port=port, timeout=LONG, resend_period=LONG)
+    servo_map = (
+        f"[ motor_0 0 1000 2000 100 200 1 ] [ motor_1 5 1000 2000 0 1000 -2 ] [ motor_2 {n - 1} 1000 +2000 0 1 1 ]"
+        "[ motor_3 3 1000 2000 0 500 1 ]"
+    )
+    autonomy = ArduPilot(
+        protocol="json", servo_map=servo_map, json_port=port, timeout=LONG, resend_period=LONG
+    )
     block = copter(port).blocks[0].replace(autonomy=[autonomy])
     with JsonServant(port, act=lambda *_: pulses), Simulation(Mission(blocks=[block], dt=0.01)) as sim:
         sim.step()
@@ -230,11 +258,11 @@ def test_an_output_that_the_autopilot_does_not_have_is_without_pulses():
     ("text", "message"),
     [
         ("[ motor_9 0 1000 2000 0 1 1 ]", "there is no channel 'motor_9' (did you mean"),
-        ("[ throttle 32 1000 2000 0 1 1 ]", "throttle has the index 32; it takes 0 to 31"),
-        ("[ throttle 1.5 1000 2000 0 1 1 ]", "index = 1.5; it takes a whole number from 0 on"),
-        ("[ throttle -1 1000 2000 0 1 1 ]", "index = -1; it takes a whole number from 0 on"),
+        ("[ throttle 32 1000 2000 0 1 1 ]", "throttle has the number 32; it takes 0 to 31"),
+        ("[ throttle 1.5 1000 2000 0 1 1 ]", "number = 1.5; it takes a whole number from 0 on"),
+        ("[ throttle -1 1000 2000 0 1 1 ]", "number = -1; it takes a whole number from 0 on"),
         ("[ throttle 1 1000 1000 0 1 1 ]", "input_min and input_max are equal"),
-        ("[ throttle 1 1000 2000 0 1 ]", "has 5 numbers; it takes 6 (index, input_min"),
+        ("[ throttle 1 1000 2000 0 1 ]", "has 5 numbers; it takes 6 (number, input_min"),
         ("[ throttle 1 1000 2000 0 1 1 ] [ throttle 2 1000 2000 0 1 1 ]", "names no channel, or one twice"),
         ("", "names no channel, or one twice"),
     ],
@@ -257,20 +285,32 @@ def error_of(mission, seeds=1):
 def test_two_vehicles_have_no_port_in_common():
     port = free_ports()
     mission = copter(port, count=2, block={"variance": (100.0, 100.0, 0.0)}, port_instance_multiplier=0)
-    assert f"port {port} is that of entity 1 of world 0; each vehicle has a port of its own: set port_instance_multiplier" in error_of(mission)
+    assert (
+        f"port {port} is that of entity 1 of world 0; each vehicle has a port of its own: set port_instance_multiplier"
+        in error_of(mission)
+    )
     own = {"protocol": "scrimmage", "from_ardupilot_port": port, "to_ardupilot_port": port + 1}
     mission = copter(port, count=2, block={"variance": (100.0, 100.0, 0.0)}, **own)
-    assert f"port {port + 1} is that of entity 1 of world 0; each vehicle has ports of its own: set ardupilot_port_base" in error_of(mission)
-    assert "port 65537 is not from 1 to 65535" in error_of(copter(65527, count=2, block={"variance": (100.0, 100.0, 0.0)}))
+    assert (
+        f"port {port + 1} is that of entity 1 of world 0; each vehicle has ports of its own: set ardupilot_port_base"
+        in error_of(mission)
+    )
+    assert "port 65537 is not from 1 to 65535" in error_of(
+        copter(65527, count=2, block={"variance": (100.0, 100.0, 0.0)})
+    )
 
 
 def test_a_port_that_is_taken_and_a_host_that_is_none_are_named():
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(("127.0.0.1", 0))
         port = other.getsockname()[1]
-        assert f"json_port: 127.0.0.1:{port} cannot be opened: Address already in use" in error_of(copter(port))
+        assert f"json_port: 127.0.0.1:{port} cannot be opened: Address already in use" in error_of(
+            copter(port)
+        )
     assert "listen_ip = 'no host' is no host" in error_of(copter(free_ports(), listen_ip="no host"))
-    assert "to_ardupilot_ip = '1.2.3.4.5' is no host" in error_of(by_scrimmage(free_ports(2), to_ardupilot_ip="1.2.3.4.5"))
+    assert "to_ardupilot_ip = '1.2.3.4.5' is no host" in error_of(
+        by_scrimmage(free_ports(2), to_ardupilot_ip="1.2.3.4.5")
+    )
 
 
 # -- peers that make no sense ---------------------------------------------------------------------------------------------------------
@@ -281,7 +321,10 @@ def test_an_autopilot_that_never_comes_is_missed():
     text = error_of(copter(port, timeout=0.2))
     assert f"ArduPilot that sends to 127.0.0.1:{port}: no servo packet within 0.2 s" in text
     text = error_of(by_scrimmage(port, timeout=0.3))
-    assert f"ArduPilot at 127.0.0.1:{port + 1}, servo packets at port {port}: no servo packet at port {port} within 0.3 s" in text
+    assert (
+        f"ArduPilot at 127.0.0.1:{port + 1}, servo packets at port {port}: no servo packet at port {port} within 0.3 s"
+        in text
+    )
 
 
 def test_a_state_that_nobody_heard_is_sent_again_as_soon_as_somebody_listens():
@@ -315,7 +358,7 @@ def test_garbage_changes_nothing_and_is_told_when_nothing_else_comes(protocol):
     with Noise(port) as noise:
         text = error_of(mission)
     sizes = "18458 with 40 bytes or 29569 with 72 bytes" if protocol == "json" else "servo packets have 32"
-    assert f"within 0.5 s" in text
+    assert "within 0.5 s" in text
     assert sizes in text
     assert f"from 127.0.0.1:{noise.own}" in text
 
@@ -323,7 +366,13 @@ def test_garbage_changes_nothing_and_is_told_when_nothing_else_comes(protocol):
 class Noise:
     """Sends packets of no sense to a port."""
 
-    PACKETS = (b"", b"x", b"\x1a" * 33, struct.pack("<HHI16H", 18459, 1, 1, *range(16)), struct.pack("<H", 29569) + b"y" * 38)
+    PACKETS = (
+        b"",
+        b"x",
+        b"\x1a" * 33,
+        struct.pack("<HHI16H", 18459, 1, 1, *range(16)),
+        struct.pack("<H", 29569) + b"y" * 38,
+    )
 
     def __init__(self, port, packets=PACKETS, pause=0.01):
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -357,7 +406,10 @@ def test_a_flood_ends_the_world_of_its_vehicle_and_no_other(protocol, monkeypatc
     if protocol == "json":
         mission, servant = copter(first, world_step=1, end=1.0), JsonServant(first + 1)
     else:
-        mission, servant = by_scrimmage(first, world_step=2, end=1.0), ScrimmageServant((first + 3, first + 2))
+        mission, servant = (
+            by_scrimmage(first, world_step=2, end=1.0),
+            ScrimmageServant((first + 3, first + 2)),
+        )
     with servant, Noise(first, pause=0.0) as noise, Simulation(mission, seeds=[1, 2]) as sim:
         flooded, other = sim.run()
     assert "more than 50 packets in one step, the last from 127.0.0.1:" in str(flooded.error)
@@ -371,7 +423,9 @@ def test_an_autopilot_that_dies_on_the_way_is_missed():
         sim.step(100)
         peer.process.kill()
         peer.process.wait()
-        with pytest.raises(PluginError, match=rf"ArduPilot that sends to 127\.0\.0\.1:{port}: no servo packet within 1 s") as raised:
+        with pytest.raises(
+            PluginError, match=rf"ArduPilot that sends to 127\.0\.0\.1:{port}: no servo packet within 1 s"
+        ) as raised:
             sim.run()
     assert raised.value.step == 100
 
@@ -407,7 +461,9 @@ def test_a_second_autopilot_at_the_port_of_the_first_is_told(protocol):
         sim.step(5)
         with Noise(port, packets=(packet,)) as noise, pytest.raises(PluginError) as raised:
             sim.run()
-    assert f"a second autopilot, at 127.0.0.1:{noise.own}, sends to the port of the one at 127.0.0.1:" in str(raised.value)
+    assert f"a second autopilot, at 127.0.0.1:{noise.own}, sends to the port of the one at 127.0.0.1:" in str(
+        raised.value
+    )
 
 
 def test_a_stranger_is_refused_where_the_place_of_the_autopilot_is_known():
@@ -457,7 +513,9 @@ def test_ctrl_c_ends_the_wait_for_an_autopilot(tmp_path):
     )
     call = [sys.executable, "-m", "tussle.cli", "run", str(file), "--out", str(tmp_path / "run")]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
-    with subprocess.Popen(call, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment) as process:
+    with subprocess.Popen(
+        call, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment
+    ) as process:
         while process.poll() is None and not is_taken(port):
             time.sleep(0.05)
         time.sleep(0.5)

@@ -72,7 +72,11 @@ def test_a_coordinated_turn_presses_into_the_seat_and_turns_about_down():
     bank, dt = math.atan(20.0 * 0.4 / G), 1e-3
     port = free_ports()
     autonomy = ArduPilot(
-        protocol="json", json_port=port, timeout=LONG, resend_period=LONG, servo_map="[ throttle 0 1000 2000 0 1 1 ]"
+        protocol="json",
+        json_port=port,
+        timeout=LONG,
+        resend_period=LONG,
+        servo_map="[ throttle 0 1000 2000 0 1 1 ]",
     )
     block = Block(name="plane", autonomy=autonomy, controller=DirectController(), motion=Orbit(bank=bank))
     with JsonServant(port) as servant, Simulation(Mission(blocks=[block], dt=dt)) as sim:

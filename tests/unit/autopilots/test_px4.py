@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import math
 import re
 import select
@@ -23,7 +24,18 @@ from tussle.stock import PX4, DirectController, Multirotor
 
 pytest.importorskip("pymavlink")
 sys.path.insert(0, str(EXAMPLES))
-from px4_peer import CONTROLS, CRC_EXTRA, GPS, HIL_CONTROLS, HIL_GPS, HIL_SENSOR, HIL_STATE, SENSOR, packet, take_messages  # noqa: E402
+from px4_peer import (
+    CONTROLS,
+    CRC_EXTRA,
+    GPS,
+    HIL_CONTROLS,
+    HIL_GPS,
+    HIL_SENSOR,
+    HIL_STATE,
+    SENSOR,
+    packet,
+    take_messages,
+)
 
 sys.path.remove(str(EXAMPLES))
 STATE = struct.Struct("<Q4f3f3i3h2H3h")
@@ -94,7 +106,9 @@ class Px4Servant(Thread):
 
     def read(self, number, layout):
         """The messages with a number, unpacked."""
-        return [layout.unpack(payload.ljust(layout.size, b"\0")) for n, payload in self.messages if n == number]
+        return [
+            layout.unpack(payload.ljust(layout.size, b"\0")) for n, payload in self.messages if n == number
+        ]
 
     def close(self):
         if self.socket:
@@ -109,7 +123,9 @@ def test_multirotors_reach_their_altitudes_by_their_sensors_and_give_the_same_bi
     for _ in range(2):
         port = tcp_port(2)
         mission = copter(port, count=2, block={"variance": (100.0, 100.0, 0.0)}, end=8.0)
-        peers = [Process("px4_peer.py", port + k, climb, "--patience", LONG) for k, climb in enumerate((20, 10))]
+        peers = [
+            Process("px4_peer.py", port + k, climb, "--patience", LONG) for k, climb in enumerate((20, 10))
+        ]
         with peers[0], peers[1], Simulation(mission) as sim:
             before = sim.read("copter.pos")[0][0]
             (result,) = sim.run()
@@ -139,7 +155,9 @@ def test_measurements_have_their_units_frames_and_rates():
     block = {"heading": "30 deg", "velocity": (3.0, 4.0, 5.0)}
     falls = Multirotor(omega_min=0.0, c_D=0.0)
     field = (0.2, 0.05, 0.4)
-    mission = copter(port, motion=falls, block=block, noise=QUIET, magnetic_field=field, gps_rate=10.0, slow_rate=50.0)
+    mission = copter(
+        port, motion=falls, block=block, noise=QUIET, magnetic_field=field, gps_rate=10.0, slow_rate=50.0
+    )
     with Px4Servant(port, act=lambda n, t: controls(t, (0.0,) * 16)) as px4, Simulation(mission) as sim:
         sim.step(100)
     start, first, *more = px4.read(HIL_SENSOR, SENSOR)
@@ -147,7 +165,11 @@ def test_measurements_have_their_units_frames_and_rates():
     assert [m[0] for m in (start, first, *more)] == list(range(4000, 4000 * 102, 4000))
     yaw = math.radians(60.0)
     north, east, down = field
-    body_field = (math.cos(yaw) * north + math.sin(yaw) * east, math.cos(yaw) * east - math.sin(yaw) * north, down)
+    body_field = (
+        math.cos(yaw) * north + math.sin(yaw) * east,
+        math.cos(yaw) * east - math.sin(yaw) * north,
+        down,
+    )
     assert start[1:] == first[1:14] + start[14:]  # the vehicle stands still while PX4 starts
     assert first[1:7] == pytest.approx((0.0, 0.0, -9.80665, 0.0, 0.0, 0.0), abs=1e-6)
     assert first[7:10] == pytest.approx(body_field, abs=1e-6)
@@ -163,12 +185,14 @@ def test_measurements_have_their_units_frames_and_rates():
     fixes = px4.read(HIL_GPS, GPS)
     assert [fix[0] for fix in fixes] == [4000 + 100_000 * k for k in range(5)][: len(fixes)]
     assert len(fixes) == 5 - (fixes[-1][0] < 404_000)
-    time_us, lat, lon, alt, eph, epv, speed, vn, ve, vd, course, fix, satellites, id_, _ = fixes[0]
+    _, lat, lon, alt, eph, epv, speed, vn, ve, vd, course, fix, satellites, id_, _ = fixes[0]
     assert (alt, speed, vn, ve, vd, fix, id_) == (498_000, 500, 400, 300, -500, 3, 0)
     assert course == round(100.0 * math.degrees(math.atan2(3.0, 4.0)))
     # Radii of curvature of WGS84 at this latitude: 6370.1 km along the meridian, 6389.7 km along the parallel.
     assert lat == pytest.approx(473977420 + 1e7 * math.degrees(-4.0 / 6370.1e3), abs=2)
-    assert lon == pytest.approx(85455940 + 1e7 * math.degrees(3.0 / (6389.7e3 * math.cos(math.radians(47.3977)))), abs=2)
+    assert lon == pytest.approx(
+        85455940 + 1e7 * math.degrees(3.0 / (6389.7e3 * math.cos(math.radians(47.3977)))), abs=2
+    )
     assert (eph, epv, satellites) == (100, 100, 10)
     assert fixes[-1][9] > 100 * (9.81 * 0.35 - 5.0) - 3
 
@@ -185,10 +209,13 @@ def test_noise_is_drawn_by_the_seed_and_no_value_comes_twice_while_px4_starts():
         port = tcp_port()
         deviations = (0.5, 0.1, 0.01, 50.0)
         mission = copter(port, noise=deviations, freewheel_period=0.001)
-        with Px4Servant(port, act=lambda n, t: controls(t) if n >= 3 else None) as px4, Simulation(mission, seeds=seed) as sim:
+        with (
+            Px4Servant(port, act=lambda n, t: controls(t) if n >= 3 else None) as px4,
+            Simulation(mission, seeds=seed) as sim,
+        ):
             sim.step(300)
         messages = px4.read(HIL_SENSOR, SENSOR)
-        assert all(a[1:10] != b[1:10] for a, b in zip(messages, messages[1:], strict=False))
+        assert all(a[1:10] != b[1:10] for a, b in itertools.pairwise(messages))
         flown = np.array(messages[-300:])
         spreads.append(flown[:, 4:7])
         assert np.std(flown[:, 4:7]) == pytest.approx(0.1, rel=0.15)
@@ -201,11 +228,14 @@ def test_controls_are_mapped_linearly_to_channels():
     port = tcp_port()
     values = [k / 16.0 for k in range(16)]
     control_map = "[ motor_0 4 0 1 100 300 1 ] [ motor_1 15 -1 1 -0.5 0.5 -1 ] [ motor_2 0 0 1 0 1 1 ] [ motor_3 1 0 1 0 1 1 ]"
-    with Px4Servant(port, act=lambda n, t: controls(t, values)), Simulation(copter(port, control_map=control_map)) as sim:
+    with (
+        Px4Servant(port, act=lambda n, t: controls(t, values)),
+        Simulation(copter(port, control_map=control_map)) as sim,
+    ):
         sim.step()
         got = [sim.read(f"copter.PX4.motor_{k}_out")[0].item() for k in range(4)]
     assert got == [150.0, -0.5 * (15.0 / 16.0), 0.0, 1.0 / 16.0]
-    with pytest.raises(ParameterError, match="motor_0 has the index 16; it takes 0 to 15"):
+    with pytest.raises(ParameterError, match="motor_0 has the number 16; it takes 0 to 15"):
         PX4(control_map="[ motor_0 16 0 1 0 1 1 ]")
 
 
@@ -216,7 +246,10 @@ def test_an_answer_to_older_measurements_is_none():
     """PX4 stamps its answer with the time of the measurements; each is preceded here by a stale one."""
     port = tcp_port()
     stale = controls(1, (0.9,) * 16)
-    with Px4Servant(port, act=lambda n, t: stale + controls(t, (0.25,) * 16)) as px4, Simulation(copter(port)) as sim:
+    with (
+        Px4Servant(port, act=lambda n, t: stale + controls(t, (0.25,) * 16)) as px4,
+        Simulation(copter(port)) as sim,
+    ):
         for k in range(5):
             sim.step()
             assert px4.n == k + 2
@@ -233,7 +266,10 @@ def test_without_px4s_lockstep_the_stamp_is_that_of_another_clock():
 def test_px4_gets_time_until_it_has_started():
     port = tcp_port()
     mission = copter(port, freewheel_period=0.001)
-    with Px4Servant(port, act=lambda n, t: controls(t) if n >= 200 else None) as px4, Simulation(mission) as sim:
+    with (
+        Px4Servant(port, act=lambda n, t: controls(t) if n >= 200 else None) as px4,
+        Simulation(mission) as sim,
+    ):
         sim.step()
         assert sim.read("copter.PX4.motor_0_out")[0].item() == 600.0
     stamps = [message[0] for message in px4.read(HIL_SENSOR, SENSOR)]
@@ -266,7 +302,10 @@ def test_ports_are_one_each():
     port = tcp_port()
     spread = {"variance": (100.0, 100.0, 0.0)}
     text = error_of(copter(port, count=2, block=spread, port_step=0))
-    assert f"port {port} is that of entity 1 of world 0; each vehicle has a port of its own: set port_step" in text
+    assert (
+        f"port {port} is that of entity 1 of world 0; each vehicle has a port of its own: set port_step"
+        in text
+    )
     with socket.create_server(("127.0.0.1", 0)) as other:
         port = other.getsockname()[1]
         assert f"port: 127.0.0.1:{port} cannot be opened: Address already in use" in error_of(copter(port))
@@ -304,7 +343,9 @@ def test_px4_that_dies_on_the_way_is_told():
         sim.step(100)
         peer.process.kill()
         peer.process.wait()
-        with pytest.raises(PluginError, match=PEER + r"(the connection was closed|Connection reset|nothing can be sent)") as raised:
+        with pytest.raises(
+            PluginError, match=PEER + r"(the connection was closed|Connection reset|nothing can be sent)"
+        ) as raised:
             sim.run()
     assert raised.value.step == 100
 
@@ -357,5 +398,7 @@ def test_a_px4_that_reads_nothing_is_told(monkeypatch):
 
 def test_a_missing_pymavlink_is_told(monkeypatch):
     monkeypatch.setitem(sys.modules, "pymavlink.dialects.v20", None)
-    with pytest.raises((MissingExtraError, PluginError), match=r"PX4 needs pymavlink: pip install 'tussle\[autopilot\]'"):
+    with pytest.raises(
+        (MissingExtraError, PluginError), match=r"PX4 needs pymavlink: pip install 'tussle\[autopilot\]'"
+    ):
         Simulation(copter(tcp_port())).run()

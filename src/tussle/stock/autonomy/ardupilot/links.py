@@ -64,7 +64,9 @@ class UdpLink(AutopilotLink):
                 return
             self._n_packets += 1
             if self._n_packets > MOST_PACKETS:
-                self.fail(f"more than {MOST_PACKETS} packets in one step, the last from {_at(place)}{self._remark()}")
+                self.fail(
+                    f"more than {MOST_PACKETS} packets in one step, the last from {_at(place)}{self._remark()}"
+                )
             elif self._is_stranger(place):
                 self._refused = f"a packet from {_at(place)}"
             else:
@@ -80,7 +82,9 @@ class UdpLink(AutopilotLink):
         if self._peer is None:
             self._peer = place
         elif place != self._peer:
-            self.fail(f"a second autopilot, at {_at(place)}, sends to the port of the one at {_at(self._peer)}")
+            self.fail(
+                f"a second autopilot, at {_at(place)}, sends to the port of the one at {_at(self._peer)}"
+            )
             return
         self.heard = time.monotonic()
         self._take(frame)
@@ -239,6 +243,7 @@ class JsonLink(UdpLink):
             self._send()
 
     def _send_state(self, data: bytes) -> None:
+        assert self._peer is not None
         self._in.sendto(data, self._peer)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 from tussle.api import HistoricAttributes, Param
@@ -16,7 +15,8 @@ SERVO_MAP = """[ throttle 2 1000 +2000 0 +1 +1 ]
     [ elevator 1 1000 +2000 -1 +1 -1 ]
     [ aileron 0 1000 +2000 -1 +1 +1 ]
     [ rudder 3 1000 +2000 -1 +1 -1 ]"""
-ONE_EACH = "each vehicle has ports of its own: set ardupilot_port_base"
+OF_JSON = "each vehicle has a port of its own: set port_instance_multiplier"
+OF_SCRIMMAGE = "each vehicle has ports of its own: set ardupilot_port_base"
 
 
 class ArduPilot(Autopilot):
@@ -40,38 +40,50 @@ class ArduPilot(Autopilot):
 
     historic_attributes = HistoricAttributes(unread=("asynchronous_mode",))
 
-    protocol = Param("scrimmage", choices=("scrimmage", "json"), doc="Packets: of ArduPilot's model scrimmage, or JSON.")
+    protocol = Param(
+        "scrimmage", choices=("scrimmage", "json"), doc="Packets: of ArduPilot's model scrimmage, or JSON."
+    )
     servo_map = ChannelMapParam(
         SERVO_MAP,
         n_inputs=wire.N_SERVOS,
         doc="Rows [channel output pulse_min pulse_max channel_min channel_max factor].",
     )
     to_ardupilot_ip = Param("127.0.0.1", doc="Where ArduPilot is, for the protocol scrimmage.")
-    to_ardupilot_port = Param(5003, structural=True, ge=1, le=MOST_PORT, doc="Port of ArduPilot that takes states.")
+    to_ardupilot_port = Param(
+        5003, structural=True, ge=1, le=MOST_PORT, doc="Port of ArduPilot that takes states."
+    )
     from_ardupilot_port = Param(
         5002, structural=True, ge=1, le=MOST_PORT, doc="Port of tussle that takes servo packets."
     )
     ardupilot_port_base = Param(
-        0, structural=True, ge=0, le=MOST_PORT, doc="If not 0, the ports of each vehicle are counted from here."
+        0,
+        structural=True,
+        ge=0,
+        le=MOST_PORT,
+        doc="If not 0, the ports of each vehicle are counted from here.",
     )
     port_instance_multiplier = Param(
         10, structural=True, ge=0, le=MOST_PORT, doc="Ports are higher by this for each id."
     )
     json_port = Param(
-        9002, structural=True, ge=1, le=MOST_PORT, doc="Port of tussle for the first vehicle, for the protocol json."
+        9002,
+        structural=True,
+        ge=1,
+        le=MOST_PORT,
+        doc="Port of tussle for the first vehicle, for the protocol json.",
     )
     listen_ip = Param("127.0.0.1", doc="Address of this machine at which servo packets are taken.")
     resend_period = Param(
-        1.0, structural=True, unit="s", gt=0.0, doc="Time after which a state without an answer is sent again."
+        1.0,
+        structural=True,
+        unit="s",
+        gt=0.0,
+        doc="Time after which a state without an answer is sent again.",
     )
 
     def channel_map(self) -> str:
         """The rows that map outputs to channels."""
-        return self.servo_map
-
-    def input_of(self, commands: Sequence[int], index: int) -> float | None:
-        """The pulse of an output [us]; None without pulses."""
-        return (commands[index] or None) if index < len(commands) else None
+        return str(self.servo_map)
 
     def open_one(self, row: Any) -> UdpLink:
         """Open the sockets of a vehicle.
@@ -80,24 +92,20 @@ class ArduPilot(Autopilot):
             ParameterError: A port is taken, or an address is none.
         """
         own = row.plugin.values
-        step, shift = own["port_instance_multiplier"], own["world_step"] * row.world
-        listen = resolved(own["listen_ip"], "listen_ip")
-        how = own["lockstep"], own["timeout"], own["resend_period"]
-        if own["protocol"] == "json":
-            port = own["json_port"] + step * (row.id - 1) + shift
-            release = self.claim(row, (port,), "each vehicle has a port of its own: set port_instance_multiplier")
-            make = lambda: JsonLink(port, listen, *how, release)  # noqa: E731
-        else:
-            address = resolved(own["to_ardupilot_ip"], "to_ardupilot_ip")
-            base = own["ardupilot_port_base"]
-            ports = own["to_ardupilot_port"], own["from_ardupilot_port"]
-            if base:
-                ports = base + step * row.id + 1, base + step * row.id
-            to_port, from_port = (port + shift for port in ports)
-            release = self.claim(row, (to_port, from_port), ONE_EACH)
-            make = lambda: ScrimmageLink(address, to_port, from_port, listen, *how, release)  # noqa: E731
+        listen, address = (resolved(own[name], name) for name in ("listen_ip", "to_ardupilot_ip"))
+        step, base = own["port_instance_multiplier"], own["ardupilot_port_base"]
+        to_port, from_port = own["to_ardupilot_port"], own["from_ardupilot_port"]
+        if base:
+            to_port, from_port = base + step * row.id + 1, base + step * row.id
+        json_port, is_json = own["json_port"] + step * (row.id - 1), own["protocol"] == "json"
+        shift = own["world_step"] * row.world
+        ports = [port + shift for port in ((json_port,) if is_json else (to_port, from_port))]
+        release = self.claim(row, ports, OF_JSON if is_json else OF_SCRIMMAGE)
+        how = own["lockstep"], own["timeout"], own["resend_period"], release
         try:
-            return make()
+            if is_json:
+                return JsonLink(ports[0], listen, *how)
+            return ScrimmageLink(address, ports[0], ports[1], listen, *how)
         except BaseException:
             release()
             raise

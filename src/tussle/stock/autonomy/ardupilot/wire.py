@@ -2,8 +2,9 @@
 
 Protocol "scrimmage", ArduPilot's model scrimmage. To ArduPilot:
 
-    uint64 time [us]; doubles: latitude, longitude [deg], altitude [m], heading [rad], velocity north, east, down [m/s], acceleration
-    forward, right, down without gravity [m/s^2], rates of roll, pitch, yaw in the body frame [rad/s], roll, pitch, yaw [rad], airspeed [m/s]
+    uint64 time [us]; doubles: latitude, longitude [deg], altitude [m], heading [rad], velocity north, east, down [m/s],
+    acceleration forward, right, down without gravity [m/s^2], rates of roll, pitch, yaw in the body frame [rad/s], roll, pitch, yaw
+    [rad], airspeed [m/s]
 
 and from it 16 uint16: pulse widths [us]. Protocol "json", ArduPilot's model JSON (libraries/SITL/examples/JSON/readme.md). From ArduPilot:
 
@@ -17,6 +18,7 @@ from __future__ import annotations
 import json
 import math
 import struct
+from collections.abc import Iterable
 from typing import NamedTuple
 
 from tussle.autopilots.frames import VehicleState
@@ -32,11 +34,11 @@ class ServoFrame(NamedTuple):
     """Outputs of ArduPilot.
 
     Attributes:
-        pulses: Pulse widths [us]; 0 for an output without pulses.
+        pulses: Pulse widths [us] by number of the output; those without pulses are missing.
         number: Number of the frame; -1 if it has none.
     """
 
-    pulses: tuple[int, ...]
+    pulses: dict[int, float]
     number: int
 
 
@@ -57,7 +59,7 @@ def decode_servos(data: bytes) -> ServoFrame:
     """
     if len(data) != SERVOS.size:
         raise ValueError(f"a packet of {len(data)} bytes; servo packets have {SERVOS.size}")
-    return ServoFrame(SERVOS.unpack(data), -1)
+    return ServoFrame(_pulses(SERVOS.unpack(data)), -1)
 
 
 def encode_json(state: VehicleState) -> bytes:
@@ -81,4 +83,9 @@ def decode_frame(data: bytes) -> ServoFrame:
         sizes = " or ".join(f"{known} with {each.size} bytes" for known, each in FRAMES.items())
         raise ValueError(f"a packet of {len(data)} bytes that begins with {magic}; frames begin with {sizes}")
     _, _, number, *pulses = layout.unpack(data)
-    return ServoFrame(tuple(pulses), number)
+    return ServoFrame(_pulses(pulses), number)
+
+
+def _pulses(widths: Iterable[int]) -> dict[int, float]:
+    """The outputs that have pulses."""
+    return {k: float(width) for k, width in enumerate(widths) if width}

@@ -81,7 +81,7 @@ class Joystick:
                 joystick.poll()
             except OSError as error:
                 g.fail(row, f"the joystick {self.device} is gone: {error.strerror}")
-            write_channels(self, self.axis_map, row, lambda axis, now=joystick.axes: now.get(axis, 0))
+            write_channels(self, self.axis_map, row, joystick.axes, missing=0.0)
         if self.publish_button_state:
             pressed = [np.array(sorted(joystick.pressed), float) for joystick in devices]
             publisher: Any = self.buttons

@@ -149,7 +149,7 @@ class Px4Link(AutopilotLink):
             if not all(map(math.isfinite, message.controls)):
                 self.fail("HIL_ACTUATOR_CONTROLS has numbers that are not finite")
                 return
-            self.heard, self.commands = time.monotonic(), tuple(message.controls)
+            self.heard, self.commands = time.monotonic(), dict(enumerate(message.controls))
             if self._has_controls:
                 self.is_done = True
             else:

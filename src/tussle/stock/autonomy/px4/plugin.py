@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -41,7 +40,9 @@ class PX4(Autopilot):
         n_inputs=N_CONTROLS,
         doc="Rows [channel output control_min control_max channel_min channel_max factor].",
     )
-    port = Param(4560, structural=True, ge=1, le=MOST_PORT, doc="Port for PX4's instance 0, the vehicle with the id 1.")
+    port = Param(
+        4560, structural=True, ge=1, le=MOST_PORT, doc="Port for PX4's instance 0, the vehicle with the id 1."
+    )
     port_step = Param(1, structural=True, ge=0, le=MOST_PORT, doc="Ports are higher by this for each id.")
     listen_ip = Param("127.0.0.1", doc="Address of this machine at which PX4 connects.")
     gps_rate = Param(10.0, structural=True, unit="1/s", gt=0.0, le=1000.0, doc="Rate of HIL_GPS.")
@@ -63,16 +64,16 @@ class PX4(Autopilot):
         doc="Standard deviations of the measurements, the field's in gauss; PX4 takes a sensor for broken whose values do not change.",
     )
     freewheel_period = Param(
-        0.02, structural=True, unit="s", gt=0.0, doc="Wall time between messages of 4 ms until PX4's first controls."
+        0.02,
+        structural=True,
+        unit="s",
+        gt=0.0,
+        doc="Wall time between messages of 4 ms until PX4's first controls.",
     )
 
     def channel_map(self) -> str:
         """The rows that map outputs to channels."""
-        return self.control_map
-
-    def input_of(self, commands: Sequence[float], index: int) -> float:
-        """The control of an output."""
-        return commands[index]
+        return str(self.control_map)
 
     def draws(self, g: GroupView) -> np.ndarray:
         """Standard normal numbers for the sensors of each row, (k, n)."""
@@ -100,7 +101,14 @@ class PX4(Autopilot):
         release = self.claim(row, (port,), "each vehicle has a port of its own: set port_step")
         try:
             return Px4Link(
-                listen, port, own["lockstep"], own["timeout"], own["freewheel_period"], make_suite, common, release
+                listen,
+                port,
+                own["lockstep"],
+                own["timeout"],
+                own["freewheel_period"],
+                make_suite,
+                common,
+                release,
             )
         except BaseException:
             release()

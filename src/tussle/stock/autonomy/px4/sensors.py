@@ -73,7 +73,9 @@ class SensorSuite:
         is_slow = now >= self._slow_due
         if is_slow:
             self._slow_due = now + self._slow_period
-        self._send_sensors(now, state, draws, INERTIAL | SLOW if is_slow else INERTIAL)  # last: it is answered
+        self._send_sensors(
+            now, state, draws, INERTIAL | SLOW if is_slow else INERTIAL
+        )  # last: it is answered
 
     def _send_sensors(self, now: int, state: VehicleState, draws: Sequence[float], updated: int) -> None:
         """HIL_SENSOR."""
