@@ -22,6 +22,7 @@ from autopilot_peers import LONG, JsonServant, Process, ScrimmageServant, free_p
 
 from tussle import Block, Mission, Simulation
 from tussle.errors import ParameterError, PluginError
+from tussle.mission import read_mission
 from tussle.scene import Scene
 from tussle.stock import ArduPilot, DirectController, FixedWing6DOFRascal, Multirotor
 
@@ -165,6 +166,34 @@ class Relay:
         for thread, each in zip(self.threads, self.sockets, strict=True):
             thread.join()
             each.close()
+
+
+def test_a_mission_in_the_style_of_scrimmage_takes_off(tmp_path):
+    """The tags are those of arducopter.xml: it starts on the ground, which bears it, and ends after 1e10 steps."""
+    port = free_ports(2)
+    file = tmp_path / "arducopter.xml"
+    file.write_text(
+        f"""<runscript name="Straight flying"><run start="0.0" end="10000000" dt="0.001" time_warp="1" enable_gui="true"/>
+        <stream_port>50051</stream_port> <end_condition>all_dead</end_condition> <metrics>SimpleCollisionMetrics</metrics>
+        <latitude_origin>${{latitude_origin=32.42553}}</latitude_origin> <longitude_origin>-84.79109</longitude_origin>
+        <altitude_origin>75</altitude_origin> <network>LocalNetwork</network> <network>GlobalNetwork</network>
+        <entity_interaction>SimpleCollision</entity_interaction>
+        <entity_interaction enable_startup_collisions="false" remove_on_collision="false">GroundCollision</entity_interaction>
+        <entity> <team_id>1</team_id> <count>1</count> <radius>1</radius> <x>0</x> <y>0</y> <z>0</z> <heading>${{heading=0}}</heading>
+          <sensor>RigidBody6DOFStateSensor</sensor>
+          <autonomy servo_map = "{MOTORS}" to_ardupilot_port="${{to_ardupilot_port={port + 1}}}" asynchronous_mode="false"
+            from_ardupilot_port="${{from_ardupilot_port={port}}}" to_ardupilot_ip="127.0.0.1">ArduPilot</autonomy>
+          <motion_model>${{motion_model=Multirotor}}</motion_model> <controller>DirectController</controller>
+        </entity></runscript>"""
+    )
+    loaded = read_mission(file, allow_large=True)
+    assert loaded.notes == ()
+    with (
+        Process("ardupilot_peer.py", "scrimmage", port + 1, port, 10, "--patience", LONG),
+        Simulation(loaded.mission) as sim,
+    ):
+        sim.step(2000)
+        assert sim.read("team_1.pos")[0][0, 0, 2] == pytest.approx(4.5, abs=0.5)
 
 
 # -- packets ------------------------------------------------------------------------------------------------------------------------
