@@ -25,8 +25,9 @@ class ArduPilot(Autopilot):
     In each step it sends the true state of the vehicle by UDP, and writes ArduPilot's servo pulses [us] to channels: a row of
     `servo_map` is [channel output pulse_min pulse_max channel_min channel_max factor], outputs counted from 0. An output without pulses
     gives 0. With the protocol "scrimmage" states go to to_ardupilot_port, and servo packets come to from_ardupilot_port; with
-    ardupilot_port_base these are that port + port_instance_multiplier times the id + 1, and + 0. With "json" ArduPilot sends to
-    json_port + port_instance_multiplier times (id - 1), and is answered there. See [Autopilots](../autopilots.md).
+    ardupilot_port_base, servo packets come to that port + port_instance_multiplier times the id, and states go to the next port. With
+    "json" ArduPilot sends to json_port + port_instance_multiplier times (id - 1), and is answered there. See
+    [Autopilots](../autopilots.md).
 
     Differences from SCRIMMAGE: it waits for the answer to each state, where `asynchronous_mode` was the default, and sends states
     again; an autopilot that is silent ends the world; servo packets are taken from to_ardupilot_ip only, at 127.0.0.1 unless listen_ip
