@@ -22,7 +22,9 @@ KINDS = {"ardupilot": ((9002, 9012), socket.SOCK_DGRAM), "px4": ((4560, 4561), s
 def test_what_the_page_tells_one_to_type_flies_two_multirotors(tmp_path, which):
     if which == "px4":
         pytest.importorskip("pymavlink")
-    (commands,) = (f[2] for f in FENCE.finditer(PAGE.read_text()) if f[1] == "sh" and f"--out {which}" in f[2])
+    (commands,) = (
+        f[2] for f in FENCE.finditer(PAGE.read_text()) if f[1] == "sh" and f"--out {which}" in f[2]
+    )
     shown, kind = KINDS[which]
     step = shown[1] - shown[0]
     first = free_ports(2, step, kind)

@@ -167,7 +167,7 @@ def await_links(links: Sequence[AutopilotLink], is_interrupted: Callable[[], boo
         poller.poll(math.ceil(1000.0 * min(NAP, limit - now)))
 
 
-class Pace:
+class StepClock:
     """The clock of a simulation that runs beside its autopilots."""
 
     def __init__(self) -> None:

@@ -12,7 +12,7 @@ from tussle.api import Autonomy, GroupView, Handle, Output, Param, State
 from tussle.api.channel_map import channel_outputs, write_channels
 from tussle.api.channels import DRIVEN_CHANNELS
 from tussle.autopilots.frames import vehicle_states
-from tussle.autopilots.link import MOST_PORT, AutopilotLink, OwnedPorts, Pace, await_links
+from tussle.autopilots.link import MOST_PORT, AutopilotLink, OwnedPorts, StepClock, await_links
 
 
 class Autopilot(Autonomy):
@@ -72,7 +72,9 @@ class Autopilot(Autonomy):
         for link in links:
             link.resume()
         if links and not self.lockstep:
-            g.context.share("autopilots' clock", Pace).wait(float(g.t[0]) / self.time_warp, is_interrupted)
+            g.context.share("autopilots' clock", StepClock).wait(
+                float(g.t[0]) / self.time_warp, is_interrupted
+            )
         states, draws = vehicle_states(g, self.last_vel), self.draws(g).T.tolist()
         for link, state, own in zip(links, states, draws, strict=True):
             link.begin(state, own)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import importlib
 import itertools
 import os
 import selectors
@@ -17,6 +18,15 @@ ROOT = Path(__file__).parents[3]
 EXAMPLES = ROOT / "examples" / "autopilots"
 LONG = 300.0
 """A wait that ends with what is waited for."""
+
+
+def example(name):
+    """A module of the examples."""
+    sys.path.insert(0, str(EXAMPLES))
+    try:
+        return importlib.import_module(name)
+    finally:
+        sys.path.remove(str(EXAMPLES))
 
 
 def open_sockets():
@@ -171,11 +181,7 @@ class Px4Crowd(Thread):
     """A PX4 for each of some ports, which connects again whenever the simulator has closed the connection."""
 
     def __init__(self, *ports):
-        sys.path.insert(0, str(EXAMPLES))
-        import px4_peer
-
-        sys.path.remove(str(EXAMPLES))
-        self.px4, self.free = px4_peer, set(ports)
+        self.px4, self.free = example("px4_peer"), set(ports)
         self.selector = selectors.DefaultSelector()
 
     def run(self):

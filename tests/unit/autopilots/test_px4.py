@@ -15,7 +15,7 @@ import time
 
 import numpy as np
 import pytest
-from autopilot_peers import EXAMPLES, LONG, Process, Thread, free_ports
+from autopilot_peers import LONG, Process, Thread, example, free_ports
 
 from tussle import Block, Mission, Simulation
 from tussle.errors import MissingExtraError, ParameterError, PluginError
@@ -23,21 +23,12 @@ from tussle.scene import Scene
 from tussle.stock import PX4, DirectController, Multirotor
 
 pytest.importorskip("pymavlink")
-sys.path.insert(0, str(EXAMPLES))
-from px4_peer import (
-    CONTROLS,
-    CRC_EXTRA,
-    GPS,
-    HIL_CONTROLS,
-    HIL_GPS,
-    HIL_SENSOR,
-    HIL_STATE,
-    SENSOR,
-    packet,
-    take_messages,
+PEER_OF_EXAMPLES = example("px4_peer")
+CONTROLS, GPS, SENSOR = PEER_OF_EXAMPLES.CONTROLS, PEER_OF_EXAMPLES.GPS, PEER_OF_EXAMPLES.SENSOR
+HIL_CONTROLS, HIL_GPS, HIL_SENSOR, HIL_STATE = (
+    getattr(PEER_OF_EXAMPLES, f"HIL_{name}") for name in ("CONTROLS", "GPS", "SENSOR", "STATE")
 )
-
-sys.path.remove(str(EXAMPLES))
+packet, take_messages = PEER_OF_EXAMPLES.packet, PEER_OF_EXAMPLES.take_messages
 STATE = struct.Struct("<Q4f3f3i3h2H3h")
 QUIET = (0.0, 0.0, 0.0, 0.0)
 
@@ -143,7 +134,7 @@ def test_multirotors_reach_their_altitudes_by_their_sensors_and_give_the_same_bi
 def test_pymavlink_and_the_peers_of_the_tests_agree_on_the_messages():
     from pymavlink.dialects.v20 import common
 
-    for number, extra in CRC_EXTRA.items():
+    for number, extra in PEER_OF_EXAMPLES.CRC_EXTRA.items():
         assert common.mavlink_map[number].crc_extra == extra
     layouts = {HIL_SENSOR: SENSOR, HIL_GPS: GPS, HIL_STATE: STATE, HIL_CONTROLS: CONTROLS}
     for number, layout in layouts.items():
