@@ -14,8 +14,8 @@ from tussle.errors import ParameterError
 
 NAP = 0.01
 """Longest wait before the clock, an interruption and the connections are looked at [s]."""
-PAUSE = 1.0
-"""Time between two steps from which on the simulation counts as paused [s]."""
+LONGEST_STEP = 1.0
+"""Wall time of a step beyond which the simulation is paused, or waits for another autopilot [s]."""
 CATCH_UP = 0.2
 """How far a simulation may lag behind the clock before the lag is forgotten [s]."""
 MOST_PORT = 65535
@@ -34,7 +34,6 @@ class AutopilotLink(ABC):
         commands: The newest commands by number of the output; None before the first ones.
         failure: Why it cannot go on; empty if all is well.
         is_done: Whether the step may go on: the autopilot has answered its state, or without lockstep has been heard.
-        heard: When the autopilot was heard last [s of `time.monotonic`].
     """
 
     def __init__(self, autopilot: str, lockstep: bool, timeout: float, release: Callable[[], object]) -> None:
@@ -43,7 +42,7 @@ class AutopilotLink(ABC):
         self.commands: dict[int, float] | None = None
         self.failure = ""
         self.is_done = False
-        self.heard = self._left = time.monotonic()
+        self._silence, self._left = 0.0, time.monotonic()
 
     def fail(self, why: str) -> None:
         """Give up; the first reason is kept."""
@@ -55,15 +54,16 @@ class AutopilotLink(ABC):
             each.close()
         self._release()
 
-    def resume(self) -> None:
-        """Do not count a pause before this step as silence."""
-        now = time.monotonic()
-        self.heard += now - self._left if now - self._left > PAUSE else 0.0
+    def hear(self) -> None:
+        """The autopilot has said something."""
+        self._silence = 0.0
 
     def leave(self) -> None:
-        """End a step: an autopilot that has been silent for too long has failed."""
-        self._left = time.monotonic()
-        if self._left - self.heard > self.timeout:
+        """End a step. Without lockstep, an autopilot that has been silent for too long has failed; a pause is not silence."""
+        now = time.monotonic()
+        self._silence += min(now - self._left, LONGEST_STEP)
+        self._left = now
+        if self._silence > self.timeout and not self.lockstep:
             self.fail(f"silent for {self.timeout:g} s")
 
     @abstractmethod

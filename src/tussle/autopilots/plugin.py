@@ -69,8 +69,6 @@ class Autopilot(Autonomy):
         """Tell the autopilots where their vehicles are, and do as they say."""
         links: list[Any] = list(self.link)
         is_interrupted = g.context.is_interrupted
-        for link in links:
-            link.resume()
         if links and not self.lockstep:
             g.context.share("autopilots' clock", StepClock).wait(
                 float(g.t[0]) / self.time_warp, is_interrupted

@@ -446,6 +446,16 @@ def test_a_flood_ends_the_world_of_its_vehicle_and_no_other(protocol, monkeypatc
     assert other.end == "time"
 
 
+@pytest.mark.parametrize("lockstep", [True, False])
+def test_an_autopilot_that_is_missed_ends_its_world_and_no_other(lockstep):
+    port = free_ports(2)
+    mission = copter(port, world_step=1, timeout=2.0, lockstep=lockstep, time_warp=10.0, end=1.0)
+    with JsonServant(port + 1), Simulation(mission, seeds=[1, 2]) as sim:
+        missed, other = sim.run()
+    assert f"ArduPilot that sends to 127.0.0.1:{port}: no servo packet within 2 s" in str(missed.error)
+    assert other.end == "time"
+
+
 def test_an_autopilot_that_dies_on_the_way_is_missed():
     port = free_ports()
     with Process("ardupilot_peer.py", "json", port, 10) as peer, Simulation(copter(port, timeout=1.0)) as sim:

@@ -86,7 +86,7 @@ class UdpLink(AutopilotLink):
                 f"a second autopilot, at {_at(place)}, sends to the port of the one at {_at(self._peer)}"
             )
             return
-        self.heard = time.monotonic()
+        self.hear()
         self._take(frame)
 
     def tick(self, now: float) -> None:

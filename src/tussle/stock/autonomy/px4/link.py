@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import socket
-import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -135,7 +134,6 @@ class Px4Link(AutopilotLink):
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)
         self.autopilot = f"PX4 at {place[0]}:{place[1]}, port {self._port}"
-        self.heard = time.monotonic()
 
     def _take(self, message: Any) -> None:
         """Take a message; only controls matter."""
@@ -149,7 +147,8 @@ class Px4Link(AutopilotLink):
             if not all(map(math.isfinite, message.controls)):
                 self.fail("HIL_ACTUATOR_CONTROLS has numbers that are not finite")
                 return
-            self.heard, self.commands = time.monotonic(), dict(enumerate(message.controls))
+            self.hear()
+            self.commands = dict(enumerate(message.controls))
             if self._has_controls:
                 self.is_done = True
             else:

@@ -64,7 +64,7 @@ class PX4(Autopilot):
         doc="Standard deviations of the measurements, the field's in gauss; PX4 takes a sensor for broken whose values do not change.",
     )
     freewheel_period = Param(
-        0.02,
+        0.01,
         structural=True,
         unit="s",
         gt=0.0,
