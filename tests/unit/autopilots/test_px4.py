@@ -247,6 +247,32 @@ def test_an_answer_to_older_measurements_is_none():
             assert sim.read("copter.PX4.motor_0_out")[0].item() == 300.0
 
 
+def test_a_px4_that_is_slower_than_its_measurements_come_starts():
+    """It answers each after 50 ms, while a new one comes every 10 ms: its first answer is to an old one."""
+    port = tcp_port()
+
+    def act(n, time_us):
+        time.sleep(0.05)
+        return controls(time_us, ((n + 1) / 100.0,) * 16)
+
+    with (
+        Px4Servant(port, act=act) as px4,
+        Simulation(copter(port, freewheel_period=0.01, timeout=20.0)) as sim,
+    ):
+        sim.step(3)
+        assert sim.read("copter.PX4.motor_0_out")[0].item() == pytest.approx(12.0 * px4.n)
+    assert px4.n > 4
+
+
+def test_messages_that_pymavlink_does_not_know_are_ignored():
+    port = tcp_port()
+    unknown = bytearray(packet(HIL_CONTROLS, 0, b"\1\2\3"))
+    unknown[7:10] = (60_000).to_bytes(3, "little")
+    with Px4Servant(port, act=lambda n, t: bytes(unknown) + controls(t)), Simulation(copter(port)) as sim:
+        sim.step(3)
+        assert sim.read("copter.PX4.motor_0_out")[0].item() == 600.0
+
+
 def test_without_px4s_lockstep_the_stamp_is_that_of_another_clock():
     port = tcp_port()
     with Px4Servant(port, act=lambda n, t: controls(0, flags=0)), Simulation(copter(port)) as sim:

@@ -141,8 +141,10 @@ class Px4Link(AutopilotLink):
         if kind == "BAD_DATA":
             self.fail(f"this is not MAVLink: {texts.shown(bytes(message.data).decode('latin-1'))}")
         elif kind == "HIL_ACTUATOR_CONTROLS":
-            # PX4 stamps its answer with the time of the measurements; an older one answers others.
-            if message.flags & LOCKSTEP_FLAG and message.time_usec < self._now and self.lockstep:
+            # PX4 stamps its answer with the time of the measurements; an older one answers others. While PX4 starts, any will do: it
+            # may be slower than the measurements come.
+            is_stamped = bool(message.flags & LOCKSTEP_FLAG) and self.lockstep and self._has_controls
+            if is_stamped and message.time_usec < self._now:
                 return
             if not all(map(math.isfinite, message.controls)):
                 self.fail("HIL_ACTUATOR_CONTROLS has numbers that are not finite")
