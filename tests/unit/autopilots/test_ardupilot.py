@@ -187,7 +187,7 @@ def test_a_mission_in_the_style_of_scrimmage_takes_off(tmp_path):
         </entity></runscript>"""
     )
     loaded = read_mission(file, allow_large=True)
-    assert loaded.notes == ()
+    assert all("kept for the viewer" in note or "asynchronous_mode" in note for note in loaded.notes)
     with (
         Process("ardupilot_peer.py", "scrimmage", port + 1, port, 10, "--patience", LONG),
         Simulation(loaded.mission) as sim,
@@ -336,6 +336,8 @@ def test_a_port_that_is_taken_and_a_host_that_is_none_are_named():
         assert f"json_port: 127.0.0.1:{port} cannot be opened: Address already in use" in error_of(
             copter(port)
         )
+    text = error_of(by_scrimmage(free_ports(2), to_ardupilot_ip="255.255.255.255"))
+    assert re.search(r"ArduPilot at 255\.255\.255\.255:\d+, .*: no way there: Permission denied", text)
     assert "listen_ip = 'no host' is no host" in error_of(copter(free_ports(), listen_ip="no host"))
     assert "to_ardupilot_ip = '1.2.3.4.5' is no host" in error_of(
         by_scrimmage(free_ports(2), to_ardupilot_ip="1.2.3.4.5")
@@ -370,6 +372,17 @@ def test_a_state_that_nobody_heard_is_sent_again_as_soon_as_somebody_listens():
         sim.step(3)
     done[0].__exit__()
     assert len(done[0].states[port]) == 3
+
+
+def test_who_waits_for_an_autopilot_leaves_the_processor_to_others():
+    port = free_ports(2)
+    with Simulation(by_scrimmage(port, timeout=2.0)) as sim:
+        with ScrimmageServant((port + 1, port)):
+            sim.step()
+        before = time.thread_time()
+        with pytest.raises(PluginError, match="within 2 s"):
+            sim.step()
+        assert time.thread_time() - before < 0.5
 
 
 @pytest.mark.parametrize("protocol", ["json", "scrimmage"])

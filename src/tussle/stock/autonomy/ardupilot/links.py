@@ -18,7 +18,7 @@ MOST_PACKETS = 1000
 LARGEST = 2048
 """More bytes than any packet has."""
 UNHEARD_PERIOD = 0.1
-"""Time between looks whether a state was refused, since nobody listened [s]."""
+"""Time after which a state that nobody listened to is sent again [s]."""
 
 
 class UdpLink(AutopilotLink):
@@ -47,6 +47,7 @@ class UdpLink(AutopilotLink):
         self._state, self._sent = b"", 0.0
         self._peer: tuple[str, int] | None = None
         self._refused, self._n_packets = "", 0
+        self._is_unheard = False
 
     def sockets(self) -> list[socket.socket]:
         """The open sockets."""
@@ -108,9 +109,10 @@ class UdpLink(AutopilotLink):
             self._send_state(self._state)
         except BlockingIOError:  # the buffer is full: it is sent again
             pass
+        except ConnectionRefusedError:  # of the packet before
+            self._is_unheard = True
         except OSError as error:
-            if error.errno != errno.ECONNREFUSED:
-                self.fail(f"nothing can be sent: {error.strerror}")
+            self.fail(f"nothing can be sent: {error.strerror}")
 
     @abstractmethod
     def _is_stranger(self, place: tuple[str, int]) -> bool:
@@ -169,14 +171,19 @@ class ScrimmageLink(UdpLink):
         self._state = wire.encode_state(state)
         self._send()
 
+    def receive(self) -> None:
+        """Read all packets, and whether nobody listens to the states."""
+        super().receive()
+        refused = self._out.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
+        self._is_unheard |= refused == errno.ECONNREFUSED
+        if refused and not self._is_unheard:
+            self.fail(f"nothing can be sent: {os.strerror(refused)}")
+
     def tick(self, now: float) -> None:
-        """Send the state again, at once if nobody listened."""
-        if not self.is_done and now - self._sent >= UNHEARD_PERIOD:
-            refused = self._out.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
-            if refused == errno.ECONNREFUSED:
-                self._send()
-            elif refused:
-                self.fail(f"nothing can be sent: {os.strerror(refused)}")
+        """Send the state again, soon if nobody listened."""
+        if self._is_unheard and not self.is_done and now - self._sent >= UNHEARD_PERIOD:
+            self._is_unheard = False
+            self._send()
         super().tick(now)
 
     def missing(self) -> str:
