@@ -66,7 +66,7 @@ class Px4Servant(Thread):
 
     def __init__(self, port, act=lambda n, time_us: controls(time_us), hello=b""):
         self.port, self.act, self.hello = port, act, hello
-        self.messages, self.n, self.ended = [], 0, False
+        self.messages, self.n = [], 0
         self.socket = None
 
     def run(self):
@@ -85,7 +85,6 @@ class Px4Servant(Thread):
                     received += data
                     for message in take_messages(received):
                         self.take(*message)
-        self.ended = True
 
     def take(self, number, payload):
         self.messages.append((number, payload))
@@ -100,6 +99,11 @@ class Px4Servant(Thread):
         return [
             layout.unpack(payload.ljust(layout.size, b"\0")) for n, payload in self.messages if n == number
         ]
+
+    def __exit__(self, *_):
+        if self.socket:  # the simulation is closed: all that it has sent is read
+            self.thread.join(LONG)
+        super().__exit__()
 
     def close(self):
         if self.socket:
@@ -218,14 +222,15 @@ def test_noise_is_drawn_by_the_seed_and_no_value_comes_twice_while_px4_starts():
 def test_controls_are_mapped_linearly_to_channels():
     port = tcp_port()
     values = [k / 16.0 for k in range(16)]
-    control_map = "[ motor_0 4 0 1 100 300 1 ] [ motor_1 15 -1 1 -0.5 0.5 -1 ] [ motor_2 0 0 1 0 1 1 ] [ motor_3 1 0 1 0 1 1 ]"
+    values[1] = math.nan
+    control_map = "[ motor_0 4 0 1 100 300 1 ] [ motor_1 15 -1 1 -0.5 0.5 -1 ] [ motor_2 0 0 1 0 1 1 ] [ motor_3 1 0 1 5 1 1 ]"
     with (
         Px4Servant(port, act=lambda n, t: controls(t, values)),
         Simulation(copter(port, control_map=control_map)) as sim,
     ):
         sim.step()
         got = [sim.read(f"copter.PX4.motor_{k}_out")[0].item() for k in range(4)]
-    assert got == [150.0, -0.5 * (15.0 / 16.0), 0.0, 1.0 / 16.0]
+    assert got == [150.0, -0.5 * (15.0 / 16.0), 0.0, 0.0]
     with pytest.raises(ParameterError, match="motor_0 has the number 16; it takes 0 to 15"):
         PX4(control_map="[ motor_0 16 0 1 0 1 1 ]")
 
@@ -343,7 +348,7 @@ PEER = r"PX4 at 127\.0\.0\.1:\d+, port \d+: "
         (b"\xfd" * 4000, None, PEER + r"this is not MAVLink: "),
         (b"", lambda n, t: None, PEER + r"no HIL_ACTUATOR_CONTROLS within 1 s"),
         (b"", lambda n, t: controls(t) if n < 5 else None, PEER + r"no HIL_ACTUATOR_CONTROLS within 1 s"),
-        (b"", lambda n, t: controls(t, (math.nan,) * 16), PEER + r"HIL_ACTUATOR_CONTROLS has numbers that are not finite"),
+        (b"", lambda n, t: controls(t, (math.inf,) * 16), PEER + r"HIL_ACTUATOR_CONTROLS has infinite numbers"),
         (b"", lambda n, t: controls(t)[:-1] + b"?" if n else controls(t), PEER + r"this is not MAVLink: "),
         (b"", lambda n, t: controls(1) * 16_000, PEER + r"more than 1048576 bytes in one step"),
     ],

@@ -146,11 +146,11 @@ class Px4Link(AutopilotLink):
             is_stamped = bool(message.flags & LOCKSTEP_FLAG) and self.lockstep and self._has_controls
             if is_stamped and message.time_usec < self._now:
                 return
-            if not all(map(math.isfinite, message.controls)):
-                self.fail("HIL_ACTUATOR_CONTROLS has numbers that are not finite")
+            if any(map(math.isinf, message.controls)):
+                self.fail("HIL_ACTUATOR_CONTROLS has infinite numbers")
                 return
             self.hear()
-            self.commands = dict(enumerate(message.controls))
+            self.commands = {k: x for k, x in enumerate(message.controls) if not math.isnan(x)}
             if self._has_controls:
                 self.is_done = True
             else:

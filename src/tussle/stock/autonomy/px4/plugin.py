@@ -23,9 +23,9 @@ class PX4(Autopilot):
     """Leaves a vehicle to PX4's simulated flight controller (SITL), in another process, which connects to tussle by TCP.
 
     In each step it sends HIL_SENSOR, HIL_STATE_QUATERNION and, at gps_rate, HIL_GPS of MAVLink, and takes HIL_ACTUATOR_CONTROLS; a row
-    of `control_map` is [channel output control_min control_max channel_min channel_max factor], outputs counted from 0. The vehicle with
-    the id 1 listens at `port`, that of PX4's instance 0; each id more adds port_step. A step is the mission's, usually 0.004 s. Until PX4
-    sends its first controls the vehicle stands still. See [Autopilots](../autopilots.md).
+    of `control_map` is [channel output control_min control_max channel_min channel_max factor], outputs counted from 0. An output that is
+    not a number gives 0. The vehicle with the id 1 listens at `port`, that of PX4's instance 0; each id more adds port_step. A step is
+    the mission's, usually 0.004 s. Until PX4 sends its first controls the vehicle stands still. See [Autopilots](../autopilots.md).
 
     It needs `pip install 'tussle[autopilot]'`.
 
