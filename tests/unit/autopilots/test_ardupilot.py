@@ -196,6 +196,27 @@ def test_a_mission_in_the_style_of_scrimmage_takes_off(tmp_path):
         assert sim.read("team_1.pos")[0][0, 0, 2] == pytest.approx(4.5, abs=0.5)
 
 
+def test_planes_of_a_mission_in_the_style_of_scrimmage_have_ports_by_their_ids(tmp_path):
+    """As arduplane_multiple.xml, with ports that are counted from a base, and with the plane that ships."""
+    first = free_ports(12)
+    plane = f"""<entity> <team_id>1</team_id> <count>1</count> <radius>1</radius> <x>{{}}</x> <z>0</z> <pitch>-20</pitch>
+        <sensor>RigidBody6DOFStateSensor</sensor>
+        <autonomy ardupilot_port_base="{first - 10}" port_instance_multiplier="10">ArduPilot</autonomy>
+        <controller>DirectController</controller> <motion_model>${{{{motion_model=FixedWing6DOF-Rascal}}}}</motion_model> </entity>"""
+    file = tmp_path / "arduplane_multiple.xml"
+    file.write_text(f'<runscript><run end="10" dt="0.001"/>{plane.format(0)}{plane.format(10)}</runscript>')
+    pairs = [(first + 1, first), (first + 11, first + 10)]
+    with ScrimmageServant(*pairs) as servant, Simulation(read_mission(file).mission) as sim:
+        sim.step(5)
+        for block in ("team_1", "team_1_2"):
+            channels = [
+                sim.read(f"{block}.ArduPilot.{name}_out")[0].item()
+                for name in ("throttle", "elevator", "aileron", "rudder")
+            ]
+            assert channels == [0.5, 0.0, 0.0, 0.0]
+    assert [len(states) for states in servant.states.values()] == [5, 5]
+
+
 # -- packets ------------------------------------------------------------------------------------------------------------------------
 
 
