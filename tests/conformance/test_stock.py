@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from actor_process import actor_server
+from autopilot_peers import JsonServant, Px4Crowd, ScrimmageServant, free_ports
 from moos_database import MoosDatabase
 from moos_helm import MoosHelm
 
@@ -93,6 +94,8 @@ def test_plugin_meets_the_contract(
     companions = [stock.load(other)() for other in NEEDED.get(name, ())]
     if name == "MOOSAutonomy":
         return check_with_helms(stock.load(name))
+    if name in ("ArduPilot", "PX4"):
+        return check_with_autopilots(name)
     return check_plugin(
         stock.load(name), companions=BOUNDARIES if name in ON_REGIONS else companions, **params
     )
@@ -103,6 +106,24 @@ def check_with_helms(cls: type[Plugin], n: int = 40) -> None:
     with MoosDatabase(n) as database, MoosHelm(*range(database.port, database.port + n)):
         check_plugin(cls, moos_port=database.port, port_step=1, moos_time_warp=1000.0, timeout=300.0)
         assert database.violations == []
+
+
+def check_with_autopilots(name: str, n: int = 40) -> None:
+    """Check ArduPilot or PX4; each of the kit's entities has an autopilot."""
+    how = {"time_warp": 1000.0, "timeout": 300.0}
+    if name == "PX4":
+        pytest.importorskip("pymavlink")
+        port = free_ports(n, 1, socket.SOCK_STREAM)
+        with Px4Crowd(*range(port, port + n)):
+            check_plugin(stock.load(name), port=port, **how)
+        return
+    port = free_ports(
+        3 * n
+    )  # for the id k: 3 k - 3 of JSON; 3 k - 2 and 3 k - 1 of the protocol of SCRIMMAGE
+    ports = [range(port + k, port + 3 * n, 3) for k in range(3)]
+    how |= {"json_port": port, "ardupilot_port_base": port - 2, "port_instance_multiplier": 3}
+    with JsonServant(*ports[0]), ScrimmageServant(*zip(ports[2], ports[1], strict=True)):
+        check_plugin(stock.load(name), **how)
 
 
 @pytest.mark.parametrize(

@@ -23,8 +23,9 @@ JSBSIM = ("controller/jsbsim_controllers", "motion/jsbsim_model")
 LEARNED = ("autonomy/learned",)
 """Likewise by a policy in onnxruntime; tests/unit/stock/test_learned.py plays it."""
 SERVED = (
-    "autonomy/flight_gear_multiplayer", "autonomy/moos", "autonomy/ros_autonomy", "controller/ros_controllers", "interaction/dis",
-    "interaction/grpc_command_string", "interaction/ros_clock_server", "interaction/ros_shape_viz", "sensor/ros_compass",
+    "autonomy/ardupilot", "autonomy/flight_gear_multiplayer", "autonomy/moos", "autonomy/px4", "autonomy/ros_autonomy",
+    "controller/ros_controllers", "interaction/dis", "interaction/grpc_command_string", "interaction/ros_clock_server",
+    "interaction/ros_shape_viz", "sensor/ros_compass",
     "sensor/ros_altimeter", "sensor/ros_imu_sensor",
 )  # fmt: skip
 """Folders whose examples need a server; tests of their own play them."""

@@ -7,3 +7,6 @@ CHANNEL_UNITS = {
     "aileron": "", "rudder": "",
 }  # fmt: skip
 """Name of a channel -> its unit."""
+
+DRIVEN_CHANNELS = CHANNEL_UNITS | {f"motor_{i}": "rad/s" for i in range(8)}
+"""The same with the motors of a multirotor, for plugins that drive actuators."""

@@ -1,0 +1,1 @@
+"""Autopilots that fly vehicles: their frames, the channels of their servos, and waiting for them."""
