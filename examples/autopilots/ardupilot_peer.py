@@ -102,13 +102,13 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("protocol", choices=("json", "scrimmage"))
     parser.add_argument("ports", type=int, nargs="+", help="ports, and the climb [m]")
-    parser.add_argument("--patience", type=float, default=5.0)
+    parser.add_argument("--patience", type=float, default=10.0, help="longest wait for the next state [s]")
     asked = parser.parse_args()
     *ports, climb = asked.ports
     peer = (JsonPeer if asked.protocol == "json" else ScrimmagePeer)(ports[0], ports[-1])
     peer.socket.settimeout(RESEND)
-    print("ready", flush=True)
     peer.send(pulses([LOWEST] * 4))
+    print("ready", flush=True)
     start, heard, t, height = None, math.inf, 0.0, 0.0
     while time.monotonic() - heard < asked.patience:
         try:

@@ -76,12 +76,6 @@ class Process:
         )  # fmt: skip
         assert self.process.stdout.readline() == "ready\n", self.process.stderr.read()
 
-    def result(self):
-        """Wait for the end; return what it has printed."""
-        printed, errors = self.process.communicate()
-        assert self.process.returncode == 0, errors
-        return printed
-
     def __enter__(self):
         return self
 

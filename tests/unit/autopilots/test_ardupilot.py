@@ -66,11 +66,13 @@ def test_a_multirotor_reaches_its_altitude_and_a_thousand_steps_give_the_same_bi
         ports, mission = (
             ((port,), copter(port)) if protocol == "json" else ((port + 1, port), by_scrimmage(port))
         )
-        with Process("ardupilot_peer.py", protocol, *ports, 30) as peer, Simulation(mission) as sim:
+        with (
+            Process("ardupilot_peer.py", protocol, *ports, 30, "--patience", LONG),
+            Simulation(mission) as sim,
+        ):
             (result,) = sim.run()
             pos = sim.read("copter.pos")[0][0, 0]
             assert sim.steps.tolist() == [1000]
-            assert peer.result().startswith("at 9.99 s: ")
         assert result.end == "time"
         assert np.abs(pos - (3.0, -4.0, 40.0)).max() < 0.3
         hashes.append(result.state_hash)
@@ -119,7 +121,7 @@ def test_lost_packets_are_sent_again_and_it_still_reaches_its_altitude():
     mission = copter(port, end=8.0, resend_period=0.05)
     with (
         Relay(port) as relay,
-        Process("ardupilot_peer.py", "json", relay.port, 10),
+        Process("ardupilot_peer.py", "json", relay.port, 10, "--patience", LONG),
         Simulation(mission) as sim,
     ):
         assert sim.run()[0].end == "time"
@@ -492,7 +494,10 @@ def test_an_autopilot_that_is_missed_ends_its_world_and_no_other(lockstep):
 
 def test_an_autopilot_that_dies_on_the_way_is_missed():
     port = free_ports()
-    with Process("ardupilot_peer.py", "json", port, 10) as peer, Simulation(copter(port, timeout=1.0)) as sim:
+    with (
+        Process("ardupilot_peer.py", "json", port, 10, "--patience", LONG) as peer,
+        Simulation(copter(port, timeout=1.0)) as sim,
+    ):
         sim.step(100)
         peer.process.kill()
         peer.process.wait()
