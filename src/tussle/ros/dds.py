@@ -1,0 +1,262 @@
+"""Topics of one simulation in ROS 2, by Cyclone DDS."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from tussle.errors import RosError
+from tussle.ros.messages import (
+    clock_bytes,
+    message_type,
+    odometry_bytes,
+    scan_bytes,
+    transforms_bytes,
+    twist_values,
+)
+from tussle.ros.steps import NANO, Link, Transform
+
+LAST_DOMAIN = 232
+"""Highest ROS_DOMAIN_ID: the ports of higher ones do not exist (DDSI-RTPS 2.5, 9.6.2.3)."""
+CONFIG = "CYCLONEDDS_URI"
+LOOPBACK = """<CycloneDDS><Domain id="any">
+<General><Interfaces><NetworkInterface address="127.0.0.1"/></Interfaces><AllowMulticast>false</AllowMulticast></General>
+<Discovery><ParticipantIndex>auto</ParticipantIndex><Peers><Peer address="127.0.0.1"/></Peers></Discovery>
+</Domain></CycloneDDS>"""
+"""Configuration of Cyclone DDS where the user has none: nobody outside this machine can command a robot."""
+QUEUE = 10
+"""Messages that wait for a slow subscriber; older ones are dropped, so that it does not delay the simulation."""
+TF_QUEUE, SCAN_QUEUE = 100, 5
+"""The same for tf, as of tf2_ros, and for scans, as of the profile for sensor data."""
+MOST_SECONDS = 0.01
+"""Longest time for which a subscriber that has stopped can delay a message [s]."""
+_environment = threading.Lock()
+
+
+def domain_id() -> int:
+    """The number of the domain, from the environment; 0 by default.
+
+    Raises:
+        RosError: It is no number of a domain.
+    """
+    text = os.environ.get("ROS_DOMAIN_ID") or "0"
+    if not (text.isascii() and text.isdigit() and int(text) <= LAST_DOMAIN):
+        raise RosError(
+            f"ROS_DOMAIN_ID = {text!r} is not allowed; it takes a whole number from 0 to {LAST_DOMAIN}"
+        )
+    return int(text)
+
+
+class Writer:
+    """Sends messages of one topic.
+
+    Args:
+        writer: That of Cyclone DDS.
+        message: Type of the messages.
+    """
+
+    def __init__(self, writer: Any, message: Any) -> None:
+        from cyclonedds.core import DDSException
+
+        self._writer, self._message, self._error = writer, message.deserialize(b""), DDSException
+
+    def get_num_connections(self) -> int:
+        """Return the number of subscribers."""
+        return len(self._writer.get_matched_subscriptions())
+
+    def close(self) -> None:
+        """Withdraw the topic."""
+        self._writer = None
+
+    def publish(self, data: bytes) -> None:
+        """Send a message, given as bytes; it is dropped if subscribers do not take the ones before it.
+
+        Raises:
+            RosError: It cannot be sent.
+        """
+        self._message.data = data
+        try:
+            self._writer.write(self._message)
+        except self._error as error:
+            if error.code != self._error.DDS_RETCODE_TIMEOUT:
+                raise RosError(f"/{self._writer.topic.name[3:]}: {error}") from None
+
+
+class Reader:
+    """Receives messages of one topic.
+
+    Args:
+        reader: That of Cyclone DDS.
+        take: Called with the bytes of each message.
+    """
+
+    def __init__(self, reader: Any, take: Callable[[bytes], None]) -> None:
+        self._reader, self._take = reader, take
+
+    def get_num_connections(self) -> int:
+        """Return the number of publishers."""
+        return len(self._reader.get_matched_publications())
+
+    def close(self) -> None:
+        """Take no more messages."""
+        self._reader = None
+
+    def collect(self) -> None:
+        """Take the messages that have come."""
+        for message in self._reader.take(QUEUE):
+            if message.sample_info.valid_data:  # otherwise a publisher has gone
+                self._take(message.data)
+
+
+class Ros2Link(Link):
+    """The topics of one simulation in ROS 2.
+
+    It has a participant of its own in the domain ROS_DOMAIN_ID, which nobody outside this machine can reach unless CYCLONEDDS_URI says so.
+    Messages are taken in the thread of the simulation.
+
+    Raises:
+        MissingExtraError: Cyclone DDS is not installed.
+        RosError: The domain cannot be joined.
+    """
+
+    system = "ROS 2"
+    settling_time = 0.5
+
+    def __init__(self) -> None:
+        super().__init__(self._wait)
+        message_type("rosgraph_msgs/Clock")  # raises if Cyclone DDS is not installed
+        from cyclonedds.core import WaitSet
+
+        self._participant = opened_participant()
+        self._waitset = WaitSet(self._participant)
+        self._readers: list[Reader] = []
+
+    def time_of(self, seconds: int, nanoseconds: int) -> Any:
+        """Return a time as messages hold it."""
+        return seconds, nanoseconds
+
+    def odometry(self, topic: str, frame: str, child: str) -> Callable[[Any, list[float]], None]:
+        """Announce odometry; returns publish(stamp, state)."""
+        writer, pack = self.advertise(topic, "nav_msgs/Odometry"), odometry_bytes(frame, child)
+        return lambda stamp, state: writer.publish(pack(stamp, state))
+
+    def scan(self, topic: str, frame: str) -> Callable[[Any, Any, np.ndarray], None]:
+        """Announce scans; returns publish(stamp, about, ranges)."""
+        writer = self.advertise(topic, "sensor_msgs/LaserScan", SCAN_QUEUE, is_reliable=False)
+        pack = scan_bytes(frame)
+        return lambda stamp, about, ranges: writer.publish(pack(stamp, about, ranges))
+
+    def transforms(self) -> Callable[[list[Transform]], None]:
+        """Announce tf; returns publish(transforms)."""
+        writer = self.advertise("tf", "tf2_msgs/TFMessage", TF_QUEUE)
+        return lambda transforms: writer.publish(transforms_bytes(transforms))
+
+    def clock(self) -> Callable[[Any], None]:
+        """Announce clock; returns publish(stamp)."""
+        writer = self.advertise("clock", "rosgraph_msgs/Clock")
+        return lambda stamp: writer.publish(clock_bytes(stamp))
+
+    def twist(
+        self, topic: str, take: Callable[[tuple[float, ...]], None], refuse: Callable[[str], None]
+    ) -> Any:
+        """Call take(values) for each command, six numbers, or refuse(what). Returns the subscriber."""
+
+        def hear(data: bytes) -> None:
+            values = twist_values(data)
+            if values is None:
+                refuse(f"{len(data)} bytes that are no geometry_msgs/Twist")
+            else:
+                take(values)
+
+        return self.subscribe(topic, "geometry_msgs/Twist", hear)
+
+    def advertise(self, topic: str, type_: str, depth: int = QUEUE, is_reliable: bool = True) -> Writer:
+        """Announce a topic."""
+        if topic not in self._topics:
+            from cyclonedds.pub import DataWriter
+
+            made, quality = self._topic(topic, type_), _quality(depth, is_reliable)
+            writer = DataWriter(self._participant, made, qos=quality)
+            self._topics[topic] = Writer(writer, message_type(type_))
+        found: Writer = self._topics[topic]
+        return found
+
+    def subscribe(self, topic: str, type_: str, take: Callable[[bytes], None]) -> Reader:
+        """Call take(data), in the thread of the simulation, for each message. Returns the subscriber."""
+        from cyclonedds.core import InstanceState, ReadCondition, SampleState, ViewState
+        from cyclonedds.sub import DataReader
+
+        reader = DataReader(
+            self._participant, self._topic(topic, type_), qos=_quality(QUEUE, is_reliable=True)
+        )
+        condition = ReadCondition(reader, SampleState.Any | ViewState.Any | InstanceState.Any)
+        self._waitset.attach(condition)
+        self._readers.append(Reader(reader, take))
+        return self._readers[-1]
+
+    def collect(self) -> None:
+        """Take the messages that have come."""
+        for reader in self._readers:
+            reader.collect()
+
+    def end(self) -> None:
+        """Leave the domain; called when the simulation is closed."""
+        self.gate.close()
+        # An entity of Cyclone DDS is deleted with the last reference to it; those of the participant hold it.
+        del self._waitset
+        for one in (*self._topics.values(), *self._readers):
+            one.close()
+        del self._participant
+
+    def _topic(self, topic: str, type_: str) -> Any:
+        from cyclonedds.topic import Topic
+
+        return Topic(self._participant, f"rt/{topic}", message_type(type_))
+
+    def _wait(self, seconds: float) -> None:
+        self._waitset.wait(max(round(seconds * NANO), 1))
+        self.collect()
+
+
+def opened_participant() -> Any:
+    """A participant in the domain of the environment, on the loopback interface unless the user has configured Cyclone DDS.
+
+    Raises:
+        RosError: The domain cannot be joined.
+    """
+    from cyclonedds.core import DDSException
+    from cyclonedds.domain import DomainParticipant
+
+    domain = domain_id()
+    with _environment:
+        # A domain reads its configuration from the environment when its first participant comes, and ends with the last one.
+        is_ours = not os.environ.get(CONFIG)
+        if is_ours:
+            os.environ[CONFIG] = LOOPBACK
+        try:
+            return DomainParticipant(domain)
+        except DDSException as error:
+            given = "" if is_ours else f" as {CONFIG} = {os.environ[CONFIG]!r} says"
+            raise RosError(f"the domain {domain} of ROS 2 cannot be joined{given}: {error}") from None
+        finally:
+            if is_ours:
+                del os.environ[CONFIG]
+
+
+def _quality(depth: int, is_reliable: bool) -> Any:
+    """Quality of service, with the message as ROS 2 writes it: CDR of version 1."""
+    from cyclonedds.core import Policy, Qos
+    from cyclonedds.util import duration
+
+    return Qos(
+        Policy.Reliability.Reliable(duration(seconds=MOST_SECONDS))
+        if is_reliable
+        else Policy.Reliability.BestEffort,
+        Policy.History.KeepLast(depth),
+        Policy.Durability.Volatile,
+        Policy.DataRepresentation(use_cdrv0_representation=True),
+    )
