@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import struct
 import sys
 from collections.abc import Callable, Sequence
@@ -58,31 +59,28 @@ def message_type(name: str) -> Any:
         MissingExtraError: Cyclone DDS is not installed.
     """
     try:
-        from cyclonedds.idl import make_idl_struct, types
+        idl, types = (importlib.import_module(f"cyclonedds.{name}") for name in ("idl", "idl.types"))
     except ImportError:
         raise MissingExtraError("ROS 2 needs Cyclone DDS: pip install 'tussle[ros2]'") from None
     fields: dict[str, Any] = {}
-    for field in DEFINITIONS[name].split(", "):
-        kind, key = field.split()
-        kind, _, size = kind.rstrip("]").partition("[")
-        type_ = message_type(kind) if "/" in kind else {"string": str, "bool": bool}.get(kind)
-        type_ = type_ or getattr(types, kind)
-        if size:
-            type_ = types.array[type_, int(size)]
-        elif field.startswith(f"{kind}[]"):
-            type_ = types.sequence[type_]
-        fields[key] = type_
+    for kind, field in map(str.split, DEFINITIONS[name].split(", ")):
+        element, is_list, size = kind.rstrip("]").partition("[")
+        plain = {"string": str, "bool": bool}.get(element)
+        type_: Any = message_type(element) if "/" in element else plain or getattr(types, element)
+        if is_list:
+            type_ = types.array[type_, int(size)] if size else types.sequence[type_]
+        fields[field] = type_
     package, _, short = name.partition("/")
-    type_: Any = make_idl_struct(short, f"{package}::msg::dds_::{short}_", fields)
+    message: Any = idl.make_idl_struct(short, f"{package}::msg::dds_::{short}_", fields)
 
     def deserialize(data: bytes, **_: Any) -> Any:
-        message = type_.__new__(type_)
-        message.data = data
-        return message
+        made = message.__new__(message)
+        made.data = data
+        return made
 
-    type_.serialize = lambda message, **_: message.data
-    type_.deserialize = type_.deserialize_key = deserialize
-    return type_
+    message.serialize = lambda made, **_: made.data
+    message.deserialize = message.deserialize_key = deserialize
+    return message
 
 
 def odometry_bytes(frame: str, child: str) -> Callable[[Stamp, Sequence[float]], bytes]:
