@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import os
+import socket
+import stat
 import threading
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,10 +21,10 @@ from tussle.ros.messages import (
     transforms_bytes,
     twist_values,
 )
-from tussle.ros.steps import NANO, Link, Transform
+from tussle.ros.steps import NANO, NodeLink, Transform
 
-LAST_DOMAIN = 232
-"""Highest ROS_DOMAIN_ID: the ports of higher ones do not exist (DDSI-RTPS 2.5, 9.6.2.3)."""
+LAST_DOMAIN, FIRST_PORT, N_PORTS = 232, 7400, 250
+"""Highest ROS_DOMAIN_ID, first port of domain 0, ports of a domain (DDSI-RTPS 2.5, 9.6.2.3)."""
 CONFIG = "CYCLONEDDS_URI"
 LOOPBACK = """<CycloneDDS><Domain id="any">
 <General><Interfaces><NetworkInterface address="127.0.0.1"/></Interfaces><AllowMulticast>false</AllowMulticast></General>
@@ -34,6 +37,7 @@ TF_QUEUE, SCAN_QUEUE = 100, 5
 """The same for tf, as of tf2_ros, and for scans, as of the profile for sensor data."""
 MOST_SECONDS = 0.01
 """Longest time for which a subscriber that has stopped can delay a message [s]."""
+ANY_ADDRESS = "0.0.0.0"  # noqa: S104 - searched for, not bound to
 _environment = threading.Lock()
 
 
@@ -51,7 +55,7 @@ def domain_id() -> int:
     return int(text)
 
 
-class Writer:
+class TopicWriter:
     """Sends messages of one topic.
 
     Args:
@@ -86,7 +90,7 @@ class Writer:
                 raise RosError(f"/{self._writer.topic.name[3:]}: {error}") from None
 
 
-class Reader:
+class TopicReader:
     """Receives messages of one topic.
 
     Args:
@@ -112,7 +116,7 @@ class Reader:
                 self._take(message.data)
 
 
-class Ros2Link(Link):
+class Ros2Link(NodeLink):
     """The topics of one simulation in ROS 2.
 
     It has a participant of its own in the domain ROS_DOMAIN_ID, which nobody outside this machine can reach unless CYCLONEDDS_URI says so.
@@ -133,7 +137,7 @@ class Ros2Link(Link):
 
         self._participant = opened_participant()
         self._waitset = WaitSet(self._participant)
-        self._readers: list[Reader] = []
+        self._readers: list[TopicReader] = []
 
     def time_of(self, seconds: int, nanoseconds: int) -> Any:
         """Return a time as messages hold it."""
@@ -174,18 +178,18 @@ class Ros2Link(Link):
 
         return self.subscribe(topic, "geometry_msgs/Twist", hear)
 
-    def advertise(self, topic: str, type_: str, depth: int = QUEUE, is_reliable: bool = True) -> Writer:
+    def advertise(self, topic: str, type_: str, depth: int = QUEUE, is_reliable: bool = True) -> TopicWriter:
         """Announce a topic."""
         if topic not in self._topics:
             from cyclonedds.pub import DataWriter
 
             made, quality = self._topic(topic, type_), _quality(depth, is_reliable)
             writer = DataWriter(self._participant, made, qos=quality)
-            self._topics[topic] = Writer(writer, message_type(type_))
-        found: Writer = self._topics[topic]
+            self._topics[topic] = TopicWriter(writer, message_type(type_))
+        found: TopicWriter = self._topics[topic]
         return found
 
-    def subscribe(self, topic: str, type_: str, take: Callable[[bytes], None]) -> Reader:
+    def subscribe(self, topic: str, type_: str, take: Callable[[bytes], None]) -> TopicReader:
         """Call take(data), in the thread of the simulation, for each message. Returns the subscriber."""
         from cyclonedds.core import InstanceState, ReadCondition, SampleState, ViewState
         from cyclonedds.sub import DataReader
@@ -195,7 +199,7 @@ class Ros2Link(Link):
         )
         condition = ReadCondition(reader, SampleState.Any | ViewState.Any | InstanceState.Any)
         self._waitset.attach(condition)
-        self._readers.append(Reader(reader, take))
+        self._readers.append(TopicReader(reader, take))
         return self._readers[-1]
 
     def collect(self) -> None:
@@ -238,13 +242,53 @@ def opened_participant() -> Any:
         if is_ours:
             os.environ[CONFIG] = LOOPBACK
         try:
-            return DomainParticipant(domain)
+            participant = DomainParticipant(domain)
+            if is_ours:
+                _bind_to_loopback(FIRST_PORT + N_PORTS * domain)
+            return participant
         except DDSException as error:
             given = "" if is_ours else f" as {CONFIG} = {os.environ[CONFIG]!r} says"
             raise RosError(f"the domain {domain} of ROS 2 cannot be joined{given}: {error}") from None
         finally:
             if is_ours:
                 del os.environ[CONFIG]
+
+
+def _bind_to_loopback(first_port: int) -> None:
+    """Let the sockets that Cyclone DDS has opened for a domain receive packets of this machine only.
+
+    It binds them to all interfaces, whatever its configuration says (its issue 2090). Not a filter on the sender's address, which needs
+    more code.
+
+    Raises:
+        RosError: The system refuses it.
+    """
+    for path in Path("/proc/self/fd").iterdir():
+        number = int(path.name)
+        try:
+            is_socket = stat.S_ISSOCK(os.fstat(number).st_mode)
+        except OSError:  # that of the listing, or another thread has closed it
+            continue
+        if is_socket:
+            with socket.socket(fileno=os.dup(number)) as one:
+                _bind_one_to_loopback(one, first_port)
+
+
+def _bind_one_to_loopback(one: socket.socket, first_port: int) -> None:
+    if one.family != socket.AF_INET or one.type != socket.SOCK_DGRAM:
+        return
+    address, port = one.getsockname()
+    if address != ANY_ADDRESS or not first_port <= port < first_port + N_PORTS:
+        return
+    device = socket.SOL_SOCKET, socket.SO_BINDTODEVICE
+    if not one.getsockopt(*device, 16):  # a second time is not allowed to everybody
+        try:
+            one.setsockopt(*device, b"lo\0")
+        except OSError as error:
+            raise RosError(
+                f"Cyclone DDS listens on all interfaces, and cannot be bound to the loopback interface: {error.strerror}; "
+                f"set {CONFIG} if that is wanted"
+            ) from None
 
 
 def _quality(depth: int, is_reliable: bool) -> Any:

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from tussle.ros.node import MASTER_TIMEOUT, master_fault, master_uri, started_node
-from tussle.ros.steps import Link, Transform
+from tussle.ros.steps import NodeLink, Transform
 
 QUEUE = 10
 """Messages that wait for a slow subscriber; older ones are dropped, so that it does not delay the simulation."""
 WATCH_PERIOD = 1.0  # [s] between two questions to the master
 
 
-class RosLink(Link):
+class RosLink(NodeLink):
     """The topics, services and parameters of one simulation in ROS 1.
 
     Attributes:

@@ -84,7 +84,7 @@ def message_type(name: str) -> Any:
 
 
 def odometry_bytes(frame: str, child: str) -> Callable[[Stamp, Sequence[float]], bytes]:
-    """What packs nav_msgs/Odometry: pack(stamp, state), of a state as that of `Link.odometry`."""
+    """What packs nav_msgs/Odometry: pack(stamp, state), of a state as that of `NodeLink.odometry`."""
     (frame_text, frame_name), (child_text, child_name) = _text(frame), _text(child)
     # Fields with native alignment are aligned as in CDR; the covariances are 0.
     pack = struct.Struct(f"@2i{frame_text}{child_text}7d288x6d288x").pack

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tussle.ros.node import checked_namespace
-from tussle.ros.steps import Link, Transform
+from tussle.ros.steps import NodeLink, Transform
 
 TWIST = "linear.x", "linear.y", "linear.z", "angular.x", "angular.y", "angular.z"
 FRAMES = "odom", "base_footprint", "base_link", "base_laser_link"
@@ -29,7 +29,7 @@ class TwistInbox:
         fault: What is wrong with a command; empty without any.
     """
 
-    def __init__(self, link: Link, topic: str) -> None:
+    def __init__(self, link: NodeLink, topic: str) -> None:
         self.link, self.topic = link, topic
         self.command: tuple[float, ...] = (0.0,) * len(TWIST)
         self.n_received, self.fault = 0, ""
@@ -78,7 +78,7 @@ class RobotTopics:
         ParameterError: The namespace is no name of ROS.
     """
 
-    def __init__(self, link: Link, namespace: str, publishes: bool) -> None:
+    def __init__(self, link: NodeLink, namespace: str, publishes: bool) -> None:
         self.link, self.namespace = link, checked_namespace(namespace)
         self.inbox = TwistInbox(link, f"{self.namespace}/cmd_vel")
         self.topics = [f"{self.namespace}/{topic}" for topic in ("odom", "base_pose_ground_truth")]

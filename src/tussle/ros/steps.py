@@ -20,7 +20,7 @@ class Transform(NamedTuple):
     Attributes:
         parent: The other frame.
         child: The frame.
-        stamp: Time, as `Link.stamp` gives it.
+        stamp: Time, as `NodeLink.stamp` gives it.
         pose: Position [m] and attitude (w, x, y, z), 7 numbers.
     """
 
@@ -88,7 +88,7 @@ class StepGate:
             self._changed.notify_all()
 
 
-class Link(ABC):
+class NodeLink(ABC):
     """The topics of one simulation; abstract. Topics are named without leading slash.
 
     Args:

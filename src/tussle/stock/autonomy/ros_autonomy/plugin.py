@@ -11,14 +11,14 @@ from tussle.api import Autonomy, GroupView, Handle, Input, Output, Param
 from tussle.numeric.quaternion import quat_from_euler, quat_rotate, quat_rotate_inverse
 from tussle.ros.link import RosLink
 from tussle.ros.robot import RobotTopics
-from tussle.ros.steps import Link
+from tussle.ros.steps import NodeLink
 
 
 class CommandedByROS(Autonomy):
     """Columns and methods of robots that follow cmd_vel; abstract."""
 
     grade = "external"
-    link_type: ClassVar[type[Link]] = RosLink
+    link_type: ClassVar[type[NodeLink]] = RosLink
     """What connects it to ROS."""
     publishes: ClassVar[bool] = False
     """Whether it publishes the states of robots."""
@@ -75,7 +75,7 @@ class CommandedByROS(Autonomy):
         robots: Any = self.robot
         if not g.n:  # no master
             return
-        link: Link = robots[0].link
+        link: NodeLink = robots[0].link
         link.begin_step(g)
         self._await_commands(g)
         commands = np.empty((6, g.n))
@@ -112,7 +112,7 @@ class PublishedByROS(CommandedByROS):
     def publish_state(self, g: GroupView) -> list[Any]:
         """Publish the states of all robots, and return their transforms."""
         robots: Any = self.robot
-        link: Link = robots[0].link
+        link: NodeLink = robots[0].link
         truth, rows = g.bodies, slice(g.first, g.last)
         true = [np.asarray(getattr(truth, name)[:, rows]) for name in ("pos", "quat", "vel", "omega")]
         believed, actual = _body_states(g.pos, g.quat, g.vel, true[3]), _body_states(*true)
@@ -149,7 +149,7 @@ class PublishedByROS(CommandedByROS):
         if self.lockstep and not all(robot.inbox.n_received for robot in robots):
             why = "nobody has subscribed to /{0}/odom and publishes /{0}/cmd_vel"
             self._await(g, RobotTopics.has_peer, why)
-            link: Link = robots[0].link
+            link: NodeLink = robots[0].link
             link.wait_for(lambda: False, link.settling_time, g.context.is_interrupted)
 
     def _await_commands(self, g: GroupView) -> None:

@@ -6,14 +6,14 @@ from typing import Any, ClassVar
 
 from tussle.api import Interaction, Param, WorldView
 from tussle.ros.link import RosLink
-from tussle.ros.steps import Link
+from tussle.ros.steps import NodeLink
 
 
 class ClockOfROS(Interaction):
     """Columns and methods of clocks; abstract."""
 
     grade = "external"
-    clock_type: ClassVar[type[Clock]]
+    clock_type: ClassVar[type[ClockTopic]]
     """Its part outside the simulation."""
 
     start_paused = Param(False, doc="Wait for tussle/step or tussle/pause before the first step.")
@@ -33,19 +33,19 @@ class ClockOfROS(Interaction):
             link.gate.enter(w.context.is_interrupted)
             link.collect()
 
-    def _clock(self, w: WorldView) -> Clock:
+    def _clock(self, w: WorldView) -> ClockTopic:
         share, type_ = w.context.share, self.clock_type
-        clock: Clock = share(
+        clock: ClockTopic = share(
             f"{type_.link_type.system} clock",
             lambda: type_(type_.link_type.of(share), bool(self.start_paused[0])),
         )
         return clock
 
-    def _tick(self, w: WorldView, clock: Clock) -> None:
+    def _tick(self, w: WorldView, clock: ClockTopic) -> None:
         clock.publish(clock.link.stamp(float(w.t[0])))
 
 
-class Clock:
+class ClockTopic:
     """Topic and control of a simulation's clock; abstract.
 
     Args:
@@ -56,7 +56,7 @@ class Clock:
         publish: Publishes a stamp.
     """
 
-    link_type: ClassVar[type[Link]]
+    link_type: ClassVar[type[NodeLink]]
 
     def __init__(self, link: Any, is_paused: bool) -> None:
         self.link = link
@@ -72,7 +72,7 @@ class Clock:
         """Do nothing: the link withdraws what is open."""
 
 
-class ServicesOfClock(Clock):
+class ServicesOfClock(ClockTopic):
     """Services of ROS 1."""
 
     link_type = RosLink

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from tussle.ros.dds import Ros2Link
-from tussle.stock.interaction.ros_clock_server.plugin import Clock, ClockOfROS
+from tussle.stock.interaction.ros_clock_server.plugin import ClockOfROS, ClockTopic
 
 
-class TopicsOfClock(Clock):
+class TopicsOfClock(ClockTopic):
     """Topics that pause the simulation and make single steps."""
 
     link_type = Ros2Link
