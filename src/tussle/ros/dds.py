@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import os
-import socket
-import stat
-import threading
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from tussle.errors import RosError
+from tussle.ros.domain import opened_participant
 from tussle.ros.messages import (
+    TYPE_HASHES,
     clock_bytes,
     message_type,
     odometry_bytes,
@@ -23,36 +20,12 @@ from tussle.ros.messages import (
 )
 from tussle.ros.steps import NANO, NodeLink, Transform
 
-LAST_DOMAIN, FIRST_PORT, N_PORTS = 232, 7400, 250
-"""Highest ROS_DOMAIN_ID, first port of domain 0, ports of a domain (DDSI-RTPS 2.5, 9.6.2.3)."""
-CONFIG = "CYCLONEDDS_URI"
-LOOPBACK = """<CycloneDDS><Domain id="any">
-<General><Interfaces><NetworkInterface address="127.0.0.1"/></Interfaces><AllowMulticast>false</AllowMulticast></General>
-<Discovery><ParticipantIndex>auto</ParticipantIndex><Peers><Peer address="127.0.0.1"/></Peers></Discovery>
-</Domain></CycloneDDS>"""
-"""Configuration of Cyclone DDS where the user has none: nobody outside this machine can command a robot."""
 QUEUE = 10
 """Messages that wait for a slow subscriber; older ones are dropped, so that it does not delay the simulation."""
 TF_QUEUE, SCAN_QUEUE = 100, 5
 """The same for tf, as of tf2_ros, and for scans, as of the profile for sensor data."""
 MOST_SECONDS = 0.01
 """Longest time for which a subscriber that has stopped can delay a message [s]."""
-ANY_ADDRESS = "0.0.0.0"  # noqa: S104 - searched for, not bound to
-_environment = threading.Lock()
-
-
-def domain_id() -> int:
-    """The number of the domain, from the environment; 0 by default.
-
-    Raises:
-        RosError: It is no number of a domain.
-    """
-    text = os.environ.get("ROS_DOMAIN_ID") or "0"
-    if not (text.isascii() and text.isdigit() and int(text) <= LAST_DOMAIN):
-        raise RosError(
-            f"ROS_DOMAIN_ID = {text!r} is not allowed; it takes a whole number from 0 to {LAST_DOMAIN}"
-        )
-    return int(text)
 
 
 class TopicWriter:
@@ -164,26 +137,16 @@ class Ros2Link(NodeLink):
         writer = self.advertise("clock", "rosgraph_msgs/Clock")
         return lambda stamp: writer.publish(clock_bytes(stamp))
 
-    def twist(
-        self, topic: str, take: Callable[[tuple[float, ...]], None], refuse: Callable[[str], None]
-    ) -> Any:
-        """Call take(values) for each command, six numbers, or refuse(what). Returns the subscriber."""
-
-        def hear(data: bytes) -> None:
-            values = twist_values(data)
-            if values is None:
-                refuse(f"{len(data)} bytes that are no geometry_msgs/Twist")
-            else:
-                take(values)
-
-        return self.subscribe(topic, "geometry_msgs/Twist", hear)
+    def twist(self, topic: str, take: Callable[[tuple[float, ...]], None]) -> Any:
+        """Call take(values) for each command, six numbers. Returns the subscriber."""
+        return self.subscribe(topic, "geometry_msgs/Twist", lambda data: take(twist_values(data)))
 
     def advertise(self, topic: str, type_: str, depth: int = QUEUE, is_reliable: bool = True) -> TopicWriter:
         """Announce a topic."""
         if topic not in self._topics:
             from cyclonedds.pub import DataWriter
 
-            made, quality = self._topic(topic, type_), _quality(depth, is_reliable)
+            made, quality = self._topic(topic, type_), _quality(type_, depth, is_reliable)
             writer = DataWriter(self._participant, made, qos=quality)
             self._topics[topic] = TopicWriter(writer, message_type(type_))
         found: TopicWriter = self._topics[topic]
@@ -195,7 +158,7 @@ class Ros2Link(NodeLink):
         from cyclonedds.sub import DataReader
 
         reader = DataReader(
-            self._participant, self._topic(topic, type_), qos=_quality(QUEUE, is_reliable=True)
+            self._participant, self._topic(topic, type_), qos=_quality(type_, QUEUE, is_reliable=True)
         )
         condition = ReadCondition(reader, SampleState.Any | ViewState.Any | InstanceState.Any)
         self._waitset.attach(condition)
@@ -226,73 +189,8 @@ class Ros2Link(NodeLink):
         self.collect()
 
 
-def opened_participant() -> Any:
-    """A participant in the domain of the environment, on the loopback interface unless the user has configured Cyclone DDS.
-
-    Raises:
-        RosError: The domain cannot be joined.
-    """
-    from cyclonedds.core import DDSException
-    from cyclonedds.domain import DomainParticipant
-
-    domain = domain_id()
-    with _environment:
-        # A domain reads its configuration from the environment when its first participant comes, and ends with the last one.
-        is_ours = not os.environ.get(CONFIG)
-        if is_ours:
-            os.environ[CONFIG] = LOOPBACK
-        try:
-            participant = DomainParticipant(domain)
-            if is_ours:
-                _bind_to_loopback(FIRST_PORT + N_PORTS * domain)
-            return participant
-        except DDSException as error:
-            given = "" if is_ours else f" as {CONFIG} = {os.environ[CONFIG]!r} says"
-            raise RosError(f"the domain {domain} of ROS 2 cannot be joined{given}: {error}") from None
-        finally:
-            if is_ours:
-                del os.environ[CONFIG]
-
-
-def _bind_to_loopback(first_port: int) -> None:
-    """Let the sockets that Cyclone DDS has opened for a domain receive packets of this machine only.
-
-    It binds them to all interfaces, whatever its configuration says (its issue 2090). Not a filter on the sender's address, which needs
-    more code.
-
-    Raises:
-        RosError: The system refuses it.
-    """
-    for path in Path("/proc/self/fd").iterdir():
-        number = int(path.name)
-        try:
-            is_socket = stat.S_ISSOCK(os.fstat(number).st_mode)
-        except OSError:  # that of the listing, or another thread has closed it
-            continue
-        if is_socket:
-            with socket.socket(fileno=os.dup(number)) as one:
-                _bind_one_to_loopback(one, first_port)
-
-
-def _bind_one_to_loopback(one: socket.socket, first_port: int) -> None:
-    if one.family != socket.AF_INET or one.type != socket.SOCK_DGRAM:
-        return
-    address, port = one.getsockname()
-    if address != ANY_ADDRESS or not first_port <= port < first_port + N_PORTS:
-        return
-    device = socket.SOL_SOCKET, socket.SO_BINDTODEVICE
-    if not one.getsockopt(*device, 16):  # a second time is not allowed to everybody
-        try:
-            one.setsockopt(*device, b"lo\0")
-        except OSError as error:
-            raise RosError(
-                f"Cyclone DDS listens on all interfaces, and cannot be bound to the loopback interface: {error.strerror}; "
-                f"set {CONFIG} if that is wanted"
-            ) from None
-
-
-def _quality(depth: int, is_reliable: bool) -> Any:
-    """Quality of service, with the message as ROS 2 writes it: CDR of version 1."""
+def _quality(type_: str, depth: int, is_reliable: bool) -> Any:
+    """Quality of service, with the message as ROS 2 writes it: CDR of version 1, and the hash of its definition."""
     from cyclonedds.core import Policy, Qos
     from cyclonedds.util import duration
 
@@ -303,4 +201,5 @@ def _quality(depth: int, is_reliable: bool) -> Any:
         Policy.History.KeepLast(depth),
         Policy.Durability.Volatile,
         Policy.DataRepresentation(use_cdrv0_representation=True),
+        Policy.Userdata(f"typehash={TYPE_HASHES[type_]};".encode()),
     )

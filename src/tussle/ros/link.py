@@ -132,10 +132,8 @@ class RosLink(NodeLink):
         publisher = self.advertise("clock", self.ros.Clock)
         return lambda stamp: publisher.publish(self.ros.Clock(stamp))
 
-    def twist(
-        self, topic: str, take: Callable[[tuple[float, ...]], None], refuse: Callable[[str], None]
-    ) -> Any:
-        """Call take(values), in another thread, for each command; rospy itself refuses what is none. Returns the subscriber."""
+    def twist(self, topic: str, take: Callable[[tuple[float, ...]], None]) -> Any:
+        """Call take(values), in another thread, for each command. Returns the subscriber."""
 
         def hear(message: Any) -> None:
             linear, angular = message.linear, message.angular

@@ -35,21 +35,18 @@ class TwistInbox:
         self.n_received, self.fault = 0, ""
         self.n_seen = 0  # commands at the beginning of the last step
         self.seen_at = -math.inf  # [s] simulated time at which the command was first seen
-        self.subscriber = link.twist(topic, self._take, self._refuse)
+        self.subscriber = link.twist(topic, self._take)
 
     def _take(self, values: tuple[float, ...]) -> None:
         wrong = [f"{name} = {v!r}" for name, v in zip(TWIST, values, strict=True) if not math.isfinite(v)]
-        if wrong:
-            self._refuse(", ".join(wrong))
-            return
         with self.link.news:
-            self.command = values
-            self.n_received += 1
-            self.link.news.notify_all()
-
-    def _refuse(self, what: str) -> None:
-        with self.link.news:
-            self.fault = f"/{self.topic}: {what} is not allowed; a command takes finite numbers"
+            if wrong:
+                self.fault = (
+                    f"/{self.topic}: {', '.join(wrong)} is not allowed; a command takes finite numbers"
+                )
+            else:
+                self.command = values
+                self.n_received += 1
             self.link.news.notify_all()
 
     def at(self, t: float, timeout: float) -> tuple[float, ...]:

@@ -144,10 +144,8 @@ class NodeLink(ABC):
         """Announce clock; returns publish(stamp)."""
 
     @abstractmethod
-    def twist(
-        self, topic: str, take: Callable[[tuple[float, ...]], None], refuse: Callable[[str], None]
-    ) -> Any:
-        """Call take(values) for each command, six numbers, or refuse(what) where it is none. Returns the subscriber."""
+    def twist(self, topic: str, take: Callable[[tuple[float, ...]], None]) -> Any:
+        """Call take(values) for each command, six numbers. Returns the subscriber."""
 
     @abstractmethod
     def collect(self) -> None:

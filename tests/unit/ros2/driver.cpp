@@ -1,6 +1,6 @@
 // A node of ROS 2 in C++ on Fast DDS, the middleware of rmw_fastrtps: each odom of a robot is answered with a speed, and told on
 // standard output. The messages are written and read by hand from the definitions of nav_msgs, sensor_msgs and geometry_msgs.
-// Usage: driver DOMAIN NAMESPACE SPEED
+// Usage: driver DOMAIN NAMESPACE SPEED [torn]; torn commands consist of one byte.
 #include <array>
 #include <cstdio>
 #include <cstdlib>
@@ -57,8 +57,14 @@ struct LaserScan {
 
 struct Twist {
   std::array<double, 6> values{};
+  bool is_torn = false;
   void read(Cdr& cdr) { cdr >> values; }
-  void write(Cdr& cdr) const { cdr << values; }
+  void write(Cdr& cdr) const {
+    if (is_torn)
+      cdr << char(7);
+    else
+      cdr << values;
+  }
 };
 
 // How Fast DDS handles a message, in plain little-endian CDR.
@@ -127,11 +133,12 @@ fast::DomainParticipantQos on_loopback(int domain) {
   return qos;
 }
 
-int main(int, char** argv) {
+int main(int argc, char** argv) {
   const int domain = std::atoi(argv[1]);
   const std::string name = std::string("rt/") + argv[2] + "/";
   Twist command;
   command.values[0] = std::atof(argv[3]);
+  command.is_torn = argc > 4;
 
   auto* participant =
       fast::DomainParticipantFactory::get_instance()->create_participant(domain, on_loopback(domain));

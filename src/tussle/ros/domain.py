@@ -1,0 +1,102 @@
+"""The domain of ROS 2: its number, and a participant of Cyclone DDS that nobody outside this machine can reach."""
+
+from __future__ import annotations
+
+import os
+import socket
+import stat
+import threading
+from pathlib import Path
+from typing import Any
+
+from tussle.errors import RosError
+
+LAST_DOMAIN, FIRST_PORT, N_PORTS = 232, 7400, 250
+"""Highest ROS_DOMAIN_ID, first port of domain 0, ports of a domain (DDSI-RTPS 2.5, 9.6.2.3)."""
+CONFIG = "CYCLONEDDS_URI"
+LOOPBACK = """<CycloneDDS><Domain id="any">
+<General><Interfaces><NetworkInterface address="127.0.0.1"/></Interfaces><AllowMulticast>false</AllowMulticast></General>
+<Discovery><ParticipantIndex>auto</ParticipantIndex><Peers><Peer address="127.0.0.1"/></Peers></Discovery>
+</Domain></CycloneDDS>"""
+"""Configuration of Cyclone DDS where the user has none: nobody outside this machine can command a robot."""
+ANY_ADDRESS = "0.0.0.0"  # noqa: S104 - searched for, not bound to
+_environment = threading.Lock()
+
+
+def domain_id() -> int:
+    """The number of the domain, from the environment; 0 by default.
+
+    Raises:
+        RosError: It is no number of a domain.
+    """
+    text = os.environ.get("ROS_DOMAIN_ID") or "0"
+    if not (text.isascii() and text.isdigit() and int(text) <= LAST_DOMAIN):
+        raise RosError(
+            f"ROS_DOMAIN_ID = {text!r} is not allowed; it takes a whole number from 0 to {LAST_DOMAIN}"
+        )
+    return int(text)
+
+
+def opened_participant() -> Any:
+    """A participant in the domain of the environment, on the loopback interface unless the user has configured Cyclone DDS.
+
+    Raises:
+        RosError: The domain cannot be joined.
+    """
+    from cyclonedds.core import DDSException
+    from cyclonedds.domain import DomainParticipant
+
+    domain = domain_id()
+    with _environment:
+        # A domain reads its configuration from the environment when its first participant comes, and ends with the last one.
+        is_ours = not os.environ.get(CONFIG)
+        if is_ours:
+            os.environ[CONFIG] = LOOPBACK
+        try:
+            participant = DomainParticipant(domain)
+            if is_ours:
+                _bind_to_loopback(FIRST_PORT + N_PORTS * domain)
+            return participant
+        except DDSException as error:
+            given = "" if is_ours else f" as {CONFIG} = {os.environ[CONFIG]!r} says"
+            raise RosError(f"the domain {domain} of ROS 2 cannot be joined{given}: {error}") from None
+        finally:
+            if is_ours:
+                del os.environ[CONFIG]
+
+
+def _bind_to_loopback(first_port: int) -> None:
+    """Let the sockets that Cyclone DDS has opened for a domain receive packets of this machine only.
+
+    It binds them to all interfaces, whatever its configuration says (its issue 2090). Not a filter on the sender's address, which needs
+    more code.
+
+    Raises:
+        RosError: The system refuses it.
+    """
+    for path in Path("/proc/self/fd").iterdir():
+        number = int(path.name)
+        try:
+            is_socket = stat.S_ISSOCK(os.fstat(number).st_mode)
+        except OSError:  # that of the listing, or another thread has closed it
+            continue
+        if is_socket:
+            with socket.socket(fileno=os.dup(number)) as one:
+                _bind_one_to_loopback(one, first_port)
+
+
+def _bind_one_to_loopback(one: socket.socket, first_port: int) -> None:
+    if one.family != socket.AF_INET or one.type != socket.SOCK_DGRAM:
+        return
+    address, port = one.getsockname()
+    if address != ANY_ADDRESS or not first_port <= port < first_port + N_PORTS:
+        return
+    device = socket.SOL_SOCKET, socket.SO_BINDTODEVICE
+    if not one.getsockopt(*device, 16):  # a second time is not allowed to everybody
+        try:
+            one.setsockopt(*device, b"lo\0")
+        except OSError as error:
+            raise RosError(
+                f"Cyclone DDS listens on all interfaces, and cannot be bound to the loopback interface: {error.strerror}; "
+                f"set {CONFIG} if that is wanted"
+            ) from None
