@@ -54,8 +54,9 @@ def opened_participant() -> Any:
             os.environ[CONFIG] = LOOPBACK
         try:
             participant = DomainParticipant(domain)
-            if is_ours:
-                _bind_to_loopback(FIRST_PORT + N_PORTS * domain)
+            if is_ours and (fault := _bind_to_loopback(FIRST_PORT + N_PORTS * domain)):
+                del participant  # the error would keep it
+                raise RosError(fault)
             return participant
         except DDSException as error:
             given = "" if is_ours else f" as {CONFIG} = {os.environ[CONFIG]!r} says"
@@ -65,14 +66,10 @@ def opened_participant() -> Any:
                 del os.environ[CONFIG]
 
 
-def _bind_to_loopback(first_port: int) -> None:
-    """Let the sockets that Cyclone DDS has opened for a domain receive packets of this machine only.
+def _bind_to_loopback(first_port: int) -> str:
+    """Let the sockets that Cyclone DDS has opened for a domain receive packets of this machine only; returns what prevents it.
 
-    It binds them to all interfaces, whatever its configuration says (its issue 2090). Not a filter on the sender's address, which needs
-    more code.
-
-    Raises:
-        RosError: The system refuses it.
+    It binds them to all interfaces, whatever its configuration says (its issue 2090).
     """
     for path in Path("/proc/self/fd").iterdir():
         number = int(path.name)
@@ -82,21 +79,26 @@ def _bind_to_loopback(first_port: int) -> None:
             continue
         if is_socket:
             with socket.socket(fileno=os.dup(number)) as one:
-                _bind_one_to_loopback(one, first_port)
+                if _is_of(one, first_port) and (fault := _bind_one_to_loopback(one)):
+                    return fault
+    return ""
 
 
-def _bind_one_to_loopback(one: socket.socket, first_port: int) -> None:
+def _is_of(one: socket.socket, first_port: int) -> bool:
     if one.family != socket.AF_INET or one.type != socket.SOCK_DGRAM:
-        return
+        return False
     address, port = one.getsockname()
-    if address != ANY_ADDRESS or not first_port <= port < first_port + N_PORTS:
-        return
+    return bool(address == ANY_ADDRESS and first_port <= port < first_port + N_PORTS)
+
+
+def _bind_one_to_loopback(one: socket.socket) -> str:
     device = socket.SOL_SOCKET, socket.SO_BINDTODEVICE
-    if not one.getsockopt(*device, 16):  # a second time is not allowed to everybody
-        try:
+    try:
+        if not one.getsockopt(*device, 16):  # a second time is not allowed to everybody
             one.setsockopt(*device, b"lo\0")
-        except OSError as error:
-            raise RosError(
-                f"Cyclone DDS listens on all interfaces, and cannot be bound to the loopback interface: {error.strerror}; "
-                f"set {CONFIG} if that is wanted"
-            ) from None
+    except OSError as error:
+        return (
+            f"Cyclone DDS listens on all interfaces, and cannot be bound to the loopback interface: {error.strerror}; "
+            f"set {CONFIG} if that is wanted"
+        )
+    return ""

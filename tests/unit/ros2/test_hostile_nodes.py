@@ -20,6 +20,7 @@ from tussle.ros.dds import Ros2Link
 from tussle.ros.domain import domain_id
 
 N_FLOOD = 20_000
+NOWHERE = "<CycloneDDS><Nonsense/></CycloneDDS>"
 GAME = """
 <runscript name="cars">
   <run end="1000000" dt="0.1"/>
@@ -158,7 +159,7 @@ def test_sockets_take_packets_of_this_machine_only(ros_domain):
             with socket.socket(fileno=os.dup(one.fd)) as udp:
                 device = udp.getsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, 16)
                 found.append((udp.getsockname()[0], device))
-    assert len(found) >= 6
+    assert [address for address, _ in found].count("0.0.0.0") == 2
     assert all(address == "127.0.0.1" or device == b"lo\x00" for address, device in found)
 
 
@@ -178,7 +179,7 @@ def test_where_the_sockets_cannot_be_bound_the_error_says_so(ros_domain, monkeyp
 
 
 def test_the_users_configuration_wins(ros_domain, monkeypatch):
-    monkeypatch.setenv("CYCLONEDDS_URI", "<CycloneDDS><Nonsense/></CycloneDDS>")
+    monkeypatch.setenv("CYCLONEDDS_URI", NOWHERE)
     with pytest.raises(
         PluginError, match=rf"the domain {ros_domain} .* as CYCLONEDDS_URI = '<CycloneDDS><Nons"
     ):
