@@ -15,7 +15,7 @@ from tussle.view import Recording
 from tussle.view.export.rosbag2 import write_rosbag2
 
 NANO = 1_000_000_000
-COLUMNS = "x y z qw qx qy qz vx vy vz".split()
+COLUMNS = ["x", "y", "z", "qw", "qx", "qy", "qz", "vx", "vy", "vz"]
 
 
 @pytest.fixture(scope="module")

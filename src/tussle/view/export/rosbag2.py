@@ -7,7 +7,7 @@ import shutil
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from tussle.view.frame import Frame
 from tussle.view.page.recorded import kept_frames
 from tussle.view.recording import Recording
 
-VERSION = 8
+VERSION: Literal[8] = 8
 """Of the format: the oldest that rosbags writes."""
 MAX_TIME = 2.0**31
 """Stamps of ROS are less [s]."""
