@@ -26,8 +26,9 @@ SERVED = (
     "autonomy/moos", "autonomy/ros_autonomy", "controller/ros_controllers", "interaction/ros_clock_server",
     "interaction/ros_shape_viz", "sensor/ros_compass",
     "sensor/ros_altimeter", "sensor/ros_imu_sensor",
+    "autonomy/ros_autonomy/ros2", "interaction/ros_clock_server/ros2",
 )  # fmt: skip
-"""Folders whose examples need a server; tests of their own play them."""
+"""Folders whose examples need a server or peers; tests of their own play them."""
 
 
 @cache
