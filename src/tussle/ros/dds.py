@@ -68,11 +68,12 @@ class TopicReader:
 
     Args:
         reader: That of Cyclone DDS.
+        condition: For which the link waits.
         take: Called with the bytes of each message.
     """
 
-    def __init__(self, reader: Any, take: Callable[[bytes], None]) -> None:
-        self._reader, self._take = reader, take
+    def __init__(self, reader: Any, condition: Any, take: Callable[[bytes], None]) -> None:
+        self._reader, self.condition, self._take = reader, condition, take
 
     def get_num_connections(self) -> int:
         """Return the number of publishers."""
@@ -80,7 +81,7 @@ class TopicReader:
 
     def close(self) -> None:
         """Take no more messages."""
-        self._reader = None
+        self._reader = self.condition = None
 
     def collect(self) -> None:
         """Take the messages that have come."""
@@ -162,8 +163,14 @@ class Ros2Link(NodeLink):
         )
         condition = ReadCondition(reader, SampleState.Any | ViewState.Any | InstanceState.Any)
         self._waitset.attach(condition)
-        self._readers.append(TopicReader(reader, take))
+        self._readers.append(TopicReader(reader, condition, take))
         return self._readers[-1]
+
+    def unsubscribe(self, subscriber: TopicReader) -> None:
+        """Take no more messages for a subscriber."""
+        self._readers.remove(subscriber)
+        self._waitset.detach(subscriber.condition)
+        subscriber.close()
 
     def collect(self) -> None:
         """Take the messages that have come."""

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import socket
-import stat
 import threading
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ LOOPBACK = """<CycloneDDS><Domain id="any">
 <Discovery><ParticipantIndex>auto</ParticipantIndex><Peers><Peer address="127.0.0.1"/></Peers></Discovery>
 </Domain></CycloneDDS>"""
 """Configuration of Cyclone DDS where the user has none: nobody outside this machine can command a robot."""
-ANY_ADDRESS = "0.0.0.0"  # noqa: S104 - searched for, not bound to
+LOOPBACK_NAME = b"lo"
 _environment = threading.Lock()
 
 
@@ -69,36 +69,40 @@ def opened_participant() -> Any:
 def _bind_to_loopback(first_port: int) -> str:
     """Let the sockets that Cyclone DDS has opened for a domain receive packets of this machine only; returns what prevents it.
 
-    It binds them to all interfaces, whatever its configuration says (its issue 2090).
+    It binds them to all interfaces, whatever its configuration says (its issue 2090). Not by Python's sockets, which may change whether a
+    socket blocks.
     """
+    names = _sockets_on_all_interfaces(range(first_port, first_port + N_PORTS))
     for path in Path("/proc/self/fd").iterdir():
-        number = int(path.name)
         try:
-            is_socket = stat.S_ISSOCK(os.fstat(number).st_mode)
+            is_ours = str(path.readlink()) in names
         except OSError:  # that of the listing, or another thread has closed it
             continue
-        if is_socket:
-            with socket.socket(fileno=os.dup(number)) as one:
-                if _is_of(one, first_port) and (fault := _bind_one_to_loopback(one)):
-                    return fault
+        if is_ours and (error := _bind_socket_to_loopback(int(path.name))):
+            return (
+                f"Cyclone DDS listens on all interfaces, and cannot be bound to the loopback interface: {os.strerror(error)}; "
+                f"set {CONFIG} if that is wanted"
+            )
     return ""
 
 
-def _is_of(one: socket.socket, first_port: int) -> bool:
-    if one.family != socket.AF_INET or one.type != socket.SOCK_DGRAM:
-        return False
-    address, port = one.getsockname()
-    return bool(address == ANY_ADDRESS and first_port <= port < first_port + N_PORTS)
+def _sockets_on_all_interfaces(ports: range) -> set[str]:
+    """UDP sockets bound to no address, as /proc/self/fd names them."""
+    found = set()
+    for line in Path("/proc/self/net/udp").read_text(encoding="ascii").splitlines()[1:]:
+        fields = line.split()
+        address, _, port = fields[1].partition(":")
+        if int(address, 16) == 0 and int(port, 16) in ports:
+            found.add(f"socket:[{fields[9]}]")
+    return found
 
 
-def _bind_one_to_loopback(one: socket.socket) -> str:
-    device = socket.SOL_SOCKET, socket.SO_BINDTODEVICE
-    try:
-        if not one.getsockopt(*device, 16):  # a second time is not allowed to everybody
-            one.setsockopt(*device, b"lo\0")
-    except OSError as error:
-        return (
-            f"Cyclone DDS listens on all interfaces, and cannot be bound to the loopback interface: {error.strerror}; "
-            f"set {CONFIG} if that is wanted"
-        )
-    return ""
+def _bind_socket_to_loopback(number: int) -> int:
+    """Bind a socket, given by its file's number, to the loopback interface; returns the number of the error, or 0."""
+    libc = ctypes.CDLL(None, use_errno=True)
+    option, name, size = (socket.SOL_SOCKET, socket.SO_BINDTODEVICE), ctypes.create_string_buffer(16), 16
+    libc.getsockopt(number, *option, name, ctypes.byref(ctypes.c_uint32(size)))
+    # A second time is not allowed to everybody.
+    if name.value != LOOPBACK_NAME and libc.setsockopt(number, *option, LOOPBACK_NAME, len(LOOPBACK_NAME)):
+        return ctypes.get_errno()
+    return 0

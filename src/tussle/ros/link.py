@@ -141,6 +141,9 @@ class RosLink(NodeLink):
 
         return self.subscribe(topic, self.ros.Twist, hear, 1)
 
+    def unsubscribe(self, subscriber: Any) -> None:
+        """Do nothing: all subscriptions are withdrawn at the end, if the master is still there."""
+
     def collect(self) -> None:
         """Do nothing: messages come in other threads."""
 

@@ -148,6 +148,10 @@ class NodeLink(ABC):
         """Call take(values) for each command, six numbers. Returns the subscriber."""
 
     @abstractmethod
+    def unsubscribe(self, subscriber: Any) -> None:
+        """Take no more messages for a subscriber, whose robot has gone."""
+
+    @abstractmethod
     def collect(self) -> None:
         """Take the messages that have come."""
 

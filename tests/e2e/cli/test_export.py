@@ -59,6 +59,14 @@ def test_all_outputs_at_once_lie_in_the_run(process, played):
         assert make_reader(file).get_summary().statistics.message_count > 60
 
 
+def test_a_bag_is_a_folder_of_the_run(tussle, played):
+    before = {p.name for p in played.iterdir()}
+    said = tussle("export", "played", "--rosbag2", "--period", "0.5")
+    assert {p.name for p in played.iterdir()} - before == {"rosbag2"}
+    assert {p.name for p in (played / "rosbag2").iterdir()} == {"rosbag2.mcap", "metadata.yaml"}
+    assert re.fullmatch(r"played/rosbag2/rosbag2.mcap: 7 states, \d+ messages, [\d.]+ k?B\n", said.stdout)
+
+
 def test_files_can_be_named(tussle, played, folder):
     said = tussle("export", "played", "--csv", "a.csv", "--png", "b.png", "--size", "96x64", "--at", "1.5 s")
     assert [line.split(":")[0] for line in said.stdout.splitlines()] == ["a.csv", "a.events.csv", "b.png"]

@@ -36,6 +36,23 @@ def opened() -> tuple[set[int], int, int]:
     return ports, process.num_fds(), process.num_threads()
 
 
+def first_port(domain) -> int:
+    """That of a participant in a domain is 10 higher (DDSI-RTPS 2.5, 9.6.2.3)."""
+    return 7400 + 250 * domain
+
+
+def devices() -> list[tuple[str, bytes]]:
+    """Address and interface of each UDP socket of this process."""
+    found = []
+    for one in psutil.Process().net_connections("udp"):
+        is_blocking = os.get_blocking(one.fd)
+        with socket.socket(fileno=os.dup(one.fd)) as udp:
+            device = udp.getsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, 16)
+            found.append((udp.getsockname()[0], device))
+        os.set_blocking(one.fd, is_blocking)
+    return found
+
+
 def test_a_command_that_is_not_finite_ends_the_game_and_the_error_names_its_topic(ros_domain):
     with ExitStack() as stack:
         simulation = stack.enter_context(Simulation(cars()))
@@ -59,7 +76,11 @@ def test_torn_commands_leave_the_game_as_it_is(ros_domain, driver, capfd):
 def test_packets_that_are_no_dds_leave_the_game_as_it_is(ros_domain):
     with ExitStack() as stack:
         simulation = stack.enter_context(Simulation(cars(1)))
-        ports = {port for port in opened()[0] if port // 250 == (7400 + 250 * ros_domain) // 250}
+        ports = {
+            port
+            for port in opened()[0]
+            if port in range(first_port(ros_domain), first_port(ros_domain) + 250)
+        }
         assert ports
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
             for text in (b"\xff" * 4096, b"GET / HTTP/1.1\r\n\r\n", b"RTPS\x02\x01" + b"\x15" * 500, b""):
@@ -154,11 +175,7 @@ def test_nothing_is_left_after_a_game(ros_domain):
 
 def test_sockets_take_packets_of_this_machine_only(ros_domain):
     with Simulation(cars()), Simulation(cars()):
-        found = []
-        for one in psutil.Process().net_connections("udp"):
-            with socket.socket(fileno=os.dup(one.fd)) as udp:
-                device = udp.getsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, 16)
-                found.append((udp.getsockname()[0], device))
+        found = devices()
     assert [address for address, _ in found].count("0.0.0.0") == 2
     assert all(address == "127.0.0.1" or device == b"lo\x00" for address, device in found)
 
@@ -166,8 +183,16 @@ def test_sockets_take_packets_of_this_machine_only(ros_domain):
 def test_sockets_of_others_are_left_alone(ros_domain):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(("", 0))
-        with Simulation(cars()):
-            assert other.getsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, 16) == b""
+        socket.setdefaulttimeout(60.0)  # as rospy does; a new socket of Python then does not block
+        try:
+            with Simulation(cars()):
+                assert os.get_blocking(other.fileno())
+                ports = {one.laddr.port: one.fd for one in psutil.Process().net_connections("udp")}
+                (number,) = (fd for port, fd in ports.items() if port == first_port(ros_domain) + 10)
+                assert os.get_blocking(number)
+        finally:
+            socket.setdefaulttimeout(None)
+        assert other.getsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, 16) == b""
 
 
 def test_where_the_sockets_cannot_be_bound_the_error_says_so(ros_domain, monkeypatch):
@@ -188,11 +213,7 @@ def test_the_users_configuration_wins(ros_domain, monkeypatch):
     monkeypatch.setenv("CYCLONEDDS_URI", config)
     with Simulation(cars()) as simulation:
         simulation.step()
-        devices = set()
-        for one in psutil.Process().net_connections("udp"):
-            with socket.socket(fileno=os.dup(one.fd)) as udp:
-                devices.add(udp.getsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, 16))
-        assert devices == {b""}
+        assert {device for _, device in devices()} == {b""}
     assert os.environ["CYCLONEDDS_URI"] == config
 
 

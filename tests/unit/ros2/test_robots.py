@@ -151,6 +151,17 @@ def test_topics_pause_the_game_and_make_single_steps(ros_domain):
         assert simulation.steps[0] == 6
 
 
+def test_a_reset_leaves_one_subscriber_of_each_robot(ros_domain):
+    with Simulation(cars(2, clock={})) as simulation:
+        link = link_of(simulation)
+        n_readers, n_topics = len(link._readers), len(link._topics)
+        for _ in range(5):
+            simulation.step()
+            simulation.reset([0])
+        assert (len(link._readers), len(link._topics)) == (n_readers, n_topics)
+        simulation.step()
+
+
 def test_stamps_are_the_wall_clocks_without_simulated_time(ros_domain):
     with Simulation(cars(1, has_clock=False)) as simulation:
         link = link_of(simulation)

@@ -55,6 +55,10 @@ class CommandedByROS(Autonomy):
         """
         return RobotTopics(self.link_type.of(row.shared), self.namespace(row), self.publishes)
 
+    def close_one(self, robot: RobotTopics) -> None:
+        """Take no more commands."""
+        robot.link.unsubscribe(robot.inbox.subscriber)
+
     def await_peers(self, g: GroupView) -> None:
         """Wait for nodes before the first step; only `ROSAutonomy` does, in lockstep."""
 
