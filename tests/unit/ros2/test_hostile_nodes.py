@@ -181,18 +181,19 @@ def test_sockets_take_packets_of_this_machine_only(ros_domain):
 
 
 def test_sockets_of_others_are_left_alone(ros_domain):
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
-        other.bind(("", 0))
-        socket.setdefaulttimeout(60.0)  # as rospy does; a new socket of Python then does not block
-        try:
+    before = socket.getdefaulttimeout()
+    try:
+        socket.setdefaulttimeout(None)
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+            other.bind(("", 0))
+            socket.setdefaulttimeout(60.0)  # as rospy does; a new socket of Python then does not block
             with Simulation(cars()):
-                assert os.get_blocking(other.fileno())
-                ports = {one.laddr.port: one.fd for one in psutil.Process().net_connections("udp")}
-                (number,) = (fd for port, fd in ports.items() if port == first_port(ros_domain) + 10)
-                assert os.get_blocking(number)
-        finally:
-            socket.setdefaulttimeout(None)
-        assert other.getsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, 16) == b""
+                numbers = {one.laddr.port: one.fd for one in psutil.Process().net_connections("udp")}
+                assert os.get_blocking(numbers[first_port(ros_domain) + 10])
+            assert os.get_blocking(other.fileno())
+            assert other.getsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, 16) == b""
+    finally:
+        socket.setdefaulttimeout(before)
 
 
 def test_where_the_sockets_cannot_be_bound_the_error_says_so(ros_domain, monkeypatch):
