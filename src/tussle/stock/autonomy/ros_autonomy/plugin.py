@@ -1,4 +1,4 @@
-"""Robots that are driven by nodes of ROS 1."""
+"""Robots that are driven by nodes of ROS 1, and what those of ROS 2 share with them."""
 
 from __future__ import annotations
 
@@ -49,8 +49,8 @@ class CommandedByROS(Autonomy):
         """Subscribe to the commands.
 
         Raises:
-            MissingExtraError: rospy is not installed.
-            RosError: The master does not answer.
+            MissingExtraError: rospy or Cyclone DDS is not installed.
+            RosError: The master does not answer, or the domain cannot be joined.
             ParameterError: The namespace is no name of ROS.
         """
         return RobotTopics(self.link_type.of(row.shared), self.namespace(row), self.publishes)
@@ -60,10 +60,10 @@ class CommandedByROS(Autonomy):
         robot.link.unsubscribe(robot.inbox.subscriber)
 
     def await_peers(self, g: GroupView) -> None:
-        """Wait for nodes before the first step; only `ROSAutonomy` does, in lockstep."""
+        """Wait for nodes before the first step; only robots that publish do, in lockstep."""
 
     def publish_state(self, g: GroupView) -> list[Any]:
-        """Publish the states of all robots, and return their transforms; only `ROSAutonomy` does."""
+        """Publish the states of all robots, and return their transforms; only robots that publish do."""
         return []
 
     def spawn(self, g: GroupView, rows: np.ndarray) -> None:
@@ -93,7 +93,7 @@ class CommandedByROS(Autonomy):
         self.velocity[:] = quat_rotate(quat_from_euler(0.0 * g.yaw, 0.0 * g.yaw, g.yaw), commands[:3])
 
     def _await_commands(self, g: GroupView) -> None:
-        """Wait for the commands of this step; only `ROSAutonomy` does, in lockstep."""
+        """Wait for the commands of this step; only robots that publish do, in lockstep."""
 
 
 class PublishedByROS(CommandedByROS):
