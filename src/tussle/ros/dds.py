@@ -12,6 +12,8 @@ from tussle.ros.domain import opened_participant
 from tussle.ros.messages import (
     TYPE_HASHES,
     clock_bytes,
+    compass_bytes,
+    imu_bytes,
     message_type,
     odometry_bytes,
     scan_bytes,
@@ -22,8 +24,8 @@ from tussle.ros.steps import NANO, NodeLink, Transform
 
 QUEUE = 10
 """Messages that wait for a slow subscriber; older ones are dropped, so that it does not delay the simulation."""
-TF_QUEUE, SCAN_QUEUE = 100, 5
-"""The same for tf, as of tf2_ros, and for scans, as of the profile for sensor data."""
+TF_QUEUE, SENSOR_QUEUE = 100, 5
+"""The same for tf, as of tf2_ros, and for sensors, as of the profile for sensor data."""
 MOST_SECONDS = 0.01
 """Longest time for which a subscriber that has stopped can delay a message [s]."""
 
@@ -124,7 +126,7 @@ class Ros2Link(NodeLink):
 
     def scan(self, topic: str, frame: str) -> Callable[[Any, Any, np.ndarray], None]:
         """Announce scans; returns publish(stamp, about, ranges)."""
-        writer = self.advertise(topic, "sensor_msgs/LaserScan", SCAN_QUEUE, is_reliable=False)
+        writer = self.advertise(topic, "sensor_msgs/LaserScan", SENSOR_QUEUE, is_reliable=False)
         pack = scan_bytes(frame)
         return lambda stamp, about, ranges: writer.publish(pack(stamp, about, ranges))
 
@@ -132,6 +134,20 @@ class Ros2Link(NodeLink):
         """Announce tf; returns publish(transforms)."""
         writer = self.advertise("tf", "tf2_msgs/TFMessage", TF_QUEUE)
         return lambda transforms: writer.publish(transforms_bytes(transforms))
+
+    def imu(self, topic: str, frame: str) -> Callable[[Any, list[float], list[float], list[float]], None]:
+        """Announce imu; returns publish(stamp, quat, rate, force)."""
+        writer, pack = (
+            self.advertise(topic, "sensor_msgs/Imu", SENSOR_QUEUE, is_reliable=False),
+            imu_bytes(frame),
+        )
+        return lambda stamp, quat, rate, force: writer.publish(pack(stamp, quat, rate, force))
+
+    def compass(self, topic: str, frame: str) -> Callable[[Any, list[float]], None]:
+        """Announce compass; returns publish(stamp, field)."""
+        writer = self.advertise(topic, "sensor_msgs/MagneticField", SENSOR_QUEUE, is_reliable=False)
+        pack = compass_bytes(frame)
+        return lambda stamp, field: writer.publish(pack(stamp, field))
 
     def clock(self) -> Callable[[Any], None]:
         """Announce clock; returns publish(stamp)."""

@@ -127,6 +127,34 @@ class RosLink(NodeLink):
             messages.append(message)
         self.publish("tf", self.ros.TFMessage(messages))
 
+    def imu(self, topic: str, frame: str) -> Callable[[Any, list[float], list[float], list[float]], None]:
+        """Announce imu; returns publish(stamp, quat, rate, force)."""
+        message = self.ros.Imu()
+        message.header.frame_id = frame
+        publisher = self.advertise(topic, self.ros.Imu)
+
+        def publish(stamp: Any, quat: list[float], rate: list[float], force: list[float]) -> None:
+            message.header.stamp = stamp
+            _turn(message.orientation, quat)
+            _set(message.angular_velocity, rate)
+            _set(message.linear_acceleration, force)
+            publisher.publish(message)
+
+        return publish
+
+    def compass(self, topic: str, frame: str) -> Callable[[Any, list[float]], None]:
+        """Announce compass; returns publish(stamp, field)."""
+        message = self.ros.MagneticField()
+        message.header.frame_id = frame
+        publisher = self.advertise(topic, self.ros.MagneticField)
+
+        def publish(stamp: Any, field: list[float]) -> None:
+            message.header.stamp = stamp
+            _set(message.magnetic_field, field)
+            publisher.publish(message)
+
+        return publish
+
     def clock(self) -> Callable[[Any], None]:
         """Announce clock; returns publish(stamp)."""
         publisher = self.advertise("clock", self.ros.Clock)

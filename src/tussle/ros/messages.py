@@ -129,6 +129,25 @@ def scan_bytes(frame: str) -> Callable[[Stamp, Any, np.ndarray], bytes]:
     return packed
 
 
+def imu_bytes(frame: str) -> Callable[[Stamp, Sequence[float], Sequence[float], Sequence[float]], bytes]:
+    """What packs sensor_msgs/Imu: pack(stamp, quat, rate, force)."""
+    text, name = _text(frame)
+    pack = struct.Struct(f"@2i{text}4d72x3d72x3d72x").pack
+
+    def packed(stamp: Stamp, quat: Sequence[float], rate: Sequence[float], force: Sequence[float]) -> bytes:
+        w, x, y, z = quat
+        return ENCAPSULATION + pack(*stamp, *name, x, y, z, w, *rate, *force)
+
+    return packed
+
+
+def compass_bytes(frame: str) -> Callable[[Stamp, Sequence[float]], bytes]:
+    """What packs sensor_msgs/MagneticField: pack(stamp, field)."""
+    text, name = _text(frame)
+    pack = struct.Struct(f"@2i{text}3d72x").pack
+    return lambda stamp, field: ENCAPSULATION + pack(*stamp, *name, *field)
+
+
 def clock_bytes(stamp: Stamp) -> bytes:
     """rosgraph_msgs/Clock."""
     return ENCAPSULATION + struct.pack("@2i", *stamp)

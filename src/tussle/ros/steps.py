@@ -140,6 +140,14 @@ class NodeLink(ABC):
         """Announce tf; returns publish(transforms)."""
 
     @abstractmethod
+    def imu(self, topic: str, frame: str) -> Callable[[Any, list[float], list[float], list[float]], None]:
+        """Announce imu; returns publish(stamp, quat, rate, force): attitude, rotation and specific force in the body frame."""
+
+    @abstractmethod
+    def compass(self, topic: str, frame: str) -> Callable[[Any, list[float]], None]:
+        """Announce compass; returns publish(stamp, field), a vector in the body frame."""
+
+    @abstractmethod
     def clock(self) -> Callable[[Any], None]:
         """Announce clock; returns publish(stamp)."""
 

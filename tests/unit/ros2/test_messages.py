@@ -13,6 +13,8 @@ from tussle.ros.messages import (
     DEFINITIONS,
     TYPE_HASHES,
     clock_bytes,
+    compass_bytes,
+    imu_bytes,
     message_type,
     odometry_bytes,
     scan_bytes,
@@ -88,6 +90,20 @@ def test_bytes_of_a_scan(store, frame, n):
     )  # fmt: skip
     packed = scan_bytes(frame)(STAMP, about, ranges)
     assert packed == bytes(store.serialize_cdr(message, "sensor_msgs/msg/LaserScan"))
+
+
+@pytest.mark.parametrize("frame", NAMES)
+def test_bytes_of_an_imu_and_a_compass(store, frame):
+    vector, zero = named(store, "geometry_msgs/Vector3"), np.zeros(9)
+    attitude = named(store, "geometry_msgs/Quaternion")(-0.5, 0.25, 0.75, 0.5)
+    imu = named(store, "sensor_msgs/Imu")(
+        header(store, frame), attitude, zero, vector(*STATE[7:10]), zero, vector(*STATE[10:]), zero
+    )
+    packed = imu_bytes(frame)(STAMP, STATE[3:7], STATE[7:10], STATE[10:])
+    assert packed == bytes(store.serialize_cdr(imu, "sensor_msgs/msg/Imu"))
+    field = named(store, "sensor_msgs/MagneticField")(header(store, frame), vector(*STATE[:3]), zero)
+    packed = compass_bytes(frame)(STAMP, STATE[:3])
+    assert packed == bytes(store.serialize_cdr(field, "sensor_msgs/msg/MagneticField"))
 
 
 def test_bytes_of_a_clock(store):

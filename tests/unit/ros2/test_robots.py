@@ -10,12 +10,26 @@ from contextlib import ExitStack
 
 import numpy as np
 import pytest
+from cyclonedds.core import Policy, Qos
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic
 from nodes import DT, cars, inbox_of, link_of, peer, started
 
 from tussle import Block, Mission, Simulation, stock
 from tussle.errors import PluginError
 from tussle.mission import read_mission
-from tussle.stock import RayTrace, ROS2Autonomy, SimpleCar, SingleIntegrator, Unicycle
+from tussle.ros.domain import opened_participant
+from tussle.ros.messages import message_type
+from tussle.stock import (
+    RayTrace,
+    ROS2Autonomy,
+    ROS2Compass,
+    ROS2IMUSensor,
+    SimpleCar,
+    SingleIntegrator,
+    Still,
+    Unicycle,
+)
 
 NANO = 1_000_000_000
 N_STEPS = 1000
@@ -151,6 +165,35 @@ def test_topics_pause_the_game_and_make_single_steps(ros_domain):
         assert simulation.steps[0] == 6
 
 
+def test_an_imu_and_a_compass_are_heard_with_the_quality_of_sensors(ros_domain):
+    typesys = pytest.importorskip("rosbags.typesys")
+    store = typesys.get_typestore(typesys.Stores.ROS2_JAZZY)
+    block = Block(
+        name="car", heading="30 deg", motion=Still(),
+        sensor=[ROS2IMUSensor(vehicle_name="tug"), ROS2Compass(vehicle_name="tug")],
+    )  # fmt: skip
+    quality = Qos(Policy.Reliability.BestEffort, Policy.History.KeepLast(1))
+    node, heard = opened_participant(), {}
+    readers = {
+        f"sensor_msgs/msg/{short}": DataReader(
+            node, Topic(node, f"rt/tug/{topic}", message_type(f"sensor_msgs/{short}")), qos=quality
+        )
+        for topic, short in (("imu", "Imu"), ("compass", "MagneticField"))
+    }
+    with Simulation(Mission(blocks=[block], dt=DT, end=1e6)) as simulation:
+        while len(heard) < 2:
+            simulation.step()
+            for name, reader in readers.items():
+                for one in reader.take(1):
+                    heard[name] = store.deserialize_cdr(one.data, name)
+    imu, compass = heard["sensor_msgs/msg/Imu"], heard["sensor_msgs/msg/MagneticField"]
+    q, force, field = imu.orientation, imu.linear_acceleration, compass.magnetic_field
+    assert [q.w, q.x, q.y, q.z] == pytest.approx([math.cos(math.pi / 12), 0.0, 0.0, math.sin(math.pi / 12)])
+    assert [force.x, force.y, force.z] == pytest.approx([0.0, 0.0, 9.80665])
+    assert [field.x, field.y, field.z] == pytest.approx([0.5, math.sqrt(0.75), 0.0])
+    assert imu.header.frame_id == compass.header.frame_id == "tug/base_link"
+
+
 def test_a_reset_leaves_one_subscriber_of_each_robot(ros_domain):
     with Simulation(cars(2, clock={})) as simulation:
         link = link_of(simulation)
@@ -185,7 +228,7 @@ def test_several_worlds_are_refused(ros_domain):
         Simulation(Mission(blocks=[block]), seeds=[1, 2])
 
 
-@pytest.mark.parametrize("name", ["ROS2Autonomy", "ROS2ClockServer"])
+@pytest.mark.parametrize("name", ["ROS2Autonomy", "ROS2ClockServer", "ROS2Compass", "ROS2IMUSensor"])
 def test_the_example_of_a_plugin_plays(ros_domain, name):
     loaded = read_mission(stock.examples()[name])
     assert loaded.notes == ()
