@@ -65,3 +65,21 @@ def roscore(tmp_path_factory):
         yield uri
         process.terminate()
         process.wait()
+
+
+@pytest.fixture(scope="session")
+def ros_domain():
+    """Number of a domain of ROS 2 that no other tests on this machine use; without Cyclone DDS, the test is skipped."""
+    pytest.importorskip("cyclonedds")
+    for domain in range(1, 101):  # the ports of higher ones are given to clients
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as claim:
+            try:
+                claim.bind(("127.0.0.1", 7400 + 250 * domain + 249))  # a port that no participant uses
+            except OSError:
+                continue
+            with pytest.MonkeyPatch.context() as patch:
+                patch.setenv("ROS_DOMAIN_ID", str(domain))
+                patch.delenv("CYCLONEDDS_URI", raising=False)
+                yield domain
+            return
+    pytest.fail("all domains are in use")

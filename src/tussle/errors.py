@@ -52,7 +52,7 @@ class MissingExtraError(TussleError, ImportError):
 
 
 class RosError(TussleError):
-    """The ROS master cannot be reached, or a node sent something that is not allowed."""
+    """The ROS master cannot be reached, the domain of ROS 2 cannot be joined, or a node sent something that is not allowed."""
 
 
 class ConformanceError(TussleError):

@@ -67,7 +67,7 @@ def test_plugin_meets_the_contract(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
 ) -> None:
     if "ROS" in name:
-        request.getfixturevalue("roscore")
+        request.getfixturevalue("ros_domain" if "ROS2" in name else "roscore")
     if name == "GraphInteraction":
         pytest.importorskip("networkx")
     if name == "TrajectoryRecordPlayback":

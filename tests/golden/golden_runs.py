@@ -27,8 +27,10 @@ SERVED = (
     "controller/ros_controllers", "interaction/dis", "interaction/grpc_command_string", "interaction/ros_clock_server",
     "interaction/ros_shape_viz", "sensor/ros_compass",
     "sensor/ros_altimeter", "sensor/ros_imu_sensor",
+    "autonomy/ros_autonomy/ros2", "interaction/ros_clock_server/ros2",
+    "sensor/ros_compass/ros2", "sensor/ros_imu_sensor/ros2",
 )  # fmt: skip
-"""Folders whose examples need a server; tests of their own play them."""
+"""Folders whose examples need a server or peers; tests of their own play them."""
 
 
 @cache

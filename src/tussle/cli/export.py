@@ -49,6 +49,7 @@ def export(options: ExportOptions) -> int:
         ("csv", "parquet"): exporter.write_tables,
         ("html",): exporter.write_html,
         ("mcap",): exporter.write_mcap,
+        ("rosbag2",): exporter.write_rosbag2,
         ("png", "mp4", "gif"): exporter.write_films,
     }
     try:
@@ -159,6 +160,16 @@ class _Exporter:
         for note in report.notes:
             say_note(note)
         _report(report.path, f"{report.n_frames:,} states, {sum(report.n_messages.values()):,} messages")
+
+    def write_rosbag2(self, files: Mapping[str, Path]) -> None:
+        from tussle.view.export.rosbag2 import write_rosbag2
+
+        recording = self.recording
+        with ProgressMeter("rosbag2", "states") as meter:
+            report = write_rosbag2(recording, files["rosbag2"], period=self._options.period, show=meter.show)
+        for note in report.notes:
+            say_note(note)
+        _report(report.path, f"{report.n_frames:,} states, {report.n_messages:,} messages")
 
     def write_films(self, files: Mapping[str, Path]) -> None:
         from tussle.view.export.film import write_film

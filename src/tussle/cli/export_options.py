@@ -17,6 +17,7 @@ DEFAULT_NAMES = {
     "gif": "film.gif",
     "png": "picture.png",
     "mcap": "run.mcap",
+    "rosbag2": "rosbag2",
     "csv": "states.csv",
     "parquet": "states.parquet",
 }
@@ -30,7 +31,7 @@ USED_BY = {
     **dict.fromkeys(("speed", "fps"), FILMS),
     "at": ("png",),
     "scale": (*IMAGES, "mcap"),
-    "period": ("html", "mcap"),
+    "period": ("html", "mcap", "rosbag2"),
 }  # fmt: skip
 """Outputs that use an option."""
 SPECIAL_NAMES = {"start": "--from", "stop": "--to"}
@@ -64,6 +65,7 @@ class ExportOptions(PluginOptions):
     gif: Annotated[Path | None, _output("gif", "A small animation.")] = None
     png: Annotated[Path | None, _output("png", "One image.")] = None
     mcap: Annotated[Path | None, _output("mcap", "A log for Foxglove.")] = None
+    rosbag2: Annotated[Path | None, _output("rosbag2", "A folder for ros2 bag.")] = None
     csv: Annotated[Path | None, _output("csv", "Tables of states and events.")] = None
     parquet: Annotated[Path | None, _output("parquet", "The same tables, compressed.")] = None
     world: Annotated[int | None, option("N", "World of a stack; by default 0, for tables all.", min=0)] = None
@@ -93,7 +95,7 @@ class ExportOptions(PluginOptions):
     scale: Annotated[float | None, option("X", "Factor on the size of the models.")] = None
     period: Annotated[
         float | None,
-        option("S", "Time between the states in --html and --mcap [s]; by default all states."),
+        option("S", "Time between the states in --html, --mcap and --rosbag2 [s]; by default all states."),
     ] = None
 
     def __post_init__(self) -> None:

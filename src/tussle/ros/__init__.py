@@ -1,1 +1,1 @@
-"""ROS 1: one node of rospy per process, and the topics of robots."""
+"""ROS 1 by one node of rospy per process, ROS 2 by Cyclone DDS, and the topics of robots, which both share."""

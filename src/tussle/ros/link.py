@@ -1,102 +1,43 @@
-"""Topics of one simulation on the node of this process."""
+"""Topics of one simulation on the ROS 1 node of this process."""
 
 from __future__ import annotations
 
 import threading
-import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from typing import Any
 
+import numpy as np
+
 from tussle.ros.node import MASTER_TIMEOUT, master_fault, master_uri, started_node
+from tussle.ros.steps import NodeLink, Transform
 
 QUEUE = 10
 """Messages that wait for a slow subscriber; older ones are dropped, so that it does not delay the simulation."""
 WATCH_PERIOD = 1.0  # [s] between two questions to the master
-NAP = 0.05  # [s] longest wait before Ctrl-C is noticed
-NANO = 1_000_000_000
 
 
-class StepGate:
-    """Pauses a simulation between two steps and lets single steps pass.
-
-    Attributes:
-        is_paused: Whether the simulation waits at the gate.
-    """
-
-    def __init__(self) -> None:
-        self.is_paused = False
-        self._changed = threading.Condition()
-        self._allowed = self._arrived = 0
-        self._is_waiting = self._is_closed = False
-
-    def set_paused(self, is_paused: bool) -> None:
-        """Pause or continue."""
-        with self._changed:
-            self.is_paused, self._allowed = is_paused, 0
-            self._changed.notify_all()
-
-    def step(self) -> bool:
-        """Let one step pass and return after it; false if the simulation is not paused, or has ended."""
-        with self._changed:
-            if not self.is_paused or self._is_closed:
-                return False
-            self._allowed += 1
-            goal = self._arrived + self._allowed + (not self._is_waiting)
-            self._changed.notify_all()
-            self._changed.wait_for(lambda: self._arrived >= goal or self._is_closed or not self.is_paused)
-            return self._arrived >= goal
-
-    def enter(self, is_interrupted: Callable[[], bool]) -> None:
-        """Wait while paused, until a step is allowed or the user interrupts; called once per step."""
-        with self._changed:
-            self._arrived += 1
-            self._is_waiting = True
-            self._changed.notify_all()
-            while self.is_paused and not (self._allowed or self._is_closed or is_interrupted()):
-                self._changed.wait(NAP)
-            self._is_waiting = False
-            self._allowed = max(self._allowed - 1, 0)
-
-    def close(self) -> None:
-        """Let all pass from now on."""
-        with self._changed:
-            self._is_closed = True
-            self._changed.notify_all()
-
-
-class RosLink:
-    """The topics, services and parameters of one simulation.
+class RosLink(NodeLink):
+    """The topics, services and parameters of one simulation in ROS 1.
 
     Attributes:
         ros: rospy and message types.
-        groups: Plugins whose `await_peers(g)` and `publish_state(g)` are called at the beginning of each step, and their views.
-        gate: Where the simulation waits between steps.
-        news: Notified when a command has come.
-        lost: Why the master is gone; empty while it answers.
-        is_sim_time: Whether stamps are simulated time; otherwise they are the wall clock's.
 
     Raises:
         MissingExtraError: rospy is not installed.
         RosError: The master does not answer.
     """
 
+    system = "ROS 1"
+
     def __init__(self) -> None:
+        super().__init__()
         self.ros = started_node()
-        self.groups: dict[int, tuple[Any, Any]] = {}
-        self.gate, self.news, self.lost = StepGate(), threading.Condition(), ""
         self.is_sim_time = bool(self.ros.rospy.get_param("/use_sim_time", False))
-        self._topics: dict[str, Any] = {}
         self._open: list[Callable[[], Any]] = []
-        self._step = -1
+        self._frames: dict[str, Any] = {}  # child -> its transform
         self._is_over = threading.Event()
         self._watch = threading.Thread(target=self._watch_master, name="ROS master", daemon=True)
         self._watch.start()
-
-    @classmethod
-    def of(cls, share: Callable[..., Any]) -> RosLink:
-        """The link of a simulation; `share` is that of a context or of the row of a handle."""
-        link: RosLink = share("ROS 1", cls)
-        return link
 
     def publish(self, topic: str, message: Any) -> None:
         """Publish a message; its topic is advertised before the first one, or by `advertise`."""
@@ -130,42 +71,109 @@ class RosLink:
         self.ros.rospy.set_param("/use_sim_time", True)
         self._open.append(lambda: self.ros.rospy.set_param("/use_sim_time", before))
 
-    def stamp(self, t: float) -> Any:
-        """Time of ROS for a simulated time [s]."""
-        nanoseconds = round(t * NANO) if self.is_sim_time else time.time_ns()
-        return self.ros.Time(*divmod(max(nanoseconds, 0), NANO))
+    def time_of(self, seconds: int, nanoseconds: int) -> Any:
+        """Return a time as messages hold it."""
+        return self.ros.Time(seconds, nanoseconds)
 
-    def begin_step(self, g: Any) -> None:
-        """At the first call in a step: publish the states of all robots, then wait while paused."""
-        step = int(g.step_count[0])
-        if step != self._step:
-            self._step = step
-            transforms: list[Any] = []
-            living = [(plugin, view) for plugin, view in self.groups.values() if view.n]
-            for plugin, view in living:
-                plugin.await_peers(view)
-            for plugin, view in living:
-                transforms += plugin.publish_state(view)
-            if transforms:
-                self.publish("tf", self.ros.TFMessage(transforms))
-            self.gate.enter(g.context.is_interrupted)
+    def odometry(self, topic: str, frame: str, child: str) -> Callable[[Any, list[float]], None]:
+        """Announce odometry; returns publish(stamp, state)."""
+        message = self.ros.Odometry(child_frame_id=child)
+        message.header.frame_id = frame
+        publisher = self.advertise(topic, self.ros.Odometry)
 
-    def has_reader(self, topics: Iterable[str]) -> bool:
-        """Return True if somebody has subscribed to one of these topics."""
-        return any(self._topics[topic].get_num_connections() for topic in topics)
+        def publish(stamp: Any, state: list[float]) -> None:
+            message.header.stamp = stamp
+            _set(message.pose.pose.position, state[:3])
+            _turn(message.pose.pose.orientation, state[3:7])
+            _set(message.twist.twist.linear, state[7:10])
+            _set(message.twist.twist.angular, state[10:])
+            publisher.publish(message)
 
-    def wait_for(
-        self, is_there: Callable[[], bool], timeout: float, is_interrupted: Callable[[], bool]
-    ) -> bool:
-        """Wait for a command until is_there(); false after `timeout` [s], when interrupted, or without a master."""
-        limit = time.monotonic() + timeout
-        with self.news:
-            while not is_there():
-                left = limit - time.monotonic()
-                if left <= 0.0 or self.lost or is_interrupted():
-                    return False
-                self.news.wait(min(left, NAP))
-        return True
+        return publish
+
+    def scan(self, topic: str, frame: str) -> Callable[[Any, Any, np.ndarray], None]:
+        """Announce scans; returns publish(stamp, about, ranges)."""
+        scan = self.ros.LaserScan()
+        scan.header.frame_id = frame
+        publisher = self.advertise(topic, self.ros.LaserScan)
+
+        def publish(stamp: Any, about: Any, ranges: np.ndarray) -> None:
+            scan.header.stamp = stamp
+            scan.angle_increment = about.angle_increment
+            scan.angle_min = -0.5 * about.angle_increment * (len(ranges) - 1)
+            scan.angle_max = -scan.angle_min
+            scan.scan_time = about.scan_time
+            scan.range_min, scan.range_max = about.range_min, about.range_max
+            scan.ranges = ranges.tolist()
+            publisher.publish(scan)
+
+        return publish
+
+    def transforms(self) -> Callable[[list[Transform]], None]:
+        """Announce tf; returns publish(transforms)."""
+        self.advertise("tf", self.ros.TFMessage)
+        return self._publish_transforms
+
+    def _publish_transforms(self, transforms: list[Transform]) -> None:
+        messages = []
+        for parent, child, stamp, pose in transforms:
+            message = self._frames.get(child)
+            if message is None:
+                message = self._frames[child] = self.ros.TransformStamped(child_frame_id=child)
+                message.header.frame_id = parent
+            message.header.stamp = stamp
+            _set(message.transform.translation, pose[:3])
+            _turn(message.transform.rotation, pose[3:])
+            messages.append(message)
+        self.publish("tf", self.ros.TFMessage(messages))
+
+    def imu(self, topic: str, frame: str) -> Callable[[Any, list[float], list[float], list[float]], None]:
+        """Announce imu; returns publish(stamp, quat, rate, force)."""
+        message = self.ros.Imu()
+        message.header.frame_id = frame
+        publisher = self.advertise(topic, self.ros.Imu)
+
+        def publish(stamp: Any, quat: list[float], rate: list[float], force: list[float]) -> None:
+            message.header.stamp = stamp
+            _turn(message.orientation, quat)
+            _set(message.angular_velocity, rate)
+            _set(message.linear_acceleration, force)
+            publisher.publish(message)
+
+        return publish
+
+    def compass(self, topic: str, frame: str) -> Callable[[Any, list[float]], None]:
+        """Announce compass; returns publish(stamp, field)."""
+        message = self.ros.MagneticField()
+        message.header.frame_id = frame
+        publisher = self.advertise(topic, self.ros.MagneticField)
+
+        def publish(stamp: Any, field: list[float]) -> None:
+            message.header.stamp = stamp
+            _set(message.magnetic_field, field)
+            publisher.publish(message)
+
+        return publish
+
+    def clock(self) -> Callable[[Any], None]:
+        """Announce clock; returns publish(stamp)."""
+        publisher = self.advertise("clock", self.ros.Clock)
+        return lambda stamp: publisher.publish(self.ros.Clock(stamp))
+
+    def twist(self, topic: str, take: Callable[[tuple[float, ...]], None]) -> Any:
+        """Call take(values), in another thread, for each command. Returns the subscriber."""
+
+        def hear(message: Any) -> None:
+            linear, angular = message.linear, message.angular
+            take((linear.x, linear.y, linear.z, angular.x, angular.y, angular.z))
+
+        return self.subscribe(topic, self.ros.Twist, hear, 1)
+
+    def unsubscribe(self, subscriber: Any) -> None:
+        """Do nothing: all subscriptions are withdrawn at the end, if the master is still there."""
+
+    def collect(self) -> None:
+        """Do nothing: messages come in other threads."""
 
     def end(self) -> None:
         """Withdraw topics, services and parameters; called when the simulation is closed."""
@@ -181,3 +189,11 @@ class RosLink:
             if fault := master_fault():
                 self.lost = f"the ROS master at {master_uri()} is gone ({fault})"
                 return
+
+
+def _set(vector: Any, values: Sequence[float]) -> None:
+    vector.x, vector.y, vector.z = values
+
+
+def _turn(quaternion: Any, values: Sequence[float]) -> None:
+    quaternion.w, quaternion.x, quaternion.y, quaternion.z = values

@@ -59,6 +59,14 @@ def test_all_outputs_at_once_lie_in_the_run(process, played):
         assert make_reader(file).get_summary().statistics.message_count > 60
 
 
+def test_a_bag_is_a_folder_of_the_run(tussle, played):
+    before = {p.name for p in played.iterdir()}
+    said = tussle("export", "played", "--rosbag2", "--period", "0.5")
+    assert {p.name for p in played.iterdir()} - before == {"rosbag2"}
+    assert {p.name for p in (played / "rosbag2").iterdir()} == {"rosbag2.mcap", "metadata.yaml"}
+    assert re.fullmatch(r"played/rosbag2/rosbag2.mcap: 7 states, \d+ messages, [\d.]+ k?B\n", said.stdout)
+
+
 def test_files_can_be_named(tussle, played, folder):
     said = tussle("export", "played", "--csv", "a.csv", "--png", "b.png", "--size", "96x64", "--at", "1.5 s")
     assert [line.split(":")[0] for line in said.stdout.splitlines()] == ["a.csv", "a.events.csv", "b.png"]
@@ -102,11 +110,11 @@ def test_a_run_that_was_killed_is_exported_as_far_as_it_goes(tussle, played, fol
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ((), "--html, --mp4, --gif, --png, --mcap, --csv, --parquet"),
+        ((), "--html, --mp4, --gif, --png, --mcap, --rosbag2, --csv, --parquet"),
         (("--csv", "--camera", "top"), "--camera is allowed with --mp4 or --gif or --png only"),
         (("--png", "--fps", "30"), "--fps is allowed with --mp4 or --gif only"),
         (("--mp4", "--at", "1"), "--at is allowed with --png only"),
-        (("--png", "--period", "1"), "--period is allowed with --html or --mcap only"),
+        (("--png", "--period", "1"), "--period is allowed with --html or --mcap or --rosbag2 only"),
         (("--png", "--camera", "folow"), "did you mean 'follow'?"),
         (("--png", "--camera", "top", "--follow", "3"), "follow = 3 means nothing to camera = 'top'"),
         (("--png", "--size", "big"), "--size 'big' does not have the form WIDTHxHEIGHT"),

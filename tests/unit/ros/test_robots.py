@@ -23,8 +23,9 @@ from tussle.errors import MissingExtraError, ParameterError, PluginError, RosErr
 from tussle.mission import read_mission
 from tussle.ros import link as ros_link
 from tussle.ros.altitude import altitude_type
-from tussle.ros.link import RosLink, StepGate
+from tussle.ros.link import RosLink
 from tussle.ros.node import load_rospy
+from tussle.ros.steps import StepGate
 from tussle.scene import FlatGround, Origin, Scene
 from tussle.stock import (
     External,

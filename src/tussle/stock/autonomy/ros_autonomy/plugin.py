@@ -1,4 +1,4 @@
-"""Robots that are driven by nodes of ROS 1."""
+"""Robots that are driven by nodes of ROS 1, and what those of ROS 2 share with them."""
 
 from __future__ import annotations
 
@@ -11,12 +11,15 @@ from tussle.api import Autonomy, GroupView, Handle, Input, Output, Param
 from tussle.numeric.quaternion import quat_from_euler, quat_rotate, quat_rotate_inverse
 from tussle.ros.link import RosLink
 from tussle.ros.robot import RobotTopics
+from tussle.ros.steps import NodeLink
 
 
 class CommandedByROS(Autonomy):
-    """Columns and methods of both plugins; abstract."""
+    """Columns and methods of robots that follow cmd_vel; abstract."""
 
     grade = "external"
+    link_type: ClassVar[type[NodeLink]] = RosLink
+    """What connects it to ROS."""
     publishes: ClassVar[bool] = False
     """Whether it publishes the states of robots."""
 
@@ -46,17 +49,21 @@ class CommandedByROS(Autonomy):
         """Subscribe to the commands.
 
         Raises:
-            MissingExtraError: rospy is not installed.
-            RosError: The master does not answer.
+            MissingExtraError: rospy or Cyclone DDS is not installed.
+            RosError: The master does not answer, or the domain cannot be joined.
             ParameterError: The namespace is no name of ROS.
         """
-        return RobotTopics(RosLink.of(row.shared), self.namespace(row), self.publishes)
+        return RobotTopics(self.link_type.of(row.shared), self.namespace(row), self.publishes)
+
+    def close_one(self, robot: RobotTopics) -> None:
+        """Take no more commands."""
+        robot.link.unsubscribe(robot.inbox.subscriber)
 
     def await_peers(self, g: GroupView) -> None:
-        """Wait for nodes before the first step; only `ROSAutonomy` does, in lockstep."""
+        """Wait for nodes before the first step; only robots that publish do, in lockstep."""
 
     def publish_state(self, g: GroupView) -> list[Any]:
-        """Publish the states of all robots, and return their transforms; only `ROSAutonomy` does."""
+        """Publish the states of all robots, and return their transforms; only robots that publish do."""
         return []
 
     def spawn(self, g: GroupView, rows: np.ndarray) -> None:
@@ -72,7 +79,7 @@ class CommandedByROS(Autonomy):
         robots: Any = self.robot
         if not g.n:  # no master
             return
-        link: RosLink = robots[0].link
+        link: NodeLink = robots[0].link
         link.begin_step(g)
         self._await_commands(g)
         commands = np.empty((6, g.n))
@@ -86,24 +93,11 @@ class CommandedByROS(Autonomy):
         self.velocity[:] = quat_rotate(quat_from_euler(0.0 * g.yaw, 0.0 * g.yaw, g.yaw), commands[:3])
 
     def _await_commands(self, g: GroupView) -> None:
-        """Wait for the commands of this step; only `ROSAutonomy` does, in lockstep."""
+        """Wait for the commands of this step; only robots that publish do, in lockstep."""
 
 
-class ROSAutonomy(CommandedByROS):
-    """Connects a robot to ROS 1 as Stage does: cmd_vel moves it; odom, base_pose_ground_truth, base_scan and tf are published.
-
-    Its topics are in the namespace `namespace_prefix` followed by its id, such as entity1/cmd_vel, and so are its frames: odom,
-    base_footprint, base_link, base_laser_link. At the beginning of each step it publishes the states at that time and takes the newest
-    command; a robot without any stands still. odom is its belief, base_pose_ground_truth its true state, both relative to the
-    world frame's origin. base_scan is the scan of a `RayTrace` with one elevation. Stamps are simulated time with
-    `ROSClockServer` or the ROS parameter use_sim_time, and the wall clock's otherwise. [ROS](../ros.md) tells more.
-
-    With `lockstep`, each step waits until each robot has received a command after its odom of that step.
-
-    Raises:
-        MissingExtraError: rospy is not installed.
-        RosError: No ROS master answers.
-    """
+class PublishedByROS(CommandedByROS):
+    """Columns and methods of robots that publish their states; abstract."""
 
     publishes = True
     namespace_prefix = Param("entity", doc="Beginning of the namespace; the id follows.")
@@ -122,23 +116,22 @@ class ROSAutonomy(CommandedByROS):
     def publish_state(self, g: GroupView) -> list[Any]:
         """Publish the states of all robots, and return their transforms."""
         robots: Any = self.robot
-        link: RosLink = robots[0].link
+        link: NodeLink = robots[0].link
         truth, rows = g.bodies, slice(g.first, g.last)
         true = [np.asarray(getattr(truth, name)[:, rows]) for name in ("pos", "quat", "vel", "omega")]
-        states = _body_states(g.pos, g.quat, g.vel, true[3]), _body_states(*true)
+        believed, actual = _body_states(g.pos, g.quat, g.vel, true[3]), _body_states(*true)
         stamp = link.stamp(float(g.t[0]))
         pattern = g.call("scan_pattern") if "scan_pattern" in g.services else None
         transforms: list[Any] = []
         for row, robot in enumerate(robots):
             robot.n_before = robot.inbox.n_received  # before publishing: the answer may be quick
-            for topic, state in zip(("odom", "base_pose_ground_truth"), states, strict=True):
-                robot.publish_odometry(topic, state[:, row], stamp)
+            robot.publish_odometry(stamp, believed[row], actual[row])
             laser = None
             if pattern is not None:
                 about = pattern(row)
                 laser = about.pos, about.quat
                 self._publish_scan(g, row, robot, about)
-            transforms += robot.transforms(states[0][:, row], stamp, laser)
+            transforms += robot.transforms(believed[row], stamp, laser)
         return transforms
 
     def _publish_scan(self, g: GroupView, row: int, robot: RobotTopics, about: Any) -> None:
@@ -158,9 +151,10 @@ class ROSAutonomy(CommandedByROS):
         """In lockstep, before the first step: wait until each robot has somebody who hears of its state and can answer."""
         robots: Any = self.robot
         if self.lockstep and not all(robot.inbox.n_received for robot in robots):
-            self._await(
-                g, RobotTopics.has_peer, "nobody has subscribed to /{0}/odom and publishes /{0}/cmd_vel"
-            )
+            why = "nobody has subscribed to /{0}/odom and publishes /{0}/cmd_vel"
+            self._await(g, RobotTopics.has_peer, why)
+            link: NodeLink = robots[0].link
+            link.wait_for(lambda: False, link.settling_time, g.context.is_interrupted)
 
     def _await_commands(self, g: GroupView) -> None:
         def has_news(robot: RobotTopics) -> bool:
@@ -180,6 +174,23 @@ class ROSAutonomy(CommandedByROS):
                     g.fail(row, f"{why.format(robot.namespace)} {limit}")
 
 
+class ROSAutonomy(PublishedByROS):
+    """Connects a robot to ROS 1 as Stage does: cmd_vel moves it; odom, base_pose_ground_truth, base_scan and tf are published.
+
+    Its topics are in the namespace `namespace_prefix` followed by its id, such as entity1/cmd_vel, and so are its frames: odom,
+    base_footprint, base_link, base_laser_link. At the beginning of each step it publishes the states at that time and takes the newest
+    command; a robot without any stands still. odom is its belief, base_pose_ground_truth its true state, both relative to the
+    world frame's origin. base_scan is the scan of a `RayTrace` with one elevation. Stamps are simulated time with
+    `ROSClockServer` or the ROS parameter use_sim_time, and the wall clock's otherwise. [ROS](../ros.md) tells more.
+
+    With `lockstep`, each step waits until each robot has received a command after its odom of that step.
+
+    Raises:
+        MissingExtraError: rospy is not installed.
+        RosError: No ROS master answers.
+    """
+
+
 class ROSControl(CommandedByROS):
     """Lets cmd_vel of ROS 1 move a robot, and publishes nothing; see `ROSAutonomy`.
 
@@ -197,6 +208,8 @@ class ROSControl(CommandedByROS):
         return f"{row.plugin.values['ros_namespace_prefix']}{row.id}"
 
 
-def _body_states(pos: np.ndarray, quat: np.ndarray, vel: np.ndarray, omega: np.ndarray) -> np.ndarray:
-    """Position, attitude, and both velocities turned into the body frame, (13, n)."""
-    return np.concatenate([pos, quat, quat_rotate_inverse(quat, vel), quat_rotate_inverse(quat, omega)])
+def _body_states(pos: np.ndarray, quat: np.ndarray, vel: np.ndarray, omega: np.ndarray) -> list[list[float]]:
+    """Position, attitude, and both velocities turned into the body frame: 13 numbers of each row."""
+    turned = quat_rotate_inverse(quat, vel), quat_rotate_inverse(quat, omega)
+    states: list[list[float]] = np.concatenate([pos, quat, *turned]).T.tolist()
+    return states

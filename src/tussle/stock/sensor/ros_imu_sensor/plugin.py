@@ -1,8 +1,9 @@
-"""Specific force and rotation for nodes of ROS 1."""
+"""Specific force and rotation for nodes of ROS 1, and what the sensor of ROS 2 shares with it."""
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from tussle.api import GroupView, Handle, Param, Sensor, State
 from tussle.numeric.quaternion import quat_rotate_inverse
 from tussle.ros.link import RosLink
 from tussle.ros.node import checked_namespace
+from tussle.ros.steps import NodeLink
 
 GRAVITY = 9.80665  # [m/s^2], standard acceleration of gravity (CGPM 1901)
 
@@ -17,27 +19,16 @@ GRAVITY = 9.80665  # [m/s^2], standard acceleration of gravity (CGPM 1901)
 class ImuTopic(NamedTuple):
     """Where the measurements of an entity go."""
 
-    link: RosLink
-    namespace: str
-    message: Any
+    link: NodeLink
+    publish: Callable[[Any, list[float], list[float], list[float]], None]
 
 
-class ROSIMUSensor(Sensor):
-    """Publishes specific force, angular velocity and attitude on imu (sensor_msgs/Imu), in the robot's namespace.
-
-    Specific force is the mean acceleration since the last measurement less gravity, and both vectors are in the body frame; a body at
-    rest measures 9.80665 m/s^2 upward. Errors: a constant bias of each axis, drawn at birth, and white noise. The attitude is that of
-    the body in the world frame, without errors.
-
-    The existing system publishes velocity and angle increments with the rotation of the Earth in fields of accelerations and rates,
-    without errors.
-
-    Raises:
-        MissingExtraError: rospy is not installed.
-        RosError: No ROS master answers.
-    """
+class ImuByROS(Sensor):
+    """Columns and methods of inertial sensors; abstract."""
 
     grade = "external"
+    link_type: ClassVar[type[NodeLink]] = RosLink
+    """What connects it to ROS."""
 
     vehicle_name = Param("none", doc="Namespace; none for prefix and id.")
     ros_namespace_prefix = Param("robot", doc="Beginning of the namespace; the id follows.")
@@ -55,17 +46,14 @@ class ROSIMUSensor(Sensor):
         """Announce the topic.
 
         Raises:
-            MissingExtraError: rospy is not installed.
-            RosError: The master does not answer.
+            MissingExtraError: rospy or Cyclone DDS is not installed.
+            RosError: The master does not answer, or the domain cannot be joined.
             ParameterError: The namespace is no name of ROS.
         """
-        link, own = RosLink.of(row.shared), row.plugin.values
+        link, own = self.link_type.of(row.shared), row.plugin.values
         given = own["vehicle_name"]
         name = checked_namespace(f"{own['ros_namespace_prefix']}{row.id}" if given == "none" else given)
-        link.advertise(f"{name}/imu", link.ros.Imu)
-        message = link.ros.Imu()
-        message.header.frame_id = f"{name}/base_link"
-        return ImuTopic(link, name, message)
+        return ImuTopic(link, link.imu(f"{name}/imu", f"{name}/base_link"))
 
     def spawn(self, g: GroupView, rows: np.ndarray) -> None:
         """Draw the biases."""
@@ -85,12 +73,24 @@ class ROSIMUSensor(Sensor):
         )
         rate = quat_rotate_inverse(g.quat, g.omega) + self.bias[3:] + self.rate_noise * noise[3:]
         self.last_vel[:] = g.vel
-        for row, (link, name, message) in enumerate(topics):
+        for row, (link, publish) in enumerate(topics):
             if link.lost:
                 g.fail(row, link.lost)
-            message.header.stamp = link.stamp(float(g.t[row]))
-            q, a, w = message.orientation, message.linear_acceleration, message.angular_velocity
-            q.w, q.x, q.y, q.z = g.quat[:, row].tolist()
-            a.x, a.y, a.z = force[:, row].tolist()
-            w.x, w.y, w.z = rate[:, row].tolist()
-            link.publish(f"{name}/imu", message)
+            measured = g.quat[:, row].tolist(), rate[:, row].tolist(), force[:, row].tolist()
+            publish(link.stamp(float(g.t[row])), *measured)
+
+
+class ROSIMUSensor(ImuByROS):
+    """Publishes specific force, angular velocity and attitude on imu (sensor_msgs/Imu), in the robot's namespace.
+
+    Specific force is the mean acceleration since the last measurement less gravity, and both vectors are in the body frame; a body at
+    rest measures 9.80665 m/s^2 upward. Errors: a constant bias of each axis, drawn at birth, and white noise. The attitude is that of
+    the body in the world frame, without errors.
+
+    The existing system publishes velocity and angle increments with the rotation of the Earth in fields of accelerations and rates,
+    without errors.
+
+    Raises:
+        MissingExtraError: rospy is not installed.
+        RosError: No ROS master answers.
+    """

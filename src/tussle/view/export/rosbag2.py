@@ -1,0 +1,149 @@
+"""A run as a rosbag2: the topics of `ROS2Autonomy`, which `ros2 bag play` publishes."""
+
+from __future__ import annotations
+
+import math
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from tussle.errors import MissingExtraError, ViewError
+from tussle.numeric.quaternion import quat_rotate_inverse
+from tussle.ros.messages import clock_bytes, odometry_bytes, transforms_bytes
+from tussle.ros.robot import AT_ORIGIN, FRAMES
+from tussle.ros.steps import NANO, Transform
+from tussle.view.export.whole_file import unwritable
+from tussle.view.frame import Frame
+from tussle.view.page.recorded import kept_frames
+from tussle.view.recording import Recording
+
+VERSION: Literal[8] = 8
+"""Of the format: the oldest that rosbags writes."""
+MAX_TIME = 2.0**31
+"""Stamps of ROS are less [s]."""
+METADATA = "metadata.yaml"
+
+
+@dataclass
+class BagReport:
+    """A bag that was written.
+
+    Attributes:
+        path: Its file of messages.
+        n_frames: States in it.
+        n_messages: Messages in it.
+        notes: What the user should know, one line each.
+    """
+
+    path: Path
+    n_frames: int = 0
+    n_messages: int = 0
+    notes: list[str] = field(default_factory=list)
+
+
+def write_rosbag2(
+    recording: Recording,
+    path: str | Path,
+    *,
+    period: float | None = None,
+    prefix: str = "entity",
+    show: Callable[[int, int], None] | None = None,
+) -> BagReport:
+    """Write a run, complete or not, as a folder of rosbag2 with an MCAP file.
+
+    Topics: /clock, /tf, and base_pose_ground_truth of each entity. Angular velocities are not recorded, and 0.
+
+    Args:
+        recording: The run.
+        path: The folder; an existing bag is replaced.
+        period: Time between states that are written [s]; None writes all.
+        prefix: Beginning of the namespaces; the id follows.
+        show: Called after each state with the numbers of states written and to write.
+
+    Raises:
+        ViewError: There is nothing to write, the bag cannot be written, or a time does not fit.
+        MissingExtraError: rosbags is not installed.
+    """
+    try:
+        from rosbags.rosbag2 import StoragePlugin, Writer
+    except ImportError:
+        raise MissingExtraError(
+            "rosbag2 needs rosbags, which is not installed: pip install 'tussle[ros2]'"
+        ) from None
+    target, kept = Path(path), kept_frames(recording.t, period)
+    if not len(kept):
+        raise ViewError(f"{recording.path}: the run holds no states, so there is nothing to write")
+    if target.exists() and not (target / METADATA).is_file():
+        raise unwritable(target, "it exists and is no rosbag2")
+    report = BagReport(target / f"{target.name}.mcap", len(kept))
+    shift = max(0, -math.floor(float(recording.t[0])))
+    if shift:
+        report.notes.append(f"t = 0 is {shift} s in the bag, since stamps of ROS are not negative")
+    if float(recording.t[-1]) + shift >= MAX_TIME:
+        raise ViewError(f"{recording.path}: {recording.t[-1]:g} s is no stamp of ROS, which takes 68 years")
+    part = target.with_name(f".{target.name}.part")
+    shutil.rmtree(part, ignore_errors=True)
+    try:
+        with Writer(part / target.name, version=VERSION, storage_plugin=StoragePlugin.MCAP) as writer:
+            bag = _Bag(writer, prefix)
+            for n, i in enumerate(kept, 1):
+                bag.put(recording.frame(int(i)), shift)
+                if show is not None:
+                    show(n, len(kept))
+        shutil.rmtree(target, ignore_errors=True)
+        (part / target.name).replace(target)
+    except OSError as error:
+        raise unwritable(target, error) from error
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+    report.n_messages = bag.n_messages
+    return report
+
+
+class _Bag:
+    """A bag that is open."""
+
+    def __init__(self, writer: Any, prefix: str) -> None:
+        from rosbags.typesys import Stores, get_typestore
+
+        self._writer, self._prefix, self.n_messages = writer, prefix, 0
+        self._store = get_typestore(Stores.ROS2_HUMBLE)
+        self._clock = self._topic("/clock", "rosgraph_msgs/msg/Clock")
+        self._tf = self._topic("/tf", "tf2_msgs/msg/TFMessage")
+        self._robots: dict[int, tuple[Any, Any, list[str]]] = {}
+
+    def _topic(self, name: str, type_: str) -> Any:
+        return self._writer.add_connection(name, type_, typestore=self._store)
+
+    def _robot(self, who: int) -> tuple[Any, Any, list[str]]:
+        if who not in self._robots:
+            frames = [f"{self._prefix}{who}/{frame}" for frame in FRAMES[:3]]
+            topic = self._topic(f"/{self._prefix}{who}/base_pose_ground_truth", "nav_msgs/msg/Odometry")
+            self._robots[who] = topic, odometry_bytes(frames[0], frames[1]), frames
+        return self._robots[who]
+
+    def _put(self, topic: Any, when: int, data: bytes) -> None:
+        self._writer.write(topic, when, data)
+        self.n_messages += 1
+
+    def put(self, frame: Frame, shift: int) -> None:
+        """Add the state of all entities at one time."""
+        when = round((frame.t + shift) * NANO)
+        stamp = divmod(when, NANO)
+        self._put(self._clock, when, clock_bytes(stamp))
+        turned = quat_rotate_inverse(frame.quat.T, frame.vel.T).T
+        states = np.concatenate([frame.pos, frame.quat, turned, np.zeros_like(turned)], axis=1).tolist()
+        transforms: list[Transform] = []
+        for who, state in zip(frame.id.tolist(), states, strict=True):
+            topic, pack, (odom, footprint, base) = self._robot(who)
+            self._put(topic, when, pack(stamp, state))
+            transforms += (
+                Transform(odom, footprint, stamp, state[:7]),
+                Transform(footprint, base, stamp, AT_ORIGIN),
+            )
+        if transforms:
+            self._put(self._tf, when, transforms_bytes(transforms))
