@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import shutil
+import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -127,10 +129,13 @@ def on_slurm(jobs: Jobs | str, stack: int | None = None) -> Iterator[OnDask]:
         BatchError: Slurm is not there, or refuses such jobs.
         MissingExtraError: A package is not installed.
     """
+    interrupt = signal.getsignal(signal.SIGINT)
     try:
         from dask_jobqueue.slurm import SLURMCluster
     except ImportError:
         raise missing_extra("dask-jobqueue") from None
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGINT, interrupt)  # its import sets a handler that exits
     jobs = Jobs.parse(jobs) if isinstance(jobs, str) else jobs
     if shutil.which("sbatch") is None:
         raise BatchError("there is no Slurm on this machine: sbatch is not found; submit from a login node")

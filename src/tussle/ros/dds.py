@@ -104,7 +104,6 @@ class Ros2Link(NodeLink):
     """
 
     system = "ROS 2"
-    settling_time = 0.5
 
     def __init__(self) -> None:
         super().__init__(self._wait)

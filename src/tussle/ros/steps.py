@@ -105,7 +105,7 @@ class NodeLink(ABC):
     """
 
     system: ClassVar[str]
-    settling_time: ClassVar[float] = 0.0
+    settling_time: ClassVar[float] = 0.5
 
     def __init__(self, rest: Callable[[float], object] | None = None) -> None:
         self.groups: dict[int, tuple[Any, Any]] = {}

@@ -496,11 +496,13 @@ def test_an_autopilot_that_dies_on_the_way_is_missed():
     port = free_ports()
     with (
         Process("ardupilot_peer.py", "json", port, 10, "--patience", LONG) as peer,
-        Simulation(copter(port, timeout=1.0)) as sim,
+        Simulation(copter(port)) as sim,
     ):
         sim.step(100)
         peer.process.kill()
         peer.process.wait()
+        link = sim.state.population.groups[0].autonomies[0].plugin.link[0]
+        link.timeout = 1.0  # not before: a process may need longer to start
         with pytest.raises(
             PluginError, match=rf"ArduPilot that sends to 127\.0\.0\.1:{port}: no servo packet within 1 s"
         ) as raised:

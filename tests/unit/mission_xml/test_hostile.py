@@ -88,7 +88,7 @@ def test_no_missions(files, text, said):
         ("", "<autonomy loop_rate='-1'>Boids</autonomy>", "loop_rate = -1.0 is not allowed"),
         ("", "<autonomy loop_rate='inf'>Boids</autonomy>", "loop_rate"),
         ("", "<autonomy behaviors=\"[ NoSuch ]\">MotorSchemas</autonomy>", "behavior: there is no plugin 'NoSuch'"),
-        ("", "<autonomy behaviors=\"[ ROSAirSim ]\">MotorSchemas</autonomy>", "behavior ROSAirSim is not in tussle yet: needs AirSim"),
+        ("", "<autonomy behaviors=\"[ ROSAirSim ]\">MotorSchemas</autonomy>", "behavior ROSAirSim is dropped: AirSim is no longer"),
         ("", "<autonomy behaviors=\"[ Boids ]\">MotorSchemas</autonomy>", "Boids is not allowed in behavior"),
         ("", f"<autonomy behaviors=\"{'[ AvoidEntityMS ]' * 5000}\">MotorSchemas</autonomy>", "more than 1,000 plugins"),
         ("", f"<autonomy behaviors=\"{'[' * 100_000}\">MotorSchemas</autonomy>", "is not a plugin"),

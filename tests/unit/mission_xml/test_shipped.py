@@ -216,8 +216,8 @@ def test_a_mission_that_flies_the_rascal_says_what_is_missing(existing, name):
 
 
 def test_missing_plugins_have_an_error_of_their_own():
-    with pytest.raises(catalogue.AbsentPluginError, match="FlightGearMultiplayer is not in tussle yet"):
-        catalogue.Catalogue().load("FlightGearMultiplayer")
+    with pytest.raises(catalogue.AbsentPluginError, match="AirSimSensor is dropped: AirSim"):
+        catalogue.Catalogue().load("AirSimSensor")
 
 
 def test_only_plugins_that_do_not_ship_are_named_as_missing():

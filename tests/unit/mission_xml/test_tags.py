@@ -361,7 +361,7 @@ def test_all_that_is_wrong_is_told_at_once(files):
   <autonomy
      max_speed="-1"
      comms_range="abc">Boids</autonomy>
-  <motion_model>FlightGearMultiplayer</motion_model> <controller>Boids</controller>
+  <motion_model>APITester</motion_model> <controller>Boids</controller>
 </entity></runscript>"""
     with pytest.raises(MissionError) as error:
         files.read(text)
@@ -377,6 +377,6 @@ def test_all_that_is_wrong_is_told_at_once(files):
     assert found[7] == ["Boids.max_speed = -1.0 is not allowed; it takes a finite number in m/s >= 0"]
     assert found[8][0].startswith("Boids.comms_range = 'abc' is not allowed; it takes a finite number in m")
     assert set(found[9]) == {
-        "motion_model FlightGearMultiplayer is not in tussle yet: needs FlightGear",
+        "motion_model APITester is dropped: it tests the plugin interface of SCRIMMAGE; here `check_plugin` tests each plugin",
         "Boids is not allowed in controller; it belongs in autonomy",
     }
