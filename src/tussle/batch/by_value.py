@@ -5,7 +5,8 @@ from __future__ import annotations
 import io
 import linecache
 import pickle
-from types import FunctionType
+from collections.abc import Callable
+from types import CodeType, FunctionType
 from typing import Any
 
 from tussle.api.laws import NeighborLaw
@@ -65,7 +66,13 @@ def _dump(value: Any, stream: io.BytesIO) -> dict[str, list[str]]:
                 return Kernel, (obj.py_func, obj.signature)
             if isinstance(obj, Device) and obj.__module__ == MAIN:
                 return type(obj), (obj.py_func,)
+            if isinstance(obj, CodeType):  # from version 3.1.3 on, cloudpickle leaves the name of the file out
+                return _code_of, (obj.co_filename, *self.dispatch_table[CodeType](obj))
             return super().reducer_override(obj)
 
     Pickler(stream).dump(value)
     return {file: linecache.getlines(file) for file in files}
+
+
+def _code_of(file: str, make: Callable[..., CodeType], values: tuple[Any, ...]) -> CodeType:
+    return make(*values).replace(co_filename=file)

@@ -121,8 +121,8 @@ class Processes:
             while workers:
                 ready = connection.wait([w.pipe for w in workers], BEAT_EVERY)
                 for worker in list(workers):
+                    worker.kill_if_overdue()
                     if worker.pipe not in ready:
-                        worker.kill_if_overdue()
                         continue
                     try:
                         yield from worker.receive(queue)

@@ -547,3 +547,14 @@ def test_the_example_is_played_from_its_file(tmp_path):
     assert loaded.notes == ()
     with Simulation(loaded.mission) as sim:
         assert sim.run()[0].metrics["DIS"]["sent"] >= 26
+
+
+def test_a_default_time_out_of_other_packages_does_not_hold_it():
+    before = socket.getdefaulttimeout()
+    socket.setdefaulttimeout(0.01)
+    try:
+        _, made = listening()
+        with Simulation(made) as sim:
+            sim.step(3)
+    finally:
+        socket.setdefaulttimeout(before)

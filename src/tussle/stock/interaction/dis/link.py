@@ -70,6 +70,7 @@ class ExerciseLink:
         self._place = (_resolved("address", address), port)
         own = _resolved("listen_address", listen_address)
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.settimeout(None)  # rospy sets a default, with which MSG_DONTWAIT waits
         try:
             self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
             if group := ipaddress.ip_address(self._place[0]).is_multicast:
