@@ -66,7 +66,7 @@ def _dump(value: Any, stream: io.BytesIO) -> dict[str, list[str]]:
                 return Kernel, (obj.py_func, obj.signature)
             if isinstance(obj, Device) and obj.__module__ == MAIN:
                 return type(obj), (obj.py_func,)
-            if isinstance(obj, CodeType):  # from version 3.1.3 on, cloudpickle leaves the name of the file out
+            if isinstance(obj, CodeType):  # whose file name cloudpickle 3.1.3 leaves out
                 return _code_of, (obj.co_filename, *self.dispatch_table[CodeType](obj))
             return super().reducer_override(obj)
 
