@@ -25,12 +25,14 @@ FLOATS = {
 }
 INTS = ("id", "team", "world", "block", "block_index")
 STORED_INTS = (*INTS, "born")
+IN_PLACE = ("health", "force", "torque")
+"""Columns that world plugins write in place, without `touch`."""
 DERIVED = {"yaw": 1, "climb": 1, "roll": 1, "forward": 3, "level_forward": 2}
 N_FLOATS = sum(FLOATS.values())
 EVERYWHERE = np.inf
-MOST_RANGES = 1000
+KEPT_RANGES = 1000
 """Maximum number of changed row ranges that are stored."""
-MOST_INDEXES = 32
+KEPT_INDEXES = 32
 """Maximum number of neighbour indexes that are kept, one per reach."""
 BRUTE = 600
 """Rows per world up to which a nearest-neighbour search is fast without cells."""
@@ -72,6 +74,9 @@ class Bodies:
         has_loads: Whether forces and torques may differ from zero.
         born: Step of its world in which each entity was born, (n,); 0 for initial entities.
         scans: Entities move one after another, so that indexes are updated row by row.
+        version: Number of the last change, which no later state of the table has again.
+        start_pos: While entities move one after another: positions at the start of the step [m], (3, n), which decide who is in range
+            of whom; None while the current ones do.
     """
 
     pos: np.ndarray
@@ -94,6 +99,8 @@ class Bodies:
     def __init__(self, floats: np.ndarray, ints: np.ndarray, n_worlds: int) -> None:
         self.n_worlds = n_worlds
         self.scans = False
+        self.version = -1
+        self._laid_out: dict[Any, CachedArrays] = {}
         self.replace(floats, ints)
 
     @classmethod
@@ -112,13 +119,15 @@ class Bodies:
         self.n = floats.shape[1]
         for name in _COLUMNS:
             self.__dict__.pop(name, None)
-        self.version = self._oldest = 0
+        self.version += 1
+        self._oldest = self._replaced = self.version
         self._touched: list[tuple[int, int]] = []
         self._derived: dict[str, CachedArrays] = {}
-        self._indexes: dict[Any, Index] = getattr(self, "_indexes", {})
-        self._laid_out: dict[Any, CachedArrays] = {}
         self._newest: CachedArrays | None = None
-        self._by_place: dict[tuple[int, str], CachedArrays] = {}
+        for kept in self._laid_out.values():
+            kept.columns = kept.columns[:1]  # not the positions, which would hold the old table in memory
+        self.start_pos: np.ndarray | None = None
+        self._started = self.version
         self._layout: tuple[np.ndarray, ...] | None = None
         self._tree: tuple[int, BodyTree] | None = None
         self._read_only: BodyView | None = None
@@ -144,7 +153,7 @@ class Bodies:
         self.version += 1
         if self.scans:  # ranges are needed only if entities move one after another
             self._touched.append((first, last))
-            if len(self._touched) > MOST_RANGES:
+            if len(self._touched) > KEPT_RANGES:
                 self._oldest = self.version
                 self._touched.clear()
 
@@ -201,19 +210,22 @@ class Bodies:
         return self.refreshed(self.laid_out(reach), split)
 
     def laid_out(self, reach: float | np.ndarray) -> CachedArrays:
-        """Neighbour index for `reach` [m], and the arrays that it is built from; valid until the next `replace`."""
+        """Neighbour index for `reach` [m], and the arrays that it is built from; valid until the next `replace`.
+
+        The table may discard it and make another one for the same reach. Who has it may go on using it, and its columns.
+        """
         if self.scans:
             reach = EVERYWHERE
         key = reach if isinstance(reach, float) else reach.tobytes()
-        kept = self._laid_out.get(key)
-        if kept is None:
-            index = self._indexes.pop(key, None) or Index()
-            self._indexes[key] = index  # the most recently used is last
-            if len(self._indexes) > MOST_INDEXES:
-                self._forget(next(iter(self._indexes)))
+        kept = self._laid_out.pop(key, None) or CachedArrays(-1, (Index(),))
+        self._laid_out[key] = kept  # the most recently used is last
+        if len(self._laid_out) > KEPT_INDEXES:
+            del self._laid_out[next(iter(self._laid_out))]
+        if kept.built != self._replaced:
+            index = kept.columns[0]
             index.layout(self.world, self.id, self.n_worlds)
             reaches = np.full(self.n_worlds, reach) if isinstance(reach, float) else reach
-            kept = self._laid_out[key] = CachedArrays(-1, (index, reaches, *self.pos))
+            kept.version, kept.built, kept.columns = -1, self._replaced, (index, reaches, *self.pos)
         return kept
 
     def refreshed(self, kept: CachedArrays, split: Split | None) -> Index:
@@ -238,24 +250,17 @@ class Bodies:
             self._tree = self.version, BodyTree(states, (self.block, boxes), members, world_start)
         return self._tree[1]
 
-    def _forget(self, key: Any) -> None:
-        """Discard the index of a reach and the columns in its order."""
-        index = self._indexes.pop(key)
-        self._laid_out.pop(key, None)
-        for place in [place for place in self._by_place if place[0] == id(index)]:
-            del self._by_place[place]
-
     def by_place(self, index: Index, name: str, split: Split | None = None) -> tuple[np.ndarray, ...]:
         """Components of a column by place of an index, as floats, each (n,), padded for lanes; for kernels.
 
         `split` calls a function for parts of the rows in several threads.
         """
-        key = (id(index), name)
-        kept = self._by_place.get(key)
+        kept = index.columns.get(name)
         if kept is None:
             k = DERIVED.get(name) or FLOATS.get(name, 1)
-            kept = self._by_place[key] = CachedArrays(-1, tuple(padded(self.n) for _ in range(k)))
-        if kept.built == index.built and (kept.version == self.version or name in INTS):
+            kept = index.columns[name] = CachedArrays(-1, tuple(padded(self.n) for _ in range(k)))
+        is_current = name in INTS or (kept.version == self.version and name not in IN_PLACE)
+        if kept.built == index.built and is_current:
             return kept.columns  # type: ignore[no-any-return]
         if name == "level_forward":
             values = self.quat  # computed on the way to the places
@@ -264,9 +269,30 @@ class Bodies:
         if split is not None and kept.built != index.built:
             split(self.n, lambda *part: put_by_place(name, values, index.place, kept.columns, *part))
         else:
-            for part in self._since(kept.version) if kept.built == index.built else [(0, self.n)]:
+            is_known = kept.built == index.built and name not in IN_PLACE
+            for part in self._since(kept.version) if is_known else [(0, self.n)]:
                 put_by_place(name, values, index.place, kept.columns, *part)
         kept.version, kept.built = self.version, index.built
+        return kept.columns  # type: ignore[no-any-return]
+
+    def keep_start(self) -> None:
+        """Let the current positions decide who is in range of whom until `end_start`."""
+        self.start_pos, self._started = self.pos.copy(), self.version
+
+    def end_start(self) -> None:
+        """Let positions decide who is in range as they change."""
+        self.start_pos = None
+
+    def range_points(self, index: Index) -> np.ndarray:
+        """Positions by place of an index that decide who is in range [m], (3, n + LANES)."""
+        if self.start_pos is None:
+            return index.points
+        kept = index.columns.get("start_pos")
+        if kept is None:
+            kept = index.columns["start_pos"] = CachedArrays(-1, np.zeros_like(index.points))
+        if kept.version != self._started or kept.built != index.built:
+            put_by_place("pos", self.start_pos, index.place, tuple(kept.columns), 0, self.n)
+            kept.version, kept.built = self._started, index.built
         return kept.columns  # type: ignore[no-any-return]
 
     def any_index(self) -> Index:

@@ -26,7 +26,7 @@ from tussle.api.context import Context, stream
 from tussle.api.draw import Draw
 from tussle.api.pairs import Nearest, Pairs, find_nearest, find_pairs
 from tussle.errors import PluginError, listed, nearest_name
-from tussle.neighbors.index import Index
+from tussle.neighbors.index import Index, next_size
 from tussle.scene import Hits, Scene, TeamRegion
 
 ROWS_PER_THREAD = 4096
@@ -257,16 +257,26 @@ class GroupView:
         """Rows in `bodies` of the entities with these ids, (n,), in the worlds of the rows; -1 for id 0 and removed entities."""
         return self._bodies.rows_of(self.world, ids)
 
-    def reach(self, radius: float | np.ndarray) -> float | np.ndarray:
-        """Longest radius of each world [m]: a float if equal in all worlds, otherwise (n_worlds,)."""
+    def reach(self, radius: float | np.ndarray, is_constant: bool = False) -> float | np.ndarray:
+        """Reach of an index for a radius, one number or (n,) [m]: a float if equal in all worlds, otherwise (n_worlds,).
+
+        It is the longest radius of the world if that is constant, as parameters are. Otherwise it is the next one of a few sizes:
+        a radius that changes does not need another index at each call.
+        """
         if not isinstance(radius, np.ndarray):
-            return float(radius)
+            return float(radius) if is_constant else float(next_size(radius))
         known: tuple[np.ndarray, float | np.ndarray] | None = self.kept.get(id(radius))
         if known is not None:
             return known[1]
         longest = np.zeros(self._bodies.n_worlds)
         common = kernels.longest_reach(radius, self.world, longest)
-        reach = longest if common < 0.0 else float(common)
+        if is_constant or not radius.flags.writeable:
+            reach = longest if common < 0.0 else float(common)
+        elif common < 0.0:
+            sizes = next_size(longest)
+            reach = float(sizes[0]) if (sizes == sizes[0]).all() else sizes
+        else:
+            reach = float(next_size(common))
         if not radius.flags.writeable:  # a parameter
             self.kept[id(radius)] = radius, reach
         return reach
@@ -278,6 +288,10 @@ class GroupView:
         if self.context.threads == 1:
             return self._bodies.index(self.reach(radius))
         return self._bodies.index(self.reach(radius), self.split_rows)
+
+    def range_points(self, index: Index) -> np.ndarray:
+        """Positions by place that decide who is in range [m], (3, N + 8); with update="sequential" those at the start of the step."""
+        return self._bodies.range_points(index)
 
     def split_rows(self, n: int, run: Callable[[int, int], Any]) -> None:
         """Call run(first, last) for parts of n rows in several threads."""
@@ -301,12 +315,14 @@ class GroupView:
     def near(self, radius: float | np.ndarray, teams: str | int | None = None) -> Pairs:
         """Pairs of a row and another entity of its world at a distance < radius.
 
+        With update="sequential", the positions at the start of the step decide which entities are in range of an autonomy or controller.
+
         Args:
             radius: One number or (n,) [m].
             teams: "own", "other", a team number, or None for all.
         """
-        rows = self.first, self.last
-        return find_pairs(self.index(radius), rows, self.pos, radius, teams, self.bodies)
+        index, rows = self.index(radius), (self.first, self.last)
+        return find_pairs(index, self.range_points(index), rows, self.pos, radius, teams, self.bodies)
 
     def nearest(
         self, k: int = 1, teams: str | int | np.ndarray | None = None, among: np.ndarray | None = None

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from tussle.api.bodies import DERIVED, FLOATS, INTS
+from tussle.api.bodies import DERIVED, FLOATS, INTS, Bodies
 from tussle.api.group import GroupView
 from tussle.columns import Channel, Numbers, Param
 from tussle.errors import DeclarationError, listed, nearest_name
-from tussle.neighbors.index import Blocks
+from tussle.neighbors.index import Blocks, Index
 from tussle.neighbors.law import OTHER, PAIR, Law
 from tussle.neighbors.walk import make_walk
 from tussle.numeric.rk4 import label
@@ -48,7 +48,8 @@ def neighbors(
 
     Args:
         radius: Name of a parameter or state, or a number [m]. Only neighbours at a smaller distance count; with several radii, smaller
-            than all of them.
+            than all of them. With update="sequential", the first radius of a law of an autonomy or controller is compared with the
+            distance from the neighbour's position at the start of the step.
         teams: "own", "other", or None for all.
         **reductions: Name of each contribution and its reduction: "sum"; "mean", 0 without neighbours; "min" and "max", inf and -inf
             without neighbours; "count" of true values; "nearest", the value of the nearest neighbour (at equal distances that with
@@ -226,7 +227,8 @@ class WalkPlan:
         run: Kernel of the pair loop.
         run_single: Kernel for views with at most one row per world.
         names: Names of the contributions.
-        reach: Function of a view and a plugin's attributes that returns the search radius [m].
+        radius: Function of a view and a plugin's attributes that returns the search radius [m].
+        is_constant: The search radius is a parameter or a number.
         own: Function of the same arguments that returns the columns by row.
         other: Columns of the neighbours, by place: body column and components.
         lists: The kernel returns one value per pair instead of one per row.
@@ -237,7 +239,8 @@ class WalkPlan:
     run: Callable[..., Any]
     run_single: Callable[..., Any]
     names: tuple[str, ...]
-    reach: Callable[[GroupView, dict[str, Any]], Any]
+    radius: Callable[[GroupView, dict[str, Any]], Any]
+    is_constant: bool
     own: Callable[[GroupView, dict[str, Any]], tuple[np.ndarray, ...]]
     other: tuple[tuple[str, tuple[int, ...]], ...]
     lists: bool
@@ -247,10 +250,10 @@ class WalkPlan:
     def walk(self, plugin: Any, g: GroupView) -> Contributions:
         """Return the contributions of the neighbours of each row."""
         blocks, arrays = self.gather(plugin, g)
-        if self.lists:
-            return self.listed(g, blocks.n_blocks, lambda *last: self.run(*arrays, *last, blocks.most))
-        out = np.empty((len(self.names), g.n))
         run = self.run_single if g._bodies.scans else self.run
+        if self.lists:
+            return self.listed(g, blocks.n_blocks, lambda *last: run(*arrays, *last, blocks.most))
+        out = np.empty((len(self.names), g.n))
         if g.context.threads == 1:
             run(*arrays, out, g.first, (0, blocks.n_blocks), blocks.most)
         else:
@@ -261,24 +264,23 @@ class WalkPlan:
         """Return the blocks of the rows and the arguments of the kernels, for the current positions."""
         key, bodies = (id(self), id(plugin)), g._bodies
         split = None if g.context.threads == 1 else g.split_rows
-        kept = g.kept.get(key)
-        if kept is not None and kept[0] is not None:
-            index = bodies.refreshed(kept[0], split)
-        else:
-            radius = self.reach(g, plugin.__dict__)
-            index = g.index(radius)
         share = None if split is None else g.context.split
-        if kept is not None and kept[1] is index:
-            _, _, blocks, arrays = kept
-            if bodies.scans and not self.lists:  # each row has its whole world as candidates
+        kept = g.kept.get(key)
+        if kept is not None and self.is_constant:
+            laid_out = kept[0]
+        else:
+            laid_out = bodies.laid_out(g.reach(self.radius(g, plugin.__dict__), self.is_constant))
+        index = bodies.refreshed(laid_out, split)
+        if kept is not None and kept[0] is laid_out:
+            _, blocks, arrays = kept
+            if bodies.scans:  # each row has its whole world as candidates
                 for name in self.moving:
                     bodies.by_place(index, name, split)
-                return blocks, arrays
+                return blocks, self._with_points(bodies, index, blocks, arrays)
             if index.blocks(g.first, g.last, share).spans is arrays[0][1]:
                 for name, _ in self.other:
                     bodies.by_place(index, name, split)
                 return blocks, arrays
-            radius = self.reach(g, plugin.__dict__)
         blocks = index.blocks(g.first, g.last, share)
         others: tuple[np.ndarray, ...] = ()
         for name, places in self.other:
@@ -287,10 +289,15 @@ class WalkPlan:
         own = self.own(g, plugin.__dict__)
         arrays = (blocks.cuts, blocks.spans, index.order), (blocks.points, index.points), others, own
         if self.keeps:
-            is_constant = not isinstance(radius, np.ndarray) or not radius.flags.writeable
-            laid_out = bodies.laid_out(g.reach(radius)) if is_constant else None
-            g.kept[key] = laid_out, index, blocks, arrays
-        return blocks, arrays
+            g.kept[key] = laid_out, blocks, arrays
+        return blocks, self._with_points(bodies, index, blocks, arrays) if bodies.scans else arrays
+
+    def _with_points(
+        self, bodies: Bodies, index: Index, blocks: Blocks, arrays: tuple[Any, ...]
+    ) -> tuple[Any, ...]:
+        """The arguments of `run_single`: also the positions that decide who is in range."""
+        longs, _, others, own = arrays
+        return longs, (blocks.points, index.points, bodies.range_points(index)), others, own
 
     def listed(self, g: GroupView, n_blocks: int, run: Callable[..., int]) -> Listed:
         """Return the contributions of each pair."""
@@ -337,11 +344,14 @@ def make_plan(g: GroupView, plugin: Any, declared: NeighborLaw) -> WalkPlan:
         name, place = BODY[part.removeprefix(OTHER)]
         other[name] = (*other.get(name, ()), place)
     by_row = "".join(f"{columns[name]}, " for name in made.own)
+    params = cls.params()
+    constant = [*params, *(f"{name}_{field}" for name, param in params.items() for field in param.fields)]
     return WalkPlan(
         made.run,
         made.run_single,
         declared.names,
         evaluated(farthest),
+        all(not isinstance(radius, str) or radius in constant for radius in radii),
         evaluated(f"({by_row})"),
         tuple(other.items()),
         laws[0].lists,

@@ -78,12 +78,19 @@ class Nearest:
 
 
 def find_pairs(
-    index: Index, rows: tuple[int, int], pos: np.ndarray, radius: Any, teams: Any, bodies: BodyView
+    index: Index,
+    range_points: np.ndarray,
+    rows: tuple[int, int],
+    pos: np.ndarray,
+    radius: Any,
+    teams: Any,
+    bodies: BodyView,
 ) -> Pairs:
     """See `GroupView.near`. Rows [first, last) of the body table are at `pos` [m], (3, n)."""
     x, y, z = pos
     reach = np.ascontiguousarray(radius, float) if isinstance(radius, np.ndarray) else np.full(len(x), radius)
-    return Pairs(queries.pairs(index, *rows, x, y, z, reach, bodies.team, _checked(teams)), bodies)
+    found = queries.pairs(index, *rows, x, y, z, reach, bodies.team, _checked(teams), range_points)
+    return Pairs(found, bodies)
 
 
 def find_nearest(

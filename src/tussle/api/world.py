@@ -8,21 +8,19 @@ from typing import Any
 import numpy as np
 
 from tussle import rng
-from tussle.api.bodies import Bodies, BodyView
+from tussle.api.bodies import IN_PLACE, Bodies, BodyView
 from tussle.api.context import Context
 from tussle.api.group import GOLDEN, LAWS, GroupView
 from tussle.comms import TopicBuffer
 from tussle.errors import MissionError, ParameterError, listed, nearest_name
 from tussle.messages import Message, Messages
 
-WRITABLE = ("health", "force", "torque")
-
 
 class WorldBodies(BodyView):
     """The body table of world plugins. health, force and torque are writable; `w.move` changes pos, vel and quat."""
 
     def __getattr__(self, name: str) -> Any:
-        if name in WRITABLE:
+        if name in IN_PLACE:
             array = getattr(self._bodies, name)
             if name == "health":
                 self.__dict__[name] = array

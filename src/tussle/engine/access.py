@@ -131,6 +131,7 @@ def write(state: SimulationState, path: str, values: Any) -> None:
         new_values = np.moveaxis(_shaped(path, values, np.moveaxis(array, -1, 0).shape), 0, -1)
         _check_written(path, new_values, column)
         array[:] = new_values
+        state.world_view.renew()  # it keeps values of parameters
         return
     if not key and name not in FLOATS:
         raise ParameterError(f"{path!r} cannot be written; {listed(FLOATS)}")

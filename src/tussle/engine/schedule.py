@@ -43,13 +43,17 @@ def compose(state: SimulationState) -> list[Call]:
         MissionError: The rate of a plugin does not fit the step.
     """
     calls: list[Call] = []
-    groups = state.population.groups
+    groups, bodies = state.population.groups, state.population.bodies
     if any(r.plugin.reads_start_positions for r in state.world_bindings):
         calls.append(Call("keep positions", partial(_keep_positions, state)))
     if state.mission.update == "sequential":
+        # As in the paper's code, which indexes the positions once per step: an entity that has moved is seen where it is by those in
+        # whose range it was at the start of the step.
+        calls.append(Call("index start positions", bodies.keep_start))
         for group in groups:
             calls += [_entity_call(state, "autonomy", group, b) for b in group.autonomies]
             calls += _motion(state, [group])
+        calls.append(Call("index current positions", bodies.end_start))
     else:
         for group in groups:
             calls += [_entity_call(state, "autonomy", group, b) for b in group.autonomies]
@@ -57,7 +61,7 @@ def compose(state: SimulationState) -> list[Call]:
     for group in groups:
         calls += [_entity_call(state, "sensor", group, b) for b in group.sensors]
     if state.interactions:
-        calls.append(Call("reset forces", state.population.bodies.clear_loads))
+        calls.append(Call("reset forces", bodies.clear_loads))
     calls += [_world_call(state, "interaction", r) for r in state.interactions if steps(r)]
     if state.interactions:
         calls.append(Call("apply moves", partial(apply_moves, state)))

@@ -20,6 +20,8 @@ from tussle.engine.world_bindings import WorldBinding
 def _sub_bodies(bodies: Bodies, rows: np.ndarray) -> Bodies:
     sub = Bodies(bodies.floats[:, rows].copy(), bodies.ints[:, rows].copy(), bodies.n_worlds)
     sub.scans = bodies.scans
+    if bodies.start_pos is not None:
+        sub.start_pos = np.take(bodies.start_pos, rows, axis=1)
     return sub
 
 

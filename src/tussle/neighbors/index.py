@@ -19,6 +19,9 @@ Split = Callable[[int, Callable[[int, int], Any]], Any]
 RINGS = 2
 """Cells per reach of a world; 2 is the fastest of 1 to 3 for 2000 entities."""
 
+SIZES = np.array([0.5, 0.5946035575013605, 0.7071067811865476, 0.8408964152537145, 1.0, np.inf])
+"""Four sizes per octave, powers of 2^(1/4): an index for the next one has at most 1.4 times the candidates in a plane."""
+
 SPARSE_WORLD = 400
 """Below this number of entities, one cell per reach is faster (1.0 instead of 1.3 us per entity with 110, equal with 500)."""
 
@@ -54,6 +57,12 @@ class Blocks:
         )
 
 
+def next_size(reach: float | Floats) -> Any:
+    """Return the next one of a few sizes that is not smaller than a reach, for reaches that change from call to call."""
+    mantissa, exponent = np.frexp(np.maximum(reach, 0.0))
+    return np.ldexp(SIZES[np.minimum(np.searchsorted(SIZES, mantissa), len(SIZES) - 1)], exponent)
+
+
 def padded(n: int) -> Floats:
     """Return n zeros that are padded, so that they can be read in groups of LANES."""
     return np.zeros(n + LANES)[:n]
@@ -64,7 +73,8 @@ class Index:
 
     After `layout` and `build`: `order` (N,) row of each place; `place` (N,) its inverse; `points` (3, N + LANES) positions by
     place [m]. `built` counts the builds. `inverse_cell` (n_worlds,) [1/m] is 0 where a world is one cell. World w holds places
-    world_start[w] to world_start[w + 1] - 1, and members[world_start[w] + k] is its k-th row by id.
+    world_start[w] to world_start[w + 1] - 1, and members[world_start[w] + k] is its k-th row by id. `columns` are the arrays in the
+    order of the places that the owner of the table keeps; they belong to the index, so that whoever holds it has its own.
     """
 
     def __init__(self) -> None:
@@ -73,6 +83,7 @@ class Index:
         self.world_start: Longs = np.zeros(1, np.int64)
         self.row_world = self.row_id = np.zeros(1, np.int64)
         self.built = 0
+        self.columns: dict[str, Any] = {}
         self._blocks: dict[tuple[int, int], Blocks] = {}
         self.layout(np.zeros(0, np.int64), np.zeros(0, np.int64), 0)
 
@@ -105,6 +116,7 @@ class Index:
         self._fixed = False
         self._given: Floats | None = None
         self.built = 0
+        self.columns.clear()
         self._blocks.clear()
 
     @property

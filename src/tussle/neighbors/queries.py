@@ -59,6 +59,7 @@ def pairs(
     radius: Floats,
     team: Longs | None = None,
     teams: Teams = None,
+    range_points: Floats | None = None,
 ) -> PairArrays:
     """Find all entities nearer than a radius to rows of the table. A row is never its own neighbour.
 
@@ -72,15 +73,18 @@ def pairs(
         radius: Radius of each row [m], (n,).
         team: Teams of the table, (N,); required unless `teams` is None.
         teams: None for all, "own", "other", or a team number.
+        range_points: Positions by place that decide who is in range [m], (3, N + LANES), where they are not those of the table;
+            for an index whose reaches are infinite.
 
     Raises:
         ValueError: `teams` has another value, or `team` is missing.
     """
     n = last - first
     mode, by_place, wanted = team_filter(index, team, teams, first, last)
+    points = index.points if range_points is None else range_points
     start, count = np.zeros(n + 1, np.int64), np.zeros(n, np.int64)
     query = (
-        (x, y, z, radius, wanted), mode, (index.row_world, index.place), first, (*index.table, by_place), start
+        (x, y, z, radius, wanted), mode, (index.row_world, index.place), first, (*index.table[:-1], points, by_place), start
     )  # fmt: skip
     m = search.pair_places(*query, (count, np.zeros(0, np.int64)))
     np.cumsum(count, out=start[1:])

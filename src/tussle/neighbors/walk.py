@@ -33,7 +33,8 @@ class Walk:
         own: Columns by row that the kernel takes, in order; includes "team" if a law filters by team.
         other: Columns by place that the kernel takes, in order.
         run: The kernel; its lanes are eight agents.
-        run_single: The kernel for agents that are each in a different world; its lanes are eight neighbours of one agent.
+        run_single: The kernel for agents that are each in a different world; its lanes are eight neighbours of one agent. It also
+            takes the positions that decide who is in range.
         n_out: Total number of contributions.
     """
 
@@ -162,18 +163,17 @@ def make_walk(laws: Sequence[Law], where: Law | None, code_of: Callable[[str], s
         return Walk(text.own, text.other, run, single, at)
     other, own = " ".join("F" * len(text.other)), " ".join(code_of(name) for name in text.own)
     out = "(I2w F2w) i8 (i8 i8) i8 -> i8" if text.lists_pairs else "F2w i8 (i8 i8) i8"
-    signature = f"(I2 I2 I) (F2 F2) ({other}) ({own}) {out}"
 
-    def written(lines: Iterable[str], suffix: str) -> Kernel:
+    def written(lines: Iterable[str], points: str, suffix: str) -> Kernel:
         exec("\n".join(lines) + "\n", scope)  # noqa: S102 - generated here; authors' code is in separate functions
         made = scope["walk"]
         made.__module__ = laws[0].function.__module__
         names = (law.function.__qualname__ for law in (*laws, *([where] if where else [])))
         made.__qualname__ = "+".join(names) + suffix
-        return kernel(signature)(made)
+        return kernel(f"(I2 I2 I) ({points}) ({other}) ({own}) {out}")(made)
 
-    kernel_of_blocks = written(text.lines(), "")
-    single = kernel_of_blocks if text.lists_pairs else written(text.single_lines(), " single")
+    kernel_of_blocks = written(text.lines(), "F2 F2", "")
+    single = written(text.single_lines(), "F2 F2 F2", " single")
     return Walk(text.own, text.other, kernel_of_blocks, single, at)
 
 

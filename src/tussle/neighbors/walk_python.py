@@ -40,7 +40,9 @@ def walk_in_python(
                 )
                 for p, start in found:
                     theirs = {name: column[p] for name, column in zip(other_names, other, strict=True)}
-                    pair = {**mine, **theirs, **between(points[1][:, p] - points[1][:, me])}
+                    here = points[1][:, me]
+                    pair = {**mine, **theirs, **between(points[1][:, p] - here)}
+                    pair["range_squared"] = between(points[-1][:, p] - here)["distance_squared"]
                     for each in totals[(p - start) % n_lanes] if where is None or call(where, pair) else ():
                         values = each.add(pair)
                         if values is not None and each.law.lists:
@@ -83,12 +85,14 @@ class Totals:
         self.law, self.n, self.closest = law, 0, (np.inf, np.inf)
         self.sums = [START.get(each, 0.0) for each in law.reductions.values()]
         radii = [mine[radius] if isinstance(radius, str) else radius for radius in law.radii]
-        self.limit = min(radius * radius if radius > 0.0 else -1.0 for radius in radii)
+        self.range, *self.limits = [radius * radius if radius > 0.0 else -1.0 for radius in radii]
 
     def add(self, pair: Values) -> tuple[Any, ...] | None:
         """Add a pair. Returns the law's values, or None if the pair does not count."""
         law = self.law
-        if not pair["distance_squared"] < self.limit:
+        if not pair["range_squared"] < self.range:
+            return None
+        if not all(pair["distance_squared"] < limit for limit in self.limits):
             return None
         if law.teams and (pair["team"] == pair[OTHER + "team"]) != (law.teams == "own"):
             return None

@@ -10,6 +10,10 @@ from tussle.neighbors.law import OTHER, Law
 
 START = {"min": math.inf, "max": -math.inf, "nearest": math.nan}
 """Initial values of reductions that do not start at 0."""
+LANE_OF_AGENT = "order[queries[q0 + k]] - first", "p"
+"""Row and place of the pair in lane k, if its lanes are agents."""
+LANE_OF_NEIGHBOR = "i", "p + k"
+"""The same if its lanes are neighbours of one agent."""
 RESULTS = {"min": "lane[:LANES].min()", "max": "lane[:LANES].max()", "nearest": "lane[first_lane]"}
 """Expressions that reduce the lanes of one agent, for reductions that are not sums."""
 
@@ -61,13 +65,13 @@ class Part:
             if reduction != "count" and is_mask:
                 yield f"v_{k} = number(v_{k})"
 
-    def step(self) -> Iterator[str]:
-        """Code for one candidate."""
+    def step(self, pair: tuple[str, str] = LANE_OF_AGENT) -> Iterator[str]:
+        """Code for one candidate of each lane. `pair`: row and place of the pair in lane k, for lists."""
         at = self.at
         yield from self.contributions()
         yield f"ok = {self.counted}"
         if self.law.lists:
-            yield from self.append()
+            yield from self.append(*pair)
             return
         if "nearest" in self.law.reductions.values():
             nearer = f"(distance_squared_ == best_{at}) & (other_id_ < best_id_{at})"
@@ -86,7 +90,7 @@ class Part:
                 mask, value = "closer", f"v_{k}"
             yield f"a_{k} = choose({mask}, {value}, a_{k})"
 
-    def append(self) -> Iterator[str]:
+    def append(self, row: str, place: str) -> Iterator[str]:
         """Code that appends the counted pairs to the lists, up to their size."""
         yield "hits = bits(ok)"
         yield "if hits != 0:"
@@ -96,13 +100,15 @@ class Part:
         yield "    k = lowest(hits)"
         yield "    hits &= hits - 1"
         yield "    if n_listed < out[1].shape[1]:"
-        yield "        out[0][0, n_listed], out[0][1, n_listed] = order[queries[q0 + k]] - first, order[p]"
+        yield f"        out[0][0, n_listed], out[0][1, n_listed] = {row}, order[{place}]"
         for k, _ in self.reductions:
             yield f"        out[1][{k}, n_listed] = lane[(results_at + {k}) * LANES + k]"
         yield "    n_listed += 1"
 
     def single_end(self) -> Iterator[str]:
         """Code that reduces the lanes of one agent and writes its row."""
+        if self.law.lists:
+            return
         if "mean" in self.law.reductions.values():
             yield f"store(lane, 0, n_{self.at})"
             yield "n = sum_of(lane)"
@@ -195,9 +201,14 @@ class WalkText:
             yield "    return n_listed"
 
     def single_lines(self) -> Iterator[str]:
-        """Text of the kernel that has neighbours in the lanes, which are reduced at the end."""
+        """Text of the kernel that has neighbours in the lanes, which are reduced at the end.
+
+        The first radius of a law is compared with the positions that decide who is in range, the others with the current ones.
+        """
         yield from self.head()
-        yield "    lane = np.empty(2 * LANES)"
+        yield "    rx, ry, rz = points[2][0], points[2][1], points[2][2]"
+        yield f"    lane = np.empty({2 + self.n_out} * LANES)"
+        yield "    results_at, n_listed = 2, 0"
         yield "    for b in range(begin, stop):"
         yield "        for q in range(block_first[b], block_first[b + 1]):"
         yield "            me = queries[q]"
@@ -207,7 +218,9 @@ class WalkText:
         if self.by_team:
             yield "            mine = splat(float(by_row_team[i]))"
         for at, radii in enumerate(self.limits):
-            yield f"            limit2_{at} = {square(radii)}"
+            yield f"            range2_{at} = {square(radii[:1])}"
+            if len(radii) > 1:
+                yield f"            limit2_{at} = {square(radii[1:])}"
         for part in self.parts:
             yield from indented(3, part.begin())
         yield "            for s in range(span_first[b], span_last[b]):"
@@ -218,18 +231,23 @@ class WalkText:
             yield f"                    inside = {f'{near} & {part.law.teams}_' if part.law.teams else near}"
             yield "                    if bits(inside) != 0:"
             yield from indented(6, distances(part.law.names))
-            yield from indented(6, part.step())
+            yield from indented(6, part.step(LANE_OF_NEIGHBOR))
         for part in self.parts:
             yield from indented(3, part.single_end())
+        if self.lists_pairs:
+            yield "    return n_listed"
 
     def single_neighbors(self) -> Iterator[str]:
         """Code that loads LANES neighbours of one agent, and their masks by existence, team and distance."""
         for axis in "xyz":
+            yield f"range_{axis} = load(r{axis}, p) - s{axis}[me]"
             yield f"offset_{axis}_ = load(s{axis}, p) - s{axis}[me]"
+        yield "range_squared = range_x * range_x + range_y * range_y + range_z * range_z"
         yield "distance_squared_ = offset_x_ * offset_x_ + offset_y_ * offset_y_ + offset_z_ * offset_z_"
         yield "counted = below(span_end[s] - p) & (below(me - p) | ~below(me - p + 1))"
-        for at in range(len(self.limits)):
-            yield f"near_{at} = (distance_squared_ < limit2_{at}) & counted"
+        for at, radii in enumerate(self.limits):
+            limit = f" & (distance_squared_ < limit2_{at})" if len(radii) > 1 else ""
+            yield f"near_{at} = (range_squared < range2_{at}){limit} & counted"
         yield f"if {' | '.join(f'bits(near_{at})' for at in range(len(self.limits)))} == 0:"
         yield "    continue"
         for name in self.other:

@@ -5,16 +5,20 @@ TUSSLE_FUZZ=20000 plays as many missions by hand.
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
-from histories import difference
+from histories import difference, played_alone
+
+from tussle.errors import TussleError
 
 N_MISSIONS = int(os.environ.get("TUSSLE_FUZZ", "200"))
 N_CHECKED = 16
+N_SMALL = int(os.environ.get("TUSSLE_FUZZ", "100"))
 CHUNK = 10
 pytestmark = [
     pytest.mark.filterwarnings("ignore:.*its messages are not received"),  # random networks often are two
@@ -29,6 +33,31 @@ def test_worlds_of_random_missions_are_as_alone(first):
     assert [text for text in found if text] == []
     least = 6 if first == 0 else len(found) // 3
     assert found.count("") >= least  # the others' parts do not fit together
+
+
+def test_caches_with_room_for_one_thing_change_no_random_mission():
+    """Alone, in stacks, in threads, reset and restored; each world is also what it is with the caches as shipped."""
+    program = Path(__file__).with_name("small_caches.py")
+    done = subprocess.run(
+        [sys.executable, str(program), "0", str(N_SMALL)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    played = json.loads(done.stdout.splitlines()[-1])
+    assert {"tussle.api.bodies.KEPT_INDEXES", "tussle.api.bodies.KEPT_RANGES", "tussle.api.laws"} <= {
+        *played["shrunk"]
+    }
+    assert played["wrong"] == []
+    assert len(played["hashes"]) >= N_SMALL // 3
+    differ = [n for n, hashes in played["hashes"].items() if tuple(hashes) != shipped_hashes(int(n))]
+    assert differ == []
+
+
+def shipped_hashes(number: int) -> tuple[str, ...]:
+    """Hashes of a random mission with the caches as shipped."""
+    try:
+        return played_alone(number, 1).hashes
+    except TussleError:
+        return ()
 
 
 @pytest.mark.slow

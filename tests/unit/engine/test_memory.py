@@ -10,7 +10,7 @@ from pathlib import Path
 
 from tussle import Block, Mission, Simulation
 from tussle.api import Autonomy
-from tussle.api.bodies import MOST_INDEXES
+from tussle.api.bodies import KEPT_INDEXES
 from tussle.stock import Boids, Still, Unicycle, manifest
 
 N_GAMES = int(os.environ.get("TUSSLE_MEMORY_GAMES", "120"))
@@ -46,11 +46,11 @@ def test_games_leave_no_memory_behind():
 def test_radii_that_change_at_each_reset_keep_no_index_each():
     block = Block(name="boids", team=1, count=5, autonomy=[Boids()], motion=Unicycle())
     sim = Simulation(Mission(blocks=[block], end=100.0, dt=0.1), seeds=range(4))
-    for k in range(3 * MOST_INDEXES):
+    for k in range(3 * KEPT_INDEXES):
         sim.reset([k % 4], [k], {"boids.Boids.comms_range": 50.0 + k})
         sim.step()
-    kept = sim.state.population.bodies._indexes
-    assert 0 < len(kept) <= MOST_INDEXES
+    kept = sim.state.population.bodies._laid_out
+    assert 0 < len(kept) <= KEPT_INDEXES
 
 
 def test_radii_that_change_at_each_step_keep_no_index_each():
@@ -61,7 +61,6 @@ def test_radii_that_change_at_each_step_keep_no_index_each():
             dt=0.1,
         )
     )
-    sim.step(3 * MOST_INDEXES)
+    sim.step(3 * KEPT_INDEXES)
     bodies = sim.state.population.bodies
-    assert 0 < len(bodies._indexes) <= MOST_INDEXES
-    assert len(bodies._laid_out) <= MOST_INDEXES
+    assert 0 < len(bodies._laid_out) <= KEPT_INDEXES

@@ -61,7 +61,8 @@ class Search:
             count, rows = is_there.sum(axis=1), other.T[is_there]
         else:
             radius = np.full(last - first, limit)
-            found = queries.pairs(index, first, last, x, y, z, radius, bodies.team, team)
+            points = g.range_points(index)
+            found = queries.pairs(index, first, last, x, y, z, radius, bodies.team, team, points)
             order = np.lexsort((bodies.id[found.other], found.distance, found.row))
             count, rows = found.count, found.other[order]
         pairs, ends = (

@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from tussle.api.bodies import IN_PLACE
 from tussle.api.easy.entities import Entity, Observer, Other, public_names, squared_distance
 from tussle.api.easy.search import Search
 from tussle.api.easy.shared import RandomNumbers, WorldDraw
@@ -16,8 +17,6 @@ from tussle.columns import Column, State
 from tussle.errors import ParameterError, listed, nearest_name
 from tussle.messages import Message
 from tussle.scene import Scene
-
-WRITABLE = ("health", "force", "torque")
 
 
 class WorldShared:
@@ -80,14 +79,14 @@ class Member(Observer, Other):
         write = self._writers.get(name)
         if write is not None:
             write(self, name, value)
-        elif name in WRITABLE:
+        elif name in IN_PLACE:
             getattr(self._shared.bodies, name)[..., self._row] = value
         elif name in BODY:
             self._refuse(
                 f"{name} of an entity is read-only; w.move(entity, pos=...) changes pos, vel and quat"
             )
         else:
-            names = [*self._writers, *WRITABLE]
+            names = [*self._writers, *IN_PLACE]
             self._refuse(
                 f"an entity's {name!r} cannot be written{nearest_name(name, names)}; {listed(names)}"
             )
