@@ -76,6 +76,14 @@ def chase_sequential() -> Mission:
     )  # fmt: skip
 
 
+def flock_sequential() -> Mission:
+    """A flock one after another, in which entities come into range and leave it while the others move."""
+    return Mission(
+        blocks=[_prey(16, comms_range=30.0), _prey(8, comms_range=45.0, averaging="historic").replace(name="far", team=2)],
+        update="sequential", end=5.0,
+    )  # fmt: skip
+
+
 def two_flocks() -> Mission:
     """Points in two flocks that see differently far, collide, and are placed apart."""
     flock = lambda name, team, east, sight: Block(  # noqa: E731
@@ -252,6 +260,7 @@ def births_sequential() -> Mission:
 STEPS: dict[str, int] = {
     "chase_synchronous": 24,
     "chase_sequential": 24,
+    "flock_sequential": 24,
     "two_flocks": 24,
     "aircraft": 40,
     "schemas": 24,

@@ -254,7 +254,7 @@ class Mission:
         start: Time of step 0 [s].
         motion_multiplier: Substeps of controllers and motion per step.
         update: "synchronous": all entities decide on the states at the start of the step. "sequential": the entities decide and
-            move one after another, in order of id.
+            move one after another, in order of id; the positions at the start of the step decide who is in range of whom.
         end_conditions: Conditions that end a world, of time, one_team, all_dead, none.
         interactions: Interaction plugins, in order.
         metrics: Metric plugins, in order.

@@ -7,7 +7,7 @@ import pytest
 from small_worlds import VELOCITY, Drift, block, mission
 
 from tussle import Simulation
-from tussle.api import Autonomy, EasyAutonomy, Output, State
+from tussle.api import Autonomy, EasyAutonomy, Interaction, Output, Param, State, neighbors
 
 
 class Follow(Autonomy):
@@ -72,6 +72,96 @@ def test_what_a_follower_sees(update, leader_first, seen, follow):
     assert found == pytest.approx(seen)
 
 
+class InRange(Autonomy):
+    """Notes whom queries find within two radii, and where they are."""
+
+    sight = Param(12.0, unit="m")
+    reach = Param(np.inf, unit="m")
+    found = State(
+        "law where listed near",
+        doc="Number found by a law and its place, numbers found by a list and by a query.",
+    )
+
+    @neighbors("sight", "reach", n="count", east="sum")
+    @staticmethod
+    def law(offset_x: float):
+        return True, offset_x
+
+    @neighbors("sight", "reach", east="each")
+    @staticmethod
+    def listing(offset_x: float):
+        return offset_x
+
+    def step(self, g):
+        sums, near = self.law(g), g.near(self.sight)
+        self.found[:2] = sums.n, sums.east
+        self.found[2] = np.bincount(self.listing(g).row, minlength=g.n)
+        self.found[3] = near.count
+        assert np.array_equal(near.distance, near.offset[0])
+
+
+class EasyInRange(EasyAutonomy):
+    sight = Param(12.0, unit="m")
+    reach = Param(np.inf, unit="m")
+    found = State("law where listed near")
+
+    def step_one(self, me):
+        others = [other for other in me.near(me.sight) if me.distance(other) < me.reach]
+        me.found = (
+            len(others),
+            sum(other.pos[0] - me.pos[0] for other in others),
+            len(others),
+            len(me.near(me.sight)),
+        )
+
+
+@pytest.mark.parametrize("query", [InRange, EasyInRange])
+@pytest.mark.parametrize(
+    ("update", "leader_first", "sight", "reach", "found"),
+    [
+        # The runner is at 10 m at the beginning of the step, and at 13 m after its move.
+        ("synchronous", True, 12.0, np.inf, (1, 10, 1, 1)),
+        ("sequential", False, 12.0, np.inf, (1, 10, 1, 1)),
+        ("sequential", True, 12.0, np.inf, (1, 13, 1, 1)),  # in range at the beginning, seen where it is
+        ("sequential", True, 12.0, 12.5, (0, 0, 0, 1)),  # a second radius is compared with where it is
+        ("sequential", True, 9.0, np.inf, (0, 0, 0, 0)),
+        ("synchronous", True, 9.0, np.inf, (0, 0, 0, 0)),
+    ],
+)
+def test_who_is_in_range_is_decided_at_the_beginning_of_the_step(
+    update, leader_first, sight, reach, found, query
+):
+    runner = block("runner", position=(10.0, 0, 0), autonomy=Drift(to=(30.0, 0, 0)))
+    follower = block("follower", autonomy=[query(sight=sight, reach=reach), Drift(to=(0.0, 0.0, 0.0))])
+    game = mission(*([runner, follower] if leader_first else [follower, runner]), update=update, end=0.3)
+    sim = Simulation(game)
+    sim.step()
+    assert sim.read(f"follower.{query.__name__}.found")[0][0, 0] == pytest.approx(found)
+
+
+def test_interactions_see_who_is_in_range_after_all_have_moved():
+    """One that comes into range by its move is found in the same step."""
+
+    class Touches(Interaction):
+        sight = Param(12.0, unit="m")
+        n = State(per="world")
+
+        @neighbors("sight", n="count")
+        @staticmethod
+        def law():
+            return True
+
+        def step(self, w):
+            self.n[:] = np.bincount(w.world, self.law(w).n, w.n_worlds)
+            assert w.near(12.0).count.sum() == self.n.sum()
+
+    runner = block("runner", position=(14.0, 0, 0), autonomy=Drift(to=(-30.0, 0, 0)))
+    follower = block("follower", autonomy=Drift(to=(0.0, 0.0, 0.0)))
+    sim = Simulation(mission(runner, follower, update="sequential", interactions=[Touches()]))
+    sim.step()
+    assert sim.read("Touches.n")[0][0] == 2
+
+
 def test_sequential_with_structural_params_is_restored_into_the_right_groups():
     from small_worlds import Talker
 
@@ -102,9 +192,9 @@ def test_sequential_with_structural_params_is_restored_into_the_right_groups():
 
 def test_the_schedule_lists_the_places_one_by_one():
     text = Simulation(pair("sequential", True, Follow)).describe()
-    lines = [line.split(maxsplit=1)[1] for line in text.splitlines()[1:5]]
-    assert lines == ["autonomy     runner 1: Drift", "motion       runner 1: SingleIntegrator",
-                     "autonomy     follower 2: Follow", "motion       follower 2: SingleIntegrator"]  # fmt: skip
+    lines = [line.split(maxsplit=1)[1] for line in text.splitlines()[1:7]]
+    assert lines == ["index start positions", "autonomy     runner 1: Drift", "motion       runner 1: SingleIntegrator",
+                     "autonomy     follower 2: Follow", "motion       follower 2: SingleIntegrator", "index current positions"]  # fmt: skip
 
 
 def test_sequential_substeps_are_all_of_one_entity_before_the_next():
