@@ -25,6 +25,7 @@ from tussle.api.kinds import (
 )
 from tussle.api.laws import neighbors, together
 from tussle.api.links import Links
+from tussle.api.mass import MassProperties
 from tussle.api.motion import MotionBody, MotionModel
 from tussle.api.plugin import HistoricAttributes, Plugin, service
 from tussle.api.rigid_body import InertiaParam, PositiveParam, RigidBodyModel
@@ -71,6 +72,7 @@ __all__ = [
     "Input",
     "Interaction",
     "Links",
+    "MassProperties",
     "Me",
     "Member",
     "Message",

@@ -13,6 +13,7 @@ import numpy as np
 
 from tussle.api.clock import Clock
 from tussle.api.draw import Draw
+from tussle.api.mass import MassProperties
 from tussle.errors import PluginError, TussleError, listed, nearest_name
 from tussle.rng import stream_key
 from tussle.scene import Scene, TeamRegion, find_region
@@ -42,7 +43,7 @@ class Context:
         simulation: Returns the simulation, for code above the engine that a plugin calls.
         shared: Objects that handles of several entities use; their method `end` is called when the simulation is closed.
         boxes: Lengths of the boxes of each block for rays [m], (n_blocks, 3); 0 for spheres.
-        mass_properties: Returns mass [kg], (n,), and inertia tensor [kg m^2], (9, n), of all rows of the body table.
+        mass_properties: Returns mass, inertia and weight of all rows of the body table.
         is_interrupted: Whether the user asked to stop; a plugin that waits for others then waits no longer.
     """
 
@@ -61,7 +62,7 @@ class Context:
     fail: Callable[[int, PluginError], None] = field(init=False)
     simulation: Callable[[], Any] = field(init=False)
     boxes: np.ndarray = field(init=False)
-    mass_properties: Callable[[], tuple[np.ndarray, np.ndarray]] = field(init=False)
+    mass_properties: Callable[[], MassProperties] = field(init=False)
     shared: dict[Hashable, Any] = field(default_factory=dict)
     is_interrupted: Callable[[], bool] = lambda: False
     _pool: ThreadPoolExecutor | None = None

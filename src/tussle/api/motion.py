@@ -12,10 +12,12 @@ import numpy as np
 from tussle.api.bodies import DERIVED, OFFSETS, Bodies, derive
 from tussle.api.group import GroupView
 from tussle.api.kinds import EntityPlugin
+from tussle.api.mass import MassProperties
 from tussle.api.range_kernel import RangeKernel
 from tussle.api.row_laws import BODY_INPUTS, advance_rows
 from tussle.columns import Channel, Param, State
 from tussle.errors import DeclarationError, ParameterError, listed, nearest_name
+from tussle.numeric.paths import GRAVITY
 from tussle.numeric.quaternion import quat_from_euler
 from tussle.numeric.rk4 import compile_derivative, rk4
 
@@ -199,12 +201,18 @@ class MotionModel(EntityPlugin):
         """Write pos, quat, vel (and omega) of all rows from the state."""
         raise TypeError(f"{type(self).__name__} has no to_body")
 
-    def mass_properties(self) -> tuple[np.ndarray | None, np.ndarray] | None:
-        """Mass [kg], (n,), None for that of the body table, and inertia tensor about the center of mass [kg m^2], body frame, (9, n).
+    def mass_properties(self, body: MotionBody) -> MassProperties:
+        """Mass, inertia and weight of all rows, by which e.g. the ground carries them and contacts push them.
 
-        None for a model whose attitude does not follow from torques.
+        The mass is the parameter `mass`, or else that of the block. The weight of a model that takes `force_z` is this mass times
+        the parameter `gravity_magnitude`, or else 9.81 m/s^2; other models have none. The inertia is 0. Override it in a model that
+        takes `force_z` and does not fall, or falls by another law.
         """
-        return None
+        own = type(self).columns
+        mass = self.mass if "mass" in own else body.mass
+        gravity = self.gravity_magnitude if "gravity_magnitude" in own else GRAVITY
+        falls = "force_z" in self.body_inputs()
+        return MassProperties(mass, np.zeros((9, body.n)), mass * gravity if falls else np.zeros(body.n))
 
     # -- planning -----------------------------------------------------------------------------------------------------------
 

@@ -9,6 +9,7 @@ import numpy as np
 from tussle.api import kernels
 from tussle.api.bodies import DERIVED
 from tussle.api.laws import BODY
+from tussle.api.mass import MassProperties
 from tussle.api.motion import MotionBody, MotionModel
 from tussle.columns import Param, State
 from tussle.errors import ParameterError
@@ -102,8 +103,8 @@ class RigidBodyModel(MotionModel):
         """Write position, velocity, attitude and angular velocity."""
         kernels.write_rigid_bodies(self.rigid_body, body.table, body.first)
 
-    def mass_properties(self) -> tuple[np.ndarray | None, np.ndarray] | None:
-        """The parameters `mass` and the inertia tensor, if the model has one."""
+    def mass_properties(self, body: MotionBody) -> MassProperties:
+        """As for other models; the inertia tensor is the first `InertiaParam`, if the model has one."""
         tensors = [name for name, column in type(self).params().items() if isinstance(column, InertiaParam)]
-        mass = self.mass if "mass" in type(self).columns else None
-        return (mass, getattr(self, tensors[0])) if tensors else None
+        found = super().mass_properties(body)
+        return found._replace(inertia=getattr(self, tensors[0])) if tensors else found

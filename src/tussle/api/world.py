@@ -11,6 +11,7 @@ from tussle import rng
 from tussle.api.bodies import IN_PLACE, Bodies, BodyView
 from tussle.api.context import Context
 from tussle.api.group import GOLDEN, LAWS, GroupView
+from tussle.api.mass import MassProperties
 from tussle.comms import TopicBuffer
 from tussle.errors import MissionError, ParameterError, listed, nearest_name
 from tussle.messages import Message, Messages
@@ -135,12 +136,14 @@ class WorldView(GroupView):
             self._bodies.touch(int(rows.min()), int(rows.max()) + 1)
         self.moved.append(rows)
 
-    def mass_properties(self) -> tuple[np.ndarray, np.ndarray]:
-        """Mass [kg], (n,), and inertia tensor [kg m^2], body frame, nine elements, (9, n); 0 for bodies that torques do not turn."""
-        mass, inertia = self.context.mass_properties()
+    def mass_properties(self) -> MassProperties:
+        """Mass, inertia and weight of all rows, as their motion models use them; `w.mass` is only the mass of their blocks."""
+        found = self.context.mass_properties()
         if self.table_rows is None:
-            return mass, inertia
-        return mass[self.table_rows], np.take(inertia, self.table_rows, axis=1)  # contiguous, for kernels
+            return found
+        return MassProperties(
+            *(np.take(each, self.table_rows, axis=-1) for each in found)
+        )  # contiguous, for kernels
 
     def spawn(self, block: str, world: Any, **where: Any) -> None:
         """Request new entities of a block, one per item of `world`. They are born at the beginning of the next step.

@@ -13,6 +13,7 @@ import numpy as np
 from tussle.api.bodies import Bodies
 from tussle.api.context import Context
 from tussle.api.kinds import EntityPlugin
+from tussle.api.mass import MassProperties
 from tussle.columns import Param
 from tussle.engine import failure, kernels
 from tussle.engine.group import Binding, Group
@@ -88,16 +89,16 @@ class Population:
         self._of_block = np.zeros(0, np.int64)  # number in `groups` of each block, if its entities share one
         self.on_new_group: Callable[[], None] = lambda: None
 
-    def mass_properties(self) -> tuple[np.ndarray, np.ndarray]:
-        """Mass [kg], (n,), and inertia tensor [kg m^2], (9, n), of all rows; the inertia is 0 if torques have no effect on the row."""
-        mass, inertia = self.bodies.mass.copy(), np.zeros((9, self.bodies.n))
+    def mass_properties(self) -> MassProperties:
+        """Mass, inertia and weight of all rows, from their motion models."""
+        n = self.bodies.n
+        every = MassProperties(np.zeros(n), np.zeros((9, n)), np.zeros(n))
         for group in self.groups:
-            found = group.motion.plugin.mass_properties() if group.n else None
-            if found is not None:
-                own, inertia[:, group.first : group.last] = found
-                if own is not None:
-                    mass[group.first : group.last] = own
-        return mass, inertia
+            if group.n:
+                found = group.motion.plugin.mass_properties(group.motion_view)
+                for column, own in zip(every, found, strict=True):
+                    column[..., group.first : group.last] = own
+        return every
 
     # -- groups -------------------------------------------------------------------------------------------------------------
 

@@ -144,7 +144,7 @@ class Block:
         speed: Initial speed [m/s].
         health: Initial health; an entity is removed when it reaches 0.
         radius: Body radius [m].
-        mass: Mass [kg].
+        mass: Mass [kg], for motion models without a parameter `mass`.
         box: Lengths along the body's x, y and z axes of the box that rays meet [m], (3,); None for a sphere of `radius`.
         rate: Births per second in each slot [1/s]; None if all entities exist from the start.
         slots: With a rate: number of birth sequences that run in parallel.

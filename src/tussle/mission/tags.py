@@ -139,7 +139,9 @@ ENTITY = {
     "count": TagSpec("Total number of entities.", "1", reads="whole"),
     "health": TagSpec("Initial health; an entity is removed at 0.", "1", bound="> 0"),
     "radius": TagSpec("Body radius.", "1", "m", bound="> 0"),
-    "mass": TagSpec("Mass (addition to the format).", "1", "kg", bound="> 0"),
+    "mass": TagSpec(
+        "Mass, for motion models without a parameter `mass` (addition to the format).", "1", "kg", bound="> 0"
+    ),
     "box_x": TagSpec(
         "Length of the box that rays meet instead of the sphere of `radius` (addition).",
         "0",

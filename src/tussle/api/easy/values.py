@@ -38,7 +38,7 @@ NUMBERS = {
     "roll": "Bank, right wing down positive [rad].",
     "health": "Health; the entity is removed when it reaches 0.",
     "radius": "Body radius [m].",
-    "mass": "Mass [kg].",
+    "mass": "Mass of the block [kg].",
     "id": "Id of the entity, unique in its world.",
     "team": "Team number.",
 }

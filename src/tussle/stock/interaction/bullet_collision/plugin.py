@@ -160,7 +160,7 @@ class BulletCollision(Interaction):
         guess: tuple[np.ndarray, np.ndarray],
     ) -> None:
         """Change velocities and positions of the bodies in contact."""
-        mass, inertia = w.mass_properties()
+        mass, inertia, _ = w.mass_properties()
         moves = ~self.remove_on_collision[w.world] & ~np.isin(w.block, self._blocks(w, "fixed"))
         state = found.entered(mass, inertia, w.quat, (w.vel, w.omega), moves)
         materials = self.restitution, self.friction, self.bounce_speed

@@ -4,7 +4,17 @@ from __future__ import annotations
 
 from typing import Any
 
-from tussle.api import HistoricAttributes, InertiaParam, Input, Param, RigidBodyModel
+import numpy as np
+
+from tussle.api import (
+    HistoricAttributes,
+    InertiaParam,
+    Input,
+    MassProperties,
+    MotionBody,
+    Param,
+    RigidBodyModel,
+)
 from tussle.numeric.rigid_body import add, cross, scale, solve, state_rates, times, to_body, to_world
 
 ALIGNMENT_TIME = 0.2
@@ -60,3 +70,7 @@ class RigidBody6DOF(RigidBodyModel):
         moments = add((aileron, elevator, rudder), to_body(rigid_body, torque))
         gyroscopic = cross(times(inertia_matrix, omega), omega)
         return state_rates(rigid_body, acceleration, solve(inertia_matrix, add(moments, gyroscopic)))
+
+    def mass_properties(self, body: MotionBody) -> MassProperties:
+        """Mass and inertia; there is no weight."""
+        return super().mass_properties(body)._replace(weight=np.zeros(body.n))

@@ -4,7 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from tussle.api import HistoricAttributes, Input, MotionBody, MotionModel, Param, State, row_law
+from tussle.api import (
+    HistoricAttributes,
+    Input,
+    MassProperties,
+    MotionBody,
+    MotionModel,
+    Param,
+    State,
+    row_law,
+)
 from tussle.numeric import sincos
 from tussle.stock.motion.simple_car import kernels
 
@@ -49,3 +58,8 @@ class SimpleCar(MotionModel):
         body.pos[:], body.omega[2] = x[:3], x[6]
         body.vel[0], body.vel[1], body.vel[2] = x[5] * cosine, x[5] * sine, x[3]
         body.set_attitude(yaw=x[4])
+
+    def mass_properties(self, body: MotionBody) -> MassProperties:
+        """Mass and, with `enable_gravity`, weight."""
+        found = super().mass_properties(body)
+        return found if self.enable_gravity else found._replace(weight=np.zeros(body.n))

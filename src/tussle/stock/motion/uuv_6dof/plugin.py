@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from tussle.api import InertiaParam, Input, Param, PositiveParam, RigidBodyModel
+import numpy as np
+
+from tussle.api import InertiaParam, Input, MassProperties, MotionBody, Param, PositiveParam, RigidBodyModel
 from tussle.numeric.rigid_body import add, cross, scale, state_rates, to_body, to_world
 from tussle.stock.motion.uuv_6dof import kernels
 
@@ -100,3 +102,9 @@ class UUV6DOF(RigidBodyModel):
         turning = cross(omega, velocity)
         moved = to_world(rigid_body, (a + turning[0], -b - turning[1], -c - turning[2]))
         return state_rates(rigid_body, moved, (p, -q, -r))
+
+    def mass_properties(self, body: MotionBody) -> MassProperties:
+        """Mass, inertia, and the weight in water: less the buoyancy, as in `derivative`."""
+        found = super().mass_properties(body)
+        wet = np.clip(0.5 + (self.surface_height - body.pos[2]) / DIAMETER, 0.0, 1.0)
+        return found._replace(weight=found.weight - wet * self.buoyancy)
