@@ -13,7 +13,7 @@ from tussle import Block, Mission, Recorder, Simulation, load_run
 from tussle.api import Autonomy, Interaction, Output
 from tussle.errors import ParameterError, RecordError
 from tussle.record.events import Events
-from tussle.stock import GroundCollision, SingleIntegrator
+from tussle.stock import GroundCollision, SingleIntegrator, Still
 
 FILES = {"trajectory.arrow", "events.arrow", "summary.csv", "run.json"}
 
@@ -315,14 +315,13 @@ def test_listeners_hear_the_kinds_they_ask_for():
 def test_a_death_is_reported_once_for_its_first_reason():
     class Twice(Interaction):
         def step(self, w):
-            if w.t[0] > 0.05:
-                w.kill(np.array([3, 1]), "first")
-                w.kill(np.array([1, 2]), "second")
+            w.kill(np.array([3, 1]), "first")
+            w.kill(np.array([1, 2]), "second")
 
-    block = Block(name="a", count=5, motion=SingleIntegrator())
+    block = Block(name="a", count=5, motion=Still())
     sim, heard = Simulation(Mission(blocks=[block], dt=0.1, end=1, interactions=[Twice()])), []
     sim.events.listen(heard.append, ["death"])
-    sim.step(2)
+    sim.step()
     assert [(e.id.tolist(), e.text) for e in heard] == [([2, 3, 4], ["first", "second", "first"])]
 
 
