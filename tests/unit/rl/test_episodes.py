@@ -90,14 +90,18 @@ def one_or_each(values):
     return values | st.lists(values, min_size=N, max_size=N)
 
 
-PARAMS = st.none() | st.just({}) | st.fixed_dictionaries(
-    {},
-    optional={
-        SPEED: one_or_each(st.sampled_from([0.5, 10.0, "40 kt"])),
-        TURN: one_or_each(st.sampled_from([0.25, 1.5])),
-        REACH: one_or_each(st.sampled_from([0.0, 30.0])),
-        BANKS: one_or_each(st.booleans()),
-    },
+PARAMS = (
+    st.none()
+    | st.just({})
+    | st.fixed_dictionaries(
+        {},
+        optional={
+            SPEED: one_or_each(st.sampled_from([0.5, 10.0, "40 kt"])),
+            TURN: one_or_each(st.sampled_from([0.25, 1.5])),
+            REACH: one_or_each(st.sampled_from([0.0, 30.0])),
+            BANKS: one_or_each(st.booleans()),
+        },
+    )
 )
 SEED = st.integers(0, 2**64 - 1)
 RESET = st.tuples(
