@@ -144,7 +144,7 @@ def results_of(cls: Any) -> dict[str, Value]:
     return found
 
 
-def laws_of(plugin: Any, wired: Collection[str] | None = None) -> list[RowCall]:
+def laws_of(plugin: Any, wired: frozenset[str] | None = None) -> list[RowCall]:
     """Return the calls of the laws that a plugin runs; `wired` names the outputs that other plugins read, None means all."""
     cls = type(plugin)
     inputs = cls.inputs()
@@ -155,7 +155,7 @@ def laws_of(plugin: Any, wired: Collection[str] | None = None) -> list[RowCall]:
         call = law.call(plugin)
         gives = {each.key[0] for each in numbers_of(call.results) if isinstance(each.key, tuple)}
         outputs = gives & cls.outputs().keys()
-        is_read = wired is None or not outputs or not outputs.isdisjoint(wired)
+        is_read = wired is None or not outputs or not wired.isdisjoint(outputs)
         if is_read and off.isdisjoint(law.arguments):
             calls.append(call)
     return calls

@@ -90,6 +90,8 @@ def read(state: SimulationState, path: str) -> tuple[np.ndarray, np.ndarray]:
             binding = _binding(group, key) if key else None
             if not len(mine) or (key and binding is None):
                 continue
+            if binding is not None:
+                binding.check_is_written(name, repr(path))
             at = bodies.world[rows[mine]], bodies.block_index[rows[mine]]
             alive[at] = True
             if binding is None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,7 +14,7 @@ from tussle.api.world import WorldView
 from tussle.comms.topic import Delivery, TopicBuffer
 from tussle.messages import EntityCaptured, EntityCollided, EntityHitGround, FlagCaptured, FlagTaken, Message
 from tussle.record import Events
-from tussle.record.events import BIRTH, CAPTURE, COLLISION, DEATH, END, FLAG
+from tussle.record.events import BIRTH, CAPTURE, COLLISION, DEATH, END, FLAG, KINDS
 
 if TYPE_CHECKING:
     from tussle.record.traffic import Traffic
@@ -43,29 +43,33 @@ class Listeners:
         self.on_change: Callable[[], None] = lambda: None
         self.traffic: list[Traffic] = []
         self._context = context
-        self._listeners: list[Callable[[Events], None]] = []
+        self._listeners: list[tuple[Callable[[Events], None], frozenset[str]]] = []
         self._causes: dict[tuple[int, int], int] = {}
 
     def __bool__(self) -> bool:
         return bool(self._listeners)
 
-    def listen(self, listener: Callable[[Events], None]) -> None:
-        """Add a listener, which is called with all later events."""
-        self._listeners.append(listener)
+    def listen(self, listener: Callable[[Events], None], kinds: Collection[str] = KINDS) -> None:
+        """Add a listener, which is called with all later events of some kinds; by default of all kinds."""
+        self._listeners.append((listener, frozenset(kinds)))
         self.on_change()
 
     def forget(self, listener: Callable[[Events], None]) -> None:
         """Remove a listener. Does nothing if it was not added."""
-        if listener in self._listeners:
-            self._listeners.remove(listener)
+        added = [known for known, _ in self._listeners]
+        if listener in added:
+            del self._listeners[added.index(listener)]
             self.on_change()
 
     def _report(self, events: Events) -> None:
-        for listener in () if self.is_replaying else list(self._listeners):
-            listener(events)
+        for listener, kinds in () if self.is_replaying else list(self._listeners):
+            if events.kind in kinds:
+                listener(events)
 
     def births(self, new: Bodies) -> None:
         """Report the births of new entities."""
+        if not any(BIRTH in kinds for _, kinds in self._listeners):
+            return  # their texts take longer than the rest
         names = self._context.block_names
         step = self._context.clock.step[new.world]
         text = [names[b] for b in new.block]
@@ -103,13 +107,16 @@ class Listeners:
             deaths: (rows, reason) of each call of `kill`.
             step: Step of the deaths in each world, (n_worlds,).
         """
-        number = np.repeat(np.arange(len(deaths)), [len(rows) for rows, _ in deaths])
-        rows, first = np.unique(np.concatenate([rows for rows, _ in deaths]), return_index=True)
-        order = np.lexsort((bodies.id[rows], bodies.world[rows]))
-        rows, why = rows[order], [deaths[i][1] for i in number[first[order]]]
-        world, ids = bodies.world[rows], bodies.id[rows]
-        by = [self._causes.get(key, 0) for key in zip(world.tolist(), ids.tolist(), strict=True)]
-        self._report(Events(DEATH, world, step[world], ids, np.array(by, np.int64), why))
+        rows = np.concatenate([rows for rows, _ in deaths])
+        why = [text for some, text in deaths for _ in range(len(some))]
+        key = bodies.world[rows] << 32 | bodies.id[rows]
+        if not (key[1:] > key[:-1]).all():
+            _, first = np.unique(key, return_index=True)
+            rows, why = rows[first], [why[i] for i in first]
+        world, ids, by = bodies.world[rows], bodies.id[rows], np.zeros(len(rows), np.int64)
+        if self._causes:
+            by[:] = [self._causes.get(who, 0) for who in zip(world.tolist(), ids.tolist(), strict=True)]
+        self._report(Events(DEATH, world, step[world], ids, by, why))
 
     def end(self, world: int, reason: str) -> None:
         """Report the end of a world."""

@@ -15,6 +15,7 @@ from tussle.api.easy.plugins import EasyEntityPlugin
 from tussle.api.group import GroupView
 from tussle.api.motion import MotionBody
 from tussle.api.rigid_body import RigidBodyModel
+from tussle.api.wired import Wired
 from tussle.columns import (
     Channel,
     EntityRef,
@@ -28,7 +29,7 @@ from tussle.columns import (
 from tussle.comms import Inbox, Publisher
 from tussle.engine.table import ColumnPlace, Table
 from tussle.engine.wiring import BELIEF, Link, Wiring, read_channels
-from tussle.errors import DeclarationError, WiringError, listed, nearest_name
+from tussle.errors import DeclarationError, ParameterError, WiringError, listed, nearest_name
 
 
 @dataclass
@@ -47,6 +48,7 @@ class Binding:
         ragged: Attribute -> index of its list column in the table.
         handles: Attribute -> one object per row.
         children: Bindings of the plugins inside this plugin.
+        wired: Outputs that other plugins read.
     """
 
     plugin: Any
@@ -60,12 +62,24 @@ class Binding:
     ragged: dict[str, int] = field(default_factory=dict)
     handles: dict[str, list[Any]] = field(default_factory=dict)
     children: list[Binding] = field(default_factory=list)
+    wired: frozenset[str] = frozenset()
 
     def walk(self) -> Iterator[Binding]:
         """Yield this binding and all bindings inside it."""
         yield self
         for child in self.children:
             yield from child.walk()
+
+    def check_is_written(self, name: str, where: str) -> None:
+        """Check that the plugin writes a column.
+
+        Raises:
+            ParameterError: It is an output that the plugin leaves out, since nobody reads it.
+        """
+        if name in self.plugin.wired.skipped:
+            raise ParameterError(
+                f"{where} is not computed: {self.path[-1]} leaves out {name!r}, since no plugin of its entity reads it"
+            )
 
     def attach(self, table: Table) -> None:
         """Set the plugin's attributes to the current arrays."""
@@ -255,7 +269,8 @@ class Group:
             inner = [self._bind(child, view, binding.path, is_private=hides) for child in spec.values[name]]
             plugin.__dict__[name] = [b.plugin for b in inner]
             binding.children += inner
-        plugin.__dict__["wired"] = frozenset(wired)
+        binding.wired = frozenset(wired)
+        plugin.__dict__["wired"] = Wired(wired)
         for service in type(spec).services:
             for one in self.views if hasattr(self, "motion_view") else [view]:
                 one.services[service] = getattr(plugin, service)

@@ -38,17 +38,8 @@ class Overrides:
         Raises:
             ParameterError: A path does not exist, or a value is not allowed.
         """
-        checked = []  # check all values before setting any
-        for path, value in values.items():
+        for path, items in self.checked(values, len(worlds)).items():
             key, column = self._find(path)
-            is_many = isinstance(value, (list, np.ndarray)) and np.ndim(value) > len(column.shape)
-            if is_many and len(value) != len(worlds):
-                raise ParameterError(
-                    f"{path!r} has {len(value)} values for {len(worlds)} worlds; give one value, or one per world"
-                )
-            items = [column.convert(v, path) for v in (value if is_many else [value] * len(worlds))]
-            checked.append((key, column, items))
-        for key, column, items in checked:
             if column.structural:
                 row = self.structural.setdefault(key, [None] * self.n_worlds)
                 for w, item in zip(worlds, items, strict=True):
@@ -59,6 +50,31 @@ class Overrides:
                 self.given[key] = np.zeros(self.n_worlds, bool)
             self.columns[key][worlds] = np.asarray(items, float)
             self.given[key][worlds] = True
+
+    def checked(self, values: Mapping[str, Any], n_worlds: int) -> dict[str, list[Any]]:
+        """Values of n_worlds worlds by path, in SI units; nothing is set.
+
+        Raises:
+            ParameterError: As in `set`.
+        """
+        found = {}
+        for path, value in values.items():
+            _, column = self._find(path)
+            is_many = isinstance(value, (list, np.ndarray)) and _depth(value) > len(column.shape)
+            if is_many and len(value) != n_worlds:
+                raise ParameterError(
+                    f"{path!r} has {len(value)} values for {n_worlds} worlds; give one value, or one per world"
+                )
+            found[path] = [column.convert(v, path) for v in (value if is_many else [value] * n_worlds)]
+        return found
+
+    def clear(self, worlds: np.ndarray) -> None:
+        """Give `worlds` the mission's own values again."""
+        for given in self.given.values():
+            given[worlds] = False
+        for row in self.structural.values():
+            for w in worlds:
+                row[w] = None
 
     def save(self) -> list[dict[Any, Any]]:
         """Copy all values, for snapshots."""
@@ -113,3 +129,8 @@ class Overrides:
                 mission = paths.with_value(mission, ".".join((owner, *plugins, name)), value)
             self._variants[key] = tuple(mission.blocks)
         return self._variants[key]
+
+
+def _depth(value: Any) -> int:
+    """Number of axes of a list of numbers or texts, whose items may differ in form."""
+    return 1 + max(map(_depth, value), default=0) if isinstance(value, (list, tuple)) else np.ndim(value)

@@ -169,7 +169,7 @@ def hashed(state: SimulationState, world: int) -> Iterator[tuple[str, Any]]:
 def _hashed_columns(group: Group, binding: Binding, rows: np.ndarray) -> Iterator[tuple[str, Any]]:
     for name, column in type(binding.spec).columns.items():
         is_memory = isinstance(column, (State, EntityRef)) or (
-            isinstance(column, Output) and name in binding.plugin.wired
+            isinstance(column, Output) and name in binding.wired
         )
         is_memory &= name not in binding.spec.unused_states()
         label = ".".join((*binding.path, name))

@@ -13,6 +13,7 @@ CAPTURE: Final = "capture"
 COLLISION: Final = "collision"
 FLAG: Final = "flag"
 END: Final = "end"
+KINDS: Final = (BIRTH, DEATH, CAPTURE, COLLISION, FLAG, END)
 
 
 @dataclass(frozen=True)

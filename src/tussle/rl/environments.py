@@ -13,6 +13,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from tussle.errors import ParameterError, listed, nearest_name
+from tussle.rl.episodes import checked_seeds, is_whole
 from tussle.rl.swarm import Swarm, task_of
 from tussle.rl.task import Task
 
@@ -22,7 +23,8 @@ MODES = {
     "disabled": AutoresetMode.DISABLED,
 }
 RENDER_MODES = ("rgb_array", "human")
-OPTIONS = ("params", "reset_mask")
+OPTIONS = ("params",)
+VECTOR_OPTIONS = ("params", "reset_mask")
 
 
 def world_spaces(task: Task) -> tuple[spaces.Box, spaces.Space[Any]]:
@@ -37,16 +39,27 @@ def world_spaces(task: Task) -> tuple[spaces.Box, spaces.Space[Any]]:
     return box, batch_space(action, n)
 
 
-def check_options(options: Any) -> dict[str, Any]:
+def check_options(options: Any, known: tuple[str, ...] = OPTIONS) -> dict[str, Any]:
     """Options of a reset; warns of those that have no effect."""
     given = dict(options or {})
     for name in given:
-        if name not in OPTIONS:
+        if name not in known:
             warnings.warn(
-                f"reset ignores the option {name!r}{nearest_name(name, OPTIONS)}; {listed(OPTIONS)}",
+                f"reset ignores the option {name!r}{nearest_name(name, known)}; {listed(known)}",
                 stacklevel=3,
             )
     return given
+
+
+def reset_one(swarm: Swarm, seed: Any, options: Any) -> None:
+    """Reset a swarm of one world, whose seed is one number.
+
+    Raises:
+        ParameterError: The seed or a parameter is not allowed.
+    """
+    if seed is not None and not is_whole(seed):
+        raise ParameterError(f"seed = {seed!r} is not allowed; it takes a whole number, or None")
+    swarm.reset(seed, None, options.get("params"))
 
 
 class Pictures:
@@ -136,21 +149,33 @@ class TaskVectorEnv(VectorEnv[Any, Any, Any]):
         }
 
     def reset(self, *, seed: Any = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
-        """Start new episodes; `options` may have "reset_mask", worlds (W,), and "params", parameters by path."""
-        given = check_options(options)
-        mask = given.get("reset_mask")
-        if isinstance(seed, (list, tuple)):  # a missing seed continues the sequence of its world
-            known = [w for w, s in enumerate(seed) if s is not None and (mask is None or mask[w])]
-            others = [w for w, s in enumerate(seed) if s is None and (mask is None or mask[w])]
-            if others:
-                self.swarm.reset(None, others)
-            if known:
-                self.swarm.reset([seed[w] for w in known], known, given.get("params"))
-        else:
-            super().reset(seed=seed)
-            self.swarm.reset(seed, None if mask is None else np.asarray(mask, bool), given.get("params"))
+        """Start new episodes.
+
+        Args:
+            seed: Seed of world 0, world k has seed + k; or one for each world, of which None continues the sequence of its world.
+            options: "reset_mask" chooses the worlds, (W,); "params" are parameters by path, as in `Swarm.reset`: one value, or one
+                for each chosen world.
+
+        Raises:
+            ParameterError: A seed, the mask or a parameter is not allowed. Nothing has changed.
+        """
+        given = check_options(options, VECTOR_OPTIONS)
+        worlds = self._chosen(given.get("reset_mask"))
+        seeds = checked_seeds(seed, np.arange(self.num_envs))
+        self.swarm.reset([seeds[w] for w in worlds], worlds, given.get("params"))
+        if is_whole(seed):
+            super().reset(seed=int(seed))
         self._pictures.follow()
         return self._seen(self.swarm.obs), self._info(np.ones(self.num_envs, bool))
+
+    def _chosen(self, mask: Any) -> np.ndarray:
+        """Numbers of the worlds of a mask; None stands for all."""
+        chosen = np.ones(self.num_envs, bool) if mask is None else np.asarray(mask)
+        if chosen.shape != (self.num_envs,) or not np.isin(chosen, (0, 1)).all():
+            raise ParameterError(
+                f"reset_mask = {chosen.tolist()} is not allowed; it takes {self.num_envs} truth values, one per world"
+            )
+        return np.flatnonzero(chosen)
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
         """Play one decision in all worlds; rewards are sums over agents."""
@@ -203,8 +228,8 @@ class TaskEnv(gymnasium.Env[Any, Any]):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
         """Start a new episode; `options` may have "params", parameters by path."""
-        super().reset(seed=seed)
-        self.swarm.reset(seed, None, check_options(options).get("params"))
+        reset_one(self.swarm, seed, check_options(options))
+        super().reset(seed=None if seed is None else int(seed))
         self._pictures.follow()
         return self._seen(self.swarm.obs), self._info()
 

@@ -237,6 +237,7 @@ def _plugin_column(group: Group, path: str) -> tuple[np.ndarray, int, int, int]:
     """Table of a plugin's column, body row of its first column, row in the table, and number of rows."""
     plugin, _, name = path.partition(".")
     binding = next(b for b in group.walk() if b.path == (plugin,))
+    binding.check_is_written(name, f"Own: {path!r}")
     place = binding.places[name]
     table = np.ascontiguousarray(group.table.arrays[place.dtype], float)
     return table, group.first, place.first, max(1, place.k)

@@ -10,7 +10,7 @@ import numpy as np
 from pettingzoo import ParallelEnv
 
 from tussle.errors import ParameterError, nearest_name
-from tussle.rl.environments import Pictures, check_options, metadata_of
+from tussle.rl.environments import Pictures, check_options, metadata_of, reset_one
 from tussle.rl.swarm import Swarm
 
 DTYPE, SHAPE = attrgetter("dtype"), attrgetter("shape")
@@ -58,7 +58,8 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
         """Start a new episode; `options` may have "params", parameters by path."""
-        self.swarm.reset(seed, None, check_options(options).get("params"))
+        reset_one(self.swarm, seed, check_options(options))
+        self._actions[:] = 0
         self.agents = self._living()
         self._at = self._numbers(self.agents)
         self._pictures.follow()
@@ -93,6 +94,7 @@ class TaskParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]  # Pett
             reported = before + [name for name in self.agents if name not in set(before)]
             self.agents = [name for name in self.agents if not dead[self._number[name]]]
             numbers, self._at = self._numbers(reported), self._numbers(self.agents)
+            self._actions[~swarm.alive[0]] = 0  # of the dead, which `Situation.actions` would still show
         rewards, deaths, ends = (
             self._by_name(reported, values[0, numbers])
             for values in (swarm.rewards, swarm.terminations, swarm.truncations)

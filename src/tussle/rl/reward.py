@@ -10,12 +10,17 @@ import numpy as np
 
 from tussle.api.bodies import FLOATS
 from tussle.errors import ParameterError, listed, nearest_name
-from tussle.record.events import CAPTURE, COLLISION, DEATH
+from tussle.record.events import CAPTURE, COLLISION, DEATH, FLAG
 
 if TYPE_CHECKING:
     from tussle.engine.simulation import Simulation
 
 SHARES = ("agent", "team", "world")
+COUNTED = (CAPTURE, COLLISION, DEATH, FLAG)
+"""Kinds of events that a situation counts."""
+IDS = ("id", "other")
+NOBODY = -1
+"""Id of an agent that has not been born; events have 0 for none."""
 
 
 class Situation:
@@ -28,6 +33,7 @@ class Situation:
         died: Who died, (W, A).
         actions: The actions, as given to `step`.
         team: Team of each agent's block, (A,).
+        id: Id of each agent in its world, (W, A); -1 of those that have not been born.
         t: Time of each world [s], (W,).
     """
 
@@ -36,9 +42,10 @@ class Situation:
         self.team = team
         self.alive, self.was_alive, self.died = alive, alive.copy(), np.zeros_like(alive)
         self.actions: Any = None
-        self.id = np.zeros(alive.shape, np.int64)
+        self.id = np.full(alive.shape, NOBODY)
         self.rows = self.agents = np.zeros(0, np.int64)
         self._events: list[Any] = []
+        self._begun = np.zeros(len(alive), bool)  # worlds whose events belong to an earlier episode
         self._columns: dict[str, np.ndarray] = {}
 
     @property
@@ -61,29 +68,44 @@ class Situation:
         self._columns.clear()
 
     def listen(self, events: Any) -> None:
-        """Keep the events of a step."""
-        if events.kind in (CAPTURE, COLLISION, DEATH):
-            self._events.append(events)
+        """Keep the events of a step, of kinds that are counted."""
+        self._events.append(events)
 
     def count(self, kind: str, ids: str = "id", text: str | None = None) -> np.ndarray:
         """Return the number of events of a kind that concern each agent in this decision, (W, A).
 
         Args:
-            kind: "capture", "collision" or "death".
+            kind: "capture", "collision", "death" or "flag".
             ids: Which of an event's entities counts, "id" or "other", as in `events.arrow`.
             text: Only events with this text, such as the cause of a death.
+
+        Raises:
+            ParameterError: There is no such kind, or `ids` is neither.
         """
+        if kind not in COUNTED:
+            raise ParameterError(
+                f"count: kind = {kind!r} is not allowed{nearest_name(str(kind), COUNTED)}; {listed(COUNTED)}"
+            )
+        if ids not in IDS:
+            raise ParameterError(f"count: ids = {ids!r} is not allowed; {listed(IDS)}")
         out = np.zeros(self.alive.shape)
         for events in self._events:
             if events.kind == kind:
                 found = self.id[events.world] == np.asarray(getattr(events, ids))[:, None]
+                found &= ~self._begun[events.world][:, None]
                 if text is not None:
                     found &= (np.asarray(events.text, object) == text)[:, None]
                 np.add.at(out, events.world, found)
         return out
 
     def clear_events(self) -> None:
+        """Forget the events of the last decision."""
         self._events.clear()
+        self._begun[:] = False
+
+    def begin(self, worlds: np.ndarray) -> None:
+        """Nothing has happened in worlds whose episode begins."""
+        self.was_alive[worlds], self.died[worlds], self._begun[worlds] = self.alive[worlds], False, True
 
 
 def alive(now: Situation) -> np.ndarray:
@@ -128,9 +150,6 @@ def closing(now: Situation, blocks: str) -> np.ndarray:
         return np.where(np.isfinite(length[..., 0]), (relative * towards).sum(axis=-1), 0.0)
 
 
-USES_EVENTS = (captures, captured, collisions)
-
-
 @dataclass(frozen=True)
 class Term:
     """One term of the reward.
@@ -139,23 +158,17 @@ class Term:
         function: Function of a `Situation`: values that broadcast to (W, A).
         weight: Factor.
         per: Who receives it: "agent", or the sum over the agents of the "team" or "world".
-        uses_events: Whether `function` calls `Situation.count`; known for the functions of this module.
     """
 
     function: Callable[[Situation], Any]
     weight: float = 1.0
     per: str = "agent"
-    uses_events: bool = False
 
     def __post_init__(self) -> None:
         if self.per not in SHARES:
             raise ParameterError(f"Term: per = {self.per!r} is not allowed; {listed(SHARES)}")
         if not np.isfinite(self.weight):
             raise ParameterError(f"Term: weight = {self.weight!r} is not allowed; it takes a finite number")
-
-    @property
-    def reads_events(self) -> bool:
-        return self.uses_events or self.function in USES_EVENTS
 
     def write(self, now: Situation, out: np.ndarray) -> None:
         """Write the weighted values to out, (W, A); 0 for agents that were dead before."""

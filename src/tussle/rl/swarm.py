@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-import copy
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 
-from tussle import rng
 from tussle.engine.simulation import Simulation
-from tussle.errors import ParameterError, listed
+from tussle.errors import ParameterError, SnapshotError, listed
+from tussle.rl.episodes import Episodes, checked_params, checked_seeds, checked_worlds
 from tussle.rl.observation import AgentRows
-from tussle.rl.reward import Situation
+from tussle.rl.reward import COUNTED, NOBODY, Situation
 from tussle.rl.task import Task
 
 AUTORESET = ("next_step", "same_step", "disabled")
-EPISODE = rng.stream_key("tussle.rl", "episode")
 
 
 def task_of(task: Any) -> Task:
@@ -76,24 +75,19 @@ class Swarm:
         self.terms = {name: np.zeros(shape, dtype) for name in task.reward}
         self.terminations, self.truncations, self.alive = np.zeros((3, *shape), bool)
         self.lengths, (self.over, self.late) = np.zeros(worlds, np.int64), np.zeros((2, worlds), bool)
-        self.seeds = np.zeros(worlds, np.uint64)
-        self._first, self._episode = self.seeds.copy(), np.zeros(worlds, np.int64)
-        self._params: dict[str, Any] = {}
-        self._reset(
-            np.arange(worlds), np.random.SeedSequence().generate_state(worlds, np.uint64) >> np.uint64(1)
-        )
+        self.episodes = Episodes(task, worlds)
+        self.seeds = self.episodes.seeds
         self.simulation = Simulation(
             task.played,
             self.seeds.tolist(),
-            self._drawn(np.arange(worlds)),
+            self.episodes.drawn(np.arange(worlds)),
             threads=threads,
             on_error="raise",
         )
         self.is_fresh = True
         team = np.array([b.team for b in task.blocks])[task.agent_block]
         self.now = Situation(self.simulation, team, self.alive)
-        if any(term.reads_events for term in task.reward.values()):
-            self.simulation.events.listen(self.now.listen)
+        self.simulation.events.listen(self.now.listen, COUNTED)
         first = np.cumsum([0, *task.capacities])
         names = [b.name for b in task.given.blocks]
         self._blocks = {
@@ -109,52 +103,22 @@ class Swarm:
         self._parts: list[AgentRows] = []
         self._check_ends = True
 
-    # -- seeds -------------------------------------------------------------------------------------------------------------
-
-    def _reset(self, worlds: np.ndarray, seeds: np.ndarray | None = None) -> None:
-        """Set the seeds of the next episodes: given ones, or those that follow."""
-        if seeds is not None:
-            self._first[worlds], self._episode[worlds] = seeds, 0
-        else:
-            self._episode[worlds] += 1
-        shares = rng.uniform(self._first[worlds], EPISODE, 0, self._episode[worlds])[0]
-        follows = (shares * 2.0**53).astype(np.uint64)
-        self.seeds[worlds] = np.where(self._episode[worlds] == 0, self._first[worlds], follows)
-
-    def _drawn(self, worlds: np.ndarray) -> dict[str, Any]:
-        """Parameters of the next episodes: variables of the task, and those given to `reset`."""
-        drawn: dict[str, Any] = {}
-        for variable in self.task.variables:
-            share = rng.uniform(self.seeds[worlds], rng.stream_key("tussle.rl", variable.name), 0, 0)[0]
-            drawn[variable.name] = [variable.setting(variable.value_at(float(s))) for s in share]
-        return {**drawn, **self._params}
-
-    def _checked_seeds(self, seed: Any, worlds: np.ndarray) -> np.ndarray | None:
-        if seed is None:
-            return None
-        many = [seed + int(w) for w in worlds] if isinstance(seed, (int, np.integer)) else list(seed)
-        if len(many) != len(worlds) or any(
-            isinstance(s, bool) or not isinstance(s, (int, np.integer)) or s < 0 for s in many
-        ):
-            raise ParameterError(
-                f"seed = {seed!r} is not allowed; it takes a whole number >= 0, or one for each of {len(worlds)} worlds"
-            )
-        return np.array([int(s) % 2**64 for s in many], np.uint64)
-
     # -- episodes ----------------------------------------------------------------------------------------------------------
 
     def reset(
         self,
-        seed: int | Iterable[int] | None = None,
+        seed: int | Iterable[int | None] | None = None,
         worlds: Any = None,
         params: Mapping[str, Any] | None = None,
     ) -> np.ndarray:
-        """Start new episodes.
+        """Start new episodes. If something is not allowed, nothing changes.
 
         Args:
-            seed: Seed of world 0, world k has seed + k; or one for each of `worlds`; None continues the sequence of each world.
+            seed: Seed of world 0, world k has seed + k; or one for each of `worlds`; None continues the sequence of each world, or in
+                a list that of one world.
             worlds: Numbers of the worlds, or a mask (W,); by default all.
-            params: Parameters by path, as for `Simulation`; they stay for later episodes.
+            params: Parameters by path, as for `Simulation`: one value, or one for each of `worlds`. A world keeps them in later
+                episodes, besides those it was given before. {} returns to the mission's own values, None keeps the present ones.
 
         Returns:
             Observations, (W, A, n).
@@ -162,33 +126,55 @@ class Swarm:
         Raises:
             ParameterError: A world, a seed or a parameter is not allowed.
         """
-        chosen = np.arange(self.n_worlds) if worlds is None else np.atleast_1d(np.asarray(worlds))
-        chosen = np.flatnonzero(chosen) if chosen.dtype == bool else chosen
-        if len(np.unique(chosen)) < len(chosen) or not set(chosen.tolist()) <= set(range(self.n_worlds)):
-            raise ParameterError(
-                f"worlds = {chosen.tolist()} is not allowed; it takes numbers from 0 to {self.n_worlds - 1}, each once"
-            )
-        seeds = self._checked_seeds(seed, chosen)
-        if seeds is not None or not self.is_fresh:
-            self._reset(chosen, seeds)
-        if params:
-            self._params = {**self._params, **params}
-        self._begin(chosen)
-        self.over[chosen] = False
+        chosen = checked_worlds(worlds, self.n_worlds)
+        seeds = checked_seeds(seed, chosen)
+        values = checked_params(params, self.simulation.state.overrides, len(chosen))
+        with self._undone_if_refused(values is not None):
+            self.episodes.begin(chosen, seeds, self.is_fresh)
+            if values is not None:
+                self.episodes.set_params(chosen, values)
+                if not values:
+                    self.simulation.state.overrides.clear(chosen)
+            self._begin(chosen, values)
+            self.over[chosen] = False
+            self._observe(None if self.is_fresh else chosen)
         self.is_fresh = False
-        self._observe(chosen)
         return self.obs
 
-    def _begin(self, worlds: np.ndarray) -> None:
-        """Restart worlds with their seeds."""
-        self.simulation.reset(worlds, self.seeds[worlds].tolist(), self._drawn(worlds))
-        self.now.clear_events()
-        self.returns[worlds], self.lengths[worlds] = 0.0, 0
-        self._look()
-        self.now.was_alive[worlds], self.now.died[worlds] = self.alive[worlds], False
+    @contextmanager
+    def _undone_if_refused(self, has_params: bool) -> Iterator[None]:
+        """Undo a reset if worlds cannot begin with their new parameters, which can each be allowed and leave no room together."""
+        if not has_params:
+            yield
+            return
+        episodes, overrides, is_fresh = self.episodes.state(), self.simulation.state.overrides, self.is_fresh
+        params = overrides.save()
+        try:
+            saved = self.state()
+        except SnapshotError:  # a plugin's objects cannot be copied
+            saved = None
+        try:
+            yield
+        except Exception:
+            if saved is not None:
+                self.restore(saved)
+                self.is_fresh = is_fresh
+            else:
+                self.episodes.restore(episodes)
+                overrides.restore(params)
+                self.is_fresh = True  # another reset has to come first
+            raise
 
-    def _look(self) -> None:
-        """Find the agents' rows, if entities were born or removed."""
+    def _begin(self, worlds: np.ndarray, params: Mapping[str, list[Any]] | None = None) -> None:
+        """Restart worlds with their seeds and parameters, of which `params` are new."""
+        drawn = self.episodes.drawn(worlds)
+        self.simulation.reset(worlds, self.seeds[worlds].tolist(), {**drawn, **(params or {})})
+        self.returns[worlds], self.lengths[worlds] = 0.0, 0
+        self._look(worlds)
+        self.now.begin(worlds)
+
+    def _look(self, begun: np.ndarray | None = None) -> None:
+        """Find the agents' rows, if entities were born or removed; in worlds that have begun, forget earlier agents."""
         bodies = self.simulation.state.population.bodies
         self.now.forget()
         if bodies.ints is self._ints:
@@ -196,6 +182,8 @@ class Swarm:
         self._ints, self._parts = bodies.ints, []
         alive, ids = self.alive.reshape(-1), self.now.id.reshape(-1)
         alive[:], kept = False, {}  # type: ignore[var-annotated]
+        if begun is not None:
+            self.now.id[begun] = NOBODY
         for group in self.simulation.state.population.groups:
             block = bodies.block[group.first : group.last]
             for number, (name, first, room) in self._blocks.items():
@@ -283,7 +271,7 @@ class Swarm:
         return self.obs, self.rewards, self.terminations, self.truncations, info
 
     def _restart(self, worlds: np.ndarray) -> None:
-        self._reset(worlds)
+        self.episodes.follow(worlds)
         self._begin(worlds)
 
     def _clear(self, worlds: np.ndarray) -> None:
@@ -373,9 +361,6 @@ class Swarm:
         "late",
         "returns",
         "lengths",
-        "seeds",
-        "_first",
-        "_episode",
         "rewards",
         "terminations",
         "truncations",
@@ -384,14 +369,16 @@ class Swarm:
     def state(self) -> dict[str, Any]:
         """A copy of everything; after `restore`, the same actions give the same bits."""
         saved = {name: getattr(self, name).copy() for name in self.KEPT}
-        return {"simulation": self.simulation.snapshot(), "params": copy.deepcopy(self._params), **saved}
+        saved |= {"ids": self.now.id.copy(), "episodes": self.episodes.state()}
+        return {"simulation": self.simulation.snapshot(), **saved}
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Return to a state of this swarm, or of another one with the same task and number of worlds."""
         self.simulation.restore(state["simulation"])
-        self._params = copy.deepcopy(state["params"])
+        self.episodes.restore(state["episodes"])
         self._ints = None
         self._look()
+        self.now.id[...] = state["ids"]
         for name in self.KEPT:
             getattr(self, name)[...] = state[name]
         self.is_fresh = False

@@ -260,6 +260,25 @@ def test_wired_tells_which_outputs_have_a_reader():
     assert sim.read("a.Chatty.unheard")[0].tolist() == [[1.0]]
 
 
+@pytest.mark.parametrize("ask", [lambda w: "unheard" in w, lambda w: not w.isdisjoint(["unheard"])])
+def test_an_output_that_is_left_out_cannot_be_read(ask):
+    class Thrifty(Autonomy):
+        velocity = Output(VELOCITY, unit="m/s")
+        unheard = Output(unit="m")
+
+        def step(self, g):
+            if ask(self.wired):
+                self.unheard[:] = 1.0
+            assert "velocity" in self.wired
+            assert not self.wired.isdisjoint(["velocity", "unheard"])
+
+    sim = Simulation(mission(block(autonomy=Thrifty())))
+    sim.step()
+    assert sim.read("a.Thrifty.velocity")[1].all()
+    with pytest.raises(ParameterError, match=r"'a.Thrifty.unheard' is not computed: Thrifty leaves out"):
+        sim.read("a.Thrifty.unheard")
+
+
 # -- belief -----------------------------------------------------------------------------------------------------------------------
 
 

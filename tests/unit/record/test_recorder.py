@@ -10,10 +10,10 @@ from recorded_games import head_on, hunt
 
 import tussle
 from tussle import Block, Mission, Recorder, Simulation, load_run
-from tussle.api import Autonomy, Output
+from tussle.api import Autonomy, Interaction, Output
 from tussle.errors import ParameterError, RecordError
 from tussle.record.events import Events
-from tussle.stock import GroundCollision, SingleIntegrator
+from tussle.stock import GroundCollision, SingleIntegrator, Still
 
 FILES = {"trajectory.arrow", "events.arrow", "summary.csv", "run.json"}
 
@@ -300,6 +300,29 @@ def test_listeners_hear_while_they_listen():
     n = len(heard)
     sim.run()
     assert len(heard) == n
+
+
+def test_listeners_hear_the_kinds_they_ask_for():
+    sim = Simulation(hunt())
+    every, some = [], []
+    sim.events.listen(every.append)
+    sim.events.listen(some.append, ["death", "end"])
+    sim.run()
+    assert {e.kind for e in every} > {e.kind for e in some} == {"death", "end"}
+    assert [id(e) for e in every if e.kind in ("death", "end")] == [id(e) for e in some]
+
+
+def test_a_death_is_reported_once_for_its_first_reason():
+    class Twice(Interaction):
+        def step(self, w):
+            w.kill(np.array([3, 1]), "first")
+            w.kill(np.array([1, 2]), "second")
+
+    block = Block(name="a", count=5, motion=Still())
+    sim, heard = Simulation(Mission(blocks=[block], dt=0.1, end=1, interactions=[Twice()])), []
+    sim.events.listen(heard.append, ["death"])
+    sim.step()
+    assert [(e.id.tolist(), e.text) for e in heard] == [([2, 3, 4], ["first", "second", "first"])]
 
 
 def test_names_are_loaded_when_asked_for():

@@ -145,7 +145,7 @@ def test_the_dead_have_zeros_and_rewards_come_in_terms(task):
     def caught(now):
         return now.count("death", text="captured")
 
-    terms = {**task.reward, "team": Term(caught, -2.0, per="team", uses_events=True)}
+    terms = {**task.reward, "team": Term(caught, -2.0, per="team")}
     swarm = make_swarm(task.replace(reward=terms), 4, autoreset="disabled")
     swarm.reset(seed=1)
     n_dead, before = 0, swarm.alive.copy()
