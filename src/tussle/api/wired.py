@@ -11,16 +11,19 @@ class Wired(frozenset[str]):
 
     Attributes:
         skipped: Outputs that were asked for and that nobody reads: their columns hold what they held at first.
+        is_asked: Whether the plugin has asked for any output.
     """
 
     skipped: set[str]
+    is_asked: bool
 
     def __new__(cls, names: Iterable[str] = ()) -> Self:
         made = super().__new__(cls, names)
-        made.skipped = set()
+        made.skipped, made.is_asked = set(), False
         return made
 
     def __contains__(self, name: object) -> bool:
+        self.is_asked = True
         is_read = super().__contains__(name)
         if not is_read:
             self.skipped.add(str(name))

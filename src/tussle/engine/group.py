@@ -49,6 +49,7 @@ class Binding:
         handles: Attribute -> one object per row.
         children: Bindings of the plugins inside this plugin.
         wired: Outputs that other plugins read.
+        asked: The same set, which keeps those that the plugin asked for and left out.
     """
 
     plugin: Any
@@ -63,6 +64,7 @@ class Binding:
     handles: dict[str, list[Any]] = field(default_factory=dict)
     children: list[Binding] = field(default_factory=list)
     wired: frozenset[str] = frozenset()
+    asked: Wired = field(default_factory=Wired)
 
     def walk(self) -> Iterator[Binding]:
         """Yield this binding and all bindings inside it."""
@@ -76,10 +78,16 @@ class Binding:
         Raises:
             ParameterError: It is an output that the plugin leaves out, since nobody reads it.
         """
-        if name in self.plugin.wired.skipped:
+        if name in self.asked.skipped:
             raise ParameterError(
                 f"{where} is not computed: {self.path[-1]} leaves out {name!r}, since no plugin of its entity reads it"
             )
+
+    def settle(self) -> bool:
+        """Let a plugin that has asked for its outputs ask a plain set from now on, which is faster. Returns whether it does."""
+        if self.asked.is_asked:
+            self.plugin.__dict__["wired"] = self.wired
+        return self.asked.is_asked
 
     def attach(self, table: Table) -> None:
         """Set the plugin's attributes to the current arrays."""
@@ -270,7 +278,7 @@ class Group:
             plugin.__dict__[name] = [b.plugin for b in inner]
             binding.children += inner
         binding.wired = frozenset(wired)
-        plugin.__dict__["wired"] = Wired(wired)
+        plugin.__dict__["wired"] = binding.asked = Wired(wired)
         for service in type(spec).services:
             for one in self.views if hasattr(self, "motion_view") else [view]:
                 one.services[service] = getattr(plugin, service)

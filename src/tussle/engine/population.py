@@ -83,6 +83,7 @@ class Population:
         self.bodies.scans = self.is_sequential
         self.groups: list[Group] = []
         self._by_key: dict[Any, Group] = {}
+        self._asking: list[Binding] = []
         self._groups: dict[tuple[int, int, int], Group] = {}
         self._specs: dict[tuple[int, tuple[str, ...]], Any] = {}
         self._params: dict[Group, tuple[Params, Params]] = {}
@@ -128,6 +129,7 @@ class Population:
                 self.advise,
             )
             self._by_key[key] = group
+            self._asking += group.walk()
             group.key = key
             if self.is_sequential:
                 group.place = place
@@ -170,6 +172,10 @@ class Population:
             )
         number = {id(g): i for i, g in enumerate(self.groups)}
         return np.array([number[id(g)] for g in found], np.int64)[which]
+
+    def settle(self) -> None:
+        """Let plugins that have been called ask plain sets which of their outputs are read."""
+        self._asking = [binding for binding in self._asking if not binding.settle()]
 
     # -- repack -------------------------------------------------------------------------------------------------------------
 

@@ -83,6 +83,7 @@ def _end_worlds(state: SimulationState) -> None:
     # Births matter too: after the last birth, a single team may be left.
     if state.has_changed:
         state.has_changed = False
+        state.population.settle()
         for number, reason in _lost_teams(state):
             over.setdefault(number, reason)
     if over:
