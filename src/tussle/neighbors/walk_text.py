@@ -241,15 +241,18 @@ class WalkText:
         """Code that loads LANES neighbours of one agent, and their masks by existence, team and distance."""
         for axis in "xyz":
             yield f"range_{axis} = load(r{axis}, p) - s{axis}[me]"
-            yield f"offset_{axis}_ = load(s{axis}, p) - s{axis}[me]"
         yield "range_squared = range_x * range_x + range_y * range_y + range_z * range_z"
-        yield "distance_squared_ = offset_x_ * offset_x_ + offset_y_ * offset_y_ + offset_z_ * offset_z_"
         yield "counted = below(span_end[s] - p) & (below(me - p) | ~below(me - p + 1))"
-        for at, radii in enumerate(self.limits):
-            limit = f" & (distance_squared_ < limit2_{at})" if len(radii) > 1 else ""
-            yield f"near_{at} = (range_squared < range2_{at}){limit} & counted"
+        for at in range(len(self.limits)):
+            yield f"near_{at} = (range_squared < range2_{at}) & counted"
         yield f"if {' | '.join(f'bits(near_{at})' for at in range(len(self.limits)))} == 0:"
         yield "    continue"
+        for axis in "xyz":
+            yield f"offset_{axis}_ = load(s{axis}, p) - s{axis}[me]"
+        yield "distance_squared_ = offset_x_ * offset_x_ + offset_y_ * offset_y_ + offset_z_ * offset_z_"
+        for at, radii in enumerate(self.limits):
+            if len(radii) > 1:
+                yield f"near_{at} = near_{at} & (distance_squared_ < limit2_{at})"
         for name in self.other:
             yield f"{name}_ = load(by_place_{name}, p)"
         if self.where:
