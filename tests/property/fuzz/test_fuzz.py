@@ -18,7 +18,7 @@ from tussle.errors import TussleError
 
 N_MISSIONS = int(os.environ.get("TUSSLE_FUZZ", "200"))
 N_CHECKED = 16
-N_SMALL = int(os.environ.get("TUSSLE_FUZZ", "100"))
+N_SMALL = int(os.environ.get("TUSSLE_FUZZ", "40"))
 CHUNK = 10
 pytestmark = [
     pytest.mark.filterwarnings("ignore:.*its messages are not received"),  # random networks often are two
