@@ -29,7 +29,7 @@ def free_port():
 def test_what_the_page_tells_one_to_type_moves_a_boat(tmp_path, which):
     missing = [name for name in PROGRAMS if not shutil.which(name)]
     if which == "installed" and missing:
-        pytest.skip(f"{' and '.join(missing)} of MOOS-IvP not on the PATH")
+        pytest.skip(f"needs {' and '.join(missing)} of MOOS-IvP on the PATH")
     programs, folder = tmp_path / "bin", tmp_path / "work"
     programs.mkdir()
     folder.mkdir()

@@ -77,6 +77,7 @@ def test_a_mission_may_ask_for_any_number(ends, place):
     ]
 
 
+@pytest.mark.with_and_without  # OpenGL
 @pytest.mark.slow
 @pytest.mark.parametrize("option", OPTIONS)
 def test_an_option_may_be_any_number(ends, option):
