@@ -34,7 +34,9 @@ def test_what_the_page_tells_one_to_type_moves_a_boat(tmp_path, which):
     programs.mkdir()
     folder.mkdir()
     own = (
-        {} if which == "installed" else {k: ROOT / "tests" / "unit" / "moos" / v for k, v in PROGRAMS.items()}
+        {}
+        if which == "installed"
+        else {k: f'"{ROOT / "tests" / "unit" / "moos" / v}"' for k, v in PROGRAMS.items()}
     )
     for name, call in {"tussle": "-m tussle.cli", **own}.items():
         (programs / name).write_text(f'#!/bin/sh\nexec "{sys.executable}" {call} "$@"\n')
