@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
-import shutil
 import socket
 import subprocess
 import time
+from collections import Counter
+from pathlib import Path
 
+import needs
 import pytest
 from hypothesis import HealthCheck, settings
 
@@ -25,6 +27,30 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: item.get_closest_marker("slow") is None)
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """A test marked with what it needs is skipped without."""
+    for mark in item.iter_markers("needs"):
+        needs.require(*mark.args)
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Tell what was skipped and how to get what it needs.
+
+    The file that the variable TUSSLE_SKIPPED_TESTS names gets what has to be played again where more is installed, one name a line.
+    """
+    skipped = terminalreporter.stats.get("skipped", [])
+    if skipped:
+        terminalreporter.section("skipped")
+        reasons = Counter(report.longrepr[2].removeprefix("Skipped: ") for report in skipped)
+        for reason, n in sorted(reasons.items()):
+            terminalreporter.write_line(f"{n:5}  {reason}")
+    if named := os.environ.get("TUSSLE_SKIPPED_TESTS"):
+        both = (r for r in terminalreporter.stats.get("passed", []) if "with_and_without" in r.keywords)
+        names = dict.fromkeys(report.nodeid for report in (*skipped, *both))
+        Path(named).write_text("".join(f"{name}\n" for name in names))
+
+
 @pytest.fixture(scope="session", autouse=True)
 def _own_state(tmp_path_factory):
     """Tests leave nothing in the state folder of who runs them."""
@@ -40,15 +66,9 @@ def _own_state(tmp_path_factory):
 @pytest.fixture(scope="session")
 def roscore(tmp_path_factory):
     """Address of a ROS master, for nodes of this process too; where ROS is not installed, the test is skipped."""
-    from tussle.errors import MissingExtraError
-    from tussle.ros.node import load_rospy, master_fault
+    from tussle.ros.node import master_fault
 
-    if shutil.which("roscore") is None:
-        pytest.skip("roscore is not installed")
-    try:
-        load_rospy()
-    except MissingExtraError as error:
-        pytest.skip(str(error))
+    needs.require("roscore", "rospy")
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
     folder = str(tmp_path_factory.mktemp("ros"))

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import os
-import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+import needs
 import pytest
 from playwright.sync_api import Browser, ConsoleMessage, Page, Request, sync_playwright
 
-PROGRAMS = ("chromium", "chromium-browser", "google-chrome")
 # Drawing without a graphics card; and nothing that the browser would ask of the network by itself.
 OPTIONS = (
     *(
@@ -27,11 +25,9 @@ NAMELESS = ("about:", "data:", "blob:")
 
 @pytest.fixture(scope="session")
 def chromium() -> Iterator[Browser]:
-    """Chromium of the system. Where checks are run in earnest, the variable CI is set and it must be there."""
-    program = next((found for name in PROGRAMS if (found := shutil.which(name))), None)
-    if program is None and not os.environ.get("CI"):
-        pytest.skip("no Chromium is installed here: apt-get install chromium")
-    assert program is not None, f"none of {', '.join(PROGRAMS)} is installed"
+    """Chromium of the system."""
+    needs.require("browser")
+    program = needs.program(*needs.BROWSERS)
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=program, args=list(OPTIONS))
         yield browser

@@ -21,7 +21,7 @@ from tussle.errors import BatchError
 pytestmark = [
     pytest.mark.skipif(
         os.environ.get("TUSSLE_TEST_SLURM") != "1",
-        reason="starts a Slurm of its own: TUSSLE_TEST_SLURM=1, as root, with slurmctld, slurmd, slurm-client and munge",
+        reason="needs root, TUSSLE_TEST_SLURM=1, and Slurm: apt-get install slurmctld slurmd slurm-client munge",
     ),
     pytest.mark.slow,
 ]

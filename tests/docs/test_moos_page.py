@@ -29,12 +29,14 @@ def free_port():
 def test_what_the_page_tells_one_to_type_moves_a_boat(tmp_path, which):
     missing = [name for name in PROGRAMS if not shutil.which(name)]
     if which == "installed" and missing:
-        pytest.skip(f"{' and '.join(missing)} of MOOS-IvP not on the PATH")
+        pytest.skip(f"needs {' and '.join(missing)} of MOOS-IvP on the PATH")
     programs, folder = tmp_path / "bin", tmp_path / "work"
     programs.mkdir()
     folder.mkdir()
     own = (
-        {} if which == "installed" else {k: ROOT / "tests" / "unit" / "moos" / v for k, v in PROGRAMS.items()}
+        {}
+        if which == "installed"
+        else {k: f'"{ROOT / "tests" / "unit" / "moos" / v}"' for k, v in PROGRAMS.items()}
     )
     for name, call in {"tussle": "-m tussle.cli", **own}.items():
         (programs / name).write_text(f'#!/bin/sh\nexec "{sys.executable}" {call} "$@"\n')

@@ -36,7 +36,7 @@ def checklist() -> list[list[str]]:
     named = os.environ.get("TUSSLE_CHECKLIST")
     found = [Path(named)] if named else sorted(ROOT.parent.glob("*/parity.md"))
     if not found:
-        pytest.skip("TUSSLE_CHECKLIST names no list of features, and none lies beside the repository")
+        pytest.skip("needs a list of SCRIMMAGE's features beside the repository, or TUSSLE_CHECKLIST")
     lines = [line for line in found[0].read_text().splitlines() if re.match(r"\| \d+ \|", line)]
     rows = [[cell.strip() for cell in line.strip("|").split(" | ")] for line in lines]
     assert [int(row[0]) for row in rows] == list(range(1, len(rows) + 1))

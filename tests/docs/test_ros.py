@@ -1,17 +1,15 @@
 """The page about ROS, typed as it stands, by the roscore of the tests."""
 
 import os
-import shutil
 import subprocess
 import sys
 
-import pytest
+import needs
 from pages import FENCE, ROOT
 
 
 def test_the_robot_of_the_page_moves(roscore, tmp_path):
-    if shutil.which("rostopic") is None:
-        pytest.skip("rostopic is not installed")
+    needs.require("rostopic")
     page = (ROOT / "docs" / "ros.md").read_text()
     blocks = [(fence[1], fence[2]) for fence in FENCE.finditer(page)]
     (mission,) = (text for language, text in blocks if language == "xml")

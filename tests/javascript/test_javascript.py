@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-import os
-import shutil
 import subprocess
 from pathlib import Path
 
-import pytest
+import needs
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
 
 
 def run(program: str, *arguments: str | Path) -> None:
-    """Run a program that must succeed. With the variable CI set, Node.js must be there."""
-    found = shutil.which(program) or shutil.which(program, path=ROOT / "node_modules" / ".bin")
-    if found is None:
-        assert program != "node" or not os.environ.get("CI"), "Node.js is not installed"
-        pytest.skip(f"{program} is not installed here: install Node.js, then npm install")
-    done = subprocess.run([found, *arguments], check=False, capture_output=True, text=True, cwd=ROOT)
+    """Run a program that must succeed."""
+    needs.require("node", program)
+    done = subprocess.run(
+        [needs.program(program), *arguments], check=False, capture_output=True, text=True, cwd=ROOT
+    )
     assert done.returncode == 0, done.stdout + done.stderr
 
 

@@ -12,7 +12,7 @@ def pytest_collection_modifyitems(items):
 
     if recordings.folder() is None:
         skip = pytest.mark.skip(
-            reason=f"no recordings: {recordings.VARIABLE} names no folder, and none lies beside the repository"
+            reason=f"needs recordings of SCRIMMAGE beside the repository, or {recordings.VARIABLE}"
         )
         for item in items:
             if HERE in item.path.parents:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import traceback
 import warnings
@@ -152,8 +153,30 @@ def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
 
 
 def run_guarded(program: Callable[[], Any]) -> None:
-    """Call the program with output streams that replace characters which the terminal's encoding lacks."""
+    """Call the program with output streams that replace characters which the terminal's encoding lacks.
+
+    Raises:
+        SystemExit: At its end; what it printed may not have been written.
+    """
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")
-    program()
+    try:
+        program()
+    except SystemExit as end:
+        error = _write_out()
+        if error is None or end.code:
+            raise
+        say_error(str(error))
+        raise SystemExit(NOT_WRITTEN) from None
+
+
+def _write_out() -> OSError | None:
+    """Write what was printed; returns why that cannot be done, None where it can or nobody reads it."""
+    try:
+        sys.stdout.flush()
+    except OSError as error:
+        # Python writes the rest at its end, and then tells of the error in its own way.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return None if isinstance(error, BrokenPipeError) else error
+    return None

@@ -28,6 +28,7 @@ def played(tussle, folder):
     return folder / "played"
 
 
+@pytest.mark.needs("renderer")
 def test_all_outputs_at_once_lie_in_the_run(process, played):
     before = {p.name for p in played.iterdir()}
     asked = ("--mp4", "--gif", "--png", "--mcap", "--csv", "--parquet", "--html")
@@ -67,12 +68,14 @@ def test_a_bag_is_a_folder_of_the_run(tussle, played):
     assert re.fullmatch(r"played/rosbag2/rosbag2.mcap: 7 states, \d+ messages, [\d.]+ k?B\n", said.stdout)
 
 
+@pytest.mark.needs("renderer")
 def test_files_can_be_named(tussle, played, folder):
     said = tussle("export", "played", "--csv", "a.csv", "--png", "b.png", "--size", "96x64", "--at", "1.5 s")
     assert [line.split(":")[0] for line in said.stdout.splitlines()] == ["a.csv", "a.events.csv", "b.png"]
     assert (folder / "a.csv").read_text().startswith('"world","t","step","id"')
 
 
+@pytest.mark.needs("renderer")
 def test_a_part_of_the_game_as_others_see_it(tussle, played):
     said = tussle(
         "export", "played", "--mp4", *SMALL, "--from", "1", "--to", "9", "--follow", "11", "--labels"
@@ -84,6 +87,7 @@ def test_a_part_of_the_game_as_others_see_it(tussle, played):
     )
 
 
+@pytest.mark.needs("renderer")
 def test_of_several_worlds_one_is_shown_and_tables_hold_all(tussle, folder):
     simulation = Simulation(read_mission(folder / "game.xml").mission, seeds=[1, 2])
     with Recorder(simulation, folder / "two"):
@@ -100,6 +104,7 @@ def test_of_several_worlds_one_is_shown_and_tables_hold_all(tussle, folder):
     assert "there is no world 2; there are worlds 0 to 1" in said.stderr
 
 
+@pytest.mark.needs("renderer")
 def test_a_run_that_was_killed_is_exported_as_far_as_it_goes(tussle, played, folder):
     (played / "run.json").unlink()
     said = tussle("export", "played", "--png", "--mcap", "--csv", "--size", "96x64")
@@ -149,6 +154,7 @@ def test_what_cannot_be_done_is_told_in_one_line(tussle, played, folder):
     assert not list((folder / "empty").iterdir())
 
 
+@pytest.mark.needs("renderer")
 def test_ctrl_c_leaves_what_was_finished_and_nothing_else(played, folder):
     """In the midst of a film of half an hour."""
     process = subprocess.Popen(
@@ -176,6 +182,7 @@ def test_the_log_says_which_game_it_is(tussle, played):
     assert about == {"mission": "A small game", "world": "0", "seed": str(seed)}
 
 
+@pytest.mark.needs("renderer")
 def test_a_terminal_sees_how_far_it_is(played, folder):
     text, code = seen(folder, "export", "played", "--mp4", *SMALL, "--fps", "60")
     assert code == 0

@@ -78,7 +78,15 @@ def test_a_mission_may_ask_for_any_number(ends, place):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("option", OPTIONS)
+@pytest.mark.parametrize(
+    "option",
+    [
+        pytest.param(
+            option, marks=[pytest.mark.needs("renderer")] if {"--png", "--gif"} & {*arguments} else []
+        )
+        for option, arguments in OPTIONS.items()
+    ],
+)
 def test_an_option_may_be_any_number(ends, option):
     arguments = OPTIONS[option]
     if "played" in arguments:

@@ -148,6 +148,7 @@ def test_a_batch_and_all_that_is_made_of_it_show_names_as_they_are(here, folder,
     assert not re.search(r"[\x80-\x9f\u202a-\u202e\u2066-\u2069]", page)
 
 
+@pytest.mark.needs("renderer")
 def test_plots_films_and_pages_take_any_name(here, folder, hostile):
     assert here("run", "game.xml", "--out", "played", *PLUGINS)[0] == 0
     with warnings.catch_warnings():

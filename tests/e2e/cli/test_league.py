@@ -7,6 +7,7 @@ import re
 
 import pytest
 from cli_process import call
+from needs import NEEDS
 
 pytest.importorskip("onnx", reason="onnx is not installed: pip install 'tussle[policy]'")
 pytest.importorskip("onnxruntime", reason="onnxruntime is not installed: pip install 'tussle[policy]'")
@@ -50,7 +51,7 @@ def test_a_league_has_a_table_a_page_and_replays(tmp_path, monkeypatch):
 
 
 def test_self_play_trains_and_repeats(tmp_path, monkeypatch):
-    pytest.importorskip("torch", reason="PyTorch is not installed: pip install 'tussle[train]'")
+    pytest.importorskip("torch", reason=NEEDS["torch"].reason)
     monkeypatch.chdir(tmp_path)
     command = (
         "train",

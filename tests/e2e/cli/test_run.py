@@ -255,14 +255,16 @@ def test_what_is_wrong_is_said_once_with_an_exit_code_and_nothing_is_written(
     assert [p.name for p in folder.iterdir()] == ["game.xml"]
 
 
-def test_a_full_disk_is_told(folder):
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_a_full_disk_is_told(folder, unbuffered):
     with open("/dev/full", "w") as full:  # noqa: PTH123 - a device
         done = subprocess.run(
             [*COMMAND, "run", "game.xml", "--no-log"],
-            check=False, stdout=full, stderr=subprocess.PIPE, text=True, cwd=folder, env=environment(), timeout=600,
+            check=False, stdout=full, stderr=subprocess.PIPE, text=True, cwd=folder, timeout=600,
+            env=environment() | {"PYTHONUNBUFFERED": unbuffered},
         )  # fmt: skip
     assert done.returncode == 4
-    assert done.stderr.startswith("error: [Errno 28] No space left on device")
+    assert done.stderr == "error: [Errno 28] No space left on device\n"
 
 
 def test_output_that_nobody_reads_is_no_error(folder):

@@ -6,6 +6,7 @@ import sys
 
 import pytest
 from cli_process import call
+from needs import NEEDS
 
 
 def test_without_torch_it_says_what_to_install(monkeypatch):
@@ -18,7 +19,7 @@ def test_without_torch_it_says_what_to_install(monkeypatch):
 
 
 def test_a_robot_learns_to_stay_near_the_origin(tmp_path, monkeypatch):
-    torch = pytest.importorskip("torch", reason="PyTorch is not installed: pip install 'tussle[train]'")
+    torch = pytest.importorskip("torch", reason=NEEDS["torch"].reason)
     monkeypatch.chdir(tmp_path)
     done = call("train", "tussle/RLSimple-v1")
     assert "did you mean 'tussle/RLSimple-v0'" in done.stderr

@@ -198,8 +198,9 @@ def test_a_stack_is_no_larger_than_its_plugins_allow():
 def test_signs_of_life_tell_how_much_of_the_games_is_played():
     slow = Mission(blocks=[Block(name="b", motion=Still())], dt=0.1, end=1.0, metrics=[Slow()])
     beats = [m for m in play(slow, take_two(), 2) if isinstance(m, Heartbeat)]
-    assert beats
-    parts = [b.under_way for b in beats]
+    # On a busy machine one may come when no game is under way any more.
+    parts = [b.under_way for b in beats if b.under_way]
+    assert parts
     assert parts == sorted(parts)
     assert all(0.0 < p < 2.0 for p in parts)
 

@@ -365,7 +365,7 @@ def small_disk(tmp_path):
         )  # fmt: skip
 
     if shutil.which("mount") is None or mount(64).returncode != 0:
-        pytest.skip("a small disk can be mounted by root only")
+        pytest.skip("needs root, who may mount a small disk")
     yield place, lambda size: mount(size, "remount").check_returncode()
     subprocess.run(["umount", place], check=True)
 

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import random
 import socket
 import subprocess
 import sys
-from importlib.util import find_spec
 from pathlib import Path
 
+import needs
 import numpy as np
 import pytest
 from hypothesis import given
@@ -54,9 +53,7 @@ class Peer:
 
 @pytest.fixture
 def peer():
-    if find_spec("opendis") is None:
-        assert "CI" not in os.environ, "opendis is not installed"
-        pytest.skip("opendis is not installed: pip install --no-deps opendis")
+    needs.require("opendis")
     peer = Peer()
     yield peer
     peer.process.stdin.close()

@@ -68,7 +68,7 @@ def existing() -> Callable[[str], Path]:
 
     def find(name: str) -> Path:
         if not folders:
-            pytest.skip("SCRIMMAGE's missions are not here")
+            pytest.skip("needs recordings of SCRIMMAGE beside the repository, or TUSSLE_RECORDINGS")
         return folders[0] / "missions" / name
 
     return find

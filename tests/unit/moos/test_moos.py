@@ -523,7 +523,7 @@ def test_ctrl_c_ends_a_run_that_waits_for_its_helm(database, tmp_path):
 
 def test_a_real_database_gives_the_bits_of_the_tests_own(tmp_path):
     if not shutil.which("MOOSDB"):
-        pytest.skip("MOOSDB of MOOS-IvP is not on the PATH")
+        pytest.skip("needs MOOSDB of MOOS-IvP on the PATH")
     hashes = []
     with MoosDatabase() as database:
         port = database.port

@@ -147,6 +147,7 @@ def test_tasks_are_registered():
     env.close()
 
 
+@pytest.mark.needs("renderer")
 def test_pictures_show_the_world(task):
     pytest.importorskip("pyvista")
     env = TaskParallelEnv(task, render_mode="rgb_array")

@@ -6,10 +6,11 @@ import warnings
 
 import numpy as np
 import pytest
+from needs import NEEDS
 
 from tussle.rl import NearOrigin, ReachPoint, evaluate, make, make_vec, parallel_env
 
-torch = pytest.importorskip("torch", reason="PyTorch is not installed: pip install 'tussle[train]'")
+torch = pytest.importorskip("torch", reason=NEEDS["torch"].reason)
 
 
 @pytest.fixture
@@ -24,7 +25,7 @@ def one_thread():
 @pytest.mark.parametrize("which", ["task", "solo"])
 def test_stable_baselines3_accepts_one_world(which, request):
     checker = pytest.importorskip(
-        "stable_baselines3.common.env_checker", reason="stable-baselines3 is not installed"
+        "stable_baselines3.common.env_checker", reason=NEEDS["stable_baselines3"].reason
     )
     env = make(request.getfixturevalue(which))
     with warnings.catch_warnings():
@@ -35,7 +36,7 @@ def test_stable_baselines3_accepts_one_world(which, request):
 
 @pytest.mark.usefixtures("one_thread")
 def test_ppo_of_stable_baselines3_learns_in_a_task():
-    baselines = pytest.importorskip("stable_baselines3", reason="stable-baselines3 is not installed")
+    baselines = pytest.importorskip("stable_baselines3", reason=NEEDS["stable_baselines3"].reason)
     env = make(NearOrigin)
     model = baselines.PPO(
         "MlpPolicy", env, n_steps=500, batch_size=100, learning_rate=3e-3, seed=1, device="cpu"
@@ -59,7 +60,7 @@ def test_ppo_of_stable_baselines3_learns_in_a_task():
 @pytest.mark.usefixtures("one_thread")
 def test_ppo_of_stable_baselines3_plays_all_agents_through_supersuit(task):
     """The lines of docs/learning.md."""
-    baselines = pytest.importorskip("stable_baselines3", reason="stable-baselines3 is not installed")
+    baselines = pytest.importorskip("stable_baselines3", reason=NEEDS["stable_baselines3"].reason)
     supersuit = pytest.importorskip("supersuit")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of SuperSuit itself

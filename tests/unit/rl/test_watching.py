@@ -95,6 +95,7 @@ def test_episodes_that_begin_by_themselves_are_followed(task):
     assert live.epoch == 2
 
 
+@pytest.mark.needs("renderer")
 def test_pettingzoo_accepts_all_modes(task):
     pytest.importorskip("pyvista")
     with warnings.catch_warnings():

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 import os
-import shutil
 import subprocess
 import sys
 from contextlib import ExitStack
 from pathlib import Path
 
+import needs
 import numpy as np
 import pytest
 
@@ -74,15 +74,10 @@ def _all_there(path) -> bool:
 @pytest.fixture(scope="module")
 def driver(tmp_path_factory):
     """The node in C++, compiled."""
-    compiler = shutil.which("g++")
-    if compiler is None:
-        pytest.skip("g++ is not installed")
-    headers = ("ros/ros.h", "nav_msgs/Odometry.h", "sensor_msgs/LaserScan.h", "geometry_msgs/Twist.h")
-    if missing := [name for name in headers if not (Path("/usr/include") / name).exists()]:
-        pytest.skip(f"headers of roscpp are not installed: {', '.join(missing)}")
+    needs.require("roscpp")
     program = tmp_path_factory.mktemp("roscpp") / "driver"
     source = Path(__file__).with_name("driver.cpp")
-    command = [compiler, "-O0", str(source), "-o", str(program)]
+    command = ["g++", "-O0", str(source), "-o", str(program)]
     subprocess.run([*command, *(f"-l{name}" for name in LIBRARIES.split())], check=True)
     return program
 

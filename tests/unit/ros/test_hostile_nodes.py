@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gc
 import os
-import shutil
 import signal
 import socket
 import subprocess
@@ -14,6 +13,7 @@ import xmlrpc.client
 from contextlib import ExitStack
 from pathlib import Path
 
+import needs
 import numpy as np
 import pytest
 
@@ -151,8 +151,7 @@ def test_a_flood_of_commands_does_not_stop_the_game_and_the_newest_holds(roscore
 
 
 def test_two_nodes_command_a_robot_until_the_last_has_gone(roscore):
-    if shutil.which("rostopic") is None:
-        pytest.skip("rostopic is not installed")
+    needs.require("rostopic")
     command = ["rostopic", "pub", "-r", "50", "/entity1/cmd_vel", "geometry_msgs/Twist"]
     with ExitStack() as stack:
         simulation = stack.enter_context(Simulation(cars(1)))
@@ -172,8 +171,7 @@ def test_two_nodes_command_a_robot_until_the_last_has_gone(roscore):
 
 
 def test_rosbag_records_what_a_robot_publishes(roscore, tmp_path):
-    if shutil.which("rosbag") is None:
-        pytest.skip("rosbag is not installed")
+    needs.require("rosbag")
     bag = tmp_path / "odom.bag"
     with ExitStack() as stack:
         simulation = stack.enter_context(Simulation(cars(1)))

@@ -15,6 +15,7 @@ import threading
 import time
 from pathlib import Path
 
+import needs
 import numpy as np
 import pytest
 
@@ -175,12 +176,8 @@ def test_a_command_that_is_not_finite_ends_the_game_and_the_error_names_its_topi
 
 
 def test_without_a_master_the_error_says_so(monkeypatch):
-    pytest.importorskip("rospy") if "rospy" in sys.modules else None
+    needs.require("rospy")
     monkeypatch.setenv("ROS_MASTER_URI", "http://127.0.0.1:1")
-    try:
-        load_rospy()
-    except MissingExtraError as error:
-        pytest.skip(str(error))
     with pytest.raises(
         PluginError, match=r"no ROS master answers at http://127\.0\.0\.1:1 \(.*\); start roscore"
     ) as error:

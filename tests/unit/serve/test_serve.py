@@ -3,7 +3,6 @@
 import asyncio
 import base64
 import json
-import shutil
 import subprocess
 import sys
 import threading
@@ -12,6 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import aiohttp
+import needs
 import numpy as np
 import pytest
 
@@ -238,10 +238,9 @@ def test_clients_in_python_and_c_plus_plus(tmp_path):
         name, *lines = done.stdout.splitlines()
         assert name.startswith("Predators and prey")
         assert [line.split(":")[0] for line in lines] == ["10 s", "20 s", "30 s"]
-        if (compiler := shutil.which("g++")) is None:
-            pytest.skip("no g++: the client in C++ is not compiled")
+        needs.require("g++")
         subprocess.run(
-            [compiler, "-std=c++17", "-Wall", "-Werror", CLIENTS / "client.cpp", "-o", tmp_path / "client"],
+            ["g++", "-std=c++17", "-Wall", "-Werror", CLIENTS / "client.cpp", "-o", tmp_path / "client"],
             check=True,
         )
         port, token = server.url.rpartition(":")[2].split("/")

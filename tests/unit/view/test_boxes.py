@@ -49,6 +49,7 @@ def test_a_visual_model_takes_the_place_of_the_box():
     assert (cube.model(0), cube.lengths(0), cube.is_true_box(0)) == ("box", (3.0, 3.0, 3.0), False)
 
 
+@pytest.mark.needs("renderer")
 def test_a_film_shows_a_box_in_its_lengths_and_attitude(stood):
     low, high = np.full(3, -50.0), np.full(3, 50.0)
     frame = stood.frame(0)

@@ -132,6 +132,7 @@ def has_colour(picture, rgb, at, reach=3):
 # -- what is seen -------------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.needs("renderer")
 @pytest.mark.parametrize("name", ["overview", "top", "follow"])
 def test_entities_are_drawn_in_their_colours_where_the_projection_says(flown, name):
     size = (320, 240)
@@ -150,6 +151,7 @@ def test_entities_are_drawn_in_their_colours_where_the_projection_says(flown, na
             assert ((pixels > 0.0) & (pixels < size)).all()
 
 
+@pytest.mark.needs("renderer")
 def test_a_nose_points_along_the_way(flown):
     """An aircraft flown east is longer to the east of its wings than the wings are thick: its mirror image is another picture."""
     size, moments = (240, 240), Moments(flown, 0.0, 4.0, 1.0, 10.0)
@@ -202,6 +204,7 @@ def test_trails_go_through_where_entities_were_and_fade(flown):
     assert len(none) == 0
 
 
+@pytest.mark.needs("renderer")
 def test_scenery_is_drawn(flown):
     shape = Cuboid(center=(0, 0, 10), lengths=(60, 60, 20))
     low, high = np.full(3, -40.0), np.full(3, 40.0)
@@ -231,6 +234,7 @@ def test_scenery_is_drawn(flown):
     assert night.mean() < 60 < 180 < empty.mean()
 
 
+@pytest.mark.needs("renderer")
 def test_words_are_written_and_can_be_left_out(flown, tmp_path):
     size = (480, 270)
     options = {"size": size, "trails": 0.0, "at": 1.0}
@@ -253,6 +257,7 @@ def test_words_are_written_and_can_be_left_out(flown, tmp_path):
     assert not changed[:, :60].any()
 
 
+@pytest.mark.needs("renderer")
 def test_the_caption_counts_who_is_left(hunted):
     """The same text is drawn for the same numbers, and other text for others."""
     size = (640, 360)
@@ -374,6 +379,7 @@ def test_speed_is_such_that_a_film_lasts_half_a_minute():
 # -- files --------------------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.needs("renderer")
 def test_an_mp4_has_all_its_pictures_and_lasts_as_long(flown, tmp_path):
     told = []
     report = write_film(
@@ -393,6 +399,7 @@ def test_an_mp4_has_all_its_pictures_and_lasts_as_long(flown, tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["a.mp4"]
 
 
+@pytest.mark.needs("renderer")
 def test_the_film_goes_on_while_the_game_does(hunted, tmp_path):
     """Its pictures are those of the moments: the middle one is nearer to a picture of the middle than to one of the end."""
     options = {"size": (128, 96), "captions": False}
@@ -405,6 +412,7 @@ def test_the_film_goes_on_while_the_game_does(hunted, tmp_path):
     assert 28 <= int(np.argmin(distances)) <= 32
 
 
+@pytest.mark.needs("renderer")
 def test_a_gif_is_small_and_has_half_the_pictures(flown, tmp_path):
     report = write_film(
         flown, gif=tmp_path / "a.gif", options=FilmOptions(stop=0.8, speed=1.0, size=(960, 540))
@@ -420,6 +428,7 @@ def test_a_gif_is_small_and_has_half_the_pictures(flown, tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["a.gif"]
 
 
+@pytest.mark.needs("renderer")
 def test_a_film_and_a_gif_and_a_picture_at_once(flown, tmp_path):
     report = write_film(
         flown, mp4=tmp_path / "a.mp4", gif=tmp_path / "a.gif", png=tmp_path / "a.png",
@@ -430,6 +439,7 @@ def test_a_film_and_a_gif_and_a_picture_at_once(flown, tmp_path):
     assert len(pictures(tmp_path / "a.png")) == 1
 
 
+@pytest.mark.needs("renderer")
 def test_a_run_that_was_cut_short_is_filmed_as_far_as_it_goes(tmp_path):
     whole = record(hunt(end=3.0), tmp_path / "whole", flush_every=1e-9)
     cut = tmp_path / "cut"
@@ -443,6 +453,7 @@ def test_a_run_that_was_cut_short_is_filmed_as_far_as_it_goes(tmp_path):
     assert len(pictures(tmp_path / "a.mp4")) == report.n_pictures == round(report.stop * 5) + 1
 
 
+@pytest.mark.needs("renderer")
 def test_what_lies_outside_the_run_is_said_or_refused(flown, tmp_path):
     report = write_film(
         flown, mp4=tmp_path / "a.mp4", options=FilmOptions(start=-3.0, stop=9.0, speed=4.0, fps=2.0, **BARE)
@@ -481,6 +492,7 @@ def test_a_file_that_cannot_be_written_is_told_and_leaves_nothing(flown, tmp_pat
     assert not list((tmp_path / "folder").iterdir())
 
 
+@pytest.mark.needs("renderer")
 @pytest.mark.filterwarnings(
     "ignore::ResourceWarning"
 )  # imageio does not close the pipe to an encoder that has ended
@@ -495,6 +507,7 @@ def test_an_encoder_that_fails_on_its_way_is_told_at_once_and_leaves_nothing(
     gc.collect()
 
 
+@pytest.mark.needs("renderer")
 def test_an_interruption_leaves_nothing(flown, tmp_path):
     def stop(done, total):
         raise KeyboardInterrupt
@@ -537,6 +550,7 @@ def test_without_a_way_to_draw_the_message_says_what_to_install(monkeypatch):
         find_window()
 
 
+@pytest.mark.needs("renderer")
 @pytest.mark.parametrize(
     ("package", "message"),
     [
@@ -560,6 +574,7 @@ def test_without_scipy_the_message_names_the_extra(hunted, monkeypatch):
         crowd_of(hunted.frame(0))
 
 
+@pytest.mark.needs("renderer")
 def test_without_an_encoder_for_this_machine_it_is_said(flown, tmp_path, monkeypatch):
     def none():
         raise RuntimeError("No ffmpeg exe could be found.")
@@ -575,6 +590,7 @@ def test_tints_go_with_the_background():
     assert Tints.on((255, 255, 255)).ink == (125.0, 125.0, 125.0)
 
 
+@pytest.mark.needs("renderer")
 def test_nobody_moves(tmp_path):
     """A film of one that stands still: no division by its speed, its spacing, or the length of its way."""
     mission = Mission(blocks=[Block(name="post", team=1, position=(3, 4, 0), motion=Still())], end=1.0)

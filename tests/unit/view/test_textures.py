@@ -103,6 +103,7 @@ def test_a_recorded_terrain_has_its_texture_on_the_page(recorded, tmp_path):
     assert np.abs(shown - photo()).mean() < 12  # it is a JPEG file
 
 
+@pytest.mark.needs("renderer")
 def test_a_picture_shows_the_texture_with_its_upper_edge_in_the_north(recorded):
     assert is_red_over_blue(from_above(recorded.style, recorded.scenery))
 
@@ -205,6 +206,7 @@ def meshed(tmp_path):
     return read
 
 
+@pytest.mark.needs("renderer")
 def test_an_obj_with_mtl_is_shown_with_its_texture(meshed, tmp_path):
     loaded = meshed("a.obj")
     assert {file.name for file in loaded.files} >= {"a.obj", "a.mtl", "photo.png"}
