@@ -124,12 +124,14 @@ def _plain(value: Any) -> Any:
 
 
 def _read_plugins(group: Group, row: int, held: Table | Stored, into: dict[str, dict[str, Reading]]) -> None:
-    """Add all columns of an entity's plugins in the order of their declaration."""
+    """Add the columns of an entity's plugins in the order of their declaration, without the outputs that a plugin leaves out."""
     for binding in group.walk():
         columns = into[".".join(binding.path)] = {}
         for name, column in type(binding.spec).columns.items():
             about = (getattr(column, "unit", ""), getattr(column, "fields", ()), column.doc)
             place = binding.places.get(name)
+            if name in binding.asked.skipped:
+                continue
             if place is not None:
                 data = held.arrays[place.dtype]
                 part = data[place.first : place.first + place.k] if place.k else data[place.first]

@@ -49,6 +49,15 @@ def value_of_all(mission, block, path, column):
     return plugin.values[column]
 
 
+def test_an_output_that_is_not_computed_is_not_shown():
+    sim = Simulation(mission("chase_synchronous"))
+    sim.step()
+    boids = entity_state(sim, 0, 1).plugins["Boids"]
+    assert "desired_heading" not in boids
+    with pytest.raises(ParameterError, match="leaves out"):
+        sim.read("prey.Boids.desired_heading")
+
+
 def test_lists_are_one_line_per_item():
     sim = Simulation(mission("schemas"))
     sim.step(10)

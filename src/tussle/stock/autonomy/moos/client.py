@@ -111,18 +111,21 @@ class MoosClient:
 
     def _run(self) -> None:
         try:
-            with self._connected() as connection:
-                self._heads = (
-                    wire.encode_head(wire.NOTIFY, False, self.name, self.community),
-                    wire.encode_head(wire.NOTIFY, True, self.name, self.community),
-                )
-                register = wire.encode_head(wire.REGISTER, False, self.name, self.community)
-                self.send([wire.joined(register, wire.encode_tail(k, 0.0, 0.0)) for k in self._variables])
-                self._read(connection)
+            connection = self._connected()
+            self._heads = (
+                wire.encode_head(wire.NOTIFY, False, self.name, self.community),
+                wire.encode_head(wire.NOTIFY, True, self.name, self.community),
+            )
+            register = wire.encode_head(wire.REGISTER, False, self.name, self.community)
+            self.send([wire.joined(register, wire.encode_tail(k, 0.0, 0.0)) for k in self._variables])
+            self._read(connection)
         except ValueError as error:
             self.fail(f"this is not the protocol of MOOS: {error}")
         except OSError as error:
             self.fail(error.strerror or str(error))
+        finally:
+            if self._socket:
+                self._socket.close()  # not before the reason is kept: `send` would find a closed socket, and call that the reason
 
     def _connected(self) -> socket.socket:
         """Connect, trying again until there is a connection; returns the socket."""
