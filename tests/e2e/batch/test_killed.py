@@ -177,6 +177,7 @@ STOPS = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_stopped_again_and_again_with_all_its_processes(folder):
     before = 0
     for name, (number, moment) in STOPS.items():

@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import tussle
 
 HIDE = """
@@ -49,6 +51,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.slow
 def test_a_game_and_a_batch_play_without_what_other_systems_lack(tmp_path):
     (tmp_path / "sitecustomize.py").write_text(HIDE)  # spawned processes read it too
     (tmp_path / "play.py").write_text(PLAY)

@@ -24,6 +24,7 @@ PLUGINS = [
 ]
 
 
+@pytest.mark.slow
 def test_each_begins_with_a_plugin_that_plays_and_a_test_that_passes(tussle, folder):
     for prefix, kind, options in PLUGINS:
         file = f"mine/{prefix.lower()}_{kind}"

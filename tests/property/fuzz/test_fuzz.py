@@ -17,6 +17,7 @@ from histories import difference, played_alone
 from tussle.errors import TussleError
 
 N_MISSIONS = int(os.environ.get("TUSSLE_FUZZ", "200"))
+N_FAST = 80  # of these, in the tests that are not slow
 N_CHECKED = 16
 N_SMALL = int(os.environ.get("TUSSLE_FUZZ", "40"))
 CHUNK = 10
@@ -27,7 +28,10 @@ pytestmark = [
 ]
 
 
-@pytest.mark.parametrize("first", range(0, N_MISSIONS, CHUNK))
+@pytest.mark.parametrize(
+    "first",
+    [pytest.param(k, marks=pytest.mark.slow if k >= N_FAST else ()) for k in range(0, N_MISSIONS, CHUNK)],
+)
 def test_worlds_of_random_missions_are_as_alone(first):
     found = [difference(number) for number in range(first, min(first + CHUNK, N_MISSIONS))]
     assert [text for text in found if text] == []
@@ -35,6 +39,7 @@ def test_worlds_of_random_missions_are_as_alone(first):
     assert found.count("") >= least  # the others' parts do not fit together
 
 
+@pytest.mark.slow
 def test_caches_with_room_for_one_thing_change_no_random_mission():
     """Alone, in stacks, in threads, reset and restored; each world is also what it is with the caches as shipped."""
     program = Path(__file__).with_name("small_caches.py")

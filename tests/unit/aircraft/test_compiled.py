@@ -106,6 +106,7 @@ def test_a_ball_falls_as_in_jsbsim():
     assert apart("ball", {**START, "ic/h-sl-ft": 5000.0, "ic/vt-fps": 180.0}, 17.0, controls) < 1e-6
 
 
+@pytest.mark.slow
 def test_a_light_aircraft_flies_as_in_jsbsim_for_a_minute():
     assert apart("c172p", {**START, "ic/h-sl-ft": 5000.0, "ic/vt-fps": 180.0}, 60.0, controls) < 1e-6
 
@@ -125,12 +126,14 @@ def test_a_take_off_from_standstill_is_that_of_jsbsim():
     assert far < 1e-3
 
 
+@pytest.mark.slow
 def test_an_autopilot_flies_as_in_jsbsim_for_a_minute():
     far, fdm = both_flights("c172x", {**START, "ic/h-sl-ft": 4000.0, "ic/vt-fps": 180.0}, 60.0, pilot)
     assert math.cos(fdm["attitude/psi-rad"] - math.radians(60.0)) > 0.99  # it flies to where it was told
     assert far < 1e-3
 
 
+@pytest.mark.slow
 def test_a_jet_flies_as_in_jsbsim_for_a_minute():
     assert apart("T37", {**START, "ic/h-sl-ft": 15000.0, "ic/vt-fps": 450.0}, 60.0, controls) < 1e-6
 

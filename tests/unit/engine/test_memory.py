@@ -8,6 +8,8 @@ import sys
 from importlib.util import find_spec
 from pathlib import Path
 
+import pytest
+
 from tussle import Block, Mission, Simulation
 from tussle.api import Autonomy
 from tussle.api.bodies import KEPT_INDEXES
@@ -33,6 +35,7 @@ class Looker(Autonomy):
         g.near(10.0 + float(g.t[0]))
 
 
+@pytest.mark.slow
 def test_games_leave_no_memory_behind():
     """In a fresh process, over the games of each model, after a few for warmth."""
     command = [sys.executable, str(Path(__file__).with_name("many_games.py")), str(N_GAMES), *MODELS]

@@ -44,6 +44,7 @@ def test_this_process_gives_these_bits(capsys):
     assert capsys.readouterr().out.strip() == HASH
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.uname().machine != "x86_64", reason="the settings name x86-64 processors")
 @pytest.mark.parametrize("name", SETTINGS)
 def test_all_instruction_sets_give_the_same_bits(name):
@@ -104,6 +105,7 @@ def kernels_of(module: str) -> list[Kernel]:
     return own
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("module", kernel_modules())
 def test_no_kernel_of_the_package_calls_the_mathematical_library(module):
     # Nor assigns an array to a slice: Numba's text for sizes that differ has log10 in it, and takes 4 s to compile.

@@ -191,6 +191,7 @@ def test_the_sizes_of_a_parquet_file_are_those_that_arrow_sees(tmp_path):
         assert sizes_of(file, path.stat().st_size) == Sizes(0)
 
 
+@pytest.mark.slow
 def test_a_parquet_file_that_is_damaged_anywhere_is_read_or_refused(tmp_path):
     path = tmp_path / "a.parquet"
     pq.write_table(pa.table({"a": np.arange(30), "b": [["x", "y"]] * 30}), path, row_group_size=20)
