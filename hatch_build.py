@@ -55,9 +55,17 @@ class KernelsHook(BuildHookInterface):
         """Run code with the package of the source tree; returns what it prints."""
         settings = {"PYTHONPATH": str(root / "src"), "PYTHONDONTWRITEBYTECODE": "1"}
         if level:
-            settings |= {"TUSSLE_CACHE_DIR": str(self._folder), "NUMBA_CPU_NAME": level, "NUMBA_CPU_FEATURES": ""}
+            settings |= {
+                "TUSSLE_CACHE_DIR": str(self._folder),
+                "NUMBA_CPU_NAME": level,
+                "NUMBA_CPU_FEATURES": "",
+            }
         done = subprocess.run(
-            [sys.executable, "-c", code, *arguments], env={**os.environ, **settings}, capture_output=True, text=True, check=False
+            [sys.executable, "-c", code, *arguments],
+            env={**os.environ, **settings},
+            capture_output=True,
+            text=True,
+            check=False,
         )
         if done.returncode:
             raise RuntimeError(f"kernels cannot be compiled: {done.stderr[-2000:]}")

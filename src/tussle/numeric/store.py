@@ -1,4 +1,7 @@
-"""Disk cache of compiled kernels: one file per kernel and key, written atomically. Old files of the same kernel are removed."""
+"""Disk cache of compiled kernels: one file per kernel and key, written atomically. Old files of the same kernel are removed.
+
+A wheel brings some along, which are only read.
+"""
 
 from __future__ import annotations
 
