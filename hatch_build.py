@@ -1,7 +1,7 @@
 """Compiles the kernels of the missions that ship, which a wheel brings along, so that the first game begins at once.
 
-They are compiled for each level of processor in TUSSLE_WHEEL_LEVELS, by default that of this processor, and fit the versions of Python, NumPy
-and Numba that compile them. With other versions, and for other missions, kernels are compiled on the first run, as without them.
+They are compiled for each level of processor in TUSSLE_WHEEL_LEVELS, by default that of this processor, and fit the versions of Python,
+NumPy and Numba that compile them. With other versions, and for other missions, kernels are compiled on the first run, as without them.
 TUSSLE_WHEEL_LEVELS= (empty) leaves them out.
 """
 
