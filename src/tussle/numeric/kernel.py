@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import gc
 import hashlib
-import platform
 import re
 import sys
 import threading
@@ -22,11 +21,11 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from tussle.numeric import store
+from tussle.numeric import processor, store
 from tussle.numeric.fingerprint import Fingerprint, package
 
 Code = str | tuple[str, ...]
-FORMAT = 1  # version of the file format, part of every key
+FORMAT = 2  # version of the file format, part of every key
 LETTERS = {"F": np.float64, "I": np.int64, "B": np.bool_, "U": np.uint64, "S": np.float32}
 NUMBERS: dict[str, tuple[type, ...]] = {
     "f8": (float, int, np.floating, np.integer),
@@ -76,18 +75,11 @@ def environment() -> str:
     import llvmlite
     import numba
     import numba.core.config
-    from numba.core.registry import cpu_target
 
     names = ("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "BOUNDSCHECK", "DEBUGINFO_DEFAULT")
     settings = [str(getattr(numba.core.config, name)) for name in names]
-    versions = [
-        platform.python_implementation(),
-        sys.version,
-        numba.__version__,
-        llvmlite.__version__,
-        np.__version__,
-    ]
-    return repr((FORMAT, versions, cpu_target.target_context.codegen().magic_tuple(), settings))
+    versions = [sys.implementation.cache_tag, numba.__version__, llvmlite.__version__, np.__version__]
+    return repr((FORMAT, versions, processor.target(), settings))
 
 
 @cache
@@ -147,6 +139,7 @@ def jitted(function: Callable[..., Any], **options: Any) -> Any:
     """Numba's dispatcher of a function."""
     from numba import njit
 
+    processor.choose()
     with compiling():
         return njit(**options)(function)
 

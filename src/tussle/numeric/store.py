@@ -1,4 +1,7 @@
-"""Disk cache of compiled kernels: one file per kernel and key, written atomically. Old files of the same kernel are removed."""
+"""Disk cache of compiled kernels: one file per kernel and key, written atomically. Old files of the same kernel are removed.
+
+A wheel brings some along, which are only read.
+"""
 
 from __future__ import annotations
 
@@ -20,6 +23,8 @@ from typing import Any
 from tussle.folders import is_private, lock, open_safely, read_own, user_folder
 
 KEEP = 8  # files per kernel: a few variants of the code and of the processor settings that tests use
+SHIPPED = Path(__file__).with_name("shipped")
+"""Kernels that came with the package: a wheel has those of its missions, see hatch_build.py."""
 TOUCH_AFTER = (
     86400.0  # [s] the time stamp of a used file is renewed once a day, so that unused files are removed first
 )
@@ -76,18 +81,32 @@ def file_stem(name: str) -> str:
 
 
 def load(name: str, key: str) -> Any:
-    """Load what was saved under a name and key; None if there is no file, or it is unreadable or damaged."""
-    path = directory() / f"{file_stem(name)}-{key}.kernel"
+    """Load what was saved under a name and key, or came with the package; None if there is no file, or it is unreadable or damaged."""
+    file_name = f"{file_stem(name)}-{key}.kernel"
+    path = directory() / file_name
     try:
         content, written = read_own(path)
         if time.time() - written > TOUCH_AFTER:
             os.utime(path)
     except OSError:
-        return None
+        content = b""
+    return _unpacked(content) or _unpacked(_shipped(file_name))
+
+
+def _unpacked(content: bytes) -> Any:
+    """The data of a file; None if the file is empty or damaged."""
     digest, data = content[:32], content[32:]
     if hashlib.sha256(data).digest() != digest:  # damaged: its machine code must not run
         return None
-    return pickle.loads(data)  # noqa: S301 - the user's own file in a folder of the user's own
+    return pickle.loads(data)  # noqa: S301 - the user's own file in a folder of the user's own, or a part of the package
+
+
+def _shipped(file_name: str) -> bytes:
+    """Content of a file of the kernels that came with the package, which is as much trusted as its code; empty if there is none."""
+    try:
+        return (SHIPPED / file_name).read_bytes()
+    except OSError:
+        return b""
 
 
 def save(name: str, key: str, data: bytes) -> None:

@@ -55,6 +55,7 @@ def test_colours_are_for_terminals_only(folder, process):
 
 def test_the_first_run_ever_says_that_it_compiles_and_the_next_does_not(folder, monkeypatch):
     monkeypatch.setenv("TUSSLE_CACHE_DIR", str(folder / "kernels"))
+    monkeypatch.setenv("NUMBA_OPT", "1")  # kernels that came with the package are of another kind
     (folder / "still.xml").write_text(
         '<runscript><run end="1" dt="0.1"/><entity><team_id>1</team_id><motion_model>Still</motion_model></entity></runscript>'
     )

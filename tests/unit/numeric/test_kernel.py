@@ -15,8 +15,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from llvmlite import binding
 
-from tussle.numeric import store
+from tussle.numeric import processor, store
 from tussle.numeric.fingerprint import Fingerprint
 from tussle.numeric.kernel import built, device, kernel, stats
 
@@ -332,6 +333,45 @@ def test_damaged_file_is_compiled_anew(own_cache, forget_kernels):
     forget_kernels()
     kernel("F f8 Fw")(scale_rows.py_func)(np.ones(1), 0.0, np.empty(1))
     assert (stats.compiled, stats.loaded) == (before + 1, loaded + 1)
+
+
+def test_a_kernel_that_came_with_the_package_is_loaded_unless_it_is_damaged(
+    own_cache, tmp_path, monkeypatch, forget_kernels
+):
+    def play():
+        forget_kernels()
+        before = stats.compiled, stats.loaded
+        out = np.empty(1)
+        kernel("F f8 Fw")(scale_rows.py_func)(np.ones(1), 1.0, out)
+        assert out == [3.0]
+        return stats.compiled - before[0], stats.loaded - before[1]
+
+    assert play() == (1, 0)
+    own_cache.rename(tmp_path / "shipped")
+    monkeypatch.setattr(store, "SHIPPED", tmp_path / "shipped")
+    assert play() == (0, 1)
+    assert not list(own_cache.glob("*.kernel"))
+    (path,) = (tmp_path / "shipped").glob("*.kernel")
+    path.write_bytes(path.read_bytes()[:-9])
+    assert play() == (1, 0)
+
+
+@pytest.mark.parametrize(
+    ("settings", "begin", "name"),
+    [
+        ({}, "", processor.level()),
+        ({"NUMBA_CPU_NAME": "generic"}, "", "generic"),
+        ({}, "import numba; numba.njit(lambda x: x)(1.0)", binding.get_host_cpu_name()),
+    ],
+    ids=["nothing chosen", "chosen by the user", "Numba has compiled before"],
+)
+def test_kernels_are_compiled_for_the_level_of_the_processor_unless_something_else_is_settled(
+    settings, begin, name
+):
+    code = f"{begin}\nfrom tussle.numeric import processor; print(processor.target()[1])"
+    env = os.environ | settings
+    done = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == (name or binding.get_host_cpu_name())
 
 
 def test_directory_that_cannot_be_written_warns_once_and_works(tmp_path, monkeypatch, forget_kernels):

@@ -1,0 +1,72 @@
+"""Compiles the kernels of the missions that ship, which a wheel brings along, so that the first game begins at once.
+
+They are compiled for each level of processor in TUSSLE_WHEEL_LEVELS, by default that of this processor, and fit the versions of Python,
+NumPy and Numba that compile them. With other versions, and for other missions, kernels are compiled on the first run, as without them.
+TUSSLE_WHEEL_LEVELS= (empty) leaves them out.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+
+LEVELS = "TUSSLE_WHEEL_LEVELS"
+MISSIONS = ("predator_prey",)
+"""Those of the first hour. Each further one makes the installation from source longer."""
+OWN_LEVEL = "from tussle.numeric import processor; print(processor.level())"
+PLAY = """
+import sys
+from tussle import Simulation
+from tussle.mission.xml import read_mission
+Simulation(read_mission(sys.argv[1]).mission).run()
+"""
+
+
+class KernelsHook(BuildHookInterface):
+    """Adds compiled kernels to a wheel. An editable installation has none: its code changes."""
+
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
+        """Compile, and tell the wheel's files and tag."""
+        root = Path(self.root)
+        levels = os.environ.get(LEVELS, self._python(root, OWN_LEVEL)).split()
+        if version == "editable" or not levels:
+            return
+        self._folder = Path(tempfile.mkdtemp(prefix="tussle-kernels-"))
+        for level in levels:
+            for mission in MISSIONS:
+                self._python(root, PLAY, mission, level=level)
+        for path in sorted(self._folder.glob("*.kernel")):
+            build_data["force_include"][str(path)] = f"tussle/numeric/shipped/{path.name}"
+        build_data["pure_python"], build_data["infer_tag"] = False, True
+
+    def finalize(self, *_: Any) -> None:
+        """Remove what was compiled."""
+        if folder := getattr(self, "_folder", None):
+            shutil.rmtree(folder)
+
+    def _python(self, root: Path, code: str, *arguments: str, level: str = "") -> str:
+        """Run code with the package of the source tree; returns what it prints."""
+        settings = {"PYTHONPATH": str(root / "src"), "PYTHONDONTWRITEBYTECODE": "1"}
+        if level:
+            settings |= {
+                "TUSSLE_CACHE_DIR": str(self._folder),
+                "NUMBA_CPU_NAME": level,
+                "NUMBA_CPU_FEATURES": "",
+            }
+        done = subprocess.run(
+            [sys.executable, "-c", code, *arguments],
+            env={**os.environ, **settings},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        if done.returncode:
+            raise RuntimeError(f"kernels cannot be compiled: {done.stderr[-2000:]}")
+        return done.stdout
