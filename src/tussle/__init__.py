@@ -11,6 +11,8 @@ from tussle.scene import Scene
 if TYPE_CHECKING:
     from tussle.record import Recorder, load_run, read_table
 
+    __version__: str
+
 __all__ = [
     "Block",
     "Mission",
@@ -24,8 +26,6 @@ __all__ = [
     "read_table",
 ]
 
-__version__ = "0.1.0.dev0"
-
 
 def __getattr__(name: str) -> Any:
     # Recording needs Arrow, which takes as long to import as the rest of tussle: it is imported on first use.
@@ -33,4 +33,13 @@ def __getattr__(name: str) -> Any:
         from tussle import record
 
         return getattr(record, name)
+    if (
+        name == "__version__"
+    ):  # that of the installation; its lookup searches folders, which most runs do not need
+        from importlib import metadata
+
+        try:
+            return metadata.version("tussle")
+        except metadata.PackageNotFoundError:
+            return "0.0.0"
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

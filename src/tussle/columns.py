@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from tussle import texts, units
+from tussle.displays import line, page, shortened, table
 from tussle.errors import DeclarationError, ParameterError, UnitError, nearest_name
 
 PER = ("entity", "world", "team")
@@ -47,6 +48,13 @@ class Column:
         raise AttributeError(
             f"{type(instance).__name__}.{self.name} is an array only inside a simulation; this plugin is not bound to one"
         )
+
+    def __repr__(self) -> str:
+        return line(type(self).__name__, f"{self.owner}.{self.name}".strip("."), *self._facts())
+
+    def _facts(self) -> tuple[str, ...]:
+        """What `repr` says besides the name."""
+        return ()
 
     def __eq__(self, other: object) -> bool:
         return type(self) is type(other) and self.__dict__ == other.__dict__
@@ -94,6 +102,11 @@ class Numbers(Column):
         if dtype not in (float, int, bool):
             raise DeclarationError(f"{type(self).__name__}: dtype {dtype!r} is not one of float, int, bool")
         self.dtype = dtype
+
+    def _facts(self) -> tuple[str, ...]:
+        return f"list of {' '.join(self.fields)}".strip() if self.ragged else " ".join(
+            self.fields
+        ), f"[{self.unit}]" * bool(self.unit)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -159,6 +172,22 @@ class Param(Numbers):
         self.choices = tuple(choices)
         self.structural = structural or self.is_text
         self.default = self.convert(default, "default")
+
+    def _facts(self) -> tuple[str, ...]:
+        return f"default {shortened(repr(self.default))}", self.allowed()
+
+    def _repr_html_(self) -> str:
+        rows = [
+            ("default", repr(self.default)),
+            ("unit", self.unit),
+            ("takes", self.allowed()),
+            ("fields", " ".join(self.fields)),
+        ]
+        return page(
+            f"{self.owner}.{self.name}".strip("."),
+            [self.doc],
+            table(("", ""), [row for row in rows if row[1]]),
+        )
 
     @property
     def is_row_data(self) -> bool:

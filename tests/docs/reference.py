@@ -85,6 +85,8 @@ def reference() -> str:
 
 def entry(name: str, value: Any) -> str:
     """What is said of one name."""
+    if name == "__version__":
+        return f"**{name}**: version of the installation, a text\n\n"
     if not (inspect.isclass(value) or callable(value)):
         return f"**{name}**: {', '.join(value) if isinstance(value, Mapping) else repr(value)}\n\n"
     lines = [f"### {name}\n"]

@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import re
 import subprocess
+import sys
+import tomllib
 
 import pytest
 from tree import ROOT, kept_files, relative
@@ -17,7 +19,10 @@ FORBIDDEN = {
         ["py" + r"pi\.(?:org|python)", "python" + r"hosted\.", "conda" + r"\.org", "npm" + r"js\."]
     ),
 }
-KINDS = ("added", "changed", "numbers", "fixed", "removed")
+KINDS = [
+    kind["directory"]
+    for kind in tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["towncrier"]["type"]
+]
 
 
 @pytest.mark.parametrize("what", FORBIDDEN)
@@ -55,6 +60,19 @@ def test_fragments_of_the_changelog_have_a_known_kind():
         if path.name != "README.md":
             assert re.fullmatch(rf"[a-z0-9-]+\.({'|'.join(KINDS)})\.md", path.name), path.name
             assert path.read_text().strip(), f"{path.name} is empty"
+
+
+def test_release_notes_are_made_of_all_fragments():
+    pytest.importorskip("towncrier", reason="needs towncrier: pip install '.[test]'")
+    command = [sys.executable, "-m", "towncrier", "build", "--draft"]
+    notes = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    listed = "".join(notes.split())
+    for path in (ROOT / "changelog").glob("*.*.md"):
+        assert "".join(path.read_text().split()) in listed, path.name
+    for target in re.findall(r"\]\(([^)#\s]+)", notes):
+        assert (ROOT / target).exists(), (
+            f"a fragment links to {target}; links are relative to the folder of CHANGELOG.md"
+        )
 
 
 def test_readme_begins_with_the_two_commands_that_the_checks_run():

@@ -25,6 +25,7 @@ from tussle.batch.store import PLUGINS
 from tussle.batch.tasks import BatchRun, Finished
 from tussle.batch.variables import Variable
 from tussle.batch.varied import as_variables, variable_entry
+from tussle.displays import counted, line, listing, page, table
 from tussle.engine.simulation import Simulation
 from tussle.errors import BatchError, ParameterError, PluginError
 from tussle.mission import Loaded, Mission, PluginFile, read_mission
@@ -154,6 +155,28 @@ class Batch:
         compat = self._options.get("compat")  # a mission made in Python does not have it yet
         mission = mission if compat in (None, mission.compat) else mission.replace(compat=compat)
         return mission.ending_by_time() if self._ends_by_time else mission
+
+    def __repr__(self) -> str:
+        return line("Batch", repr(self._name), *self._facts())
+
+    @property
+    def _name(self) -> str:
+        return self.mission.name or (str(self.source) if isinstance(self.source, (str, Path)) else "")
+
+    def _facts(self) -> tuple[str, ...]:
+        n_points, first = len(self.plan.points), self.plan.seed(0)
+        varied = (
+            f"{counted(n_points, 'point')} of {listing([v.name for v in self.variables])}"
+            if self.variables
+            else ""
+        )
+        return counted(self.plan.n_runs, "run"), varied, f"seeds from {first}"
+
+    def _repr_html_(self) -> str:
+        names = [v.name for v in self.variables]
+        rows = ((number, *(point[name] for name in names)) for number, point in enumerate(self.plan.points))
+        points = table(("point", *names), rows) if names else ""
+        return page(f"Batch {self._name}", self._facts(), points, self.mission._repr_html_())
 
     # -- runs -----------------------------------------------------------------------------------------------------------------
 

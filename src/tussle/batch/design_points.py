@@ -167,9 +167,21 @@ def _pickled(mission: Mission) -> bytes:
 
 
 def exactly(mission: Mission) -> str:
-    """All of a mission as text, with every digit: `repr` rounds arrays and leaves out the middle of long ones."""
+    """All of a mission as text, with every digit: `repr` of arrays rounds them and leaves out the middle of long ones."""
     with np.printoptions(threshold=sys.maxsize, floatmode="unique"):
-        return repr(mission)
+        return _written_out(mission)
+
+
+def _written_out(value: Any) -> str:
+    """`repr` of a value, with all that missions and blocks have."""
+    if isinstance(value, (Mission, Block)):
+        fields = (
+            f"{f.name}={_written_out(getattr(value, f.name))}" for f in dataclasses.fields(value) if f.repr
+        )
+        return f"{type(value).__name__}({', '.join(fields)})"
+    if isinstance(value, tuple) and value and isinstance(value[0], Block):
+        return f"({', '.join(map(_written_out, value))}{',' * (len(value) == 1)})"
+    return repr(value)
 
 
 def split(mission: Mission) -> tuple[Signature, dict[str, Any]]:

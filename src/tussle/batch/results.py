@@ -29,6 +29,7 @@ from tussle.batch.statistics import (
 from tussle.batch.survival import N_TIMES, Survival, survival_of
 from tussle.batch.variables import Choice, Range, Variable
 from tussle.batch.varied import variable_of
+from tussle.displays import counted, line, listing, page, table
 from tussle.errors import ParameterError, listed
 from tussle.mission.codecs import written as text_of
 from tussle.record.run import check_frames, frame_of
@@ -407,8 +408,26 @@ class Results:
         return self._game[rows] if self._has_copies else None
 
     def __repr__(self) -> str:
-        failed = f", {self.n_failed} failed" if self.n_failed else ""
-        return f"<Results {str(self.path)!r}: {self.n_runs} of {self.n_planned} runs{failed}>"
+        return line("Results", "in memory" if self.path is None else repr(str(self.path)), *self._facts())
+
+    def _facts(self) -> tuple[str, ...]:
+        runs = f"{self.n_runs:,} of {self.n_planned:,} runs"
+        points = (
+            f"{counted(len(self.points), 'point')} of {listing([v.name for v in self.variables])}"
+            if self.variables
+            else ""
+        )
+        return runs, points, f"{self.n_failed:,} failed" if self.n_failed else ""
+
+    def _repr_html_(self) -> str:
+        finite = ((name, values[np.isfinite(values)]) for name, values in self._columns.items())
+        rows = (
+            (self.title(name), float(v.mean()), float(v.min()), float(v.max()))
+            for name, v in finite
+            if len(v)
+        )
+        title = "Results in memory" if self.path is None else f"Results {self.path}"
+        return page(title, self._facts(), table(("quantity", "mean", "minimum", "maximum"), rows))
 
 
 def _numbered(rows: np.ndarray) -> np.ndarray:

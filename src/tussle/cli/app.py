@@ -18,6 +18,7 @@ COMMANDS = {
     "convert": (play_options.ConvertOptions, "tussle.cli.play:convert"),
     "describe": (play_options.DescribeOptions, "tussle.cli.pages:describe"),
     "plugins": (PluginOptions, "tussle.cli.pages:plugins"),
+    "schema": (play_options.SchemaOptions, "tussle.cli.schema:schema"),
     "missions": (play_options.MissionsOptions, "tussle.cli.pages:missions"),
     "new": (play_options.NewOptions, "tussle.cli.scaffold:new"),
     "export": (export_options.ExportOptions, "tussle.cli.export:export"),

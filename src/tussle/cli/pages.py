@@ -57,9 +57,20 @@ def plugins(options: PluginOptions) -> int:
     Returns:
         The exit code.
     """
+    found, catalogue, wrong = load_plugins(options.plugin_files)
+    show_plugins(found)
+    for text in filter(None, map(catalogue.hides, found)):
+        say_note(text)
+    for text in wrong:
+        say_error(text)
+    return WRONG_INPUT if wrong else 0
+
+
+def load_plugins(files: Iterable[Path]) -> tuple[dict[str, type[Plugin]], Catalogue, list[str]]:
+    """Return all plugins by name, the catalogue that has them, and an error for each plugin and file that cannot be loaded."""
     found: dict[str, type[Plugin]] = {}
     good, wrong = list[PluginFile](), list[str]()
-    for path in options.plugin_files:
+    for path in files:
         try:
             file = PluginFile.of(path)
             file.load()
@@ -72,12 +83,7 @@ def plugins(options: PluginOptions) -> int:
             found[name] = catalogue.load(name)
         except MissionError as error:
             wrong.append(str(error))
-    show_plugins(found)
-    for text in filter(None, map(catalogue.hides, found)):
-        say_note(text)
-    for text in wrong:
-        say_error(text)
-    return WRONG_INPUT if wrong else 0
+    return found, catalogue, wrong
 
 
 def missions(_: MissionsOptions) -> None:

@@ -89,6 +89,11 @@ class DoctorOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
+class SchemaOptions(PluginOptions):
+    """Print the XML schema (XSD) of mission files, by which editors complete and check them."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class ConvertOptions(MissionOptions):
     """Write a mission with all its values as one mission file, or as the Python code that builds it."""
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+from tussle.displays import MAX_TABLE, line, listing, number, page, table
+
 
 @dataclass
 class WorldResult:
@@ -42,3 +44,26 @@ class WorldResult:
         best = max(self.scores.values())
         leaders = [team for team, score in self.scores.items() if score == best]
         return leaders[0] if len(leaders) == 1 else None
+
+    def __repr__(self) -> str:
+        return line("WorldResult", "", *self._facts())
+
+    def _facts(self) -> tuple[str, ...]:
+        left = listing([f"team {team}: {n:,}" for team, n in self.alive.items()])
+        scores = listing([f"team {team}: {number(float(score))}" for team, score in self.scores.items()])
+        error = f"{type(self.error).__name__}: {self.error}" if self.error is not None else ""
+        return (
+            f"seed {self.seed}", f"ended by {self.end}" if self.end else "running", f"t = {self.t:.6g} s",
+            f"left {left}" if left else "", f"score {scores}" if scores else "", error.partition("\n")[0],
+        )  # fmt: skip
+
+    def _repr_html_(self) -> str:
+        seed, end, t, _, _, error = self._facts()
+        teams = [(team, n, self.scores.get(team, "")) for team, n in self.alive.items()]
+        values = (
+            (f"{name}.{key}", value) for name, found in self.metrics.items() for key, value in found.items()
+        )
+        return page(
+            f"World {self.world}", [seed, end, t, f"{self.steps:,} steps", error],
+            table(("team", "left", "score"), teams, MAX_TABLE // 2), table(("result", "value"), values, MAX_TABLE // 2),
+        )  # fmt: skip

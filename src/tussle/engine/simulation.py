@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import warnings
 import weakref
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Self
 
@@ -12,6 +13,7 @@ import numpy as np
 
 from tussle.api.plugin import GRADES
 from tussle.columns import Handle
+from tussle.displays import counted, line, listing, page, table
 from tussle.engine import access
 from tussle.engine.arrivals import reset, spawn_due
 from tussle.engine.reseed import renew_keys
@@ -332,6 +334,34 @@ class Simulation:
             for (where, c), names in writers.items()
         ]
         return "\n".join([*lines, f"grade: {self.grade}"])
+
+    def __repr__(self) -> str:
+        return line("Simulation", repr(self.mission.name) if self.mission.name else "", *self._facts())
+
+    def _facts(self) -> tuple[str, ...]:
+        """What `repr` says of worlds, seeds, time, entities and ends."""
+        state, t = self.state, self.t
+        span = f"t = {t.min():.6g} s" if t.min() == t.max() else f"t = {t.min():.6g} to {t.max():.6g} s"
+        bodies = state.population.bodies
+        counts = np.bincount(bodies.block, minlength=len(self.mission.blocks))
+        left = listing([f"{block.name} {n:,}" for block, n in zip(self.mission.blocks, counts, strict=False)])
+        ends = Counter(r.end for w, r in enumerate(state.results) if r is not None and not state.running[w])
+        ended = listing([f"{n:,} by {end}" for end, n in ends.items()])
+        seeds = state.context.seeds.tolist()
+        return (
+            counted(self.n_worlds, "world"), f"seed {seeds[0]}" if len(seeds) == 1 else f"seeds {listing(seeds)}", span, f"left {left}",
+            f"ended {ended}" if ended else "", "closed" if self.is_closed else "",
+        )  # fmt: skip
+
+    def _repr_html_(self) -> str:
+        state, bodies, blocks = self.state, self.state.population.bodies, self.mission.blocks
+        counts = np.zeros((self.n_worlds, len(blocks)), np.int64)
+        np.add.at(counts, (bodies.world, bodies.block), 1)
+        ends = ["running" if state.running[w] or r is None else r.end for w, r in enumerate(state.results)]
+        rows = zip(state.context.seeds.tolist(), self.t.tolist(), ends, counts, strict=True)
+        head = ("seed", "t [s]", "end", *(block.name for block in blocks))
+        title = f"Simulation {self.mission.name}"
+        return page(title, self._facts(), table(head, ((seed, t, end, *n) for seed, t, end, n in rows)))
 
     def close(self) -> None:
         """Release threads and all objects that plugins hold outside the arrays. Called at the end of `with`; may be called twice."""

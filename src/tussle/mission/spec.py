@@ -16,6 +16,7 @@ from tussle.api import Autonomy, Controller, Interaction, Metric, MotionModel, N
 from tussle.api.context import missing_service
 from tussle.columns import Param
 from tussle.errors import MissionError, ParameterError, TussleError, listed, nearest_name
+from tussle.mission import displayed
 from tussle.mission.cadence import Cadence
 from tussle.mission.laws import check_compat, with_laws
 from tussle.mission.limits import Limits
@@ -212,6 +213,12 @@ class Block:
         """All plugins in the order of a step."""
         return (*self.autonomy, *self.controller, self.motion, *self.sensor)
 
+    def __repr__(self) -> str:
+        return displayed.block_line(self)
+
+    def _repr_html_(self) -> str:
+        return displayed.block_html(self)
+
 
 BLOCK_VALUES = _declared(
     Block,
@@ -393,6 +400,12 @@ class Mission:
         """Return a copy with the end condition "time" in addition to its own."""
         conditions = tuple(self.end_conditions)
         return self if "time" in conditions else self.replace(end_conditions=(*conditions, "time"))
+
+    def __repr__(self) -> str:
+        return displayed.mission_line(self)
+
+    def _repr_html_(self) -> str:
+        return displayed.mission_html(self)
 
 
 MISSION_VALUES = _declared(

@@ -12,6 +12,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.csv
 
+from tussle.displays import MAX_LINE, counted, line, listing, page, shortened, table
 from tussle.documents import read_text
 from tussle.errors import MissingExtraError, ParameterError, RecordError, listed, nearest_name
 from tussle.mission.limits import Limits
@@ -159,8 +160,30 @@ class Run:
         return frame_of(table, self._frames)
 
     def __repr__(self) -> str:
-        state = "complete" if self.is_complete else f"incomplete: {'; '.join(self.notes)}"
-        return f"<Run {str(self.path)!r}: {self.trajectory_table.num_rows} states, {state}>"
+        return line("Run", repr(str(self.path)), *self._facts())
+
+    def _facts(self) -> tuple[str, ...]:
+        name = self.info.get("mission", {}).get("name") or ""
+        seeds = [world["seed"] for world in self.info.get("worlds", ())]
+        ends = listing([world["end"] or "interrupted" for world in self.info.get("worlds", ())])
+        state = (
+            "complete" if self.is_complete else f"incomplete: {shortened('; '.join(self.notes), MAX_LINE)}"
+        )
+        return (
+            name, f"seed {seeds[0]}" if len(seeds) == 1 else f"seeds {listing(seeds)}" if seeds else "",
+            counted(self.trajectory_table.num_rows, "state"), f"ended by {ends}" if ends else "", state,
+        )  # fmt: skip
+
+    def _repr_html_(self) -> str:
+        worlds = self.info.get("worlds", ())
+        rows = (
+            (w["seed"], w["end"], w["t"], team, n, w["scores"].get(team, ""))
+            for w in worlds
+            for team, n in w["alive"].items()
+        )
+        return page(
+            f"Run {self.path}", self._facts(), table(("seed", "end", "t [s]", "team", "left", "score"), rows)
+        )
 
 
 def load_run(path: str | Path, frames: str = "", *, is_mapped: bool = False) -> Run:

@@ -137,3 +137,16 @@ def test_check_says_that_a_mission_can_be_played(tussle, folder):
     done = tussle("check", "game.xml")
     assert done.stdout == "game.xml can be played: 12 entities, grade portable\n"
     assert [p.name for p in folder.iterdir()] == ["game.xml"]
+
+
+def test_the_schema_has_own_plugins_and_tells_of_those_it_lacks(tussle, folder):
+    (folder / "mine.py").write_text(
+        'from tussle.stock import Boids\n\n\nclass Mine(Boids):\n    """Sheep. They sleep."""\n'
+    )
+    (folder / "wrong.py").write_text("import no_such_module\n")
+    done = tussle(
+        "schema", "--plugin-path", "mine.py", "--plugin-path", "wrong.py", code=terminal.WRONG_INPUT
+    )
+    assert '<xs:enumeration value="Mine">' in done.stdout
+    assert done.stdout.rstrip().endswith("</xs:schema>")
+    assert "no_such_module" in done.stderr

@@ -116,7 +116,10 @@ def test_a_batch_directory_is_loaded(tmp_path, grid):
     pd.testing.assert_frame_equal(loaded.frame("pandas"), grid.frame("pandas"))
     assert loaded.variables == grid.variables == GRID
     assert loaded.points == POINTS
-    assert repr(loaded) == f"<Results {str(tmp_path / 'batch')!r}: 120 of 120 runs, 3 failed>"
+    assert (
+        repr(loaded)
+        == f"<Results {str(tmp_path / 'batch')!r}: 120 of 120 runs, 4 points of tactic, speed, 3 failed>"
+    )
 
 
 def test_values_of_a_choice_stay_what_they_were():

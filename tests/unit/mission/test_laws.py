@@ -10,6 +10,7 @@ import pytest
 import tussle.stock as stock
 from tussle import Block, Mission, Simulation, historic
 from tussle.batch import Batch
+from tussle.batch.design_points import exactly
 from tussle.errors import MissionError
 from tussle.mission import Catalogue, read_mission, to_python, to_xml
 
@@ -54,7 +55,7 @@ def test_the_laws_of_a_mission_stay_with_it(file, tmp_path):
         mission.replace(end=2.0),
     ]
     assert [played(each) for each in others] == [expected] * 5
-    assert [repr(each) for each in others] == [repr(mission)] * 5
+    assert [exactly(each) for each in others] == [exactly(mission)] * 5
 
 
 def test_without_compat_nothing_historic_is_loaded(file):

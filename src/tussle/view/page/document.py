@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from tussle import __version__
+import tussle
 from tussle.mission import Mission
 from tussle.rays.surfaces import MeshPart
 from tussle.rays.textures import jpeg
@@ -70,7 +70,7 @@ def game_document(
     models = {style.model(i) for i in range(len(game.blocks))} | {"sphere"}
     return {
         "format": FORMAT,
-        "generator": f"tussle {__version__}",
+        "generator": f"tussle {tussle.__version__}",
         "title": game.name if title is None else title,
         "blocks": [
             {
