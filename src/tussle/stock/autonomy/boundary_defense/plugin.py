@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from tussle.api import Autonomy, GroupView, Output, Param
@@ -10,9 +12,9 @@ from tussle.api import Autonomy, GroupView, Output, Param
 class BoundaryDefense(Autonomy):
     """Flies to the nearest entity inside a boundary that is not of the boundary's team; without one, to the centre.
 
-    It aims at the position of the intruder one step ahead. The desired velocity is the offset to that point, divided by 1 s; limit it
-    with `SingleIntegrator.max_speed`. In SCRIMMAGE a defender learned of its boundary by a message at the end of the first
-    step, and stood still until then.
+    The desired velocity is the one with which it is there in 1 s; limit it with `SingleIntegrator.max_speed`. In SCRIMMAGE a
+    defender aimed at the intruder's position one step ahead, always at max_speed; it learned of its boundary by a message at
+    the end of the first step, and stood still until then.
 
     Raises:
         MissionError: `boundary_id` is not the id of exactly one boundary of the mission.
@@ -31,5 +33,9 @@ class BoundaryDefense(Autonomy):
         region, bodies = g.region(self.boundary_id), g.bodies
         intrudes = (bodies.team != region.team) & region.shape.contains(bodies.pos)
         other = g.nearest(among=intrudes).other[0]
-        ahead = bodies.pos[:, other] + g.dt * bodies.vel[:, other]
+        ahead = bodies.pos[:, other] + self.lead(g) * bodies.vel[:, other]
         self.velocity[:] = np.where(other >= 0, ahead, np.array(region.center)[:, None]) - g.pos
+
+    def lead(self, g: GroupView) -> Any:
+        """Time [s] by which the point that is flown to is ahead of the intruder; a number or (n,)."""
+        return 1.0
