@@ -4,8 +4,8 @@ from typing import TYPE_CHECKING, Any
 
 from tussle.engine.result import WorldResult
 from tussle.engine.simulation import Simulation
-from tussle.errors import TussleError
-from tussle.mission import Block, Mission
+from tussle.errors import TussleError, nearest_name
+from tussle.mission import Block, Mission, read_mission
 from tussle.scene import Scene
 
 if TYPE_CHECKING:
@@ -21,6 +21,7 @@ __all__ = [
     "WorldResult",
     "__version__",
     "load_run",
+    "read_mission",
     "read_table",
 ]
 
@@ -33,4 +34,9 @@ def __getattr__(name: str) -> Any:
         from tussle import record
 
         return getattr(record, name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    hint = "" if name.startswith("_") else nearest_name(name, __all__)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}{hint}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)
