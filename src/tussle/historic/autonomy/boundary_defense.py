@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from tussle.stock.autonomy import boundary_defense
 
 
 class BoundaryDefense(boundary_defense.BoundaryDefense):
-    """BoundaryDefense that aims one step ahead of an intruder, and stands still in the first step.
+    """BoundaryDefense that does not add the speed of the intruder to its own, and stands still in the first step.
 
     In SCRIMMAGE it receives its regions in messages, which are delivered at the end of that step; in tussle all entities have the
     regions of the mission at once. In SCRIMMAGE entities born later never receive them; here they have them too.
@@ -18,6 +20,6 @@ class BoundaryDefense(boundary_defense.BoundaryDefense):
         super().step(g)
         self.velocity[:, g.step_count == 0] = 0.0
 
-    def lead(self, g: Any) -> Any:
-        """One step [s]."""
-        return g.dt
+    def command(self, way: np.ndarray, _: np.ndarray) -> np.ndarray:
+        """Desired velocity [m/s], (3, n): the way [m] in one second."""
+        return way
