@@ -38,4 +38,5 @@ class BoundaryDefense(Autonomy):
 
     def command(self, way: np.ndarray, vel: np.ndarray) -> np.ndarray:
         """Desired velocity [m/s], (3, n), for the way to a point [m] and the intruder's velocity [m/s], 0 without one, (3, n) each."""
-        return way + np.sqrt(vel[0] * vel[0] + vel[1] * vel[1] + vel[2] * vel[2]) * unit(way)
+        speed = np.sqrt(vel[0] * vel[0] + vel[1] * vel[1] + vel[2] * vel[2])
+        return np.asarray(way + speed * unit(way))
