@@ -61,7 +61,7 @@ def game(scene: Scene, robots: int, rays: int, boxes: int) -> Simulation:
         num_rays_horiz=rays,
         angle_res_horiz=f"{270.0 / max(rays - 1, 1)} deg",
         max_range=RANGE,
-        max_sample_rate=0.0,
+        scan_period=0.0,
     )
     blocks = [Block(name="robot", count=robots, sensor=lidar, radius=0.5, **common)]
     blocks += [Block(name="box", count=boxes, box=(1.0, 1.0, 1.0), **common)] if boxes else []

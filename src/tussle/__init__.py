@@ -4,8 +4,8 @@ from typing import TYPE_CHECKING, Any
 
 from tussle.engine.result import WorldResult
 from tussle.engine.simulation import Simulation
-from tussle.errors import TussleError
-from tussle.mission import Block, Mission
+from tussle.errors import TussleError, nearest_name
+from tussle.mission import Block, Mission, read_mission
 from tussle.scene import Scene
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ __all__ = [
     "WorldResult",
     "__version__",
     "load_run",
+    "read_mission",
     "read_table",
 ]
 
@@ -33,13 +34,17 @@ def __getattr__(name: str) -> Any:
         from tussle import record
 
         return getattr(record, name)
-    if (
-        name == "__version__"
-    ):  # that of the installation; its lookup searches folders, which most runs do not need
+    # That of the installation: its lookup searches folders, which most runs do not need.
+    if name == "__version__":
         from importlib import metadata
 
         try:
             return metadata.version("tussle")
         except metadata.PackageNotFoundError:
             return "0.0.0"
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    hint = "" if name.startswith("_") else nearest_name(name, __all__)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}{hint}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

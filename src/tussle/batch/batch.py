@@ -15,7 +15,14 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tussle.batch.design_points import DesignPoint, build_points, exactly, group_points, read_points
+from tussle.batch.design_points import (
+    DesignPoint,
+    build_points,
+    check_source,
+    exactly,
+    group_points,
+    read_points,
+)
 from tussle.batch.executors import OVERDUE, Executor, InProcess, Processes
 from tussle.batch.plan import BatchPlan
 from tussle.batch.points import settings_of, variables_of
@@ -72,7 +79,7 @@ class Batch:
 
     Raises:
         ParameterError: A variable or a number is not allowed.
-        MissionError: The mission cannot be played at one of the points.
+        MissionError: There is no such mission, or it cannot be played at one of the points.
     """
 
     def __init__(
@@ -93,6 +100,7 @@ class Batch:
         run_timeout: float | None = None,
         **options: Any,
     ) -> None:
+        check_source(mission, "Batch")
         if run_timeout is not None and not 0.0 < run_timeout < math.inf:
             raise ParameterError(
                 f"run_timeout = {run_timeout!r} is not allowed; it takes a number of seconds > 0"

@@ -18,6 +18,7 @@ from tussle.batch import by_value
 from tussle.batch.tasks import Package
 from tussle.errors import MissionError, ParameterError, TussleError, nearest_name
 from tussle.mission import Block, Loaded, Mission, PluginFile, read_mission
+from tussle.mission.given import wanted
 from tussle.mission.paths import with_value
 from tussle.mission.spec import WORLD_VALUES
 
@@ -31,6 +32,16 @@ class DesignPoint:
 
     group: int
     params: dict[str, Any]
+
+
+def check_source(source: Any, taker: str) -> None:
+    """Check that a mission is given, or what one can be made from.
+
+    Raises:
+        MissionError: It is neither.
+    """
+    if not isinstance(source, (str, Path, Mission)) and not callable(source):
+        raise MissionError(f"{taker} needs {wanted(source)}")
 
 
 def read_points(

@@ -39,7 +39,7 @@ COMMANDS = {
 
 app = typer.Typer(
     help="Simulate thousands of robots in one 3D world: play missions, inspect plugins, write your own.",
-    epilog=EPILOG, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None,
+    epilog=EPILOG, no_args_is_help=True, add_completion=True, pretty_exceptions_enable=False, rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 80},
 )  # fmt: skip
 

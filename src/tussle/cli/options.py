@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 import typer
 from typer.core import TyperCommand
 
+from tussle.cli import completion
 from tussle.cli.terminal import EXIT_CODES, OK, reported, say_note
 from tussle.errors import ParameterError
 from tussle.units import parse
@@ -22,15 +23,14 @@ if TYPE_CHECKING:
 # \b keeps click from rewrapping the lines that follow.
 EPILOG = "\b\nExit codes:\n" + "\n".join(f"  {code:>3}  {meaning}" for code, meaning in EXIT_CODES.items())
 LARGEST_SEED = 2**64 - 1
-VIEWER_NOTE = ": kept for the viewer: "
 """Part of the notes on settings that only the viewer uses."""
 RENAMED = {"--log": "--record-runs"}
 """Former names of options."""
 
 
-def argument(metavar: str, text: str) -> Any:
+def argument(metavar: str, text: str, **more: Any) -> Any:
     """A positional argument."""
-    return typer.Argument(metavar=metavar, help=text, show_default=False)
+    return typer.Argument(metavar=metavar, help=text, show_default=False, **more)
 
 
 def option(metavar: str | None, text: str, *names: str, shows_default: bool = False, **more: Any) -> Any:
@@ -44,7 +44,7 @@ def flag(name: str, text: str) -> Any:
 
 
 class TussleCommand(TyperCommand):
-    """A command that names the new name of a renamed option."""
+    """A command that names the new name of a renamed option, and reads command lines that the shell completes."""
 
     def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:  # type: ignore[override]
         """Parse the command line.
@@ -55,7 +55,9 @@ class TussleCommand(TyperCommand):
         for name in (word.partition("=")[0] for word in args):
             if name in RENAMED and any(RENAMED[name] in each.opts for each in self.params):
                 raise typer.BadParameter(f"no such option: {name}; it is now called {RENAMED[name]}")
-        return super().parse_args(ctx, args)
+        # The word after an option's name is being completed: without this, the parser would stop before the mission.
+        is_cut = ctx.resilient_parsing and bool(args) and any(args[-1] in each.opts for each in self.params)
+        return super().parse_args(ctx, args[:-1] if is_cut else args)
 
 
 def add_command(
@@ -160,9 +162,16 @@ class MissionOptions(PluginOptions):
     """Check a mission: read it, build its game, and report all errors."""
 
     mission: Annotated[
-        str, argument("MISSION", "A mission file, a built-in mission, or a plugin, for its example.")
+        str,
+        argument(
+            "MISSION",
+            "A mission file, a built-in mission, or a plugin, for its example.",
+            autocompletion=completion.missions,
+        ),
     ]
-    more: Annotated[list[str], argument("NAME=VALUE", "Same as --set.")] = field(default_factory=list)
+    more: Annotated[
+        list[str], argument("NAME=VALUE", "Same as --set.", autocompletion=completion.settings)
+    ] = field(default_factory=list)
     seed: Annotated[
         int | None,
         option("N", "Seed of the game; by default that of the mission, or 1.", min=0, max=LARGEST_SEED),
@@ -174,6 +183,7 @@ class MissionOptions(PluginOptions):
             "Set a variable ${name=default} of the mission, or any value by its path: prey.Boids.max_speed='50 kt', "
             "prey.motion_model=SimpleAircraft, run.dt=0.05. Can be repeated.",
             "--set",
+            autocompletion=completion.settings,
         ),
     ] = field(default_factory=list)
     end: Annotated[str | None, option("TIME", "End the game at this time: 60, or '2 min'.")] = None
@@ -222,8 +232,8 @@ class MissionOptions(PluginOptions):
 
 def show_notes(loaded: Loaded | None, shows_viewer_notes: bool = False) -> None:
     """Print the notes on a mission file, by default without those on settings of the viewer."""
-    for note in loaded.notes if loaded is not None else ():
-        if shows_viewer_notes or VIEWER_NOTE not in note:
+    if loaded is not None:
+        for note in loaded.notes if shows_viewer_notes else loaded.game_notes:
             say_note(note)
 
 

@@ -10,6 +10,7 @@ import sys
 import time
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -109,6 +110,7 @@ def run(options: RunOptions) -> int:
 
     Raises:
         PluginError: A plugin failed. The game up to the failure is recorded and shown.
+        KeyboardInterrupt: The user left the debugger. The game up to there is recorded.
     """
     began = time.perf_counter()
     planned = None if options.from_batch is None else planned_by(options)
@@ -130,6 +132,8 @@ def run(options: RunOptions) -> int:
             if not options.no_log:
                 directory = options.directory or _new_directory(name, seed)
                 recorder = record(simulation, directory, loaded, options.log_period, options.shapes)
+            if recorder is not None:
+                stack.push(partial(_close_interrupted, recorder))
             simulation.step()  # loads or compiles kernels, so it counts as preparation
         speed = Speed(began)
         _play(simulation, name, speed, options.pace, interrupt)
@@ -149,6 +153,13 @@ def run(options: RunOptions) -> int:
         files = ", and all files were written" if recorder else ""
         say("interrupted", f"the current step was finished{files}", "bold yellow")
     return interrupt.code
+
+
+def _close_interrupted(recorder: Recorder, kind: type[BaseException] | None, *_: object) -> None:
+    """Complete the run directory if the user left the debugger."""
+    if kind is not None and issubclass(kind, KeyboardInterrupt):
+        recorder.close("interrupted")
+        say_note(f"the game up to there is in {recorder.directory}")
 
 
 def _play(simulation: Simulation, name: str, speed: Speed, pace: float | None, interrupt: Interrupt) -> None:

@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from tussle.cli import completion
 from tussle.cli.options import (
     MissionOptions,
     PluginOptions,
@@ -24,7 +25,12 @@ class RunOptions(MissionOptions):
     """Play one game, record it, and show its result."""
 
     mission: Annotated[
-        str, argument("MISSION", "A mission file, a built-in mission, or a plugin, for its example.")
+        str,
+        argument(
+            "MISSION",
+            "A mission file, a built-in mission, or a plugin, for its example.",
+            autocompletion=completion.missions,
+        ),
     ] = ""
     from_batch: Annotated[
         str | None, option("BATCH:RUN", "Play a run of a batch again instead of a mission.", "--from")
@@ -72,7 +78,14 @@ class RunOptions(MissionOptions):
 class DescribeOptions(MissionOptions):
     """Show the parameters and channels of a plugin, or the entities and the step schedule of a mission."""
 
-    mission: Annotated[str, argument("MISSION|PLUGIN", "A mission file, a built-in mission, or a plugin.")]
+    mission: Annotated[
+        str,
+        argument(
+            "MISSION|PLUGIN",
+            "A mission file, a built-in mission, or a plugin.",
+            autocompletion=completion.plugins,
+        ),
+    ]
     example: Annotated[bool, flag("--example", "Print the mission file that shows what a plugin does.")] = (
         False
     )
@@ -115,7 +128,15 @@ class NewOptions:
         str, argument("KIND", "autonomy, motion, controller, sensor, interaction, metric or network.")
     ]
     name: Annotated[str, argument("NAME", "Class name, such as MyBoids.")]
-    origin: Annotated[str | None, option("STOCK", "Start from a copy of this stock plugin.", "--from")] = None
+    origin: Annotated[
+        str | None,
+        option(
+            "STOCK",
+            "Start from a copy of this stock plugin.",
+            "--from",
+            autocompletion=completion.stock_plugins,
+        ),
+    ] = None
     easy: Annotated[bool, flag("--easy", "Write code for one entity, or one world, at a time.")] = False
     directory: Annotated[Path, option("DIR", "Directory for the files.", "--out", shows_default=True)] = (
         Path()

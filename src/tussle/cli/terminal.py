@@ -139,7 +139,7 @@ def reported(is_debugging: bool) -> Iterator[None]:
 
 def _report(error: BaseException) -> None:
     if isinstance(error, KeyboardInterrupt):
-        say("interrupted", "nothing was played", "bold yellow")
+        say("interrupted", str(error) or "nothing was played", "bold yellow")
     elif isinstance(error, (TussleError, OSError)):
         say_error(str(error))
     else:

@@ -53,7 +53,12 @@ def view(options: ViewOptions) -> int:
         announce(page, options)
         speed = Speed(began)
         speed.begin(float(simulation.t[0]))
-        code = watch(page, interrupt, lambda: options.exit_when_over and live.is_over)
+        code = watch(
+            page,
+            interrupt,
+            # KeyboardInterrupt: the user left the debugger.
+            lambda: isinstance(live.error, KeyboardInterrupt) or (options.exit_when_over and live.is_over),
+        )
         page.stop()
         live.stop()
         speed.end(float(simulation.t[0]))

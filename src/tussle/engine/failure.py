@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import traceback
+from bdb import BdbQuit
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +35,13 @@ def _location(error: BaseException, plugin: Any) -> str:
 
 
 def raised(error: BaseException, plugin: Any, *, where: str, step: int, world: int | None) -> PluginError:
-    """Return the `PluginError` for an exception raised in a plugin. Its cause has a traceback that starts in the plugin's code."""
+    """Return the `PluginError` for an exception raised in a plugin. Its cause has a traceback that starts in the plugin's code.
+
+    Raises:
+        KeyboardInterrupt: The user left the debugger.
+    """
+    if isinstance(error, BdbQuit):
+        raise KeyboardInterrupt(f"the debugger was left in {plugin.instance_name}, step {step}") from None
     if isinstance(error, TussleError) and all(
         frame.filename.startswith(_OWN) for frame in traceback.extract_tb(error.__traceback__)
     ):  # raised by this package: its message names the place
@@ -50,7 +57,11 @@ def raised(error: BaseException, plugin: Any, *, where: str, step: int, world: i
 
 
 def in_call(error: Exception, plugin: Any, view: GroupView, group: Group | None = None) -> PluginError:
-    """Return the `PluginError` for an exception in a plugin call: with plugin and step, and with entity and world if they are known."""
+    """Return the `PluginError` for an exception in a plugin call: with plugin and step, and with entity and world if they are known.
+
+    Raises:
+        KeyboardInterrupt: The user left the debugger.
+    """
     if isinstance(error, PluginError) and error.step is not None:  # raised by `fail`
         return error
     row, view.failing_row = view.failing_row, None

@@ -24,7 +24,7 @@ from tussle.engine.state import SimulationState
 from tussle.engine.step_end import remove_dead, world_result
 from tussle.errors import MissionError, ParameterError, PluginError
 from tussle.messages import Message, Messages
-from tussle.mission import Mission
+from tussle.mission import GivenMission, Mission, mission_of
 
 if TYPE_CHECKING:
     from tussle.record import FirstStates
@@ -36,8 +36,8 @@ class Simulation:
     Each world gives bit-identical results alone and in any stack.
 
     Args:
-        mission: The mission.
-        seeds: Seed of each world; a single number for a stack of one world.
+        mission: The mission, the name of one that ships ("predator_prey"), or a mission file. Notes on a file are warnings.
+        seeds: Seed of each world; a single number for a stack of one world. By default the seed of the mission file, or else 1.
         params: Parameters by path ("prey.Boids.gain", "prey.speed", "SimpleCapture.capture_range"); one value, or one per world.
         threads: Number of threads a step may use; results do not depend on it.
         on_error: Handling of an error of one world, for example a state that is not finite: "raise" raises it, "record" ends the world
@@ -52,21 +52,24 @@ class Simulation:
         events: Listeners for births, deaths, captures, collisions and ends of worlds.
 
     Raises:
-        MissionError: The mission is invalid, or `seeds` is empty.
+        MissionError: There is no such mission, it is invalid, or `seeds` is empty.
         WiringError: The plugins cannot be connected.
         ParameterError: A parameter is unknown, or a value is not allowed.
     """
 
     def __init__(
         self,
-        mission: Mission,
-        seeds: int | Iterable[int] = 1,
+        mission: GivenMission,
+        seeds: int | Iterable[int] | None = None,
         params: Mapping[str, Any] | None = None,
         *,
         threads: int = 1,
         on_error: str | None = None,
         start_from: FirstStates | None = None,
     ) -> None:
+        mission, seed = mission_of(mission, "Simulation")
+        if seeds is None:
+            seeds = 1 if seed is None else seed
         numbers = list(seeds) if isinstance(seeds, Iterable) else [seeds]
         if isinstance(threads, bool) or int(threads) != threads or threads < 1:
             raise ParameterError(f"threads = {threads!r} is not allowed; it takes a whole number >= 1")
@@ -90,8 +93,6 @@ class Simulation:
             raise
 
     def _check(self, mission: Mission, seeds: Sequence[Any], on_error: str | None) -> None:
-        if not isinstance(mission, Mission):
-            raise MissionError(f"Simulation needs a Mission, not {mission!r}")
         if not seeds:
             raise MissionError("seeds is empty; it takes one or more numbers")
         _check_seeds(seeds)

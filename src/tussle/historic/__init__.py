@@ -36,4 +36,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *manifest()})
+    return sorted(name for name in manifest() if name.isidentifier())

@@ -1,6 +1,7 @@
 """Missions as data, and the reading of mission files."""
 
 from tussle.mission.catalogue import Catalogue
+from tussle.mission.given import GivenMission, mission_of
 from tussle.mission.limits import Limits
 from tussle.mission.plugin_files import PluginFile, load_plugin_file
 from tussle.mission.source import shipped_missions
@@ -11,11 +12,13 @@ from tussle.mission.xml import Loaded, read_mission
 __all__ = [
     "Block",
     "Catalogue",
+    "GivenMission",
     "Limits",
     "Loaded",
     "Mission",
     "PluginFile",
     "load_plugin_file",
+    "mission_of",
     "read_mission",
     "shipped_missions",
     "to_python",

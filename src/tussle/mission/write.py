@@ -12,6 +12,7 @@ from tussle.api.plugin import Plugin
 from tussle.errors import MissionError, ParameterError
 from tussle.mission import codecs
 from tussle.mission.entities import block_names
+from tussle.mission.given import GivenMission, mission_of
 from tussle.mission.node import Node
 from tussle.mission.plugin_tags import RATED
 from tussle.mission.problems import Place
@@ -50,16 +51,18 @@ TAGS = {
 """Values of a block that are one tag each."""
 
 
-def to_xml(mission: Mission, seed: int | None = None) -> str:
+def to_xml(mission: GivenMission, seed: int | None = None) -> str:
     """Write a mission as a mission file, which plays to the same state hash. Plugins are written by the names of their classes.
 
     Args:
-        mission: The mission.
-        seed: Written as <seed>, unless it is None.
+        mission: The mission, the name of one that ships, or a mission file.
+        seed: Written as <seed>; None for that of the file, if it has one.
 
     Raises:
-        MissionError: A value of the mission cannot be written in a mission file.
+        MissionError: There is no such mission, or a value of it cannot be written in a mission file.
     """
+    mission, own_seed = mission_of(mission, "to_xml")
+    seed = own_seed if seed is None else seed
     titles = {"name": mission.name, "compat": mission.compat}
     root = _node("runscript", {name: text for name, text in titles.items() if text})
     run = {
@@ -228,16 +231,18 @@ def _add_base(base: Base, blocks: Sequence[Block], entities: Sequence[Node]) -> 
     )
 
 
-def to_python(mission: Mission, seed: int | None = None) -> str:
+def to_python(mission: GivenMission, seed: int | None = None) -> str:
     """Write the Python code that builds a mission and plays it.
 
     Args:
-        mission: The mission.
-        seed: Seed of the game; 1 if it is None.
+        mission: The mission, the name of one that ships, or a mission file.
+        seed: Seed of the game; None for that of the file, or else 1.
 
     Raises:
-        MissionError: Two classes have the same name, or the mission has a height field or a mesh.
+        MissionError: There is no such mission, two classes have the same name, or the mission has a height field or a mesh.
     """
+    mission, own_seed = mission_of(mission, "to_python")
+    seed = own_seed if seed is None else seed
     imports: dict[str, str] = {"Mission": "tussle", "Simulation": "tussle"}
     made = "\n".join(_code(mission, imports))
     by_module = {

@@ -28,6 +28,7 @@ from tussle.mission.tags import RUN, RUNSCRIPT, SEED_ATTRIBUTES, WORLD, TagSpec
 from tussle.scene import Scene
 from tussle.texts import shown, truth
 
+VIEWER_NOTE = "kept for the viewer: "
 SEED = re.compile(r"\d{1,20}", re.ASCII)
 PLUGIN_TAGS = {"entity_interaction": "interactions", "metrics": "metrics", "network": "networks"}
 
@@ -65,6 +66,11 @@ class Loaded:
     files: tuple[Path, ...] = ()
     scene_files: dict[str, Path] = field(default_factory=dict)
     settings: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def game_notes(self) -> tuple[str, ...]:
+        """The notes without those on settings of the viewer."""
+        return tuple(note for note in self.notes if VIEWER_NOTE not in note)
 
 
 def read_mission(
@@ -355,5 +361,5 @@ class _WorldReader:
         )
         if names:
             self.problems.note(
-                Place(self.root.place.file, self.root.place.line), f"kept for the viewer: {', '.join(names)}"
+                Place(self.root.place.file, self.root.place.line), f"{VIEWER_NOTE}{', '.join(names)}"
             )

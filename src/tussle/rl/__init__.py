@@ -67,6 +67,11 @@ __all__ = [
     "write_policy",
 ]
 
+
+def __dir__() -> list[str]:
+    return sorted(__all__)
+
+
 for _task in (
     Battle,
     BattleBlue,

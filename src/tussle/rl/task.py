@@ -12,7 +12,7 @@ from gymnasium import spaces
 
 from tussle.batch.variables import parse_variable
 from tussle.errors import ParameterError, listed, nearest_name
-from tussle.mission import Block, Mission, read_mission
+from tussle.mission import Block, Mission, mission_of
 from tussle.rl.action import Act, Decoder, learned
 from tussle.rl.observation import Component
 from tussle.rl.reward import Situation, Term
@@ -108,13 +108,11 @@ class Task:
     @cached_property
     def given(self) -> Mission:
         """The mission as given."""
-        if isinstance(self.mission, Mission):
-            return self.mission
         if self.mission is None:
             raise ParameterError(
                 f"{type(self).__name__} has no mission; set mission = a Mission, or the name of one"
             )
-        return read_mission(self.mission, self.overrides).mission
+        return mission_of(self.mission, f"{type(self).__name__}.mission", self.overrides)[0]
 
     @cached_property
     def blocks(self) -> list[Block]:

@@ -284,7 +284,7 @@ class Live:
         return self._playback.epoch
 
     @property
-    def error(self) -> Exception | None:
+    def error(self) -> BaseException | None:
         """The error that stopped the game, which can still be rewound; None without one."""
         ended = self.simulation.state.results[self.world]
         return self._playback.error or (ended.error if ended is not None and self.is_over else None)

@@ -66,7 +66,7 @@ class PlaybackController:
         self.player, self.pace, self.collector = player, pace, collector
         self.speed = Speedometer()
         self.is_paused = is_paused
-        self.error: Exception | None = None
+        self.error: BaseException | None = None
         self.version = self.epoch = 0
         self.shown = player.step, player.is_over
         self._on_moment = on_moment
@@ -178,7 +178,7 @@ class PlaybackController:
     def _carry_out(self, order: Order) -> None:
         try:
             order.do()
-        except Exception as error:  # noqa: BLE001 - whatever it is, whoever watches reads it, and nothing hangs
+        except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 - whatever it is, whoever watches reads it, and nothing hangs
             if isinstance(error, TussleError) and not isinstance(error, PluginError):
                 self.player.note(str(error))
             else:
@@ -215,11 +215,11 @@ class PlaybackController:
             self.collector.begin_step()
         try:
             self.player.advance()
-        except Exception as error:  # noqa: BLE001 - whatever a plugin does, whoever watches reads it
+        except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 - whatever a plugin does, whoever watches reads it
             self._fail(error)
         self._changed()
 
-    def _fail(self, error: Exception) -> None:
+    def _fail(self, error: BaseException) -> None:
         self.error, self.is_paused, self.player.is_broken = error, True, True
         self._goal, self._is_going = None, False
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from tussle.errors import TussleError
 from tussle.geodesy import Origin
-from tussle.mission import Block, Mission
+from tussle.mission import Block, GivenMission, Mission, mission_of
 from tussle.rays.surfaces import MeshPart
 from tussle.scene import Base, Cuboid, HeightField, Plane, Polyhedron, Prism, Sphere, TriangleMesh, Volume
 from tussle.view.shapes import Mesh
@@ -84,17 +84,21 @@ class Scenery:
 
 
 def scenery_of(
-    mission: Mission | None,
+    mission: GivenMission | None,
     viewer: Mapping[str, Any] | None = None,
     extent: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> Scenery:
     """The scenery of a mission.
 
     Args:
-        mission: The mission; None if it is unknown, which leaves ground and grid.
+        mission: The mission, the name of one that ships, or a mission file; None if it is unknown, which leaves ground and grid.
         viewer: Viewer tags of the mission file, see `tussle.mission.Loaded`.
         extent: Lower and upper corner of all positions of a game [m], each (3,); by default of the initial positions.
+
+    Raises:
+        MissionError: There is no such mission.
     """
+    mission = None if mission is None else mission_of(mission, "scenery_of")[0]
     viewer = viewer or {}
     corners = [np.asarray(c, float) for c in extent or ()]
     notes: list[str] = []

@@ -509,8 +509,11 @@ def test_a_model_without_to_body_says_so():
 
 
 def test_simulations_that_cannot_be():
-    with pytest.raises(MissionError, match="Simulation needs a Mission, not"):
-        Simulation("game.xml")
+    with pytest.raises(
+        MissionError,
+        match="Simulation needs a Mission, the name of one that ships, or a mission file, not None",
+    ):
+        Simulation(None)
     with pytest.raises(MissionError, match="seeds is empty"):
         Simulation(mission(), seeds=[])
     for seed in ("x", 1.5, True):

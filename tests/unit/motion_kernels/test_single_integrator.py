@@ -28,8 +28,9 @@ def test_held_velocity_is_exact_whatever_the_substeps(substeps):
     assert x[:6].tolist() == [3.0 * 0.1, -4.0 * 0.1, 12.0 * 0.1, 3.0, -4.0, 12.0]
 
 
-def test_max_speed_runs_every_command_but_zero():
-    assert flown((3.0, 0.0, 4.0), max_speed=10.0)[3:6].tolist() == [6.0, 0.0, 8.0]
+def test_max_speed_is_a_limit():
+    assert flown((3.0, 0.0, 4.0), max_speed=10.0)[3:6].tolist() == [3.0, 0.0, 4.0]
+    assert flown((6.0, 0.0, 8.0), max_speed=10.0)[3:6].tolist() == [6.0, 0.0, 8.0]
     assert flown((30.0, 0.0, 40.0), max_speed=10.0)[3:6].tolist() == [6.0, 0.0, 8.0]
     assert flown((0.0, 0.0, 0.0), max_speed=10.0)[:6].tolist() == [0.0] * 6
     assert flown((3.0, 0.0, 4.0), max_speed=0.0)[3:6].tolist() == [0.0] * 3

@@ -190,8 +190,11 @@ def test_outputs_follow_the_wanted_velocity():
     quat = quat_from_euler(np.zeros(n), -climb, yaw)
     quat = tuple(2.0 * np.ascontiguousarray(part) for part in quat)  # of any length
     fast, out, results = np.full(n, 30.0), np.empty((3, n)), [np.empty(n) for _ in range(6)]
-    kernels.velocity(wanted, fast, out)
+    wanted[:, 1] = 0.0
     size = np.sqrt((wanted**2).sum(0))
+    kernels.velocity(wanted, fast, out)
+    np.testing.assert_allclose(out, 30.0 * wanted / np.where(size > 0.0, size, 1.0), rtol=1e-14)
+    kernels.historic_velocity(wanted, fast, out)
     np.testing.assert_allclose(out, wanted * np.minimum(15.0 / np.maximum(size, 1.0), 1.0), rtol=1e-14)
     for part in ((0, 7), (7, n)):
         kernels.rates(wanted, quat, fast, *results[:3], part)

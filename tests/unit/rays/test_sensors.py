@@ -110,7 +110,7 @@ class Hear(Autonomy):
 
 
 def test_scans_are_timed_and_sent():
-    sensor = RayTrace(max_sample_rate=0.25, publish_on_local_networks=True)
+    sensor = RayTrace(scan_period=0.25, publish_on_local_networks=True)
     late = flyer(sensor, autonomy=[Hear()], to=(1.0, 0.0, 0.0), count=3, rate=2.0, slots=1, first_birth=0.15)
     sim = Simulation(mission(late, scene=ROOM, dt=0.1, end=3.0))
     seen = []

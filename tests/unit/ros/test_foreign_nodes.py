@@ -85,7 +85,7 @@ def driver(tmp_path_factory):
 def test_a_node_in_cpp_hears_a_car_and_drives_it(roscore, driver):
     block = Block(
         name="car", heading="90 deg", motion=SimpleCar(), autonomy=ROSAutonomy(lockstep=600.0),
-        sensor=RayTrace(num_rays_horiz=5, angle_res_horiz="45 deg", max_sample_rate=DT),
+        sensor=RayTrace(num_rays_horiz=5, angle_res_horiz="45 deg", scan_period=DT),
     )  # fmt: skip
     mission = Mission(blocks=[block], dt=DT, end=100.0, interactions=[ROSClockServer()])
     with ExitStack() as stack:

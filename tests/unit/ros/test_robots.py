@@ -64,7 +64,7 @@ def cars(n=2, has_clock=True, clock=None, **autonomy):
     block = Block(
         name="car", team=1, count=n, position=(10.0, 20.0, 0.0), variance=(50.0, 50.0, 0.0), heading="30 deg",
         autonomy=ROSAutonomy(**autonomy), motion=SimpleCar(),
-        sensor=RayTrace(num_rays_horiz=5, angle_res_horiz="45 deg", max_sample_rate=DT),
+        sensor=RayTrace(num_rays_horiz=5, angle_res_horiz="45 deg", scan_period=DT),
     )  # fmt: skip
     return Mission(
         blocks=[block], dt=DT, end=100.0, interactions=[ROSClockServer(**(clock or {}))] if has_clock else []

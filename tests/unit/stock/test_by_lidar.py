@@ -13,7 +13,7 @@ from tussle.scene import Cuboid, Scene
 from tussle.stock import Arrivals, GoToByLidar, RayTrace, SceneCollision, SingleIntegrator
 
 WALL = Scene(walls=[Cuboid((40, 5, 0), (2, 40, 40))])
-LIDAR = RayTrace(num_rays_horiz=120, angle_res_horiz="3 deg", max_range=60.0, max_sample_rate=0.0)
+LIDAR = RayTrace(num_rays_horiz=120, angle_res_horiz="3 deg", max_range=60.0, scan_period=0.0)
 
 
 def flown(scene, lidar=LIDAR, *, count=1, **law):

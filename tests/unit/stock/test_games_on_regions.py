@@ -179,9 +179,9 @@ def test_a_flag_is_fetched_once():
     sim.events.listen(told.append)
     result = sim.run()[0]
     flags = [(e.step.tolist(), e.id.tolist(), e.text) for e in told if e.kind == "flag"]
-    assert flags == [([25], [2], ["took the flag"]), ([66], [2], ["brought the flag home"])]
-    # 26 steps to 4.5 m; then 41 steps to 45.5 m, which lies within 5 m of 50 m.
-    assert sim.read("Told.step_of")[0][0, 1:].tolist() == [26, 67]
+    assert flags == [([27], [2], ["took the flag"]), ([70], [2], ["brought the flag home"])]
+    # 21 steps of 1 m to 9.5 m, and 7 that leave 0.9 of the distance each, to 4.54 m; then 36 to 40.54 m, and 7 to 45.47 m.
+    assert sim.read("Told.step_of")[0][0, 1:].tolist() == [28, 71]
     assert result.metrics["FlagCaptureMetrics"] == {
         "flags_taken": {1: 0, 2: 1},
         "flags_captured": {1: 0, 2: 1},
@@ -205,8 +205,8 @@ def test_a_flag_whose_carrier_is_gone_is_free():
     ]
     sim = Simulation(game.replace(interactions=[*game.interactions, *hole]))
     sim.run()
-    # The first takes it in step 6 and is removed at 40 m, in step 41; the second waits at 0 and takes it in step 42.
-    assert sim.read("Told.step_of")[0][0, 1] == 42
+    # The first takes it in step 8, at 4.54 m, and is removed at 39.54 m, in step 43; the second waits at 0 and takes it in step 44.
+    assert sim.read("Told.step_of")[0][0, 1] == 44
     assert sim.read("FlagCaptureInteraction.carrier")[0][0] == 3
 
 

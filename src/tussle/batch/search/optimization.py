@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tussle.batch.design_points import check_source
 from tussle.batch.executors import Executor
 from tussle.batch.quantities import Quantity
 from tussle.batch.search.evaluation import Evaluator, RoundPlayer
@@ -95,6 +96,7 @@ class Optimization:
         run_timeout: float | None = None,
         **options: Any,
     ) -> None:
+        check_source(mission, "Optimization")
         check_argument("runs", runs, Whole(1))
         check_argument("per_round", per_round, Whole(1, MOST_TRIALS))
         check_argument("sample_seed", sample_seed, Whole())

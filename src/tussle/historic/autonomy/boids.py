@@ -9,16 +9,20 @@ import numpy as np
 from tussle.api import GroupView, State, together
 from tussle.numeric import atan2
 from tussle.stock.autonomy import boids
+from tussle.stock.autonomy.boids.kernels import historic_velocity
 
 
 class Boids(boids.Boids):
     """Boids with SCRIMMAGE's averages, whatever `averaging` says, and with its output of the climb speed as the desired altitude.
+
+    Its velocity is at most half of max_speed, and 1 m/s without neighbours.
 
     The sign of pitch_rate is opposite: SCRIMMAGE turned the pitch of its vehicles nose down in 2020, but not this command, so entities
     that should climb dive, do half a loop, and fly on upside down, where the sign is right. Fields of view are cut to whole
     degrees. A neighbour exactly astern is outside of a field of view of 360 degrees too.
     """
 
+    velocity_kernel = staticmethod(historic_velocity)
     half_view = State("az el", unit="rad", doc="Half the fields of view, of whole degrees.")
 
     @staticmethod

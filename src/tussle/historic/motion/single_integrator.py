@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tussle.api import MotionBody
+from tussle.api import MotionBody, Param
 from tussle.historic.integration import advance_by
 from tussle.numeric import atan2
 from tussle.numeric.quaternion import quat_from_euler
@@ -15,10 +15,14 @@ from tussle.stock.motion import single_integrator
 
 
 class SingleIntegrator(single_integrator.SingleIntegrator):
-    """SingleIntegrator whose nose is down in a climb, and which faces East at rest.
+    """SingleIntegrator that flies every nonzero command at max_speed, with the nose down in a climb, and faces East at rest.
 
-    In tussle a climb is nose up, and at rest the attitude does not change.
+    In tussle max_speed is a limit, a climb is nose up, and at rest the attitude does not change.
     """
+
+    max_speed = Param(
+        -1.0, unit="m/s", doc="Speed of every nonzero command; negative to use the commanded speed."
+    )
 
     @property
     def advance(self) -> Callable[..., None]:  # type: ignore[override]

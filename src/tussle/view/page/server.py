@@ -186,7 +186,7 @@ class Page:
         return len(self.publisher.readers) if self.publisher else 0
 
     @property
-    def game_error(self) -> Exception | None:
+    def game_error(self) -> BaseException | None:
         """The error that stopped a live game, or None."""
         return self.game.error if isinstance(self.game, Live) else None
 

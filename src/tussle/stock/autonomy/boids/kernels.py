@@ -142,7 +142,18 @@ def law(pos, goal, seen, weights, wanted, part):
 
 @kernel("F2 F F2w")
 def velocity(wanted, max_speed, out):
-    """Velocity command [m/s], (3, n): the desired velocity, limited to max_speed / 2 where it exceeds 1 m/s."""
+    """Velocity command [m/s], (3, n): max_speed in the direction of the desired velocity; 0 where that is 0."""
+    for i in range(0, max_speed.shape[0], LANES):
+        m = min(LANES, max_speed.shape[0] - i)
+        vx, vy, vz = rows(wanted, 0, i, m)
+        speed = length(vx, vy, vz)
+        factor = load_some(max_speed, i, m) / choose(speed > 0.0, speed, 1.0)
+        put_rows(out, i, m, vx * factor, vy * factor, vz * factor)
+
+
+@kernel("F2 F F2w")
+def historic_velocity(wanted, max_speed, out):
+    """Velocity command [m/s], (3, n), of SCRIMMAGE: the desired velocity, limited to max_speed / 2 where it exceeds 1 m/s."""
     for i in range(0, max_speed.shape[0], LANES):
         m = min(LANES, max_speed.shape[0] - i)
         vx, vy, vz = rows(wanted, 0, i, m)

@@ -26,9 +26,9 @@ class Boids(Autonomy):
     averaged as a plain number (wrong near West), and both sums are divided by the number of all neighbours, other teams included,
     which biases the centroid towards the world's origin and the heading towards East.
 
-    The outputs fit a unicycle (speed, turn_rate, pitch_rate), an integrator (velocity) and heading controllers (desired_...). Only
-    outputs that are wired are computed. In SCRIMMAGE the desired altitude was the climb speed; here it is the altitude one
-    second ahead.
+    The outputs fit a unicycle (speed, turn_rate, pitch_rate), an integrator (velocity) and heading controllers (desired_...); the speed
+    of all is `max_speed`. Only outputs that are wired are computed. In SCRIMMAGE the desired altitude was the climb speed; here it
+    is the altitude one second ahead. There `velocity` was at most half of max_speed, and 1 m/s without neighbours.
     """
 
     grade = "portable"
@@ -137,6 +137,7 @@ class Boids(Autonomy):
     seen_in_view = together(mates, others, team_push, other_push, where=in_view)
     historic = together(historic_mates, others, team_push, other_push)
     historic_in_view = together(historic_mates, others, team_push, other_push, where=in_view)
+    velocity_kernel = staticmethod(kernels.velocity)
 
     def spawn(self, g: GroupView, rows: np.ndarray) -> None:
         ahead = g.pos[:, rows] + self.goal_distance[rows] * g.column("forward", rows)
@@ -170,7 +171,7 @@ class Boids(Autonomy):
         else:
             g.split(kernels.law, pos, self.target, seen, weights, wanted)
         if "velocity" in wired:
-            kernels.velocity(wanted, self.max_speed, self.velocity)
+            self.velocity_kernel(wanted, self.max_speed, self.velocity)
         if "desired_heading" in wired or "desired_altitude" in wired or "desired_speed" in wired:
             kernels.desired(
                 wanted,

@@ -20,7 +20,7 @@ def advance(x, u, p, dt, substeps):
         x: x, y, z [m], vx, vy, vz [m/s], yaw, climb [rad], (8, n), world frame.
         u: velocity_x, velocity_y, velocity_z [m/s] and, where the heading is commanded, desired_heading [rad], (3 or
             4, n).
-        p: max_speed [m/s], negative to use the commanded speed, (1, n).
+        p: max_speed [m/s], longer commands are shortened to it; negative for no limit, (1, n).
         dt: Duration [s].
         substeps: Number of steps in dt; unused.
     """
@@ -38,8 +38,8 @@ def advance(x, u, p, dt, substeps):
         for l in range(m):
             i = first + l
             speed = math.sqrt(ux[i] * ux[i] + uy[i] * uy[i] + uz[i] * uz[i])
-            divisor = 1.0 if speed == 0.0 else speed
-            scale[l] = 1.0 if max_speed[i] < 0.0 else max_speed[i] / divisor
+            is_free = (max_speed[i] < 0.0) | (speed <= max_speed[i])
+            scale[l] = 1.0 if is_free else max_speed[i] / speed
         for l in range(m):
             i = first + l
             vx[i] = ux[i] * scale[l]

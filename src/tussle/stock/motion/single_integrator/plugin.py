@@ -11,8 +11,8 @@ from tussle.stock.motion.single_integrator import kernels
 class SingleIntegrator(MotionModel):
     """A point that moves at the commanded velocity and faces its direction of motion.
 
-    x' = v. A constant velocity is integrated exactly, for any number of substeps. With `max_speed` >= 0 every nonzero
-    command is scaled to max_speed, as in SCRIMMAGE.
+    x' = v. A constant velocity is integrated exactly, for any number of substeps. A command longer than `max_speed` is
+    shortened to it; in SCRIMMAGE every nonzero command was scaled to max_speed, a shorter one too.
 
     In a climb the nose is up. At rest the attitude does not change, and in vertical motion the heading does not change.
     In SCRIMMAGE a climb lowered the nose, and at rest the heading was East. Some of its missions set `vel_max`,
@@ -21,9 +21,7 @@ class SingleIntegrator(MotionModel):
 
     grade = "portable"
 
-    max_speed = Param(
-        -1.0, unit="m/s", doc="Speed of every nonzero command; negative to use the commanded speed."
-    )
+    max_speed = Param(-1.0, unit="m/s", doc="Largest speed; negative for no limit.")
     override_heading = Param(
         False,
         structural=True,

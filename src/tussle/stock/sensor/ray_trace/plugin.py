@@ -25,12 +25,14 @@ class RayTrace(Sensor):
     between `min_range` and `max_range`, or whose return is lost (`dropout`), ends at `max_range` and is not in range.
 
     SCRIMMAGE leaves the casting to BulletCollision, whose points are in the sensor's frame and begin at the body's centre
-    whatever `xyz` is; it reads a position noise and does not apply it.
+    whatever `xyz` is; it reads a position noise and does not apply it. It calls the period `max_sample_rate`, which missions may
+    write too.
     """
 
     grade = "portable"
     historic_attributes = HistoricAttributes(
-        unread=("pos_noise_0", "pos_noise_1", "pos_noise_2", "auto_ray_tracing")
+        renamed={"max_sample_rate": "scan_period"},
+        unread=("pos_noise_0", "pos_noise_1", "pos_noise_2", "auto_ray_tracing"),
     )
 
     angle_res_vert = Param(
@@ -47,9 +49,7 @@ class RayTrace(Sensor):
     num_rays_horiz = Param(20, ge=1, le=10_000, structural=True, doc="Number of rays of one elevation.")
     max_range = Param(30.0, unit="m", gt=0.0, doc="Largest range.")
     min_range = Param(0.0, unit="m", ge=0.0, doc="Smallest range.")
-    max_sample_rate = Param(
-        0.1, unit="s", ge=0.0, doc="Time between two scans; the name is that of SCRIMMAGE."
-    )
+    scan_period = Param(0.1, unit="s", ge=0.0, doc="Time between two scans.")
     xyz = Param((0.0, 0.0, 0.0), fields="x y z", unit="m", doc="Place of the sensor on the body.")
     rpy = Param(
         (0.0, 0.0, 0.0),
@@ -81,9 +81,7 @@ class RayTrace(Sensor):
             return
         # Counted from the last scan, so that scans keep their rate whatever the step is.
         last = np.where(self.next_scan[rows] > -math.inf, self.next_scan[rows], g.t[rows])
-        self.next_scan[rows] = np.maximum(
-            last + self.max_sample_rate[rows], g.t[rows] - self.max_sample_rate[rows]
-        )
+        self.next_scan[rows] = np.maximum(last + self.scan_period[rows], g.t[rows] - self.scan_period[rows])
         pattern = self._pattern()
         k = pattern.shape[1]
         scan = self._scan(g, rows, pattern)
@@ -103,7 +101,7 @@ class RayTrace(Sensor):
         quats = quat_from_euler(*self.rpy)
 
         def of(row: int) -> ScanPattern:
-            period = float(self.max_sample_rate[row])
+            period = float(self.scan_period[row])
             return ScanPattern(
                 self.xyz[:, row], quats[:, row], self.angle_res_horiz, self.num_rays_vert,
                 float(self.min_range[row]), float(self.max_range[row]), period,
