@@ -15,7 +15,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tussle.batch.design_points import DesignPoint, build_points, exactly, group_points, read_points
+from tussle.batch.design_points import DesignPoint, build_points, check_variables, group_points, read_points
 from tussle.batch.executors import OVERDUE, Executor, InProcess, Processes
 from tussle.batch.plan import BatchPlan
 from tussle.batch.points import settings_of, variables_of
@@ -28,6 +28,7 @@ from tussle.batch.varied import as_variables, variable_entry
 from tussle.engine.simulation import Simulation
 from tussle.errors import BatchError, ParameterError, PluginError
 from tussle.mission import Loaded, Mission, PluginFile, read_mission
+from tussle.mission.effects import exactly
 from tussle.record.run_file import versions
 
 if TYPE_CHECKING:
@@ -127,6 +128,9 @@ class Batch:
         self._rules: set[str] = set()  # that `check` has checked
         self.loaded = self._read()
         self.missions = list(self._missions(self.plan.points))
+        if isinstance(self.source, (str, Path)) and self.variables:
+            points = list(map(self._settings, self.plan.points))
+            check_variables(self.source, self.settings, points, **self._options)
         self.design_points, package = group_points(self.missions, self.plugin_files)
         self.package = replace(package, run_timeout=run_timeout)
 

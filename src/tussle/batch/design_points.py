@@ -5,23 +5,24 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import pickle
-import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from tussle.batch import by_value
 from tussle.batch.tasks import Package
 from tussle.errors import MissionError, ParameterError, TussleError, nearest_name
 from tussle.mission import Block, Loaded, Mission, PluginFile, read_mission
+from tussle.mission.effects import has_effect, without_effect
 from tussle.mission.paths import with_value
 from tussle.mission.spec import WORLD_VALUES
 
 Point = Mapping[str, Any]
+
+MAX_CHECKED = 16
+"""Number of points, about, at which an effect of a variable is searched: it may depend on the values of others."""
 Signature = tuple[Any, ...]
 
 
@@ -49,7 +50,36 @@ def read_points(
     """
     for number, point in enumerate(points):
         with _naming(number, point):
-            yield read_mission(source, {**settings, **point}, **options)
+            yield read_mission(source, {**settings, **point}, **{**options, "checks_effects": False})
+
+
+def check_variables(
+    source: str | Path, settings: Mapping[str, Any], points: Sequence[Point], **options: Any
+) -> None:
+    """Check that the game depends on each variable, at some of the points.
+
+    Args:
+        source: The file.
+        settings: Settings of all points.
+        points: Settings of each point, with which the mission can be read.
+        options: As for `read_mission`.
+
+    Raises:
+        MissionError: A variable has no effect, so that points that differ only in it would play the same games.
+    """
+
+    def read(given: Mapping[str, Any]) -> Loaded:
+        return read_mission(source, given, **{**options, "checks_effects": False})
+
+    useless = list(points[0])
+    for point in points[:: max(1, len(points) // MAX_CHECKED)]:
+        if not useless:
+            return
+        given = {**settings, **point}
+        loaded = read(given)
+        useless = [name for name in useless if not has_effect(read, loaded, given, name, of_game=True)]
+    if useless:
+        raise MissionError("\n".join(without_effect(name, loaded, "the game") for name in useless))
 
 
 def build_points(
@@ -164,12 +194,6 @@ def _pickled(mission: Mission) -> bytes:
         return by_value.dumps(mission)
     except (pickle.PicklingError, AttributeError, TypeError) as error:
         raise MissionError(f"the mission cannot be sent to other processes: {error}") from None
-
-
-def exactly(mission: Mission) -> str:
-    """All of a mission as text, with every digit: `repr` rounds arrays and leaves out the middle of long ones."""
-    with np.printoptions(threshold=sys.maxsize, floatmode="unique"):
-        return repr(mission)
 
 
 def split(mission: Mission) -> tuple[Signature, dict[str, Any]]:

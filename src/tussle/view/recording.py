@@ -388,7 +388,7 @@ class Recording:
             )
             return None
         try:
-            loaded = read_mission(path.resolve(), plugin_files=self._plugin_files)
+            loaded = read_mission(path.resolve(), strict=False, plugin_files=self._plugin_files)
             self.notes.extend(note for note in loaded.notes if "<terrain>" in note)
             return loaded
         except TussleError as error:
