@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 # \b keeps click from rewrapping the lines that follow.
 EPILOG = "\b\nExit codes:\n" + "\n".join(f"  {code:>3}  {meaning}" for code, meaning in EXIT_CODES.items())
 LARGEST_SEED = 2**64 - 1
-VIEWER_NOTE = ": kept for the viewer: "
-"""Part of the notes on settings that only the viewer uses."""
 RENAMED = {"--log": "--record-runs"}
 """Former names of options."""
 
@@ -228,8 +226,8 @@ class MissionOptions(PluginOptions):
 
 def show_notes(loaded: Loaded | None, shows_viewer_notes: bool = False) -> None:
     """Print the notes on a mission file, by default without those on settings of the viewer."""
-    for note in loaded.notes if loaded is not None else ():
-        if shows_viewer_notes or VIEWER_NOTE not in note:
+    if loaded is not None:
+        for note in loaded.notes if shows_viewer_notes else loaded.game_notes:
             say_note(note)
 
 

@@ -35,6 +35,10 @@ SEED = re.compile(r"\d{1,20}", re.ASCII)
 PLUGIN_TAGS = {"entity_interaction": "interactions", "metrics": "metrics", "network": "networks"}
 
 
+VIEWER_NOTE = ": kept for the viewer: "
+"""Part of the notes on settings that only the viewer uses."""
+
+
 @dataclass(frozen=True)
 class Loaded:
     """The content of a mission file.
@@ -70,6 +74,11 @@ class Loaded:
     files: tuple[Path, ...] = ()
     scene_files: dict[str, Path] = field(default_factory=dict)
     settings: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def game_notes(self) -> tuple[str, ...]:
+        """The notes without those on settings of the viewer."""
+        return tuple(note for note in self.notes if VIEWER_NOTE not in note)
 
 
 def read_mission(
