@@ -15,7 +15,14 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tussle.batch.design_points import DesignPoint, build_points, check_variables, group_points, read_points
+from tussle.batch.design_points import (
+    DesignPoint,
+    build_points,
+    check_variables,
+    group_points,
+    read_points,
+    with_whole_numbers,
+)
 from tussle.batch.executors import OVERDUE, Executor, InProcess, Processes
 from tussle.batch.plan import BatchPlan
 from tussle.batch.points import settings_of, variables_of
@@ -103,6 +110,9 @@ class Batch:
         for file in self.plugin_files:
             file.load()
         self.variables = as_variables(vary)
+        self._options = {**options, "plugin_files": tuple(plugin_files)}
+        if isinstance(mission, (str, Path)):
+            self.variables = with_whole_numbers(mission, self.settings, self.variables, **self._options)
         self.sample, self.sample_seed = sample, sample_seed
         if points is not None and self.variables:
             raise ParameterError(
@@ -120,7 +130,6 @@ class Batch:
         if runs is None:
             runs = max(1, min(MOST_SEEDS, MOST_RUNS_UNTIL // len(chosen)))
         self.plan = BatchPlan(chosen, runs, first_seed, independent)
-        self._options = {**options, "plugin_files": tuple(plugin_files)}
         self._ends_by_time = ends_by_time
         self._game_s: float | None = (
             None  # CPU time of a game, estimated from its second step; None before `check`
@@ -301,6 +310,7 @@ class Batch:
                 "ends_by_time": self._ends_by_time,
                 "plugin_files": [f"{i}/{file.name}" for i, file in enumerate(self.plugin_files)],
                 "options": {k: v for k, v in self._options.items() if k != "plugin_files"},
+                "notes": list(self.loaded.game_notes),
             },
             "variables": [variable_entry(v) for v in self.variables],
             "sample": self.sample,

@@ -13,6 +13,7 @@ from typing import Any
 
 from tussle.batch import by_value
 from tussle.batch.tasks import Package
+from tussle.batch.variables import Range, Variable
 from tussle.errors import MissionError, ParameterError, TussleError, nearest_name
 from tussle.mission import Block, Loaded, Mission, PluginFile, read_mission
 from tussle.mission.effects import has_effect, without_effect
@@ -23,6 +24,8 @@ Point = Mapping[str, Any]
 
 MAX_CHECKED = 16
 """Number of points, about, at which an effect of a variable is searched: it may depend on the values of others."""
+MAX_OTHERS = 3
+"""Number of other values of a variable with which a mission is read to find an effect."""
 Signature = tuple[Any, ...]
 
 
@@ -77,9 +80,43 @@ def check_variables(
             return
         given = {**settings, **point}
         loaded = read(given)
-        useless = [name for name in useless if not has_effect(read, loaded, given, name, of_game=True)]
+        useless = [
+            name
+            for name in useless
+            if not has_effect(read, loaded, given, name, _others(points, name, point[name]))
+        ]
     if useless:
         raise MissionError("\n".join(without_effect(name, loaded, "the game") for name in useless))
+
+
+def with_whole_numbers(
+    source: str | Path, settings: Mapping[str, Any], variables: Iterable[Variable], **options: Any
+) -> list[Variable]:
+    """Return the variables, those ranges as ranges of whole numbers of which the mission reads only whole numbers.
+
+    Args:
+        source: The file.
+        settings: Settings of all points.
+        variables: The variables.
+        options: As for `read_mission`.
+
+    Raises:
+        ParameterError: A range has more levels than whole numbers.
+    """
+
+    def is_read(name: str, value: Any) -> bool:
+        try:
+            read_mission(source, {**settings, name: value}, **{**options, "checks_effects": False})
+        except TussleError:
+            return False
+        return True
+
+    def takes_whole(v: Variable) -> bool:
+        if not isinstance(v, Range) or v.is_int or not (v.low.is_integer() and v.high.is_integer()):
+            return False
+        return is_read(v.name, v.setting(v.low)) and not is_read(v.name, v.setting(v.low + 0.5))
+
+    return [dataclasses.replace(v, is_int=True) if takes_whole(v) else v for v in variables]  # type: ignore[arg-type]
 
 
 def build_points(
@@ -108,6 +145,17 @@ def build_points(
             else:
                 mission = _made(source, values)
         yield mission
+
+
+def _others(points: Sequence[Point], name: str, value: Any) -> list[Any]:
+    """A few other values of a variable."""
+    found: list[Any] = []
+    for point in points:
+        if len(found) == MAX_OTHERS:
+            break
+        if point[name] not in (value, *found):
+            found.append(point[name])
+    return found
 
 
 @contextmanager

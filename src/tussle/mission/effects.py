@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -50,25 +50,34 @@ def has_effect(
     loaded: Loaded,
     settings: Mapping[str, Any],
     name: str,
-    *,
-    of_game: bool = False,
+    others: Sequence[Any] = (),
 ) -> bool:
-    """Return whether the mission depends on a setting: it is read again with a text that no reader accepts.
+    """Return whether the mission depends on a setting: it is read again with a text that no reader accepts, or with other values.
 
     Args:
         read: Reads the mission with other settings.
         loaded: The mission, read with the settings.
         settings: The settings.
         name: One of them.
-        of_game: The game of a given seed must depend on it, not only the seed, and settings of the viewer and the output.
+        others: Other values. If there are any, the game of a given seed must differ with one of them; else it is enough if the seed, or
+            settings of the viewer or the output do.
     """
+    kept = () if others else ("seed", "viewer", "log")
+    return any(_differs(read, loaded, {**settings, name: value}, kept) for value in others or (PROBE,))
+
+
+def _differs(
+    read: Callable[[Mapping[str, Any]], Loaded],
+    loaded: Loaded,
+    settings: Mapping[str, Any],
+    kept: Sequence[str],
+) -> bool:
     try:
-        other = read({**settings, name: PROBE})
+        other = read(settings)
     except TussleError:
         return True
-    others = () if of_game else ("seed", "viewer", "log")
     return exactly(loaded.mission) != exactly(other.mission) or any(
-        getattr(loaded, each) != getattr(other, each) for each in others
+        getattr(loaded, each) != getattr(other, each) for each in kept
     )
 
 
