@@ -4,19 +4,27 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from tussle.errors import MissionError, TussleError
 from tussle.mission.spec import Mission
 
-if TYPE_CHECKING:
-    from tussle.mission.xml import Loaded
-
 PROBE = "\N{REPLACEMENT CHARACTER}"
 """A text that no number, name or choice is written as: whoever reads it either refuses it or has another value than before."""
 SHOWN_PLACES = 5
+
+
+class _Loaded(Protocol):
+    """A mission as read, see `tussle.mission.Loaded`."""
+
+    @property
+    def mission(self) -> Mission: ...
+    @property
+    def placeholders(self) -> Mapping[str, str]: ...
+    @property
+    def placeholder_places(self) -> Mapping[str, Sequence[str]]: ...
 
 
 def exactly(mission: Mission) -> str:
@@ -26,7 +34,7 @@ def exactly(mission: Mission) -> str:
 
 
 def check_effects(
-    read: Callable[[Mapping[str, Any]], Loaded], loaded: Loaded, settings: Mapping[str, Any]
+    read: Callable[[Mapping[str, Any]], _Loaded], loaded: _Loaded, settings: Mapping[str, Any]
 ) -> None:
     """Check that settings have an effect.
 
@@ -46,8 +54,8 @@ def check_effects(
 
 
 def has_effect(
-    read: Callable[[Mapping[str, Any]], Loaded],
-    loaded: Loaded,
+    read: Callable[[Mapping[str, Any]], _Loaded],
+    loaded: _Loaded,
     settings: Mapping[str, Any],
     name: str,
     others: Sequence[Any] = (),
@@ -67,8 +75,8 @@ def has_effect(
 
 
 def _differs(
-    read: Callable[[Mapping[str, Any]], Loaded],
-    loaded: Loaded,
+    read: Callable[[Mapping[str, Any]], _Loaded],
+    loaded: _Loaded,
     settings: Mapping[str, Any],
     kept: Sequence[str],
 ) -> bool:
@@ -81,7 +89,7 @@ def _differs(
     )
 
 
-def without_effect(name: str, loaded: Loaded, on: str = "anything") -> str:
+def without_effect(name: str, loaded: _Loaded, on: str = "anything") -> str:
     """The message about a setting that has no effect."""
     if name not in loaded.placeholders:
         return f"{name} has no effect on {on} in this mission"
