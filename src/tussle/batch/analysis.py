@@ -8,8 +8,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
 from tussle.batch.quantities import column_name
 from tussle.batch.results import Results
 from tussle.batch.sensitivity import Effect
@@ -134,7 +132,7 @@ def analyse(
 
     Args:
         results: The batch.
-        quantities: What is analysed; by default the scores, what is left of each team and the time at the end.
+        quantities: What is analysed; by default those of `Results.usual`.
         compare: Pairs of points, or of values that select points; by default the values of each choice with its first.
 
     Raises:
@@ -169,18 +167,14 @@ def analyse(
 
 
 def leading(results: Results) -> list[str]:
-    """The default quantities of points and comparisons: scores, else numbers left, if they vary, else the time."""
-    for metric in ("score", "alive"):
-        names = [column_name(metric, team) for team in results.teams]
-        found = [name for name in names if name in results.quantities and _varies(results.quantity(name))]
+    """The default quantities of points and comparisons: scores, else what is measured, else numbers left, if they vary, else the time."""
+    scores = [column_name("score", team) for team in results.scored]
+    left = [column_name("alive", team) for team in results.diminished]
+    for names in (scores, [] if scores else results.measured, left):
+        found = [name for name in names if results.varies(name)]
         if found:
             return found
     return ["t"]
-
-
-def _varies(values: np.ndarray) -> bool:
-    known = values[np.isfinite(values)]
-    return bool(len(known)) and bool(np.ptp(known) > 0.0)
 
 
 def _points(results: Results, quantities: Sequence[str]) -> list[PointResult]:

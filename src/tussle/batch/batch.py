@@ -19,9 +19,10 @@ from tussle.batch.design_points import (
     DesignPoint,
     build_points,
     check_source,
-    exactly,
+    check_variables,
     group_points,
     read_points,
+    with_whole_numbers,
 )
 from tussle.batch.executors import OVERDUE, Executor, InProcess, Processes
 from tussle.batch.plan import BatchPlan
@@ -36,6 +37,7 @@ from tussle.displays import counted, line, listing, page, table
 from tussle.engine.simulation import Simulation
 from tussle.errors import BatchError, ParameterError, PluginError
 from tussle.mission import Loaded, Mission, PluginFile, read_mission
+from tussle.mission.effects import exactly
 from tussle.record.run_file import versions
 
 if TYPE_CHECKING:
@@ -111,6 +113,9 @@ class Batch:
         for file in self.plugin_files:
             file.load()
         self.variables = as_variables(vary)
+        self._options = {**options, "plugin_files": tuple(plugin_files)}
+        if isinstance(mission, (str, Path)):
+            self.variables = with_whole_numbers(mission, self.settings, self.variables, **self._options)
         self.sample, self.sample_seed = sample, sample_seed
         if points is not None and self.variables:
             raise ParameterError(
@@ -128,7 +133,6 @@ class Batch:
         if runs is None:
             runs = max(1, min(MOST_SEEDS, MOST_RUNS_UNTIL // len(chosen)))
         self.plan = BatchPlan(chosen, runs, first_seed, independent)
-        self._options = {**options, "plugin_files": tuple(plugin_files)}
         self._ends_by_time = ends_by_time
         self._game_s: float | None = (
             None  # CPU time of a game, estimated from its second step; None before `check`
@@ -136,6 +140,9 @@ class Batch:
         self._rules: set[str] = set()  # that `check` has checked
         self.loaded = self._read()
         self.missions = list(self._missions(self.plan.points))
+        if isinstance(self.source, (str, Path)) and self.variables:
+            points = list(map(self._settings, self.plan.points))
+            check_variables(self.source, self.settings, points, **self._options)
         self.design_points, package = group_points(self.missions, self.plugin_files)
         self.package = replace(package, run_timeout=run_timeout)
 
@@ -328,6 +335,7 @@ class Batch:
                 "ends_by_time": self._ends_by_time,
                 "plugin_files": [f"{i}/{file.name}" for i, file in enumerate(self.plugin_files)],
                 "options": {k: v for k, v in self._options.items() if k != "plugin_files"},
+                "notes": list(self.loaded.game_notes),
             },
             "variables": [variable_entry(v) for v in self.variables],
             "sample": self.sample,

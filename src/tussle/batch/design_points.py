@@ -5,24 +5,28 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import pickle
-import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from tussle.batch import by_value
 from tussle.batch.tasks import Package
+from tussle.batch.variables import Range, Variable
 from tussle.errors import MissionError, ParameterError, TussleError, nearest_name
 from tussle.mission import Block, Loaded, Mission, PluginFile, read_mission
+from tussle.mission.effects import has_effect, without_effect
 from tussle.mission.given import wanted
 from tussle.mission.paths import with_value
 from tussle.mission.spec import WORLD_VALUES
 
 Point = Mapping[str, Any]
+
+MAX_CHECKED = 16
+"""Number of points, about, at which an effect of a variable is searched: it may depend on the values of others."""
+MAX_OTHERS = 3
+"""Number of other values of a variable with which a mission is read to find an effect."""
 Signature = tuple[Any, ...]
 
 
@@ -60,7 +64,70 @@ def read_points(
     """
     for number, point in enumerate(points):
         with _naming(number, point):
-            yield read_mission(source, {**settings, **point}, **options)
+            yield read_mission(source, {**settings, **point}, **{**options, "checks_effects": False})
+
+
+def check_variables(
+    source: str | Path, settings: Mapping[str, Any], points: Sequence[Point], **options: Any
+) -> None:
+    """Check that the game depends on each variable, at some of the points.
+
+    Args:
+        source: The file.
+        settings: Settings of all points.
+        points: Settings of each point, with which the mission can be read.
+        options: As for `read_mission`.
+
+    Raises:
+        MissionError: A variable has no effect, so that points that differ only in it would play the same games.
+    """
+
+    def read(given: Mapping[str, Any]) -> Loaded:
+        return read_mission(source, given, **{**options, "checks_effects": False})
+
+    useless = list(points[0])
+    for point in points[:: max(1, len(points) // MAX_CHECKED)]:
+        if not useless:
+            return
+        given = {**settings, **point}
+        loaded = read(given)
+        useless = [
+            name
+            for name in useless
+            if not has_effect(read, loaded, given, name, _others(points, name, point[name]))
+        ]
+    if useless:
+        raise MissionError("\n".join(without_effect(name, loaded, "the game") for name in useless))
+
+
+def with_whole_numbers(
+    source: str | Path, settings: Mapping[str, Any], variables: Iterable[Variable], **options: Any
+) -> list[Variable]:
+    """Return the variables, those ranges as ranges of whole numbers of which the mission reads only whole numbers.
+
+    Args:
+        source: The file.
+        settings: Settings of all points.
+        variables: The variables.
+        options: As for `read_mission`.
+
+    Raises:
+        ParameterError: A range has more levels than whole numbers.
+    """
+
+    def is_read(name: str, value: Any) -> bool:
+        try:
+            read_mission(source, {**settings, name: value}, **{**options, "checks_effects": False})
+        except TussleError:
+            return False
+        return True
+
+    def takes_whole(v: Variable) -> bool:
+        if not isinstance(v, Range) or v.is_int or not (v.low.is_integer() and v.high.is_integer()):
+            return False
+        return is_read(v.name, v.setting(v.low)) and not is_read(v.name, v.setting(v.low + 0.5))
+
+    return [dataclasses.replace(v, is_int=True) if takes_whole(v) else v for v in variables]  # type: ignore[arg-type]
 
 
 def build_points(
@@ -89,6 +156,17 @@ def build_points(
             else:
                 mission = _made(source, values)
         yield mission
+
+
+def _others(points: Sequence[Point], name: str, value: Any) -> list[Any]:
+    """A few other values of a variable."""
+    found: list[Any] = []
+    for point in points:
+        if len(found) == MAX_OTHERS:
+            break
+        if point[name] not in (value, *found):
+            found.append(point[name])
+    return found
 
 
 @contextmanager
@@ -175,24 +253,6 @@ def _pickled(mission: Mission) -> bytes:
         return by_value.dumps(mission)
     except (pickle.PicklingError, AttributeError, TypeError) as error:
         raise MissionError(f"the mission cannot be sent to other processes: {error}") from None
-
-
-def exactly(mission: Mission) -> str:
-    """All of a mission as text, with every digit: `repr` of arrays rounds them and leaves out the middle of long ones."""
-    with np.printoptions(threshold=sys.maxsize, floatmode="unique"):
-        return _written_out(mission)
-
-
-def _written_out(value: Any) -> str:
-    """`repr` of a value, with all that missions and blocks have."""
-    if isinstance(value, (Mission, Block)):
-        fields = (
-            f"{f.name}={_written_out(getattr(value, f.name))}" for f in dataclasses.fields(value) if f.repr
-        )
-        return f"{type(value).__name__}({', '.join(fields)})"
-    if isinstance(value, tuple) and value and isinstance(value[0], Block):
-        return f"({', '.join(map(_written_out, value))}{',' * (len(value) == 1)})"
-    return repr(value)
 
 
 def split(mission: Mission) -> tuple[Signature, dict[str, Any]]:

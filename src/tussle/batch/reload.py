@@ -94,7 +94,13 @@ def planned_run(
     point = {v.name: planned[v.name] for v in results.variables}
     settings = {**about["settings"], **settings_of(point, results.variables)}
     loaded = read_mission(
-        file, settings, plugin_files=code.files, search=search, allow_large=allow_large, **options
+        file,
+        settings,
+        plugin_files=code.files,
+        search=search,
+        allow_large=allow_large,
+        checks_effects=False,  # the batch was played with them
+        **options,
     )
     mission = loaded.mission.ending_by_time() if about["ends_by_time"] else loaded.mission
     found = results.table.filter(pc.equal(results.table["run"], number))["state_hash"]

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,7 +19,6 @@ from tussle.batch.quantities import Quantity, column_name
 from tussle.batch.selection import is_number, known_point, paired_points, select_points, written
 from tussle.batch.sensitivity import Effect, effects, rank_effects
 from tussle.batch.statistics import (
-    BLOCKS_FROM,
     Mean,
     PairedComparison,
     Share,
@@ -41,11 +42,16 @@ FIRST = ("wins", "ties", "score", "alive", "lost", "start", "t", "steps")
 """Quantities that every game has, in the order in which they are listed; what plugins report comes behind."""
 
 
+MAX_MEASURED = 12
+"""Number of measured quantities that are looked at without being asked for."""
+
+
 class Results:
     """Results of the runs of a batch; of an unfinished batch, those of its finished runs.
 
     Failed runs are in no share, mean or comparison; `n_failed` says how many there are. Where several points are taken together,
-    the runs of a seed count as one block if there are 20 seeds or more: they share their random numbers.
+    intervals are those of the mean over these points, and the differences between points are no part of their width. The runs of
+    a seed then count as one block, since they share their random numbers; of one seed there is no interval.
 
     Args:
         stored: The batch as it was read.
@@ -53,7 +59,7 @@ class Results:
     Attributes:
         path: The batch directory; None for a batch in memory.
         info: What `batch.json` says.
-        notes: What is missing, one line each.
+        notes: What is missing, and notes about the mission file, one line each.
         design: One row per planned run: run, point, seed and the variables.
         table: One row per run, team and metric.
         alive: Entities of each run and team whenever their number changes.
@@ -64,7 +70,7 @@ class Results:
     def __init__(self, stored: StoredBatch) -> None:
         self.path: Path | None = stored.path
         self.info: dict[str, Any] = stored.info
-        self.notes: list[str] = list(stored.notes)
+        self.notes: list[str] = [*stored.notes, *(stored.info.get("mission", {}).get("notes") or ())]
         self.design: pa.Table = stored.design
         self.table: pa.Table = stored.table
         self.alive: pa.Table = stored.alive
@@ -198,26 +204,31 @@ class Results:
             point: The runs of this point; None for all runs.
         """
         rows = self._rows(point)
-        blocks = self._blocks(rows, point)
-        return [
-            share_of(name, team, self._columns[column][rows], blocks)
+        blocks, strata = self._blocks(rows, point)
+        shares = [
+            share_of(name, team, self._columns[column][rows], blocks, None if blocks is None else strata)
             for name, team, column in self._outcomes()
         ]
+        if self._is_blocked(point) and len(np.unique(self._seed_index[rows])) < 2:
+            shares = [replace(share, low=math.nan, high=math.nan) for share in shares]
+        return shares
 
     def means(self, expressions: Sequence[str] | None = None, point: int | None = None) -> list[Mean]:
         """Means of quantities with their intervals.
 
         Args:
-            expressions: What; by default the scores, what is left of each team, and the time at the end.
+            expressions: What; by default those of `usual`.
             point: Over the runs of this point; None for all runs.
 
         Raises:
             ParameterError: There is no such name or point.
         """
         rows = self._rows(point)
-        blocks = self._blocks(rows, point)
-        chosen = self.usual if expressions is None else expressions
-        return [mean_of(text, self.quantity(text)[rows], blocks) for text in chosen]
+        blocks, strata = self._blocks(rows, point)
+        chosen, are_copies = self.usual if expressions is None else expressions, not self._is_blocked(point)
+        return [
+            mean_of(text, self.quantity(text)[rows], blocks, strata, are_copies=are_copies) for text in chosen
+        ]
 
     def means_by_point(self, expression: str) -> list[Mean]:
         """The mean of a quantity at each point, without gathering its runs anew for each."""
@@ -255,7 +266,9 @@ class Results:
         return np.split(values[order], cuts)
 
     def _outcomes(self) -> list[tuple[str, int | None, str]]:
-        """Name, team and column of each way in which a game can end."""
+        """Name, team and column of each way in which a game can end; empty where no team has a rival, so that nobody can win."""
+        if len(self.scored) < 2:
+            return []
         found: list[tuple[str, int | None, str]] = [
             (name, team, column_name("wins", team)) for team, name in self.scored.items()
         ]
@@ -263,9 +276,32 @@ class Results:
 
     @property
     def usual(self) -> list[str]:
-        """The quantities that are looked at first: scores, what is left of each team, the time at the end."""
-        names = [column_name(metric, team) for metric in ("score", "alive") for team in self.teams]
-        return [name for name in [*names, "t"] if name in self._columns]
+        """The quantities that are looked at first.
+
+        Scores, or without them what metrics and interactions measure; what is left of teams that lost entities; and the time at the
+        end, if it varies or there is nothing else.
+        """
+        names = [column_name("score", team) for team in self.scored] or self.measured
+        names += [column_name("alive", team) for team in self.diminished]
+        return [*names, "t"] if self.varies("t") or not names else names
+
+    @property
+    def measured(self) -> list[str]:
+        """What metrics and interactions measure: those quantities that vary, or without any all; at most `MAX_MEASURED`."""
+        names = [name for name in self._columns if name.partition("[")[0] not in FIRST]
+        names = [name for name in names if np.isfinite(self._columns[name]).any()]
+        return ([name for name in names if self.varies(name)] or names)[:MAX_MEASURED]
+
+    @property
+    def diminished(self) -> list[int]:
+        """The teams that lost entities in some run."""
+        lost = {team: self._columns.get(column_name("lost", team)) for team in self.teams}
+        return [team for team, values in lost.items() if values is not None and np.any(values > 0.0)]
+
+    def varies(self, name: str) -> bool:
+        """Return whether a quantity differs between runs."""
+        known = self._columns[name][np.isfinite(self._columns[name])]
+        return bool(len(known)) and bool(np.ptp(known) > 0.0)
 
     def compare(self, expression: str, a: int | str, b: int | str) -> PairedComparison:
         """Differences b - a of pairs of runs with the same seed; with independent seeds, in order of the runs.
@@ -280,7 +316,8 @@ class Results:
         """
         firsts, seconds = paired_points(self.variables, self.points, a, b)
         matrix, games, blocks = self.by_seed(expression), self._games_by_seed, None
-        is_by_seed = len(firsts) > 1 and len(matrix) >= BLOCKS_FROM and not self.info["independent"]
+        strata = np.tile(np.arange(len(firsts)), len(matrix)) if len(firsts) > 1 else None
+        is_by_seed = len(firsts) > 1 and not self.info["independent"]
         if is_by_seed:
             blocks = np.repeat(_numbered(games), len(firsts))
         elif self._has_copies:
@@ -289,7 +326,7 @@ class Results:
         if is_number(a) or is_number(b):
             names = (self.label(firsts[0]), self.label(seconds[0]))
         values = matrix[:, firsts].ravel(), matrix[:, seconds].ravel()
-        return paired_difference(expression, names, *values, blocks, are_copies=not is_by_seed)
+        return paired_difference(expression, names, *values, blocks, strata, are_copies=not is_by_seed)
 
     def by_seed(self, expression: str) -> np.ndarray:
         """A quantity by seed and point, (n_seeds, n_points); NaN where it failed or is not finished."""
@@ -349,7 +386,7 @@ class Results:
 
         Args:
             team: Its number.
-            point: Over the runs of this point; None for all runs.
+            point: Over the runs of this point; None for all runs, without an interval if there are several points.
 
         Raises:
             ParameterError: There is no such team or point.
@@ -366,7 +403,11 @@ class Results:
         rows = np.flatnonzero(is_chosen & (of_team == team))
         rows = rows[np.lexsort((t[rows], run[rows]))]
         label = "" if point is None else self.label(point)
-        return survival_of(label, team, run[rows], t[rows], alive[rows].astype(np.int64), len(chosen), times)
+        found = survival_of(label, team, run[rows], t[rows], alive[rows].astype(np.int64), len(chosen), times)
+        if point is None and len(self.points) > 1:
+            nothing = np.full(len(times), np.nan)
+            return replace(found, low=nothing, high=nothing)
+        return found
 
     # -- tables -----------------------------------------------------------------------------------------------------------
 
@@ -400,12 +441,20 @@ class Results:
         """Return True for each run of a point, (n_runs,)."""
         return np.ones(self.n_runs, bool) if point is None else self._point == known_point(self.points, point)
 
-    def _blocks(self, rows: np.ndarray, point: int | None) -> np.ndarray | None:
-        """Block of each of these runs: their seed, over all points, or else their distinct game; None where runs are independent."""
-        is_shared = point is None and len(self.points) > 1 and not self.info["independent"]
-        if is_shared and len(np.unique(self._seed_index[rows])) >= BLOCKS_FROM:
-            return np.asarray(self.seed_blocks(range(len(self.points)))[rows])
-        return self._game[rows] if self._has_copies else None
+    def _is_blocked(self, point: int | None) -> bool:
+        """Runs of several points share their seeds."""
+        return point is None and len(self.points) > 1 and not self.info["independent"]
+
+    def _blocks(self, rows: np.ndarray, point: int | None) -> tuple[np.ndarray | None, np.ndarray | None]:
+        """Block and stratum of each of these runs.
+
+        The block is their seed, over all points, or else their distinct game; None where runs are independent. The stratum is their
+        point; None for the runs of one point.
+        """
+        strata = self._point[rows] if point is None and len(self.points) > 1 else None
+        if self._is_blocked(point):
+            return np.asarray(self.seed_blocks(range(len(self.points)))[rows]), strata
+        return self._game[rows] if self._has_copies else None, strata
 
     def __repr__(self) -> str:
         return line("Results", "in memory" if self.path is None else repr(str(self.path)), *self._facts())

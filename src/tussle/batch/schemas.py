@@ -19,6 +19,7 @@ FILE = {
     "ends_by_time": bool,
     "plugin_files": [Inside],
     "options": OPTIONS,
+    "notes": Maybe([str]),
 }
 RANGE = {
     "low": Real(),

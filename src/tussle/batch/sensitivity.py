@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from tussle.batch.statistics import BLOCKS_FROM, LEVEL, SEED, scipy_package
+from tussle.batch.statistics import BOOTSTRAP_FROM, LEVEL, SEED, scipy_package
 from tussle.batch.variables import Range, Variable
 from tussle.errors import MissingExtraError
 
@@ -113,7 +113,7 @@ def rank_effects(
     chosen = np.arange(matrix.shape[1])
     if step:
         chosen = chosen[(chosen % step == 0) | (chosen % step == step - 1)]
-    if len(chosen) >= BLOCKS_FROM:
+    if len(chosen) >= BOOTSTRAP_FROM:
         place, y, over = chosen, _means(matrix)[chosen], "the points' means"
     else:
         place, y, over = np.tile(np.arange(matrix.shape[1]), len(matrix)), matrix.ravel(), "runs"
@@ -125,7 +125,10 @@ def rank_effects(
             found.append(Effect(variable.name, *(math.nan,) * 3, note=f"{variable.name} has no order"))
             continue
         x = np.array(values, dtype=np.float64)[place[is_known]]
-        found.append(Effect(variable.name, *spearman(x, y[is_known]), note=f"rank correlation over {over}"))
+        r, low, high = spearman(x, y[is_known])
+        if over == "runs":  # those of a point are alike, so the interval would be too narrow
+            low = high = math.nan
+        found.append(Effect(variable.name, r, low, high, note=f"rank correlation over {over}"))
     return found
 
 
@@ -292,11 +295,11 @@ def _by_anova(found: list[Effect], values: np.ndarray, n_seeds: int) -> list[Eff
     shares[0] = variance_shares(values)
     note = f"analysis of variance over all {np.prod(values.shape[1:])} combinations × {n} seeds"
     note += f"; {n_seeds - n} seeds lack a run and are left out" if n < n_seeds else ""
-    if n >= BLOCKS_FROM:
+    if n >= BOOTSTRAP_FROM:
         draws = np.random.default_rng(SEED).integers(n, size=(2 * N_RESAMPLES, n))
         shares[1:] = np.quantile([variance_shares(values[draw]) for draw in draws], (0.025, 0.975), axis=0)
     else:
-        note += f"; intervals take {BLOCKS_FROM} seeds"
+        note += f"; intervals take {BOOTSTRAP_FROM} seeds"
     parts = [tuple(None if math.isnan(v) else v for v in column) for column in shares.T.tolist()]
     nothing = (None, None, None)  # of one seed, the total would be taken for interaction
     done = [

@@ -28,8 +28,6 @@ N_RESAMPLES = 2000
 """Efron and Tibshirani, An Introduction to the Bootstrap (1993), section 14: at least 1,000 for intervals of 95 %."""
 NUMBERS_AT_ONCE = 4_000_000
 """Largest count of numbers that the bootstrap holds at a time, 32 MB."""
-BLOCKS_FROM = BOOTSTRAP_FROM
-"""Smallest number of seeds for which the runs of a seed, over all points, count as one block."""
 ROUNDING = 1e-12
 """Relative tolerance below which values are equal, such as differences of equal effects after rounding."""
 SEED = 20180101
@@ -143,7 +141,13 @@ def wilson(k: float, n: float) -> tuple[float, float]:
     return float(found.low), float(found.high)
 
 
-def share_of(name: str, team: int | None, won: np.ndarray, blocks: np.ndarray | None = None) -> Share:
+def share_of(
+    name: str,
+    team: int | None,
+    won: np.ndarray,
+    blocks: np.ndarray | None = None,
+    strata: np.ndarray | None = None,
+) -> Share:
     """Share of the runs with one outcome.
 
     Args:
@@ -151,17 +155,18 @@ def share_of(name: str, team: int | None, won: np.ndarray, blocks: np.ndarray | 
         team: Its number; None for ties.
         won: 1 for runs with the outcome, 0 for others, NaN for unknown runs, (n,).
         blocks: Number of the block that each run belongs to, (n,); None where runs are independent.
+        strata: Number of the point that each run belongs to, (n,), if blocks go over several points, which are as they are.
     """
     is_known = np.isfinite(won)
     won = won[is_known]
     k, n = int(won.sum()), len(won)
     value = k / n if n else math.nan
-    size = effective_size(won, None if blocks is None else blocks[is_known])
+    size = effective_size(won, *(None if by is None else by[is_known] for by in (blocks, strata)))
     low, high = wilson(value * size, size) if n else (math.nan, math.nan)
     return Share(name, team, k, n, value, low, high)
 
 
-def effective_size(won: np.ndarray, blocks: np.ndarray | None) -> float:
+def effective_size(won: np.ndarray, blocks: np.ndarray | None, strata: np.ndarray | None = None) -> float:
     """Number of independent runs whose share has the same variance as that of runs in blocks.
 
     Kish, Survey Sampling (1965), 8.2: n over the design effect. Not less than the blocks, not more than the runs.
@@ -169,10 +174,10 @@ def effective_size(won: np.ndarray, blocks: np.ndarray | None) -> float:
     n = len(won)
     if blocks is None or n == 0:
         return float(n)
-    sums = block_values(won, blocks)
+    sums = block_values(won, blocks, strata)
     share = float(won.mean())
     variance = float(sums.var(ddof=1)) / len(sums) if len(sums) > 1 else 0.0
-    if variance == 0.0:  # always or never so
+    if variance <= ROUNDING**2:  # always or never so, or in every block alike
         return float(len(sums))
     return min(max(share * (1.0 - share) / variance, float(len(sums))), float(n))
 
@@ -198,20 +203,65 @@ def running_result(wins: Mapping[str, int], n: int) -> str:
 # -- means ----------------------------------------------------------------------------------------------------------------
 
 
-def mean_of(name: str, values: np.ndarray, blocks: np.ndarray | None = None) -> Mean:
+def mean_of(
+    name: str,
+    values: np.ndarray,
+    blocks: np.ndarray | None = None,
+    strata: np.ndarray | None = None,
+    *,
+    are_copies: bool = False,
+) -> Mean:
     """Mean of a quantity over runs.
 
     Args:
         name: The quantity.
         values: Its value for each run, (n,).
         blocks: Number of the block that each run belongs to, (n,); None where runs are independent.
+        strata: Number of the point that each run belongs to, (n,); None for runs of one point. The interval is that of the mean over
+            these points: how they differ is no part of its width.
+        are_copies: The runs of a block are copies of one run, so that no block goes over several points.
     """
     mean = means_of(name, [values])[0]
-    if blocks is None or mean.n == 0:
+    if (blocks is None and strata is None) or mean.n == 0:
         return mean
     is_known = np.isfinite(values)
-    low, high = mean_interval(block_values(values[is_known], blocks[is_known]))
+    block, stratum = (None if by is None else by[is_known] for by in (blocks, strata))
+    if stratum is not None and (block is None or are_copies):
+        low, high = stratified_interval(values[is_known], stratum, block)
+    else:
+        assert block is not None
+        low, high = mean_interval(block_values(values[is_known], block, stratum))
     return replace(mean, low=low, high=high)
+
+
+def stratified_interval(
+    values: np.ndarray, strata: np.ndarray, copies: np.ndarray | None = None
+) -> tuple[float, float]:
+    """Interval of the mean of independent runs of several points; NaN if a point has less than two distinct runs.
+
+    Cochran, Sampling Techniques (1977), 5.4: the variance is the sum of those of the points' means, with the degrees of freedom of
+    Satterthwaite.
+
+    Args:
+        values: Value of each run, (n,).
+        strata: Number of the point that it belongs to, (n,).
+        copies: Number of the distinct run that it is a copy of, (n,); None if all are distinct.
+    """
+    _, stratum, n = np.unique(strata, return_inverse=True, return_counts=True)
+    first = slice(None) if copies is None else np.unique(copies, return_index=True)[1]
+    own, stratum = values[first], stratum[first]
+    n_own = np.bincount(stratum)
+    if n_own.min() < 2:
+        return math.nan, math.nan
+    apart = own - (np.bincount(stratum, own) / n_own)[stratum]
+    apart[np.abs(apart) <= ROUNDING * np.abs(own)] = 0.0
+    parts = (n / len(values)) ** 2 * np.bincount(stratum, apart**2) / (n_own - 1) / n_own
+    mean, variance = float(values.mean()), float(parts.sum())
+    if variance == 0.0:
+        return mean, mean
+    freedom = variance**2 / float((parts**2 / (n_own - 1)).sum())
+    half = float(scipy_package().special.stdtrit(freedom, 0.5 + LEVEL / 2.0)) * math.sqrt(variance)
+    return mean - half, mean + half
 
 
 def means_of(name: str, rows: Sequence[np.ndarray]) -> list[Mean]:
@@ -269,9 +319,8 @@ def _by_t(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         * rows.std(axis=1, ddof=1)
         / math.sqrt(n)
     )
-    half[np.ptp(rows, axis=1) == 0.0] = (
-        0.0  # where the mean of equal values is not their value to the last bit
-    )
+    # Where the mean of equal values is not their value to the last bit.
+    half[np.ptp(rows, axis=1) <= ROUNDING * np.abs(rows).max(axis=1)] = 0.0
     return mean - half, mean + half
 
 
@@ -292,20 +341,25 @@ def _by_bootstrap(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return low, high
 
 
-def block_values(values: np.ndarray, blocks: np.ndarray) -> np.ndarray:
+def block_values(values: np.ndarray, blocks: np.ndarray, strata: np.ndarray | None = None) -> np.ndarray:
     """One value for each block, (n_blocks,): their mean is that of all values, and so is its variance from block to block.
 
-    The mean plus what the block adds to it; for blocks of equal size, the mean of the block.
+    The mean plus what the block adds to it; for blocks of equal size, the mean of the block. With strata, the mean plus what the block
+    adds to the means of the strata, so that blocks in which some strata are missing do not differ for that.
 
     Args:
         values: Value of each run, (n,).
         blocks: Number of the block that it belongs to, (n,).
+        strata: Number of the stratum that it belongs to, (n,); None for one.
     """
     if len(values) == 0:
         return values
-    mean = values.mean()
+    mean = centre = values.mean()
+    if strata is not None:
+        _, stratum = np.unique(strata, return_inverse=True)
+        centre = (np.bincount(stratum, values) / np.bincount(stratum))[stratum]
     numbers, block = np.unique(blocks, return_inverse=True)
-    sums: np.ndarray = np.bincount(block, values - mean)
+    sums: np.ndarray = np.bincount(block, values - centre)
     shares: np.ndarray = mean + sums * (len(numbers) / len(values))
     return shares
 
@@ -326,6 +380,7 @@ def paired_difference(
     a: np.ndarray,
     b: np.ndarray,
     blocks: np.ndarray | None = None,
+    strata: np.ndarray | None = None,
     *,
     are_copies: bool = False,
 ) -> PairedComparison:
@@ -337,13 +392,14 @@ def paired_difference(
         a: Value of each pair's first run, (n,).
         b: Value of each pair's second run, (n,).
         blocks: Number of the block that each pair belongs to, (n,); None where pairs are independent.
+        strata: Number of the two points that each pair belongs to, (n,); None for one pair of points.
         are_copies: The pairs of a block are copies of one pair, so that the sign test counts each block once.
     """
     is_known = np.isfinite(a) & np.isfinite(b)
     a, b = a[is_known], b[is_known]
-    more, own = b - a, None if blocks is None else blocks[is_known]
+    more, own, strata = b - a, *(None if by is None else by[is_known] for by in (blocks, strata))
     n_greater, n_less = int((more > 0.0).sum()), int((more < 0.0).sum())
-    mean = mean_of(quantity, more, own)
+    mean = mean_of(quantity, more, own, strata, are_copies=are_copies)
     signs = np.sign(more if own is None or not are_copies else more[np.unique(own, return_index=True)[1]])
     mean_a, mean_b = (float(v.mean()) if len(v) else math.nan for v in (a, b))
     return PairedComparison(

@@ -77,7 +77,8 @@ def _parts(found: Analysis, shows_all_points: bool) -> Iterable[RenderableType]:
         yield _heading("means", over)
         yield from _means(found)
     if found.points:
-        yield _heading("points", "games won in %, means ± half of their intervals")
+        won = "games won in %, " if any(share.n for share in found.shares) else ""
+        yield _heading("points", f"{won}means ± half of their intervals")
         yield from _points(found, shows_all_points)
     for pairs in _by_quantity(found.comparisons):
         quantity = found.titles.get(pairs[0].quantity, pairs[0].quantity)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import shlex
 import shutil
@@ -16,6 +17,7 @@ from rich.padding import Padding
 from rich.text import Text
 
 from tussle.batch import store
+from tussle.batch.analysis import leading
 from tussle.batch.batch import Batch
 from tussle.batch.executors import Executor
 from tussle.batch.progress import Progress as BatchProgress
@@ -249,6 +251,7 @@ def show_batch(results: Results, directory: Path, wall: float, n_new: int) -> in
     """
     info = results.info
     has_points = info["n_points"] > 1
+    over = " over the seeds, of the mean over these points" if has_points else ""
     facts = f"{results.n_runs:,} runs" if results.n_runs != 1 else "1 run"
     facts += f" · {info['n_points']:,} points" if has_points else ""
     n_seeds = info["n_runs"] if info["independent"] else info["n_seeds"]
@@ -267,7 +270,7 @@ def show_batch(results: Results, directory: Path, wall: float, n_new: int) -> in
         title(info["name"], f"{facts} · {seeds_text(info['first_seed'], n_seeds)}"),
         *(point_tables(results) if has_points else []),
         *share_tables(results),
-        Text(" in parentheses: 95 % intervals", "dim italic"),
+        Text(f" in parentheses: 95 % intervals{over}", "dim italic"),
         fact_list(
             [
                 ("stopped", f"{stopped} is reached with {info['n_seeds']:,} seeds" if stopped else ""),
@@ -279,7 +282,8 @@ def show_batch(results: Results, directory: Path, wall: float, n_new: int) -> in
         "",
     )
     for note in results.notes:
-        say_note(note)
+        if note not in (info["mission"].get("notes") or ()):  # those were shown before the games
+            say_note(note)
     if results.n_failed == results.n_runs:
         say_error(f"all runs failed; the first: {results.failed()['error'][0].as_py()}")
         return PLUGIN_FAILED
@@ -303,26 +307,39 @@ def short_names(variables: Sequence[Variable]) -> list[str]:
 
 
 def share_tables(results: Results) -> list[Padding]:
-    """Return one line per team: how often it won, its mean score, how many are left, each with its interval."""
+    """Return one line per team, how often it won, its mean score, how many are left, and one per other usual quantity; with intervals."""
     shares = {share.team: share for share in results.shares()}
+    teams = results.teams if shares else {team: results.teams[team] for team in results.diminished}
     best = max((s.n for s in shares.values() if s.team is not None), default=0)
     rows = []
-    for team, name in results.teams.items():
+    for team, name in teams.items():
         share, cells = shares.get(team), [f"{team} {name}"]
         if shares:
             cells += ["", ""] if share is None else [f"{share.n:,}", _share(share)]
             cells.append(_mean(results, f"score[{team}]"))
         style = "green" if share is not None and share.n == best > 0 else ""
-        rows.append((style, [*cells, _mean(results, f"alive[{team}]")]))
+        left = [_mean(results, f"alive[{team}]") if team in results.diminished else ""]
+        rows.append((style, [*cells, *(left if results.diminished else [])]))
+    head = ["team", *(["won", "share of wins, %", "mean score"] if shares else [])]
+    head += ["left"] if results.diminished else []
     if None in shares:
-        rows.append(("dim", ["  ties", f"{shares[None].n:,}", _share(shares[None]), "", ""]))
-    return number_tables(
-        ["team", *(["won", "share of wins, %", "mean score"] if shares else []), "left"], rows
-    )
+        cells = ["  ties", f"{shares[None].n:,}", _share(shares[None])]
+        rows.append(("dim", [*cells, *[""] * (len(head) - len(cells))]))
+    shown = [
+        f"{metric}[{team}]" for metric in (["score", "alive"] if shares else ["alive"]) for team in teams
+    ]
+    others = [
+        ("", [results.title(name), _mean(results, name)]) for name in results.usual if name not in shown
+    ]
+    return [
+        *(number_tables(head, rows) if rows else []),
+        *(number_tables(["", "mean"], others) if others else []),
+    ]
 
 
 def _share(share: Share) -> str:
-    return f"{100 * share.value:.1f} ({100 * share.low:.1f}–{100 * share.high:.1f})"
+    interval = f" ({100 * share.low:.1f}–{100 * share.high:.1f})" if math.isfinite(share.low) else ""
+    return f"{100 * share.value:.1f}{interval}"
 
 
 def _mean(results: Results, name: str) -> str:
@@ -333,10 +350,12 @@ def _mean(results: Results, name: str) -> str:
 
 
 def point_tables(results: Results) -> list[Padding]:
-    """Return one line per point: its values, and who won how often there."""
+    """Return one line per point: its values, and who won how often there, or the leading quantities where nobody wins."""
     winners = [share for share in results.shares() if share.n]
     teams = [share.team for share in winners]
+    means = {} if winners else {name: results.means_by_point(name) for name in leading(results)}
     head = ["point", *short_names(results.variables), *(f"{share.name} won, %" for share in winners)]
+    head += map(results.title, means)
     rows = [
         (
             "",
@@ -344,6 +363,10 @@ def point_tables(results: Results) -> list[Padding]:
                 str(point),
                 *map(written, values.values()),
                 *(_share(share) for share in results.shares(point) if share.team in teams),
+                *(
+                    estimate(m[point].value, m[point].low, m[point].high) if m[point].n else ""
+                    for m in means.values()
+                ),
             ],
         )
         for point, values in list(enumerate(results.points))[:MOST_POINTS]

@@ -131,7 +131,7 @@ def play_again(options: OptimizeOptions, study: Study) -> str:
     words = ["tussle", "batch", options.mission]
     words += [word for name, text in settings.items() for word in ("--set", f"{name}={text}")]
     words += ["--end", options.end] if options.end is not None else []
-    words += ["--strict"] if options.strict else []
+    words += [] if options.strict is None else ["--strict" if options.strict else "--lenient"]
     words += [word for path in options.plugin_files for word in ("--plugin-path", str(path))]
     words += ["--allow-large"] if options.allow_large else []
     words += ["--compat", options.compat] if options.compat is not None else []

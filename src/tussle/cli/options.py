@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 # \b keeps click from rewrapping the lines that follow.
 EPILOG = "\b\nExit codes:\n" + "\n".join(f"  {code:>3}  {meaning}" for code, meaning in EXIT_CODES.items())
 LARGEST_SEED = 2**64 - 1
-"""Part of the notes on settings that only the viewer uses."""
 RENAMED = {"--log": "--record-runs"}
 """Former names of options."""
 
@@ -188,8 +187,14 @@ class MissionOptions(PluginOptions):
     ] = field(default_factory=list)
     end: Annotated[str | None, option("TIME", "End the game at this time: 60, or '2 min'.")] = None
     strict: Annotated[
-        bool, flag("--strict", "Treat unknown tags and attributes of the mission as errors.")
-    ] = False
+        bool | None,
+        typer.Option(
+            "--strict/--lenient",
+            help="Treat unknown tags and attributes of the mission as errors, or ignore them; by default they are errors, "
+            "except in missions that were written for SCRIMMAGE.",
+            show_default=False,
+        ),
+    ] = None
     allow_large: Annotated[bool, flag("--allow-large", "Lift the limits on the size of a mission.")] = False
     compat: Annotated[
         str | None,

@@ -65,7 +65,7 @@ def record(
 
     return Recorder(
         simulation, directory, period=period, mission_text=loaded.text, parameters=loaded.settings, shapes=shapes,
-        scene_files=loaded.scene_files,
+        scene_files=loaded.scene_files, mission_notes=loaded.game_notes,
     )  # fmt: skip
 
 

@@ -22,12 +22,14 @@ class Replaced:
     Attributes:
         text: The text to parse.
         names: Placeholders outside comments, with their defaults.
+        places: Name -> places where it stands outside comments.
         ends: Line of `text` at the end of each replacement that changed the number of lines.
         shifts: Number to add to lines from there on to get the line of the file.
     """
 
     text: str
     names: dict[str, str] = field(default_factory=dict)
+    places: dict[str, list[Place]] = field(default_factory=dict)
     ends: list[int] = field(default_factory=list)
     shifts: list[int] = field(default_factory=list)
 
@@ -68,16 +70,18 @@ def replace_placeholders(
     for match in PLACEHOLDER.finditer(text):
         name: str = match[1]
         default: str | None = match[2]
+        place = Place(file, line + text.count("\n", at, match.start()))
         i = bisect_right(starts, match.start()) - 1
         is_comment = i >= 0 and match.start() < comments[i][1]
         if not is_comment:
             out.names.setdefault(name, default or "")
+            out.places.setdefault(name, []).append(place)
         value = safe.get(name, default)
         if value is None:
             value = match[0] if is_comment else ""
             if not is_comment:
                 problems.error(
-                    Place(file, line + text.count("\n", at, match.start())),
+                    place,
                     f"${{{name}}} has no default and is not set; write ${{{name}=default}} or set {name}",
                 )
         parts += [text[done : match.start()], value]

@@ -42,12 +42,14 @@ class PluginTag:
         plugin: Name of the plugin class.
         attributes: Attributes as written.
         where: Returns the place of an attribute; of the tag for "".
+        common: Attributes that it takes from a <param_common>: name -> tag there.
     """
 
     tag: str
     plugin: str
     attributes: dict[str, str]
     where: Callable[[str], Place]
+    common: dict[str, Node] = field(default_factory=dict)
 
     @classmethod
     def of(cls, node: Node) -> PluginTag:
@@ -62,17 +64,21 @@ class PluginReader:
         catalogue: Finds the classes.
         problems: Receives errors and notes.
         budget: Limits that it shares with the mission's files.
-        shared: <param_common> name -> attributes.
+        shared: <param_common> name -> its tags, by name.
         from_geodetic: Converts latitude, longitude [rad], altitude [m], (3,), to a world position [m].
         viewer: Receives attributes for the viewer: "plugin@attribute" -> text.
+        unread: Tags of <param_common> that a plugin does not read: place and name -> the arguments of `Problems.unknown`.
+        read: Place and name of those that a plugin reads.
     """
 
     catalogue: Catalogue
     problems: Problems
     budget: Budget
-    shared: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    shared: Mapping[str, Mapping[str, Node]] = field(default_factory=dict)
     from_geodetic: Callable[..., Any] | None = None
     viewer: dict[str, str] = field(default_factory=dict)
+    unread: dict[tuple[Place, str], tuple[Place, str, str, list[str]]] = field(default_factory=dict)
+    read: set[tuple[Place, str]] = field(default_factory=set)
 
     def many(self, nodes: Iterable[Node], taken: set[str] | None = None) -> list[Any]:
         """Make the plugins of several tags; tags with errors are left out.
@@ -108,6 +114,7 @@ class PluginReader:
                 rest[attribute] = text
             else:
                 self._not_a_parameter(written, cls, attribute)
+        self.read.update((node.place, key) for key, node in written.common.items())
         if rest:
             values[known.rest] = json.dumps(rest)
         for attribute, text in known.differs.items():
@@ -161,9 +168,15 @@ class PluginReader:
             return
         place, shared = written.where("param_common"), self.shared[name]
         self.budget.spend_nodes(len(shared), place)
-        self.budget.spend_text(sum(map(len, shared.values())), str(place))
-        for key, text in shared.items():
-            written.attributes.setdefault(key, text)
+        self.budget.spend_text(sum(len(node.text) for node in shared.values()), str(place))
+        written.common = {key: node for key, node in shared.items() if key not in written.attributes}
+        written.attributes |= {key: node.text for key, node in written.common.items()}
+
+    def report_unread(self) -> None:
+        """Report the tags of <param_common> that no plugin reads. A plugin may take some that only others read."""
+        for where, unknown in self.unread.items():
+            if where not in self.read:
+                self.problems.unknown(*unknown, lists=True)
 
     def _name(self, written: PluginTag, taken: set[str]) -> str:
         wanted = written.attributes.get("name", written.plugin).strip()
@@ -233,7 +246,12 @@ class PluginReader:
             )
         else:
             allowed = [*cls.params(), *cls.children(), *known.renamed, *PLUGIN]
-            self.problems.unknown(place, f"attribute of {cls.__name__}", attribute, allowed, lists=True)
+            what = f"attribute of {cls.__name__}"
+            if attribute in written.common:
+                place = written.common.pop(attribute).place
+                self.unread[place, attribute] = place, what, attribute, allowed
+            else:
+                self.problems.unknown(place, what, attribute, allowed, lists=True)
 
     def _report(self, place: Place, cls: type[Plugin], parameter: str, error: TussleError) -> None:
         name = f"{cls.__name__}.{parameter}"

@@ -26,20 +26,33 @@ class Place(NamedTuple):
         return f"{self.file}:{self.line}" if self.line else f"{self.file}, value set from outside"
 
 
+class Strictness(NamedTuple):
+    """Whether unknown tags and attributes of a file are errors.
+
+    Attributes:
+        is_strict: They are errors instead of notes.
+        reason: Why, and how to choose otherwise; "" if the user has chosen.
+    """
+
+    is_strict: bool
+    reason: str = ""
+
+
 class Problems:
     """Errors and notes of one reading.
 
-    Args:
-        strict: Unknown tags and attributes are errors instead of notes.
+    Attributes:
+        strictness: Whether unknown tags and attributes are errors.
     """
 
-    def __init__(self, *, strict: bool = False) -> None:
-        self.strict = strict
+    def __init__(self) -> None:
+        self.strictness = Strictness(True)
         self._errors: dict[str, list[Place]] = {}
         self._notes: dict[str, list[Place]] = {}
         self._n_omitted = 0
         self._absent: dict[tuple[str, str], str] = {}
         self._unknown: dict[tuple[str, str], tuple[str, str]] = {}
+        self._has_unknown = False
 
     def error(self, place: Place, text: str) -> None:
         """Add an error: the mission cannot be run.
@@ -71,8 +84,8 @@ class Problems:
     def unknown(
         self, place: Place, what: str, name: str, allowed: Iterable[str], *, lists: bool = False
     ) -> None:
-        """Add a note about an unknown tag or attribute; an error with `strict`, or if it was set from outside."""
-        if not self.strict and len(self._notes) >= MOST_LINES:
+        """Add an error about an unknown tag or attribute; a note if the reading is lenient and the file has it."""
+        if not self.strictness.is_strict and len(self._notes) >= MOST_LINES:
             self._n_omitted += 1  # skips the search for the nearest name, which is slow
             return
         if (what, name) not in self._unknown:
@@ -80,26 +93,34 @@ class Problems:
             text = f"{what} {shown(name)} is unknown{nearest_name(name[:LONGEST_SHOWN], known)}"
             self._unknown[what, name] = text, listed(known)
         text, allowed_names = self._unknown[what, name]
-        if self.strict or not place.line:
+        if self.strictness.is_strict or not place.line:
+            self._has_unknown |= self.strictness.is_strict
             self.error(place, f"{text}; {allowed_names}" if lists else text)
         else:
+            self._has_unknown = True
             self.note(place, f"{text}; it is ignored")
 
     @property
     def notes(self) -> tuple[str, ...]:
         """The notes, one line each, in the order of the file."""
         more = [f"... and {self._n_omitted} more notes"] if self._n_omitted else []
-        return (*_lines(self._notes), *more)
+        why = [self.strictness.reason] if self._has_unknown and self.strictness.reason else []
+        return (*_lines(self._notes), *more, *why)
+
+    def at(self, place: Place) -> list[str]:
+        """Return the notes about a place."""
+        return [text for text, places in self._notes.items() if place in places]
 
     def check(self) -> None:
         """Raise the collected errors.
 
         Raises:
-            MissionError: There are errors; the message has one line for each.
+            MissionError: There are errors; the message has one line for each, and one on how unknown names are ignored.
         """
         if not self._errors:
             return
-        raise MissionError("\n".join(_lines(self._errors)))
+        why = [self.strictness.reason] if self._has_unknown and self.strictness.is_strict else []
+        raise MissionError("\n".join([*_lines(self._errors), *filter(None, why)]))
 
 
 def _lines(found: dict[str, list[Place]]) -> list[str]:

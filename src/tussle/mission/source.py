@@ -113,14 +113,18 @@ class MissionSource:
         path: The mission's file.
         root: Its tree, includes resolved.
         text: Its text with placeholders replaced; if there are includes, the tree written as XML.
+        own_text: The text of the mission's file alone, with placeholders replaced.
         placeholders: Names that can be set, with their defaults.
+        places: Name of a placeholder -> places where it stands.
         files: All files that were read.
     """
 
     path: Path
     root: Node
     text: str
+    own_text: str
     placeholders: dict[str, str] = field(default_factory=dict)
+    places: dict[str, list[Place]] = field(default_factory=dict)
     files: list[Path] = field(default_factory=list)
 
 
@@ -146,6 +150,7 @@ class SourceReader:
         self.budget = budget
         self.search = [_expanded(s) for s in search]
         self.placeholders: dict[str, str] = {}
+        self.places: dict[str, list[Place]] = {}
         self.files: list[Path] = []
 
     def read(self, path: Path, text: str | None = None) -> MissionSource:
@@ -154,15 +159,14 @@ class SourceReader:
         Raises:
             MissionError: It cannot be read.
         """
-        root, resolved = self._file(path, text)
+        root, own_text = self._file(path, text)
         roots = [path.parent.resolve(), *(s.resolve() for s in self.search)]
         if root.tag.startswith(XINCLUDE):
             raise MissionError(f"{root.place}: the root tag must be <runscript>, not an include")
         n_before = len(self.files)
         self._include_all(root, [path.resolve()], roots)
-        if len(self.files) > n_before:
-            resolved = root.to_text()
-        return MissionSource(path, root, resolved, self.placeholders, self.files)
+        resolved = root.to_text() if len(self.files) > n_before else own_text
+        return MissionSource(path, root, resolved, own_text, self.placeholders, self.places, self.files)
 
     def _file(self, path: Path, text: str | None = None) -> tuple[Node, str]:
         text = read_text(path, self.budget) if text is None else text
@@ -170,6 +174,7 @@ class SourceReader:
         replaced = replace_placeholders(text, str(path), overrides, self.problems, self.budget)
         for name, default in replaced.names.items():
             self.placeholders.setdefault(name, default)
+            self.places.setdefault(name, []).extend(replaced.places[name])
         self.files.append(path)
         return parse(replaced.text, str(path), self.budget, replaced.line_of), replaced.text
 

@@ -17,6 +17,7 @@ class TagSpec(NamedTuple):
         kept_for: "viewer" or "log" if the game does not depend on it.
         reads: How its text is parsed: "text", "truth", "number", "whole", "words".
         bound: Bound of a number: "> 0" or ">= 0".
+        attributes: Attributes of a tag for the viewer.
     """
 
     doc: str
@@ -25,10 +26,11 @@ class TagSpec(NamedTuple):
     kept_for: str = ""
     reads: str = "number"
     bound: str = ""
+    attributes: tuple[str, ...] = ()
 
 
-def _viewer(doc: str, default: str = "", reads: str = "text", unit: str = "") -> TagSpec:
-    return TagSpec(doc, default, unit, "viewer", reads)
+def _viewer(doc: str, default: str = "", reads: str = "text", attributes: str = "") -> TagSpec:
+    return TagSpec(doc, default, "", "viewer", reads, attributes=tuple(attributes.split()))
 
 
 def _log(doc: str, default: str = "", reads: str = "text") -> TagSpec:
@@ -123,8 +125,13 @@ WORLD = {
     "scale": _viewer("Scale of all models.", "1", "number"),
     "gui_update_period": _viewer("Time between frames [ms]."),
     "plot_tracks": _viewer("Draw the paths.", "false", "truth"),
-    "camera": _viewer("Attributes `mode`, `follow_id`, `pos`, `focal_point`, `show_fps`."),
-    "enable_screenshots": _viewer("Attributes `min_period`, `start`, `end`.", "false", "truth"),
+    "camera": _viewer(
+        "Attributes `mode`, `follow_id`, `pos`, `focal_point`, `show_fps`.",
+        attributes="mode follow_id pos focal_point show_fps",
+    ),
+    "enable_screenshots": _viewer(
+        "Attributes `min_period`, `start`, `end`.", "false", "truth", "min_period start end"
+    ),
     "stream_ip": _viewer("Address of a remote viewer.", "localhost"),
     "stream_port": _viewer("Port of a remote viewer.", "50051"),
 }

@@ -13,6 +13,7 @@ from tussle.errors import MissionError, ParameterError, TussleError
 from tussle.geodesy import Origin
 from tussle.mission import codecs
 from tussle.mission.catalogue import KINDS, Catalogue
+from tussle.mission.effects import check_effects
 from tussle.mission.entities import EntityReader, Fields, block_names, expand_entity_common
 from tussle.mission.laws import check_compat
 from tussle.mission.limits import Limits
@@ -24,6 +25,8 @@ from tussle.mission.problems import Place, Problems
 from tussle.mission.scene_tags import SCENE_TAGS, SceneReader
 from tussle.mission.source import MissionSource, SourceReader, find_mission
 from tussle.mission.spec import MISSION_VALUES, Mission, end_conditions
+from tussle.mission.stray_tags import report_stray
+from tussle.mission.strictness import strictness_of
 from tussle.mission.tags import RUN, RUNSCRIPT, SEED_ATTRIBUTES, WORLD, TagSpec
 from tussle.scene import Scene
 from tussle.texts import shown, truth
@@ -31,6 +34,10 @@ from tussle.texts import shown, truth
 VIEWER_NOTE = "kept for the viewer: "
 SEED = re.compile(r"\d{1,20}", re.ASCII)
 PLUGIN_TAGS = {"entity_interaction": "interactions", "metrics": "metrics", "network": "networks"}
+
+
+VIEWER_NOTE = ": kept for the viewer: "
+"""Part of the notes on settings that only the viewer uses."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +54,7 @@ class Loaded:
         viewer: Settings for the viewer: attributes of <run> and tags by name, "entities" by block, "plugins" by "plugin@attribute".
         log: Settings of the output, by tag.
         placeholders: Names of the placeholders, with their defaults.
+        placeholder_places: Name of a placeholder -> "file:line" of each place where it stands, with what is ignored there.
         places: Block name -> "file:line", for messages about it.
         files: All files that were read: the mission's and those it includes.
         scene_files: Files of surfaces and their textures, by their paths from the folder in which they were found.
@@ -62,6 +70,7 @@ class Loaded:
     viewer: dict[str, Any] = field(default_factory=dict)
     log: dict[str, Any] = field(default_factory=dict)
     placeholders: dict[str, str] = field(default_factory=dict)
+    placeholder_places: dict[str, tuple[str, ...]] = field(default_factory=dict)
     places: dict[str, str] = field(default_factory=dict)
     files: tuple[Path, ...] = ()
     scene_files: dict[str, Path] = field(default_factory=dict)
@@ -77,11 +86,12 @@ def read_mission(
     source: str | Path,
     overrides: Mapping[str, Any] | None = None,
     *,
-    strict: bool = False,
+    strict: bool | None = None,
     plugin_files: Sequence[str | Path | PluginFile] = (),
     search: Sequence[str | Path] = (),
     allow_large: bool = False,
     compat: str | None = None,
+    checks_effects: bool = True,
 ) -> Loaded:
     """Read a mission.
 
@@ -90,19 +100,42 @@ def read_mission(
         overrides: Values of the file's placeholders, `${name=default}`, and of anything in it by path: "run.dt", "prey.count",
             "prey.Boids.max_speed", "SimpleCapture.capture_range", "prey.motion_model" ("Unicycle vel_max='30'"). By path, a number
             is SI and a text is read as in the file; the value of a placeholder is inserted into the file as it is.
-        strict: Unknown tags and attributes are errors instead of notes.
+        strict: Unknown tags and attributes are errors, else they are ignored with a note; None: they are errors, unless the file has
+            marks of a mission of SCRIMMAGE: its style sheet, compat="scrimmage", or tags that only SCRIMMAGE uses, such as <log_dir>.
         plugin_files: Python files with further plugins for the mission.
         search: Folders that are searched for missions and included files, besides the mission's own.
         allow_large: Raise the limits that keep a hostile file from taking all memory, for reading and for running.
         compat: As for `Mission`; None for the value in the file.
+        checks_effects: It is an error if an override has no effect, since its placeholder stands only in what is ignored. For this
+            check the mission is read once more for each override.
 
     Raises:
         MissionError: The mission cannot be read or is invalid. The message has one line for each error, with file and line.
     """
-    budget = Budget(Limits.large() if allow_large else Limits())
+    limits = Limits.large() if allow_large else Limits()
+
+    def read(given: Mapping[str, Any]) -> Loaded:
+        return _read(source, given, strict, plugin_files, search, limits, compat)
+
     given = {str(name): value for name, value in (overrides or {}).items()}
+    loaded = read(given)
+    if checks_effects:
+        check_effects(read, loaded, given)
+    return loaded
+
+
+def _read(
+    source: str | Path,
+    given: Mapping[str, Any],
+    strict: bool | None,
+    plugin_files: Sequence[str | Path | PluginFile],
+    search: Sequence[str | Path],
+    limits: Limits,
+    compat: str | None,
+) -> Loaded:
+    budget = Budget(limits)
     settings = as_texts(given)
-    problems = Problems(strict=strict)
+    problems = Problems()
     path = find_mission(source, search)
     read = SourceReader(settings, problems, budget, search).read(path)
     if read.root.tag != "runscript":
@@ -110,6 +143,8 @@ def read_mission(
             f"{read.root.place}: the root tag is <{read.root.tag[:80]}>; it must be <runscript>"
         )
     catalogue = _catalogue(read, compat, plugin_files)
+    problems.strictness = strictness_of(read.root, read.own_text, strict)
+    report_stray(read.root, problems)
     expand_entity_common(read.root, problems, budget)
     tree = TreeEditor(read.root, catalogue, read.placeholders)
     paths = {name: tree.set(name, value) for name, value in given.items() if name not in read.placeholders}
@@ -175,6 +210,7 @@ class _WorldReader:
         nodes = list(root.find_all("entity"))
         self._count_tags(nodes)
         blocks = [entities.block(node, name) for node, name in zip(nodes, block_names(nodes), strict=True)]
+        plugins.report_unread()
         conditions, seed, reseed = self._end_conditions(), self._seed(), self._reseed()
         parts = scene.parts()
         self._settings()
@@ -201,8 +237,16 @@ class _WorldReader:
         places = {block: str(place) for block, place in entities.places.items()}
         return Loaded(
             mission, seed, name or self.source.path.stem, self.source.path, self.source.text, problems.notes, self.viewer, self.log,
-            self.source.placeholders, places, (*self.source.files, *scene.files), scene.files_by_name(),
+            self.source.placeholders, self._placeholder_places(), places, (*self.source.files, *scene.files), scene.files_by_name(),
         )  # fmt: skip
+
+    def _placeholder_places(self) -> dict[str, tuple[str, ...]]:
+        return {
+            name: tuple(
+                ": ".join([str(place), *self.problems.at(place)[:1]]) for place in dict.fromkeys(places)
+            )
+            for name, places in self.source.places.items()
+        }
 
     def _count_tags(self, entities: list[Node]) -> None:
         """Check the number of blocks and plugins before they are compared with one another, which takes quadratic time.
@@ -259,14 +303,14 @@ class _WorldReader:
         fields = Fields(Node("runscript", {}, "", nodes, self.root.place), WORLD, self.problems)
         return Origin(*fields.angles(names[0], names[1]), fields.number(names[2]))
 
-    def _shared(self) -> dict[str, dict[str, str]]:
-        """Map the name of each <param_common> to its attributes."""
-        shared: dict[str, dict[str, str]] = {}
+    def _shared(self) -> dict[str, dict[str, Node]]:
+        """Map the name of each <param_common> to its tags, by name."""
+        shared: dict[str, dict[str, Node]] = {}
         for node in self.root.find_all("param_common"):
             name = node.attributes.get("name", "")
             if not name:
                 self.problems.error(node.place, "param_common has no name; plugins take it by its name")
-            shared[name] = {child.tag: child.text for child in node.children}
+            shared[name] = {child.tag: child for child in node.children}
         return shared
 
     def _world_plugins(self, plugins: PluginReader) -> dict[str, list[Any]]:
@@ -329,6 +373,11 @@ class _WorldReader:
             if known is None:
                 self.problems.unknown(node.place, "tag", node.tag, WORLD)
             elif known.kept_for:
+                for attribute in node.attributes if known.kept_for == "viewer" else ():
+                    if attribute not in known.attributes:
+                        self.problems.unknown(
+                            node.where(attribute), f"attribute of <{node.tag}>", attribute, known.attributes
+                        )
                 self._keep(
                     self.viewer if known.kept_for == "viewer" else self.log, node.tag, node, known, node.tag
                 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 import time
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, Protocol, Self
@@ -66,6 +66,7 @@ class Recorder:
         mission_text: Mission file with all its values, saved as `mission.xml`; by default the mission of the simulation is written,
             if a mission file can hold it.
         parameters: Values that were set in addition to the mission, for `run.json`.
+        mission_notes: Notes about the mission file, for `run.json`, see `tussle.mission.Loaded`.
         flush_every: Wall time between flushes [s].
         shapes: Whether the shapes that plugins draw are recorded, too; of every step, whatever the period.
         scene_files: Files of terrain, meshes and textures that the mission's text names, which are copied, by name: see
@@ -84,6 +85,7 @@ class Recorder:
         period: float | None = None,
         mission_text: str | None = None,
         parameters: Mapping[str, Any] | None = None,
+        mission_notes: Sequence[str] = (),
         flush_every: float = 1.0,
         shapes: bool = False,
         scene_files: Mapping[str, Path] | None = None,
@@ -95,6 +97,7 @@ class Recorder:
         self.sim, self.directory = sim, Path(directory)
         self.period, self.flush_every = period, flush_every
         self.parameters = dict(parameters or {})
+        self.mission_notes = list(mission_notes)
         self.is_closed = False
         self._timings = run_file.Timings()
         clock, mission = sim.state.context.clock, sim.mission
@@ -297,7 +300,12 @@ class Recorder:
             sim,
             self._timings,
             self._streams,
-            {"period": self.period, "parameters": self.parameters, "interrupted": interrupted},
+            {
+                "period": self.period,
+                "parameters": self.parameters,
+                "mission_notes": self.mission_notes,
+                "interrupted": interrupted,
+            },
         )
 
     def _detach(self) -> None:

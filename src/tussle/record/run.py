@@ -112,6 +112,11 @@ class Run:
         return table
 
     @property
+    def mission_notes(self) -> list[str]:
+        """Notes about the mission file, as they were when it was played: what was ignored, and differences from SCRIMMAGE."""
+        return list(self.info.get("mission_notes") or ())
+
+    @property
     def is_complete(self) -> bool:
         """True if the run was played to its end and no part of it is missing."""
         return bool(self.info.get("is_complete")) and not self.notes

@@ -127,6 +127,7 @@ RUN = Document(
         "is_complete": bool,
         "interrupted": str,
         "period": Maybe(Real(5e-324)),
+        "mission_notes": Maybe([str]),
         "mission": {
             "name": str,
             "dt": Real(5e-324),

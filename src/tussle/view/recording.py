@@ -48,7 +48,7 @@ class Recording:
         teams: Team number -> names of its blocks, in order of the teams.
         t: Time of each frame [s], (T,), ascending.
         steps: Step of each frame, (T,).
-        notes: Missing parts of the run, one line each.
+        notes: Missing parts of the run, and notes about its mission, one line each.
         id_shift: Offset of the ids: 0.
 
     Raises:
@@ -69,7 +69,7 @@ class Recording:
         self.world = world
         self.run: Run = load_run(self.path, is_mapped=is_mapped)
         self._is_mapped = is_mapped
-        self.notes: list[str] = list(self.run.notes)
+        self.notes: list[str] = [*self.run.notes, *self.run.mission_notes]
         self._plugin_files = plugin_files
         table = self.run.trajectory_table
         self._batches = table.to_batches()
@@ -388,7 +388,7 @@ class Recording:
             )
             return None
         try:
-            loaded = read_mission(path.resolve(), plugin_files=self._plugin_files)
+            loaded = read_mission(path.resolve(), strict=False, plugin_files=self._plugin_files)
             self.notes.extend(note for note in loaded.notes if "<terrain>" in note)
             return loaded
         except TussleError as error:

@@ -179,13 +179,20 @@ def test_a_plugin_of_ones_own_is_played(tussle, folder):
     assert done.stdout
 
 
-def test_strict_makes_notes_errors(tussle, folder):
+def test_unknown_names_are_errors_unless_they_are_read_leniently(tussle, folder):
     text = (folder / "game.xml").read_text().replace("<seed>", "<sed>1</sed><seed>")
     (folder / "typo.xml").write_text(text)
-    lax = tussle("run", "typo.xml", "--no-log")
-    assert lax.stderr == "note: typo.xml:4: tag 'sed' is unknown (did you mean 'seed'?); it is ignored\n"
-    strict = tussle("run", "typo.xml", "--no-log", "--strict", code=1)
+    strict = tussle("run", "typo.xml", "--no-log", code=1)
     assert strict.stderr.startswith("error: typo.xml:4: tag 'sed' is unknown (did you mean 'seed'?)")
+    assert "--lenient (strict=False) ignores them" in strict.stderr
+    lax = tussle("run", "typo.xml", "--lenient", "--out", "lax")
+    note = "typo.xml:4: tag 'sed' is unknown (did you mean 'seed'?); it is ignored"
+    assert lax.stderr == f"note: {note}\n"
+    assert json.loads((folder / "lax/run.json").read_text())["mission_notes"] == [note]
+    old = text.replace("<sed>", "<stream_port>50051</stream_port><sed>")
+    (folder / "typo.xml").write_text(old)
+    assert note in tussle("run", "typo.xml", "--no-log").stderr
+    assert "'sed' is unknown" in tussle("run", "typo.xml", "--no-log", "--strict", code=1).stderr
 
 
 FAILING = '''\

@@ -11,8 +11,9 @@ from gambles import game
 
 from tussle import Block, Mission, Simulation
 from tussle.api import Autonomy, Param, State
-from tussle.batch.design_points import build_points, exactly, group_points, read_points, split, with_value
+from tussle.batch.design_points import build_points, group_points, read_points, split, with_value
 from tussle.errors import MissionError, ParameterError, TussleError
+from tussle.mission.effects import exactly
 from tussle.stock import AvoidEntityMS, Boundary, MotorSchemas, MoveToGoalMS, SingleIntegrator, Still
 
 

@@ -181,7 +181,7 @@ def test_games_without_scores_have_no_winners():
     results = Results(made_batch({}, metrics={"Cap.hits": {None: np.ones((3, 1))}}))
     assert results.shares() == []
     assert not {"ties", "wins[1]"} & set(results.quantities)
-    assert results.usual == ["alive[1]", "alive[2]", "alive[3]", "t"]
+    assert results.usual == ["Cap.hits", "alive[1]"]
 
 
 def test_means_are_those_of_the_runs(grid):
@@ -194,9 +194,6 @@ def test_means_are_those_of_the_runs(grid):
         "score[2]",
         "score[3]",
         "alive[1]",
-        "alive[2]",
-        "alive[3]",
-        "t",
     ]
 
 

@@ -22,6 +22,7 @@ from tussle.batch.statistics import (
     running_result,
     share_of,
     sign_test,
+    stratified_interval,
     wilson,
 )
 from tussle.cli.batch import batch
@@ -146,6 +147,61 @@ def test_shared_seeds_widen_the_interval_over_points_as_they_should():
         held_without += naive.low <= 0.0 <= naive.high
     assert held > 0.88 * 150
     assert held_without < 0.85 * 150
+
+
+def test_the_interval_over_points_has_none_of_their_differences():
+    values, points = np.repeat([5.0, 10.0, 20.0], 4), np.repeat([0, 1, 2], 4)
+    seeds = np.tile(np.arange(4), 3)
+    for mean in (mean_of("robots", values, seeds, points), mean_of("robots", values, None, points)):
+        assert (mean.value, mean.low, mean.high) == pytest.approx((35 / 3,) * 3)
+        assert mean.high - mean.low == 0.0
+
+
+def test_one_run_of_each_point_has_no_interval():
+    mean = mean_of("robots", np.array([5.0, 10.0, 20.0]), None, np.arange(3))
+    assert np.isnan([mean.low, mean.high]).all()
+    mean = mean_of("robots", np.array([5.0, 10.0, 20.0]), np.zeros(3), np.arange(3))
+    assert np.isnan([mean.low, mean.high]).all()
+
+
+def test_a_stratified_interval_is_students_where_there_is_one_point():
+    values = np.random.default_rng(1).normal(size=9)
+    assert stratified_interval(values, np.zeros(9)) == pytest.approx(mean_interval(values))
+
+
+@pytest.mark.parametrize("n_seeds", [3, 5, 12])
+@pytest.mark.parametrize("shared", [0.0, 1.0])
+def test_intervals_over_points_hold_the_mean_over_these_points_as_often_as_they_say(n_seeds, shared):
+    """Four points that differ by far more than their runs; seeds that add the same at all points, and apart."""
+    rng, n = np.random.default_rng(5), 400
+    effect = np.array([0.0, 30.0, 70.0, 200.0])
+    points, seeds = np.tile(np.arange(4), n_seeds), np.repeat(np.arange(n_seeds), 4)
+    held = widths = 0.0
+    for _ in range(n):
+        luck = shared * rng.normal(size=(n_seeds, 1)) + rng.normal(size=(n_seeds, 4)) * [1.0, 2.0, 1.0, 0.5]
+        mean = mean_of("x", (effect + luck).ravel(), seeds if shared else None, points)
+        held += mean.low <= effect.mean() <= mean.high
+        widths += (mean.high - mean.low) / n
+    assert abs(held / n - 0.95) < 4.0 * (0.95 * 0.05 / n) ** 0.5  # four standard errors
+    assert widths < 12.0  # the points are 200 apart
+
+
+def test_blocks_that_lack_a_point_do_not_differ_for_that():
+    values, points = np.array([1.0, 100.0, 1.0, 100.0, 1.0]), np.array([0, 1, 0, 1, 0])
+    mean = mean_of("x", values, np.array([0, 0, 1, 1, 2]), points)
+    assert mean.low == mean.high == pytest.approx(values.mean())
+
+
+def test_shares_over_points_stay_within_0_and_1_and_hold_as_often_as_they_say():
+    rng, n, n_seeds = np.random.default_rng(6), 400, 8
+    odds = np.array([0.02, 0.5, 0.98])
+    points, seeds = np.tile(np.arange(3), n_seeds), np.repeat(np.arange(n_seeds), 3)
+    held = 0
+    for _ in range(n):
+        share = share_of("a", 1, (rng.random((n_seeds, 3)) < odds).astype(float).ravel(), seeds, points)
+        assert 0.0 <= share.low <= share.value <= share.high <= 1.0
+        held += share.low <= odds.mean() <= share.high
+    assert held / n > 0.95 - 4.0 * (0.95 * 0.05 / n) ** 0.5
 
 
 # -- differences ----------------------------------------------------------------------------------------------------------

@@ -10,9 +10,9 @@ import pytest
 import tussle.stock as stock
 from tussle import Block, Mission, Simulation, historic
 from tussle.batch import Batch
-from tussle.batch.design_points import exactly
 from tussle.errors import MissionError
 from tussle.mission import Catalogue, read_mission, to_python, to_xml
+from tussle.mission.effects import exactly
 
 TEXT = """<runscript name="a"{}>
   <run start="0" end="2" dt="0.1"/>

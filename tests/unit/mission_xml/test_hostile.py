@@ -51,7 +51,7 @@ def soon():
         ("<runscript>" + "<metrics/>" * 1001 + "<entity/></runscript>", "more than 1,000 plugins in <runscript>"),
         ("<runscript>" + "<!--" * 500_000 + "</runscript>", "not well-formed"),
         ("${" * 500_000, "not well-formed"),
-        ("<runscript " + " ".join(f"a{i}='1'" for i in range(50_000)) + "/>", "has no <entity>"),
+        ("<runscript " + " ".join(f"a{i}='1'" for i in range(50_000)) + "/>", "reading stopped here"),
         ("<runscript>" + "".join(f"<u{i}/>" for i in range(50_000)) + "</runscript>", "has no <entity>"),
         ("<runscript>" + "".join(f"<metrics>P{i}</metrics>" for i in range(900)) + "<entity/></runscript>", "reading stopped here"),
     ],
@@ -119,7 +119,7 @@ def test_large_files_are_read_when_allowed(files):
     text = "<runscript>" + "<x/>" * 150_000 + "<entity><count>300000</count></entity></runscript>"
     with pytest.raises(MissionError, match="allow_large"):
         files.read(text)
-    loaded = files.read(text, allow_large=True)
+    loaded = files.read(text, allow_large=True, strict=False)
     assert loaded.mission.blocks[0].count == 300_000
     assert len(loaded.notes) <= 102
 

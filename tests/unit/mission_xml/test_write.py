@@ -15,9 +15,9 @@ import random_missions
 
 from tussle import Block, Mission
 from tussle.api import Interaction
-from tussle.batch.design_points import exactly
 from tussle.errors import MissionError, TussleError
 from tussle.mission import Loaded, read_mission, shipped_missions, to_python, to_xml
+from tussle.mission.effects import exactly
 from tussle.scene import Base, Scene, Sphere
 from tussle.stock import Boids, MotorSchemas, MoveToGoalMS, SimpleCollision, SphereNetwork, Still
 

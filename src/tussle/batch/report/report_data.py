@@ -16,7 +16,7 @@ from tussle.batch.report.formatting import file_name
 from tussle.batch.results import Results
 from tussle.batch.sampling import method_for
 from tussle.batch.selection import written
-from tussle.batch.statistics import wilson
+from tussle.batch.statistics import mean_of, share_of, wilson
 from tussle.batch.variables import Choice, Range, Variable
 from tussle.errors import MissingExtraError
 from tussle.palette import MUTED, colour_of
@@ -320,9 +320,22 @@ class ReportData:
         for place in range(axis.n_places):
             points = np.flatnonzero(axis.index == place).tolist()
             rows, seed = np.isin(self.point, points), self.results.seed_blocks(points)
-            drawn = None if draw is None else draw[rows]
-            found.append(clustered_mean(values[rows], seed[rows], drawn, is_share=measure.is_share))
+            if draw is None:
+                found.append(self._mean_over(values[rows], seed[rows], self.point[rows], measure.is_share))
+            else:
+                found.append(clustered_mean(values[rows], seed[rows], draw[rows], is_share=measure.is_share))
         return np.array(found)
+
+    def _mean_over(
+        self, values: np.ndarray, seed: np.ndarray, point: np.ndarray, is_share: bool
+    ) -> tuple[float, float, float]:
+        """Mean of runs of given points, which are as they are, and its interval over their seeds."""
+        is_apart = bool(self.results.info["independent"])
+        if is_share:
+            share = share_of("", None, values, None if is_apart else seed, None if is_apart else point)
+            return share.value, share.low, share.high
+        mean = mean_of("", values, None if is_apart else seed, point)
+        return mean.value, mean.low, mean.high
 
     # -- what is shown ------------------------------------------------------------------------------------------------------
 
@@ -339,27 +352,38 @@ class ReportData:
     @cached_property
     def wins(self) -> tuple[Measure, ...]:
         """Wins of the teams that score or win; empty for games without scores."""
-        teams = [t for t in self.rivals if f"wins[{t}]" in self.results.quantities]
+        teams = [t for t in self.rivals if t in self.results.scored] if len(self.results.scored) > 1 else []
         return tuple(Measure(f"wins[{t}]", self.name_of(t), t, "share of the games won", True) for t in teams)
 
     @cached_property
     def scores(self) -> tuple[Measure, ...]:
-        """Scores of the teams; in games without scores, the entities left at the end."""
+        """Scores of the teams; in games without scores, the entities left at the end of teams that lost some."""
         if self.rivals:
             return tuple(Measure(f"score[{t}]", self.name_of(t), t, "score") for t in sorted(self.rivals))
-        teams = [t for t in self.results.teams if varies(self.known(f"alive[{t}]"))]
+        teams = [t for t in self.results.diminished if varies(self.known(f"alive[{t}]"))]
         return tuple(Measure(f"alive[{t}]", self.name_of(t), t, "left at the end") for t in teams)
+
+    @cached_property
+    def measured(self) -> tuple[Measure, ...]:
+        """Quantities that the user asks for, and in games without scores what metrics and interactions measure."""
+        asked = [m.expression for m in self.more]
+        names = (
+            []
+            if self.rivals
+            else [n for n in self.results.measured if varies(self.known(n)) and n not in asked]
+        )
+        return (*self.more, *(Measure(n, self.title(n), None, self.title(n)) for n in names))
 
     @property
     def measures(self) -> tuple[Measure, ...]:
         """All quantities of the report."""
-        return (*self.wins, *self.scores, *self.more)
+        return (*self.wins, *self.scores, *self.measured)
 
     @property
     def groups(self) -> list[tuple[str, tuple[Measure, ...]]]:
         """Measures that share a plot, with the beginning of its file name."""
         found = [("wins", self.wins), ("score" if self.rivals else "left", self.scores)]
-        found += [(file_name(m.expression), (m,)) for m in self.more]
+        found += [(file_name(m.expression), (m,)) for m in self.measured]
         return [(stem, measures) for stem, measures in found if measures]
 
     @cached_property

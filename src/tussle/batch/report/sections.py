@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import shlex
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -24,7 +25,7 @@ from tussle.batch.report.formatting import (
 )
 from tussle.batch.report.report_data import Measure, ReportData, axis_of, varies
 from tussle.batch.selection import written
-from tussle.batch.statistics import BLOCKS_FROM
+from tussle.batch.statistics import Mean
 from tussle.batch.variables import Range
 from tussle.event_texts import END_TEXTS, end_text
 from tussle.palette import PAPER, colour_of, mixed
@@ -33,6 +34,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MOST_MEANS = 60
+MAX_SAID = 3
+"""Number of measured quantities in the sentence on the result."""
 MOST_FAILED = 50
 MOST_SLOW = 10
 SMALL = 5
@@ -125,7 +128,7 @@ def won(data: ReportData) -> Section:
     colours = [plots.END_COLOURS["time"] if s.team is None else colour_of(s.team) for s in shares]
     blocks = ""
     if data.has_points:
-        is_shared = not data.results.info.get("independent") and len(np.unique(data.seed)) >= BLOCKS_FROM
+        is_shared = not data.results.info.get("independent")
         blocks = f", over all points; {'games of one seed count as one block' if is_shared else 'each game counts by itself'}"
     caption = (
         f"Bar: share of the {count(data.n_good, 'game')}. Line: its 95 % interval (Wilson){blocks}. A tie is a game with two highest"
@@ -153,7 +156,7 @@ def _outside(values: np.ndarray) -> str:
 def scores(data: ReportData) -> Section:
     """The section on the scores of teams and the means of all quantities."""
     found = []
-    for measures in (data.scores, *((measure,) for measure in data.more)):
+    for measures in (data.scores, *((measure,) for measure in data.measured)):
         varied = [m for m in measures if varies(data.known(m.expression))]
         if varied:
             found.append(_distribution(data, varied))
@@ -462,14 +465,22 @@ def _most_and_least(data: ReportData) -> Iterator[str]:
 
 
 def _who_was_left(data: ReportData) -> str:
-    """Return how many of each team were left, for games without scores."""
+    """Return how many of each team were left, and else what was measured, for games without scores."""
     found = []
+    over = ", over these points" if data.has_points else ""
+
+    def mean_text(mean: Mean, of: str) -> str:
+        known = f" (95 % interval {interval(mean.low, mean.high)}{over})" if math.isfinite(mean.low) else ""
+        return f"{estimate(mean.value)}{of}{known}"
+
     for measure in data.scores:
         left_, start = data.results.means([measure.expression, measure.expression.replace("alive", "start")])
-        text = f"{estimate(left_.value)} of {number(start.value)} {measure.name}"
-        found.append(f"{text} (95 % interval {interval(left_.low, left_.high)})")
+        found.append(mean_text(left_, f" of {number(start.value)} {measure.name}"))
     if found:
         return f"{' and '.join(found)} were left on average"
+    if measured := data.results.means(data.results.measured):
+        texts = [f"{data.title(m.name)} was {mean_text(m, '')}" for m in measured[:MAX_SAID] if m.n]
+        return f"On average, {' and '.join(texts)}"
     teams = [t for t in data.results.teams if f"alive[{t}]" in data.results.quantities]
     return f"All of {' and of '.join(map(data.name_of, teams))} were left" if teams else "Nothing was counted"
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tussle.batch.design_points import check_source
+from tussle.batch.design_points import check_source, with_whole_numbers
 from tussle.batch.executors import Executor
 from tussle.batch.quantities import Quantity
 from tussle.batch.search.evaluation import Evaluator, RoundPlayer
@@ -108,6 +108,9 @@ class Optimization:
         for variable in variables:
             if variable.name in settings:
                 raise ParameterError(f"{variable.name} is set and varies; say one of the two")
+        if isinstance(mission, (str, Path)):
+            reading = {**options, "plugin_files": tuple(plugin_files)}
+            variables = tuple(with_whole_numbers(mission, settings, variables, **reading))
         self.quantity = Quantity.parse(objective)
         self.variables, self.sampler, self.is_minimized = variables, sampler, minimize
         self.sample_seed, self.per_round = sample_seed, per_round
