@@ -94,7 +94,7 @@ class Problems:
             self._unknown[what, name] = text, listed(known)
         text, allowed_names = self._unknown[what, name]
         if self.strictness.is_strict or not place.line:
-            self._has_unknown |= self.strictness.is_strict
+            self._has_unknown |= bool(place.line)
             self.error(place, f"{text}; {allowed_names}" if lists else text)
         else:
             self._has_unknown = True

@@ -253,7 +253,8 @@ def to_python(mission: GivenMission, seed: int | None = None) -> str:
         'if __name__ == "__main__":\n'
         f"    with Simulation(mission, {1 if seed is None else seed}) as simulation:\n"
         "        simulation.run()\n"
-        '        print(*simulation.result(), sep="\\n")\n'
+        "        for result in simulation.result():\n"
+        "            print(result, result.state_hash)\n"
     )
 
 

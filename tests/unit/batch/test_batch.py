@@ -257,8 +257,8 @@ def test_files_that_only_some_points_include_belong_to_the_batch(mission, tmp_pa
     batch = Batch(mission, runs=2, vary=["what=a,b"], **PLUGINS)
     results = batch.play(tmp_path / "out", InProcess())
     before = batch.fingerprint
-    for name in ("a", "b"):
-        (tmp_path / "parts" / f"{name}.xml").write_text('<metrics weight="5">Chips</metrics>')
+    for name, weight in (("a", 5), ("b", 6)):
+        (tmp_path / "parts" / f"{name}.xml").write_text(f'<metrics weight="{weight}">Chips</metrics>')
         changed = Batch(mission, runs=2, vary=["what=a,b"], **PLUGINS).fingerprint
         assert changed != before
         before = changed
@@ -322,7 +322,7 @@ def test_what_batch_json_says(mission, tmp_path):
     info = json.loads((tmp_path / "out" / "batch.json").read_text())
     assert info["mission"] == {
         "made_in": "file", "file": "game.xml", "settings": {"reds": "3"}, "ends_by_time": True,
-        "plugin_files": ["0/gambles.py"], "options": {},
+        "plugin_files": ["0/gambles.py"], "options": {}, "notes": [],
     }  # fmt: skip
     expected = {
         "format": 1, "name": "A game of chance", "fingerprint": batch.fingerprint, "sample": "lhs", "sample_seed": 4,

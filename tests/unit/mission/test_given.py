@@ -80,9 +80,12 @@ def test_files_and_names_are_written_and_shown(file):
 
 
 def test_what_a_file_has_that_is_not_read_is_a_warning_of_the_caller(file):
-    file.write_text(TEXT.format(seed="", more=' max_spead="3"'))
-    with pytest.warns(RuntimeWarning, match="max_spead") as caught:
+    text = TEXT.format(seed="", more=' max_spead="3"')
+    of_scrimmage = "<stream_port>5555</stream_port>"
+    file.write_text(text.replace("</runscript>", f"{of_scrimmage}</runscript>"))
+    with pytest.warns(RuntimeWarning, match="unknown") as caught:
         Simulation(file)
-    assert [warning.filename for warning in caught] == [__file__]
+    assert "max_spead" in str(caught[0].message)
+    assert {warning.filename for warning in caught} == {__file__}
     file.write_text(TEXT.format(seed="", more="").replace("</name>", "</name> <color>1 2 3</color>"))
     Simulation(file)  # a setting of the viewer needs no warning

@@ -130,7 +130,7 @@ def test_blocks_that_cannot_be(values, message):
         ({"end": 1e308, "dt": 1e-300}, r"mission: end = 1e\+308 with dt = 1e-300 is not allowed"),
         ({"blocks": [5]}, r"mission: 5 is not a Block"),
         ({"blocks": 5}, r"mission: blocks = 5 is not allowed; it takes a list of Block"),
-        ({"blocks": block()}, r"mission: blocks = Block\(.* is not allowed; it takes a list of Block"),
+        ({"blocks": block()}, r"mission: blocks = <Block .* is not allowed; it takes a list of Block"),
         ({"blocks": [block(), block()]}, r"mission: two blocks are called 'a'"),
         ({"dt": 0}, r"mission: dt = 0 is not allowed; it takes a finite number in s > 0"),
         ({"dt": "3 m"}, r"mission: dt = '3 m': '3 m' is in m, not convertible to s"),

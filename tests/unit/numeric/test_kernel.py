@@ -15,7 +15,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from llvmlite import binding
 
 from tussle.numeric import processor, store
 from tussle.numeric.fingerprint import Fingerprint
@@ -361,7 +360,7 @@ def test_a_kernel_that_came_with_the_package_is_loaded_unless_it_is_damaged(
     [
         ({}, "", processor.level()),
         ({"NUMBA_CPU_NAME": "generic"}, "", "generic"),
-        ({}, "import numba; numba.njit(lambda x: x)(1.0)", binding.get_host_cpu_name()),
+        ({}, "import numba; numba.njit(lambda x: x)(1.0)", None),
     ],
     ids=["nothing chosen", "chosen by the user", "Numba has compiled before"],
 )
@@ -371,7 +370,8 @@ def test_kernels_are_compiled_for_the_level_of_the_processor_unless_something_el
     code = f"{begin}\nfrom tussle.numeric import processor; print(processor.target()[1])"
     env = os.environ | settings
     done = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == (name or binding.get_host_cpu_name())
+    found = done.stdout.strip()
+    assert found == name if name else found not in processor.LEVELS  # else the name of this very processor
 
 
 def test_directory_that_cannot_be_written_warns_once_and_works(tmp_path, monkeypatch, forget_kernels):

@@ -399,7 +399,9 @@ def test_hostile_tags(folder, tags, message):
 
 
 def test_a_terrain_that_is_elsewhere_is_noted(tmp_path):
-    loaded = read(tmp_path, "<terrain>mcmillan</terrain><wall centre='1 2 3'/>")
+    loaded = read(
+        tmp_path, "<terrain>mcmillan</terrain><wall centre='1 2 3'/><stream_port>5555</stream_port>"
+    )
     assert loaded.mission.scene.terrain is None
     assert any(
         "there is no 'mcmillan' beside the mission, so the mission has no terrain" in note

@@ -78,7 +78,7 @@ def test_units_and_fields_are_those_declared():
     assert (goal.unit, goal.fields) == ("m", ("x", "y", "z"))
     speed = state.plugins["SingleIntegrator"]["max_speed"]
     assert (speed.value, speed.unit) == (20.0, "m/s")
-    assert speed.doc.startswith("Speed of every")
+    assert speed.doc.startswith("Largest speed")
     assert state.body["yaw"].unit == "rad"
 
 
