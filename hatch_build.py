@@ -53,7 +53,10 @@ class KernelsHook(BuildHookInterface):
 
     def _python(self, root: Path, code: str, *arguments: str, level: str = "") -> str:
         """Run code with the package of the source tree; returns what it prints."""
-        settings = {"PYTHONPATH": str(root / "src"), "PYTHONDONTWRITEBYTECODE": "1"}
+        path = os.pathsep.join(
+            [str(root / "src"), *filter(None, sys.path)]
+        )  # pip installs what a build needs in folders of its own
+        settings = {"PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1"}
         if level:
             settings |= {
                 "TUSSLE_CACHE_DIR": str(self._folder),
