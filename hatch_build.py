@@ -34,42 +34,47 @@ class KernelsHook(BuildHookInterface):
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Compile, and tell the wheel's files and tag."""
-        root = Path(self.root)
-        levels = os.environ.get(LEVELS, self._python(root, OWN_LEVEL)).split()
-        if version == "editable" or not levels:
+        if version == "editable":
             return
         self._folder = Path(tempfile.mkdtemp(prefix="tussle-kernels-"))
-        for level in levels:
-            for mission in MISSIONS:
-                self._python(root, PLAY, mission, level=level)
-        for path in sorted(self._folder.glob("*.kernel")):
-            build_data["force_include"][str(path)] = f"tussle/numeric/shipped/{path.name}"
-        build_data["pure_python"], build_data["infer_tag"] = False, True
+        try:
+            for level in os.environ.get(LEVELS, self._python(OWN_LEVEL)).split():
+                for mission in MISSIONS:
+                    self._python(PLAY, mission, level=level)
+        except RuntimeError as error:
+            self.app.display_warning(f"the wheel brings no kernels along: {error}")
+            return
+        kernels = sorted(self._folder.glob("*.kernel"))
+        build_data["force_include"] |= {str(k): f"tussle/numeric/shipped/{k.name}" for k in kernels}
+        if kernels:
+            build_data["pure_python"], build_data["infer_tag"] = False, True
 
     def finalize(self, *_: Any) -> None:
         """Remove what was compiled."""
         if folder := getattr(self, "_folder", None):
             shutil.rmtree(folder)
 
-    def _python(self, root: Path, code: str, *arguments: str, level: str = "") -> str:
-        """Run code with the package of the source tree; returns what it prints."""
-        path = os.pathsep.join(
-            [str(root / "src"), *filter(None, sys.path)]
-        )  # pip installs what a build needs in folders of its own
-        settings = {"PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1"}
+    def _python(self, code: str, *arguments: str, level: str = "") -> str:
+        """Run code with the package of the source tree; returns what it prints.
+
+        Raises:
+            RuntimeError: It fails.
+        """
+        # Not by PYTHONPATH: the isolation of pip would take the source tree out where tussle is installed in editable form.
+        path = [str(Path(self.root) / "src"), *filter(None, sys.path)]
+        command = [
+            sys.executable,
+            "-S",
+            "-E",
+            "-B",
+            "-c",
+            f"import sys; sys.path[:0] = {path!r}\n{code}",
+            *arguments,
+        ]
+        env = {**os.environ, "TUSSLE_CACHE_DIR": str(self._folder)}
         if level:
-            settings |= {
-                "TUSSLE_CACHE_DIR": str(self._folder),
-                "NUMBA_CPU_NAME": level,
-                "NUMBA_CPU_FEATURES": "",
-            }
-        done = subprocess.run(
-            [sys.executable, "-c", code, *arguments],
-            env={**os.environ, **settings},
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+            env |= {"NUMBA_CPU_NAME": level, "NUMBA_CPU_FEATURES": ""}
+        done = subprocess.run(command, env=env, capture_output=True, text=True, check=False)
         if done.returncode:
-            raise RuntimeError(f"kernels cannot be compiled: {done.stderr[-2000:]}")
+            raise RuntimeError(done.stderr[-2000:])
         return done.stdout
