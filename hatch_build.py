@@ -38,7 +38,8 @@ class KernelsHook(BuildHookInterface):
             return
         self._folder = Path(tempfile.mkdtemp(prefix="tussle-kernels-"))
         try:
-            for level in os.environ.get(LEVELS, self._python(OWN_LEVEL)).split():
+            levels = os.environ[LEVELS] if LEVELS in os.environ else self._python(OWN_LEVEL)
+            for level in levels.split():
                 for mission in MISSIONS:
                     self._python(PLAY, mission, level=level)
         except RuntimeError as error:

@@ -23,6 +23,7 @@ from tussle.cli.play_options import ConvertOptions, RunOptions
 from tussle.cli.progress import ProgressMeter, compiling
 from tussle.cli.summary import Speed, show_summary
 from tussle.cli.terminal import out, say, say_note
+from tussle.displays import counted
 from tussle.engine.simulation import Simulation
 from tussle.errors import BatchError, MissionError, ParameterError, RecordError, WiringError
 from tussle.mission import Loaded, Mission, to_python, to_xml
@@ -73,11 +74,9 @@ def check(options: MissionOptions) -> None:
     """Build the game of a mission and show its size."""
     loaded, mission, seed = options.read(shows_viewer_notes=True)
     with compiling(), simulate(loaded, mission, seed) as simulation:
-        n = sum(block.count for block in mission.blocks)
-        notes = f", {len(loaded.notes)} note(s)" if loaded.notes else ""
-        out().print(
-            f"{options.mission} can be played: {n} entities, grade {simulation.grade}{notes}", soft_wrap=True
-        )
+        n = counted(sum(block.count for block in mission.blocks), "entity", "entities")
+        notes = f", {counted(len(loaded.notes), 'note')}" if loaded.notes else ""
+        out().print(f"{options.mission} can be played: {n}, grade {simulation.grade}{notes}", soft_wrap=True)
 
 
 def convert(options: ConvertOptions) -> None:

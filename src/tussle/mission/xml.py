@@ -31,12 +31,11 @@ from tussle.mission.tags import RUN, RUNSCRIPT, SEED_ATTRIBUTES, WORLD, TagSpec
 from tussle.scene import Scene
 from tussle.texts import shown, truth
 
-VIEWER_NOTE = "kept for the viewer: "
 SEED = re.compile(r"\d{1,20}", re.ASCII)
 PLUGIN_TAGS = {"entity_interaction": "interactions", "metrics": "metrics", "network": "networks"}
 
 
-VIEWER_NOTE = ": kept for the viewer: "
+VIEWER_NOTE = "kept for the viewer: "
 """Part of the notes on settings that only the viewer uses."""
 
 

@@ -137,6 +137,11 @@ def test_check_says_that_a_mission_can_be_played(tussle, folder):
     done = tussle("check", "game.xml")
     assert done.stdout == "game.xml can be played: 12 entities, grade portable\n"
     assert [p.name for p in folder.iterdir()] == ["game.xml"]
+    one = "<entity><team_id>1</team_id><color>1 2 3</color><motion_model>Still</motion_model></entity>"
+    (folder / "one.xml").write_text(f"<runscript><run end='1' dt='0.1'/>{one}</runscript>")
+    done = tussle("check", "one.xml")
+    assert done.stdout == "one.xml can be played: 1 entity, grade portable, 1 note\n"
+    assert done.stderr == "note: one.xml:1: kept for the viewer: entity color\n"
 
 
 def test_the_schema_has_own_plugins_and_tells_of_those_it_lacks(tussle, folder):

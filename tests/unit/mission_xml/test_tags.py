@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 import pytest
 
@@ -304,7 +305,10 @@ def test_settings_for_the_viewer_and_the_log_are_kept(files):
     assert loaded.viewer["camera"] == {"value": "", "mode": "free", "pos": "0,1,2"}
     assert loaded.viewer["entities"] == {"a": {"color": "77 77 255", "visual_model": "sphere"}}
     assert loaded.log == {"output_type": "all", "log_dir": "~/x"}
-    assert [n for n in loaded.notes if "kept for the viewer: background_color, camera" in n]
+    assert [
+        n for n in loaded.notes if re.search(r"m\.xml:\d+: kept for the viewer: background_color, camera", n)
+    ]
+    assert [n for n in loaded.game_notes if "kept for the viewer" in n] == []
 
 
 @pytest.mark.parametrize(
